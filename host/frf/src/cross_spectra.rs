@@ -10,7 +10,7 @@ use super::window::effective_averages;
 /// Number of segments whose transforms are multiplied in one pass over the sums. A choice that reduces memory traffic.
 const BATCH: usize = 4;
 
-/// Number of frequency lines multiplied in one pass. A choice: the lines of all channels then fit into the cache of a core.
+/// Number of frequency lines multiplied in one pass over the sums. A choice: the lines of all channels then fit into the cache of a core.
 const LINES: usize = 256;
 
 /// Cross-spectra S_ab(f) = E[A(f) B*(f)] of all pairs of channels; X = H F then gives S_xf = H S_ff.
@@ -22,14 +22,14 @@ pub(super) struct CrossSpectra {
     pub(super) frequency_hz: Vec<f64>,
     /// Number of channels.
     channels: usize,
-    /// S_ab at all lines for pairs a ≤ b, in the order aa, ab, …, bb, …
+    /// S_ab at all frequency lines for each pair of channels a ≤ b, in the order aa, ab, …, bb, …
     pairs: Vec<Vec<Complex64>>,
-    /// Effective number of independent averages.
+    /// Effective number of independent averages in each cross-spectrum.
     pub(super) averages: f64,
 }
 
 impl CrossSpectra {
-    /// S_ab of channels `a` and `b` at a line.
+    /// Cross-spectrum S_ab of channels `a` and `b` at one frequency line.
     pub(super) fn at(&self, line: usize, a: usize, b: usize) -> Complex64 {
         if a <= b {
             self.pairs[self.index(a, b)][line]
@@ -46,18 +46,19 @@ impl CrossSpectra {
 /// Segments of a record for averaged spectra.
 #[derive(Clone, Debug)]
 pub(super) struct Segments {
-    /// Window weights; their number is the segment length.
+    /// Window weight of each sample of a segment; their number is the segment length.
     pub(super) weights: Vec<f64>,
     /// Index of the first sample of each segment.
     pub(super) starts: Vec<usize>,
-    /// True if the mean of each segment is removed first.
+    /// True if the mean of each segment is subtracted before its transform.
     pub(super) without_mean: bool,
     /// Effective number of independent averages of the segments.
     pub(super) averages: f64,
 }
 
 impl Segments {
-    /// Overlapping segments of the length of `weights`; `overlap` is the overlapping fraction (Welch's method).
+    /// Overlapping segments of a record of `samples` samples (Welch's method): each has as many samples as `weights` and shares the fraction
+    /// `overlap` of them with the next.
     pub(super) fn overlapping(weights: Vec<f64>, overlap: f64, samples: usize) -> Self {
         let length = weights.len();
         let shift = ((length as f64 * (1.0 - overlap)).round() as usize).clamp(1, length.max(1));
@@ -73,7 +74,7 @@ impl Segments {
     }
 }
 
-/// Spectra averaged over the segments of `signals` (all of one length), at the transform lines `lines`.
+/// Cross-spectra of `signals` (all of one length), averaged over their `segments`, at the transform lines `lines`.
 pub(super) fn averaged(
     signals: &[&[f64]],
     sample_rate_hz: f64,
@@ -112,7 +113,8 @@ pub(super) fn averaged(
     spectra
 }
 
-/// Spectra of whole signals, averaged over `width` neighbouring lines; both ends are tapered over the fraction `taper` of the length.
+/// Cross-spectra of whole `signals`, averaged over `width` neighbouring frequency lines. The fraction `taper` of each signal is tapered at
+/// both ends.
 pub(super) fn smoothed(
     signals: &[&[f64]],
     sample_rate_hz: f64,
@@ -171,7 +173,7 @@ fn tukey(length: usize, taper: f64) -> Vec<f64> {
         .collect()
 }
 
-/// Adds A B* of every pair of channels, for all segments of a batch, to the sums.
+/// Adds the products A B* of every pair of channels in a batch of segments to the sums `pairs`.
 fn multiply(
     pairs: &mut [Vec<Complex64>],
     batch: &[Complex64],
@@ -201,7 +203,7 @@ fn multiply(
     }
 }
 
-/// Real Fourier transform of a segment, with its buffers.
+/// Fourier transform of the real samples of a segment, with its buffers.
 struct Transform {
     plan: Arc<dyn RealToComplex<f64>>,
     time: Vec<f64>,

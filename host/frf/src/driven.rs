@@ -14,7 +14,7 @@ pub(super) struct Driven<'a> {
     pub(super) forces: Vec<(Direction, &'a Channel)>,
     /// Response channels, in the order x, y, z.
     pub(super) responses: Vec<Response<'a>>,
-    /// Notes on channels that were selected among several.
+    /// Warnings about channels that were selected among several in one direction.
     pub(super) warnings: Vec<String>,
 }
 
@@ -23,15 +23,15 @@ pub(super) struct Driven<'a> {
 pub(super) struct Response<'a> {
     pub(super) direction: Direction,
     pub(super) channel: &'a Channel,
-    /// Order of the time derivative of displacement: 0 displacement, 1 velocity, 2 acceleration.
+    /// Order of the time derivative of displacement that the channel measures: 0 displacement, 1 velocity, 2 acceleration.
     pub(super) derivatives: i32,
 }
 
 impl<'a> Driven<'a> {
     /// Selects forces and responses; `chosen` restricts them to the named channels.
     ///
-    /// Forces are the inputs of the sidecar, else all force channels that are not constant. Of several response channels in one direction,
-    /// displacement takes precedence over velocity, and velocity over acceleration.
+    /// Forces are the channels that the sidecar names as inputs; without that key, all force channels that are not constant. Of several
+    /// response channels in one direction, displacement takes precedence over velocity, and velocity over acceleration.
     ///
     /// # Errors
     /// There is no force or no response; a chosen channel does not exist; an input is not a force.
@@ -80,7 +80,7 @@ impl<'a> Driven<'a> {
             .collect()
     }
 
-    /// Samples of all channels: forces, then responses.
+    /// Samples of all selected channels: the forces, followed by the responses.
     pub(super) fn signals(&self) -> Vec<&'a [f64]> {
         let forces = self.forces.iter().map(|(_, channel)| channel.samples.as_slice());
         let responses = self
@@ -93,7 +93,7 @@ impl<'a> Driven<'a> {
     /// The single force channel.
     ///
     /// # Errors
-    /// There are several forces; `needed` names the kind of test that requires one.
+    /// The recording has several forces. `needed` names the kind of test for the message.
     pub(super) fn only_force(&self, needed: &str) -> Result<&'a Channel, FrfError> {
         match self.forces.as_slice() {
             [(_, channel)] => Ok(channel),

@@ -11,7 +11,7 @@ pub enum FrfError {
     /// The file does not exist, or cannot be read or written.
     #[error(transparent)]
     File(#[from] FileError),
-    /// A recording cannot be read, or lacks a required channel.
+    /// A recording that cannot be read or lacks a required channel.
     #[error(transparent)]
     Recording(RecordingError),
     /// A line of the file is malformed.
@@ -21,7 +21,7 @@ pub enum FrfError {
         path: PathBuf,
         /// Number of the line, from 1.
         line: u64,
-        /// What was found, and what would be right.
+        /// The fault, and the expected content.
         what: String,
     },
     /// A column of the file has an unknown name or unit.
@@ -31,7 +31,7 @@ pub enum FrfError {
         path: PathBuf,
         /// The header of the column.
         column: String,
-        /// What was found, and what would be right.
+        /// The fault, and the expected content.
         what: String,
     },
     /// The content of the file or the given values are not a valid table.
@@ -39,7 +39,7 @@ pub enum FrfError {
     Content {
         /// The file, or the origin of the values.
         path: PathBuf,
-        /// What was found, and what would be right.
+        /// The fault, and the expected content.
         what: String,
     },
 }

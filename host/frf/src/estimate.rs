@@ -16,8 +16,8 @@ pub enum Estimator {
     H2,
     /// Mean ½ (H1 + H2), thesis eq. (4.4).
     Mean,
-    /// Pseudo-inverse H = [S_xf,1 S_xf,2 …][S_ff,1 S_ff,2 …]⁺ over several tests (thesis eq. 7.12). The forces of one test may be dependent if those of all
-    /// tests together are independent.
+    /// Pseudo-inverse H = [S_xf,1 S_xf,2 …][S_ff,1 S_ff,2 …]⁺ over several tests (thesis eq. 7.12). The forces of a single test may be
+    /// linearly dependent if those of all tests together are independent.
     PseudoInverse,
 }
 
@@ -31,11 +31,11 @@ pub(super) struct Line {
     pub(super) frequency_hz: f64,
     /// FRF matrix, rows responses, columns forces; responses as measured, before integration to displacement.
     pub(super) h: Matrix,
-    /// Multiple coherence of each response (thesis eq. 7.10): fraction of its power that is linearly related to the forces.
+    /// Multiple coherence of each response (thesis eq. 7.10): fraction of the power of the response that is linearly related to the forces.
     pub(super) coherence: [f64; 3],
     /// Standard deviation of |H| for each response and force (random error).
     pub(super) deviation: [[f64; 3]; 3],
-    /// Smallest and largest singular value of the forces, each force divided by its root mean square.
+    /// Smallest and largest singular value of the force spectra, each force divided by its root mean square.
     pub(super) singular: (f64, f64),
 }
 
@@ -48,7 +48,7 @@ pub(super) struct Shape {
     pub(super) responses: usize,
 }
 
-/// FRF estimate at every frequency line; lines with a singular force matrix are left out.
+/// FRF estimate at every frequency line, except those at which the matrix of the force spectra is singular.
 ///
 /// All `tests` have the same lines. For several forces, H2 and the mean require equal numbers of responses and forces; the caller checks it.
 ///
@@ -61,7 +61,7 @@ pub(super) fn lines(tests: &[CrossSpectra], shape: Shape, estimator: Estimator) 
         .collect()
 }
 
-/// Auto- and cross-spectra of one test at one line, divided by the number of averages.
+/// Auto- and cross-spectra of one test at one frequency line, divided by the number of averages: forces, responses with forces, responses.
 struct Powers {
     averages: f64,
     ff: Matrix,
@@ -124,7 +124,7 @@ fn line(tests: &[CrossSpectra], shape: Shape, estimator: Estimator, index: usize
         Estimator::H2 => second(&xf, &xx, shape)?,
         Estimator::Mean => scaled(&sum(&first, &second(&xf, &xx, shape)?), 0.5),
     };
-    // Residual power of X − H1 F: S_xx − 2 Re(S_xf Hᴴ) + H S_ff Hᴴ.
+    // Power of the residual X − H1 F of the responses: S_xx − 2 Re(S_xf Hᴴ) + H S_ff Hᴴ.
     let explained = product_adjoint(&xf, &first);
     let modelled = product_adjoint(&product(&first, &ff), &first);
     let unbiased = averages / (averages - shape.forces as f64).max(1.0);
@@ -158,7 +158,7 @@ fn line(tests: &[CrossSpectra], shape: Shape, estimator: Estimator, index: usize
     Some(line)
 }
 
-/// H2 = S_xx S_fx⁻¹. With one force it is computed separately for each response.
+/// Estimate H2 = S_xx S_fx⁻¹. With one force, H2 is computed separately for each response.
 fn second(xf: &Matrix, xx: &Matrix, shape: Shape) -> Option<Matrix> {
     if shape.forces == 1 {
         let mut h = ZERO;

@@ -16,7 +16,7 @@ pub enum Excitation {
 }
 
 impl Excitation {
-    /// Excitation of a recording, from the kind of test in its sidecar.
+    /// Kind of excitation of a recording, from the kind of test that its sidecar names.
     pub(super) fn of(sidecar: &Sidecar) -> Self {
         let glides = sidecar.cut.is_some_and(|cut| cut.last_rpm.is_some());
         match sidecar.kind {
@@ -30,7 +30,7 @@ impl Excitation {
         }
     }
 
-    /// Name in messages and JSON.
+    /// Name of the kind of excitation in messages and JSON.
     pub fn name(self) -> &'static str {
         match self {
             Self::Random => "random",

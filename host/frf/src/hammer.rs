@@ -28,18 +28,19 @@ pub struct Blow {
     pub time_s: f64,
     /// Peak force, N, with sign.
     pub peak_n: f64,
-    /// Largest second pulse within the segment: delay after the peak, s, and height as a fraction of the peak; `None` for a single impact.
+    /// Largest second force pulse within the segment: delay after the first peak, s, and height as a fraction of that peak; `None` for a single
+    /// impact.
     pub second: Option<(f64, f64)>,
-    /// First sample of the force pulse.
+    /// Index of the first sample of the force pulse.
     first: usize,
-    /// Last sample of the force pulse.
+    /// Index of the last sample of the force pulse.
     last: usize,
 }
 
 /// Segment length and exponential window of a hammer test.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct HammerWindows {
-    /// Length of a segment, s; `None` for the longest that the intervals between impacts allow.
+    /// Length of the segment of each impact, s; `None` for the longest without overlap of two impacts.
     pub segment_s: Option<f64>,
     /// Time constant τ of the exponential window on force and response, s; `None` for no window.
     ///
@@ -61,15 +62,15 @@ pub fn true_damping(frequency_hz: f64, damping_ratio: f64, exponential_s: f64) -
 
 /// Windowed segments of the impacts of one record.
 pub(super) struct BlowSegments {
-    /// Windowed force, then responses; the segments of each signal are concatenated.
+    /// Windowed signals: the force, then the responses. The segments of each signal are concatenated.
     pub(super) signals: Vec<Vec<f64>>,
-    /// Number of samples per segment.
+    /// Number of samples of each segment.
     pub(super) length: usize,
-    /// Single impacts, whose segments are used.
+    /// Single impacts, whose segments are evaluated.
     pub(super) used: Vec<Blow>,
-    /// Double impacts, which are left out.
+    /// Double impacts, whose segments are not evaluated.
     pub(super) double: Vec<Blow>,
-    /// Largest amplitude of a response at the end of a segment, as a fraction of its peak.
+    /// Largest amplitude of a response at the end of a segment, as a fraction of the peak of that response in the segment.
     pub(super) left_over: f64,
 }
 
@@ -159,7 +160,7 @@ pub(super) fn segments(driven: &Driven<'_>, windows: HammerWindows) -> Result<Bl
     Ok(cut)
 }
 
-/// Amplitude (√2 · RMS) of the last twentieth of a segment, as a fraction of its peak.
+/// Amplitude (√2 · RMS) of the last twentieth of a segment of a response, as a fraction of the peak of the segment.
 fn left_over(segment: &[f64]) -> f64 {
     let tail = &segment[segment.len() - segment.len() / 20..];
     let power = tail.iter().map(|x| x * x).sum::<f64>() / tail.len().max(1) as f64;
@@ -171,8 +172,8 @@ fn left_over(segment: &[f64]) -> f64 {
     }
 }
 
-/// Force window: 1 over the pulse and one pulse width after it, then a half-cosine taper to 0. After the contact the force signal is only
-/// noise.
+/// Weight of the force window at a sample: 1 over the force pulse and one pulse width after it, then a half-cosine taper to 0, since the
+/// force signal after the contact is noise only.
 fn pulse_weight(blow: &Blow, sample: usize) -> f64 {
     let width = (blow.last - blow.first).max(4);
     let outside = if sample < blow.first {
@@ -187,7 +188,7 @@ fn pulse_weight(blow: &Blow, sample: usize) -> f64 {
     }
 }
 
-/// Longest segment, samples, without overlap between impacts.
+/// Length, in samples, of the longest segments that do not overlap between impacts.
 fn longest_segment(blows: &[Blow], samples: usize) -> usize {
     let ends = blows.iter().skip(1).map(|blow| blow.first).chain([samples]);
     let shortest = blows
@@ -196,7 +197,7 @@ fn longest_segment(blows: &[Blow], samples: usize) -> usize {
         .map(|(blow, end)| end - blow.first)
         .min()
         .unwrap_or(0);
-    // The segment also includes its pre-impact part.
+    // A segment also includes the fraction `BEFORE` of its length before the impact.
     (shortest as f64 / (1.0 + BEFORE)) as usize
 }
 
@@ -245,11 +246,12 @@ fn blows(force: &[f64], rate: f64) -> Vec<Blow> {
     blows
 }
 
-/// Largest second pulse before sample `end`: delay, s, and height as a fraction of the peak; `None` below the threshold.
+/// Largest second force pulse before sample `end`: delay after the peak of the impact, s, and height as a fraction of that peak. `None` if no
+/// pulse exceeds the threshold of a double impact.
 fn second_pulse(force: &[f64], blow: &Blow, end: usize, rate: f64) -> Option<(f64, f64)> {
     let middle = median(force.to_vec());
     let width = (blow.last - blow.first).max(4);
-    // One pulse width after the pulse is skipped, since filters ring there.
+    // One pulse width after the first pulse is skipped, since anti-aliasing filters ring there.
     let from = (blow.last + width).min(end);
     let (at, size) = (from..end.min(force.len()))
         .map(|k| (k, (force[k] - middle).abs()))
@@ -259,7 +261,8 @@ fn second_pulse(force: &[f64], blow: &Blow, end: usize, rate: f64) -> Option<(f6
     (size > threshold).then(|| (delay_s, size / blow.peak_n.abs()))
 }
 
-/// Standard deviation of Gaussian noise, 1.4826 · median absolute deviation; rare impacts do not affect it.
+/// Standard deviation of the force noise: 1.4826 · median absolute deviation from `middle`, which holds for Gaussian noise. Rare impacts do
+/// not affect the median.
 fn noise(force: &[f64], middle: f64) -> f64 {
     1.4826 * median(force.iter().map(|f| (f - middle).abs()).collect())
 }

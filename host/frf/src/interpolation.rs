@@ -6,14 +6,14 @@ use num_complex::Complex64;
 use super::{FrfError, FrfTable};
 use quietcut_model::structure::feed_axes;
 
-/// Smallest number of lines of a table: a cubic polynomial needs four points.
+/// Smallest number of frequency lines of a table that is interpolated: a cubic polynomial needs four points.
 const LINES_MIN: usize = 4;
 
-/// Receptance matrix H(f), m/N, at all frequencies; rows displacement, columns force.
+/// Receptance matrix H(f), m/N, at any frequency, from a table; rows displacement, columns force.
 ///
 /// Between the lines each entry is the cubic through the four nearest lines (Lagrange), equal to the table on its
-/// lines. For a mode of half bandwidth ζf it is off by 0.56 (Δf/ζf)⁴ of the peak midway between lines Δf apart: 0.09 %
-/// with five lines per half bandwidth, 3.5 % with two. [`Interpolation::error`] measures it on the table itself.
+/// lines. Near the resonance of a mode with the half bandwidth ζf, the error midway between lines at the spacing Δf is 0.56 (Δf/ζf)⁴ of
+/// the peak: 0.09 % with five lines per half bandwidth, 3.5 % with two. [`Interpolation::error`] estimates it from the table itself.
 ///
 /// Below the first line H is that of stiffness and viscous damping: Re H constant, Im H ∝ f. Above the last line H is that of inertia,
 /// H ∝ f⁻². Both continue the table without a step; their error is the contribution of modes outside the table. H(−f) is the conjugate of
@@ -46,7 +46,7 @@ impl Interpolation {
         Ok(Self { frequency_hz, lines })
     }
 
-    /// Interpolation through every second line and the last line; `None` for fewer than four lines.
+    /// Interpolation through every second line of this table and its last line; `None` if fewer than four lines remain.
     pub fn thinned(&self) -> Option<Self> {
         let last = self.lines.len() - 1;
         let kept = || (0..last).step_by(2).chain([last]);
@@ -60,17 +60,17 @@ impl Interpolation {
     pub fn band_hz(&self) -> (f64, f64) {
         match self.frequency_hz.as_slice() {
             [first, .., last] => (*first, *last),
-            // There are at least four lines.
+            // This arm is not reached, since a table has at least four lines.
             _ => (0.0, 0.0),
         }
     }
 
-    /// Frequencies of the lines, Hz.
+    /// Frequencies of the lines of the table, Hz.
     pub fn frequency_hz(&self) -> &[f64] {
         &self.frequency_hz
     }
 
-    /// The receptances in feed coordinates, rotated by `angle_deg` degrees from x towards y: Rᵀ H R.
+    /// The receptances in feed, normal and axial direction, Rᵀ H R, for a feed at `angle_deg` degrees from x towards y.
     pub fn turned(&self, angle_deg: f64) -> Self {
         let machine_from_feed = feed_axes(angle_deg).map(Complex64::from);
         Self {
@@ -83,18 +83,18 @@ impl Interpolation {
         }
     }
 
-    /// H at the lines of the table, m/N.
+    /// Receptance matrices H at the lines of the table, m/N.
     pub fn lines(&self) -> &[Matrix3<Complex64>] {
         &self.lines
     }
 
-    /// H at the complex frequency f = s/(2πi), Hz.
+    /// Receptance matrix H, m/N, at the complex frequency f = s/(2πi), Hz.
     ///
     /// Off the real axis the cubic of the nearest lines is continued analytically. It is accurate within about one line spacing of the
     /// axis, or within the distance of the nearest pole if that is smaller.
     pub fn at(&self, frequency_hz: Complex64) -> Matrix3<Complex64> {
         if frequency_hz.re < 0.0 {
-            // Complex conjugation of s maps f to −f̄.
+            // H of the conjugate s is the conjugate of H; conjugation of s maps f to −f̄.
             self.at_positive(-frequency_hz.conj()).map(|entry| entry.conj())
         } else {
             self.at_positive(frequency_hz)
@@ -116,7 +116,7 @@ impl Interpolation {
         self.cubic([from, from + 1, from + 2, from + 3], frequency_hz)
     }
 
-    /// Cubic Lagrange polynomial through four lines.
+    /// Value at `frequency_hz` of the cubic Lagrange polynomial through the four lines `nodes`.
     fn cubic(&self, nodes: [usize; 4], frequency_hz: Complex64) -> Matrix3<Complex64> {
         let at = nodes.map(|node| self.frequency_hz[node]);
         let mut sum = SMatrix::zeros();
@@ -132,9 +132,9 @@ impl Interpolation {
 
     /// Estimate of the largest interpolation error, as a fraction of the largest entry of H.
     ///
-    /// Each line is predicted from the lines at distances −3, −1, +1 and +3, that is, with twice the line spacing. The estimate is 1/16 of the
-    /// largest prediction error, since the error of a cubic is proportional to the fourth power of the spacing. Measurement noise counts as
-    /// error.
+    /// Each line is predicted from the lines at the distances −3, −1, +1 and +3 line spacings, a cubic with twice the spacing. The error of a
+    /// cubic is proportional to the fourth power of the spacing, so that the estimate is 1/16 of the largest prediction error. Measurement
+    /// noise counts as error.
     pub fn error(&self) -> f64 {
         let peak = self.lines.iter().map(largest).fold(0.0, f64::max);
         let count = self.lines.len();

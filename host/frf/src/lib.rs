@@ -31,7 +31,7 @@
 //! # Ok::<(), quietcut_frf::FrfError>(())
 //! ```
 //!
-//! This crate knows structures only by their directions: no modes, no cutting force, no stability.
+//! Of a structure, this crate uses only the names of its directions: no modal model, no cutting force, no stability.
 
 mod cross_spectra;
 mod driven;

@@ -37,7 +37,7 @@ pub struct Measurement {
     pub deviation: Vec<Vec<f64>>,
     /// Groups of recordings that were evaluated together.
     pub parts: Vec<Part>,
-    /// Warnings for the user, such as double impacts or responses that had not settled.
+    /// Warnings for the user, such as of double impacts or of responses that had not settled.
     pub warnings: Vec<String>,
 }
 

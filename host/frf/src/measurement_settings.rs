@@ -10,20 +10,20 @@ use super::window::Window;
 /// Settings of an FRF measurement from recordings.
 #[derive(Clone, Debug)]
 pub struct MeasurementSettings {
-    /// Kind of excitation; `None` to use the kind of test in the sidecar of each recording.
+    /// Kind of excitation; `None` takes that of the test named in the sidecar of each recording.
     pub excitation: Option<Excitation>,
     /// FRF estimator.
     pub estimator: Estimator,
-    /// Frequency resolution (line spacing), Hz. `None` selects eight half-overlapping segments per force for random excitation, and averages of
-    /// eight lines per force for sweeps.
+    /// Frequency resolution (line spacing), Hz. `None` selects eight half-overlapping segments for each force in random excitation, and
+    /// averages over eight lines for each force in a sweep.
     pub resolution_hz: Option<f64>,
     /// Overlap of the segments, as a fraction of their length.
     pub overlap: f64,
-    /// Window of the segments of random excitation.
+    /// Time window of the segments of random excitation.
     pub window: Window,
-    /// First and last frequency, Hz; `None` for all frequencies.
+    /// First and last frequency to evaluate, Hz; `None` for all frequencies.
     pub band_hz: Option<(f64, f64)>,
-    /// Names of the channels to use; empty for all channels.
+    /// Names of the channels to evaluate; empty for all channels.
     pub channels: Vec<String>,
     /// Segment length and exponential window of hammer tests.
     pub hammer: HammerWindows,
@@ -47,7 +47,7 @@ impl Default for MeasurementSettings {
     }
 }
 
-/// Lines of a transform of `length` samples at `rate` Hz within the band; 0 Hz is excluded.
+/// Indices of the lines within the band to evaluate, of a transform of `length` samples at the sampling rate `rate`, Hz; 0 Hz is excluded.
 pub(super) fn band(settings: &MeasurementSettings, rate: f64, length: usize) -> Range<usize> {
     let line = |hertz: f64| hertz * length as f64 / rate;
     match settings.band_hz {

@@ -1,8 +1,8 @@
 //! Vector fitting: a sum of modes with common poles fitted to measured receptances.
 //!
-//! Gustavsen and Semlyen (1999), with the poles of all functions in common and each function eliminated by itself
-//! (Deschrijver and others, 2008). This is what tool-tip calibration needs of modal analysis, poles and residues in
-//! a band, and where the fit of complex modes begins.
+//! The method is that of Gustavsen and Semlyen (1999) with common poles for all functions, where the unknowns of each function are
+//! eliminated separately (Deschrijver and others, 2008). Tool-tip calibration uses its poles and residues, and the fit of complex
+//! modes starts from them.
 
 use std::f64::consts::TAU;
 
@@ -43,9 +43,9 @@ pub enum RationalFitError {
 pub struct RationalFit {
     /// Poles λ_r with positive imaginary part, rad/s, by ascending frequency.
     pub(crate) poles: Vec<Complex64>,
-    /// Residues R_kr; rows functions, columns poles.
+    /// Residues R_kr, m/(N s): one row for each function, one column for each pole.
     pub residues: Vec<Vec<Complex64>>,
-    /// Relative RMS residual of the fit, each function divided by its own RMS.
+    /// RMS residual of the fit over all functions, each divided by its own RMS.
     pub(crate) rest: f64,
 }
 
@@ -63,7 +63,7 @@ impl RationalFit {
     }
 }
 
-/// Fits `modes` modes to `functions`, which have a value for each frequency.
+/// Fits `modes` modes to `functions`, each with one value per frequency.
 ///
 /// # Errors
 /// There are too few frequencies, or an iteration exceeds its bound.
@@ -75,7 +75,7 @@ pub(super) fn fit(
     let (&[first, .., last], false) = (frequency_hz, frequency_hz.len() < 2 * modes + 4 || modes == 0) else {
         return Err(undetermined(frequency_hz, functions, modes));
     };
-    // Lightly damped, over the band.
+    // Start values of the poles: damping ratio 1 %, equally spaced over the band.
     let mut poles: Vec<Complex64> = (0..modes)
         .map(|mode| {
             let omega = TAU * (first + (last - first) * (mode as f64 + 0.5) / modes as f64);
@@ -89,13 +89,13 @@ pub(super) fn fit(
     residues(frequency_hz, functions, poles)
 }
 
-/// Basis functions of a conjugate pole pair at s: coefficients of the real and the imaginary part of the residue.
+/// Basis functions of a conjugate pole pair at s: those of the real and of the imaginary part of the residue.
 fn pair(s: Complex64, pole: Complex64) -> [Complex64; 2] {
     let (a, b) = ((s - pole).inv(), (s - pole.conj()).inv());
     [a + b, Complex64::i() * (a - b)]
 }
 
-/// Basis functions of an FRF: pole pairs, a constant (modes above the band), and 1/s² (modes below the band).
+/// Basis functions of an FRF at one frequency: pole pairs, a constant (modes above the band), and 1/s² (modes below the band).
 fn basis(frequency_hz: f64, poles: &[Complex64], scale: f64) -> Vec<Complex64> {
     let s = Complex64::new(0.0, TAU * frequency_hz);
     let mut row: Vec<Complex64> = poles.iter().flat_map(|&pole| pair(s, pole)).collect();
@@ -114,7 +114,8 @@ fn undetermined(frequency_hz: &[f64], functions: &[&[Complex64]], modes: usize) 
     }
 }
 
-/// Relocated poles: zeros of σ(s) = 1 + Σ c_n φ_n(s), for which σH is a sum over the previous poles.
+/// Relocated poles: the zeros of σ(s) = 1 + Σ c_n φ_n(s), with the coefficients c_n for which σH is best fitted by a sum over the previous
+/// poles.
 fn moved(
     frequency_hz: &[f64],
     functions: &[&[Complex64]],
@@ -146,7 +147,7 @@ fn moved(
             matrix[(2 * k, width + own)] = h.re;
             matrix[(2 * k + 1, width + own)] = h.im;
         }
-        // What is left of the common unknowns once those of this function are gone.
+        // QR decomposition eliminates the residues of this function: the lower block of R has the common unknowns c_n only.
         balance(&mut matrix, width);
         let r = matrix.qr().r();
         let count = (r.nrows() - width).min(own);
@@ -169,7 +170,7 @@ fn moved(
     Ok(zeros(poles, &c)?)
 }
 
-/// Scales the first columns to one: the basis spans many powers of ten, and these unknowns are not used.
+/// Scales the first `columns` columns to unit norm, since the basis functions span many powers of ten.
 fn balance(matrix: &mut DMatrix<f64>, columns: usize) {
     for mut column in matrix.column_iter_mut().take(columns) {
         let norm = column.norm();
@@ -179,7 +180,7 @@ fn balance(matrix: &mut DMatrix<f64>, columns: usize) {
     }
 }
 
-/// Zeros of 1 + Σ c_n φ_n: eigenvalues of A − b cᵀ in real form, turned to the stable side.
+/// Zeros of σ = 1 + Σ c_n φ_n: the eigenvalues of A − b cᵀ in real form. Zeros with positive real part are mirrored at the imaginary axis.
 fn zeros(poles: &[Complex64], c: &DVector<f64>) -> Result<Vec<Complex64>, EigenvalueError> {
     let size = 2 * poles.len();
     let mut matrix = DMatrix::<f64>::zeros(size, size);
@@ -236,7 +237,7 @@ pub fn residues(
         let solution = decomposed
             .solve(&right, 1e-13)
             .map_err(RationalFitError::Solution)?;
-        // Each function is normalized, so that all have equal weight.
+        // Residual of each function relative to the function itself, so that all functions have equal weight.
         let norm = right.norm_squared();
         if norm > 0.0 {
             rest += (&matrix * &solution - &right).norm_squared() / norm;

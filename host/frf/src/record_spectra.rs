@@ -22,11 +22,11 @@ pub struct ChannelLines {
     pub direction: Direction,
     /// Measured quantity.
     pub quantity: Quantity,
-    /// Order of the time derivative of displacement: 0 displacement, 1 velocity, 2 acceleration; 0 for a force.
+    /// Order of the time derivative of displacement that the channel measures: 0 displacement, 1 velocity, 2 acceleration; 0 for a force.
     pub derivatives: i32,
     /// Root mean square of the samples, SI unit.
     pub root_mean_square: f64,
-    /// Variance of white noise per sample, SI unit squared, from the plateau of the spectrum; `None` if there is no plateau.
+    /// Variance of the white noise per sample, SI unit squared, from the noise plateau of the spectrum; `None` if there is no plateau.
     pub plateau: Option<f64>,
     /// Transform X(f) = Σ x_k e^{−2πi·fk/rate}/√N at each line; white noise of variance σ² per sample has E|X|² = σ².
     pub lines: Vec<Complex64>,
@@ -128,8 +128,8 @@ const ALIKE: usize = 3;
 /// Smallest number of lines per band. A choice: the mean power of a band then has a standard deviation of 14 %.
 const LINES_MIN: usize = 50;
 
-/// Noise plateau of a spectrum: the median power of the bands whose mean power exceeds the lowest by at most six standard deviations (1/√n,
-/// relative, for n lines). White noise is equal in all bands; bands without signal show it alone.
+/// Noise plateau of a spectrum: the median over the bands whose mean power exceeds that of the lowest band by at most six standard deviations
+/// (1/√n of the power for n lines). White noise has equal power in all bands, and bands without signal contain nothing else.
 fn plateau(lines: &[Complex64], scale: f64) -> Option<f64> {
     let count = lines.len() / PARTS;
     if count < LINES_MIN {
@@ -146,7 +146,7 @@ fn plateau(lines: &[Complex64], scale: f64) -> Option<f64> {
 }
 
 impl RecordSpectra {
-    /// Laplace variable s = i2πf of a line, rad/s.
+    /// Laplace variable s = i2πf of a frequency line, rad/s.
     pub fn s(&self, line: usize) -> Complex64 {
         Complex64::new(0.0, TAU * self.frequency_hz[line])
     }

@@ -2,7 +2,7 @@
 
 use num_complex::Complex64;
 
-/// A complex 3 × 3 matrix; rows and columns beyond the size in use are zero.
+/// A complex 3 × 3 matrix. Smaller matrices occupy its leading block; all other entries are zero.
 pub(super) type Matrix = [[Complex64; 3]; 3];
 
 /// The zero matrix.
@@ -66,7 +66,7 @@ pub(super) fn inverse(a: &Matrix, size: usize) -> Option<Matrix> {
 }
 
 /// Smallest and largest eigenvalue of D^−½ A D^−½ for the leading `size` × `size` block (`size` ≤ 3) of a positive semidefinite Hermitian
-/// matrix A with diagonal D. Both lie between 0 and `size`; the smallest is 0 if a diagonal entry is 0.
+/// matrix A with diagonal D. Both eigenvalues lie between 0 and `size`; the smallest is 0 if a diagonal entry of A is 0.
 ///
 /// Closed form: with a unit diagonal, μ = λ − 1 solves μ³ − pμ − q = 0 with p = Σ_{i<j} |a_ij|² and q = 2 Re(a_12 a_23 a_31).
 pub(super) fn extreme_eigenvalues(a: &Matrix, size: usize) -> (f64, f64) {

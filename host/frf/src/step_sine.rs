@@ -14,10 +14,10 @@ const PERIODS_MIN: usize = 8;
 /// Smallest relative change of the period that begins a new step. A choice, below usual frequency increments.
 const STEP: f64 = 1.5e-3;
 
-/// Decay time of the tracked force amplitude, in periods. A choice: more than one period, and less than a step.
+/// Decay time of the tracked force amplitude, in periods of the excitation. A choice: more than one period, and less than a frequency step.
 const FORGET: f64 = 3.0;
 
-/// Longest decay time of the tracked force amplitude, s; also used before the first period is known. A choice.
+/// Longest decay time of the tracked force amplitude, s; also the decay time before the first period is known. A choice.
 const FORGET_S: f64 = 1.0;
 
 /// Number of subsegments of a step that are demodulated separately, to estimate noise and settling. A choice.
@@ -34,33 +34,33 @@ const NOISE: f64 = 3.0;
 #[derive(Clone, Debug)]
 pub(super) struct Step {
     pub(super) frequency_hz: f64,
-    /// Number of samples of the step.
+    /// Number of samples of the frequency step.
     samples: usize,
-    /// Amplitude of the force, N.
+    /// Mean amplitude of the force, N.
     pub(super) force_n: f64,
-    /// Phasor ratio response/force of each response, in the measured quantity.
+    /// Phasor ratio response/force of each response, in SI units of the measured quantity.
     pub(super) h: Vec<Complex64>,
     /// Coherence of each response over the subsegments of the step.
     pub(super) coherence: Vec<f64>,
-    /// Standard deviation of |H| of each response.
+    /// Standard deviation of |H| of each response, in the unit of `h`.
     pub(super) deviation: Vec<f64>,
-    /// True if all responses reached steady state.
+    /// True if all responses reached steady state within the step.
     pub(super) is_settled: bool,
 }
 
 /// All steps of a record at one force level.
 #[derive(Clone, Debug)]
 pub(super) struct Level {
-    /// Median of the amplitudes of the force, N.
+    /// Median of the force amplitudes of the steps, N.
     pub(super) force_n: f64,
-    /// Steps by ascending frequency. Of repeated frequencies the longest step is kept, the last of about equal ones.
+    /// Steps by ascending frequency. Of several steps at one frequency the longest is kept; of steps of about equal length, the last.
     pub(super) steps: Vec<Step>,
 }
 
 /// Largest ratio of forces that count as one force level. A choice.
 const SAME_LEVEL: f64 = 1.05;
 
-/// Force levels of a record, in order of time. Repeated frequencies at another force form another level.
+/// Force levels of a record in the order of time. Frequencies that are repeated at another force form another level.
 ///
 /// # Errors
 /// The record has several forces, or no segment of constant frequency.
@@ -97,7 +97,7 @@ pub(super) fn levels(driven: &Driven<'_>) -> Result<Vec<Level>, FrfError> {
     Ok(levels)
 }
 
-/// Divides the steps into passes through the frequencies: a new pass begins when an earlier frequency returns.
+/// Divides the steps into passes through the frequency range: a new pass begins when the frequency of an earlier step returns.
 fn passes(steps: Vec<Step>) -> Vec<Vec<Step>> {
     let mut passes: Vec<Vec<Step>> = Vec::new();
     for step in steps {
@@ -159,7 +159,7 @@ fn stretches(force: &[f64], rate: f64) -> Vec<Stretch> {
         let spread = scatter(&periods[from..to]);
         let tolerance = |mean: f64| (STEP * mean).max(5.0 * spread);
         let mean = |to: usize| (crossings[to] - crossings[from]) / (to - from) as f64;
-        // A start within a frequency change has scattered periods, and a start with a pause has one long period.
+        // The candidate segment must not begin within a frequency change, where periods scatter, nor at a pause, which is one long period.
         let is_pause = |period: &f64| (period - mean(to)).abs() > 0.5 * mean(to);
         if spread > 10.0 * STEP * mean(to) || periods[from..to].iter().any(is_pause) {
             from += 1;
@@ -167,7 +167,7 @@ fn stretches(force: &[f64], rate: f64) -> Vec<Stretch> {
         }
         while to < periods.len() {
             let now = mean(to);
-            // One deviating period may be noise. Two in a row begin a new step. A long period is a pause.
+            // One deviating period may be noise; two in a row begin a new step; a single long period is a pause.
             let off = |k: usize| periods.get(k).map_or(0.0, |period| (period - now).abs());
             let is_off = |k: usize| off(k) > tolerance(now);
             let drift = || (crossings[to] - crossings[to - PERIODS_MIN]) / PERIODS_MIN as f64 - now;
@@ -190,7 +190,7 @@ fn stretches(force: &[f64], rate: f64) -> Vec<Stretch> {
     stretches
 }
 
-/// Robust standard deviation of periods: 1.4826 · median absolute deviation.
+/// Robust standard deviation of `periods`, in samples: 1.4826 · median absolute deviation.
 fn scatter(periods: &[f64]) -> f64 {
     let mut sorted = periods.to_vec();
     sorted.sort_by(f64::total_cmp);
@@ -233,7 +233,7 @@ fn crossings(force: &[f64], rate: f64) -> Vec<f64> {
 fn demodulated(driven: &Driven<'_>, force: &[f64], stretch: Stretch, rate: f64) -> Option<Step> {
     let period = refined(force, stretch);
     let periods = ((stretch.last - stretch.first) as f64 / period).floor() as usize;
-    // Each subsegment has the largest possible whole number of periods.
+    // Whole number of periods in each subsegment.
     let per_piece = (periods / PIECES).max(1);
     let pieces = periods / per_piece;
     let length = (per_piece as f64 * period).round() as usize;
@@ -243,7 +243,7 @@ fn demodulated(driven: &Driven<'_>, force: &[f64], stretch: Stretch, rate: f64) 
     let phasors = |signal: &[f64]| -> Option<Vec<Phasor>> {
         (0..pieces)
             .map(|piece| {
-                // Subsegments are counted from the end, since transients are at the start.
+                // Subsegments are aligned with the end of the step, since transients are at its start.
                 let end =
                     stretch.last - ((pieces - 1 - piece) as f64 * per_piece as f64 * period).round() as usize;
                 phasor(signal, end.checked_sub(length)?, length, period)
@@ -280,7 +280,7 @@ fn demodulated(driven: &Driven<'_>, force: &[f64], stretch: Stretch, rate: f64) 
     Some(step)
 }
 
-/// H1 estimate over the subsegments, its coherence, and the standard deviation of |H|.
+/// H1 estimate over the subsegments of a step, its coherence, and the standard deviation of |H|.
 fn averaged(forces: &[Phasor], responses: &[Phasor]) -> (Complex64, f64, f64) {
     let count = forces.len() as f64;
     let pairs = || responses.iter().zip(forces).map(|(x, f)| (x.value, f.value));
@@ -315,7 +315,7 @@ fn settled_from(ratios: &[Vec<Phasor>]) -> Option<usize> {
     (from <= pieces / 2).then_some(from)
 }
 
-/// Refined period of a segment, samples, from the phase shift between its halves.
+/// Refined period of the force in a segment, in samples, from the phase shift between the two halves of the segment.
 fn refined(force: &[f64], stretch: Stretch) -> f64 {
     let mut period = stretch.period;
     for _ in 0..3 {
@@ -327,14 +327,14 @@ fn refined(force: &[f64], stretch: Stretch) -> f64 {
         ) else {
             return period;
         };
-        // The phase of all phasors refers to sample 0 of the record. So equal phases mean that the period is exact.
+        // The phases of all phasors refer to sample 0 of the record. The two halves have equal phases if the period is exact.
         let turned = (b.value * a.value.conj()).arg();
         period = 1.0 / (1.0 / period + turned / TAU / half as f64);
     }
     period
 }
 
-/// Complex amplitude of a sine, and its variance due to noise.
+/// Complex amplitude of a sine, and the variance of this amplitude due to noise.
 #[derive(Clone, Copy, Debug)]
 struct Phasor {
     value: Complex64,
@@ -342,7 +342,7 @@ struct Phasor {
 }
 
 impl Phasor {
-    /// Ratio of two phasors, with propagated variance.
+    /// Ratio of this phasor to `other`, with the variance propagated from both.
     fn by(self, other: Self) -> Self {
         let value = self.value / other.value;
         Self {
@@ -375,7 +375,7 @@ fn phasor(signal: &[f64], first: usize, length: usize, period: f64) -> Option<Ph
     let count = length as f64;
     Some(Phasor {
         value: Complex64::new(solution[0], solution[1]),
-        // Variance 2σ²/n of the real part and of the imaginary part each.
+        // Sum of the variances of real and imaginary part, 2σ²/n each, with the residual variance σ².
         variance: 4.0 * rest / (count - 4.0).max(1.0) / count,
     })
 }

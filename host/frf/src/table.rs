@@ -17,13 +17,13 @@ pub struct Frf {
     pub force: Direction,
     /// Receptance at each line of the table, m/N; sign convention e^{+iωt}.
     pub receptance: Vec<Complex64>,
-    /// Coherence γ² at each line, from 0 to 1; `None` if unknown.
+    /// Coherence γ² at each line of the table, from 0 to 1; `None` if it is not known.
     pub coherence: Option<Vec<f64>>,
 }
 
 /// Table of receptances at common frequencies.
 ///
-/// Frequencies ascend and are not negative. The table has at least one line and one receptance, and no receptance twice.
+/// Frequencies ascend and are not negative. The table has at least one frequency line and one receptance, and no receptance twice.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FrfTable {
     path: PathBuf,
@@ -32,7 +32,7 @@ pub struct FrfTable {
 }
 
 impl Frf {
-    /// Name from both directions, as in a column header: `xy` is displacement in x due to force in y.
+    /// Name of the receptance from its directions, as in a column header: `xy` is displacement in x due to force in y.
     pub fn name(&self) -> String {
         format!("{}{}", self.response, self.force)
     }
@@ -59,7 +59,7 @@ impl FrfTable {
         }
     }
 
-    /// Description of the first fault in the values; `None` for a valid table.
+    /// Description of the first fault in the values of the table; `None` for a valid table.
     fn fault(&self) -> Option<String> {
         if self.frequency_hz.is_empty() || self.entries.is_empty() {
             return Some(
@@ -114,12 +114,12 @@ impl FrfTable {
         &self.path
     }
 
-    /// Frequencies of the lines, Hz, ascending.
+    /// Frequencies of the lines of the table, Hz, ascending.
     pub fn frequency_hz(&self) -> &[f64] {
         &self.frequency_hz
     }
 
-    /// The receptances, in the order of the file.
+    /// The receptances of the table, in the order of the file.
     pub fn entries(&self) -> &[Frf] {
         &self.entries
     }

@@ -9,7 +9,7 @@ use super::{Frf, FrfError, FrfTable};
 use quietcut_model::structure::Direction;
 use quietcut_recording::{Quantity, Unit};
 
-/// Content of a column, from its header.
+/// Content of a column of an FRF table, from its header.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Content {
     Frequency,
@@ -21,7 +21,7 @@ enum Content {
     Coherence(Pair),
 }
 
-/// Directions of displacement and force.
+/// Directions of displacement and force of a receptance.
 type Pair = (Direction, Direction);
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -195,7 +195,7 @@ impl Compliance {
         derivatives: 0,
     };
 
-    /// Converts a value in this unit to receptance, m/N; `None` for mobility and accelerance at 0 Hz.
+    /// Converts an FRF value in this unit to receptance, m/N; `None` for mobility and accelerance at 0 Hz, where no receptance follows.
     fn receptance(self, value: Complex64, frequency_hz: f64) -> Option<Complex64> {
         let rate = Complex64::new(0.0, TAU * frequency_hz).powi(self.derivatives);
         let receptance = value * self.factor / rate;
@@ -314,7 +314,7 @@ fn assemble(path: &Path, columns: Vec<Column>) -> Result<FrfTable, FrfError> {
                 column.title
             )));
         };
-        // The entry is created once, at the column of its real part.
+        // The receptance is created once, at the column of its real part.
         if part == Part::Imaginary {
             continue;
         }

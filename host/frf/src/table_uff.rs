@@ -23,7 +23,7 @@ impl From<RecordingError> for FrfError {
     }
 }
 
-/// Reads an FRF table: the functions of type 4 with their coherence, if present.
+/// Reads an FRF table from UFF 58: the functions of type 4, each with its coherence (type 6) if the file has it.
 pub(super) fn read(path: &Path) -> Result<FrfTable, FrfError> {
     let sets = data_sets(path)?;
     let found: Vec<i64> = sets.iter().map(|set| set.header.function.code()).collect();
@@ -70,7 +70,7 @@ pub(super) fn read(path: &Path) -> Result<FrfTable, FrfError> {
     FrfTable::new(path, frequency_hz.unwrap_or_default(), entries)
 }
 
-/// Frequencies without 0 Hz if the receptance is not finite there (mobility or accelerance).
+/// Frequencies of an FRF without 0 Hz, if its receptance is not finite there (mobility or accelerance).
 fn without_rest(entry: &Frf, frequencies: &[f64]) -> Vec<f64> {
     let is_rest = frequencies.first() == Some(&0.0);
     let from = usize::from(is_rest && entry.receptance.first().is_some_and(|value| !value.is_finite()));
@@ -129,7 +129,7 @@ fn direction(dof: &DegreeOfFreedom, what: &str) -> Result<(Direction, f64), Stri
     Ok((axis, dof.direction.signum() as f64))
 }
 
-/// Conversion factor to SI, and order of the time derivative of displacement: 0 receptance, 1 mobility, 2 accelerance.
+/// Conversion factor of an FRF to SI, and order of the time derivative of displacement: 0 receptance, 1 mobility, 2 accelerance.
 fn compliance(set: &DataSet) -> Result<(f64, i32), String> {
     let needed = "receptance (m/N), mobility (m/s/N) or accelerance (m/s^2/N) is needed";
     let (ordinate, denominator) = ratio(set)?;
@@ -145,7 +145,7 @@ fn compliance(set: &DataSet) -> Result<(f64, i32), String> {
     Ok((ordinate.factor / denominator.factor, derivatives))
 }
 
-/// Units of numerator and denominator. Some writers put both into the unit label of the ordinate: `(m/s^2)/N`.
+/// Units of response and force of an FRF. Some programs write both into the unit label of the ordinate, such as `(m/s^2)/N`.
 fn ratio(set: &DataSet) -> Result<(Unit, Unit), String> {
     let Header {
         ordinate,
@@ -221,7 +221,8 @@ impl FrfTable {
         Ok(())
     }
 
-    /// First frequency and step, Hz, if both rounded to seven digits give every frequency within 0.001 steps; else `None`.
+    /// First frequency and line spacing, Hz, both rounded to seven digits, if they give every frequency of the table within 0.001 spacings;
+    /// otherwise `None`.
     fn even(&self) -> Option<(f64, f64)> {
         let (&first, &last) = (self.frequency_hz().first()?, self.frequency_hz().last()?);
         let count = self.frequency_hz().len();

@@ -1,8 +1,8 @@
 //! Tool-tip calibration: receptances at the tool tip from a sensor on the spindle housing.
 //!
-//! If spindle, holder and tool move as a rigid body in a mode, the motions of tip T and sensor S keep the constant ratio φ_T/φ_S of the
-//! mode shape (thesis eqs 7.13 and 7.14). Two hammer tests with impacts at the tip give this ratio for each mode: one with the sensor at its position during the cut,
-//! one with a sensor at the tip.
+//! If spindle, holder and tool move as a rigid body in a mode, the motions of tip T and sensor S have the constant ratio φ_T/φ_S of the
+//! mode shape (thesis eqs 7.13 and 7.14). Two hammer tests with impacts at the tip give this ratio for each mode: one with the sensor at
+//! its position during the cut, one with a sensor at the tip.
 
 use num_complex::Complex64;
 
@@ -28,13 +28,14 @@ const MODE: f64 = 2e-3;
 /// Ratio of the mode shape at tool tip and sensor, for one mode and response direction.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ModeRatio {
-    /// Natural frequency in the calibration, Hz.
+    /// Natural frequency of the mode in the calibration tests, Hz.
     pub frequency_hz: f64,
-    /// Direction of the response.
+    /// Direction of the response at tip and sensor.
     pub response: Direction,
     /// Mode shape ratio φ_T/φ_S (tip over sensor).
     pub ratio: f64,
-    /// Relative RMS deviation of the residues from this ratio. A rigid body in a clean measurement gives a few 0.01.
+    /// RMS deviation of the residues at the tip from `ratio` times those at the sensor, relative to this product. A rigid body in a measurement
+    /// with little noise gives a few 0.01.
     pub misfit: f64,
 }
 
@@ -161,17 +162,18 @@ fn ratios(housing: &FrfTable, tip: &FrfTable) -> Result<Vec<ModeRatio>, FrfError
     Ok(ratios)
 }
 
-/// Fits the smallest number of modes that describes the functions. If no fit succeeds, the error of the first failed fit is returned.
+/// Fits the smallest number of modes beyond which the residual hardly decreases. If no fit succeeds, the error of the first failed fit is
+/// returned.
 fn modes(frequency_hz: &[f64], functions: &[&[Complex64]]) -> Result<RationalFit, RationalFitError> {
     let mut best: Option<RationalFit> = None;
     let mut refused = None;
-    // The search stops after two mode counts without improvement: one further mode may help only together with the next.
+    // Number of successive mode counts without improvement. The search stops after two, since a further mode may help only with the next.
     let mut in_vain = 0;
     for count in 1..=MODES_MAX {
         let next = match fit(frequency_hz, functions, count) {
             Ok(next) => next,
             Err(error) => {
-                // The smallest model has the plainest reason.
+                // The reason of the smallest number of modes is reported: it is the easiest to remedy.
                 refused.get_or_insert(error);
                 continue;
             }
@@ -190,9 +192,9 @@ fn modes(frequency_hz: &[f64], functions: &[&[Complex64]]) -> Result<RationalFit
     best.ok_or_else(|| refused.unwrap_or(RationalFitError::Solution("no model order is tried")))
 }
 
-/// Indices of the poles that are modes: lightly damped (ζ < 0.3), and with a significant peak in at least one function.
+/// Indices of the poles that count as modes: lightly damped, and with a significant peak in at least one function.
 fn mode_numbers(modes: &RationalFit) -> Vec<usize> {
-    // Peak height of a mode: |residue| / decay rate.
+    // Height of the resonance peak of a mode in a function: |residue| / decay rate.
     let height =
         |function: usize, mode: usize| modes.residues[function][mode].norm() / modes.poles[mode].re.abs();
     let functions = 0..modes.residues.len();

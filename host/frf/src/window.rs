@@ -5,12 +5,12 @@ use std::f64::consts::TAU;
 /// Time window that weights the samples of a segment before the Fourier transform.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Window {
-    /// w = 1: for transients that begin and end at rest within the segment.
+    /// Rectangular window w = 1, for transients that begin and end at rest within the segment.
     Rectangular,
-    /// Hann window w_k = ½ − ½ cos(2πk/N): side lobes fall fastest.
+    /// Hann window w_k = ½ − ½ cos(2πk/N), whose side lobes fall fastest of the three windows.
     #[default]
     Hann,
-    /// Hamming window w_k = 0.54 − 0.46 cos(2πk/N): lowest first side lobes.
+    /// Hamming window w_k = 0.54 − 0.46 cos(2πk/N), which has the lowest first side lobes of the three windows.
     Hamming,
 }
 
@@ -32,7 +32,7 @@ impl Window {
 
 /// Effective number of independent averages of n = `segments` segments whose starts are `shift` samples apart (Welch 1967).
 ///
-/// n_eff = n / (1 + 2 Σ_j (1 − j/n) ρ_j²) with ρ_j = Σ_k w_k w_{k+j·shift} / Σ_k w_k²: overlapping segments are correlated.
+/// n_eff = n / (1 + 2 Σ_j (1 − j/n) ρ_j²), where ρ_j = Σ_k w_k w_{k+j·shift} / Σ_k w_k² is the correlation of segments j apart.
 pub(super) fn effective_averages(weights: &[f64], shift: usize, segments: usize) -> f64 {
     let energy: f64 = weights.iter().map(|w| w * w).sum();
     let mut shared = 0.0;

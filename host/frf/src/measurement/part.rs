@@ -18,11 +18,12 @@ pub struct Part {
     pub forces: Vec<Direction>,
     /// Kind of excitation.
     pub excitation: Excitation,
-    /// Effective number of independent averages.
+    /// Effective number of independent averages of the spectra of the group.
     pub averages: f64,
-    /// Frequencies left out because the forces are dependent there, Hz.
+    /// Frequencies left out because the forces are linearly dependent there, Hz.
     pub left_out_hz: Vec<f64>,
-    /// Smallest singular value of the forces over all remaining frequencies, each force divided by its root mean square; 1 for one force.
+    /// Smallest singular value of the force spectra over all frequencies of the group, each force divided by its root mean square; 1 for a
+    /// single force.
     pub least_singular: f64,
     /// Single impacts (used) and double impacts (left out) of a hammer test; `None` for other excitation.
     pub blows: Option<(Vec<Blow>, Vec<Blow>)>,

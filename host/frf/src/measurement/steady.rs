@@ -7,7 +7,7 @@ use crate::excitation::Excitation;
 use crate::measurement_settings::{MeasurementSettings, band};
 use crate::window::fast_length;
 
-/// Auto- and cross-spectra of a record with continuous excitation, at the lines of the band.
+/// Auto- and cross-spectra of a record with continuous excitation, at the frequency lines of the band to evaluate.
 pub(super) fn steady(
     excitation: Excitation,
     driven: &Driven<'_>,
@@ -62,11 +62,12 @@ pub(super) fn steady(
     ))
 }
 
-/// Number of segments per force if no resolution is set. A choice between random error and resolution.
+/// Number of segments for each force if no frequency resolution is set. A choice between random error and resolution.
 const SEGMENTS_PER_FORCE: usize = 8;
 
-/// Number of averaged lines per force for sweeps if no resolution is set. A choice between random error and resolution.
+/// Number of averaged lines for each force of a sweep if no frequency resolution is set. A choice between random error and resolution.
 const LINES_PER_FORCE: usize = 8;
 
-/// Length of the taper at each end of a swept record, as a fraction of the record. A choice; it reduces leakage from vibration at the ends.
+/// Length of the taper at each end of the record of a sweep, as a fraction of the record. A choice: the taper reduces leakage from vibration
+/// at the ends of the record.
 const TAPER: f64 = 0.01;

@@ -69,7 +69,7 @@ pub(super) fn stepped(
     Ok(receptances(part, &lines, first, warnings))
 }
 
-/// Force level to evaluate: the only one, or the level nearest to `force_n`.
+/// Force level to evaluate: the only level of the test, or the level nearest to `force_n`, N.
 fn level(driven: &Driven<'_>, force_n: Option<f64>) -> Result<Level, FrfError> {
     let mut levels = step_sine::levels(driven)?;
     let all: Vec<String> = levels

@@ -7,7 +7,7 @@ use crate::error::FrfError;
 use crate::hammer::{self, Blow};
 use crate::measurement_settings::{MeasurementSettings, band};
 
-/// Auto- and cross-spectra of hammer tests, one segment per single impact; one result per recording.
+/// Auto- and cross-spectra of hammer tests with one segment for each single impact; one result for each recording.
 pub(super) fn struck(
     part: &mut Part,
     members: &[Driven<'_>],
@@ -25,7 +25,7 @@ pub(super) fn struck(
     let rate = members[0].recording.sample_rate_hz;
     let length = cuts.iter().map(|cut| cut.length).min().unwrap_or(0);
     if cuts.iter().any(|cut| cut.length != length) {
-        // All records use the segment length of the record with the shortest segments, so that their lines agree.
+        // All recordings use the segment length of the one with the shortest segments, so that their frequency lines agree.
         windows.segment_s = Some(length as f64 / rate);
         cuts = members
             .iter()

@@ -4,7 +4,7 @@ use super::part::Part;
 use crate::cross_spectra::CrossSpectra;
 use crate::estimate::{DEPENDENT, Line, Shape};
 
-/// Removes the lines outside the frequency range of a sweep.
+/// Removes the frequency lines outside the range of a sweep, where the force is too small.
 pub(super) fn keep_driven(lines: &mut Vec<Line>, spectra: &[CrossSpectra], shape: Shape) {
     let power = |line: usize| -> f64 {
         let forces = (0..shape.forces).map(|force| {
@@ -28,7 +28,7 @@ pub(super) fn keep_driven(lines: &mut Vec<Line>, spectra: &[CrossSpectra], shape
 /// about 1e-2 of the largest power.
 const DRIVEN: f64 = 1e-3;
 
-/// Removes the lines with dependent forces; an error if these are more than half of all lines.
+/// Removes the frequency lines at which the forces are linearly dependent; an error if these are more than half of all lines.
 pub(super) fn independent(lines: &mut Vec<Line>, part: &mut Part, shape: Shape) -> Result<(), String> {
     let count = lines.len();
     let dependent: Vec<Line> = lines
