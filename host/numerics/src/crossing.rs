@@ -2,15 +2,15 @@
 
 use crate::roots::bisection;
 
-/// Fractions of the step at which the function is evaluated. They are dense at the start, since a contact that has just
-/// changed may change back there. Unfounded.
+/// Fractions of the time step at which the function is evaluated. They are dense at the start of the step, where a state that has just
+/// changed, such as a contact, may change back. Unfounded.
 const LOOKED_AT: [f64; 7] = [0.03, 0.12, 0.3, 0.5, 0.7, 0.85, 1.0];
 
-/// Last u in [0, 1] before `f` first becomes negative, to 1e-12; `None` if `f` stays at or above zero.
+/// Last u in [0, 1], to 1e-12, before the function `f` first becomes negative; `None` if `f` stays at or above zero.
 ///
-/// Detects every negative interval that contains one of the evaluated points, and those between two evaluated points
-/// into which a parabola through three points falls. A negative value at 0 itself counts as zero, since a contact has
-/// just changed there.
+/// Detects every interval of negative values that contains one of the evaluated points. Between two evaluated points, it detects an interval
+/// that contains the minimum of the parabola through three neighbouring points. A negative value at u = 0 counts as zero, since the state
+/// has just changed there.
 pub fn first_below_zero(f: impl Fn(f64) -> f64) -> Option<f64> {
     let (mut before, mut last) = ((0.0, f64::NAN), (0.0, f(0.0).max(0.0)));
     for u in LOOKED_AT {
@@ -29,8 +29,8 @@ pub fn first_below_zero(f: impl Fn(f64) -> f64) -> Option<f64> {
     None
 }
 
-/// Minimum of the parabola through three points, of which the middle one is lowest, if it lies below half the middle
-/// value; the function itself may then be negative there.
+/// Argument of the minimum of the parabola through three points (u, f), of which the middle one is lowest. `None` if the minimum is above half
+/// the middle value, so that f is hardly negative there.
 fn dip(a: (f64, f64), b: (f64, f64), c: (f64, f64)) -> Option<f64> {
     if a.1.is_nan() || b.1 > a.1 || b.1 > c.1 {
         return None;

@@ -1,17 +1,17 @@
 //! One step of the Dormand–Prince 5(4) method, with its fourth-order interpolant.
 //!
 //! Coefficients and interpolant: Hairer, Nørsett, Wanner, *Solving Ordinary Differential Equations I*, II.5 and
-//! II.6 (code DOPRI5). With a local error O(h⁶) of the step and O(h⁵) of the interpolant, delayed values taken
-//! from the interpolant keep the global order 5.
+//! II.6 (code DOPRI5). The local error is O(h⁶) for a step and O(h⁵) for the interpolant. A delay equation whose delayed values are
+//! taken from the interpolant keeps the global order 5.
 
-/// Polynomial of degree 4 in u = (t − t₀)/h on [0, 1]: coefficients of 1, u, … u⁴.
+/// Polynomial of degree 4 in u = (t − t₀)/h on [0, 1]: the coefficients of 1, u, … u⁴.
 pub type Quartic = [f64; 5];
 
 /// Times c_i of the stages, as fractions of the step (Dormand–Prince tableau).
 const NODES: [f64; 7] = [0.0, 1.0 / 5.0, 3.0 / 10.0, 4.0 / 5.0, 8.0 / 9.0, 1.0, 1.0];
 
-/// Coefficients a_ij of the stages: row i combines the preceding stages to stage i + 1; the last row is the fifth-order
-/// solution.
+/// Coefficients a_ij of the stages (Dormand–Prince tableau): row i combines the preceding stages to stage i + 1. The last row also gives the
+/// fifth-order solution.
 const STAGES: [[f64; 6]; 6] = [
     [1.0 / 5.0, 0.0, 0.0, 0.0, 0.0, 0.0],
     [3.0 / 40.0, 9.0 / 40.0, 0.0, 0.0, 0.0, 0.0],
@@ -42,7 +42,7 @@ const STAGES: [[f64; 6]; 6] = [
     ],
 ];
 
-/// Coefficients of the difference between the fifth- and the fourth-order solution, the error estimate.
+/// Coefficients of the error estimate: the difference between the fifth- and the fourth-order solution.
 const ERROR: [f64; 7] = [
     71.0 / 57600.0,
     0.0,
@@ -64,7 +64,7 @@ const INTERPOLANT: [f64; 7] = [
     69997945.0 / 29380423.0,
 ];
 
-/// Dormand–Prince step: stages, result and error estimate. One value serves all steps of an integration.
+/// One step of the Dormand–Prince method: stages, result and error estimate. An integration reuses one value for all its steps.
 #[derive(Clone, Debug)]
 pub struct DormandPrince {
     stages: [Vec<f64>; 7],
@@ -73,7 +73,7 @@ pub struct DormandPrince {
 }
 
 impl DormandPrince {
-    /// Allocates the stages for a state y of this dimension.
+    /// Allocates the stages for a state vector y with `dimension` entries.
     pub fn new(dimension: usize) -> Self {
         Self {
             stages: std::array::from_fn(|_| vec![0.0; dimension]),
@@ -108,7 +108,7 @@ impl DormandPrince {
             }
             rate(t + NODES[stage] * h, &self.at_stage, &mut self.stages[stage]);
         }
-        // The last stage is evaluated at the solution (first same as last).
+        // The last stage is evaluated at the fifth-order solution, which is the result (first same as last).
         self.end.copy_from_slice(&self.at_stage);
     }
 
@@ -117,7 +117,7 @@ impl DormandPrince {
         &self.end
     }
 
-    /// Root mean square of the estimated error of the step, each element divided by its `tolerance`.
+    /// Root mean square over the elements of y of the estimated error of the last trial step, each divided by its `tolerance`.
     pub fn error(&self, h: f64, tolerance: impl Fn(usize) -> f64) -> f64 {
         let sum: f64 = (0..self.end.len())
             .map(|element| {
@@ -128,7 +128,7 @@ impl DormandPrince {
         (sum / self.end.len() as f64).sqrt()
     }
 
-    /// Writes the interpolant of the last trial step: one quartic per element of y.
+    /// Writes the interpolant of the last trial step: one polynomial of degree 4 for each element of y.
     pub fn interpolant(&self, h: f64, y: &[f64], quartics: &mut [Quartic]) {
         for (element, quartic) in quartics.iter_mut().enumerate() {
             let rise = self.end[element] - y[element];

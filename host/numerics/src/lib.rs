@@ -1,4 +1,4 @@
-//! Numerical methods that know nothing of milling.
+//! Numerical methods without reference to milling: eigenvalues, least squares, integration of differential equations, statistics.
 //!
 //! | module | |
 //! |---|---|

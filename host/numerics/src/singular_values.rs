@@ -2,10 +2,10 @@
 
 use nalgebra::{ComplexField, DMatrix, DVector, Dyn, SVD};
 
-/// Iterations per singular value after which a matrix is given up; two or three are usual.
+/// Largest number of QR iterations per singular value; two or three are usual, more end the decomposition with an error.
 const ITERATIONS_PER_VALUE: usize = 100;
 
-/// Why a matrix has no singular values that can be computed.
+/// Error of the singular value decomposition of a matrix.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SingularValueError {
     /// The matrix has no rows or no columns.
@@ -35,23 +35,23 @@ pub enum SingularValueError {
         rows: usize,
         /// Columns.
         columns: usize,
-        /// The bound.
+        /// Largest number of iterations.
         iterations: usize,
     },
 }
 
-/// The singular vectors that are computed beside the singular values.
+/// Selects which singular vectors are computed together with the singular values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Vectors {
     /// None.
     Neither,
-    /// The left ones, columns of U.
+    /// The left singular vectors, columns of U.
     Left,
-    /// The left ones and the right ones, rows of Vᵀ (Vᴴ of complex matrices).
+    /// The left singular vectors, columns of U, and the right ones, rows of Vᵀ (Vᴴ for a complex matrix).
     Both,
 }
 
-/// The decomposition, singular values in falling order.
+/// Singular value decomposition of `matrix`, with the singular values in descending order.
 ///
 /// # Errors
 /// The matrix is empty, has an entry that is not finite, or the iteration exceeds its bound.
@@ -77,7 +77,7 @@ pub fn decompose<T: ComplexField<RealField = f64>>(
     )
 }
 
-/// The singular values alone, in falling order.
+/// The singular values of `matrix` in descending order, without singular vectors.
 ///
 /// # Errors
 /// See [`decompose`].

@@ -1,8 +1,8 @@
 //! Quantiles of the normal, Student's, χ² and F distributions, and intervals of a proportion.
 //!
-//! A quantile inverts its distribution function by bracketing and bisection of a monotone function, refined by Newton: it
-//! returns for every argument. Continued fractions and series of the incomplete gamma and beta functions: Press et al., *Numerical
-//! Recipes*, 3rd edition, 6.2 and 6.4 (Lentz's method).
+//! A quantile inverts the monotone distribution function by bracketing and bisection, that of the normal distribution by Halley's method. The
+//! number of iterations is bounded for every argument. Continued fractions and series of the incomplete gamma and beta functions: Press
+//! et al., *Numerical Recipes*, 3rd edition, 6.2 and 6.4 (Lentz's method).
 
 use std::f64::consts::{PI, SQRT_2};
 
@@ -11,10 +11,10 @@ use crate::roots::bisection;
 /// Half the width of a two-sided 90 % interval of a normal distribution, in standard deviations: Φ⁻¹(0.95).
 pub const NINETY_PERCENT: f64 = 1.644_853_626_951_472_7;
 
-/// Relative change at which a series or a continued fraction ends.
+/// Relative change of a series or a continued fraction by one more term below which it has converged.
 const SETTLED: f64 = 1e-16;
 
-/// Terms of a series or a continued fraction; √(degrees of freedom) times a few are needed.
+/// Largest number of terms of a series or a continued fraction. A few times √(degrees of freedom) are needed.
 const TERMS_MAX: usize = 100_000;
 
 /// Φ(x): the probability that a standard normal variable stays below x.
@@ -22,17 +22,17 @@ pub fn normal_probability(x: f64) -> f64 {
     0.5 * libm::erfc(-x / SQRT_2)
 }
 
-/// Φ⁻¹: the number below which a standard normal variable stays with probability `share`, to 1e-12.
+/// Quantile Φ⁻¹ of the standard normal distribution: the number below which the variable stays with the probability `share`; error 1e-12.
 ///
-/// Shares outside of 0 … 1 count as the nearest one that has a finite quantile.
+/// A `share` of 0 or less, or of 1 or more, is replaced by the nearest probability with a finite quantile.
 pub fn normal_quantile(share: f64) -> f64 {
-    // Tails are lighter than a double can hold from 1e-300 on.
+    // A double cannot represent probabilities far below 1e-300, nor differences from 1 below its rounding.
     let share = share.clamp(1e-300, 1.0 - f64::EPSILON);
-    // By symmetry the lower half is enough, where erfc keeps its relative precision.
+    // Φ⁻¹ is odd about 1/2. In the lower half, erfc keeps its relative precision.
     if share > 0.5 {
         return -normal_quantile(1.0 - share);
     }
-    // Start: the tail bound; then Halley, which triples the digits.
+    // Start value from the tail bound of Φ. Halley's method then triples the number of correct digits in each iteration.
     let mut x = -(-2.0 * (2.0 * share).ln()).sqrt();
     for _ in 0..8 {
         let density = (-0.5 * x * x).exp() / (2.0 * PI).sqrt();
@@ -48,11 +48,11 @@ pub fn normal_quantile(share: f64) -> f64 {
 
 /// The probability that |t| of Student's distribution with ν degrees of freedom stays below `t`: 1 − I_{ν/(ν + t²)}(ν/2, 1/2).
 pub fn student_two_sided_probability(t: f64, freedoms: f64) -> f64 {
-    // The other half of the beta function: no cancellation for small t.
+    // The complement I_{t²/(ν + t²)}(1/2, ν/2), which is free of cancellation for small t.
     incomplete_beta(0.5, 0.5 * freedoms, t * t / (freedoms + t * t))
 }
 
-/// Half the width of the two-sided interval that holds a Student variable with probability `share`, to 1e-10.
+/// Half the width of the two-sided interval that contains a variable of Student's distribution with the probability `share`; error 1e-10.
 ///
 /// Infinite without degrees of freedom.
 pub fn student_two_sided_quantile(share: f64, freedoms: f64) -> f64 {
@@ -62,7 +62,7 @@ pub fn student_two_sided_quantile(share: f64, freedoms: f64) -> f64 {
     quantile(share, |t| student_two_sided_probability(t, freedoms))
 }
 
-/// The factor from a standard deviation to half a 90 % interval where the deviation comes from `freedoms` degrees of freedom.
+/// Factor from a standard deviation that is estimated with `freedoms` degrees of freedom to half the width of the 90 % interval.
 pub fn student_ninety_percent(freedoms: usize) -> f64 {
     student_two_sided_quantile(0.9, freedoms as f64)
 }
@@ -72,7 +72,7 @@ pub fn chi_squared_probability(x: f64, freedoms: f64) -> f64 {
     incomplete_gamma(0.5 * freedoms, 0.5 * x)
 }
 
-/// The number below which χ² with ν degrees of freedom stays with probability `share`, to 1e-10 of it.
+/// The number below which χ² with ν degrees of freedom stays with the probability `share`; relative error 1e-10.
 pub fn chi_squared_quantile(share: f64, freedoms: f64) -> f64 {
     quantile(share, |x| chi_squared_probability(x, freedoms))
 }
@@ -82,7 +82,7 @@ pub fn f_probability(x: f64, [above, below]: [f64; 2]) -> f64 {
     incomplete_beta(0.5 * above, 0.5 * below, above * x / (above * x + below))
 }
 
-/// The number below which F with (ν₁, ν₂) degrees of freedom stays with probability `share`, to 1e-10 of it.
+/// The number below which F with (ν₁, ν₂) degrees of freedom stays with the probability `share`; relative error 1e-10.
 pub fn f_quantile(share: f64, freedoms: [f64; 2]) -> f64 {
     quantile(share, |x| f_probability(x, freedoms))
 }
@@ -99,8 +99,8 @@ pub fn hotelling_quantile(share: f64, dimension: usize, samples: usize) -> f64 {
     p * (n - 1.0) / (n - p) * f_quantile(share, [p, n - p])
 }
 
-/// The exact two-sided interval of a probability of which `hits` of `trials` are known (Clopper and Pearson, Biometrika 26
-/// (1934) 404).
+/// Exact two-sided confidence interval, at the level `share`, of a probability after `hits` successes in `trials` trials (Clopper and
+/// Pearson, Biometrika 26 (1934) 404).
 pub fn binomial_interval(share: f64, hits: usize, trials: usize) -> [f64; 2] {
     let tail = 0.5 * (1.0 - share);
     let (k, n) = (hits.min(trials) as f64, trials as f64);
@@ -114,13 +114,13 @@ pub fn binomial_interval(share: f64, hits: usize, trials: usize) -> [f64; 2] {
     [low, high]
 }
 
-/// The quantile of a sorted sample, linear between the order statistics at (i + 1/2)/n (Hazen); `None` of an empty one.
+/// Quantile of a `sorted` sample, interpolated linearly between the order statistics at (i + 1/2)/n (Hazen); `None` for an empty sample.
 pub fn sample_quantile(sorted: &[f64], share: f64) -> Option<f64> {
     let position = (share * sorted.len() as f64 - 0.5).max(0.0);
     let (below, rest) = (position.floor() as usize, position.fract());
     let at = |index: usize| sorted.get(index).or(sorted.last()).copied();
     let (low, high) = (at(below)?, at(below + 1)?);
-    // Beside an infinite neighbour an order statistic keeps its value.
+    // Without interpolation, an order statistic next to an infinite one keeps its value.
     Some(if rest == 0.0 {
         low
     } else {
@@ -128,7 +128,7 @@ pub fn sample_quantile(sorted: &[f64], share: f64) -> Option<f64> {
     })
 }
 
-/// Inverts a distribution function on 0 … ∞.
+/// Inverts a distribution function on [0, ∞): the argument at which `probability` reaches `share`.
 fn quantile(share: f64, probability: impl Fn(f64) -> f64) -> f64 {
     if share.is_nan() {
         return f64::NAN;
@@ -188,7 +188,7 @@ fn incomplete_beta(a: f64, b: f64, x: f64) -> f64 {
     if x <= 0.0 || x >= 1.0 || x.is_nan() {
         return x.clamp(0.0, 1.0);
     }
-    // The fraction converges fast on the near side of the mean.
+    // The continued fraction converges fast for x below about the mean of the distribution; above, symmetry applies.
     if x > (a + 1.0) / (a + b + 2.0) {
         return 1.0 - incomplete_beta(b, a, 1.0 - x);
     }
@@ -207,10 +207,10 @@ fn incomplete_beta(a: f64, b: f64, x: f64) -> f64 {
 
 /// ln B(a, b) = ln Γ(a) + ln Γ(b) − ln Γ(a + b).
 ///
-/// Of large arguments the logarithms cancel; Stirling's series of the difference does not (Abramowitz & Stegun 6.1.41).
+/// For large arguments the logarithms of Γ cancel. Stirling's series of their difference does not (Abramowitz & Stegun 6.1.41).
 fn log_beta(a: f64, b: f64) -> f64 {
     let (small, large) = (a.min(b), a.max(b));
-    // From 20 on four terms of the series are exact to 1e-14.
+    // For arguments from 20 on, four terms of Stirling's series are accurate to 1e-14.
     if large < 20.0 {
         return libm::lgamma(a) + libm::lgamma(b) - libm::lgamma(a + b);
     }
@@ -223,7 +223,7 @@ fn log_beta(a: f64, b: f64) -> f64 {
     libm::lgamma(small) - ratio
 }
 
-/// b₀ + a₁/(b₁ + a₂/(b₂ + …)) by Lentz's method, from [a_k, b_k].
+/// Continued fraction b₀ + a₁/(b₁ + a₂/(b₂ + …)) by Lentz's method; `step(k)` gives [a_k, b_k].
 fn continued_fraction(first: f64, step: impl Fn(usize) -> [f64; 2]) -> f64 {
     let tiny = |value: f64| if value.abs() < 1e-300 { 1e-300 } else { value };
     let mut value = tiny(first);

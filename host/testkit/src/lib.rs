@@ -1,6 +1,6 @@
 //! Support for tests of several crates: the project's cases, the folder of measured recordings, and the files of campaign results.
 //!
-//! A dev-dependency only. It knows the layers up to `quietcut-model`; that crate and those below it cannot use it.
+//! A dev-dependency only. It depends on `quietcut-model` and the crates below, so that these cannot use it in their tests.
 //!
 //! ```
 //! let case = quietcut_testkit::case("kuka-kr90-acetal");
@@ -22,8 +22,8 @@ pub fn tests_folder() -> PathBuf {
 
 /// Path of the file `name` in the folder of measured recordings, given by the environment variable `QUIETCUT_DATA`.
 ///
-/// A test that uses it has `measured` in its name and is `#[ignore]`d, so that it is skipped without these recordings; `tests/run` runs it if
-/// they are present.
+/// A test that uses such a file has `measured` in its name and is `#[ignore]`d, so that it is skipped without the recordings; `tests/run`
+/// runs it if they are present.
 ///
 /// # Panics
 /// `QUIETCUT_DATA` is not set.

@@ -7,9 +7,9 @@ use serde_json::json;
 /// A test campaign and the command that reproduces its figures.
 #[derive(Clone, Debug)]
 pub struct Campaign<'a> {
-    /// Name of its result file, without extension.
+    /// Name of the result file of the campaign, without extension.
     pub name: &'a str,
-    /// Heading on the page.
+    /// Heading of the campaign on the page.
     pub title: &'a str,
     /// The command that prints the figures.
     pub command: &'a str,

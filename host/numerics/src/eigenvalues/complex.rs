@@ -1,21 +1,21 @@
-//! Eigenvalues of complex matrices: all of a small one, the largest of a large one.
+//! Eigenvalues of complex matrices: all eigenvalues, or only the largest of a large matrix.
 
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 
 use super::error::{EigenvalueError, size_of};
 
-/// Iterations for one eigenvalue after which a matrix is given up; two or three are usual, and at 10, 20, … an
-/// exceptional shift breaks cycles.
+/// Largest number of QR iterations for one eigenvalue; more end the computation with an error. Two or three are usual; an exceptional shift
+/// in every tenth iteration breaks cycles.
 const ITERATIONS_MAX: usize = 90;
 
-/// Matrices up to this size are solved whole.
+/// Largest number of rows of a matrix all of whose eigenvalues are computed at once; larger ones are projected on a Krylov space.
 const WHOLE: usize = 20;
 
-/// Relative change of an eigenvalue from one look to the next below which it has settled.
+/// Relative change of an eigenvalue, while the Krylov space grows by four dimensions, below which it has converged.
 const SETTLED: f64 = 1e-11;
 
-/// All eigenvalues, in no order, backward stable.
+/// All eigenvalues of a complex matrix, unordered; the method is backward stable.
 ///
 /// # Errors
 /// The matrix is not square, has an entry that is not finite, or the iteration exceeds its bound.
@@ -28,10 +28,10 @@ pub fn of_complex(matrix: DMatrix<Complex64>) -> Result<Vec<Complex64>, Eigenval
     }
 }
 
-/// Eigenvalues of absolute value `floor` and above, and possibly smaller ones, largest first.
+/// Eigenvalues of absolute value `floor` and above, and possibly smaller ones, in descending order of the absolute value.
 ///
-/// Small matrices are solved whole; of large ones a Krylov space is built until the eigenvalues in question no longer
-/// move: at the latest it is the whole space.
+/// For a small matrix, all eigenvalues are computed. For a large one, a Krylov space grows until the eigenvalues above `floor` no longer
+/// change, at most until it is the whole space.
 ///
 /// # Errors
 /// The matrix is not square, has an entry that is not finite, or the iteration exceeds its bound.
@@ -70,16 +70,16 @@ fn sorted(mut values: Vec<Complex64>) -> Vec<Complex64> {
     values
 }
 
-/// The Arnoldi process.
+/// Orthonormal basis of a Krylov space, and the matrix projected on it (Arnoldi process).
 struct Krylov {
     basis: Vec<DVector<Complex64>>,
-    /// Column j: the coefficients of M q_j.
+    /// Columns of the projected matrix: column j has the coefficients of M q_j in the basis vectors q.
     columns: Vec<Vec<Complex64>>,
 }
 
 impl Krylov {
     fn new(size: usize) -> Self {
-        // A start with a part in every direction, no two alike: an invariant subspace is not hit by accident.
+        // The start vector has a different component in each direction, so that it does not lie in an invariant subspace by accident.
         let start = DVector::from_fn(size, |i, _| Complex64::cis(1.0 + 2.399_963 * (i * i) as f64));
         let norm = start.norm();
         Self {
@@ -88,12 +88,12 @@ impl Krylov {
         }
     }
 
-    /// One more dimension; true where the space is invariant.
+    /// Extends the Krylov space by one dimension; true if the space is invariant. `None` if the new vector is not finite.
     fn extend(&mut self, matrix: &DMatrix<Complex64>) -> Option<bool> {
         let mut next = matrix * self.basis.last()?;
         let size = next.norm();
         let mut column = vec![Complex64::ZERO; self.basis.len()];
-        // Twice: once leaves rounding that makes spurious copies.
+        // Orthogonalization is done twice, since rounding after a single pass causes spurious copies of eigenvalues.
         for _ in 0..2 {
             for (vector, coefficient) in self.basis.iter().zip(&mut column) {
                 let part = vector.dotc(&next);
@@ -114,7 +114,7 @@ impl Krylov {
         Some(is_complete)
     }
 
-    /// The matrix in the basis, a Hessenberg matrix.
+    /// The matrix projected on the Krylov space, a Hessenberg matrix.
     fn projected(&self) -> DMatrix<Complex64> {
         let size = self.columns.len();
         DMatrix::from_fn(size, size, |i, j| {
@@ -129,7 +129,7 @@ fn pair(m: &DMatrix<Complex64>, first: usize) -> [Complex64; 2] {
     let (c, d) = (m[(first + 1, first)], m[(first + 1, first + 1)]);
     let (mean, half) = ((a + d) * 0.5, (a - d) * 0.5);
     let root = (half * half + b * c).sqrt();
-    // The larger one without cancellation, the other from the determinant.
+    // The larger eigenvalue is computed without cancellation, the smaller one from the determinant.
     let large = if (mean.conj() * root).re >= 0.0 {
         mean + root
     } else {
@@ -143,7 +143,7 @@ fn pair(m: &DMatrix<Complex64>, first: usize) -> [Complex64; 2] {
     [large, small]
 }
 
-/// QR iteration with single shifts on a Hessenberg matrix, deflating from the end.
+/// Eigenvalues of a Hessenberg matrix by QR iteration with single shifts, with deflation of converged eigenvalues from the last row on.
 fn of_hessenberg(mut m: DMatrix<Complex64>) -> Result<Vec<Complex64>, EigenvalueError> {
     let mut found = Vec::with_capacity(m.nrows());
     let norm = m.norm();
@@ -186,7 +186,7 @@ fn of_hessenberg(mut m: DMatrix<Complex64>) -> Result<Vec<Complex64>, Eigenvalue
     Ok(found)
 }
 
-/// One QR step with a shift on the rows and columns `first..=last`: R Q + shift of (M − shift) = Q R.
+/// One QR step with a shift on rows and columns `first..=last`: M − shift = Q R is replaced by R Q + shift.
 fn sweep(m: &mut DMatrix<Complex64>, first: usize, last: usize, shift: Complex64) {
     for i in first..=last {
         m[(i, i)] -= shift;

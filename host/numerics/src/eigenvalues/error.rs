@@ -1,8 +1,8 @@
-//! Errors of eigenvalue problems, and the check of a matrix that both forms share.
+//! Errors of eigenvalue problems, and the check of a matrix before its eigenvalues are computed.
 
 use nalgebra::{ComplexField, DMatrix};
 
-/// Why a matrix has no eigenvalues that can be computed.
+/// Error of an eigenvalue problem.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum EigenvalueError {
     /// The matrix is not square.
@@ -18,7 +18,7 @@ pub enum EigenvalueError {
         "a matrix of {size} × {size} has an entry that is not finite; check the data for gaps, overflow and division by zero"
     )]
     NotFinite {
-        /// Rows and columns.
+        /// Number of rows and of columns.
         size: usize,
     },
     /// The matrix M of a symmetric pencil is not positive definite.
@@ -26,7 +26,7 @@ pub enum EigenvalueError {
         "the mass matrix of {size} × {size} is not positive definite; every degree of freedom needs a mass"
     )]
     NotDefinite {
-        /// Rows and columns.
+        /// Number of rows and of columns.
         size: usize,
     },
     /// The QR iteration exceeds its bound.
@@ -34,14 +34,14 @@ pub enum EigenvalueError {
         "the QR iteration on a matrix of {size} × {size} does not converge within {iterations} iterations; use a lower model order, or scale the data to similar magnitudes"
     )]
     NotConverged {
-        /// Rows and columns.
+        /// Number of rows and of columns.
         size: usize,
-        /// The bound.
+        /// Largest number of iterations.
         iterations: usize,
     },
 }
 
-/// The number of rows of a square matrix with finite entries.
+/// Number of rows of the matrix; an error if it is not square or has an entry that is not finite.
 pub(super) fn size_of<T: ComplexField>(matrix: &DMatrix<T>) -> Result<usize, EigenvalueError> {
     let (rows, columns) = matrix.shape();
     if rows != columns {

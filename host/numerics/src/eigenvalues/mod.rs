@@ -10,7 +10,7 @@
 //! | polynomial | [`polynomial_roots`] | companion matrix |
 //!
 //! A matrix with an entry that is not finite, or on which an iteration exceeds its bound, yields an [`EigenvalueError`] that
-//! names the size and the iterations. No function spins and no function panics.
+//! names the size and the number of iterations. Every function ends, and none panics.
 
 mod complex;
 mod error;

@@ -1,7 +1,7 @@
 //! Eigenvalues of a real matrix by the Francis double-shift QR iteration.
 //!
-//! The one of nalgebra has no exceptional shifts: on some one-period maps it does not end. Method: Wilkinson &
-//! Reinsch, Handbook for Automatic Computation II, balance, orthes and hqr.
+//! The QR iteration of nalgebra has no exceptional shifts and does not end for some matrices of period maps. Method: Wilkinson &
+//! Reinsch, Handbook for Automatic Computation II, procedures balance, orthes and hqr.
 
 use nalgebra::DMatrix;
 use nalgebra::linalg::balancing::balance_parlett_reinsch;
@@ -9,14 +9,14 @@ use num_complex::Complex64;
 
 use super::error::{EigenvalueError, size_of};
 
-/// Iterations for one eigenvalue after which the matrix is given up; three are usual, and at 10, 20, … an exceptional
-/// shift breaks cycles.
+/// Largest number of QR iterations for one eigenvalue; more end the computation with an error. Three are usual; an exceptional shift at 10,
+/// 20, … breaks cycles.
 const ITERATIONS_MAX: usize = 90;
 
-/// All eigenvalues, in no order; complex ones in exact pairs, real ones with imaginary part zero.
+/// All eigenvalues of a real matrix, unordered: complex ones in exact conjugate pairs, real ones with the imaginary part zero.
 ///
-/// Backward stable: they are those of a matrix that differs by a few rounding errors of the norm (after
-/// balancing).
+/// The method is backward stable: the results are the exact eigenvalues of a matrix that differs from the balanced one by a few rounding
+/// errors of its norm.
 ///
 /// # Errors
 /// The matrix is not square, has an entry that is not finite, or the iteration exceeds its bound.
@@ -38,8 +38,8 @@ pub fn of_real(mut matrix: DMatrix<f64>) -> Result<Vec<Complex64>, EigenvalueErr
     Ok(found)
 }
 
-/// A power of two near the largest entry where squares of entries would leave the range of numbers, else 1: balancing would not
-/// end.
+/// Scale of a matrix: a power of two near its largest entry if squares of entries would overflow or underflow, which keeps balancing from
+/// ending; otherwise 1.
 fn unit(largest: f64) -> f64 {
     if (1e-100..1e100).contains(&largest) || largest == 0.0 {
         1.0
@@ -63,7 +63,7 @@ impl Rows {
         self.entries[i * self.size + j] = value;
     }
 
-    /// Householder reflections from both sides until nothing is left below the first subdiagonal.
+    /// Reduces the matrix to Hessenberg form, zero below the first subdiagonal, by Householder reflections from both sides.
     fn reduce_to_hessenberg(&mut self) {
         let n = self.size;
         let mut vector = vec![0.0; n];
@@ -107,7 +107,7 @@ impl Rows {
         }
     }
 
-    /// The QR iteration on a Hessenberg matrix, deflating from the end.
+    /// Eigenvalues of a Hessenberg matrix by QR iteration, with deflation of converged eigenvalues from the last row on.
     fn iterate(mut self) -> Result<Vec<Complex64>, EigenvalueError> {
         let n = self.size;
         let norm: f64 = self.entries.iter().map(|entry| entry.abs()).sum();
@@ -157,7 +157,7 @@ impl Rows {
         Ok(found)
     }
 
-    /// The first row of the unreduced block that ends at `last`.
+    /// First row of the unreduced block (no negligible subdiagonal entry) that ends at row `last`.
     fn split(&mut self, last: usize, norm: f64) -> usize {
         let mut row = last;
         while row > 0 {
@@ -172,7 +172,7 @@ impl Rows {
         row
     }
 
-    /// Both eigenvalues of the block of two that ends at `last`.
+    /// Both eigenvalues of the 2 × 2 block that ends at row `last`, plus the sum `shifted` of exceptional shifts.
     fn pair(&self, last: usize, shifted: f64) -> [Complex64; 2] {
         let x = self.at(last, last);
         let w = self.at(last, last - 1) * self.at(last - 1, last);
@@ -189,7 +189,7 @@ impl Rows {
         }
     }
 
-    /// One double step on the block from `first` to `last`.
+    /// One QR step with two shifts on the block from row `first` to row `last`.
     fn sweep(&mut self, first: usize, last: usize, shift: Shift) {
         let (start, mut vector) = self.start(first, last, shift);
         for i in start + 2..=last {
@@ -232,7 +232,7 @@ impl Rows {
         }
     }
 
-    /// Rows k, k + 1 and, up to `last`, k + 2 from the left.
+    /// Applies a Householder reflection from the left to rows k, k + 1 and, if it is not beyond `last`, k + 2.
     fn reflect_rows(&mut self, k: usize, last: usize, [q, r]: [f64; 2], [x, y, z]: [f64; 3]) {
         let n = self.size;
         let (row_k, rest) = self.entries[k * n..].split_at_mut(n);
@@ -255,7 +255,7 @@ impl Rows {
         }
     }
 
-    /// Columns k, k + 1 and, of a `triple`, k + 2 from the right.
+    /// Applies a Householder reflection from the right to columns k, k + 1 and, if `triple`, k + 2.
     fn reflect_columns(
         &mut self,
         k: usize,
@@ -286,7 +286,7 @@ impl Rows {
         }
     }
 
-    /// Where the double step starts, two small subdiagonal entries after each other, and its first vector.
+    /// Row at which the double step starts, after two successive small subdiagonal entries, and the first vector of the step.
     fn start(&self, first: usize, last: usize, shift: Shift) -> (usize, [f64; 3]) {
         let mut m = last - 2;
         loop {
@@ -317,7 +317,7 @@ impl Rows {
     }
 }
 
-/// The sum and product of two shifts, as the last block of two has them.
+/// The two shifts of a double step, by the entries of the last 2 × 2 block: both diagonal entries and the product of the others.
 #[derive(Clone, Copy)]
 struct Shift {
     x: f64,

@@ -4,12 +4,12 @@ use nalgebra::{Cholesky, ComplexField, DMatrix, DVector, Dyn, SymmetricEigen};
 
 use super::error::{EigenvalueError, size_of};
 
-/// Iterations per eigenvalue after which a matrix is given up; two or three are usual.
+/// Largest number of QR iterations per eigenvalue; two or three are usual, more end the computation with an error.
 const ITERATIONS_PER_EIGENVALUE: usize = 60;
 
-/// Eigenvalues (real) and orthonormal eigenvectors of a real symmetric or Hermitian matrix, in no order.
+/// Eigenvalues (real) and orthonormal eigenvectors of a real symmetric or Hermitian matrix, unordered.
 ///
-/// The lower triangle is read. Backward stable: the error of each eigenvalue is a few rounding errors of the norm.
+/// Only the lower triangle of the matrix is used. The error of each eigenvalue is a few rounding errors of the norm of the matrix.
 ///
 /// # Errors
 /// The matrix is not square, has an entry that is not finite, or the iteration exceeds its bound.
@@ -28,10 +28,10 @@ pub fn of_symmetric<T: ComplexField<RealField = f64>>(
         .ok_or(EigenvalueError::NotConverged { size, iterations })
 }
 
-/// Eigenvalues λ and eigenvectors v of K v = λ M v, K symmetric and M symmetric positive definite, in no order.
+/// Eigenvalues λ and eigenvectors v of K v = λ M v, unordered, with K symmetric and M symmetric positive definite.
 ///
 /// With M = L Lᵀ the eigenvalues are those of L⁻¹ K L⁻ᵀ; the eigenvectors, columns of V, satisfy Vᵀ M V = I and
-/// Vᵀ K V = diag λ. Of masses and stiffnesses λ = ω².
+/// Vᵀ K V = diag λ. For a mass and a stiffness matrix, λ = ω².
 ///
 /// # Errors
 /// See [`EigenvalueError`].

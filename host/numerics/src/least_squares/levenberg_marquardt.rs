@@ -68,7 +68,7 @@ pub struct Minimum<P, V> {
     pub value: V,
     /// The sums of the last linearization, at θ or one step before; `None` if there was none.
     pub sums: Option<NormalSums>,
-    /// The reason.
+    /// Reason for which the iteration stopped.
     pub stop: Stop,
     /// Linearizations.
     pub iterations: usize,
@@ -77,7 +77,7 @@ pub struct Minimum<P, V> {
 /// The damping λ of (N + λ diag N) δ = g, and how it changes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Damping {
-    /// λ of the first step: 0 near the minimum.
+    /// Damping λ of the first step; 0 if the start is near the minimum.
     pub first: f64,
     /// The factor of λ after an improvement, below 1.
     pub shrink: f64,
@@ -168,7 +168,7 @@ impl LevenbergMarquardt {
             let mut moved = None;
             for _ in 0..self.trials_max {
                 let Some(step) = self.step(sums, damping) else {
-                    // Far from the minimum parameters may look alike that are not.
+                    // Far from the minimum, the normal matrix may be singular although the data determine the parameters: damp more.
                     if damping >= 1.0 {
                         here.stop = Stop::Singular;
                         return Some(here);

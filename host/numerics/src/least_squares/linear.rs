@@ -5,9 +5,9 @@ use nalgebra::{DMatrix, DVector};
 use super::LeastSquaresError;
 use super::factored::Factored;
 
-/// min over x of Σᵢ wᵢ (aᵢᵀx − bᵢ)² + Σⱼ pⱼ (xⱼ − x₀ⱼ)², with A of m rows and n columns.
+/// Linear least squares: min over x of Σᵢ wᵢ (aᵢᵀx − bᵢ)² + Σⱼ pⱼ (xⱼ − x₀ⱼ)², where A has m rows aᵢᵀ and n columns.
 ///
-/// Weights are inverse variances: with wᵢ = 1/σᵢ² the [`LinearFit::covariance`] is that of the parameters.
+/// If the weights are inverse variances, wᵢ = 1/σᵢ², then [`LinearFit::covariance`] is the covariance of the parameters.
 ///
 /// ```
 /// use nalgebra::{DMatrix, DVector};
@@ -31,27 +31,27 @@ pub struct LinearProblem<'a> {
 /// The solution of a [`LinearProblem`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct LinearFit {
-    /// x, n entries.
+    /// Parameters x, n entries.
     pub parameters: DVector<f64>,
-    /// (AᵀWA + P)⁻¹, n × n: the covariance where the weights are inverse variances; else times [`Self::variance`].
+    /// (AᵀWA + P)⁻¹, n × n: covariance of the parameters if the weights are inverse variances; otherwise multiply by [`Self::variance`].
     pub covariance: DMatrix<f64>,
-    /// Σᵢ wᵢ (aᵢᵀx − bᵢ)², without the prior.
+    /// Weighted sum of squared residuals Σᵢ wᵢ (aᵢᵀx − bᵢ)², without the term of the prior.
     pub sum_of_squares: f64,
-    /// Rows with a weight above zero, less parameters.
+    /// Number of rows with a weight above zero, minus the number of parameters.
     pub degrees_of_freedom: usize,
-    /// The first pivot over the last one, of the scaled columns: the condition number within a factor of √n as a rule.
+    /// First pivot divided by the last one, for columns scaled to unit length: usually the condition number within a factor of √n.
     pub condition: f64,
 }
 
 impl LinearFit {
-    /// The variance of a residual of weight 1, from the residuals; infinite without degrees of freedom.
+    /// Variance of a residual of weight 1, estimated from the residuals; infinite without degrees of freedom.
     pub fn variance(&self) -> f64 {
         self.sum_of_squares / self.degrees_of_freedom as f64
     }
 }
 
 impl<'a> LinearProblem<'a> {
-    /// A x = b with unit weights and without a prior.
+    /// The problem A x = b with unit weights and without a prior; A = `matrix`, b = `right`.
     pub fn new(matrix: &'a DMatrix<f64>, right: &'a DVector<f64>) -> Self {
         Self {
             matrix,
@@ -61,7 +61,7 @@ impl<'a> LinearProblem<'a> {
         }
     }
 
-    /// With weights wᵢ ≥ 0, m entries.
+    /// This problem with weights wᵢ ≥ 0 of the m rows.
     #[must_use]
     pub fn with_weights(self, weights: &'a DVector<f64>) -> Self {
         Self {
@@ -70,7 +70,7 @@ impl<'a> LinearProblem<'a> {
         }
     }
 
-    /// With a prior mean x₀ and inverse variances pⱼ ≥ 0, n entries each; a mean of 0 is a ridge.
+    /// This problem with a prior of mean x₀ and inverse variances pⱼ ≥ 0, n entries each; a mean of 0 is ridge regression.
     #[must_use]
     pub fn with_prior(self, mean: &'a DVector<f64>, inverse_variances: &'a DVector<f64>) -> Self {
         Self {
@@ -79,7 +79,7 @@ impl<'a> LinearProblem<'a> {
         }
     }
 
-    /// The least sum of squares, by Householder QR with column pivoting of the scaled columns (Golub and Van Loan, *Matrix
+    /// Solution with the least sum of squares, from Householder QR with pivoting of the scaled columns (Golub and Van Loan, *Matrix
     /// Computations*, 4th edition, 5.4.2).
     ///
     /// # Errors
@@ -109,7 +109,7 @@ impl<'a> LinearProblem<'a> {
         }
     }
 
-    /// √W A and √W b, with the rows of the prior below.
+    /// Weighted rows √W A and √W b, followed by the rows √P and √P x₀ of the prior.
     fn rows(&self) -> (DMatrix<f64>, DVector<f64>) {
         let (rows, columns) = self.matrix.shape();
         let (mut matrix, mut right) = (self.matrix.clone(), self.right.clone());
@@ -154,7 +154,7 @@ impl<'a> LinearProblem<'a> {
                     expected,
                 });
             }
-            // A negative weight has no root.
+            // Weights and inverse variances must not be negative, since their square roots scale the rows.
             let is_weight = !std::ptr::eq(vector, self.right) && what.starts_with("the vector");
             if vector
                 .iter()

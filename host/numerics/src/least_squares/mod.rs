@@ -9,8 +9,8 @@
 //! | AᴴA x = Aᴴb that was summed | [`NormalEquations`] | diagonal scaling, Cholesky |
 //! | min ‖r(θ)‖² | [`LevenbergMarquardt`] | Levenberg–Marquardt with the reason to stop |
 //!
-//! Columns are scaled to length 1 first: parameters of one fit differ by many powers of ten. A rank is therefore independent of
-//! the units of the parameters. Only [`MinimumNorm`] takes the columns as they are.
+//! The columns of the matrix are scaled to length 1 first, since the parameters of one fit differ by many powers of ten. The rank is
+//! therefore independent of the units of the parameters. Only [`MinimumNorm`] takes the columns as they are.
 
 mod elimination;
 mod factored;
@@ -27,23 +27,23 @@ pub use minimum_norm::{MinimumNorm, Tolerance};
 pub use normal_equations::{Idle, NormalEquations, invert_normal_equations, solve_normal_equations};
 pub use robust::{Loss, RobustFit};
 
-/// Why a least-squares problem has no solution.
+/// Error of a least-squares problem.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum LeastSquaresError {
     /// Matrix, right side, weights or prior do not fit together.
     #[error("{what} has {found} entries instead of {expected}")]
     Shape {
-        /// The vector or matrix.
+        /// Name of the vector or matrix.
         what: &'static str,
-        /// Its entries, or rows.
+        /// Number of its entries or rows.
         found: usize,
-        /// The entries, or rows, that fit.
+        /// Expected number of entries or rows.
         expected: usize,
     },
     /// An entry is infinite or not a number.
     #[error("{what} has an entry that is not finite; check the data for gaps, overflow and division by zero")]
     NotFinite {
-        /// The vector or matrix.
+        /// Name of the vector or matrix.
         what: &'static str,
     },
     /// The data do not determine all parameters.
@@ -51,11 +51,11 @@ pub enum LeastSquaresError {
         "the data determine {rank} of {parameters} parameters; record data of another kind, or leave out the parameters with the indices {undetermined:?}"
     )]
     RankDeficient {
-        /// Independent columns.
+        /// Number of linearly independent columns.
         rank: usize,
-        /// Columns.
+        /// Number of columns.
         parameters: usize,
-        /// Columns that depend on the others, from 0, as the pivoting finds them.
+        /// Indices, from 0, of the columns that depend linearly on the others, as column pivoting selects them.
         undetermined: Vec<usize>,
     },
 }

@@ -4,21 +4,22 @@ use nalgebra::DVector;
 
 use super::{LeastSquaresError, LinearFit, LinearProblem};
 
-/// Rounds of reweighting; ten are usual.
+/// Largest number of rounds of reweighting; ten are usual.
 const ROUNDS_MAX: usize = 100;
 
-/// Change of the parameters, in standard deviations, below which the weights have settled.
+/// Change of every parameter in one round, in its standard deviation, below which the weights have settled.
 const SETTLED: f64 = 1e-6;
 
-/// The median absolute deviation of a normal distribution is 1/1.4826 of its standard deviation.
+/// Factor from the median absolute deviation of a normal distribution to its standard deviation, 1/Φ⁻¹(3/4).
 const MEDIAN_TO_DEVIATION: f64 = 1.482_602_218_505_602;
 
-/// The loss ρ of a residual over its scale, by its weight ψ(u)/u. Both have 95 % efficiency with normal noise.
+/// Loss function ρ(u) of a residual divided by its scale; it acts through its weight ψ(u)/u. Both functions have 95 % efficiency for normal
+/// noise.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Loss {
-    /// Huber's: linear beyond 1.345 scales. Convex, with one minimum.
+    /// Huber's loss: linear beyond 1.345 scales. It is convex, so that the sum has one minimum.
     Huber,
-    /// Tukey's biweight: constant beyond 4.685 scales; it starts from the solution of Huber's.
+    /// Tukey's biweight: constant beyond 4.685 scales. The iteration starts from the solution with Huber's loss.
     Tukey,
 }
 
@@ -31,25 +32,25 @@ impl Loss {
     }
 }
 
-/// A robust fit with the weight that each row kept.
+/// A robust fit, with the factor by which the loss function reduced the weight of each row.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RobustFit {
-    /// The fit with the last weights.
+    /// The linear fit with the weights of the last round.
     pub fit: LinearFit,
-    /// The share, 0 … 1, of the weight of each row that is kept; 0 is an outlier.
+    /// Factor, from 0 to 1, on the weight of each row; 0 marks an outlier.
     pub kept: DVector<f64>,
-    /// The robust scale of the weighted residuals, in their unit.
+    /// Robust standard deviation of the weighted residuals, in their unit.
     pub scale: f64,
-    /// False where the weights still moved at the last round.
+    /// False if the weights still changed in the last round.
     pub is_settled: bool,
 }
 
 impl LinearProblem<'_> {
-    /// The least sum of ρ(rᵢ √wᵢ / scale), the scale from the median absolute residual of each round (Huber and Ronchetti,
+    /// Parameters with the least sum of ρ(rᵢ √wᵢ / scale). Each round takes the scale from the median absolute residual (Huber and Ronchetti,
     /// *Robust Statistics*, 2nd edition, 7.8).
     ///
     /// # Errors
-    /// See [`LeastSquaresError`]; also where outliers leave fewer rows than parameters.
+    /// See [`LeastSquaresError`]. Also if fewer rows than parameters remain without the outliers.
     pub fn solve_robust(&self, loss: Loss) -> Result<RobustFit, LeastSquaresError> {
         let (first, rounds) = match loss {
             Loss::Huber => (self.solve()?, ROUNDS_MAX),
@@ -71,7 +72,7 @@ impl LinearProblem<'_> {
             let residual = residual.zip_map(&given, |r, weight| r * weight.sqrt());
             robust.scale = MEDIAN_TO_DEVIATION * median(residual.iter().map(|r| r.abs()).collect());
             if robust.scale <= f64::EPSILON * self.right.amax() {
-                // More than half of the rows are met exactly.
+                // More than half of the residuals are zero to rounding, so that no scale can be estimated.
                 robust.is_settled = true;
                 break;
             }
