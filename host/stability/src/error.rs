@@ -99,7 +99,7 @@ pub enum StabilityError {
         path: PathBuf,
         /// Percentage of drawn machines that are not physical.
         percent: f64,
-        /// Why the first of them is impossible.
+        /// Reason why the first of these machines is not physical.
         reason: String,
     },
     /// A speed or depth that is out of range.

@@ -156,7 +156,7 @@ mod tests {
     use quietcut_testkit::case;
 
     #[test]
-    fn what_is_written_is_read_again_and_called() {
+    fn written_trial_cuts_are_read_again_and_compared() {
         // Chapter 7: the limit is 3.174 mm at 600 rev/min.
         let cut = |depth_mm, outcome| TestCut {
             rpm: 600.0,
@@ -187,7 +187,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_said_with_its_line() {
+    fn errors_in_a_table_of_trial_cuts_name_the_line() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("cuts.csv");
         let header = "rpm [rev/min],depth [mm],outcome\n";

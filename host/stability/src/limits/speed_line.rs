@@ -19,7 +19,7 @@ pub struct Switch {
     /// True if the multiplier moves into the unit circle with growing depth: stability is gained, provided that no
     /// other multiplier is outside.
     pub gain: bool,
-    /// Frequency of the vibration that begins or ends there, Hz.
+    /// Frequency of the vibration that begins or ends at this depth, Hz.
     pub chatter_hz: Option<f64>,
 }
 

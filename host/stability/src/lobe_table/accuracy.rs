@@ -73,7 +73,7 @@ impl Disagreement {
         }
     }
 
-    /// True if one side is larger than `factor` times that of the other miss.
+    /// True if the disagreement is more than `factor` times `other`, on the unsafe or on the cautious side.
     fn exceeds(self, other: Self, factor: f64) -> bool {
         self.unsafe_mm > factor * other.unsafe_mm || self.cautious_mm > factor * other.cautious_mm
     }

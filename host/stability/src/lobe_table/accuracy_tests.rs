@@ -32,13 +32,13 @@ fn at_no_depth(case: &Case) -> WorkingPoint {
     }
 }
 
-/// Error stated by a table, and the number of random speeds at which it is wrong on either side.
+/// Numbers of random speeds at which a table differs from the method by more than its stated error.
 struct Trial {
     /// Number of speeds at which some depth that is stable in the table is further than the stated depth from the
     /// stable depths of the method.
     unsafe_speeds: usize,
-    /// Number of speeds at which some depth that is unstable in the table is further than the stated depth from all
-    /// limits of the method, although it is stable by the method at all speeds within the stated share.
+    /// Number of speeds at which some depth is unstable in the table, although it is stable by the method at all speeds
+    /// within the stated speed error and further than the stated depth from every limit.
     cautious_speeds: usize,
 }
 
@@ -150,7 +150,7 @@ fn check(name: &str, rpm: Option<(f64, f64)>, depth_mm: Option<f64>, speeds: Opt
     );
 }
 
-/// Complete tables of linear structures, at low and full immersion, with and without flip islands.
+/// Tables with default settings of linear structures, at low and full immersion, with and without flip islands.
 #[test]
 fn the_stated_error_holds_at_999_of_1000_speeds_of_whole_tables() {
     for (seed, name) in (20_261_123..).zip([
@@ -163,7 +163,8 @@ fn the_stated_error_holds_at_999_of_1000_speeds_of_whole_tables() {
     }
 }
 
-/// Few speeds over a wide range, so that refinement misses whole lobes, and a narrow range with flip islands.
+/// Tables with few initial speeds: over a wide range, where refinement misses whole lobes, and over a narrow range with
+/// flip islands.
 #[test]
 fn the_stated_error_holds_at_999_of_1000_speeds_of_coarse_tables() {
     for (seed, (name, rpm, depth_mm, speeds)) in (20_261_133..).zip([
@@ -176,7 +177,8 @@ fn the_stated_error_holds_at_999_of_1000_speeds_of_coarse_tables() {
     }
 }
 
-/// Three entries for an octave of lobes. Only the unsafe side is bounded, since columns give up what they cannot hold.
+/// A table of few entries over a factor of two in speed. Only the unsafe side is checked, since full columns call
+/// narrow stable gaps unstable.
 #[test]
 fn a_table_of_three_speeds_calls_nothing_stable_beyond_the_stated_depth() {
     let rpm = Some((5182.07, 11_876.75));

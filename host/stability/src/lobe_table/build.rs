@@ -33,7 +33,7 @@ const GUARDED: usize = 3;
 /// is checked against the method at two more speeds, and at up to 23 if these disagree with the table, in every layer
 /// and half way between layers. If the table is too deep there, on flanks too steep for its speeds, the surrounding
 /// entries become as shallow as the gap; see [`InterpolationError`] for the stated error. Depths with two stable
-/// orbits, which only cubic terms cause, count as unstable.
+/// orbits, which only nonlinear cases have, count as unstable.
 ///
 /// # Errors
 /// No case, cases of different tools, two layers for the same cut, or a case whose stability cannot be computed.

@@ -209,7 +209,7 @@ fn depends_on_feed(case: &Case) -> bool {
 /// Layers between which a table is checked: a single one, or the middle of two between which lookups interpolate.
 pub(super) struct CheckedLayers {
     pub(super) family: Family,
-    /// Index of the layer, or of both layers.
+    /// Index of the single layer, or indices of the two layers.
     pub(super) layers: Vec<usize>,
 }
 

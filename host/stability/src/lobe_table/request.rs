@@ -9,8 +9,8 @@ pub struct TableRequest {
     /// Largest axial depth, mm. Default: four times the lowest limit.
     pub depth_mm: Option<f64>,
     /// Feeds per tooth, mm, one layer each; more are added between them where limits bend. Default: the feed of each
-    /// case. Without axial-depth modulation and cubic terms limits do not depend on the feed, and one layer holds for
-    /// all feeds.
+    /// case. Without axial-depth modulation and nonlinear effects limits do not depend on the feed, and one layer holds
+    /// for all feeds.
     pub feeds_per_tooth_mm: Vec<f64>,
     /// Feed directions, degrees from the machine's x towards its y, one layer each; more are added between them where
     /// limits bend. If empty, the direction of each case, which the table then does not state.

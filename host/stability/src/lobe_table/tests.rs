@@ -41,7 +41,7 @@ fn request(rpm: (f64, f64), depth_mm: f64) -> TableRequest {
     }
 }
 
-/// First limit stated by a table, mm; the last depth if nothing is unstable.
+/// First limit according to a table, mm; the last depth if nothing is unstable.
 fn tabulated_limit(table: &LobeTable, point: &WorkingPoint, direction_deg: Option<f64>, rpm: f64) -> f64 {
     let table = towards(table, direction_deg);
     let column = table.column(Rpm(rpm as f32), point).unwrap();
@@ -58,7 +58,7 @@ fn is_stable(line: &SpeedLine, depth_mm: f64) -> bool {
     entries::surely_stable(line, f64::INFINITY).iter().any(within)
 }
 
-/// Comparison of a table with the method at random points, with the error stated by the table.
+/// Comparison of a table with the method at random speeds, against the error that the table states.
 struct Trial<'a> {
     table: &'a LobeTable<'a>,
     depth_mm: f64,
@@ -74,8 +74,8 @@ impl<'a> Trial<'a> {
         }
     }
 
-    /// Checks that every depth the table calls stable at the speed of a cut is so within the stated depth. `direct` is
-    /// the line of the method.
+    /// Asserts that every depth which the table calls stable at the speed of `direct`, the line of the method, lies
+    /// within the stated error of its stable depths.
     fn check(
         &mut self,
         point: &WorkingPoint,
@@ -124,14 +124,14 @@ fn stable_depths_between_the_entries_are_stable_within_the_stated_error() {
     let bytes = build_table(std::slice::from_ref(&case), &request((from, to), depth_mm)).unwrap();
     let table = LobeTable::parse(&bytes).unwrap();
     let error = table.interpolation_error().unwrap();
-    // Refinement aims at 0.3 % of the depth; stated are 1.5 times that and the rounding of an entry. Islands begin
-    // within 0.5 % of speed.
+    // The stated error in depth is 1.5 times the tolerance of the refinement, 0.3 % of the depth, plus the rounding of
+    // an entry. Islands begin within 0.5 % of the speed.
     assert!(error.depth.0 < 0.05 && error.speed < 0.01, "{error:?}");
     let problem = problem(&case);
     let seed = 20_261_121;
     println!("seed {seed}");
     let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
-    // Half of the speeds lie around the notch and its islands.
+    // Half of the speeds lie around the flip notch and its islands.
     let speeds: Vec<f64> = (0..600)
         .map(|index| {
             if index % 2 == 0 {
@@ -150,7 +150,8 @@ fn stable_depths_between_the_entries_are_stable_within_the_stated_error() {
         if miss.cautious_mm <= allowed_mm {
             continue;
         }
-        // Depths given up lie within the speed error of a limit: they are unstable at some speed within it.
+        // Stable depths that the table calls unstable lie next to a limit within the speed error: they are unstable at
+        // some speed within it.
         let reach = f64::from(error.speed) * line.rpm;
         let around = [-1.0, -0.6, -0.3, 0.3, 0.6, 1.0].map(|share| direct(line.rpm + share * reach));
         for _ in 0..50 {
@@ -239,7 +240,8 @@ fn teeth_at_unequal_pitch_have_a_table_of_their_own() {
         differs_mm = differs_mm.max((tabulated_mm - even_mm).abs());
     }
     trial.report();
-    // The difference is forty times the stated error, so that the table is that of the tool with unequal pitch.
+    // Unequal pitch changes the limit by forty times the stated error: the table is that of the tool with unequal
+    // pitch.
     assert!(differs_mm > 0.01, "{differs_mm}");
     let derivatives = TableRequest {
         derivatives: true,
@@ -281,8 +283,8 @@ fn the_stated_error_of_a_5_percent_table_holds() {
     trial.report();
 }
 
-/// Follows a case with cubic terms through the bytes of its table and the lookup of the device. About two CPU minutes:
-/// `cargo test --release -p quietcut-stability --lib cubic_terms_through -- --ignored --nocapture`
+/// A case with cubic terms: its table, written to bytes and read by the device's lookup, agrees with the method. About
+/// two CPU minutes: `cargo test --release -p quietcut-stability --lib cubic_terms_through -- --ignored --nocapture`
 #[test]
 #[ignore = "forced orbits at some hundred speeds; see the comment above for the command"]
 fn cubic_terms_through_table_and_lookup_stay_within_the_stated_error() {
@@ -309,7 +311,7 @@ fn cubic_terms_through_table_and_lookup_stay_within_the_stated_error() {
         let forced = orbit::ForcedProblem::new(&there).unwrap();
         let direct = forced.line(rpm, depth_mm, 40).unwrap();
         trial.check(&point(&case, 1.0, feed_mm), None, &direct);
-        // The limit is that with cubic terms, not the linear one.
+        // The tabulated limit is that with cubic terms: it is more than 10 % deeper than the linear one.
         let tabulated_mm = tabulated_limit(&table, &point(&case, 1.0, feed_mm), None, rpm);
         let linear_mm = limit(&line(&linear, rpm, depth_mm, 40).unwrap(), depth_mm);
         assert!(
@@ -321,7 +323,7 @@ fn cubic_terms_through_table_and_lookup_stay_within_the_stated_error() {
 }
 
 #[test]
-fn a_miss_is_measured_from_the_limits_of_the_method() {
+fn disagreement_is_measured_from_the_limits_of_the_method() {
     let miss = |truth: &[[f64; 2]], tabulated: &[[f64; 2]]| {
         let miss = Disagreement::between(truth, tabulated, 5.0);
         [miss.unsafe_mm, miss.cautious_mm]
@@ -329,10 +331,10 @@ fn a_miss_is_measured_from_the_limits_of_the_method() {
     let close = |a: [f64; 2], b: [f64; 2]| (0..2).all(|i| a[i] == b[i] || (a[i] - b[i]).abs() < 1e-12);
     assert!(close(miss(&[[0.0, 2.0]], &[[0.0, 2.3]]), [0.3, 0.0]));
     assert!(close(miss(&[[0.0, 2.0]], &[[0.0, 1.5]]), [0.0, 0.5]));
-    // An island that only the table has, and one that only the method has.
+    // First an island that only the table has, then one that only the method has.
     assert!(close(miss(&[[0.0, 2.0]], &[[0.0, 2.0], [3.0, 3.5]]), [1.5, 0.0]));
     assert!(close(miss(&[[0.0, 2.0], [3.0, 3.5]], &[[0.0, 2.0]]), [0.0, 0.25]));
-    // Nothing is stable on one side; everything on the other.
+    // First nothing is stable by the method, then everything.
     assert!(close(miss(&[], &[[0.0, 0.4]]), [0.4, 0.0]));
     assert!(close(miss(&[[0.0, 5.0]], &[[0.0, 1.0]]), [0.0, f64::INFINITY]));
     // Equal sets, apart from the rounding of the last depth.
@@ -340,7 +342,7 @@ fn a_miss_is_measured_from_the_limits_of_the_method() {
 }
 
 #[test]
-fn entries_take_others_in_and_keep_their_kind() {
+fn the_union_of_entries_keeps_their_kind() {
     let entry = |from_mm: f64, to_mm: f64, kind| Entry {
         interval: quietcut_core::lobes::Interval {
             from: Millimeters(from_mm as f32),
@@ -409,7 +411,7 @@ fn derivatives_of_entries_are_those_of_limits_of_another_machine() {
         let [before, after] = [&was, &is].map(|problem| limit(&line(problem, rpm, 4.0, 40).unwrap(), 4.0));
         let corrected = table.corrected_entry(0, index, &learned).unwrap();
         let corrected = f64::from(corrected.first_limit().unwrap().from.0);
-        // The remaining error is of second order: a tenth of the change, plus the rounding of an entry.
+        // Tolerance: second-order terms, a tenth of the change, plus the rounding of an entry.
         assert!(
             (corrected - after).abs() < 0.1 * (after - before).abs() + 1e-3,
             "{rpm}: {before} {after} {corrected}"
@@ -430,8 +432,8 @@ fn feed_layers_agree_with_the_direct_solution_between_them() {
     let table = LobeTable::parse(&bytes).unwrap();
     let error = table.interpolation_error().unwrap();
     println!("{} layers, stated error {}", table.layers().len(), error.depth);
-    // Layers are both requested feeds and those that limits need between them; the stated error is not enlarged in
-    // their place.
+    // There are layers for both requested feeds, and more between them if limits need these. The stated error stays
+    // small.
     assert!(
         table.layers().len() >= 2 && error.depth.0 < 0.02,
         "{}",
@@ -449,7 +451,8 @@ fn feed_layers_agree_with_the_direct_solution_between_them() {
         for (rpm, allowed_mm) in [
             (407.0, f64::from(error.depth.0)),
             (561.3, f64::from(error.depth.0)),
-            // At a speed of the grid only the feed is interpolated: the error is a tenth of the change with the feed.
+            // At a speed of the table only the feed is interpolated; the tolerance is a tenth of the change over the
+            // feeds.
             (grid[0], 7e-4),
             (grid[1], 7e-4),
             (grid[2], 7e-4),
@@ -478,7 +481,7 @@ fn direction_layers_agree_with_the_direct_solution_between_them() {
     let table = LobeTable::parse(&bytes).unwrap();
     let error = table.interpolation_error().unwrap();
     println!("{} layers, stated error {}", table.layers().len(), error.depth);
-    // The directions are more than 45 degrees apart: at least one was added.
+    // The requested directions are more than 45 degrees apart, so that refinement adds at least one.
     assert!(table.layers().len() > 2);
     for degrees in [5.0, 22.0, 48.0] {
         case.cut.as_mut().unwrap().feed_direction_deg = degrees;
@@ -533,7 +536,7 @@ fn postures_are_layers_and_a_percentile_is_that_of_the_machines() {
     assert!(Parameter::Ktc.shift(&mut hard, 1.644_853_6 * 12.0));
     let expected_mm = limit(&line(&problem(&hard), 1300.0, 5.0, 40).unwrap(), 5.0);
     let tabulated_mm = limit(&tabulated[0], 5.0);
-    // Tolerance: slices of 1/256 of the machines, 0.04 standard deviations wide there.
+    // Tolerance: slices of 1/256 of the machines are 0.04 standard deviations wide at this quantile.
     assert!(
         (tabulated_mm - expected_mm).abs() < 2e-3 * expected_mm,
         "{tabulated_mm} {expected_mm}"
@@ -567,7 +570,7 @@ fn a_structure_with_cubic_terms_has_layers_over_feed() {
     let forced = orbit::ForcedProblem::new(&case).unwrap();
     let direct = forced.line(rpm, depth_mm, 40).unwrap();
     assert_eq!(families[1].lines(&[rpm], depth_mm).unwrap()[0], direct);
-    // Every depth that is not surely stable belongs to an entry.
+    // Unstable depths of the entries and stable depths together cover the whole depth range.
     let entries = entries::unstable(&direct, depth_mm);
     let stable = entries::surely_stable(&direct, depth_mm);
     let length = |intervals: &[[f64; 2]]| intervals.iter().map(|[from, to]| to - from).sum::<f64>();

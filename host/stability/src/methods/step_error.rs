@@ -30,7 +30,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_error_of_a_step_is_that_of_its_leading_term_with_room() {
+    fn the_error_of_a_step_is_that_of_its_leading_term_with_a_safety_factor() {
         let exact = Complex64::new(0.3, -0.9);
         for order in 1..=4 {
             let with = |step: f64| exact + Complex64::new(0.2, 0.1) * step.powi(order);

@@ -35,7 +35,7 @@ pub struct Event {
     /// Multiplier at the crossing.
     #[serde(skip)]
     pub multiplier: Complex64,
-    /// Frequency of the vibration that begins or ends there, Hz; `None` at a fold.
+    /// Frequency of the vibration that begins or ends at this depth, Hz; `None` at a fold.
     pub chatter_hz: Option<f64>,
 }
 

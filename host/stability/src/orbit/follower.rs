@@ -45,7 +45,7 @@ pub fn follow_depth(
 pub(super) struct Dominant {
     /// Multiplier; of a conjugate pair the one above the real axis.
     pub(super) multiplier: Complex64,
-    /// Vibration frequency that belongs to it, Hz.
+    /// Vibration frequency of the motion that belongs to the multiplier, Hz.
     pub(super) chatter_hz: Option<f64>,
 }
 

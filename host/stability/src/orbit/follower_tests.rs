@@ -54,7 +54,7 @@ fn the_first_loss_is_a_fold_of_the_orbit_where_it_turns_back() {
             "{inverse}"
         );
     }
-    // The branch turns back twice at this speed, and two stable orbits coexist.
+    // At this speed the branch turns back twice, so that two stable orbits coexist over a range of depths.
     let branch = follow_depth(&full, rpm(1.0 / 0.165), 15.0, Extent::Whole).unwrap();
     let bistable = branch.bistable_mm();
     assert_eq!(bistable.len(), 1);
@@ -82,7 +82,7 @@ fn stated_errors_of_limits_hold_what_a_mesh_four_times_as_fine_changes() {
         println!("{tau}: {found:?}, {change_mm:.1e} mm from the finest");
         assert_eq!(found.kind, kind, "{tau}");
         assert!(change_mm <= found.error_mm, "{tau}: {change_mm} {found:?}");
-        // The error of the limits is far below the four digits required.
+        // Stated errors lie far below the four digits that limits need.
         assert!(found.error_mm < 1e-5 * found.depth_mm, "{tau}: {found:?}");
     }
 }
@@ -95,7 +95,7 @@ fn cubic_terms_raise_the_pockets_of_half_immersion() {
             let branch = follow_depth(problem, speed, 20.0, Extent::FirstLoss).unwrap();
             branch.speed_line().first_limit.unwrap().depth_mm
         };
-        // Reference ratios have three digits.
+        // Tolerance: the reference ratios have three digits.
         assert!((limit(&cubic) / limit(&linear) - ratio).abs() < 0.005, "{speed}");
     }
 }
@@ -108,7 +108,7 @@ fn about_the_orbit_of_a_linear_structure_the_limit_is_the_linear_one() {
     let linear = crate::line(&case.linear, 900.0, 6.0, 60).unwrap();
     let linear = linear.first_limit.unwrap();
     assert_eq!(orbits.kind, linear.kind);
-    // Both methods solve for the crossing to 1e-9.
+    // Tolerance: both methods solve for the crossing to 1e-9.
     assert!((orbits.depth_mm / linear.depth_mm - 1.0).abs() < 1e-8);
 }
 

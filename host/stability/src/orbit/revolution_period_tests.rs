@@ -17,7 +17,7 @@ use quietcut_model::case::Case;
 use quietcut_simulate::{Regeneration, Settings, VirtualCut};
 use quietcut_testkit::case;
 
-/// The same problem with the revolution as its period.
+/// The same problem with the revolution in place of the tooth period as its period.
 fn over_revolution(mut problem: ForcedProblem) -> ForcedProblem {
     problem.uneven = Some(Uneven {
         pitched: Pitched::from(problem.linear.clone()).over_revolution(),
@@ -26,7 +26,7 @@ fn over_revolution(mut problem: ForcedProblem) -> ForcedProblem {
     problem
 }
 
-/// Robot of chapter 6 with cubic terms and teeth at these angles.
+/// Robot of chapter 6 with cubic terms and two teeth at these pitch angles, degrees.
 fn uneven_robot(pitch_deg: [f64; 2]) -> Case {
     let mut case = case("kuka-kr90-half-cubic");
     case.tool.as_mut().unwrap().pitch_deg = pitch_deg.to_vec();
@@ -39,7 +39,7 @@ fn first_limit(line: &SpeedLine) -> crate::Limit {
 
 #[test]
 fn limits_of_equal_teeth_over_the_revolution_are_those_over_the_tooth_period() {
-    // The case before the last has a fold of the orbit.
+    // The third case has a fold of the orbit.
     for (name, rpm, depth_mm) in [
         ("kuka-kr90-half-cubic", 526.0, 16.0),
         ("kuka-kr90-half-cubic", 800.0, 8.0),
@@ -56,7 +56,7 @@ fn limits_of_equal_teeth_over_the_revolution_are_those_over_the_tooth_period() {
         println!("{rpm} rev/min: {tooth:?} {turn:?}");
         let both_mm = tooth.error_mm.unwrap() + turn.error_mm.unwrap();
         assert!((tooth.depth_mm - turn.depth_mm).abs() < both_mm, "{rpm}");
-        // The stated errors of both leave more than four digits.
+        // The sum of both stated errors is small enough for a comparison to more than four digits.
         assert!(both_mm < 1e-5 * tooth.depth_mm, "{rpm}: {both_mm}");
         assert_eq!(tooth.kind, turn.kind);
         match (tooth.chatter_hz, turn.chatter_hz) {
@@ -92,7 +92,7 @@ fn where_the_orbit_is_small_unequal_teeth_have_the_limits_of_the_linear_problem(
     }
 }
 
-/// Displacement, m, at the entry of tooth 0 in the last of `turns` revolutions, by time integration.
+/// Displacement, m, at the entry of tooth 0 after `turns` revolutions of time integration from rest.
 fn settled(case: &Case, rpm: f64, depth_mm: f64, turns: usize, regeneration: Regeneration) -> [f64; 3] {
     let cut = VirtualCut {
         entry: quietcut_simulate::Entry::None,
@@ -151,7 +151,7 @@ fn the_orbits_of_unequal_pitch_and_of_runout_are_what_integration_in_time_settle
         println!(
             "{name}: {orbit:?}, in time {time:?}, with loss of contact {surface:?}; from equal teeth {unlike:.3}"
         );
-        // Tolerance: the rest of the transient, and time steps accurate to 1e-10.
+        // Tolerance: the remaining transient, and time steps accurate to 1e-10.
         assert!(distance(orbit, time) < 1e-6 * size, "{name}");
         assert!(unlike > 0.01, "{name}");
     }
@@ -182,7 +182,7 @@ fn linear_structures_with_unequal_pitch_and_chip_laws_with_runout_are_refused() 
     }
 }
 
-/// Image of a start under the map: Newton steps over the revolution until the states at the nodes settle.
+/// Image of a start under the map over the revolution, from Newton steps until the states at the nodes settle.
 fn image(map: &RevolutionPeriod<'_>, start: &DVector<f64>, depth_m: f64, orbit: &Orbit) -> DVector<f64> {
     let mut states = orbit.states.clone();
     loop {
@@ -213,7 +213,7 @@ fn derivatives_of_the_map_are_those_of_differences() {
         };
         let difference = (moved(step) - moved(-step)) / (2.0 * step);
         let error = (difference - at.by.column(column)).norm();
-        // Tolerance: the square of the difference step, and rounding divided by it.
+        // Tolerance: square of the relative difference step, and rounding divided by that step.
         assert!(error < 1e-7 * at.by.norm(), "{column}: {error}");
     }
     let step_m = 1e-5 * depth_m;

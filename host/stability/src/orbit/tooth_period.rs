@@ -27,9 +27,9 @@ const NODES: usize = 9;
 /// Subinterval of the tooth period without entry or exit of a tooth.
 #[derive(Clone, Debug)]
 pub(super) struct Subinterval {
-    /// Phase of the tooth period at its start, rad.
+    /// Phase of the tooth period at the start of the subinterval, rad.
     pub(super) phase: f64,
-    /// Rotation of the tool over it, rad.
+    /// Rotation of the tool over the subinterval, rad.
     pub(super) turn: f64,
     /// Duration, s.
     pub(super) duration: f64,

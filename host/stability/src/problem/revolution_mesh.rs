@@ -252,7 +252,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn interpolation_errs_by_no_more_than_is_aimed_at() {
+    fn interpolation_errs_by_no_more_than_the_tolerance() {
         for (angle, tolerance) in [(0.3, 1e-9), (2.0, 1e-9), (5.0, 1e-9), (4.0, 1e-11), (TAU, 1e-6)] {
             let gauss = Gauss::shared(nodes_for(angle, tolerance));
             let worst = (0..=200).map(|i| {

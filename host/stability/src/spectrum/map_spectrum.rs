@@ -93,7 +93,7 @@ impl<M: PeriodMap, F: Fn(f64) -> Option<M>, E: Fn(Complex64, f64) -> Option<f64>
             self.at(depth_m)?.deeper = Some(deeper);
         }
         let deeper = self.at(depth_m)?.deeper.as_deref()?;
-        // If two real multipliers meet between both depths, the derivative does not exist.
+        // If two real multipliers meet between the depths w and w + step, the derivative does not exist.
         Some((nearest(deeper, own)? - own) / step_m)
     }
 

@@ -1,4 +1,4 @@
-//! Every method against the default on every case, and against what the literature quotes.
+//! Every method against the default method on every case, and against multipliers quoted in the literature.
 
 use num_complex::Complex64;
 
@@ -29,7 +29,7 @@ fn fdm(name: &str, steps: usize) -> Fdm {
     }
 }
 
-/// (case, rpm, depth in mm, multiplier) of every reference.
+/// Case, spindle speed in rev/min, depth in mm and multiplier of every reference.
 fn references() -> Vec<(String, f64, f64, Complex64)> {
     let path = format!("{}/../../tests/data/multipliers.csv", env!("CARGO_MANIFEST_DIR"));
     let mut reader = csv::ReaderBuilder::new()
@@ -47,7 +47,8 @@ fn references() -> Vec<(String, f64, f64, Complex64)> {
 
 #[test]
 fn the_quoted_multipliers_are_those_of_first_order_semi_discretization_with_192_steps() {
-    // a/D = 1, 5 000 rev/min: what is quoted as exact, and what converges.
+    // Immersion a/D = 1 at 5000 rev/min: |μ| as quoted, which is that of 192 steps, and the value to which it
+    // converges.
     let method = sdm("insperger-1dof-ad1", SdmOrder::First, 192);
     for (depth_mm, quoted, converged) in [
         (0.2, 0.8192, 0.819_742_78),
@@ -55,12 +56,12 @@ fn the_quoted_multipliers_are_those_of_first_order_semi_discretization_with_192_
         (1.0, 1.4040, 1.406_473_53),
     ] {
         let point = method.point(5000.0, depth_mm).unwrap();
-        // Half a unit of the last quoted digit, and rounding of it.
+        // Tolerance: half a unit of the last quoted digit, and its rounding.
         assert!((point.multiplier_abs - quoted).abs() < 5.5e-5, "{point:?}");
         let error = (point.multiplier_abs - converged).abs();
         assert!(error > 4e-4 && error < point.error, "{point:?}");
     }
-    // Forty steps, as in the published programs: wrong in the second digit, and they say so.
+    // With forty steps, as in published programs, |μ| errs by one to four percent; the stated error covers that.
     for (depth_mm, off) in [(0.2, 0.0134), (0.5, 0.0282), (1.0, 0.0400)] {
         let coarse = sdm("insperger-1dof-ad1", SdmOrder::First, 40);
         let point = coarse.point(5000.0, depth_mm).unwrap();
@@ -73,7 +74,7 @@ fn the_quoted_multipliers_are_those_of_first_order_semi_discretization_with_192_
     }
 }
 
-/// The error of the multiplier that belongs to the exact one.
+/// Error of the multiplier of a discretization that lies nearest to the exact one.
 fn error_of<D: Discretization>(method: &Discretized<D>, rpm: f64, depth_mm: f64, exact: Complex64) -> f64 {
     let nearest = |dominant: &Dominant, _: &Stepped| {
         let distances = dominant.eigenvalues.iter().map(|value| (value - exact).norm());
@@ -86,13 +87,14 @@ fn error_of<D: Discretization>(method: &Discretized<D>, rpm: f64, depth_mm: f64,
 fn multipliers_converge_on_every_case_with_the_order_of_the_method() {
     let mut seen = Vec::new();
     for (name, rpm, depth_mm, exact) in references() {
-        // One point of each case. Near a double multiplier convergence is that of a square root.
+        // One point of each case. Points with a multiplier near the real axis are left out, since near a double
+        // multiplier convergence is that of a square root.
         if seen.contains(&name) || exact.im.abs() < 0.2 {
             continue;
         }
         let check = |label: &str, order: f64, errors: [f64; 2]| {
             let slope = (errors[0] / errors[1]).log2();
-            // The next term is a few percent of the leading one at these steps.
+            // Tolerance: the second term of the error is a few percent of the leading one at these steps.
             assert!((slope - order).abs() < 0.15, "{label} {name}: {slope} {errors:?}");
         };
         let steps = [320, 640];
@@ -104,13 +106,13 @@ fn multipliers_converge_on_every_case_with_the_order_of_the_method() {
         check("fdm", 2.0, full);
         seen.push(name);
     }
-    // Every case that has a cut and no cubic terms.
+    // All cases that have a cut and no cubic terms are covered.
     assert_eq!(seen.len(), 12, "{seen:?}");
 }
 
 #[test]
 fn stated_errors_cover_the_true_ones_on_all_references() {
-    // All with few steps, every fourth with more.
+    // All references with 40 steps, every fourth with 100.
     for (steps, every) in [(40, 1), (100, 4)] {
         for (name, rpm, depth_mm, exact) in references().into_iter().step_by(every) {
             let methods: [&dyn Method; 3] = [
@@ -120,7 +122,8 @@ fn stated_errors_cover_the_true_ones_on_all_references() {
             ];
             for method in methods {
                 let point = method.point(rpm, depth_mm).unwrap();
-                // Of the size: where two multipliers are nearly as large, a method may take the other one.
+                // Error of |μ| and not of μ: if two multipliers have nearly one size, the method may take the other
+                // one.
                 let error = (point.multiplier_abs - exact.norm()).abs();
                 assert!(
                     error < point.error,
@@ -142,7 +145,7 @@ fn limits_windows_kinds_and_chatter_are_those_of_the_default() {
     let default = Collocation {
         problem: Problem::new(&case("kuka-kr90-acetal"), CubicTerms::Refuse).unwrap(),
     };
-    // 1 036: a window that is stable again; 1 045: a flip notch; 1 200: Hopf.
+    // At 1036 rev/min there is a stable window above the limit, at 1045 a flip notch, at 1200 a Hopf limit.
     let speeds = [1036.0, 1045.0, 1200.0];
     let exact = chart(&default, &speeds, 4.0, 40).unwrap();
     let methods: [&dyn Method; 2] = [
@@ -155,7 +158,7 @@ fn limits_windows_kinds_and_chatter_are_those_of_the_default() {
         for (found, exact) in found.speeds.iter().zip(&exact.speeds) {
             assert_eq!(found.switches.len(), exact.switches.len(), "{found:?} {exact:?}");
             for (found, exact) in found.switches.iter().zip(&exact.switches) {
-                // Errors of order h² of multipliers that change slowly with depth.
+                // Tolerance: multipliers err by h² and change slowly with the depth.
                 assert!(
                     (found.depth_mm / exact.depth_mm - 1.0).abs() < 0.01,
                     "{found:?} {exact:?}"
@@ -170,8 +173,8 @@ fn limits_windows_kinds_and_chatter_are_those_of_the_default() {
 
 #[test]
 fn chatter_is_named_after_the_largest_harmonic_by_every_method() {
-    // The fourth pair to leave the circle: its motion has many harmonics, and is drowned by another that grows a million times
-    // faster within a period.
+    // Case in which four pairs leave the unit circle. The motion of the fourth pair has many harmonics, and within a
+    // period another motion grows a million times faster.
     let name = "insperger-2dof-ad1";
     let default = Collocation {
         problem: Problem::new(&case(name), CubicTerms::Refuse).unwrap(),
@@ -191,7 +194,7 @@ fn chatter_is_named_after_the_largest_harmonic_by_every_method() {
         (by_default - by_receptances).abs() < 1e-6,
         "{by_default} {by_receptances}"
     );
-    // The limits of these steps are 2e-3 off.
+    // Tolerance: limits with 300 steps err by 2e-3.
     let by_steps = chatter_hz(&sdm(name, SdmOrder::First, 300));
     assert!(
         (by_steps / by_default - 1.0).abs() < 2e-3,

@@ -8,7 +8,7 @@ fn grid(first: f64, last: f64, count: usize) -> Vec<f64> {
         .collect()
 }
 
-/// The charts that are asked for: name, speeds, largest depth.
+/// Charts that are compared: case, lowest and highest spindle speed (rev/min), largest depth (mm).
 const CHARTS: [(&str, f64, f64, f64); 3] = [
     ("insperger-2dof-ad0.05", 5000.0, 25_000.0, 10.0),
     ("insperger-2dof-ad0.5", 5000.0, 25_000.0, 10.0),
@@ -43,7 +43,7 @@ fn cells_of_whole_charts_are_those_of_single_points() {
             );
         }
         println!("{name}: worst {worst:.1e}, over its error {ratio:.2}");
-        // What is asked for is 1e-4; curves are corrected by what was found half way.
+        // Tolerance: a fifth of the 1e-4 that cells may have, since each cubic is corrected by its error at the middle.
         assert!(worst < 2e-5, "{name}: {worst}");
         assert!(ratio <= 1.0, "{name}: {ratio}");
     }
@@ -80,7 +80,8 @@ fn verdicts_of_whole_charts_are_those_of_semi_discretization() {
             }
         }
         println!("{name}: {decided} of 60 decided, {large} of them beyond 2");
-        // Sixty steps tell most cells; at a twentieth of the diameter, and on the robot, no multiplier is beyond 2.
+        // With sixty steps semi-discretization decides most cells. Multipliers above 2 occur in the case with an
+        // immersion of half the diameter only.
         assert!(decided >= 45, "{name}: {decided}");
         assert_eq!(large > 0, name == "insperger-2dof-ad0.5", "{name}: {large}");
     }
@@ -109,7 +110,7 @@ fn cells_are_the_same_for_any_number_of_threads_and_any_order_of_depths() {
                 .eq(reversed.multiplier_abs.iter().rev())
         );
     }
-    // Verdicts are those of the limits.
+    // A cell is stable if and only if its depth lies in a stable interval of the line at its speed.
     for (line, cells) in chart(&method, &speeds, 4.0, 40)
         .unwrap()
         .speeds
@@ -127,7 +128,7 @@ fn cells_are_the_same_for_any_number_of_threads_and_any_order_of_depths() {
 }
 
 #[test]
-fn cells_without_sense_are_refused_and_none_are_none() {
+fn invalid_cells_are_refused_and_no_depths_give_no_cells() {
     let method = Collocation {
         problem: problem("kuka-kr90-acetal"),
     };

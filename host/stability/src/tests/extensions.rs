@@ -38,7 +38,7 @@ fn wear_and_drift_are_coefficients_and_stiffness_of_the_moment() {
 }
 
 #[test]
-fn what_has_no_multipliers_is_refused_with_its_reason() {
+fn effects_without_multipliers_are_refused_with_their_reason() {
     for (extension, reason) in [
         (
             "[extension.coulomb-friction]\nfc_n = 1.0\ndirection = \"x\"\n",
@@ -58,6 +58,6 @@ fn what_has_no_multipliers_is_refused_with_its_reason() {
             .to_string();
         assert!(error.contains(reason), "{error}");
     }
-    // Sensors change nothing.
+    // Effects of sensors do not change stability and are accepted.
     assert!(Problem::new(&case("[extension.sensor-gain]\ngain = 1.2\n"), CubicTerms::Refuse).is_ok());
 }

@@ -15,7 +15,7 @@ fn first(method: &impl Method, rpm: f64, depth_mm: f64) -> (f64, StabilityLoss) 
     (limit.depth_mm, limit.kind)
 }
 
-/// Averaged limits of chapter 7, mm, with four digits as PHYSICS has them.
+/// Spindle speed, rev/min, and limit with averaged coefficients, mm, of chapter 7 with four digits.
 const CHAPTER_7: [(f64, f64); 9] = [
     (600.0, 3.349),
     (800.0, 1.643),
@@ -43,7 +43,7 @@ fn averaged_limits_of_chapter_7() {
     for (rpm, expected) in CHAPTER_7 {
         let (depth_mm, kind) = first(&zoa, rpm, 6.0);
         let other = first(&nyquist, rpm, 6.0).0;
-        // Half a unit of the last printed digit, and what that digit was rounded from.
+        // Tolerance: half a unit of the last printed digit, and its rounding.
         assert!((depth_mm - expected).abs() <= 0.0006, "{rpm}: {depth_mm}");
         assert_eq!(kind, StabilityLoss::Hopf);
         assert!(
@@ -79,7 +79,7 @@ fn averaged_limits_of_chapter_3_with_and_without_edge_and_feed_terms() {
     assert!((with.0 - with.1).abs() < 1e-9 && (without.0 - without.1).abs() < 1e-9);
 }
 
-/// Every case with a cut: name, two speeds, rev/min, and a depth that its limits do not reach, mm.
+/// Every case with a cut: name, two spindle speeds (rev/min), and largest depth of the lines (mm), beyond the limits.
 const CASES: [(&str, [f64; 2], f64); 14] = [
     ("insperger-1dof-ad0.05", [6100.0, 15_000.0], 8.0),
     ("insperger-1dof-ad0.1", [6100.0, 15_000.0], 5.0),
@@ -105,7 +105,8 @@ fn switches(method: &impl Method, rpm: f64, depth_mm: f64) -> Vec<Switch> {
     method.line(rpm, depth_mm, 40).unwrap().switches
 }
 
-/// The largest relative difference of depths; both lists must have the same kinds and directions in the same order.
+/// Largest relative difference of depths between two lists of switches, which must have the same kinds and directions
+/// in the same order.
 fn difference(a: &[Switch], b: &[Switch]) -> f64 {
     assert_eq!(a.len(), b.len(), "{a:?}\n{b:?}");
     a.iter()
@@ -132,7 +133,7 @@ fn the_closed_form_and_the_confirmed_loci_have_the_same_averaged_limits_on_all_c
         for rpm in speeds {
             let (a, b) = (switches(&zoa, rpm, depth_mm), switches(&nyquist, rpm, depth_mm));
             count += a.len();
-            // Both solve to 1e-11.
+            // Tolerance: both methods solve for their limits to 1e-11.
             assert!(difference(&a, &b) < 1e-9, "{name} {rpm}");
         }
     }
@@ -158,13 +159,15 @@ fn limits_with_rising_harmonics_converge_to_those_of_the_one_period_map_on_all_c
                 "{name} {rpm}: {least} {coarse:.1e} {fine:.1e} {:.1e}",
                 error(None)
             );
-            // Order 2 or 3: a quarter at least with twice the harmonics, where rounding is not reached.
+            // The truncation error falls with the second or third power of the harmonics: by four or more with twice
+            // their number, unless it has reached rounding.
             assert!(
                 fine < 0.3 * coarse || fine < 1e-8,
                 "{name} {rpm}: {coarse} {fine}"
             );
         }
-        // By default limits settle to 1e-4; what is left is a third of it.
+        // By default harmonics are doubled until limits change by less than 1e-4, so that their error is a third of
+        // that.
         let rpm = speeds[0];
         let exact = line(&model, rpm, depth_mm, 40).unwrap().switches;
         let method = MultiFrequency {
@@ -226,7 +229,7 @@ fn the_flip_notch_its_upper_branch_and_the_window_are_found_by_harmonics() {
     let near = |found: &[Switch], expected: &[(f64, StabilityLoss, bool)]| {
         assert_eq!(found.len(), expected.len(), "{found:?}");
         for (found, (depth_mm, kind, gain)) in found.iter().zip(expected) {
-            // Half a unit of the last printed digit and the 4e-5 of the method.
+            // Tolerance: half a unit of the last printed digit, and the 4e-5 of the truncated harmonics.
             assert!((found.depth_mm - depth_mm).abs() < 0.0007, "{found:?}");
             assert_eq!((found.kind, found.gain), (*kind, *gain), "{found:?}");
         }
@@ -279,7 +282,8 @@ fn multipliers_are_those_of_the_one_period_map_within_the_error_stated() {
     }
 }
 
-/// With four teeth at full immersion the coefficients do not depend on the angle: averaged methods are exact.
+/// With four teeth at full immersion the sum of the directional coefficients does not depend on the rotation angle, so
+/// that methods with averaged coefficients are exact.
 #[test]
 fn where_coefficients_are_constant_averaged_methods_are_exact() {
     let mut case = case("insperger-2dof-ad1");
@@ -293,7 +297,7 @@ fn where_coefficients_are_constant_averaged_methods_are_exact() {
     for rpm in [4000.0, 9000.0, 14_000.0] {
         let exact = line(&model, rpm, 1.0, 60).unwrap().switches;
         assert!(!exact.is_empty());
-        // The default solves limits to 1e-9.
+        // Tolerance: the default method solves for limits to 1e-9.
         assert!(difference(&switches(&zoa, rpm, 1.0), &exact) < 1e-8, "{rpm}");
         let at = |method: &dyn Method| method.point(rpm, 0.3).unwrap().multiplier;
         let exact = point(&model, rpm, 0.3).unwrap().multiplier;
@@ -302,7 +306,7 @@ fn where_coefficients_are_constant_averaged_methods_are_exact() {
 }
 
 #[test]
-fn averaged_coefficients_know_no_flip_and_are_three_times_too_high_at_3_13() {
+fn averaged_coefficients_miss_a_flip_and_give_three_times_its_limit() {
     let rpm = 30.0 * 109.6416 / 3.13;
     let problem = problem("kuka-kr90-full");
     let exact = line(&model("kuka-kr90-full"), rpm, 8.0, 40)
@@ -317,7 +321,8 @@ fn averaged_coefficients_know_no_flip_and_are_three_times_too_high_at_3_13() {
     );
 }
 
-/// Mode coupling against its own definition: eigenvalues of the equations of motion with the cut as a stiffness.
+/// The limit of mode coupling is the depth at which an eigenvalue of the equations of motion, with the cut as a
+/// constant stiffness, crosses the imaginary axis.
 #[test]
 fn mode_coupling_limits_are_where_an_eigenvalue_of_the_equations_of_motion_crosses() {
     let name = "kuka-kr90-full";
@@ -344,7 +349,7 @@ fn mode_coupling_limits_are_where_an_eigenvalue_of_the_equations_of_motion_cross
     assert!(growth(limit).abs() < 1e-8 * decay, "{limit}");
     assert!(growth(0.99 * limit) < 0.0 && growth(1.01 * limit) > 0.0);
     assert_eq!(switches(&method, 2000.0, 60.0)[0].depth_mm, limit);
-    // Regeneration limits this cut first.
+    // In this cut regeneration limits the depth to less than half of the mode-coupling limit.
     assert!(
         limit
             > 2.0
@@ -361,7 +366,7 @@ fn mode_coupling_limits_are_where_an_eigenvalue_of_the_equations_of_motion_cross
 }
 
 #[test]
-fn mode_coupling_is_refused_where_nothing_can_couple() {
+fn mode_coupling_is_refused_for_a_single_mode() {
     let error = ModeCoupling::new(problem("insperger-1dof-ad1"))
         .unwrap_err()
         .to_string();
@@ -393,7 +398,7 @@ fn structures_without_damping_are_refused() {
 
 #[test]
 fn the_closed_form_is_found_on_a_single_degree_of_freedom() {
-    // One direction: w = −1/(2 K α_xx Re H), Altintas' own formula, at every chatter frequency found.
+    // With one direction the limit is w = 1/(2 K α_xx Re H) at every chatter frequency (Altintas & Budak).
     let model = model("insperger-1dof-ad1");
     let problem = problem("insperger-1dof-ad1");
     let process = &model.process;

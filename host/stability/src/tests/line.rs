@@ -1,17 +1,18 @@
-//! Errors of limits against motions by Taylor series, and of methods that discretize against the default.
+//! Stated errors of limits: against multipliers from Taylor series, and for discretizations against the default method.
 
 use crate::tests::taylor::{Series, largest_abs};
 use crate::tests::{problem, random_case, rpm_of};
 use crate::*;
 
-/// |μ| by Taylor series, with an error of 1e-9.
+/// Absolute value |μ| of the largest multiplier from Taylor series, with an error of 1e-9.
 fn reference(problem: &Problem, rpm: f64, depth_mm: f64) -> f64 {
     largest_abs(problem, rpm, depth_mm * 1e-3, Series::FINE)
         .unwrap()
         .0
 }
 
-/// The stable depths end, and begin again, within the errors stated.
+/// Checks that limits lie within their stated errors: at the distance of the error |μ| from Taylor series is below 1 on
+/// the stable side and above 1 on the other. Returns the number of switches.
 fn check(problem: &Problem, rpm: f64, depth_mm: f64) -> usize {
     let found = line(problem, rpm, depth_mm, 40).unwrap();
     for [from, to] in &found.stable_mm {
@@ -48,14 +49,15 @@ fn the_limits_of_the_thesis_lie_within_their_errors() {
     }
     assert!(check(&problem("staubli-tx200"), 500.0, 2.0) > 0);
     let limit = line(&acetal, 1200.0, 6.0, 40).unwrap().first_limit.unwrap();
-    // Errors are of use: d|μ|/d depth is about 0.1/mm there, and 1e-7 of the multiplier is stated.
+    // Stated errors are small enough to be useful: with d|μ|/dw of about 0.1/mm an error of 1e-7 of |μ| is 1e-6 mm.
     assert!(limit.error_mm.unwrap() < 1e-5, "{limit:?}");
 }
 
-/// Fig. 6.4: at half immersion an island of period doubling near 1/τ = 0.11, with (τ, w) = (8.7, 0.16) in it.
+/// Fig. 6.4: at half immersion there is an island of period doubling near 1/τ = 0.11, which contains (τ, w) = (8.7,
+/// 0.16).
 #[test]
 fn the_flip_island_of_half_immersion_is_found_and_closed() {
-    /// w per mm of depth.
+    /// Dimensionless depth w of chapter 6 per mm of axial depth.
     const PER_MM: f64 = 0.033_628;
     let half = problem("kuka-kr90-half");
     let flips_mm = |tau: f64| -> Vec<f64> {
@@ -74,7 +76,7 @@ fn the_flip_island_of_half_immersion_is_found_and_closed() {
             ref other => panic!("1/τ = {inverse}: {other:?}"),
         })
         .collect();
-    // One interval of speeds, with an end on both sides of it, and the tips of the island shorter than its middle.
+    // The island covers one interval of speeds and is lower at both tips than in its middle.
     let (first, last) = (reaches[0], reaches[reaches.len() - 1]);
     assert!(0.1105 < first.0 && first.0 < 0.1120 && 0.1160 < last.0 && last.0 < 0.1180);
     assert!(((last.0 - first.0) / 0.0003 - (reaches.len() - 1) as f64).abs() < 0.5);
@@ -86,7 +88,7 @@ fn the_flip_island_of_half_immersion_is_found_and_closed() {
     );
     for (inverse, [from, to]) in reaches {
         let rpm = rpm_of(inverse.recip());
-        // Motions by Taylor series double their period within, and die out below.
+        // The oracle of Taylor series finds the cut unstable within the island and stable below it.
         let inside = reference(&half, rpm, 0.5 * (from + to));
         let below = reference(&half, rpm, from - 0.01);
         assert!(inside > 1.0 && below < 1.0, "1/τ = {inverse}: {inside} {below}");
@@ -164,7 +166,7 @@ fn limits_of_few_steps_err_by_less_than_they_state() {
 }
 
 #[test]
-fn an_error_stands_in_undecided_depths_only_where_the_side_depends_on_it() {
+fn errors_leave_depths_undecided_only_at_the_ends_of_stable_intervals() {
     let switch = |depth_mm: f64, kind, gain| Switch {
         depth_mm,
         error_mm: Some(0.2),
@@ -181,6 +183,7 @@ fn an_error_stands_in_undecided_depths_only_where_the_side_depends_on_it() {
     ];
     let line = SpeedLine::of_switches(1000.0, 4.0, 0, switches);
     assert_eq!(line.stable_mm, [[0.0, 0.1], [3.0, 3.3]]);
-    // The pair at 1 and 2 mm leaves what the flip has made unstable.
+    // The Hopf pair crosses at 1 and 2 mm, where the flip has already made the cut unstable: those errors leave nothing
+    // undecided.
     assert_eq!(line.undecided_mm, [[0.0, 0.1 + 0.2], [3.0 - 0.2, 3.3 + 0.2]]);
 }

@@ -23,11 +23,11 @@ pub(crate) fn problem(name: &str) -> Problem {
     Problem::new(&case(name), CubicTerms::Refuse).unwrap()
 }
 
-/// Chapter 6 without dimensions: speed from τ, w from the depth.
+/// Spindle speed, rev/min, of a tooth period τ in the dimensionless units of chapter 6.
 pub(crate) fn rpm_of(tau: f64) -> f64 {
     30.0 * 109.6416 / tau
 }
-/// A random machine, tool, material and cut: 1 to 4 modes, 1 to 8 teeth, any immersion.
+/// Case with random modes (1 to 4), tool (1 to 8 teeth), material and cut (any immersion).
 pub(crate) fn random_case(rng: &mut impl rand::Rng) -> Case {
     use quietcut_model::milling::{Cut, Material, Tool};
     use quietcut_model::structure::{Direction, Form, Mode, Structure};
@@ -39,7 +39,8 @@ pub(crate) fn random_case(rng: &mut impl rand::Rng) -> Case {
             let frequency_hz = 10.0_f64.powf(rng.random_range(1.0..3.0));
             let omega = std::f64::consts::TAU * frequency_hz;
             let stiffness = 10.0_f64.powf(rng.random_range(5.5..7.5));
-            // ψψᵀ ω/(2ik) is a mode of stiffness k; a random phase makes it complex.
+            // With mode shape ψ the residue ψψᵀ ω/(2ik) belongs to a mode of stiffness k; a random phase of ψ makes the
+            // mode complex.
             let size = (omega / (2.0 * stiffness)).sqrt();
             let shape: Vec<Complex64> = (0..3)
                 .map(|_| {

@@ -1,4 +1,5 @@
-//! Multipliers and limits of the default method against references, plain integration and random machines.
+//! Multipliers and limits of the default method against references and against Runge–Kutta integration, and lines
+//! against single depths on random machines.
 
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
@@ -31,7 +32,7 @@ fn every_reference_multiplier_is_met_and_its_error_is_below_the_one_stated() {
         count += 1;
     }
     assert_eq!(count, 113);
-    // Asked for are 1e-6; the references themselves are good to 2.1e-8.
+    // Tolerance: the references are good to 2.1e-8, better than the 1e-6 that is required.
     assert!(worst < 2.1e-8, "{worst}");
 }
 
@@ -51,7 +52,7 @@ fn limits_of_chapter_7_are_met_to_four_digits() {
     ];
     for (rpm, depth_mm, kind) in limits {
         let limit = line(&problem, rpm, 6.0, 40).unwrap().first_limit.unwrap();
-        // Half a unit of the last printed digit.
+        // Tolerance: half a unit of the last printed digit.
         assert!((limit.depth_mm - depth_mm).abs() <= 0.0006, "{rpm}: {limit:?}");
         assert_eq!(limit.kind, kind);
     }
@@ -74,7 +75,7 @@ fn notch_window_and_upper_flip_of_chapter_7_are_found() {
     );
     assert_eq!(notch.stable_mm.len(), 1);
 
-    // Few samples must not step over the window either.
+    // Even five samples in depth must find the stable window above the notch.
     for samples in [5, 40, 200] {
         let window = line(&problem, 1036.0, 6.0, samples).unwrap();
         let expected = [[0.0, 1.575], [2.334, 2.712]];
@@ -102,7 +103,7 @@ fn limits_of_chapter_6_are_met_to_four_digits() {
     ];
     for (tau, w, kind) in limits {
         let limit = line(&full, rpm_of(tau), 12.0, 40).unwrap().first_limit.unwrap();
-        // Half a unit of the last printed digit, and 3e-5 for the factor from w to depth with five digits.
+        // Tolerance: half a unit of the last printed digit of w, and 3e-5 for the five digits of W_PER_MM.
         assert!(
             (limit.depth_mm * W_PER_MM - w).abs() < 1e-5 + 3e-5 * w,
             "{tau}: {limit:?}"
@@ -148,8 +149,8 @@ fn chatter_of_the_acetal_robot_is_near_17_4_hz() {
     assert!((flip.chatter_hz.unwrap() - 1045.0 / 60.0).abs() < 1e-9);
 }
 
-/// The transition matrix over a period by classical Runge–Kutta steps on ẋ = (A + B[κKα − β]C) x: nothing but the
-/// equation itself.
+/// Transition matrix over a period from classical Runge–Kutta steps on ẋ = (A + B[κKα − β]C) x, which share no code
+/// with collocation.
 fn transition_by_runge_kutta(problem: &Problem, rpm: f64, kappa: Complex64) -> DMatrix<Complex64> {
     const STEPS: usize = 4000;
     let structure = &problem.structure;
@@ -204,7 +205,7 @@ fn the_transition_matrix_is_that_of_plain_integration() {
     ];
     for (name, rpm, depth_m) in cases {
         let mut problem = problem(name);
-        // Twelve teeth at this immersion have three and four teeth in the cut.
+        // With twelve teeth at this immersion three and four teeth cut at once.
         for teeth in [problem.teeth, 12] {
             problem.teeth = teeth;
             problem.process.engagement.pitch = std::f64::consts::TAU / teeth as f64;
@@ -215,7 +216,7 @@ fn the_transition_matrix_is_that_of_plain_integration() {
                 let plain = transition_by_runge_kutta(&problem, rpm, kappa);
                 let n = plain.nrows();
                 let error = (DMatrix::from_row_slice(n, n, &ours) - &plain).norm() / plain.norm();
-                // (ωh)⁴/120 per radian with ωh below 0.02.
+                // Tolerance: the Runge–Kutta error (ωh)⁴/120 per radian, with ωh below 0.02.
                 assert!(error < 1e-7, "{name}, {teeth} teeth: {error}");
             }
         }
@@ -234,7 +235,7 @@ fn the_collocated_map_and_the_characteristic_matrix_have_the_same_multipliers() 
             let polished = characteristic
                 .multiplier_near(*multiplier, depth_m, 0.1, &mut work)
                 .unwrap();
-            // Rounding of a dense eigenvalue computation with entries up to about ten.
+            // Tolerance: rounding of the eigenvalues of a dense matrix with entries up to about ten.
             assert!((polished - multiplier).norm() < 1e-9 * multiplier.norm().max(1.0));
         }
     }
@@ -263,7 +264,7 @@ fn turning_structure_and_feed_together_changes_nothing() {
     };
     let angle_deg = -33.0_f64;
     let (sin, cos) = angle_deg.to_radians().sin_cos();
-    // Machine axes turned back by the angle: q_new = R q, so that the same feed lies at the angle.
+    // The machine's axes are rotated by R, q_new = R q. The feed direction moves to the same angle in the new axes.
     let turn = DMatrix::from_row_slice(2, 2, &[cos, -sin, sin, cos]);
     let mut turned = original.clone();
     let apply = |matrix: &DMatrix<f64>| &turn * matrix * turn.transpose();
@@ -285,7 +286,7 @@ fn turning_structure_and_feed_together_changes_nothing() {
             .depth_mm
     };
     let (a, b) = (limit(&original), limit(&turned));
-    // Limits are solved for to 1e-9 relative.
+    // Tolerance: limits are solved for to 1e-9 relative.
     assert!((a - b).abs() < 1e-8 * a, "{a} {b}");
     let mut unturned = turned;
     unturned.cut.as_mut().unwrap().feed_direction_deg = 0.0;
@@ -293,7 +294,7 @@ fn turning_structure_and_feed_together_changes_nothing() {
 }
 
 #[test]
-fn what_is_not_covered_is_refused_with_the_reason() {
+fn features_that_are_not_covered_are_refused_with_the_reason() {
     let refused = |case: &Case| Problem::new(case, CubicTerms::Refuse).unwrap_err().to_string();
     let cubic = refused(&case("kuka-kr90-full-cubic"));
     assert!(cubic.contains("cubic") && cubic.contains("--linear"), "{cubic}");
@@ -345,7 +346,7 @@ fn a_chart_is_the_same_for_any_number_of_threads_and_refinement_finds_the_notch(
         .filter_map(|line| Some((line.first_limit?.depth_mm, line.rpm)))
         .min_by(|a, b| a.0.total_cmp(&b.0))
         .unwrap();
-    // The true minimum is 1.327 mm at 1045; refinement allows 0.3 % of 5 mm.
+    // Reference: the lowest limit is 1.327 mm at 1045 rev/min. Tolerance: that of the refinement, 0.3 % of 5 mm.
     assert!(
         (lowest.0 - 1.327).abs() < 0.015 && (lowest.1 - 1045.0).abs() < 5.0,
         "{lowest:?}"
@@ -354,7 +355,7 @@ fn a_chart_is_the_same_for_any_number_of_threads_and_refinement_finds_the_notch(
 }
 
 #[test]
-fn the_lobe_table_says_what_the_direct_solution_says() {
+fn the_lobe_table_agrees_with_the_direct_solution() {
     use crate::lobe_table::TableRequest;
     use crate::lobe_table::build_table;
     use quietcut_core::lobes::{LobeTable, TabulatedStability};
@@ -383,7 +384,7 @@ fn the_lobe_table_says_what_the_direct_solution_says() {
         match (direct.first_limit, column.first_limit()) {
             (Some(limit), Some(interval)) => {
                 let error = f64::from(interval.from.0) - limit.depth_mm;
-                // Tolerance of the refinement, 0.3 % of 5 mm, doubled: a middle that fits does not bound all.
+                // Tolerance: twice that of the refinement, 0.3 % of 5 mm, which holds at the middle of a gap only.
                 assert!(error.abs() < 0.03, "{rpm}: {interval:?} {limit:?}");
                 assert!(interval.chatter.0 > 15.0 && interval.chatter.0 < 20.0);
             }
@@ -404,8 +405,8 @@ fn the_lobe_table_says_what_the_direct_solution_says() {
     );
 }
 
-/// Eigenvalues by power iteration on random vectors are below the dominant one: guards against a dominant multiplier
-/// that the dense eigenvalue routine would miss.
+/// The growth rate of power iteration is that of the dominant multiplier: a larger eigenvalue that the dense eigenvalue
+/// routine had missed would show.
 #[test]
 fn the_dominant_multiplier_is_the_growth_rate_of_the_map() {
     let problem = problem("insperger-2dof-ad0.5");
@@ -422,7 +423,8 @@ fn the_dominant_multiplier_is_the_growth_rate_of_the_map() {
             vector /= norm;
         }
         let dominant = period_map::multipliers(&period, depth_m).unwrap()[0].norm();
-        // The start vector and the turning of a complex pair count for a few units over 400 turns.
+        // Tolerance: the start vector and the rotation of a complex pair change the logarithm of the growth over all
+        // iterations by a few units.
         assert!(
             (growth / f64::from(TURNS) - dominant.ln()).abs() < 0.02,
             "{rpm}: {growth} {dominant}"
@@ -451,7 +453,7 @@ fn lines_of_random_machines_agree_with_multipliers_at_single_depths() {
             .iter()
             .map(|pole| pole.im)
             .fold(0.0, f64::max);
-        // 0.3 to 4 vibrations of the fastest mode in a tooth period.
+        // Number of vibrations of the fastest mode in a tooth period: 0.3 to 4.
         let vibrations = 10.0_f64.powf(rng.random_range(-0.5..0.6));
         let rpm = 60.0 / problem.teeth as f64 * fastest / std::f64::consts::TAU / vibrations;
         let depth_mm = 10.0_f64.powf(rng.random_range(-1.5..0.5));
@@ -465,7 +467,7 @@ fn lines_of_random_machines_agree_with_multipliers_at_single_depths() {
                 .stable_mm
                 .iter()
                 .any(|[from, to]| (*from..=*to).contains(&depth));
-            // Limits are good to 1e-9: closer to the circle both may be right.
+            // Limits are accurate to 1e-9. If |μ| is closer to 1 than 1e-6, rounding decides the side.
             assert!(
                 (dominant - 1.0).abs() < 1e-6 || stable == (dominant < 1.0),
                 "case {index}: {rpm} rev/min, {depth} mm: |μ| = {dominant}, {line:?}"

@@ -1,8 +1,9 @@
-//! Properties of limits that hold for every machine and cut: scaling laws, turning, limits of no damping and no depth,
-//! closed forms of constant coefficients; and methods by receptances against the default on random machines.
+//! Properties of limits that hold for every machine and cut: scaling laws, rotation of the axes, vanishing damping and
+//! depth, closed forms for constant coefficients. Methods that use receptances are compared with the default method on
+//! random machines.
 //!
-//! A case that fails is printed with all its parameters, shrunk. A campaign, minutes:
-//! `QUIETCUT_RANDOM_CASES=300 cargo test --release -p quietcut-stability --lib -- tests::properties`
+//! A case that fails is shrunk and printed with all its parameters. A campaign of minutes: `QUIETCUT_RANDOM_CASES=300
+//! cargo test --release -p quietcut-stability --lib -- tests::properties`
 
 use std::f64::consts::{PI, TAU};
 
@@ -14,7 +15,7 @@ use crate::*;
 use quietcut_model::milling::{Cut, Material, Process, Tool};
 use quietcut_model::structure::{Direction, Form, Matrices, Structure, feed_axes};
 
-/// Two coupled modes in feed and normal direction, and a cut.
+/// Structure with two coupled modes in feed and normal direction, and a cut.
 #[derive(Clone, Debug)]
 struct Machine {
     /// Natural frequencies, rad/s.
@@ -23,14 +24,14 @@ struct Machine {
     zeta: [f64; 2],
     /// Modal masses, kg.
     mass: [f64; 2],
-    /// Angle between the first mode and the feed, rad.
+    /// Angle between the direction of the first mode and the feed, rad.
     lean: f64,
     teeth: usize,
     start_deg: f64,
     exit_deg: f64,
     ktc_mpa: f64,
     krc_ratio: f64,
-    /// Vibrations of the slower mode in a tooth period.
+    /// Number of vibrations of the slower mode in a tooth period.
     vibrations: f64,
 }
 
@@ -138,7 +139,7 @@ impl Machine {
         60.0 * self.omega[0] / TAU / self.vibrations / self.teeth as f64
     }
 
-    /// A depth, mm, at which the stiffness of the cut is that of the softer mode: above most first limits.
+    /// Axial depth, mm, at which w K_tc equals the stiffness of the softer mode: deeper than most first limits.
     fn depth_mm(&self) -> f64 {
         let softest = (0..2)
             .map(|i| self.mass[i] * self.omega[i] * self.omega[i])
@@ -155,7 +156,8 @@ fn depths(problem: &Problem, rpm: f64, depth_mm: f64) -> Vec<(f64, StabilityLoss
         .collect()
 }
 
-/// Depths times a factor are the same as others, but for what lies at the last depth.
+/// True if the limits `a`, with depths times `factor`, are the limits `b` up to a relative tolerance; limits at the
+/// last depth are not compared.
 fn same(
     a: &[(f64, StabilityLoss, bool)],
     factor: f64,
@@ -176,10 +178,10 @@ fn same(
             .all(|(x, y)| (x.0 - y.0).abs() <= tolerance * y.0 && x.1 == y.1 && x.2 == y.2)
 }
 
-/// Limits are solved for to 1e-9; a scaled problem is cut into elements in another way.
+/// Relative tolerance of limits: each is solved for to 1e-9, and a scaled problem has another mesh.
 const LIMIT: f64 = 1e-7;
 
-/// As many cases as asked for by QUIETCUT_RANDOM_CASES.
+/// Number of random cases: that of QUIETCUT_RANDOM_CASES, otherwise `cases`.
 fn config(cases: u32) -> ProptestConfig {
     let asked = std::env::var("QUIETCUT_RANDOM_CASES").ok();
     ProptestConfig {
@@ -227,7 +229,7 @@ proptest! {
     }
 
     #[test]
-    fn turning_feed_and_structure_together_changes_nothing(machine in machines(), angle_deg in -180.0..180.0_f64) {
+    fn rotating_feed_and_structure_together_changes_nothing(machine in machines(), angle_deg in -180.0..180.0_f64) {
         let axes = feed_axes(angle_deg);
         let turn = DMatrix::from_fn(2, 2, |i, j| axes[(i, j)]);
         let turned = machine.matrices().map(|matrix| &turn * matrix * turn.transpose());
@@ -238,7 +240,7 @@ proptest! {
         prop_assert!(same(&a, 1.0, &b, depth_mm, LIMIT), "{a:?} {b:?}");
     }
 
-    /// Without depth the tool rings down with its own modes; the multiplier leaves that value in proportion to the depth.
+    /// At depth 0 the multiplier is that of the free structure; its change is proportional to a small depth.
     #[test]
     fn as_the_depth_vanishes_multipliers_are_those_of_the_free_structure(machine in machines()) {
         let (problem, rpm, depth_mm) = (machine.problem(), machine.rpm(), machine.depth_mm());
@@ -251,7 +253,7 @@ proptest! {
         let gap = |share: f64| (point(&problem, rpm, share * depth_mm).unwrap().multiplier_abs - free).abs();
         prop_assert!(gap(0.0) < 1e-9);
         let (far, near) = (gap(1e-5), gap(1e-6));
-        // A tenth of the depth, a tenth of the gap, to the second order and to rounding.
+        // A tenth of the depth changes |μ| by a tenth, apart from second order and rounding.
         prop_assert!((near - 0.1 * far).abs() < 0.01 * far + 1e-9, "{far} {near}");
     }
 
@@ -263,7 +265,8 @@ proptest! {
         above in 0.02..0.5_f64, lobe in 0usize..4, krc_ratio in 0.1..0.7_f64,
     ) {
         let (problem, alpha) = turning(omega, zeta, mass, krc_ratio);
-        // α_xx Re H > 0 above resonance only, α_xx being negative; from where Re H is large enough on.
+        // α_xx is negative, so that α_xx Re H > 0 only above the resonance. The frequency starts where |Re H| is large
+        // enough for the test.
         let chatter = omega * (1.0 + 0.6 * zeta + above);
         let h = problem.structure.receptance(chatter).unwrap()[(0, 0)];
         let inverse = (h * alpha).inv();
@@ -279,7 +282,8 @@ proptest! {
         prop_assert!((nearest.depth_mm - depth_mm).abs() < 1e-7 * depth_mm, "{nearest:?} {depth_mm}");
     }
 
-    /// The least limit of turning is 2kζ(1 + ζ) over the cutting stiffness: it goes to zero with the damping.
+    /// The smallest limit of turning is 2kζ(1 + ζ)/|α_xx| with the modal stiffness k: it vanishes with the damping
+    /// ratio ζ.
     #[test]
     fn as_damping_vanishes_so_does_the_least_limit(
         omega in 100.0..5000.0_f64, mass in 0.1..100.0_f64, krc_ratio in 0.1..0.7_f64, exponent in 2.0..5.0_f64,
@@ -288,7 +292,7 @@ proptest! {
         let (problem, alpha) = turning(omega, zeta, mass, krc_ratio);
         let stiffness = mass * omega * omega;
         let least_mm = 1e3 * 2.0 * stiffness * zeta * (1.0 + zeta) / alpha.abs();
-        // Where Re H is least, at ω√(1 + 2ζ), in the first lobe.
+        // Frequency ω√(1 + 2ζ) at which Re H is smallest, in the first lobe.
         let chatter = omega * (1.0 + 2.0 * zeta).sqrt();
         let h = problem.structure.receptance(chatter).unwrap()[(0, 0)];
         let delay_s = (PI - 2.0 * (h * alpha).inv().arg() + TAU) / chatter;
@@ -297,7 +301,8 @@ proptest! {
     }
 }
 
-/// One mode along the feed under four teeth at full immersion, and the constant coefficient α_xx, Pa.
+/// Problem with constant coefficients: one mode along the feed under four teeth at full immersion. Also returns the
+/// coefficient α_xx, Pa.
 fn turning(omega: f64, zeta: f64, mass: f64, krc_ratio: f64) -> (Problem, f64) {
     let machine = Machine {
         omega: [omega; 2],
@@ -326,9 +331,9 @@ fn turning(omega: f64, zeta: f64, mass: f64, krc_ratio: f64) -> (Problem, f64) {
     (problem, alpha)
 }
 
-/// Two loci that pass close by each other near the axis: taken for one another they cross it elsewhere.
+/// Two loci pass close by each other near the real axis: if they were exchanged, crossings would lie elsewhere.
 #[test]
-fn loci_that_nearly_meet_are_told_apart() {
+fn loci_that_nearly_meet_are_not_exchanged() {
     let machine = Machine {
         omega: [50.0, 54.70051932559452],
         zeta: [0.01, 0.012826296196247138],
@@ -350,7 +355,7 @@ fn loci_that_nearly_meet_are_told_apart() {
     let found = method.line(rpm, depth_mm, 40).unwrap().switches;
     assert_eq!(found.len(), exact.len());
     for (found, exact) in found.iter().zip(&exact) {
-        // What 20 harmonics leave out.
+        // Tolerance: truncation error with 20 harmonics.
         assert!(
             (found.depth_mm - exact.0).abs() < 2e-5 * exact.0,
             "{found:?} {exact:?}"
@@ -361,7 +366,8 @@ fn loci_that_nearly_meet_are_told_apart() {
 proptest! {
     #![proptest_config(config(12))]
 
-    /// Receptances alone give the limits of the one-period map, and the count of unstable roots the number outside.
+    /// Receptances alone give the limits of the period map, and the number of unstable roots is that of multipliers
+    /// outside the unit circle.
     #[test]
     fn methods_by_receptances_agree_with_the_default_on_random_machines(machine in machines(), share in 0.05..0.95_f64) {
         let (problem, rpm, depth_mm) = (machine.problem(), machine.rpm(), machine.depth_mm());
@@ -375,12 +381,12 @@ proptest! {
             .iter()
             .map(|switch| (switch.depth_mm, switch.kind, switch.gain))
             .collect();
-        // Limits settle to 1e-4, and a third of it is left.
+        // Limits with doubled harmonics change by less than 1e-4, so that their error is a third of that.
         prop_assert!(same(&found, 1.0, &exact, depth_mm, 1e-4), "{found:?} {exact:?}");
 
         let nyquist = Nyquist { problem: frequency.clone(), harmonics: 20 };
         let depth = share * depth_mm;
-        // So near a limit the truncation of harmonics may decide.
+        // Closer than 1 % to a limit the truncation of harmonics may decide the count.
         prop_assume!(exact.iter().all(|switch| (switch.0 / depth - 1.0).abs() > 1e-2));
         let outside: i32 = exact
             .iter()
@@ -389,7 +395,8 @@ proptest! {
             .sum();
         prop_assert_eq!(nyquist.unstable_roots(rpm, depth).unwrap(), outside);
 
-        // The two averaged methods, and the averaged roots, are exact for each other.
+        // ZOA and the Nyquist criterion with averaged coefficients solve the same equations: their limits and roots
+        // must agree.
         let zoa = Zoa { problem: frequency.clone() }.line(rpm, depth_mm, 40).unwrap();
         let averaged = Nyquist { problem: frequency, harmonics: 0 };
         let loci = averaged.line(rpm, depth_mm, 40).unwrap();

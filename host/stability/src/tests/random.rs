@@ -1,4 +1,5 @@
-//! Random machines: verdicts against motions by Taylor series, and of some against a winding number, without eigenvalues.
+//! Verdicts on random machines against multipliers from Taylor series, and on some machines against a winding number,
+//! which uses no eigenvalues.
 
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -14,13 +15,13 @@ use crate::tests::random_case;
 use crate::tests::taylor::{self, Series};
 use crate::*;
 
-/// Whether no multiplier lies outside the unit circle, by the argument principle on the finest period; `None` where that
-/// does not tell.
+/// True if no multiplier lies outside the unit circle, from the argument principle on the finer mesh; `None` if the
+/// winding number does not converge.
 ///
-/// F = det(Φ − μI) is analytic outside but for a pole of order n at infinity: the mean of μ ∂ ln F/∂μ over the unit circle
-/// is n less the number of zeros outside. The pair that was found is taken out of ∂ ln F/∂μ first, so that its neighbourhood
-/// does not need many points, and put back as what it is. Where it lies outside, that it is a zero is shown by
-/// a small circle around it.
+/// F = det(Φ − μI) is analytic outside the unit circle except for a pole of order n at infinity, so that the mean of μ
+/// ∂ ln F/∂μ over the circle is n minus the number of zeros outside. The terms of the multiplier `found` and its
+/// conjugate are subtracted from ∂ ln F/∂μ, since points close to them would have to be dense; their count is added
+/// afterwards. If `found` lies outside, a small circle about it shows that it is a zero.
 fn is_stable_by_winding(problem: &Problem, rpm: f64, depth_m: f64, found: Complex64) -> Option<bool> {
     let period = Period::new(problem, rpm, 2.0 * depth_m, Resolution::FINE);
     let characteristic = Characteristic::new(&period, 2.0 * depth_m);
@@ -46,17 +47,17 @@ fn is_stable_by_winding(problem: &Problem, rpm: f64, depth_m: f64, found: Comple
         let rest: Complex64 = pair.iter().map(|known| (multiplier - known).inv()).sum();
         Some(((slope(multiplier)? - rest) * multiplier).re)
     })?;
-    // The pair itself lies inside.
+    // Adds the multiplier and its conjugate, which lie inside the circle and whose terms were subtracted.
     Some(inside + pair.len() as i32 == period.order() as i32)
 }
 
-/// The mean over the angles of a circle, by the trapezoidal rule with ever more points until it is a whole number; `None`
-/// where 8 192 do not tell.
+/// Mean of a function of the angle over a circle, which must be an integer, by the trapezoidal rule. The number of
+/// points is doubled until the mean is close to an integer; `None` if 8192 points do not suffice.
 fn winding(of: &mut dyn FnMut(f64) -> Option<f64>) -> Option<i32> {
     use std::f64::consts::TAU;
     let mut count = 24_u32;
     let mut over = |count: u32, shift: f64| -> Option<f64> {
-        // Not at angle 0, where a real zero would be met.
+        // Starts a quarter of a step away from angle 0, where the function has a pole if there is a real zero.
         (0..count)
             .map(|i| of(TAU * (f64::from(i) + 0.25 + shift) / f64::from(count)))
             .sum()
@@ -66,7 +67,8 @@ fn winding(of: &mut dyn FnMut(f64) -> Option<f64>) -> Option<i32> {
     while count <= 4096 {
         let mean = sum / f64::from(count);
         let whole = mean.round();
-        // Errors fall as a power of the number of points: three rounds near the same whole number have arrived.
+        // Once the points resolve the zero nearest to the circle, each doubling of their number squares the error of
+        // the mean. Three successive means close to the same integer are taken as converged.
         if (mean - whole).abs() < 0.02 && (last - whole).abs() < 0.1 && (before - whole).abs() < 0.4 {
             return Some(whole as i32);
         }
@@ -77,23 +79,24 @@ fn winding(of: &mut dyn FnMut(f64) -> Option<f64>) -> Option<i32> {
     None
 }
 
-/// What came of one random machine at one speed and depth.
+/// Result for one random machine at one speed and depth, with its references.
 struct Outcome {
     verdict: Option<Verdict>,
-    /// What the reference says; `None` where it cannot tell.
+    /// Reference from Taylor series or from counting; `None` if neither gives a result.
     reference: Option<Reference>,
-    /// What the winding number says, where it was asked and could tell.
+    /// Stability from the winding number; `None` if it was not computed or did not converge.
     stable_by_winding: Option<bool>,
-    /// Distance from the reference, over the sum of both errors.
+    /// Difference of |μ| between method and reference, divided by the sum of both stated errors.
     error_ratio: f64,
-    /// Change of the reference with finer series over its error, where that was asked for.
+    /// Difference of |μ| between coarse and fine series, divided by the sum of both errors; 0 if fine series were not
+    /// computed.
     reference_ratio: f64,
     time: Duration,
     reference_time: Duration,
     words: String,
 }
 
-/// The size of the largest multiplier by Taylor series.
+/// Absolute value |μ| of the largest multiplier from Taylor series or from counting, with its error.
 #[derive(Clone, Copy, Debug)]
 struct Reference {
     multiplier_abs: f64,
@@ -102,16 +105,18 @@ struct Reference {
 }
 
 impl Reference {
-    /// What both of its resolutions keep to, relative to max(1, |μ|); every machine of [`BY_FINER_SERIES`] tests it.
+    /// Error of the reference from coarse series, relative to max(1, |μ|). One machine of [`BY_FINER_SERIES`] checks it
+    /// against fine series.
     const COARSE: f64 = 3e-8;
+    /// Error of the reference from fine series, relative to max(1, |μ|).
     const FINE: f64 = 1e-9;
 
-    /// Fine series are for multipliers that coarse ones leave near 1, and counting for what series do not tell or miss by more than
-    /// half of both errors.
+    /// Reference from coarse series; from fine series if |μ| is near 1; from counting if the series do not converge,
+    /// leave the verdict open, or differ from `found` by more than half the sum of both errors.
     fn new(problem: &Problem, rpm: f64, depth_m: f64, found: Option<&CutStability>) -> Option<Self> {
         let is_near = |reference: &Self| reference.miss(found) < 0.5;
         let by_series = || {
-            // Where coarse series do not settle fine ones do not either.
+            // If coarse series do not converge, fine ones do not either.
             let coarse = Self::at(problem, rpm, depth_m, Series::COARSE, Self::COARSE)?;
             if (coarse.multiplier_abs - 1.0).abs() > 100.0 * coarse.error && is_near(&coarse) {
                 return Some(coarse);
@@ -133,10 +138,11 @@ impl Reference {
         })
     }
 
-    /// By the numbers of multipliers beyond what was found and its error, and within: there is to be none, and one. Where nothing
-    /// was found, or these numbers do not tell a verdict, by that outside the unit circle.
+    /// Reference from the number of multipliers beyond two radii: beyond |μ| of `found` plus its error there must be
+    /// none, beyond |μ| minus its error at least one. If nothing was found, or if both numbers leave the verdict open,
+    /// the number outside the unit circle decides.
     fn by_counting(problem: &Problem, rpm: f64, depth_m: f64, found: Option<&CutStability>) -> Option<Self> {
-        /// Smaller multipliers are not counted.
+        /// Least radius beyond which multipliers are counted.
         const LEAST: f64 = 0.2;
         let count_beyond = |radius: f64| taylor::count_beyond(problem, rpm, depth_m, radius);
         let (size, error) = found.map_or((0.0, 0.0), |point| (point.multiplier_abs, point.error));
@@ -162,7 +168,7 @@ impl Reference {
         })
     }
 
-    /// Distance from what was found, over the sum of both errors.
+    /// Difference of |μ| between `found` and this reference, divided by the sum of both errors.
     fn miss(&self, found: Option<&CutStability>) -> f64 {
         found.map_or(0.0, |found| {
             (found.multiplier_abs - self.multiplier_abs).abs() / (found.error + self.error)
@@ -170,7 +176,7 @@ impl Reference {
     }
 }
 
-/// Of so many machines one is computed with finer series too.
+/// One machine in this number is also computed with fine series, as a check of the coarse ones.
 const BY_FINER_SERIES: usize = 50;
 
 impl Outcome {
@@ -191,7 +197,7 @@ impl Outcome {
         })
     }
 
-    fn is_silent(&self) -> bool {
+    fn lacks_reference(&self) -> bool {
         self.reference
             .is_none_or(|reference| reference.verdict == Verdict::Undecided)
     }
@@ -200,8 +206,9 @@ impl Outcome {
         self.verdict.is_none_or(|verdict| verdict == Verdict::Undecided)
     }
 
-    /// Says on stderr what is out of the ordinary.
-    fn tell(&self) {
+    /// Reports on stderr a wrong verdict, an error above the stated one, an open verdict, a missing reference and a
+    /// slow computation.
+    fn report(&self) {
         let Self { words, .. } = self;
         if self.is_wrong() || self.error_ratio > 1.0 || self.reference_ratio > 1.0 {
             let ratios = (self.error_ratio, self.reference_ratio);
@@ -213,7 +220,7 @@ impl Outcome {
         if self.is_undecided() {
             eprintln!("undecided {:?} {words}", self.reference);
         }
-        if self.is_silent() {
+        if self.lacks_reference() {
             eprintln!("silent {:?}, {:.2?} {words}", self.reference, self.reference_time);
         }
         if self.time.max(self.reference_time) > Duration::from_secs(2) {
@@ -222,7 +229,8 @@ impl Outcome {
     }
 }
 
-/// The machine with this index: 0.3 to 40 vibrations of its fastest mode in a tooth period, 0 to 10 mm.
+/// Random machine with this index at a random speed and depth: 0.3 to 40 vibrations of its fastest mode in a tooth
+/// period, and 0 to 10 mm of axial depth.
 fn random_point(seed: u64, index: usize, ports_max: usize) -> Outcome {
     let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
     rng.set_stream(index as u64);
@@ -265,14 +273,14 @@ fn random_point(seed: u64, index: usize, ports_max: usize) -> Outcome {
     }
 }
 
-/// What came of many machines.
+/// Numbers of machines by result, and the largest errors and times.
 #[derive(Default)]
 struct Counts {
     machines: usize,
     wrong: usize,
     crashed: usize,
     hung: usize,
-    /// With a distance from the reference beyond both stated errors.
+    /// Number of machines whose |μ| differs from the reference by more than the sum of both stated errors.
     beyond_error: usize,
     undecided: usize,
     refused: usize,
@@ -295,7 +303,7 @@ impl Counts {
         self.undecided += usize::from(outcome.is_undecided());
         self.refused += usize::from(outcome.verdict.is_none());
         self.stable += usize::from(outcome.verdict == Some(Verdict::Stable));
-        self.silent += usize::from(outcome.is_silent());
+        self.silent += usize::from(outcome.lacks_reference());
         self.by_winding += usize::from(outcome.stable_by_winding.is_some());
         self.error_ratio = self.error_ratio.max(outcome.error_ratio);
         self.reference_ratio = self.reference_ratio.max(outcome.reference_ratio);
@@ -319,7 +327,8 @@ impl Counts {
         assert_eq!((self.wrong, self.crashed, self.hung), (0, 0, 0));
         assert!(self.error_ratio <= 1.0, "{}", self.error_ratio);
         assert!(self.reference_ratio <= 1.0, "{}", self.reference_ratio);
-        // Asked for is less than 1 % each; some hundred machines may hold a few more by chance.
+        // At most 1 % of the machines may be undecided, and as many may lack a reference; the second term is two
+        // standard deviations of such a count.
         let most = 0.01 * self.machines as f64 + 0.2 * (self.machines as f64).sqrt();
         assert!((self.undecided as f64) < most && (self.silent as f64) < most);
     }
@@ -356,32 +365,33 @@ impl std::fmt::Display for Counts {
     }
 }
 
-/// Machines after which counts so far are printed.
+/// Number of machines after which the counts so far are printed.
 const PROGRESS: usize = 1000;
 
-/// A machine that takes longer, s by the clock on the wall, counts as a failure: as one that never ends.
+/// Longest wall-clock time for a machine, s; beyond it the computation counts as one that never ends.
 const LONGEST_S: usize = 60;
 
-/// What a worker says: which machine it is at, and what came of it (the words of a panic, if that is what came).
-enum Word {
+/// Message of a worker thread: index of the machine that it has begun or ended, with the outcome or the text of a
+/// panic.
+enum WorkerMessage {
     Began(usize),
     Ended(usize, Box<Result<Outcome, String>>),
 }
 
-/// A thread that takes machines one after the other from `next` on until `end`.
+/// Starts a thread that computes one machine after another, with indices from the shared counter `next` up to `end`.
 fn worker(
     seed: u64,
     next: &Arc<AtomicUsize>,
     end: usize,
     ports_max: usize,
-    words: mpsc::Sender<(usize, Word)>,
+    messages: mpsc::Sender<(usize, WorkerMessage)>,
     number: usize,
 ) {
     let next = Arc::clone(next);
     std::thread::spawn(move || {
         loop {
             let index = next.fetch_add(1, Ordering::Relaxed);
-            if index >= end || words.send((number, Word::Began(index))).is_err() {
+            if index >= end || messages.send((number, WorkerMessage::Began(index))).is_err() {
                 return;
             }
             let outcome =
@@ -390,8 +400,8 @@ fn worker(
                     text.or_else(|| panic.downcast_ref::<&str>().map(ToString::to_string))
                         .unwrap_or_default()
                 });
-            if words
-                .send((number, Word::Ended(index, Box::new(outcome))))
+            if messages
+                .send((number, WorkerMessage::Ended(index, Box::new(outcome))))
                 .is_err()
             {
                 return;
@@ -400,14 +410,15 @@ fn worker(
     });
 }
 
-/// Runs machines, says what came of them, and panics where a verdict is wrong, an error larger than stated, or no answer came.
+/// Computes `count` machines from the index `first` on and prints their results. Panics if a verdict is wrong, an error
+/// is larger than stated, or a computation crashes or hangs.
 ///
-/// The winding number is asked where the finest map has at most `ports_max` ports.
+/// The winding number is computed for machines whose finer mesh has at most `ports_max` ports.
 fn run(seed: u64, first: usize, count: usize, ports_max: usize) {
     let end = first + count;
     let longest = Duration::from_secs(number("QUIETCUT_RANDOM_LONGEST_S", LONGEST_S) as u64);
     let next = Arc::new(AtomicUsize::new(first));
-    let (sender, words) = mpsc::channel();
+    let (sender, messages) = mpsc::channel();
     let mut workers = rayon::current_num_threads().min(count);
     for number in 0..workers {
         worker(seed, &next, end, ports_max, sender.clone(), number);
@@ -416,18 +427,18 @@ fn run(seed: u64, first: usize, count: usize, ports_max: usize) {
     let mut counts = Counts::default();
     let mut at: BTreeMap<usize, (usize, Instant)> = BTreeMap::new();
     while counts.machines < count {
-        match words.recv_timeout(Duration::from_secs(1)) {
-            Ok((number, Word::Began(index))) => {
+        match messages.recv_timeout(Duration::from_secs(1)) {
+            Ok((number, WorkerMessage::Began(index))) => {
                 at.insert(number, (index, Instant::now()));
             }
-            Ok((number, Word::Ended(index, outcome))) => {
-                // One that was given up may end after all.
+            Ok((number, WorkerMessage::Ended(index, outcome))) => {
+                // The machine was already counted as hung, and its worker was replaced.
                 if at.remove(&number).is_none() {
                     continue;
                 }
                 match *outcome {
                     Ok(outcome) => {
-                        outcome.tell();
+                        outcome.report();
                         counts.add(index, &outcome);
                     }
                     Err(panic) => {
@@ -471,12 +482,12 @@ fn number(name: &str, default: usize) -> usize {
 #[test]
 fn verdicts_of_some_random_machines_are_right() {
     run(20_261_121, 0, 500, 0);
-    // The winding number takes much longer.
+    // Forty machines with the winding number, which takes much longer.
     run(20_261_122, 0, 40, 150);
 }
 
-/// Maps so far from normal that rounding moves their largest eigenvalue from 15.7 to 18, growth of 1e29 and of 1e197 in a period,
-/// and a map whose eigenvalues by QR are all rounding.
+/// Four machines: a map so far from normal that rounding moves its largest eigenvalue from 15.7 to 18, motions that
+/// grow by 1e29 and by 1e197 within a period, and a map whose eigenvalues from QR iteration are rounding only.
 #[test]
 fn verdicts_of_machines_that_grow_within_a_period_are_right() {
     for index in [18_041, 20_109, 14_762, 81_745] {
@@ -484,15 +495,16 @@ fn verdicts_of_machines_that_grow_within_a_period_are_right() {
     }
 }
 
-/// All of them; counts so far go to stdout after every thousand, whatever is undecided or slow to stderr:
+/// Campaign over all random machines. Counts go to stdout after every thousand machines; undecided and slow machines go
+/// to stderr:
 ///
 /// ```text
 /// RAYON_NUM_THREADS=1 cargo test --release -p quietcut-stability --lib -- --ignored --nocapture verdicts_of_a_hundred_thousand
 /// ```
 ///
-/// `QUIETCUT_RANDOM_CASES` sets how many, `QUIETCUT_RANDOM_FIRST` the first, `QUIETCUT_SEED` the seed, `QUIETCUT_WINDING_PORTS` up to
-/// which size the winding number is asked too, `QUIETCUT_RANDOM_LONGEST_S` after which time a machine counts as hung: more where the
-/// processor is shared.
+/// `QUIETCUT_RANDOM_CASES` sets the number of machines, `QUIETCUT_RANDOM_FIRST` the first index, `QUIETCUT_SEED` the
+/// seed, `QUIETCUT_WINDING_PORTS` the largest number of ports for the winding number, and `QUIETCUT_RANDOM_LONGEST_S`
+/// the time, s, after which a machine counts as hung (more on a shared processor).
 #[test]
 #[ignore = "most of an hour; the command stands above"]
 fn verdicts_of_a_hundred_thousand_random_machines_are_right() {

@@ -9,7 +9,8 @@ fn problem(case: &Case) -> Problem {
     Problem::new(case, CubicTerms::LeaveOut).unwrap()
 }
 
-/// dw/dp, mm, of the switch nearest to one in depth, from four lines with steps h and 2h: the error is of order h⁴.
+/// Derivative dw/dp, mm, of the depth of the nearest switch of the same kind, from lines at the steps ±h and ±2h of the
+/// parameter; the error is of order h⁴.
 fn by_differences(switch: &Switch, rpm: f64, depth_mm: f64, h: f64, at: impl Fn(f64) -> Problem) -> f64 {
     let depth = |step: f64| {
         let line = line(&at(step * h), rpm, depth_mm, 40).unwrap();
@@ -27,8 +28,8 @@ fn by_differences(switch: &Switch, rpm: f64, depth_mm: f64, h: f64, at: impl Fn(
     (8.0 * (depth(1.0) - depth(-1.0)) - (depth(2.0) - depth(-2.0))) / (12.0 * h)
 }
 
-/// What is compared: relative, or against this much of the depth per relative change of the parameter. Limits are good
-/// to 1e-9 at least and steps are 3e-5 and more.
+/// Asserts that a derivative agrees with its difference quotient to 1e-4, relative to the quotient or to a tenth of
+/// `size` if that is larger. Limits are accurate to 1e-9 and relative steps are 3e-5 or more.
 fn assert_close(exact: f64, differences: f64, size: f64, what: &str) {
     assert!(
         (exact - differences).abs() < 1e-4 * differences.abs().max(0.1 * size),
@@ -77,7 +78,8 @@ fn derivatives_by_modes_and_ktc_are_those_of_differences() {
                         let mut moved = problem.clone();
                         let (omega, zeta) = (mode.omega(), mode.damping_ratio());
                         let (from, to) = (zeta, zeta * (1.0 + by));
-                        // The pole goes from −ζω + iω√(1 − ζ²) to that of the new ζ; ∂A/∂ω holds A's change per λ/ω.
+                        // Pole of the mode at another damping ratio. `moved` changes A so that the pole moves by the
+                        // given amount.
                         let pole = |zeta: f64| {
                             num_complex::Complex64::new(-zeta, (1.0 - zeta * zeta).sqrt()) * omega
                         };
@@ -112,7 +114,7 @@ fn derivatives_by_modes_and_ktc_are_those_of_differences() {
                     &format!("{what}, Ktc"),
                 );
                 if !problem.process.axial_depth_modulation {
-                    // Depth and force coefficient come as a product: w Ktc is constant. Limits are good to 1e-9.
+                    // Only the product w K_tc enters the equation, so that dw/w = −dK_tc/K_tc at a limit.
                     assert!(
                         (slope.depth_mm + switch.depth_mm).abs() < 1e-6 * switch.depth_mm,
                         "{what}"
@@ -125,7 +127,7 @@ fn derivatives_by_modes_and_ktc_are_those_of_differences() {
     assert!(count > 30, "{count}");
 }
 
-/// Every parameter of a case that may carry a deviation, with a step that is small against its value.
+/// Every parameter of a case that may have a standard deviation, with a step that is small against its value.
 fn parameters(case: &Case) -> Vec<(Parameter, f64)> {
     let mut all: Vec<Parameter> = vec![
         Parameter::Ktc,
@@ -162,7 +164,7 @@ fn parameters(case: &Case) -> Vec<(Parameter, f64)> {
     all.into_iter()
         .filter_map(|parameter| {
             let value = parameter.value(case)?;
-            // Angles of 0 and lengths that are 0 have no size of their own.
+            // A parameter with the value 0 (an angle, an entry of a mode shape) has no size; its step is 0.01.
             Some((parameter, if value == 0.0 { 1e-2 } else { 3e-4 * value.abs() }))
         })
         .collect()
@@ -178,7 +180,7 @@ fn derivatives_by_every_parameter_of_the_case_file_are_those_of_differences() {
     ] {
         let mut case = case(name);
         let cut = case.cut.as_mut().unwrap();
-        // Away from the ends of the range, so that both sides exist.
+        // Moves the exit angle away from the end of its range, so that it can be varied to both sides.
         cut.exit_deg -= 3.0;
         cut.feed_direction_deg = 20.0;
         let problem = problem(&case);
@@ -193,7 +195,7 @@ fn derivatives_by_every_parameter_of_the_case_file_are_those_of_differences() {
                 let tangent = Tangent::between(&moved(-0.1), &moved(0.1), 0.2);
                 let exact = sensitivity.slope(&tangent).unwrap().depth_mm;
                 let differences = by_differences(&switch, rpm, depth_mm, 1.0, moved);
-                // Steps are about 3e-4 of the parameter.
+                // Derivatives are per step, and steps are about 3e-4 of the parameter.
                 let size = 3e-4 * switch.depth_mm;
                 assert_close(
                     exact,
@@ -210,9 +212,10 @@ fn derivatives_by_every_parameter_of_the_case_file_are_those_of_differences() {
 }
 
 #[test]
-fn a_limit_that_moves_in_frequency_moves_in_speed() {
-    // All poles, the speed and the decay by the same factor with residues kept, and the force by 1/factor: only the unit
-    // of time changes. So w(ω, Ω) has w = ω ∂w/∂ω + Ω ∂w/∂Ω with ω of all modes (H = R/(s − λ) scales as 1/ω).
+fn derivatives_by_frequency_and_speed_fulfil_eulers_theorem() {
+    // If all poles and the spindle speed Ω are multiplied by one factor with constant residues, the receptance H = R/(s
+    // − λ) is divided by it and the limit w multiplied by it. Hence w = ω ∂w/∂ω + Ω ∂w/∂Ω (Euler's theorem), where ω
+    // stands for the frequencies of all modes.
     let case = case("kuka-kr90-acetal");
     let problem = problem(&case);
     for rpm in [812.0, 1045.0, 1300.0] {

@@ -1,4 +1,4 @@
-//! Percentiles of limits against plain Monte Carlo, and against a distribution that is known.
+//! Percentiles of limits against plain Monte Carlo sampling, and against a distribution in closed form.
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -10,7 +10,7 @@ use crate::*;
 use quietcut_model::case::{Case, Deviation, Parameter};
 use quietcut_testkit::case;
 
-/// The acetal robot with modes and force coefficients as well known as a good measurement makes them.
+/// The acetal robot with the standard deviations of modes and cutting coefficients that a good measurement leaves.
 fn acetal() -> Case {
     let mut case = case("kuka-kr90-acetal");
     let std = |parameter, std| Deviation { parameter, std };
@@ -36,16 +36,18 @@ fn nominal(case: &Case, rpm: f64, depth_mm: f64) -> SpeedLine {
     method_of(case).unwrap().line(rpm, depth_mm, 40).unwrap()
 }
 
-/// The seed of the Monte Carlo; it differs from that of the draws.
+/// Seed of the Monte Carlo samples; it differs from the seed of the stratified draws.
 const SEED: u64 = 20_261_121;
 
-/// Two-sided quantiles of the standard normal distribution for 90, 95 and 99.9 % confidence.
+/// Two-sided quantile of the standard normal distribution for 90 % confidence.
 const Z_90: f64 = 1.644_853_627;
+/// Two-sided quantile of the standard normal distribution for 95 % confidence.
 const Z_95: f64 = 1.959_963_985;
+/// Two-sided quantile of the standard normal distribution for 99.9 % confidence.
 const Z_999: f64 = 3.290_526_731;
 
-/// The percentile and how the answers of a spread call it.
-fn told(spread: &LimitSpread) -> [(f64, Option<f64>, [Option<f64>; 2]); 3] {
+/// Percentiles of a spread: share of the machines, depth in mm, and confidence interval in mm.
+fn percentiles_of(spread: &LimitSpread) -> [(f64, Option<f64>, [Option<f64>; 2]); 3] {
     let (percentiles, intervals) = (spread.limit_percentiles_mm, spread.limit_percentiles_ci90_mm);
     [
         (0.05, percentiles.low, intervals.low),
@@ -54,17 +56,17 @@ fn told(spread: &LimitSpread) -> [(f64, Option<f64>, [Option<f64>; 2]); 3] {
     ]
 }
 
-/// Limits of machines that are drawn one by one, independently; each is solved for by itself.
+/// Limits of machines drawn independently, each computed on its own.
 struct MonteCarlo<'a> {
     case: &'a Case,
     rpm: f64,
     depth_mm: f64,
-    /// Where not 0 and the last depth: only limits between these depths are solved for; of others it is known that they are
-    /// shallower, 0, or deeper, infinite.
+    /// Depths between which limits are computed; [0, last depth] computes all. A limit below the bracket is stored as
+    /// 0, one above it as infinite.
     bracket_mm: [f64; 2],
-    /// How many were drawn; impossible ones leave no limit.
+    /// Number of machines drawn, including those that are not physical and have no limit.
     drawn: u64,
-    /// First limits, sorted, infinite where nothing is lost.
+    /// First limits, ascending, mm; infinite for machines that stay stable.
     limits: Vec<f64>,
 }
 
@@ -80,7 +82,7 @@ impl<'a> MonteCarlo<'a> {
         }
     }
 
-    /// Draws until so many are drawn; the draws before stay.
+    /// Draws machines until `count` are drawn; earlier ones are kept.
     fn grow_to(&mut self, count: u64) {
         let variables = Variable::of_case(self.case);
         let limits = (self.drawn..count).into_par_iter().filter_map(|index| {
@@ -100,7 +102,8 @@ impl<'a> MonteCarlo<'a> {
         self.drawn = count.max(self.drawn);
     }
 
-    /// As [`new`](Self::new), for a percentile: its own interval, six standard deviations wide, is the bracket.
+    /// Empty sample for one percentile: limits are computed only within the interval of six standard deviations about
+    /// it in `other`.
     fn around(other: &Self, share: f64) -> Self {
         let [from, to] = other.interval(share, 6.0);
         Self {
@@ -109,8 +112,8 @@ impl<'a> MonteCarlo<'a> {
         }
     }
 
-    /// The first limit is also the first of a shorter line, with the same steps; the next longer one is searched where that has
-    /// none.
+    /// First limit of a machine, mm. It is searched up to 20 %, then 40 %, then all of the depth, with equal steps,
+    /// since the first limit of a shorter line is that of a longer one.
     fn first_limit(&self, method: &dyn Method) -> f64 {
         let [shallow_mm, deep_mm] = self.bracket_mm;
         if shallow_mm > 0.0 && method.point(self.rpm, shallow_mm).unwrap().verdict == Verdict::Unstable {
@@ -129,13 +132,13 @@ impl<'a> MonteCarlo<'a> {
         self.limits[index.min(self.limits.len() - 1)]
     }
 
-    /// Between which depths a percentile of independent draws lies: from the ranks np ± z √(np(1 − p)).
+    /// Confidence interval of a percentile of independent samples: the limits at the ranks np ± z √(np(1 − p)).
     fn interval(&self, share: f64, z: f64) -> [f64; 2] {
         let reach = z * (share * (1.0 - share) / self.limits.len() as f64).sqrt();
         [share - reach, share + reach].map(|share| self.quantile(share))
     }
 
-    /// The larger distance of the ends of the interval of 90 % from the percentile, relative to it.
+    /// Larger distance of the ends of the 90 % interval from the percentile, relative to the percentile.
     fn half_width(&self, share: f64) -> f64 {
         let [low, high] = self.interval(share, Z_90);
         let middle = self.quantile(share);
@@ -147,7 +150,7 @@ impl<'a> MonteCarlo<'a> {
     }
 }
 
-/// Compares at one speed with so many machines.
+/// Compares the spread at one speed with a Monte Carlo sample of `count` machines.
 fn compare<'a>(case: &'a Case, rpm: f64, depth_mm: f64, count: u64) -> (LimitSpread, MonteCarlo<'a>) {
     let uncertainty = Uncertainty::new(case, &method_of, 7).unwrap();
     let line = nominal(case, rpm, depth_mm);
@@ -165,7 +168,7 @@ fn compare<'a>(case: &'a Case, rpm: f64, depth_mm: f64, count: u64) -> (LimitSpr
         ours.as_secs_f64(),
         theirs.as_secs_f64(),
     );
-    for (share, found, interval) in told(&spread) {
+    for (share, found, interval) in percentiles_of(&spread) {
         let found = found.unwrap_or(f64::INFINITY);
         let [from, to] = interval.map(|end| end.unwrap_or(f64::INFINITY));
         let expected = drawn.quantile(share);
@@ -176,8 +179,8 @@ fn compare<'a>(case: &'a Case, rpm: f64, depth_mm: f64, count: u64) -> (LimitSpr
             100.0 * share,
             100.0 * difference,
         );
-        // Where few machines have limits near a percentile the Monte Carlo does not know it to 2 % itself: then its own
-        // interval of 95 % is what can be met.
+        // If few machines have limits near a percentile, the Monte Carlo sample does not determine it to 2 %. The
+        // percentile must then lie in the sample's 95 % interval.
         let [low, high] = drawn.interval(share, Z_95);
         assert!(
             found == expected || difference.abs() < 0.02 || (low <= found && found <= high),
@@ -187,7 +190,8 @@ fn compare<'a>(case: &'a Case, rpm: f64, depth_mm: f64, count: u64) -> (LimitSpr
             from <= found && found <= to,
             "{rpm} rev/min, {share}: {interval:?}"
         );
-        // The stated interval reaches into that of the Monte Carlo; of 99.9 %, since there are dozens of comparisons.
+        // The stated interval must overlap that of the sample, with 99.9 % confidence because of the dozens of
+        // comparisons.
         let [low, high] = drawn.interval(share, Z_999);
         assert!(
             from <= high && low <= to,
@@ -197,14 +201,14 @@ fn compare<'a>(case: &'a Case, rpm: f64, depth_mm: f64, count: u64) -> (LimitSpr
     (spread, drawn)
 }
 
-/// The most machines that a percentile is decided with.
+/// Largest number of machines from which one percentile is determined.
 const DRAWN_MAX: u64 = 4_096_000;
 
-/// Decides whether percentiles are within 2 % also where the Monte Carlo does not know them to 2 %: a larger one is then drawn,
-/// until it knows them to 1 %.
+/// Checks that percentiles agree to 2 %. Where the sample determines a percentile less well, a larger sample is drawn
+/// until its 90 % interval is 1 % wide to either side.
 fn decide(spread: &LimitSpread, drawn: &MonteCarlo<'_>) {
     let rpm = drawn.rpm;
-    for (share, found, _) in told(spread) {
+    for (share, found, _) in percentiles_of(spread) {
         let found = found.unwrap_or(f64::INFINITY);
         let check = |drawn: &MonteCarlo<'_>| {
             let expected = drawn.quantile(share);
@@ -248,7 +252,7 @@ fn percentiles_at_a_cusp_are_those_of_2000_machines() {
 }
 
 #[test]
-fn what_lies_beside_a_bracket_need_not_be_solved_for() {
+fn limits_outside_the_bracket_are_not_computed() {
     let case = acetal();
     let mut whole = MonteCarlo::new(&case, 1045.0, 8.0);
     whole.grow_to(150);
@@ -278,7 +282,7 @@ fn percentiles_over_lobes_cusps_and_islands_are_those_of_2000_machines() {
 /// Beside the gap between flip notch and Hopf limits few machines have a limit, and 2 000 know the 95 % limit to 20 %.
 #[test]
 #[ignore = "four million machines; see the comment above for the command"]
-fn percentiles_over_the_bottom_of_the_flip_notch_are_those_of_as_many_machines_as_know_them() {
+fn percentiles_over_the_bottom_of_the_flip_notch_are_those_of_a_larger_monte_carlo_sample() {
     compare_and_decide(1045.0);
 }
 
@@ -290,8 +294,8 @@ fn compare_and_decide(rpm: f64) {
 
 #[test]
 fn the_force_coefficient_alone_gives_the_distribution_of_its_inverse() {
-    // Without axial depth modulation w K is constant, K with its three coefficients in fixed ratio; with K_rc = K_ac = 0 that
-    // is K_tc alone.
+    // Without axial-depth modulation the product of depth and cutting coefficients is constant at a limit. With K_rc =
+    // K_ac = 0 the limit is therefore proportional to 1/K_tc.
     let mut case = case("kuka-kr90-full");
     let material = case.material.as_mut().unwrap();
     (material.krc_mpa, material.kac_mpa) = (0.0, 0.0);
@@ -312,13 +316,15 @@ fn the_force_coefficient_alone_gives_the_distribution_of_its_inverse() {
         (percentiles.high, -1.644_853_6),
     ] {
         let expected = limit_mm / (1.0 + 0.1 * deviations);
-        // Slices of 1/256 and interpolation in them: a tenth of their width of 0.04 deviations.
+        // Tolerance: interpolation within a slice of 1/256 of the machines errs by a tenth of its width, 0.04 standard
+        // deviations.
         assert!(
             (found.unwrap() - expected).abs() < 1e-3 * expected,
             "{found:?} {expected}"
         );
     }
-    // Batches lie between one another: their scatter is more than the error of all of them.
+    // The strata of the batches interleave, so that the scatter between batches exceeds the error of all of them
+    // together: the interval is wide enough.
     let [from, to] = spread.limit_percentiles_ci90_mm.median.map(Option::unwrap);
     assert!(from < limit_mm && limit_mm < to && to - from < 0.014 * limit_mm);
     let [shallow, at, deep] = spread.stable_share[..] else {

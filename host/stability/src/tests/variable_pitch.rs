@@ -1,4 +1,5 @@
-//! Variable pitch against equal pitch, against semi- and full discretization, and against itself on a finer mesh.
+//! Collocation over the revolution against collocation over the tooth period, semi-discretization and full
+//! discretization, and against its own result on a finer mesh.
 
 use std::time::{Duration, Instant};
 
@@ -14,7 +15,7 @@ use crate::tests::random_case;
 use crate::*;
 use quietcut_testkit::case;
 
-/// A case with other pitches; the number of teeth is that of the pitches.
+/// Problem of a case with these pitch angles, degrees; their number is the number of teeth.
 fn pitched(case_name: &str, pitch_deg: &[f64]) -> Pitched {
     let mut case = case(case_name);
     let tool = case.tool.as_mut().unwrap();
@@ -23,7 +24,7 @@ fn pitched(case_name: &str, pitch_deg: &[f64]) -> Pitched {
     Pitched::new(&case, CubicTerms::LeaveOut).unwrap()
 }
 
-/// Equal pitches that are treated as if they were not.
+/// Collocation over the revolution of a tool with equal pitch.
 fn as_revolution(problem: &Problem) -> RevolutionCollocation {
     RevolutionCollocation {
         pitched: Pitched::from(problem.clone()).over_revolution(),
@@ -42,7 +43,8 @@ fn equal_pitches_over_the_revolution_give_the_power_of_the_multiplier_over_the_t
         let problem = Problem::new(&case(&name), CubicTerms::Refuse).unwrap();
         let power = num_complex::Complex64::new(re, im).powi(problem.teeth as i32);
         let found = as_revolution(&problem).point(rpm, depth_mm).unwrap();
-        // The upper one of a pair is given; references are good to 2.1e-8, each factor of the power.
+        // The reference is the upper multiplier of a pair. Tolerance: references are good to 2.1e-8, in each factor of
+        // the power.
         let error = (found.multiplier - power)
             .norm()
             .min((found.multiplier.conj() - power).norm());
@@ -68,7 +70,7 @@ fn limits_of_equal_pitches_over_the_revolution_are_those_over_the_tooth_period()
             "{found:?} {exact:?}"
         );
         assert!((found.chatter_hz.unwrap() / exact.chatter_hz.unwrap() - 1.0).abs() < 1e-6);
-        // Two flips over a tooth period are a fold over a revolution of two teeth.
+        // Over a revolution of two teeth a flip over the tooth period, μ = −1, has the multiplier (−1)² = 1: a fold.
         let expected = if exact.kind == StabilityLoss::Flip {
             StabilityLoss::Fold
         } else {
@@ -78,13 +80,14 @@ fn limits_of_equal_pitches_over_the_revolution_are_those_over_the_tooth_period()
     }
 }
 
-/// The multipliers of a discretization near one value.
+/// Errors of semi-discretization and of full discretization, each with steps of one degree and of a quarter of a
+/// degree.
 fn step_errors(pitched: &Pitched, rpm: f64, depth_mm: f64, exact: num_complex::Complex64) -> [[f64; 2]; 2] {
     let nearest = |dominant: &Dominant| {
         let distances = dominant.eigenvalues.iter().map(|value| (value - exact).norm());
         distances.min_by(f64::total_cmp)
     };
-    // Steps of one degree and of a quarter: delays of whole degrees then end at the same place within a step.
+    // With these steps delays of whole degrees end at the start of a step.
     let degrees = pitched.problem.process.engagement.pitch.to_degrees().round() as usize;
     let steps = [degrees, 4 * degrees];
     let sdm = steps.map(|steps| {
@@ -112,7 +115,7 @@ fn discretizations_converge_to_the_collocation_of_tools_with_variable_pitch() {
         ("insperger-1dof-ad1", &[170.0, 190.0], 5000.0, 0.5),
         ("insperger-2dof-ad0.5", &[70.0, 110.0, 70.0, 110.0], 6200.0, 0.2),
         ("insperger-2dof-ad0.1", &[100.0, 125.0, 135.0], 9000.0, 1.0),
-        // Up to three teeth cut at once, at four different delays.
+        // A tool with four different delays, of which up to three teeth cut at once.
         ("insperger-2dof-ad1", &[62.0, 71.0, 93.0, 134.0], 7500.0, 0.1),
         ("kuka-kr90-acetal", &[175.0, 185.0], 1200.0, 2.0),
     ];
@@ -124,7 +127,7 @@ fn discretizations_converge_to_the_collocation_of_tools_with_variable_pitch() {
         assert!(point.error < 1e-5 * point.multiplier_abs.max(1.0), "{point:?}");
         for errors in step_errors(&method.pitched, rpm, depth_mm, point.multiplier) {
             let slope = 0.5 * (errors[0] / errors[1]).log2();
-            // The next term is a thousandth of the leading one at these steps.
+            // Tolerance: at these steps the second term of the error is a thousandth of the leading one.
             assert!(
                 (slope - 2.0).abs() < 0.02,
                 "{name} {pitch_deg:?}: {slope} {errors:?} {point:?}"
@@ -137,7 +140,7 @@ fn discretizations_converge_to_the_collocation_of_tools_with_variable_pitch() {
     }
 }
 
-/// A random machine whose teeth stand up to 15 % of a pitch off.
+/// Random machine whose pitch angles differ from the mean by up to 15 %.
 fn random_pitched(rng: &mut impl rand::Rng) -> (Pitched, f64) {
     let case = random_case(rng);
     let problem = Problem::new(&case, CubicTerms::Refuse).unwrap();
@@ -182,27 +185,28 @@ fn check_random(seed: u64, count: usize) {
     let number = |is: &dyn Fn(&RandomTool) -> bool| found.iter().filter(|tool| is(tool)).count();
     let undecided = number(&|tool| tool.verdict == Some(Verdict::Undecided));
     let refused = number(&|tool| tool.verdict.is_none());
-    let silent = number(&|tool| tool.is_silent);
+    let silent = number(&|tool| tool.lacks_reference);
     let slowest = found.iter().map(|tool| tool.time).max().unwrap();
     println!(
         "{count} tools: {undecided} undecided, {refused} refused, reference silent at {silent}; slowest {slowest:.1?}"
     );
-    // Error bars are so short that next to no point lies within its own.
+    // Stated errors are so small that at most one point in 50 may be undecided or refused; one in 25 may lack a
+    // reference.
     assert!((undecided + refused) * 50 <= count && silent * 25 <= count);
 }
 
-/// What came of a random tool.
+/// Result for one random tool.
 struct RandomTool {
-    /// `None` where the point is refused.
+    /// Verdict of the method; `None` if it refuses the point.
     verdict: Option<Verdict>,
-    /// The reference has no answer either.
-    is_silent: bool,
-    /// Of the method, without the reference.
+    /// True if the reference on the finest mesh has no result.
+    lacks_reference: bool,
+    /// Computing time of the method, without the reference.
     time: Duration,
 }
 
 impl RandomTool {
-    /// Panics where the error is larger than stated.
+    /// Computes one random tool; panics if its error is larger than stated.
     fn check(seed: u64, index: usize) -> Self {
         const FINEST: Fineness = Fineness {
             angle: 2.5,
@@ -231,7 +235,7 @@ impl RandomTool {
         }
         Self {
             verdict: point.ok().map(|point| point.verdict),
-            is_silent: exact.is_none(),
+            lacks_reference: exact.is_none(),
             time,
         }
     }
@@ -251,7 +255,7 @@ fn limits_of_variable_pitch_separate_stable_from_unstable_points() {
             let is_first = line
                 .first_limit
                 .is_some_and(|limit| limit.depth_mm == switch.depth_mm);
-            // Later switches happen under another multiplier that is larger.
+            // At switches after the first limit another multiplier, which lies outside, is the dominant one.
             if is_first {
                 assert!((multiplier - 1.0).abs() < 1e-6, "{switch:?} {multiplier}");
                 assert_eq!(at(0.999).verdict, Verdict::Stable);

@@ -1,5 +1,6 @@
-//! Counts multipliers without the map on surfaces: by the phase of G(z) = det(I − z Φ(w (1 − z))), whose zeros are 1/μ, along
-//! circles. Φ is that of the series with the force of the surface before in proportion to that of the tooth.
+//! Counts multipliers without the map of the cut surface: from the phase of G(z) = det(I − z Φ(w (1 − z))), whose zeros
+//! are 1/μ, along circles. Φ is the transition matrix from Taylor series, with a delayed displacement of z times the
+//! present one.
 
 use std::f64::consts::TAU;
 
@@ -9,16 +10,17 @@ use num_complex::Complex64;
 use crate::problem::linear::Problem;
 use crate::tests::taylor::{Series, TaylorPeriod, are_short, least_counts, refine};
 
-/// The most points on half of a circle.
+/// Largest number of points on half of a circle: a limit on computing time.
 const POINTS_MAX: usize = 800;
 
-/// How many operations a count may take: some seconds.
+/// Largest number of floating-point operations of a count: some seconds.
 const OPERATIONS_MAX: f64 = 1e10;
 
-/// How much the phase may turn between neighbouring points, rad.
+/// Largest change of the phase of G between neighbouring points, rad; a larger change adds a point between them.
 const PHASE: f64 = 0.6;
 
-/// How many multipliers are larger than a radius; `None` where the steps and points allowed do not tell.
+/// Number of multipliers with |μ| larger than a radius; `None` if the largest numbers of steps and points do not
+/// suffice.
 pub(crate) fn count_beyond(problem: &Problem, rpm: f64, depth_m: f64, radius: f64) -> Option<usize> {
     let series = Series::FINE;
     let mut counts = least_counts(problem, rpm, series);
@@ -41,7 +43,7 @@ struct Counter {
 }
 
 impl Counter {
-    /// The phase of G at z, to whole turns; `None` where Φ is not finite.
+    /// Phase of G at z, rad, modulo 2π; `None` if Φ is not finite.
     fn phase(&self, z: Complex64) -> Option<f64> {
         let n = self.period.order;
         let mut tails = vec![0.0; self.period.steps.len()];
@@ -92,12 +94,12 @@ impl Counter {
             let turn = to - from;
             turn - TAU * (turn / TAU).round()
         };
-        let (mut turned, mut points) = (0.0, FIRST);
-        // Values at conjugate points are conjugate: half of the circle will do.
+        let (mut increase, mut points) = (0.0, FIRST);
+        // Values at conjugate points are conjugate, so that half of the circle suffices.
         let mut last = (0.0, at(0.0)?);
         for i in 1..=FIRST {
             let angle = half * i as f64 / FIRST as f64;
-            // Segments that remain, the nearest last.
+            // Ends of the intervals still to be passed, the nearest last.
             let mut ends = vec![(angle, at(angle)?)];
             while let Some(&end) = ends.last() {
                 let middle = 0.5 * (last.0 + end.0);
@@ -105,7 +107,7 @@ impl Counter {
                 points += 1;
                 let turns = [turn(last.1, between.1), turn(between.1, end.1)];
                 if turns.iter().all(|turn| turn.abs() < PHASE) {
-                    turned += turns[0] + turns[1];
+                    increase += turns[0] + turns[1];
                     last = end;
                     ends.pop();
                 } else if points > points_max {
@@ -115,7 +117,7 @@ impl Counter {
                 }
             }
         }
-        let count = turned / half;
+        let count = increase / half;
         ((count - count.round()).abs() < 0.01 && count > -0.5).then_some(count.round() as usize)
     }
 }

@@ -1,14 +1,15 @@
-//! A reference for tests: motions by Taylor series in time, the largest multiplier by Arnoldi's method on them, and how many there
-//! are beyond a radius.
+//! Test oracle: motions from Taylor series in time, their largest Floquet multiplier from Arnoldi's method, and the
+//! number of multipliers beyond a radius.
 //!
-//! Nothing of the default method is in it: no collocation, no matrix exponential, no characteristic matrix, no chip normals. On each
-//! step of length h, with σ = (t − t₀)/h, structure, forces and the surface before are power series in σ:
+//! The oracle shares no code with the default method: no collocation, no matrix exponential, no characteristic matrix,
+//! no chip normals. On each step of length h, with σ = (t − t₀)/h, states, forces and delayed displacement u_τ are
+//! power series in σ:
 //!
 //!   (k + 1) x_{k+1} = h (A x_k + B F_k),   F_k = Σ_j [w K_j (u − u_τ)_{k−j} − β_j u_{k−j}],   u_k = C x_k,
 //!
-//! where the coefficients K_j and β_j follow from the harmonics of the tool's rotation. Steps end where a tooth enters or leaves.
-//! The delay is the period, so that the surface before is the series of the same step one period earlier: the state is x, and the
-//! coefficients u_k of every step in the cut.
+//! where the coefficients K_j and β_j follow from the harmonics of the tool's rotation. Steps end where a tooth enters
+//! or leaves. The delay is the period, so that u_τ is the series of the same step one period earlier. The state of the
+//! map contains x and the coefficients u_k of every step in which a tooth cuts.
 
 use std::f64::consts::TAU;
 
@@ -23,25 +24,25 @@ mod largest;
 pub(crate) use counter::count_beyond;
 pub(crate) use largest::largest_abs;
 
-/// How finely a period is computed.
+/// Accuracy of the Taylor series of a period.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Series {
-    /// The last power of a series.
+    /// Highest power of a series.
     last: usize,
-    /// The last two terms may be this share of the motion.
+    /// Largest sum of the last two terms of a series, as a share of the motion; beyond it steps are shortened.
     tail: f64,
-    /// Largest angle, rad, by which the structure alone turns in a step.
+    /// Largest phase angle of the free structure in a step, rad.
     angle: f64,
 }
 
 impl Series {
-    /// Errors near 1e-10.
+    /// Coarse series, with errors near 1e-10.
     pub(crate) const COARSE: Self = Self {
         last: 20,
         tail: 1e-10,
         angle: 2.5,
     };
-    /// Errors near rounding.
+    /// Fine series, with errors near rounding.
     pub(crate) const FINE: Self = Self {
         last: 26,
         tail: 1e-14,
@@ -49,25 +50,25 @@ impl Series {
     };
 }
 
-/// The largest angle, rad, by which the tool turns in a step.
+/// Largest rotation of the tool in a step, rad.
 const TURN: f64 = 0.7;
 
-/// Terms of coefficients below this share of the first are rounding.
+/// Share of the largest term of a coefficient's series below which the last terms are dropped as rounding.
 const TERM: f64 = 1e-17;
 
-/// Harmonics of a coefficient that turns with the tool: products of two of first order.
+/// Highest harmonic of the directional coefficients: products of two sines of the tool's rotation angle.
 const HARMONICS: usize = 2;
 
-/// One step.
+/// One time step of the period.
 struct Step {
     duration_s: f64,
-    /// The part of the period that it belongs to.
+    /// Index of the part of the tooth period (between entries and exits) that contains the step.
     part: usize,
-    /// w K_j, N/m, by rows; empty in free flight.
+    /// Terms w K_j of the regenerative coefficient, N/m, each 3 × 3 by rows; empty in free flight.
     force: Vec<[f64; 9]>,
-    /// β_j, N/m: force per axial displacement; empty without modulation.
+    /// Terms β_j of the force per axial displacement, N/m; empty without axial-depth modulation.
     forced: Vec<[f64; 3]>,
-    /// Where its displacements stand in the state.
+    /// Index in the state of the first displacement coefficient of this step.
     first: usize,
 }
 
@@ -75,21 +76,23 @@ struct Step {
 struct TaylorPeriod {
     series: Series,
     order: usize,
-    /// A by rows, B by rows, C by rows.
+    /// Matrix A of the structure by rows, n × n.
     a: Vec<f64>,
+    /// Matrix B of the structure by rows, n × 3.
     b: Vec<[f64; 3]>,
+    /// Matrix C of the structure by rows, 3 × n.
     c: Vec<f64>,
-    /// By which displacements are divided in the state, so that both parts of it are of one size.
+    /// Unit of the displacements in the state, m, so that they have the order of magnitude of x.
     scale_m: f64,
     steps: Vec<Step>,
     size: usize,
 }
 
-/// A function of the angle of the tool, by its harmonics 0, 1, 2.
-struct Turning<const N: usize>([[Complex64; N]; HARMONICS + 1]);
+/// Function of the rotation angle of the tool, given by its harmonics 0, 1 and 2.
+struct RotatingCoefficient<const N: usize>([[Complex64; N]; HARMONICS + 1]);
 
-impl<const N: usize> Turning<N> {
-    /// From its values: one more angle than would do, so that a further harmonic would be seen.
+impl<const N: usize> RotatingCoefficient<N> {
+    /// Harmonics of a function from its values at seven angles: enough to show that a third harmonic vanishes.
     fn of(function: impl Fn(f64) -> [f64; N]) -> Self {
         let count = 2 * HARMONICS + 3;
         let mut harmonics = [[Complex64::ZERO; N]; HARMONICS + 2];
@@ -108,10 +111,10 @@ impl<const N: usize> Turning<N> {
         Self([harmonics[0], harmonics[1], harmonics[2]])
     }
 
-    /// Adds the series at `angle` for steps of `turn`, rad.
+    /// Adds the power series of the function over steps that rotate the tool by `turn` from `angle`, both rad.
     fn add_series(&self, angle: f64, turn: f64, factor: f64, terms: &mut [[f64; N]]) {
         for (m, harmonic) in self.0.iter().enumerate() {
-            // Harmonics −m are the conjugates.
+            // The harmonics −m are conjugate to m, so that twice the real part of m stands for both.
             let twice = if m == 0 { 1.0 } else { 2.0 };
             let mut phase = Complex64::cis(m as f64 * angle) * (factor * twice);
             for (j, term) in terms.iter_mut().enumerate() {
@@ -126,7 +129,7 @@ impl<const N: usize> Turning<N> {
     }
 }
 
-/// Drops the last terms that are rounding.
+/// Drops the last terms of a series that lie below [`TERM`].
 fn trim<const N: usize>(terms: &mut Vec<[f64; N]>) {
     let size = |term: &[f64; N]| term.iter().map(|entry| entry.abs()).fold(0.0, f64::max);
     let largest = terms.iter().map(size).fold(0.0, f64::max);
@@ -135,7 +138,8 @@ fn trim<const N: usize>(terms: &mut Vec<[f64; N]>) {
     }
 }
 
-/// The parts of the tooth period, from phase 0 of the first tooth, with the immersion angles at phase 0 of the teeth that cut.
+/// Parts of the tooth period between entries and exits, as phases of the first tooth, with the immersion angles at
+/// phase 0 of the teeth that cut in each.
 fn parts(problem: &Problem) -> Vec<([f64; 2], Vec<f64>)> {
     let engagement = &problem.process.engagement;
     let (teeth, pitch) = (problem.teeth, TAU / problem.teeth as f64);
@@ -155,18 +159,18 @@ fn parts(problem: &Problem) -> Vec<([f64; 2], Vec<f64>)> {
 }
 
 impl TaylorPeriod {
-    /// The period in `counts` steps for each of its parts.
+    /// Series of the tooth period with `counts` steps in each of its parts.
     fn new(problem: &Problem, rpm: f64, depth_m: f64, series: Series, counts: &[usize]) -> Self {
         let structure = &problem.structure;
         let process = &problem.process;
         let order = structure.order();
         let rad_per_s = rpm * TAU / 60.0;
-        let directional = Turning::of(|angle| {
+        let directional = RotatingCoefficient::of(|angle| {
             let matrix: Matrix3<f64> = process.force.directional(angle);
             std::array::from_fn(|index| matrix[(index / 3, index % 3)])
         });
         let forced = process.axial_depth_modulation.then(|| {
-            Turning::of(|angle| {
+            RotatingCoefficient::of(|angle| {
                 let vector = process.force.forced(angle, process.feed_per_tooth_m);
                 [vector.x, vector.y, vector.z]
             })
@@ -214,7 +218,8 @@ impl TaylorPeriod {
         }
     }
 
-    /// The state one period later, and for each part of the period the share of the last two terms in the motion.
+    /// State one period later. Also writes, for each part of the period, the largest share of the last two terms in the
+    /// motion.
     fn apply(&self, state: &[f64], tails: &mut [f64]) -> Vec<f64> {
         let (n, last) = (self.order, self.series.last);
         let mut after = vec![0.0; self.size];
@@ -269,8 +274,8 @@ impl TaylorPeriod {
         after
     }
 
-    /// Φ by columns where the surface before counts as much as makes the forces `share` times those of the displacement alone, and for
-    /// each part of the period the share of the last two terms.
+    /// Transition matrix Φ by columns, with regenerative forces of `share` times w K u (share = 1 − z). Also writes,
+    /// for each part of the period, the largest share of the last two terms in the motion.
     fn transition(&self, share: Complex64, tails: &mut [f64]) -> Vec<Complex64> {
         let (n, last) = (self.order, self.series.last);
         let mut phi = vec![Complex64::ZERO; n * n];
@@ -322,14 +327,16 @@ impl TaylorPeriod {
         phi
     }
 
-    /// Operations of [`transition`](Self::transition), about: those of complex with real numbers are two each.
+    /// Approximate number of floating-point operations of [`transition`](Self::transition). A product of a complex and
+    /// a real number counts as two.
     fn transition_operations(&self) -> f64 {
         let (n, last) = (self.order as f64, self.series.last as f64);
         let of_step = |step: &Step| 4.0 * n * n + 12.0 * n + 18.0 * step.force.len() as f64;
         2.0 * n * last * self.steps.iter().map(of_step).sum::<f64>()
     }
 
-    /// A state that is the same at every call and has a part along everything; the surface is one of steps.
+    /// Starting vector, the same at every call, with components along all directions; the delayed displacement is
+    /// constant in each step.
     fn start(&self) -> Vec<f64> {
         let mut state = vec![0.0; self.size];
         let number = |i: usize| ((i + 1) as f64 * 2.0_f64.sqrt()).fract() - 0.5;
@@ -345,7 +352,7 @@ impl TaylorPeriod {
     }
 }
 
-/// The least numbers of steps for the parts of the period.
+/// Number of steps of each part of the period with which the series are tried first.
 fn least_counts(problem: &Problem, rpm: f64, series: Series) -> Vec<usize> {
     let period_s = problem.tooth_period_s(rpm);
     let rate = (0..problem.structure.order())
@@ -362,7 +369,7 @@ fn least_counts(problem: &Problem, rpm: f64, series: Series) -> Vec<usize> {
         .collect()
 }
 
-/// The larger tail; infinite where one is no number, of motions that grew out of all of them.
+/// The larger of two shares of the last terms; infinite if one is not a number, since the motion has overflowed.
 fn longer(p: f64, q: f64) -> f64 {
     if p.is_nan() || q.is_nan() {
         f64::INFINITY
@@ -371,19 +378,19 @@ fn longer(p: f64, q: f64) -> f64 {
     }
 }
 
-/// True where all series end below this share of the motion.
+/// True if the last terms of all series are below the share `tail` of the motion.
 fn are_short(tails: &[f64], tail: f64) -> bool {
     tails.iter().all(|&found| found < tail)
 }
 
-/// The most steps of a period: where more are needed motions leave the range of numbers, or take seconds.
+/// Largest number of steps of a period. Motions that need more leave the range of numbers or take seconds.
 const STEPS_MAX: usize = 8000;
 
-/// More steps where the tails of the series were too large; `None` where these would be too many.
+/// Raises the number of steps of the parts whose last terms are too large; `None` if the total exceeds [`STEPS_MAX`].
 fn refine(counts: &mut [usize], tails: &[f64], series: Series) -> Option<()> {
     for (count, tail) in counts.iter_mut().zip(tails) {
         if !tail.is_finite() {
-            // The series grew out of all numbers.
+            // The motion has overflowed, so that its terms do not say how many steps are needed.
             *count *= 4;
         } else if *tail >= series.tail {
             let finer = 1.05 * (tail / series.tail).powf(1.0 / (series.last - 1) as f64);
