@@ -2,7 +2,7 @@
 //!
 //! | module | |
 //! |---|---|
-//! | [`eigenvalues`] | of real, complex, symmetric and companion matrices |
+//! | [`eigenvalues`] | eigenvalues of real, complex, symmetric and companion matrices |
 //! | [`singular_values`] | decomposition A = U Σ Vᵀ |
 //! | [`least_squares`] | linear, robust, from normal equations, nonlinear |
 //! | [`newton`] | Newton's method for numbers and vectors |
@@ -12,7 +12,8 @@
 //! | [`dormand_prince`] | one step of an integration in time |
 //! | [`statistics`] | quantiles of the usual distributions |
 //!
-//! `nalgebra` is the type of matrices at every border. Every iteration is bounded, and says why it stopped.
+//! Arguments and results are matrices of `nalgebra`. The number of iterations is bounded everywhere, and a result states why an iteration
+//! stopped.
 
 pub mod crossing;
 pub mod dormand_prince;

@@ -1,7 +1,7 @@
 //! Newton's method x ← x − J⁻¹ r(x) for r(x) = 0, with a bound on the growth of its steps and the reason to stop.
 //!
-//! The caller computes the step J⁻¹ r and chooses how: by a quotient, by an LU decomposition, or by an iterative solver. [`Newton`]
-//! decides how far to go and when to stop, in the same way for numbers and vectors.
+//! The caller computes the step J⁻¹ r by a method of its choice: a quotient, an LU decomposition or an iterative solver. [`Newton`] limits
+//! the step and decides when to stop, in the same way for numbers and vectors.
 
 use nalgebra::DVector;
 use num_complex::Complex64;
@@ -10,10 +10,10 @@ use crate::stop::Stop;
 
 /// An unknown of Newton's method: a real or complex number, or a vector.
 pub trait Unknown {
-    /// Absolute value or Euclidean norm.
+    /// Absolute value of a number, or Euclidean norm of a vector.
     fn size(&self) -> f64;
 
-    /// x ← x − `share` · `step`.
+    /// Subtracts the fraction `share` of `step` from x: x ← x − `share` · `step`.
     fn subtract(&mut self, share: f64, step: &Self);
 }
 
@@ -59,7 +59,7 @@ impl Unknown for Vec<f64> {
     }
 }
 
-/// Newton's method with its bounds.
+/// Newton's method with bounds on the number and the growth of its steps.
 ///
 /// ```
 /// use quietcut_numerics::Stop;
@@ -77,28 +77,28 @@ pub struct Newton {
     growth: f64,
 }
 
-/// The point where Newton's method stopped, and the reason.
+/// The unknown x at which Newton's method stopped, and the reason for the stop.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Root<X> {
-    /// x after the last step.
+    /// Unknown x after the last step.
     pub x: X,
-    /// The reason.
+    /// Reason for which the iteration stopped.
     pub stop: Stop,
-    /// Steps that were computed.
+    /// Number of steps that were computed.
     pub iterations: usize,
 }
 
 impl<X> Root<X> {
-    /// x, if the iteration has converged.
+    /// The unknown x if the iteration has converged, otherwise `None`.
     pub fn converged(self) -> Option<X> {
         (self.stop == Stop::Converged).then_some(self.x)
     }
 }
 
 impl Newton {
-    /// At most `iterations_max` full steps, until ‖step‖ ≤ `tolerance` · ‖x‖.
+    /// Newton's method with full steps, until ‖step‖ ≤ `tolerance` · ‖x‖ or after `iterations_max` steps.
     ///
-    /// Convergence is quadratic: after a step of 1e-9 · ‖x‖ the next one is rounding.
+    /// Convergence is quadratic: the step after one of 1e-9 · ‖x‖ is below rounding.
     pub fn new(iterations_max: usize, tolerance: f64) -> Self {
         Self {
             iterations_max,
@@ -107,8 +107,7 @@ impl Newton {
         }
     }
 
-    /// Shortens each step to at most `factor` times the step before it, which keeps the iteration from jumping to a distant
-    /// solution.
+    /// Limits each step to `factor` times the length of the preceding step, which keeps the iteration from jumping to a distant solution.
     #[must_use]
     pub fn with_growth(self, factor: f64) -> Self {
         Self {
@@ -117,9 +116,9 @@ impl Newton {
         }
     }
 
-    /// The root near `start`; `step` returns J⁻¹ r at a point, or the reason for which there is none.
+    /// Searches the root near `start`; `step` returns J⁻¹ r at a given x, or the reason for which it cannot be computed.
     ///
-    /// Always returns: see [`Root::stop`]. The last step is applied in full.
+    /// The search always ends; [`Root::stop`] states the reason. The last step before convergence is applied in full.
     pub fn solve<X: Unknown>(&self, start: X, mut step: impl FnMut(&X) -> Result<X, Stop>) -> Root<X> {
         let mut root = Root {
             x: start,

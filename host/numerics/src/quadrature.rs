@@ -5,8 +5,8 @@ use std::sync::OnceLock;
 
 use nalgebra::DMatrix;
 
-/// Gauss–Legendre rule: m nodes c in (0, 1), their weights b, and integrals S_ij = ∫₀^{c_i} ℓ_j of the Lagrange
-/// polynomials ℓ_j.
+/// Gauss–Legendre rule: m nodes c in (0, 1), their weights b, and the integrals S_ij = ∫₀^{c_i} ℓ_j of the Lagrange polynomials ℓ_j of
+/// the nodes.
 ///
 /// Quadrature with b is exact for polynomials up to degree 2m − 1, integration with S up to degree m − 1. A collocation
 /// step on these nodes has order 2m (Hairer, Nørsett & Wanner, Solving ODEs I, II.7).
@@ -21,17 +21,17 @@ use nalgebra::DMatrix;
 pub struct Gauss {
     /// Nodes c_i, in ascending order.
     pub nodes: Vec<f64>,
-    /// Weights b_i.
+    /// Weights b_i of the nodes.
     pub weights: Vec<f64>,
-    /// Integrals S_ij, m × m.
+    /// Integrals S_ij of the Lagrange polynomials, m × m.
     pub integrals: DMatrix<f64>,
 }
 
-/// Number of cached rules: those with 0 to 40 nodes.
+/// Number of rules that can be cached: those with up to 40 nodes.
 const SHARED: usize = 41;
 
 impl Gauss {
-    /// Cached rule with `count` nodes, at most 40.
+    /// Rule with `count` nodes, at most 40, which is computed once and cached.
     pub fn shared(count: usize) -> &'static Self {
         static RULES: [OnceLock<Gauss>; SHARED] = [const { OnceLock::new() }; SHARED];
         let count = count.clamp(1, SHARED - 1);
@@ -57,7 +57,7 @@ impl Gauss {
         }
     }
 
-    /// Values of the Lagrange polynomials of the nodes at the coordinate `place`; the nodes lie in (0, 1).
+    /// Values of the Lagrange polynomials ℓ_j of the nodes at the coordinate `place` in [0, 1].
     pub fn lagrange(&self, place: f64) -> Vec<f64> {
         let nodes = &self.nodes;
         let weight = |i: usize| -> f64 {
@@ -80,8 +80,8 @@ fn legendre(count: usize, x: f64) -> Vec<f64> {
     values
 }
 
-/// The i-th root of the Legendre polynomial P_count from the left and its weight on [−1, 1], by Newton from Tricomi's
-/// estimate.
+/// The i-th root of the Legendre polynomial P_count in ascending order and its quadrature weight on [−1, 1], by Newton's method from
+/// Tricomi's estimate.
 fn root(count: usize, i: usize) -> (f64, f64) {
     let n = count as f64;
     let mut x = -(PI * (i as f64 + 0.75) / (n + 0.5)).cos();

@@ -1,9 +1,9 @@
 //! Roots and extrema of functions of one real variable: bisection, Newton's method with a bracket, regula falsi, golden section.
 
-/// Halves [below, above] until it is no wider than `width`, or until its ends are neighbouring numbers, and returns it.
+/// Bracket of a root from bisection of the bracket [below, above], until it is no wider than `width` or its ends are neighbouring numbers.
 ///
-/// `is_below` is true at the first end and false at the second one; the ends may come in either order on the axis. With a width of 0
-/// the root is found to the last bit.
+/// The condition `is_below` is true at the first end and false at the second; either end may be the larger number. With `width` 0 the root
+/// is found to the last bit.
 ///
 /// ```
 /// use quietcut_numerics::roots::bisection;
@@ -31,12 +31,12 @@ pub fn bisection(
     [below, above]
 }
 
-/// Steps after which [`monotone`] ends: bisection alone needs 64 from a bracket of a second to rounding.
+/// Largest number of steps of [`monotone`]. Bisection alone needs 64 to reduce a bracket of 1 to rounding.
 const STEPS_MAX: usize = 100;
 
-/// The root of a rising function in [low, high], from Newton's method; a step that leaves the bracket becomes a halving.
+/// Root of an increasing function in [low, high] by Newton's method, in which bisection replaces a step that leaves the bracket.
 ///
-/// `function` returns value and derivative. The root is exact to 2 ε · max(|x|, high − low).
+/// `function` returns value and derivative. The error of the root is 2 ε · max(|x|, high − low), with the machine precision ε.
 pub fn monotone([mut low, mut high]: [f64; 2], start: f64, function: impl Fn(f64) -> [f64; 2]) -> f64 {
     let reach = high - low;
     let mut x = start;
@@ -62,24 +62,24 @@ pub fn monotone([mut low, mut high]: [f64; 2], start: f64, function: impl Fn(f64
     x
 }
 
-/// A sign change between two ends, narrowed by regula falsi with the weights of Anderson and Björck (BIT 13 (1973) 253).
+/// Bracket of a sign change of a function, narrowed by regula falsi with the weights of Anderson and Björck (BIT 13 (1973) 253).
 ///
-/// The caller evaluates the function at [`Self::next`] and passes the value to [`Self::narrow`], so that an evaluation may fail
-/// and may carry other results. The order of convergence is 1.7. A bracket that four evaluations have not halved is bisected.
+/// The caller evaluates the function at [`Self::next`] and passes the value to [`Self::narrow`], so that an evaluation may fail or have
+/// further results. The order of convergence is 1.7. If four evaluations have not halved the bracket, it is bisected.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SignChange {
     ends: [[f64; 2]; 2],
-    /// The end that the last step replaced.
+    /// Index of the end that the last step replaced; `None` before the first step.
     replaced: Option<usize>,
-    /// The width at the last halving, and the evaluations since.
+    /// Width of the bracket when it was last halved, and number of evaluations since then.
     halved: (f64, usize),
 }
 
-/// Evaluations within which the bracket must halve: regula falsi halves it in three where it converges.
+/// Number of evaluations without a halving of the bracket after which it is bisected. Regula falsi halves it within three if it converges.
 const EVALUATIONS_PER_HALVING: usize = 4;
 
 impl SignChange {
-    /// Between the points (x, f(x)) of two ends, whose values differ in sign.
+    /// Bracket between two points (x, f(x)) whose values differ in sign.
     pub fn new(first: [f64; 2], second: [f64; 2]) -> Self {
         Self {
             ends: [first, second],
@@ -92,7 +92,7 @@ impl SignChange {
     pub fn next(&self) -> f64 {
         let [[a, fa], [b, fb]] = self.ends;
         let x = a + (b - a) * fa / (fa - fb);
-        // Rounding may carry the quotient out of the bracket, and equal values have none.
+        // Rounding may place the secant's root outside the bracket, and equal values have no secant root: then bisection.
         if self.halved.1 < EVALUATIONS_PER_HALVING && (a.min(b)..=a.max(b)).contains(&x) {
             x
         } else {
@@ -100,11 +100,11 @@ impl SignChange {
         }
     }
 
-    /// Replaces the end whose value has the sign of `value`, and returns its index: 0 or 1.
+    /// Replaces the end whose value has the sign of `value` by the point (`x`, `value`); returns the index of that end, 0 or 1.
     pub fn narrow(&mut self, x: f64, value: f64) -> usize {
         let index = usize::from((value > 0.0) != (self.ends[0][1] > 0.0));
         if self.replaced == Some(index) {
-            // The other end has stayed twice: its value is weighted down, or the iteration would creep.
+            // The other end has stayed for two steps. Its value is reduced, since regula falsi would otherwise converge slowly.
             let gained = 1.0 - value / self.ends[index][1];
             self.ends[1 - index][1] *= if gained > 0.0 { gained } else { 0.5 };
         }
@@ -118,24 +118,24 @@ impl SignChange {
         index
     }
 
-    /// The arguments of both ends, in the order in which they were given.
+    /// The arguments x of both ends of the bracket, in the order in which they were given.
     pub fn ends(&self) -> [f64; 2] {
         self.ends.map(|[x, _]| x)
     }
 
-    /// Distance between the ends.
+    /// Width of the bracket: distance between its ends.
     pub fn width(&self) -> f64 {
         (self.ends[1][0] - self.ends[0][0]).abs()
     }
 }
 
-/// Ratio of successive brackets of a golden-section search, (√5 − 1)/2.
+/// Ratio of the widths of successive brackets in a golden-section search, (√5 − 1)/2.
 const GOLDEN: f64 = 0.618_033_988_749_894_8;
 
-/// The argument at which a function with one minimum in [from, to] is least, by golden-section search (Kiefer, Proc. AMS 4 (1953)
-/// 502), with a bracket no wider than `width`.
+/// Argument of the minimum of a function with a single minimum in [from, to], by golden-section search (Kiefer, Proc. AMS 4 (1953) 502)
+/// until the bracket is no wider than `width`.
 ///
-/// The minimum of a smooth function is determined to the square root of rounding only.
+/// Rounding limits the accuracy of the argument to about the square root of the machine precision.
 pub fn minimum([mut from, mut to]: [f64; 2], width: f64, function: impl Fn(f64) -> f64) -> f64 {
     let (mut left, mut right) = (to - GOLDEN * (to - from), from + GOLDEN * (to - from));
     let (mut at_left, mut at_right) = (function(left), function(right));

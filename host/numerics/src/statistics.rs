@@ -150,7 +150,7 @@ fn quantile(share: f64, probability: impl Fn(f64) -> f64) -> f64 {
     bisect(share, [low, high], probability)
 }
 
-/// The argument at which a rising function passes `share`, to neighbouring numbers.
+/// Argument at which an increasing function reaches `share`, from bisection to neighbouring numbers.
 fn bisect(share: f64, ends: [f64; 2], probability: impl Fn(f64) -> f64) -> f64 {
     let [low, high] = bisection(ends, 0.0, |x| probability(x) < share);
     0.5 * (low + high)

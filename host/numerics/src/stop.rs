@@ -1,18 +1,18 @@
 //! The reason for which an iteration stopped.
 
-/// The reason for which an iteration stopped; only [`Stop::Converged`] is a solution to the tolerance.
+/// The reason for which an iteration stopped; only [`Stop::Converged`] means that a solution is found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stop {
-    /// The step is below the tolerance.
+    /// The last step is below the tolerance.
     Converged,
-    /// No step, however short, is an improvement.
+    /// No step improves the solution, however short it is.
     Stagnated,
     /// The linear equations of a step are singular.
     Singular,
-    /// The model does not hold, or is not finite, where the iteration is.
+    /// The iteration has reached a point where the model is not valid or not finite.
     LeftDomain,
-    /// The caller gave up.
+    /// The caller has given up the iteration.
     GivenUp,
-    /// The bound of the iterations is reached.
+    /// The largest number of iterations is reached.
     Iterations,
 }

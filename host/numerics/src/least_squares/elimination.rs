@@ -1,13 +1,13 @@
-//! Elimination of the parameters that are not wanted from a linear least-squares problem.
+//! Elimination of some parameters from a linear least-squares problem.
 
 use nalgebra::DMatrix;
 
-/// The equations of the last columns once the first `count` columns are eliminated: the block below and right of them in the
+/// Least-squares equations of the last columns of `matrix` after elimination of the first `count` columns: the lower right block of the
 /// triangle R of A = Q R.
 ///
-/// The first columns may have any units. The solution for the last columns is that of the whole problem, and so is its residual:
-/// several problems that share parameters are solved together from their eliminated rows (Golub and Pereyra, SIAM J. Numer. Anal. 10
-/// (1973) 413).
+/// The parameters of the first columns may have any units. The remaining equations have the same solution and residual as the whole problem.
+/// Several problems with common parameters are therefore solved together from their remaining equations (Golub and Pereyra, SIAM J.
+/// Numer. Anal. 10 (1973) 413).
 pub fn eliminated(mut matrix: DMatrix<f64>, count: usize) -> DMatrix<f64> {
     for mut column in matrix.column_iter_mut().take(count) {
         let length = column.norm();

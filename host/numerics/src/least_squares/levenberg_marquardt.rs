@@ -5,92 +5,94 @@ use nalgebra::{DMatrix, DVector};
 use super::{Idle, NormalEquations};
 use crate::stop::Stop;
 
-/// A sum of squares ‖r(θ)‖² of residuals over their noise, r = measured − predicted, to be minimized.
+/// A sum of squares ‖r(θ)‖² to be minimized, where the residuals r = measured − predicted are divided by the standard deviation of their
+/// noise.
 ///
-/// The point θ is a type of the caller: a vector, or the parts of a model. Values and derivatives are separate, since most trial points
-/// need no derivatives.
+/// The caller chooses the type of the parameters θ: a vector, or the parts of a model. Value and derivatives are computed by separate
+/// methods, since most trial steps need no derivatives.
 pub trait Objective {
-    /// The point θ.
+    /// Type of the parameters θ.
     type Point;
 
-    /// The sum of squares at a point, with all that comparing and linearizing need.
+    /// The sum of squares at θ, with the intermediate results that comparison and linearization use.
     type Value;
 
-    /// The value at a point; `None` where the model does not hold there.
+    /// The sum of squares at the parameters `point`; `None` if the model is not valid there.
     fn value(&mut self, point: &Self::Point) -> Option<Self::Value>;
 
-    /// The normal equations at a point; `None` where they break down.
+    /// The normal equations at the parameters `point`; `None` if they cannot be computed.
     fn linearize(&mut self, point: &Self::Point, value: &Self::Value) -> Option<NormalSums>;
 
-    /// θ + δ, within the bounds of the parameters.
+    /// The parameters θ + δ with δ = `step`, limited to the bounds of the parameters.
     fn moved(&self, point: &Self::Point, step: &DVector<f64>) -> Self::Point;
 
-    /// The step, shortened where the parameters may not move so far at once.
+    /// The step δ, shortened if it exceeds the largest change that the model allows in one step.
     fn limited(&self, step: DVector<f64>) -> DVector<f64> {
         step
     }
 
-    /// True where the value `next` is no worse than the value `now`.
+    /// True if the sum of squares `next` is not larger than `now`, so that the step is accepted.
     fn is_no_worse(&self, next: &Self::Value, now: &Self::Value) -> bool;
 
-    /// True where a step of `length` = √(δᵀNδ) from `now` to `next` is the last one.
+    /// True if the minimization has converged with a step of `length` = √(δᵀNδ), in standard deviations of the parameters, from the value
+    /// `now` to the value `next`.
     ///
-    /// The length is in standard deviations of the parameters. A step to a worse value may be the last one: weights that move with the
-    /// parameters keep the sum from falling at the very end.
+    /// The last step may increase the sum slightly: weights that depend on the parameters keep it from decreasing close to the minimum.
     fn has_converged(&self, length: f64, next: &Self::Value, now: &Self::Value) -> bool;
 
-    /// True where the value is not worth another linearization; `before` is the value at the linearization before.
+    /// True if the minimization is to be given up before it is linearized at `value`; `before` is the value at the preceding linearization.
     fn gives_up(&self, _round: usize, _value: &Self::Value, _before: Option<&Self::Value>) -> bool {
         false
     }
 
-    /// True where the linearization promises too little for a step.
+    /// True if the minimization is to be given up because the linearization predicts too small an improvement.
     fn gives_up_linearized(&self, _round: usize, _value: &Self::Value, _sums: &NormalSums) -> bool {
         false
     }
 }
 
-/// N = JᵀJ, n × n, and g = Jᵀr, n entries, of r = measured − predicted and J = ∂predicted/∂θ, both over the noise.
+/// Normal equations of a linearization: N = JᵀJ, n × n, and g = Jᵀr, n entries. The residuals r = measured − predicted and the Jacobian
+/// J = ∂predicted/∂θ are both divided by the standard deviation of the noise.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NormalSums {
-    /// N.
+    /// Normal matrix N.
     pub matrix: DMatrix<f64>,
-    /// g.
+    /// Right side g.
     pub gradient: DVector<f64>,
 }
 
-/// The point where a minimization stopped.
+/// Parameters at which a minimization stopped, and the reason for the stop.
 #[derive(Clone, Debug)]
 pub struct Minimum<P, V> {
-    /// θ.
+    /// Parameters θ.
     pub point: P,
-    /// The value there.
+    /// Sum of squares at these parameters.
     pub value: V,
-    /// The sums of the last linearization, at θ or one step before; `None` if there was none.
+    /// Normal equations of the last linearization, at these parameters or one step before; `None` if there was no linearization.
     pub sums: Option<NormalSums>,
     /// Reason for which the iteration stopped.
     pub stop: Stop,
-    /// Linearizations.
+    /// Number of linearizations.
     pub iterations: usize,
 }
 
-/// The damping λ of (N + λ diag N) δ = g, and how it changes.
+/// Damping λ of the equations (N + λ diag N) δ = g of a step δ, and the rule by which it changes from step to step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Damping {
     /// Damping λ of the first step; 0 if the start is near the minimum.
     pub first: f64,
-    /// The factor of λ after an improvement, below 1.
+    /// Factor on λ after a step that reduces the sum, below 1.
     pub shrink: f64,
-    /// The factor of λ after a step without improvement, above 1.
+    /// Factor on λ after a step that increases the sum, above 1.
     pub growth: f64,
-    /// The least λ after an improvement: above 0 where N is singular.
+    /// Smallest λ after a step that reduces the sum; above 0 if N is singular.
     pub least: f64,
-    /// The least λ after a step without improvement.
+    /// Smallest λ after a step that increases the sum.
     pub least_retried: f64,
 }
 
 impl Damping {
-    /// λ falls and rises tenfold; undamped near the minimum.
+    /// Damping that changes by a factor of ten, with undamped steps near the minimum; `first` is λ of the first step.
     pub fn tenfold(first: f64) -> Self {
         Self {
             first,
@@ -114,26 +116,26 @@ impl Damping {
     }
 }
 
-/// λ below which the next step is not damped: it changes the step by a millionth.
+/// Damping λ below which the next step is not damped, since it would change the step by a millionth only.
 const UNDAMPED: f64 = 1e-6;
 
 /// The damped Gauss–Newton iteration (Marquardt, J. SIAM 11 (1963) 431).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LevenbergMarquardt {
-    /// The damping.
+    /// Damping of the steps.
     pub damping: Damping,
-    /// The bound of the linearizations.
+    /// Largest number of linearizations.
     pub iterations_max: usize,
-    /// The bound of the steps that are tried from one point.
+    /// Largest number of steps that are tried from one linearization.
     pub trials_max: usize,
-    /// The treatment of parameters without effect.
+    /// Treatment of parameters without effect on the prediction.
     pub idle: Idle,
 }
 
 impl LevenbergMarquardt {
-    /// The parameters of the least sum near `start`; `None` where the model does not hold at the start.
+    /// Searches the parameters with the least sum of squares near `start`; `None` if the model is not valid at the start.
     ///
-    /// Always returns: see [`Minimum::stop`].
+    /// The search always ends; [`Minimum::stop`] states the reason.
     pub fn minimize<O: Objective>(
         &self,
         objective: &mut O,

@@ -1,12 +1,13 @@
-//! Least squares of columns that may depend on each other: the solution of least norm.
+//! Least squares with linearly dependent columns: the solution of least norm.
 
 use nalgebra::{DMatrix, DVector, Dyn, SVD};
 
 use crate::singular_values::{SingularValueError, Vectors, decompose};
 
-/// The x of least norm among those of least ‖A x − b‖², from the singular value decomposition.
+/// Least-squares solution of A x = b for a matrix A with linearly dependent columns: of all x with the least ‖A x − b‖², that of least norm,
+/// from the singular value decomposition.
 ///
-/// Columns are not scaled: the least norm depends on the units of the parameters.
+/// The columns are not scaled, so that the solution depends on the units of the parameters.
 #[derive(Clone, Debug)]
 pub struct MinimumNorm {
     decomposed: SVD<f64, Dyn, Dyn>,
@@ -27,7 +28,7 @@ impl MinimumNorm {
         Ok(Self { decomposed, least })
     }
 
-    /// The solution for one right side, m entries.
+    /// The solution x for the right side b = `right`, m entries.
     pub fn solve(&self, right: &DVector<f64>) -> DVector<f64> {
         let svd = &self.decomposed;
         let (Some(u), Some(v_t)) = (&svd.u, &svd.v_t) else {
@@ -41,11 +42,11 @@ impl MinimumNorm {
     }
 }
 
-/// The singular value below which a combination of columns is rounding.
+/// Singular value of a matrix below which a combination of its columns counts as zero.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Tolerance {
-    /// In the unit of the columns.
+    /// Absolute bound, in the unit of the entries of the matrix.
     Absolute(f64),
-    /// As a share of the largest one.
+    /// Bound as a fraction of the largest singular value.
     Relative(f64),
 }

@@ -2,19 +2,19 @@
 
 use nalgebra::{Cholesky, ComplexField, DMatrix, DVector, Dyn};
 
-/// The treatment of a parameter without effect, whose column of A is zero.
+/// Treatment of a parameter without effect on the prediction, whose column of A is zero.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Idle {
-    /// The equations have no solution.
+    /// Such a parameter is refused: the equations have no solution.
     Refuse,
-    /// The parameter is zero, with a covariance of zero: it is fixed.
+    /// Such a parameter is fixed at zero, with a covariance of zero.
     Hold,
 }
 
-/// Factored normal equations, for data too many to be held as a matrix, or given as sums.
+/// Factored normal equations N x = g, for data that are given as sums or are too many to be held as a matrix.
 ///
-/// D N D = L Lᴴ with D = diag(N)^(−1/2): parameters of one fit differ by many powers of ten. The condition of N is the square of that
-/// of A; a [`super::LinearProblem`] keeps twice the digits.
+/// The factors are D N D = L Lᴴ with D = diag(N)^(−1/2), since the parameters of one fit differ by many powers of ten. The condition number of
+/// N is the square of that of A: a [`super::LinearProblem`] loses only half as many digits.
 ///
 /// ```
 /// use nalgebra::{DMatrix, DVector};
@@ -29,15 +29,16 @@ pub enum Idle {
 #[derive(Clone, Debug)]
 pub struct NormalEquations<T: ComplexField = f64> {
     cholesky: Cholesky<T, Dyn>,
-    /// The diagonal of D; 0 for a parameter that is held.
+    /// Diagonal of D; 0 for a parameter that is fixed at zero.
     scale: DVector<f64>,
 }
 
 impl<T: ComplexField<RealField = f64>> NormalEquations<T> {
-    /// Factors N, n × n and Hermitian, of which only the lower triangle is read; `ridge` is added to its diagonal, scaled to 1.
+    /// Factors N = `matrix`, n × n and Hermitian, of which only the lower triangle is used. `ridge` is added to the diagonal after it is scaled
+    /// to 1.
     ///
-    /// A ridge λ is the damping of Levenberg and Marquardt, or regularizes columns that depend on each other below the accuracy √λ.
-    /// `None` where N is not positive definite or not finite.
+    /// A ridge λ is the damping of Levenberg and Marquardt, or regularizes columns that are linearly dependent within the accuracy √λ.
+    /// `None` if N is not positive definite or not finite.
     pub fn new(matrix: &DMatrix<T>, ridge: f64, idle: Idle) -> Option<Self> {
         let size = matrix.nrows();
         let mut scale = DVector::zeros(size);
@@ -51,7 +52,7 @@ impl<T: ComplexField<RealField = f64>> NormalEquations<T> {
                 return None;
             };
         }
-        // The Cholesky decomposition reads the lower triangle only.
+        // Only the lower triangle is filled, since the Cholesky decomposition uses no other entries.
         let mut scaled = DMatrix::zeros(size, size);
         for j in 0..size {
             scaled[(j, j)] = T::from_real(1.0 + ridge);
@@ -65,7 +66,7 @@ impl<T: ComplexField<RealField = f64>> NormalEquations<T> {
         })
     }
 
-    /// x of N x = g.
+    /// Solution x of N x = g with g = `right`.
     pub fn solve(&self, right: &DVector<T>) -> DVector<T> {
         let mut solution = right.clone();
         self.scaled(&mut solution);
@@ -74,7 +75,7 @@ impl<T: ComplexField<RealField = f64>> NormalEquations<T> {
         solution
     }
 
-    /// X of N X = G, one right side per column.
+    /// Solution X of N X = G, where each column of G = `right` is one right side.
     pub fn solve_columns(&self, right: &DMatrix<T>) -> DMatrix<T> {
         let mut solution = right.clone();
         self.scaled(&mut solution);
@@ -83,7 +84,7 @@ impl<T: ComplexField<RealField = f64>> NormalEquations<T> {
         solution
     }
 
-    /// N⁻¹: the covariance of the parameters where the rows are divided by their standard deviation.
+    /// Inverse N⁻¹: the covariance of the parameters if each row of A is divided by the standard deviation of its noise.
     pub fn inverse(&self) -> DMatrix<T> {
         let mut inverse = self.cholesky.inverse();
         for j in 0..self.scale.len() {
@@ -95,7 +96,7 @@ impl<T: ComplexField<RealField = f64>> NormalEquations<T> {
         inverse
     }
 
-    /// gᴴ N⁻¹ g: the decrease of the sum of squares from x = 0 to the solution.
+    /// Decrease gᴴ N⁻¹ g of the sum of squares from x = 0 to the solution, with g = `right`.
     pub fn explained(&self, right: &DVector<T>) -> f64 {
         let mut whitened = right.clone();
         self.scaled(&mut whitened);
@@ -113,12 +114,12 @@ impl<T: ComplexField<RealField = f64>> NormalEquations<T> {
     }
 }
 
-/// x of N x = g without a ridge; `None` where N is not positive definite.
+/// Solution x of the normal equations N x = g without a ridge; `None` if N is not positive definite.
 pub fn solve_normal_equations(matrix: &DMatrix<f64>, right: &DVector<f64>) -> Option<DVector<f64>> {
     Some(NormalEquations::new(matrix, 0.0, Idle::Refuse)?.solve(right))
 }
 
-/// N⁻¹ without a ridge; `None` where N is not positive definite.
+/// Inverse of the normal matrix N without a ridge; `None` if N is not positive definite.
 pub fn invert_normal_equations(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     Some(NormalEquations::new(matrix, 0.0, Idle::Refuse)?.inverse())
 }
