@@ -11,6 +11,7 @@ use quietcut_model::case::Case;
 use quietcut_recording::Recording;
 use quietcut_simulate::rig::Noise;
 use quietcut_simulate::{Entry, Recorder, TachometerModel, VirtualCut};
+use quietcut_testkit::results::Campaign;
 
 /// A case with a structure stiff enough for steel, whose two modes vibrate by a fraction of the feed, and a tool for which every
 /// coefficient contributes to every direction.
@@ -195,8 +196,8 @@ fn coverage(seeds: u64) -> [f64; 6] {
     std::array::from_fn(|index| all.iter().filter(|held| held[index]).count() as f64 / seeds as f64)
 }
 
-/// Prints the coverage of each coefficient and checks it against the given ranges, for each coefficient and pooled.
-fn check_coverage(seeds: u64, each: std::ops::RangeInclusive<f64>, pooled: std::ops::RangeInclusive<f64>) {
+/// Prints the coverage of each coefficient. Returns it, with the mean over all coefficients.
+fn measured_coverage(seeds: u64) -> ([f64; 6], f64) {
     let shares = coverage(seeds);
     let said: Vec<String> = KEYS
         .iter()
@@ -210,6 +211,15 @@ fn check_coverage(seeds: u64, each: std::ops::RangeInclusive<f64>, pooled: std::
         said.join(", "),
         100.0 * mean
     );
+    (shares, mean)
+}
+
+/// Checks the coverage against the given ranges, for each coefficient and pooled.
+fn check_coverage(
+    (shares, mean): ([f64; 6], f64),
+    each: std::ops::RangeInclusive<f64>,
+    pooled: std::ops::RangeInclusive<f64>,
+) {
     assert!(pooled.contains(&mean), "{mean}");
     assert!(shares.iter().all(|share| each.contains(share)), "{shares:?}");
 }
@@ -217,7 +227,7 @@ fn check_coverage(seeds: u64, each: std::ops::RangeInclusive<f64>, pooled: std::
 #[test]
 fn ninety_percent_intervals_hold_the_truth_nine_times_of_ten() {
     // Fewer than 13 of 20 draws at 0.9 have the probability 1e-5.
-    check_coverage(20, 0.65..=1.0, 0.8..=0.98);
+    check_coverage(measured_coverage(20), 0.65..=1.0, 0.8..=0.98);
 }
 
 #[test]
@@ -225,7 +235,30 @@ fn ninety_percent_intervals_hold_the_truth_nine_times_of_ten() {
 fn coverage_of_force_coefficients() {
     let seeds = std::env::var("QUIETCUT_SEEDS")
         .ok()
-        .and_then(|seeds| seeds.parse().ok());
+        .and_then(|seeds| seeds.parse().ok())
+        .unwrap_or(100);
+    let (shares, mean) = measured_coverage(seeds);
+    let percent = |share: f64| format!("{:.1} %", 100.0 * share);
+    let mut figures: Vec<_> = KEYS
+        .iter()
+        .zip(shares)
+        .map(|(key, share)| {
+            (
+                format!("90 % intervals of {key} that hold the truth"),
+                percent(share),
+            )
+        })
+        .collect();
+    figures.push(("all together".to_owned(), percent(mean)));
+    Campaign {
+        name: "force-coefficients",
+        title: "Cutting force coefficients from measured forces",
+        command: &format!(
+            "QUIETCUT_SEEDS={seeds} cargo test --release -p quietcut-identify --lib -- --ignored --nocapture coverage_of_force_coefficients"
+        ),
+        seeds: &format!("0 to {}", seeds - 1),
+    }
+    .record(&figures);
     // Fewer than 80 of 100 draws at 0.9 have the probability 1e-3.
-    check_coverage(seeds.unwrap_or(100), 0.8..=0.98, 0.85..=0.95);
+    check_coverage((shares, mean), 0.8..=0.98, 0.85..=0.95);
 }

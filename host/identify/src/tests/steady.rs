@@ -208,6 +208,27 @@ fn intervals_cover_the_truth_in_nine_of_ten_cases() {
         100.0 * pooled,
         100.0 * worst
     );
+    let percent = |share: f64| format!("{:.1} %", 100.0 * share);
+    let mut figures = vec![
+        (
+            "90 % intervals that hold the truth, all together".to_owned(),
+            percent(pooled),
+        ),
+        ("largest relative error of a parameter".to_owned(), percent(worst)),
+    ];
+    figures.extend(by_parameter.iter().map(|(name, covered)| {
+        (
+            format!("90 % intervals that hold the truth, {name}"),
+            percent(*covered),
+        )
+    }));
+    quietcut_testkit::results::Campaign {
+        name: "periodic-fit",
+        title: "One nonlinear mode from step-sine tests",
+        command: "cargo test --release -p quietcut-identify --lib intervals_cover -- --ignored --nocapture",
+        seeds: "0 to 199; noise with the standard deviation of 1 % of force and motion",
+    }
+    .record(&figures);
     assert!(worst < 0.02, "{worst}");
     assert!((0.88..=0.92).contains(&pooled), "{pooled}");
     for (name, covered) in by_parameter {

@@ -320,6 +320,24 @@ fn cubic_terms_through_table_and_lookup_stay_within_the_stated_error() {
         );
     }
     trial.report();
+    let stated = table.interpolation_error().unwrap();
+    quietcut_testkit::results::Campaign {
+        name: "table-with-cubic-terms",
+        title: "Lobe table of a machine with cubic terms, between its entries",
+        command: "cargo test --release -p quietcut-stability --lib cubic_terms_through -- --ignored --nocapture",
+        seeds: &format!("{seed}; 60 points"),
+    }
+    .record(&[
+        ("stated error in depth".to_owned(), format!("{} mm", stated.depth.0)),
+        (
+            "largest error to the unsafe side".to_owned(),
+            format!("{:.4} mm", trial.largest.unsafe_mm),
+        ),
+        (
+            "largest error to the safe side".to_owned(),
+            format!("{:.4} mm", trial.largest.cautious_mm),
+        ),
+    ]);
 }
 
 #[test]

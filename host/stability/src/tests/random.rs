@@ -14,6 +14,7 @@ use crate::spectrum::characteristic::Characteristic;
 use crate::tests::random_case;
 use crate::tests::taylor::{self, Series};
 use crate::*;
+use quietcut_testkit::results::Campaign;
 
 /// True if no multiplier lies outside the unit circle, from the argument principle on the finer mesh; `None` if the
 /// winding number does not converge.
@@ -323,6 +324,35 @@ impl Counts {
         self.hung += 1;
     }
 
+    /// The counts as figures of the campaign.
+    fn figures(&self) -> Vec<(String, String)> {
+        let of_all = |count: usize| format!("{count} of {}", self.machines);
+        let mean_ms = |time: Duration| format!("{:.1} ms", 1e3 * time.as_secs_f64() / self.machines as f64);
+        [
+            (
+                "wrong verdicts, crashed and hung machines",
+                of_all(self.wrong + self.crashed + self.hung),
+            ),
+            (
+                "undecided machines, against motions by Taylor series",
+                of_all(self.undecided),
+            ),
+            ("of these refused", self.refused.to_string()),
+            (
+                "machines for which the reference has no verdict",
+                of_all(self.silent),
+            ),
+            (
+                "largest distance from the reference over the sum of both stated errors",
+                format!("{:.2}", self.error_ratio),
+            ),
+            ("time per machine, method", mean_ms(self.time)),
+            ("time per machine, reference", mean_ms(self.reference_time)),
+        ]
+        .map(|(figure, value)| (figure.to_owned(), value))
+        .into()
+    }
+
     fn check(&self) {
         assert_eq!((self.wrong, self.crashed, self.hung), (0, 0, 0));
         assert!(self.error_ratio <= 1.0, "{}", self.error_ratio);
@@ -410,11 +440,10 @@ fn worker(
     });
 }
 
-/// Computes `count` machines from the index `first` on and prints their results. Panics if a verdict is wrong, an error
-/// is larger than stated, or a computation crashes or hangs.
+/// Computes `count` machines from the index `first` on, prints their results and returns the counts.
 ///
 /// The winding number is computed for machines whose finer mesh has at most `ports_max` ports.
-fn run(seed: u64, first: usize, count: usize, ports_max: usize) {
+fn run(seed: u64, first: usize, count: usize, ports_max: usize) -> Counts {
     let end = first + count;
     let longest = Duration::from_secs(number("QUIETCUT_RANDOM_LONGEST_S", LONGEST_S) as u64);
     let next = Arc::new(AtomicUsize::new(first));
@@ -469,7 +498,7 @@ fn run(seed: u64, first: usize, count: usize, ports_max: usize) {
         "seed {seed}, from {first}, all, {:.0?}: {counts}",
         began.elapsed()
     );
-    counts.check();
+    counts
 }
 
 fn number(name: &str, default: usize) -> usize {
@@ -481,9 +510,9 @@ fn number(name: &str, default: usize) -> usize {
 
 #[test]
 fn verdicts_of_some_random_machines_are_right() {
-    run(20_261_121, 0, 500, 0);
+    run(20_261_121, 0, 500, 0).check();
     // Forty machines with the winding number, which takes much longer.
-    run(20_261_122, 0, 40, 150);
+    run(20_261_122, 0, 40, 150).check();
 }
 
 /// Four machines: a map so far from normal that rounding moves its largest eigenvalue from 15.7 to 18, motions that
@@ -491,7 +520,7 @@ fn verdicts_of_some_random_machines_are_right() {
 #[test]
 fn verdicts_of_machines_that_grow_within_a_period_are_right() {
     for index in [18_041, 20_109, 14_762, 81_745] {
-        run(20_261_121, index, 1, 0);
+        run(20_261_121, index, 1, 0).check();
     }
 }
 
@@ -508,10 +537,18 @@ fn verdicts_of_machines_that_grow_within_a_period_are_right() {
 #[test]
 #[ignore = "most of an hour; the command stands above"]
 fn verdicts_of_a_hundred_thousand_random_machines_are_right() {
-    run(
-        number("QUIETCUT_SEED", 20_261_121) as u64,
-        number("QUIETCUT_RANDOM_FIRST", 0),
-        number("QUIETCUT_RANDOM_CASES", 100_000),
-        number("QUIETCUT_WINDING_PORTS", 0),
-    );
+    let seed = number("QUIETCUT_SEED", 20_261_121);
+    let first = number("QUIETCUT_RANDOM_FIRST", 0);
+    let count = number("QUIETCUT_RANDOM_CASES", 100_000);
+    let counts = run(seed as u64, first, count, number("QUIETCUT_WINDING_PORTS", 0));
+    Campaign {
+        name: "random-machines",
+        title: "Random machines",
+        command: &format!(
+            "QUIETCUT_RANDOM_CASES={count} RAYON_NUM_THREADS=1 cargo test --release -p quietcut-stability --lib -- --ignored --nocapture verdicts_of_a_hundred_thousand"
+        ),
+        seeds: &format!("{seed}, machines {first} to {}", first + count - 1),
+    }
+    .record(&counts.figures());
+    counts.check();
 }

@@ -9,6 +9,7 @@ use crate::limits::percentiles::limit_of;
 use crate::*;
 use quietcut_model::case::{Case, Deviation, Parameter};
 use quietcut_testkit::case;
+use quietcut_testkit::results::Campaign;
 
 /// The acetal robot with the standard deviations of modes and cutting coefficients that a good measurement leaves.
 fn acetal() -> Case {
@@ -150,8 +151,13 @@ impl<'a> MonteCarlo<'a> {
     }
 }
 
-/// Compares the spread at one speed with a Monte Carlo sample of `count` machines.
-fn compare<'a>(case: &'a Case, rpm: f64, depth_mm: f64, count: u64) -> (LimitSpread, MonteCarlo<'a>) {
+/// Computes the percentiles of the limit at one speed, and the Monte Carlo of `count` machines. Prints both.
+fn percentiles_and_monte_carlo<'a>(
+    case: &'a Case,
+    rpm: f64,
+    depth_mm: f64,
+    count: u64,
+) -> (LimitSpread, MonteCarlo<'a>) {
     let uncertainty = Uncertainty::new(case, &method_of, 7).unwrap();
     let line = nominal(case, rpm, depth_mm);
     let began = std::time::Instant::now();
@@ -179,6 +185,18 @@ fn compare<'a>(case: &'a Case, rpm: f64, depth_mm: f64, count: u64) -> (LimitSpr
             100.0 * share,
             100.0 * difference,
         );
+    }
+    (spread, drawn)
+}
+
+/// Compares the percentiles of the limit at one speed with the Monte Carlo.
+fn compare(spread: &LimitSpread, drawn: &MonteCarlo<'_>) {
+    let rpm = drawn.rpm;
+    for (share, found, interval) in percentiles_of(spread) {
+        let found = found.unwrap_or(f64::INFINITY);
+        let [from, to] = interval.map(|end| end.unwrap_or(f64::INFINITY));
+        let expected = drawn.quantile(share);
+        let difference = found / expected - 1.0;
         // If few machines have limits near a percentile, the Monte Carlo sample does not determine it to 2 %. The
         // percentile must then lie in the sample's 95 % interval.
         let [low, high] = drawn.interval(share, Z_95);
@@ -198,7 +216,6 @@ fn compare<'a>(case: &'a Case, rpm: f64, depth_mm: f64, count: u64) -> (LimitSpr
             "{rpm} rev/min, {share}: {interval:?} and {low} to {high}"
         );
     }
-    (spread, drawn)
 }
 
 /// Largest number of machines from which one percentile is determined.
@@ -248,7 +265,9 @@ fn decide(spread: &LimitSpread, drawn: &MonteCarlo<'_>) {
 
 #[test]
 fn percentiles_at_a_cusp_are_those_of_2000_machines() {
-    compare(&acetal(), 1480.0, 8.0, 2000);
+    let case = acetal();
+    let (spread, drawn) = percentiles_and_monte_carlo(&case, 1480.0, 8.0, 2000);
+    compare(&spread, &drawn);
 }
 
 #[test]
@@ -272,24 +291,66 @@ fn limits_outside_the_bracket_are_not_computed() {
 #[test]
 #[ignore = "minutes of Monte Carlo; see the comment above for the command"]
 fn percentiles_over_lobes_cusps_and_islands_are_those_of_2000_machines() {
-    for rpm in [
-        650.0, 715.0, 812.0, 900.0, 1000.0, 1036.0, 1060.0, 1078.0, 1100.0, 1200.0, 1480.0, 2000.0,
-    ] {
-        compare_and_decide(rpm);
-    }
+    campaign(
+        "percentiles",
+        "Percentiles of limits against machines drawn one by one",
+        "percentiles_over_lobes",
+        &[
+            650.0, 715.0, 812.0, 900.0, 1000.0, 1036.0, 1060.0, 1078.0, 1100.0, 1200.0, 1480.0, 2000.0,
+        ],
+    );
 }
 
 /// Beside the gap between flip notch and Hopf limits few machines have a limit, and 2 000 know the 95 % limit to 20 %.
 #[test]
 #[ignore = "four million machines; see the comment above for the command"]
 fn percentiles_over_the_bottom_of_the_flip_notch_are_those_of_a_larger_monte_carlo_sample() {
-    compare_and_decide(1045.0);
+    campaign(
+        "percentiles-of-the-flip-notch",
+        "Percentiles of limits at the bottom of the flip notch",
+        "percentiles_over_the_bottom",
+        &[1045.0],
+    );
 }
 
-fn compare_and_decide(rpm: f64) {
+/// Records the percentiles at these speeds beside those of 2 000 drawn machines, then checks them.
+fn campaign(name: &str, title: &str, test: &str, speeds_rpm: &[f64]) {
     let case = acetal();
-    let (spread, drawn) = compare(&case, rpm, 8.0, 2000);
-    decide(&spread, &drawn);
+    let found: Vec<_> = speeds_rpm
+        .iter()
+        .map(|&rpm| percentiles_and_monte_carlo(&case, rpm, 8.0, 2000))
+        .collect();
+    let figures: Vec<_> = found
+        .iter()
+        .flat_map(|(spread, drawn)| {
+            percentiles_of(spread).map(|(share, found, _)| {
+                let [low, high] = drawn.interval(share, Z_90);
+                (
+                    format!(
+                        "{} rev/min, {:.0} % of the limits below",
+                        drawn.rpm,
+                        100.0 * share
+                    ),
+                    format!(
+                        "{:.4} mm; drawn machines {:.4} mm, 90 % interval {low:.4} to {high:.4} mm",
+                        found.unwrap_or(f64::INFINITY),
+                        drawn.quantile(share)
+                    ),
+                )
+            })
+        })
+        .collect();
+    Campaign {
+        name,
+        title,
+        command: &format!("cargo test --release -p quietcut-stability --lib {test} -- --ignored --nocapture"),
+        seeds: &format!("{SEED} for 2 000 machines at each speed, 7 for the percentiles"),
+    }
+    .record(&figures);
+    for (spread, drawn) in &found {
+        compare(spread, drawn);
+        decide(spread, drawn);
+    }
 }
 
 #[test]

@@ -16,6 +16,7 @@ use quietcut_recording::{Channel, Quantity, Recording, Sidecar, TestKind};
 use quietcut_simulate::rig::Noise;
 use quietcut_simulate::{Entry, Pores, Recorder, TachometerModel, VirtualCut};
 use quietcut_testkit::case;
+use quietcut_testkit::results::Campaign;
 
 const RATE_HZ: f64 = 1024.0;
 const SECONDS: f64 = 100.0;
@@ -378,6 +379,25 @@ fn coverage_of_modes_from_porous_milling_and_speed_sweeps() {
         sweeps.add(off(&found, &truth));
     }
     pooled.push(sweeps.covered("speed sweep"));
+    let figures: Vec<_> = ["porous cuts", "speed sweeps in three immersions"]
+        .iter()
+        .zip(&pooled)
+        .map(|(name, share)| {
+            (
+                format!("90 % intervals that hold the truth, {name}"),
+                format!("{:.1} %", 100.0 * share),
+            )
+        })
+        .collect();
+    Campaign {
+        name: "modes-in-process",
+        title: "Modes from porous milling and speed sweeps",
+        command: &format!(
+            "QUIETCUT_SEEDS={seeds} cargo test --release -p quietcut-identify --lib -- --ignored --nocapture coverage_of_modes_from_porous"
+        ),
+        seeds: &format!("0 to {}; noise with the standard deviation of 1 % of each channel", seeds - 1),
+    }
+    .record(&figures);
     for share in pooled {
         assert!((0.85..0.95).contains(&share), "{share}");
     }
