@@ -1,4 +1,4 @@
-//! This test's equations against those of the library's simulation: the names mean the same in both.
+//! Compares this test's equations with those of the library's simulation: each effect name means the same in both.
 
 use std::f64::consts::TAU;
 use std::path::Path;
@@ -13,12 +13,12 @@ use rand_chacha::ChaCha8Rng;
 
 use super::cause::{Cause, Kind, PROCESS, STRUCTURAL};
 use super::cut::CutBench;
-use super::judge::Lab;
 use super::machine::Machine;
+use super::oracle::Lab;
 use super::rig::Rig;
 use super::sensor::Sensor;
 
-/// `--effect` of a cause.
+/// Values of the option `--effect` that describe a cause to the library.
 fn texts(cause: &Cause, machine: &Machine, rig: &Rig) -> Vec<String> {
     let name = cause.kind.name();
     let values = cause.values(machine, &rig.scale);
@@ -42,7 +42,7 @@ fn texts(cause: &Cause, machine: &Machine, rig: &Rig) -> Vec<String> {
 }
 
 #[test]
-fn every_structural_effect_means_what_it_means_in_the_simulation() {
+fn structural_effects_agree_with_the_library() {
     for kind in STRUCTURAL.into_iter().chain([Kind::SensorOffsetByMode]) {
         let mut compared = 0;
         for seed in 0..40 {
@@ -90,8 +90,8 @@ fn every_structural_effect_means_what_it_means_in_the_simulation() {
             for (sensor, ours) in rig.sensors.iter().zip(&ours) {
                 let theirs = &recording.channel(&sensor.name()).unwrap().samples;
                 let size = theirs.iter().fold(0.0_f64, |a, b| a.max(b.abs()));
-                // The last sample may be missing by rounding of the duration; a jump of the acceleration may fall to either
-                // side of a sample.
+                // Rounding of the duration may drop the last sample, and a jump of the acceleration may fall on either side of a sample:
+                // one percent of the samples is not compared.
                 let mut apart: Vec<f64> = ours
                     .iter()
                     .zip(theirs)
@@ -99,7 +99,7 @@ fn every_structural_effect_means_what_it_means_in_the_simulation() {
                     .collect();
                 apart.sort_by(f64::total_cmp);
                 let most = apart[apart.len() * 99 / 100];
-                // The library allows itself 1e-12 m in every step, some thousand in all.
+                // The library integrates to 1e-12 m in each of some thousand steps.
                 let tolerance = 2e-5 + 1e-9 / machine.amplitude_m;
                 assert!(
                     most < tolerance,
@@ -115,7 +115,7 @@ fn every_structural_effect_means_what_it_means_in_the_simulation() {
 }
 
 #[test]
-fn a_cut_is_the_cut_of_the_simulation() {
+fn cutting_effects_agree_with_the_library() {
     for kind in PROCESS {
         let mut compared = 0;
         for seed in 0..8 {
@@ -148,7 +148,7 @@ fn a_cut_is_the_cut_of_the_simulation() {
             for (name, ours) in bench.channel_names().iter().zip(&ours) {
                 let theirs = &recording.channel(name).unwrap().samples;
                 let size = theirs.iter().fold(0.0_f64, |a, b| a.max(b.abs()));
-                // The surface before the first cut is not the same in both: the last third has forgotten it.
+                // The two simulations start from different surfaces. The last third of the record no longer depends on them.
                 let late = ours.len() * 2 / 3..theirs.len().min(ours.len());
                 let mut apart: Vec<f64> = ours[late.clone()]
                     .iter()
@@ -156,7 +156,7 @@ fn a_cut_is_the_cut_of_the_simulation() {
                     .map(|(a, b)| (a - b).abs() / size)
                     .collect();
                 apart.sort_by(f64::total_cmp);
-                // A sample at the very moment of entry may fall to either side.
+                // A sample at the instant of an entry may fall on either side of the step: two percent of the samples are not compared.
                 let most = apart[apart.len() * 98 / 100];
                 assert!(
                     most < 1e-3,
@@ -170,7 +170,7 @@ fn a_cut_is_the_cut_of_the_simulation() {
     }
 }
 
-/// The effect of a process cause.
+/// The library's effect for a cause of the cutting process.
 fn process_effects(cause: &Cause, bench: &CutBench) -> Effects {
     let name = cause.kind.name();
     if cause.kind == Kind::AxialDepthModulation {

@@ -1,4 +1,4 @@
-//! Many seeds of a family through the tool, and how often it was right.
+//! Runs many seeds of a family through the diagnosis, and counts how often it is right.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
@@ -7,53 +7,53 @@ use std::time::Instant;
 use rayon::prelude::*;
 use serde_json::Value;
 
-use super::judge::Verdict;
+use super::oracle::Verdict;
 use super::puzzle::{Family, Hidden, Puzzle};
 
-/// What the tool said of one puzzle.
+/// The answer of the diagnosis to one puzzle.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Said {
+pub(crate) struct GivenAnswer {
     outcome: String,
-    /// Causes in their order.
-    causes: Vec<SaidCause>,
+    /// Causes in the order of the answer.
+    causes: Vec<AnsweredCause>,
     energy_removed: Option<f64>,
-    /// What it leaves beyond the noise, as a share of what was there.
+    /// Residual energy of the extended case above the noise, as a share of that of the baseline.
     left: f64,
     seconds: f64,
 }
 
-/// One cause of an answer.
+/// One cause of an answer, with its confidence, location and parameters.
 #[derive(Clone, Debug)]
-struct SaidCause {
+struct AnsweredCause {
     name: String,
     confidence: f64,
-    /// Its direction and its channel, where it says one.
+    /// Direction and channel of the cause, if the answer gives them.
     places: Vec<String>,
-    /// Parameters with their 90 % intervals.
+    /// Parameters by key, with their 90 % intervals.
     parameters: Vec<(String, [f64; 2])>,
 }
 
-/// What was found of one seed.
+/// The puzzle of one seed with the answer and its assessment.
 #[derive(Clone, Debug)]
 pub(crate) struct Finding {
     seed: u64,
     hidden: Vec<&'static str>,
     verdict: Verdict,
-    /// How plain each effect is, over the noise.
+    /// Root mean square of each effect over the noise, in the channel where it is largest.
     ratios: Vec<f64>,
     redrawn: usize,
-    said: Said,
+    said: GivenAnswer,
     right: bool,
-    /// What is named first is hidden; of two effects this is less than right.
+    /// True if the first cause of the answer is hidden. Of two effects, `right` requires both.
     first: bool,
-    /// Of the parameters of causes that were named rightly: how many have their truth in the interval, of how many.
+    /// Among the parameters of rightly named causes: the number whose true value is in the interval, and the number of all.
     covered: [usize; 2],
-    /// The worst: name and key, truth, interval.
+    /// The parameters outside their interval: name and key, true value, interval.
     missed: Vec<String>,
 }
 
-impl Said {
-    /// An answer as `diagnose --json` prints it.
+impl GivenAnswer {
+    /// Reads an answer in the form that `diagnose --json` prints.
     pub(crate) fn of(answer: &Value, seconds: f64) -> Self {
         let causes = answer["causes"].as_array().cloned().unwrap_or_default();
         Self {
@@ -64,7 +64,7 @@ impl Said {
                     let parameters = cause["parameters"].as_object().cloned().unwrap_or_default();
                     let interval =
                         |value: &Value| [0, 1].map(|end| value["ci90"][end].as_f64().unwrap_or(f64::NAN));
-                    SaidCause {
+                    AnsweredCause {
                         name: cause["name"].as_str().unwrap_or_default().to_owned(),
                         confidence: cause["confidence"].as_f64().unwrap_or(f64::NAN),
                         places: ["direction", "channel"]
@@ -88,7 +88,7 @@ impl Said {
         self.causes.iter().map(|cause| cause.name.as_str()).collect()
     }
 
-    /// What stands in the confusion matrix.
+    /// Label of the answer in the confusion matrix.
     fn label(&self) -> String {
         match self.outcome.as_str() {
             "cause" => self
@@ -103,9 +103,9 @@ impl Said {
     }
 }
 
-impl SaidCause {
-    /// True where it is one of the hidden causes, and where it says its direction or channel, at the right one; of sensors `all` that
-    /// are said to be wrong have to be those that are.
+impl AnsweredCause {
+    /// True if the cause is one of the hidden ones. A direction or channel in the answer must be the hidden one. Of sensor errors, the set
+    /// of channels in `all` causes of this name must be the hidden set.
     fn is_any_of(&self, hidden: &[Hidden], all: &[Self]) -> bool {
         hidden.iter().any(|hidden| {
             if hidden.name != self.name {
@@ -123,10 +123,10 @@ impl SaidCause {
 }
 
 impl Finding {
-    /// Asks `tool` and judges what it says.
+    /// Diagnoses a puzzle with `tool` and assesses the answer.
     pub(crate) fn of(puzzle: &Puzzle, tool: &(dyn Fn(&Puzzle) -> Value + Sync)) -> Self {
         let began = Instant::now();
-        let said = Said::of(&tool(puzzle), began.elapsed().as_secs_f64());
+        let said = GivenAnswer::of(&tool(puzzle), began.elapsed().as_secs_f64());
         let hidden: Vec<&'static str> = puzzle.hidden.iter().map(|hidden| hidden.name).collect();
         let wanted: BTreeSet<&str> = hidden.iter().copied().collect();
         let first = said.outcome == "cause"
@@ -149,14 +149,14 @@ impl Finding {
         };
         let (mut covered, mut missed) = ([0, 0], Vec::new());
         if right && puzzle.verdict == Verdict::Separable {
-            for SaidCause { name, parameters, .. } in &said.causes {
+            for AnsweredCause { name, parameters, .. } in &said.causes {
                 for hidden in puzzle.hidden.iter().filter(|hidden| hidden.name == name) {
                     for (key, truth) in &hidden.values {
                         let Some((_, [low, high])) = parameters.iter().find(|(known, _)| known == key) else {
                             continue;
                         };
                         covered[1] += 1;
-                        // Angles come around.
+                        // Angles are compared modulo 360 degrees.
                         let turn = if *key == "angle_deg" { 360.0 } else { 0.0 };
                         if [-turn, 0.0, turn]
                             .iter()
@@ -199,7 +199,7 @@ impl Finding {
         }
     }
 
-    /// True of a separable one of which every effect is above three times the noise; of a weaker one `Some(false)`.
+    /// For a separable puzzle: true if every effect is larger than three times the noise. `None` for other puzzles.
     fn is_plain(&self) -> Option<bool> {
         (self.verdict == Verdict::Separable).then(|| self.ratios.iter().all(|ratio| *ratio > 3.0))
     }
@@ -237,14 +237,14 @@ impl fmt::Display for Finding {
     }
 }
 
-/// All seeds of a family.
+/// Findings of all seeds of a family.
 pub(crate) struct Report {
     pub(crate) family: Family,
     pub(crate) findings: Vec<Finding>,
 }
 
 impl Report {
-    /// Runs `seeds` of a family; the same for any number of threads.
+    /// Runs the `seeds` of a family in parallel. The result does not depend on the number of threads.
     pub(crate) fn run(
         family: Family,
         seeds: std::ops::Range<u64>,
@@ -269,37 +269,37 @@ impl Report {
         }
     }
 
-    /// Right among the separable ones whose every effect is above three times the noise.
+    /// Share of right answers among separable puzzles in which every effect is larger than three times the noise.
     pub(crate) fn separable(&self) -> Share {
         self.share(|f| (f.is_plain() == Some(true)).then_some(f.right))
     }
 
-    /// Of two effects, each above three times the noise: one of them is named first.
+    /// Share of answers whose first cause is hidden, among puzzles of two effects that are both larger than three times the noise.
     fn one_of_two_first(&self) -> Share {
         self.share(|f| (f.hidden.len() == 2 && f.is_plain() == Some(true)).then_some(f.first))
     }
 
-    /// The exact set among the equivalent ones.
+    /// Share of answers with exactly the set of equivalent causes, among puzzles whose causes are equivalent.
     pub(crate) fn equivalent(&self) -> Share {
         self.share(|f| matches!(f.verdict, Verdict::Equivalent(_)).then_some(f.right))
     }
 
-    /// `none` where nothing can be seen.
+    /// Share of answers `none`, among puzzles whose records show no effect.
     pub(crate) fn invisible(&self) -> Share {
         self.share(|f| (f.verdict == Verdict::Invisible).then_some(f.right))
     }
 
-    /// Weak but separable effects: right.
+    /// Share of right answers, among separable puzzles with an effect below three times the noise.
     pub(crate) fn weak(&self) -> Share {
         self.share(|f| (f.is_plain() == Some(false)).then_some(f.right))
     }
 
-    /// Weak but separable effects: right, or said to be nothing.
+    /// Share of answers that are right or `none`, among separable puzzles with an effect below three times the noise.
     fn weak_not_wrong(&self) -> Share {
         self.share(|f| (f.is_plain() == Some(false)).then_some(f.right || f.said.outcome == "none"))
     }
 
-    /// Truths in their 90 % intervals.
+    /// Share of true parameter values inside their 90 % intervals.
     pub(crate) fn covered(&self) -> Share {
         let sum = |index: usize| self.findings.iter().map(|f| f.covered[index]).sum();
         Share {
@@ -308,7 +308,7 @@ impl Report {
         }
     }
 
-    /// Right among the answers with a confidence of 0.9 or more.
+    /// Share of right answers, among answers that name a cause with a confidence of 0.9 or more.
     pub(crate) fn confident(&self) -> Share {
         self.share(|f| {
             let confidence = f
@@ -321,7 +321,8 @@ impl Report {
         })
     }
 
-    /// Held-out residual energy cut by 80 % or more where a cause of more than three times the noise is named.
+    /// Share of answers that remove at least 80 % of the held-out residual energy, among right answers to puzzles whose every effect is
+    /// larger than three times the noise.
     pub(crate) fn energy(&self) -> Share {
         self.share(|f| {
             let named = f.said.outcome == "cause" && f.right && f.is_plain() == Some(true);
@@ -330,7 +331,7 @@ impl Report {
     }
 }
 
-/// So many of so many.
+/// A number of good cases among all cases.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Share {
     pub(crate) good: usize,
@@ -338,7 +339,7 @@ pub(crate) struct Share {
 }
 
 impl Share {
-    /// Both together.
+    /// Sum of two shares: good cases and all cases added.
     pub(crate) fn and(self, other: Self) -> Self {
         Self {
             good: self.good + other.good,
@@ -346,7 +347,7 @@ impl Share {
         }
     }
 
-    /// The share; 1 of none.
+    /// Good cases over all cases; 1 if there are none.
     pub(crate) fn value(self) -> f64 {
         if self.all == 0 {
             1.0

@@ -1,4 +1,4 @@
-//! What can be hidden, by the names of the field, and what it does to a machine and its sensors.
+//! Effects that can be hidden, by the names of answers, and their influence on a machine and its sensors.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -14,7 +14,7 @@ pub(crate) enum Kind {
     Mass,
     Stiffness,
     Damping,
-    /// Mass, stiffness and damping by one factor: what a gain looks like.
+    /// Mass, stiffness and damping changed by one factor: equivalent to a gain of the only channel.
     CommonFactor,
     MissingMode,
     CubicStiffness,
@@ -30,10 +30,10 @@ pub(crate) enum Kind {
     SensorDelay,
     CrossAxis,
     SensorOffset,
-    /// The same with a ratio for each mode of a structure of modes.
+    /// Sensor offset with a ratio for each mode, of a structure given by modes.
     SensorOffsetByMode,
     ForceCoefficients,
-    /// All force coefficients, edges included, by one factor: what a gain of all channels looks like.
+    /// All cutting and edge coefficients changed by one factor: equivalent to a gain of all channels.
     CommonForce,
     EdgeForce,
     ForceExponent,
@@ -42,16 +42,16 @@ pub(crate) enum Kind {
     AxialDepthModulation,
     SpeedFluctuation,
     Wear,
-    // Not in the library.
+    // The following effects are not in the library.
     PulsatingStiffness,
     Stop,
     Stribeck,
-    Stranger,
+    UnmeasuredForce,
     SensorSaturation,
     SensorSquare,
 }
 
-/// The effects of the library in structures.
+/// Effects of the library that tests of structures can hide.
 pub(crate) const STRUCTURAL: [Kind; 17] = [
     Kind::Mass,
     Kind::Stiffness,
@@ -72,7 +72,7 @@ pub(crate) const STRUCTURAL: [Kind; 17] = [
     Kind::SensorOffset,
 ];
 
-/// The effects of the library in cuts.
+/// Effects of the library that belong to the cutting process.
 pub(crate) const PROCESS: [Kind; 8] = [
     Kind::ForceCoefficients,
     Kind::EdgeForce,
@@ -84,43 +84,43 @@ pub(crate) const PROCESS: [Kind; 8] = [
     Kind::Wear,
 ];
 
-/// Effects that no library has.
-pub(crate) const STRANGE: [Kind; 6] = [
+/// Effects that the library does not have.
+pub(crate) const NOT_IN_LIBRARY: [Kind; 6] = [
     Kind::PulsatingStiffness,
     Kind::Stop,
     Kind::Stribeck,
-    Kind::Stranger,
+    Kind::UnmeasuredForce,
     Kind::SensorSaturation,
     Kind::SensorSquare,
 ];
 
-/// One effect of one size.
+/// One effect at one location with given parameters.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Cause {
     pub(crate) kind: Kind,
-    /// Direction: 0, 1, 2.
+    /// Direction of the effect: 0, 1, 2 for x, y, z.
     pub(crate) axis: usize,
-    /// The sensor that it is about, by its place in the rig.
+    /// Index of the sensor that the effect concerns, in the order of the rig.
     pub(crate) sensor: usize,
-    /// Parameters, each over its scale: 1 is an effect that is easily seen.
+    /// Parameters, each divided by a scale so that 1 is an effect that is easily seen.
     pub(crate) shares: Vec<f64>,
 }
 
-/// What sizes are measured by.
+/// Scales of the parameters of effects.
 #[derive(Clone, Debug)]
 pub(crate) struct Scale {
     /// Peak displacement of the test, m.
     pub(crate) peak_m: f64,
-    /// Length of a record, s.
+    /// Duration of a record, s.
     pub(crate) seconds: f64,
     /// Time between samples, s.
     pub(crate) sample_s: f64,
-    /// Of cuts: the job.
+    /// Scales of the cut, if the records are of cuts.
     pub(crate) cut: Option<CutScale>,
 }
 
 impl Kind {
-    /// Its name in answers; the names, where it is several.
+    /// Effect names in answers: one, or several for a common factor.
     pub(crate) fn names(self) -> &'static [&'static str] {
         match self {
             Self::Mass => &["mass"],
@@ -153,18 +153,18 @@ impl Kind {
             Self::PulsatingStiffness => &["(pulsating stiffness)"],
             Self::Stop => &["(one-sided stop)"],
             Self::Stribeck => &["(Stribeck friction)"],
-            Self::Stranger => &["(unmeasured periodic force)"],
+            Self::UnmeasuredForce => &["(unmeasured periodic force)"],
             Self::SensorSaturation => &["(saturating sensor)"],
             Self::SensorSquare => &["(sensor with a square)"],
         }
     }
 
-    /// Its name, or the first of its names.
+    /// The effect's name in answers, or the first of several.
     pub(crate) fn name(self) -> &'static str {
         self.names()[0]
     }
 
-    /// Number of parameters.
+    /// Number of the effect's fitted parameters.
     pub(crate) fn parameters(self) -> usize {
         match self {
             Self::MissingMode | Self::SpeedFluctuation => 3,
@@ -174,7 +174,7 @@ impl Kind {
         }
     }
 
-    /// True of what sensors do.
+    /// True for an error of a sensor.
     pub(crate) fn of_sensor(self) -> bool {
         matches!(
             self,
@@ -188,7 +188,7 @@ impl Kind {
         )
     }
 
-    /// True of what acts along one direction.
+    /// True for an effect that acts along one direction.
     pub(crate) fn has_direction(self) -> bool {
         let of_all = matches!(
             self,
@@ -197,7 +197,7 @@ impl Kind {
         !of_all && !self.of_sensor() && !PROCESS.contains(&self)
     }
 
-    /// Shares of a hidden effect, drawn.
+    /// Draws the scaled parameters of a hidden effect.
     pub(crate) fn draw(self, random: &mut ChaCha8Rng) -> Vec<f64> {
         let size = between(random, 0.1, 1.5);
         match self {
@@ -211,7 +211,7 @@ impl Kind {
             Self::ModeCoupling | Self::Drift | Self::SensorGain | Self::CrossAxis => {
                 vec![size * either(random)]
             }
-            // Frequency over that of the machine, damping ratio, a mass over that of the machine.
+            // Parameters: natural frequency and modal mass relative to those of the machine, and the damping ratio in between.
             Self::MissingMode => {
                 let apart = if random.random::<bool>() {
                     random.random_range(0.55..0.8)
@@ -239,7 +239,7 @@ impl Kind {
         }
     }
 
-    /// Where a fit of it begins.
+    /// Start values of a fit of this effect, as scaled parameters.
     pub(crate) fn starts(self, random: &mut ChaCha8Rng) -> Vec<Vec<f64>> {
         match self {
             Self::MissingMode => [0.55, 0.7, 0.9, 1.15, 1.4, 1.7]
@@ -261,7 +261,7 @@ impl Kind {
 }
 
 impl Cause {
-    /// True where a machine and a rig can have it at all.
+    /// True if the machine can have the effect at all.
     pub(crate) fn possible(kind: Kind, machine: &Machine) -> bool {
         match kind {
             Kind::Mass | Kind::Stiffness | Kind::Damping | Kind::Drift => !machine.modal,
@@ -271,7 +271,7 @@ impl Cause {
         }
     }
 
-    /// The parameters by the keys that answers give them.
+    /// True values of the parameters, by their keys in answers.
     pub(crate) fn values(&self, machine: &Machine, scale: &Scale) -> Vec<(&'static str, f64)> {
         if let Some(cut) = &scale.cut
             && let Some(values) = self.process_values(machine, cut, scale)
@@ -322,14 +322,14 @@ impl Cause {
             Kind::PulsatingStiffness => vec![("stiffness", 0.1 * s[0] * k)],
             Kind::Stop => vec![("stiffness", 0.5 * s[0] * k)],
             Kind::Stribeck => vec![("kinetic", 0.5 * s[0] * c * speed)],
-            Kind::Stranger => vec![("amplitude", 0.3 * s[0] * c * speed)],
+            Kind::UnmeasuredForce => vec![("amplitude", 0.3 * s[0] * c * speed)],
             Kind::SensorSaturation => vec![("third", 0.1 * s[0])],
             Kind::SensorSquare => vec![("second", 0.1 * s[0])],
             _ => Vec::new(),
         }
     }
 
-    /// Natural frequency along its direction, rad/s.
+    /// Natural frequency along the effect's direction, rad/s.
     fn natural(&self, machine: &Machine) -> f64 {
         let i = if machine.modal { 0 } else { self.axis };
         (machine.stiffness[(i, i)] / machine.mass[(i, i)]).sqrt()
@@ -340,7 +340,7 @@ impl Cause {
         machine.damping[(i, i)]
     }
 
-    /// The machine's own matrices as it changes them.
+    /// Changes the machine's matrices, if the effect is one of the linear structure.
     pub(crate) fn change(&self, machine: &mut Machine, scale: &Scale) {
         let values = self.values(machine, scale);
         let (a, value) = (self.axis, values[0].1);
@@ -348,7 +348,7 @@ impl Cause {
             Kind::Mass => machine.mass[(a, a)] = value,
             Kind::Stiffness => machine.stiffness[(a, a)] = value,
             Kind::Damping => machine.damping[(a, a)] = value,
-            // Modes are of all directions: so is their factor.
+            // Modes belong to all directions, and so does their factor.
             Kind::CommonFactor if machine.modal => {
                 machine.mass *= value;
                 machine.damping *= value;
@@ -378,7 +378,7 @@ impl Cause {
         }
     }
 
-    /// The law that it adds; sizes are those of the machine that is believed.
+    /// Adds the effect's law to `system`. Scales are those of the baseline machine.
     pub(crate) fn add(&self, machine: &Machine, scale: &Scale, system: &mut System) {
         let values = self.values(machine, scale);
         let (axis, value) = (self.axis, values[0].1);
@@ -447,7 +447,7 @@ impl Cause {
                 gap_m: 0.3 * scale.peak_m,
                 stiffness: value,
             }),
-            Kind::Stranger => system.add(Law::Stranger {
+            Kind::UnmeasuredForce => system.add(Law::UnmeasuredForce {
                 axis,
                 amplitude_n: value,
                 omega: 0.83 * omega,

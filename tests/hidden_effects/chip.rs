@@ -1,4 +1,4 @@
-//! Chips: which teeth cut when, how thick a chip, how hard it pushes.
+//! Chips: engaged teeth, chip thickness and cutting force.
 
 use std::cell::Cell;
 use std::f64::consts::TAU;
@@ -6,22 +6,22 @@ use std::f64::consts::TAU;
 use super::motion::{State, System, interpolated};
 use super::process::Process;
 
-/// Tool, material and engagement as they are believed.
+/// Tool, material and engagement of the baseline.
 #[derive(Clone, Debug)]
 pub(crate) struct Job {
     pub(crate) teeth: usize,
     pub(crate) edge_angle_deg: f64,
     pub(crate) diameter_mm: f64,
-    /// Tangential, radial, axial: MPa.
+    /// Tangential, radial and axial cutting coefficient, MPa.
     pub(crate) cutting_mpa: [f64; 3],
-    /// Tangential, radial, axial: N/mm.
+    /// Tangential, radial and axial edge coefficient, N/mm.
     pub(crate) edge_n_per_mm: [f64; 3],
     pub(crate) start_deg: f64,
     pub(crate) exit_deg: f64,
     pub(crate) feed_mm: f64,
 }
 
-/// One cut.
+/// Working point of one cut.
 #[derive(Clone, Debug)]
 pub(crate) struct Run {
     pub(crate) rpm: f64,
@@ -29,39 +29,39 @@ pub(crate) struct Run {
     pub(crate) feed_mm: f64,
     /// Spindle angle at the start of the record, rad.
     pub(crate) angle: f64,
-    /// Passes that teeth in chatter may jump over; 0 of stable cuts.
+    /// Number of passes that teeth in chatter may miss; 0 in stable cuts.
     pub(crate) jumped: usize,
 }
 
-/// The chips of one run.
+/// The chips of one cut.
 pub(crate) struct Chips<'a> {
     pub(crate) job: &'a Job,
     pub(crate) run: &'a Run,
     pub(crate) process: Process,
     pub(crate) before_s: f64,
     pub(crate) step_s: f64,
-    /// The furthest that the tool has been from where it stands at rest, m.
+    /// Largest displacement of the tool from its rest position so far, m.
     pub(crate) furthest_m: Cell<f64>,
 }
 
 impl Chips<'_> {
-    /// Spindle angle; t counts from the start of the cut, the record's time from `before_s` on.
+    /// Spindle angle at time `t` from the start of the cut, rad. The record begins at `before_s`.
     pub(crate) fn angle(&self, t: f64) -> f64 {
         let omega = TAU * self.run.rpm / 60.0;
         let recorded = t - self.before_s;
-        let swing = self.process.fluctuation.map_or(0.0, |[delta, hz, phase]| {
+        let modulation = self.process.fluctuation.map_or(0.0, |[delta, hz, phase]| {
             let rate = TAU * hz;
             delta * omega / rate * (phase.cos() - (rate * recorded + phase).cos())
         });
-        self.run.angle + omega * recorded + swing
+        self.run.angle + omega * recorded + modulation
     }
 
-    /// When the spindle was at an angle near `guess`.
+    /// Time at which the spindle is at `angle`, near the time `guess`.
     fn time_at(&self, angle: f64, guess: f64) -> f64 {
         let omega = TAU * self.run.rpm / 60.0;
         let mut t = guess;
         if self.process.fluctuation.is_some() {
-            // The speed swings by a percent or so: every round gains two digits.
+            // The speed modulation is about one percent: every iteration gains two digits.
             for _ in 0..8 {
                 t -= (self.angle(t) - angle) / omega;
             }
@@ -69,7 +69,7 @@ impl Chips<'_> {
         t
     }
 
-    /// Which teeth are between start and exit, one bit each.
+    /// Teeth between entry and exit angle, one bit for each.
     pub(crate) fn engaged(&self, t: f64) -> u32 {
         let [start, exit] = [self.job.start_deg, self.job.exit_deg].map(f64::to_radians);
         (0..self.job.teeth).fold(0, |bits, tooth| {
@@ -86,7 +86,7 @@ impl Chips<'_> {
         (self.angle(t) + TAU * tooth as f64 / self.job.teeth as f64).rem_euclid(TAU)
     }
 
-    /// When teeth enter or leave between two times, in order.
+    /// Times at which teeth enter or leave between two times, in order.
     pub(crate) fn switches(&self, from: f64, to: f64) -> Vec<f64> {
         let omega = TAU * self.run.rpm / 60.0;
         let mut all = Vec::new();
@@ -101,12 +101,13 @@ impl Chips<'_> {
             }
         }
         all.sort_by(f64::total_cmp);
-        // One tooth may leave as another enters: that is one instant.
+        // One tooth may leave while another enters: their times count as one.
         all.dedup_by(|a, b| *a - *b < 1e-6 * self.step_s);
         all
     }
 
-    /// From one time to another between which no tooth enters or leaves: steps end where a tooth loses the surface or finds it.
+    /// Advances the state between two times in which no tooth enters or leaves. Steps end when a tooth loses contact with the workpiece or
+    /// regains it.
     pub(crate) fn advance(
         &self,
         system: &System,
@@ -116,7 +117,7 @@ impl Chips<'_> {
     ) {
         let engaged = self.engaged(0.5 * (from + to));
         let mut cutting = self.cutting(from, system.displacement(y), engaged, past);
-        // A tooth that touches again and again within one step is beyond what can be told apart.
+        // At most sixteen changes of contact per step are resolved.
         for _ in 0..16 {
             let stepped = |to: f64| {
                 let mut after = *y;
@@ -157,7 +158,7 @@ impl Chips<'_> {
             .fold(0, |bits, tooth| bits | 1 << tooth)
     }
 
-    /// How far a tooth is into what all passes before it left, m.
+    /// Chip thickness of a tooth: its depth in the surface that all earlier passes left, m; negative without contact.
     fn chip_m(&self, t: f64, x: [f64; 3], tooth: usize, past: &[[f64; 3]]) -> f64 {
         let (sin, cos) = self.immersion(t, tooth).sin_cos();
         let (sin_edge, cos_edge) = self.edge();
@@ -166,7 +167,8 @@ impl Chips<'_> {
             (sin * x[0] + cos * x[1] + self.process.radial_m[tooth]) * sin_edge - cos_edge * x[2]
         };
         let mut chip = f64::INFINITY;
-        // With runout the longest tooth may be the only one that cuts: a turn back, and one more pass for the vibration.
+        // With runout, one tooth may be the only one that cuts: one revolution of passes is then evaluated, and one more pass for the
+        // vibration.
         let passes = if self.process.radial_m.iter().all(|radial| *radial == 0.0) {
             2
         } else {
@@ -181,10 +183,10 @@ impl Chips<'_> {
             } else {
                 interpolated(past, then / self.step_s)
             };
-            // The feed axis moves on steadily, however the spindle turns.
+            // The feed is proportional to time, whatever the speed modulation.
             let fed = 1e-3 * self.run.feed_mm * (t - then) / period;
             if pass > 2 && self.run.jumped > 0 {
-                // What was left further back cannot stand out any more.
+                // Earlier passes cannot have left a thinner chip: their surfaces are farther away by the feed.
                 let most = 2.0 * self.furthest_m.get()
                     + self.process.radial_m[(tooth + pass) % self.job.teeth].abs();
                 if reach(x, tooth) - most + fed * sin * sin_edge > chip {
@@ -193,7 +195,7 @@ impl Chips<'_> {
             }
             let left = reach(was, (tooth + pass) % self.job.teeth) - fed * sin * sin_edge;
             chip = chip.min(reach(x, tooth) - left);
-            // What lies before the start is the tool at rest, once.
+            // Before the start of the cut the tool was at rest: one such pass suffices.
             if then <= 0.0 {
                 break;
             }
@@ -201,7 +203,7 @@ impl Chips<'_> {
         chip
     }
 
-    /// Sine and cosine of the edge angle.
+    /// Sine and cosine of the edge angle (90° is an end mill).
     fn edge(&self) -> (f64, f64) {
         if self.job.edge_angle_deg == 90.0 {
             (1.0, 0.0)
@@ -210,7 +212,7 @@ impl Chips<'_> {
         }
     }
 
-    /// Force of the `cutting` teeth on the tool, N, with the displacements `past` on the grid of steps.
+    /// Force of the teeth in the bit set `cutting` on the tool, N. `past` holds earlier displacements on the integration grid.
     pub(crate) fn force(
         &self,
         t: f64,
@@ -227,7 +229,7 @@ impl Chips<'_> {
         for tooth in (0..self.job.teeth).filter(|tooth| cutting & 1 << tooth != 0) {
             let (sin, cos) = self.immersion(t, tooth).sin_cos();
             let chip = self.chip_m(t, x, tooth, past);
-            // A stage of a step may look a hair beyond the end of the contact.
+            // An intermediate stage of a step may lie slightly beyond the end of contact.
             let power = |power: f64, reference: f64| reference * (chip.max(0.0) / reference).powf(power);
             let chip = process
                 .exponent

@@ -1,4 +1,4 @@
-//! The integrator against motions that can be written down.
+//! Compares the integrator with motions in closed form.
 
 use nalgebra::DMatrix;
 
@@ -22,7 +22,7 @@ fn one(damping: f64, laws: &[Law], step_s: f64) -> System {
     system
 }
 
-/// Displacements every `step` from `start_m` on, at rest.
+/// Free decay from the displacement `start_m` at rest: `count` displacements at intervals `step`.
 fn released(system: &System, start_m: f64, step: f64, count: usize) -> Vec<f64> {
     let force = |_: f64, _: [f64; 3], _: [f64; 3]| [0.0; 3];
     let mut y = system.pulled([STIFFNESS * start_m, 0.0, 0.0]);
@@ -36,7 +36,7 @@ fn released(system: &System, start_m: f64, step: f64, count: usize) -> Vec<f64> 
 }
 
 #[test]
-fn a_damped_mass_decays_as_written_down() {
+fn a_damped_mass_decays_as_in_closed_form() {
     let damping = 4.0;
     let (decay, step) = (damping / (2.0 * MASS), 0.005);
     let omega = (OMEGA * OMEGA - decay * decay).sqrt();
@@ -51,8 +51,8 @@ fn a_damped_mass_decays_as_written_down() {
 }
 
 #[test]
-fn dry_friction_takes_the_same_from_every_swing_and_then_holds() {
-    // Each half swing ends 2·fc/k lower, until |u| is within fc/k: there it stays.
+fn dry_friction_reduces_the_amplitude_linearly_and_then_sticks() {
+    // The amplitude falls by 2·fc/k in each half period until |u| is within fc/k, where the mass sticks.
     let fc = 0.1 * STIFFNESS * 1e-3;
     let friction = Law::Friction {
         axis: 0,
@@ -72,8 +72,8 @@ fn dry_friction_takes_the_same_from_every_swing_and_then_holds() {
 }
 
 #[test]
-fn play_lengthens_the_period_by_the_time_in_the_gap() {
-    // All of the spring has play: free flight within the gap at the speed that the spring gave.
+fn backlash_lengthens_the_period_by_the_time_in_the_gap() {
+    // The whole spring has backlash: within the gap the mass moves with the constant speed that the spring gave it.
     let half_gap = 0.3e-3;
     let gap = Law::Gap {
         axis: 0,
@@ -93,8 +93,8 @@ fn play_lengthens_the_period_by_the_time_in_the_gap() {
 }
 
 #[test]
-fn a_hardening_spring_keeps_its_energy_and_its_period() {
-    // T = 4∫du/√(2(V(A) − V(u))/m) with V = ku²/2 + k₃u⁴/4.
+fn a_hardening_spring_has_the_period_of_its_potential() {
+    // The period is T = 4∫du/√(2(V(A) − V(u))/m) with V = ku²/2 + k₃u⁴/4.
     let (amplitude, k3) = (1e-3, 0.5 * STIFFNESS / 1e-6);
     let spring = Law::Spring {
         axis: 0,
@@ -106,7 +106,7 @@ fn a_hardening_spring_keeps_its_energy_and_its_period() {
         .map(|i| {
             let theta = (f64::from(i) + 0.5) / f64::from(n) * std::f64::consts::FRAC_PI_2;
             let u = amplitude * theta.sin();
-            // (V(A) − V(u))/(A² − u²), which is free of the root at the end.
+            // `share` is (V(A) − V(u))/(A² − u²), without the singularity at the end of the range.
             let share = 0.5 * STIFFNESS + 0.25 * k3 * (amplitude * amplitude + u * u);
             4.0 * std::f64::consts::FRAC_PI_2 / f64::from(n) / (2.0 * share / MASS).sqrt()
         })

@@ -1,5 +1,5 @@
-//! Stable cuts with everything that a chip can have: teeth that enter and leave at their angles, the surface that all earlier
-//! passes left, teeth that lose it.
+//! Cuts with all details of the chip: entry and exit of teeth at their angles, the surface that all earlier passes left, and loss of
+//! contact.
 
 use std::cell::Cell;
 use std::f64::consts::TAU;
@@ -13,38 +13,38 @@ use rand_chacha::ChaCha8Rng;
 
 use super::cause::{Cause, Kind, PROCESS, Scale};
 use super::chip::{Chips, Job, Run};
-use super::judge::Lab;
 use super::machine::{Machine, between};
 use super::motion::interpolated;
 use super::motion::{Path, System};
+use super::oracle::Lab;
 use super::process::{CutScale, Process};
 use super::rig::Output;
 use super::sensor::{Sensor, letter, noisy, read_by};
 
-/// Cuts of a machine, recorded.
+/// Cuts of a machine, with the sensors that record them.
 pub(crate) struct CutBench {
     pub(crate) machine: Machine,
     pub(crate) job: Job,
     runs: Vec<Run>,
-    /// Forces first where they are measured, then motion.
+    /// True if forces are measured. Their channels come before those of motion.
     forces: bool,
     motion: Vec<Sensor>,
     pub(crate) rate_hz: f64,
     samples: usize,
-    /// Samples before the record while the cut settles.
+    /// Number of samples before the record, in which the transient of the cut decays.
     before: usize,
     steps: usize,
     pub(crate) scale: Scale,
-    /// The motions as they are believed: what sensors do to them needs no other.
+    /// Motions of the baseline. Sensor errors need no others.
     plain: OnceLock<Vec<Motion>>,
 }
 
 impl CutBench {
-    /// Two or three stable cuts of a machine with two or three directions, at different speeds and feeds.
+    /// Draws two or three stable cuts of a machine with two or three directions, at different speeds and feeds.
     pub(crate) fn draw(random: &mut ChaCha8Rng, forces: bool) -> Self {
         let directions = if random.random::<f64>() < 0.3 { 3 } else { 2 };
         let mut machine = Machine::draw(random, directions);
-        // A cut settles within a few turns: soft machines with little damping would need long records.
+        // The transient must decay within a few revolutions: soft machines with little damping would need long records.
         machine.damping *= 3.0;
         let mut teeth = random.random_range(2..=4);
         let ktc = between(random, 70.0, 1500.0);
@@ -55,7 +55,7 @@ impl CutBench {
             (120.0, 180.0),
             (0.0, 70.0),
         ][random.random_range(0..5)];
-        // Four teeth in a slot push with the same force all the time: nothing would move.
+        // Four teeth in a slot give a constant force without vibration.
         if teeth == 4 && exit_deg - start_deg == 180.0 {
             teeth = 3;
         }
@@ -89,7 +89,7 @@ impl CutBench {
         };
         let tooth_hz = machine.omega[0] / TAU * random.random_range(0.35..1.6);
         let rpm = 60.0 * tooth_hz / teeth as f64;
-        // Loop gain below one at every frequency: stable whatever the speed.
+        // The loop gain is below one at every frequency, so that the cut is stable at any speed.
         let compliance = machine.axes.iter().fold(0.0_f64, |most, &a| {
             let (m, c, k) = (
                 machine.mass[(a, a)],
@@ -154,12 +154,12 @@ impl CutBench {
         }
     }
 
-    /// The same with its first run alone, so deep that it chatters; `None` where no depth makes it.
+    /// Keeps the first cut only and makes it so deep that it chatters; `None` if no tried depth does.
     ///
-    /// Chatter is a motion that is mostly new in each turn; it may not be larger than the tool could stand.
+    /// In chatter most of the motion differs from revolution to revolution. Its amplitude is bounded by `MOST_FEEDS`.
     pub(crate) fn chattering(mut self) -> Option<Self> {
         self.runs.truncate(1);
-        self.runs[0].jumped = JUMPED;
+        self.runs[0].jumped = MOST_MISSED;
         for _ in 0..16 {
             self.runs[0].depth_mm *= 1.3;
             let motion = self.motion(&self.runs[0], &[]);
@@ -178,7 +178,7 @@ impl CutBench {
         None
     }
 
-    /// The same with its first run alone, from the moment the tool, at rest, is put into the full cut.
+    /// Keeps the first cut only, recorded from the instant at which the tool, at rest, begins with full engagement.
     pub(crate) fn starting_at_rest(mut self) -> Self {
         self.runs.truncate(1);
         self.runs[0].angle = 0.0;
@@ -186,12 +186,12 @@ impl CutBench {
         self
     }
 
-    /// Speed and depth of the first run.
+    /// Speed, rev/min, and axial depth, mm, of the first cut.
     pub(crate) fn working_point(&self) -> [f64; 2] {
         [self.runs[0].rpm, self.runs[0].depth_mm]
     }
 
-    /// The names of the channels of an output.
+    /// Names of the channels of an output: forces, then motion.
     pub(crate) fn channel_names(&self) -> Vec<String> {
         self.sensors().iter().map(|sensor| sensor.name()).collect()
     }
@@ -208,7 +208,7 @@ impl CutBench {
         self.channel_names()[forces..].to_vec()
     }
 
-    /// The case file.
+    /// Text of the case file: the baseline.
     pub(crate) fn case_text(&self) -> String {
         let Job {
             teeth,
@@ -238,7 +238,7 @@ impl CutBench {
         text
     }
 
-    /// Forces and motion of one run at the samples of its record, and the spindle angle.
+    /// Forces, motion and spindle angle of one cut at the samples of its record.
     fn motion(&self, run: &Run, causes: &[Cause]) -> Motion {
         let step_s = 1.0 / (self.rate_hz * self.steps as f64);
         let mut changed = self.machine.clone();
@@ -302,7 +302,7 @@ impl CutBench {
         found
     }
 
-    /// What the sensors say of a motion, and behind them the angle that the tachometer tells.
+    /// Readings of all sensors in a motion, and after them the spindle angle, which stands for the tachometer.
     fn sensed(&self, motion: &Motion, causes: &[Cause]) -> Vec<Vec<f64>> {
         let mut channels: Vec<Vec<f64>> = self
             .sensors()
@@ -350,7 +350,7 @@ impl CutBench {
         channels
     }
 
-    /// Everything that is measured of a run: forces if there are any, motion.
+    /// The sensors of a cut: forces if they are measured, then motion.
     fn sensors(&self) -> Vec<Sensed> {
         let forces = self
             .machine
@@ -363,7 +363,7 @@ impl CutBench {
             .collect()
     }
 
-    /// What the file beside a recording says of the cut.
+    /// The working point in the sidecar of a recording.
     fn said_of(&self, run: &Run) -> RecordedCut {
         serde_json::from_value(serde_json::json!({
             "spindle_rpm": run.rpm,
@@ -376,7 +376,7 @@ impl CutBench {
         .unwrap()
     }
 
-    /// Recordings of an output with white noise of `sigma` per sensor.
+    /// Recordings of an output, with white noise of the standard deviations `sigma` by sensor.
     pub(crate) fn recordings(
         &self,
         output: &Output,
@@ -427,7 +427,7 @@ impl CutBench {
             .collect()
     }
 
-    /// The jitter with which the spindle angle is known from the tachometer, rad: a fiftieth of a sample.
+    /// Standard deviation of the spindle angle from the tachometer, rad: a fiftieth of a sample.
     pub(crate) fn angle_sigma(&self) -> f64 {
         0.02 * TAU * self.runs[0].rpm / 60.0 / self.rate_hz
     }
@@ -461,7 +461,7 @@ struct Motion {
     force: Vec<[f64; 3]>,
     u: Vec<[f64; 3]>,
     a: Vec<[f64; 3]>,
-    /// Where the acceleration jumps, s from the start of the record, and by how much.
+    /// Jumps of the acceleration: time from the start of the record, s, and height along x, y, z.
     jumps: Vec<(f64, [f64; 3])>,
     angle: Vec<f64>,
 }
@@ -471,7 +471,8 @@ impl Motion {
         self.u.iter().flatten().fold(0.0, |most, u| most.max(u.abs()))
     }
 
-    /// The least of all axes that move: variance about the mean over turns at the same angle, over that about the mean.
+    /// Share of the motion that differs between revolutions: variance about the mean at equal spindle angles over the whole variance, the
+    /// smallest of the axes that move.
     fn share_new_each_turn(&self) -> f64 {
         const PARTS: usize = 48;
         let share = |axis: usize| {
@@ -491,7 +492,7 @@ impl Motion {
         (0..3).filter_map(share).fold(1.0, f64::min)
     }
 
-    /// The acceleration `delay_s` before each sample: its steps stay steps, between them it is smooth.
+    /// The acceleration `delay_s` before each sample. Steps stay steps; between them it is interpolated.
     fn late(&self, delay_s: f64, rate_hz: f64) -> Vec<[f64; 3]> {
         let jumped = |t: f64| {
             let before = self.jumps.iter().take_while(|(at, _)| *at <= t);
@@ -573,7 +574,7 @@ impl Lab for CutBench {
     }
 
     fn names(&self, kind: Kind) -> &'static [&'static str] {
-        // Edges that are zero stay so by any factor.
+        // A factor does not change edge coefficients that are zero.
         let edgeless = kind == Kind::CommonForce && self.job.edge_n_per_mm == [0.0; 3];
         if edgeless {
             &kind.names()[..1]
@@ -582,7 +583,7 @@ impl Lab for CutBench {
         }
     }
 
-    /// The offset of each sensor in each run; the angle has none.
+    /// Offset of each sensor in each cut. The spindle angle has none.
     fn nuisance(&self, sigma: &[f64]) -> DMatrix<f64> {
         let (runs, channels, samples) = (self.runs.len(), sigma.len(), self.samples);
         let sensors = channels - 1;
@@ -598,20 +599,20 @@ impl Lab for CutBench {
     }
 }
 
-/// Passes that a tooth in chatter may jump over.
-const JUMPED: usize = 64;
+/// Largest number of passes that a tooth in chatter may miss.
+const MOST_MISSED: usize = 64;
 
-/// Feeds per tooth that a tool in chatter moves at most.
+/// Largest displacement of the tool in chatter, in feeds per tooth.
 const MOST_FEEDS: f64 = 20.0;
 
-/// The place of an effect that all channels of motion have.
+/// Sensor index of an error that all channels of motion have.
 pub(crate) const EVERY_SENSOR: usize = usize::MAX;
 
-/// The place of a gain that all channels of force have: that of a dynamometer.
+/// Sensor index of a gain that all channels of force have, as that of a dynamometer.
 pub(crate) const EVERY_FORCE: usize = usize::MAX - 1;
 
-/// A tachometer of one pulse per turn: it rises, over two samples, where the angle passes a whole turn, and falls half a
-/// turn later.
+/// Level of a tachometer with one pulse per revolution. It rises within two samples when the angle passes a multiple of 2π, and falls half
+/// a revolution later.
 fn level(angle: &[f64]) -> Vec<f64> {
     (0..angle.len())
         .map(|k| {
@@ -621,7 +622,7 @@ fn level(angle: &[f64]) -> Vec<f64> {
                 angle[k] - angle[k - 1]
             };
             let turn = angle[k].rem_euclid(TAU);
-            // Samples since the last rise, and since the fall.
+            // Samples since the last rise, and since the last fall.
             let since_rise = if turn > 0.75 * TAU { turn - TAU } else { turn } / per_sample;
             let since_fall = (turn - 0.5 * TAU) / per_sample;
             (0.5 + 0.5 * since_rise).clamp(0.0, 1.0).min(

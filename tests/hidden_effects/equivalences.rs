@@ -1,4 +1,4 @@
-//! The judge against what is exactly the same, or exactly invisible, by the equations themselves.
+//! Checks the test oracle with causes that are exactly equivalent, or exactly invisible, by their equations.
 
 use std::collections::BTreeSet;
 
@@ -7,11 +7,11 @@ use rand_chacha::ChaCha8Rng;
 
 use super::cause::{Cause, Kind};
 use super::cut::{CutBench, EVERY_FORCE, EVERY_SENSOR};
-use super::judge::{Judge, Lab, Verdict};
 use super::machine::Machine;
+use super::oracle::{Lab, Oracle, Verdict};
 use super::rig::{Bench, Rig, Test};
 
-/// A percent of what each sensor says; the angle of a cut as the tachometer tells it.
+/// Noise of one percent of each sensor's reading. In a cut, the noise of the spindle angle follows.
 fn percent(lab: &dyn Lab, angle_sigma: Option<f64>) -> Vec<f64> {
     let plain = lab.output(&[]);
     let sensors = plain[0].len() - usize::from(angle_sigma.is_some());
@@ -23,7 +23,7 @@ fn percent(lab: &dyn Lab, angle_sigma: Option<f64>) -> Vec<f64> {
 }
 
 fn verdict(lab: &dyn Lab, sigma: &[f64], hidden: &Cause) -> Verdict {
-    Judge::new(lab, sigma).verdict(hidden, &mut ChaCha8Rng::seed_from_u64(1))
+    Oracle::new(lab, sigma).verdict(hidden, &mut ChaCha8Rng::seed_from_u64(1))
 }
 
 fn gain(sensor: usize) -> Cause {
@@ -35,7 +35,7 @@ fn gain(sensor: usize) -> Cause {
     }
 }
 
-/// The first machine of one direction and one sensor, in a test.
+/// The first drawn machine with one direction, given by matrices, and with one sensor.
 fn single(test: Test) -> Bench {
     for seed in 0.. {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
@@ -49,7 +49,7 @@ fn single(test: Test) -> Bench {
 }
 
 #[test]
-fn a_gain_of_the_only_channel_is_one_factor_of_mass_damping_and_stiffness() {
+fn a_gain_of_the_only_channel_is_equivalent_to_one_factor() {
     let bench = single(Test::Shaker);
     let sigma = percent(&bench, None);
     let expected = BTreeSet::from(["sensor-gain", "mass", "stiffness", "damping"]);
@@ -57,15 +57,15 @@ fn a_gain_of_the_only_channel_is_one_factor_of_mass_damping_and_stiffness() {
 }
 
 #[test]
-fn a_gain_cannot_be_seen_in_the_decay_of_a_linear_machine() {
-    // Its start is not known, so a larger one and a gain are the same.
+fn a_gain_is_invisible_in_the_decay_of_a_linear_machine() {
+    // The initial state is unknown: a larger one is equivalent to a gain.
     let bench = single(Test::FreeDecay);
     let sigma = percent(&bench, None);
     assert_eq!(verdict(&bench, &sigma, &gain(0)), Verdict::Invisible);
 }
 
 #[test]
-fn a_gain_of_one_of_two_sensors_is_one_of_the_other_where_nobody_knows_the_start() {
+fn gains_of_two_sensors_are_equivalent_in_a_free_decay() {
     let (mut tried, mut seed) = (0, 0);
     while tried < 2 {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
@@ -84,7 +84,7 @@ fn a_gain_of_one_of_two_sensors_is_one_of_the_other_where_nobody_knows_the_start
 }
 
 #[test]
-fn a_gain_of_the_only_channel_of_modes_is_one_factor_too() {
+fn a_gain_of_the_only_channel_is_equivalent_to_one_factor_on_modes() {
     for seed in 0.. {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let machine = Machine::draw(&mut random, 1);
@@ -101,7 +101,7 @@ fn a_gain_of_the_only_channel_of_modes_is_one_factor_too() {
 }
 
 #[test]
-fn a_common_gain_of_a_steady_cut_without_force_is_a_factor_of_the_force() {
+fn a_common_gain_of_a_cut_without_force_is_equivalent_to_a_factor_on_the_force() {
     for seed in [0, 2] {
         let bench = CutBench::draw(&mut ChaCha8Rng::seed_from_u64(seed), false);
         let sigma = percent(&bench, Some(bench.angle_sigma()));
@@ -120,7 +120,7 @@ fn measured_force_separates_a_common_gain_from_the_force() {
     let bench = CutBench::draw(&mut ChaCha8Rng::seed_from_u64(0), true);
     let sigma = percent(&bench, Some(bench.angle_sigma()));
     assert_eq!(verdict(&bench, &sigma, &gain(EVERY_SENSOR)), Verdict::Separable);
-    // A dynamometer that reads too much, as a whole or along one axis, leaves the motion as it is.
+    // A gain of the dynamometer, as a whole or along one axis, does not change the motion.
     for sensor in [EVERY_FORCE, 0] {
         assert_eq!(verdict(&bench, &sigma, &gain(sensor)), Verdict::Separable);
     }

@@ -1,55 +1,55 @@
-//! Laws: what acts on the tool beside the linear structure.
+//! Restoring forces in addition to the linear structure.
 
 use super::motion::State;
 
-/// What acts on the tool beside the linear structure, as f_r in M q̈ + C q̇ + K q + Bᵀf_r = Bᵀ F.
+/// A restoring force f_r in addition to the linear structure: M q̈ + C q̇ + K q + Bᵀf_r = Bᵀ F.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Law {
-    /// c_n·u^n.
+    /// Nonlinear spring: c_n·u^n.
     Spring {
         axis: usize,
         power: i32,
         coefficient: f64,
     },
-    /// c_n·v^n.
+    /// Nonlinear damper: c_n·v^n.
     Damper {
         axis: usize,
         power: i32,
         coefficient: f64,
     },
-    /// kinetic·sign(v)·(1 + (breakaway/kinetic − 1)·e^(−(v/v_s)²)); at rest whatever is within ±breakaway.
+    /// Stribeck friction: kinetic·sign(v)·(1 + (breakaway/kinetic − 1)·e^(−(v/v_s)²)); while it sticks, any force within ±breakaway.
     Friction {
         axis: usize,
         kinetic_n: f64,
         breakaway_n: f64,
         stribeck_m_per_s: f64,
     },
-    /// A spring that has no force within ±half_gap: what is missing of its linear force.
+    /// Backlash of a spring that has no force within ±half_gap: minus the force that the linear spring has too much.
     Gap {
         axis: usize,
         half_gap_m: f64,
         stiffness: f64,
     },
-    /// Bouc–Wen of exponent 1 with γ = β = ½; z is the own state `own`.
+    /// Bouc–Wen hysteresis of exponent 1 with γ = β = ½. Its internal state z is number `own` of the state vector.
     BoucWen {
         axis: usize,
         stiffness: f64,
         yield_m: f64,
         own: usize,
     },
-    /// Potential ½·k·x²·y².
+    /// Mode coupling: the derivatives of the potential ½·k·x²·y².
     Coupling { axes: [usize; 2], coefficient: f64 },
-    /// K·u·r·t.
+    /// Drift of the stiffness: r·t·K·u.
     Drift {
         stiffness: [[f64; 3]; 3],
         rate_per_s: f64,
     },
-    /// k·cos(ωt)·u.
+    /// Pulsating stiffness: k·cos(ωt)·u.
     Pulsating { axis: usize, stiffness: f64, omega: f64 },
-    /// A stop on one side: k·(u − gap) beyond the gap.
+    /// Stop on one side: k·(u − gap) beyond the gap.
     Stop { axis: usize, gap_m: f64, stiffness: f64 },
-    /// −F·cos(ωt + φ): a force that nobody measured.
-    Stranger {
+    /// An unmeasured periodic force: −F·cos(ωt + φ).
+    UnmeasuredForce {
         axis: usize,
         amplitude_n: f64,
         omega: f64,
@@ -57,10 +57,10 @@ pub(crate) enum Law {
     },
 }
 
-/// Which smooth piece of a law holds.
+/// Number of the smooth branch of a law that holds at present.
 pub(crate) type Branch = i8;
 
-/// Signs of v and z on a branch of Bouc and Wen.
+/// Signs of v and z in a branch of the Bouc–Wen law.
 pub(crate) fn signs(branch: Branch) -> (f64, f64) {
     (
         if branch & 1 == 0 { 1.0 } else { -1.0 },
@@ -69,7 +69,7 @@ pub(crate) fn signs(branch: Branch) -> (f64, f64) {
 }
 
 impl Law {
-    /// True of a law that has pieces.
+    /// True for a law with more than one smooth branch.
     pub(crate) fn switches(&self) -> bool {
         matches!(
             self,
@@ -77,7 +77,7 @@ impl Law {
         )
     }
 
-    /// f_r, N.
+    /// The restoring force f_r along x, y, z, N.
     pub(crate) fn restoring(&self, t: f64, u: [f64; 3], v: [f64; 3], y: &State, branch: Branch) -> [f64; 3] {
         let mut force = [0.0; 3];
         match *self {
@@ -144,7 +144,7 @@ impl Law {
                     force[axis] = stiffness * (u[axis] - gap_m);
                 }
             }
-            Self::Stranger {
+            Self::UnmeasuredForce {
                 axis,
                 amplitude_n,
                 omega,

@@ -1,4 +1,4 @@
-//! Random machines, and the case file that says of one what is believed.
+//! Random machines, and the case file of each as the baseline.
 
 use std::f64::consts::TAU;
 use std::fmt::Write as _;
@@ -7,36 +7,36 @@ use nalgebra::{Complex, DMatrix};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-/// A machine without anything hidden.
+/// A machine without hidden effects.
 #[derive(Clone, Debug)]
 pub(crate) struct Machine {
-    /// Its directions: 0, 1, 2 for x, y, z.
+    /// Directions in which the tool moves: 0, 1, 2 for x, y, z.
     pub(crate) axes: Vec<usize>,
     pub(crate) mass: DMatrix<f64>,
     pub(crate) damping: DMatrix<f64>,
     pub(crate) stiffness: DMatrix<f64>,
-    /// How each degree of freedom moves the tool.
+    /// Displacement of the tool per unit of each degree of freedom, along x, y, z.
     pub(crate) tip: Vec<[f64; 3]>,
-    /// True where the case gives modes and not matrices.
+    /// True if the case gives modes and not matrices.
     pub(crate) modal: bool,
-    /// Natural frequencies, lowest and highest, rad/s.
+    /// Lowest and highest natural frequency, rad/s.
     pub(crate) omega: [f64; 2],
-    /// Amplitude that is usual in it, m.
+    /// Typical vibration amplitude of the machine, m.
     pub(crate) amplitude_m: f64,
 }
 
-/// Evenly on a logarithmic scale.
+/// A random number between `low` and `high`, uniform in its logarithm.
 pub(crate) fn between(random: &mut ChaCha8Rng, low: f64, high: f64) -> f64 {
     (low.ln() + (high / low).ln() * random.random::<f64>()).exp()
 }
 
-/// −1 or 1.
+/// A random sign: −1 or 1.
 pub(crate) fn either(random: &mut ChaCha8Rng) -> f64 {
     if random.random::<bool>() { 1.0 } else { -1.0 }
 }
 
 impl Machine {
-    /// A robot (8 to 40 Hz) or a spindle (200 to 1200 Hz) with `directions` directions.
+    /// Draws a robot (8 to 40 Hz) or a spindle (200 to 1200 Hz) with this number of directions.
     pub(crate) fn draw(random: &mut ChaCha8Rng, directions: usize) -> Self {
         let robot = random.random::<bool>();
         let (frequency, mass, amplitude_m) = if robot {
@@ -87,7 +87,7 @@ impl Machine {
         machine
     }
 
-    /// Ties the directions together, a little.
+    /// Adds small off-diagonal entries to the matrices, which couple the directions.
     fn couple(&mut self, random: &mut ChaCha8Rng) {
         for matrix in [&mut self.mass, &mut self.damping, &mut self.stiffness] {
             for i in 0..matrix.nrows() {
@@ -101,8 +101,7 @@ impl Machine {
         }
     }
 
-    /// Stiffness that a static force at the tool feels along `axis` while it is held nowhere else, N/m; of matrices
-    /// the diagonal entry.
+    /// Static stiffness at the tool along `axis`, N/m: for modes with all other directions free, for matrices the diagonal entry.
     pub(crate) fn stiffness_along(&self, axis: usize) -> f64 {
         if !self.modal {
             return self.stiffness[(axis, axis)];
@@ -112,7 +111,7 @@ impl Machine {
             .sum::<f64>()
     }
 
-    /// Motion of the tool over the force on it, m/N, x, y, z × x, y, z: B (K − ω²M + iωC)⁻¹ Bᵀ.
+    /// Receptance of the tool along x, y, z, m/N: B (K − ω²M + iωC)⁻¹ Bᵀ.
     pub(crate) fn receptance(&self, omega: f64) -> DMatrix<Complex<f64>> {
         let dynamic = DMatrix::from_fn(self.tip.len(), self.tip.len(), |i, j| {
             Complex::new(
@@ -125,7 +124,7 @@ impl Machine {
         &tip * inverse * tip.transpose()
     }
 
-    /// The case file's `[structure]`.
+    /// Text of the table `[structure]` of the case file.
     pub(crate) fn case_text(&self) -> String {
         let mut text = String::from("[structure]\n");
         let names: Vec<&str> = self

@@ -1,12 +1,12 @@
-//! Effects hidden in virtual machines, and what can be said of their records.
+//! Hides effects in virtual machines, and checks the diagnosis of their records.
 //!
-//! Equations, integrators and the judge are this test's own: nothing of the library's simulation or diagnosis is in them, so
-//! that a mistake in the library cannot hide in its own mirror.
+//! Equations, integrators and the test oracle are this test's own. They use nothing of the library's simulation or diagnosis, so that a
+//! mistake in the library is not repeated in its test.
 //!
-//! An effect counts as plain where its root mean square in some channel is above three times the noise; of two effects each has to
-//! be, by what it changes beside the other.
+//! An effect is counted as clear if its root mean square in some channel is larger than three times the noise. Of two effects, each must be
+//! clear by the change that it makes in addition to the other.
 //!
-//! The whole campaign, with so many seeds of each family (200 take long), or of the families that contain a text:
+//! The whole campaign runs a number of seeds of each family (200 take long), or of the families whose names contain a text:
 //!
 //! ```text
 //! QUIETCUT_SEEDS=200 QUIETCUT_FAMILY=shaker cargo test --release -p quietcut-tests --test hidden_effects -- --ignored --nocapture
@@ -21,11 +21,11 @@ mod chip;
 mod closed_forms;
 mod cut;
 mod equivalences;
-mod judge;
 mod law;
 mod machine;
 mod motion;
 mod noise;
+mod oracle;
 mod process;
 mod puzzle;
 mod rig;
@@ -38,7 +38,7 @@ use quietcut::diagnose::{Options, diagnose};
 use quietcut_testkit::results::Campaign;
 use serde_json::Value;
 
-/// What the tool answers; an error is an outcome of its own. Case and recordings are kept where `QUIETCUT_KEEP` names a folder.
+/// The answer of the diagnosis; an error is an outcome of its own. Case and recordings are kept if `QUIETCUT_KEEP` names a folder.
 fn ask(puzzle: &Puzzle) -> Value {
     if let Some(folder) = std::env::var_os("QUIETCUT_KEEP") {
         puzzle.keep(std::path::Path::new(&folder));
@@ -49,7 +49,7 @@ fn ask(puzzle: &Puzzle) -> Value {
     }
 }
 
-/// One requirement over all families: at least this share, at most that.
+/// One requirement on a share over several families, with its lower and upper bound.
 struct Wanted {
     what: &'static str,
     share: Share,
@@ -57,7 +57,7 @@ struct Wanted {
     most: f64,
 }
 
-/// The requirements, summed over the families that were run.
+/// The requirements of the campaign, with shares over the families that were run.
 fn requirements(reports: &[Report]) -> Vec<Wanted> {
     let named = |family: Family| !matches!(family, Family::Nothing | Family::NotInLibrary | Family::Chatter);
     let sum = |of: &dyn Fn(&Report) -> Share, which: &dyn Fn(Family) -> bool| {
@@ -68,7 +68,7 @@ fn requirements(reports: &[Report]) -> Vec<Wanted> {
             .fold(Share { good: 0, all: 0 }, Share::and)
     };
     let any = |_: Family| true;
-    // What records of chatter could tell at best is not known: of them only what is said with confidence is asked for.
+    // The oracle does not treat chatter: of its answers only those with high confidence are assessed.
     let judged = |family: Family| family != Family::Chatter;
     let line = |what, share, least| Wanted {
         what,
@@ -127,11 +127,11 @@ fn a_part_of_the_campaign() {
         (Family::Nothing, 0..3),
         (Family::NotInLibrary, 0..1),
         (Family::TwoEffects, 0..1),
-        // A mass that moves a resonance of a cut: without slopes of its own a third cause is named.
+        // A mass moves a resonance of a cut: without an updated Jacobian a third cause is named.
         (Family::TwoEffects, 4119..4120),
-        // Beside hysteresis the search ends at a cubic spring only from where one that softens and hardens ends.
+        // Beside hysteresis the search finds the cubic spring only from the fit of a softening-hardening one.
         (Family::TwoEffects, 7009..7010),
-        // One with nothing hidden, one with a late sensor.
+        // One puzzle without hidden effect, one with a delayed sensor.
         (Family::Chatter, 54..56),
     ];
     for (family, seeds) in part {
@@ -140,7 +140,7 @@ fn a_part_of_the_campaign() {
         for judged in [report.separable(), report.equivalent(), report.invisible()] {
             assert_eq!(judged.good, judged.all, "{report}");
         }
-        // Of these two effects the weaker is found as well.
+        // Of these two effects, the diagnosis must find the weaker one as well.
         if family == Family::TwoEffects {
             assert_eq!(report.weak().good, report.weak().all, "{report}");
         }

@@ -1,23 +1,23 @@
-//! Structures with laws of their own, in time: the linear structure by its exponential, what is added by a Runge–Kutta method
-//! of fixed steps (Lawson's), and steps that end where a law switches.
+//! Integrates structures with nonlinear laws in time: the linear structure by its matrix exponential, the laws by a Runge–Kutta method with
+//! fixed steps (Lawson's) and with steps that end when a law switches.
 
 use nalgebra::{DMatrix, DVector};
 
 use super::law::{Branch, Law, signs};
 
-/// Most states that a structure and its laws may have.
+/// Largest number of state variables of a structure and its laws.
 const ROOM: usize = 16;
 
-/// q, q̇ and the own states of the laws.
+/// State vector: q, q̇ and the internal states of the laws.
 pub(crate) type State = [f64; ROOM];
 
-/// A force of time, place and velocity, N along x, y, z.
+/// A force along x, y, z, N, as a function of time, displacement and velocity.
 pub(crate) type Force<'a> = dyn Fn(f64, [f64; 3], [f64; 3]) -> [f64; 3] + 'a;
 
-/// M q̈ + C q̇ + K q + Bᵀ f_r = Bᵀ F, u = B q.
+/// Equation of motion M q̈ + C q̇ + K q + Bᵀ f_r = Bᵀ F of the structure, u = B q the displacement of the tool.
 #[derive(Clone, Debug)]
 pub(crate) struct System {
-    /// Degrees of freedom.
+    /// Number of degrees of freedom.
     freedoms: usize,
     inverse_mass: Vec<f64>,
     damping: Vec<f64>,
@@ -27,23 +27,23 @@ pub(crate) struct System {
     /// M⁻¹ Bᵀ.
     mobility: Vec<[f64; 3]>,
     laws: Vec<Law>,
-    /// The step whose exponential is known, and e^(A·h/2) by rows.
+    /// The step h for which `half` holds e^(A·h/2), by rows.
     step_s: f64,
     half: Vec<f64>,
 }
 
-/// The tool on an even grid of times.
+/// Motion of the tool on a grid of equally spaced times.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Path {
     pub(crate) u: Vec<[f64; 3]>,
     pub(crate) v: Vec<[f64; 3]>,
     pub(crate) a: Vec<[f64; 3]>,
-    /// The first two degrees of freedom, and their accelerations.
+    /// Displacements and accelerations of the first two degrees of freedom.
     pub(crate) freedoms: Vec<[[f64; 2]; 2]>,
 }
 
 impl System {
-    /// The equations; matrices by rows.
+    /// Builds the equation of motion without laws.
     pub(crate) fn new(
         mass: &DMatrix<f64>,
         damping: &DMatrix<f64>,
@@ -70,7 +70,7 @@ impl System {
         }
     }
 
-    /// e^(A·h/2)·y of the structure; own states stay.
+    /// e^(A·h/2)·y for the state of the structure; internal states of laws do not change.
     fn half(&self, y: &State) -> State {
         let n = 2 * self.freedoms;
         let mut after = *y;
@@ -80,7 +80,7 @@ impl System {
         after
     }
 
-    /// Adds a law.
+    /// Adds a law to the equation of motion.
     pub(crate) fn add(&mut self, law: Law) {
         let own = self
             .laws
@@ -122,12 +122,12 @@ impl System {
         sum
     }
 
-    /// Displacement of the tool.
+    /// Displacement of the tool along x, y, z.
     pub(crate) fn displacement(&self, y: &State) -> [f64; 3] {
         self.of_tip(&y[..self.freedoms])
     }
 
-    /// The state at rest under a static force, the laws left out.
+    /// The state at rest under a static force, without the laws.
     pub(crate) fn pulled(&self, force_n: [f64; 3]) -> State {
         let n = self.freedoms;
         let stiffness = DMatrix::from_row_slice(n, n, &self.stiffness);
@@ -140,7 +140,7 @@ impl System {
         state
     }
 
-    /// ẏ into `rate`, the linear structure's own part left out if not `whole`; what a sticking law holds with, N.
+    /// Writes ẏ into `rate`, without the linear structure's part if `whole` is false. Returns the holding force of a sticking law, N.
     fn rate(
         &self,
         t: f64,
@@ -168,7 +168,7 @@ impl System {
                 axis, yield_m, own, ..
             } = law
             {
-                // γ = β = ½: ż = v·(1 − |z/z_y|·(sign(v z) + 1)/2).
+                // Bouc–Wen with γ = β = ½: ż = v·(1 − |z/z_y|·(sign(v z) + 1)/2).
                 let (of_v, of_z) = signs(branch);
                 let share = if of_v == of_z {
                     of_z * y[*own] / yield_m
@@ -197,7 +197,7 @@ impl System {
         holding
     }
 
-    /// Takes M⁻¹(C q̇ + K q) from the accelerations.
+    /// Subtracts M⁻¹(C q̇ + K q) from the accelerations.
     fn resist(&self, y: &State, rate: &mut State) {
         let n = self.freedoms;
         for k in 0..n {
@@ -216,14 +216,14 @@ impl System {
         }
     }
 
-    /// One step: Lawson's where its exponential is known and nothing sticks, else the classical one.
+    /// One step: by Lawson's method if the step is the one of the exponential and no law sticks, otherwise by the classical method.
     fn step(&self, t: f64, h: f64, y: &State, branches: &[Branch], force: &Force<'_>) -> State {
         let sticks = self
             .laws
             .iter()
             .zip(branches)
             .any(|(law, branch)| matches!(law, Law::Friction { .. }) && *branch == 0);
-        // Times are sums: a whole step is one to rounding.
+        // Times are sums, so that a whole step is one within rounding.
         if sticks || (h - self.step_s).abs() > 1e-9 * self.step_s {
             return self.classical_step(t, h, y, branches, force);
         }
@@ -247,7 +247,7 @@ impl System {
         std::array::from_fn(|i| end[i] + h / 6.0 * (k1[i] + 2.0 * k23[i] + k4[i]))
     }
 
-    /// One step of the classical method of fourth order.
+    /// One step of the classical Runge–Kutta method of fourth order.
     fn classical_step(&self, t: f64, h: f64, y: &State, branches: &[Branch], force: &Force<'_>) -> State {
         let states = self.states();
         let mut k = [[0.0; ROOM]; 4];
@@ -268,7 +268,7 @@ impl System {
         after
     }
 
-    /// How far each law is from its next switch; the smallest, and which law it is.
+    /// Distance of the laws from their next switch: the smallest, and the index of its law. Negative after the switch.
     fn margin(&self, t: f64, y: &State, branches: &[Branch], force: &Force<'_>) -> (f64, usize) {
         let mut least = (f64::INFINITY, 0);
         if self.laws.iter().all(|law| !law.switches()) {
@@ -287,7 +287,7 @@ impl System {
                 Law::Gap { axis, half_gap_m, .. } => f64::from(branch) * u[*axis] - half_gap_m,
                 Law::BoucWen { axis, own, .. } => {
                     let (of_v, of_z) = signs(branch);
-                    // Times of either zero are what counts: any unit will do.
+                    // Only the zeros of velocity and internal state count, so that their units may differ.
                     (of_v * v[*axis] * self.step_s).min(of_z * y[*own])
                 }
                 Law::Stop { axis, gap_m, .. } => f64::from(2 * branch - 1) * (u[*axis] - gap_m),
@@ -300,7 +300,7 @@ impl System {
         least
     }
 
-    /// Takes what rounding left of a velocity that is at zero.
+    /// Sets a velocity that is zero within rounding to zero.
     fn stop(&self, axis: usize, velocity: f64, y: &mut State) {
         let n = self.freedoms;
         let mobility: f64 = (0..n).map(|i| self.tip[i][axis] * self.mobility[i][axis]).sum();
@@ -309,7 +309,7 @@ impl System {
         }
     }
 
-    /// What follows when law `index` is at its switch; at the start, what holds.
+    /// Sets the branch that follows when law `index` switches or, if `start` is true, the branch that holds at the start.
     fn switch(
         &self,
         index: usize,
@@ -327,7 +327,7 @@ impl System {
             Law::Friction {
                 axis, breakaway_n, ..
             } => {
-                // A hair within the limit at the end of sticking, where the switch was found.
+                // At the end of sticking the limit is slightly reduced, because the switch was found only within rounding.
                 let sticks = branches[index] == 0 && !start;
                 let limit = if sticks {
                     breakaway_n * (1.0 - 1e-9)
@@ -359,7 +359,7 @@ impl System {
         };
     }
 
-    /// The branches at the start.
+    /// The branches of all laws at the start.
     pub(crate) fn branches(&self, t: f64, y: &mut State, force: &Force<'_>) -> Vec<Branch> {
         let mut branches = vec![0; self.laws.len()];
         for index in 0..self.laws.len() {
@@ -368,10 +368,10 @@ impl System {
         branches
     }
 
-    /// From `t` to `t + h`, with a step that ends wherever a law switches.
+    /// Advances the state from `t` to `t + h`, with steps that end when a law switches.
     pub(crate) fn advance(&self, t: f64, h: f64, y: &mut State, branches: &mut [i8], force: &Force<'_>) {
         let (mut now, end) = (t, t + h);
-        // A law that switches endlessly within one step would be one that this method cannot follow.
+        // At most 64 switches per step are resolved.
         for _ in 0..64 {
             let rest = end - now;
             let after = self.step(now, rest, y, branches, force);
@@ -393,8 +393,8 @@ impl System {
         *y = self.step(now, end - now, y, branches, force);
     }
 
-    /// The share of a step just after which a law switches, where its end is beyond by `margin`: regula falsi, the side that
-    /// stays is halved (Illinois), and halves where the margin is too crooked for that.
+    /// The share of a step just after which a law switches, if the end of the step is beyond the switch by `margin`. Regula falsi with the
+    /// Illinois modification; every third iteration bisects, in case the margin is strongly curved.
     fn crossing(
         &self,
         t: f64,
@@ -437,7 +437,7 @@ impl System {
         outside
     }
 
-    /// Notes the tool at a point of the grid.
+    /// Appends the motion of the tool at one time of the grid to `path`.
     pub(crate) fn note(&self, t: f64, y: &State, branches: &[Branch], force: &Force<'_>, path: &mut Path) {
         let n = self.freedoms;
         let mut rate = [0.0; ROOM];
@@ -451,7 +451,7 @@ impl System {
     }
 }
 
-/// A of ẏ = A y with y = (q, q̇).
+/// System matrix A of ẏ = A y with y = (q, q̇).
 pub(crate) fn first_order(
     inverse_mass: &DMatrix<f64>,
     damping: &DMatrix<f64>,
@@ -465,7 +465,7 @@ pub(crate) fn first_order(
     a
 }
 
-/// Values on an even grid, between points by the cubic through the four around `place`, which counts points.
+/// Value of `series` at `place`, a fractional index: cubic interpolation through the four nearest points.
 pub(crate) fn interpolated(series: &[[f64; 3]], place: f64) -> [f64; 3] {
     let nearest = place.round();
     if (place - nearest).abs() < 1e-6 {

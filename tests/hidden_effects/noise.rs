@@ -1,24 +1,24 @@
-//! Noise of measured forces: in the motion that is predicted from them it has the colour of the machine.
+//! Noise of measured forces: in the predicted motion it has the spectrum of the machine's receptance.
 
 use nalgebra::{Complex, DMatrix};
 use realfft::RealFftPlanner;
 
-/// What makes noise white that is white sensor noise and, through the receptance of the machine, white noise of the force:
-/// in units of the sensor noise S(ω) = I + a(ω)·a(ω)ᴴ, with S = L·Lᴴ, it is L⁻¹.
+/// Whitens the sum of white sensor noise and white force noise filtered by the receptance of the machine: in units of the sensor noise S(ω)
+/// = I + a(ω)·a(ω)ᴴ = L·Lᴴ, whitening is L⁻¹.
 ///
-/// Runs are taken as if they came round at their end, which leaves the distances between outputs right to a few percent.
+/// Runs are treated as periodic, which keeps the distances between outputs within a few percent.
 pub(crate) struct Whitening {
-    /// By run and bin: L⁻¹, sensors × sensors.
+    /// By run and bin: the matrix L⁻¹, sensors × sensors.
     inverse: Vec<Vec<DMatrix<Complex<f64>>>>,
     sensors: usize,
     samples: usize,
-    /// Root mean square of all noise over that of the sensor, by sensor, over all runs.
+    /// By sensor: standard deviation of all noise over that of the sensor, over all runs.
     pub(crate) growth: Vec<f64>,
 }
 
 impl Whitening {
-    /// `seen(run, bin)` is a: what the sensors, in units of their noise, say of a force as large as the noise of each force sensor,
-    /// sensors × forces, at the bins of records of so many samples.
+    /// Builds the whitening. `seen(run, bin)` is the matrix a, sensors × forces: readings in units of the sensor noise per force as large
+    /// as the noise of its sensor, at the bins of a record of `samples` samples.
     pub(crate) fn new(
         runs: usize,
         sensors: usize,
@@ -48,7 +48,7 @@ impl Whitening {
         }
     }
 
-    /// Whitens what the sensors say, in units of their noise, run by run and sensor by sensor.
+    /// Whitens readings in units of the sensor noise, run by run and sensor by sensor.
     pub(crate) fn apply(&self, values: &mut [f64]) {
         let mut planner = RealFftPlanner::<f64>::new();
         let (forward, back) = (
@@ -66,13 +66,13 @@ impl Whitening {
                 })
                 .collect();
             for (bin, inverse) in inverse.iter().enumerate() {
-                // From the last sensor on: the matrix is lower triangular.
+                // The matrix is lower triangular: starting with the last sensor, it can be applied in place.
                 for i in (0..self.sensors).rev() {
                     spectra[i][bin] = (0..=i).map(|j| inverse[(i, j)] * spectra[j][bin]).sum();
                 }
             }
             for (samples, spectrum) in run.chunks_exact_mut(self.samples).zip(&mut spectra) {
-                // The constant and, of an even count, the last bin of a real signal are real.
+                // The constant and, for an even number of samples, the last bin of a real signal are real.
                 spectrum[0].im = 0.0;
                 if self.samples.is_multiple_of(2) {
                     spectrum[self.samples / 2].im = 0.0;
@@ -94,7 +94,7 @@ mod tests {
 
     #[test]
     fn noise_through_a_filter_becomes_white() {
-        // Noise that is smoothed over two samples, n_k + n_(k-1), seen by two sensors at 3 and −2 times: 1 + e^(−iω).
+        // Smoothed noise n_k + n_(k−1), with the spectrum 1 + e^(−iω), read by two sensors with the factors 3 and −2.
         let samples = 4096;
         let filter = |bin: usize| {
             let turn = Complex::from_polar(1.0, -std::f64::consts::TAU * bin as f64 / samples as f64);
@@ -110,14 +110,14 @@ mod tests {
         whitening.apply(&mut values);
         let (x, y) = values.split_at(samples);
         let mean = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>() / samples as f64;
-        // Of so many products of normal deviates the mean scatters by √(2/4096) = 0.022 for squares, 0.016 else.
+        // Means of 4096 products of normal deviates scatter by √(2/4096) = 0.022 for squares and by 0.016 otherwise.
         for lag in 0..3 {
             let wanted = if lag == 0 { 1.0 } else { 0.0 };
             assert!((mean(&x[lag..], x) - wanted).abs() < 0.08, "{lag}");
             assert!((mean(&y[lag..], y) - wanted).abs() < 0.08, "{lag}");
             assert!(mean(&x[lag..], y).abs() < 0.06, "{lag}");
         }
-        // 1 + 9·2 and 1 + 4·2.
+        // The noise variances of the two sensors grow to 1 + 9·2 and 1 + 4·2.
         assert!((whitening.growth[0] - 19.0_f64.sqrt()).abs() < 1e-2);
         assert!((whitening.growth[1] - 3.0).abs() < 1e-2);
     }

@@ -1,4 +1,4 @@
-//! The cutting process, and what causes make of it.
+//! The cutting process and its changes by causes.
 
 use std::f64::consts::TAU;
 
@@ -6,22 +6,22 @@ use super::cause::{Cause, Kind, Scale};
 use super::chip::Job;
 use super::machine::Machine;
 
-/// The process as some causes make it.
+/// The cutting process changed by causes.
 pub(crate) struct Process {
     pub(crate) cutting_pa: [f64; 3],
     pub(crate) edge_n_per_m: [f64; 3],
-    /// Radius of each tooth beyond the mean, m.
+    /// Deviation of each tooth's radius from the mean, m.
     pub(crate) radial_m: Vec<f64>,
     pub(crate) exponent: Option<(f64, f64)>,
     pub(crate) damping_n_per_m: f64,
-    /// How much of z is taken from the depth.
+    /// Factor on z, which is subtracted from the axial depth: 1 for axial depth modulation, otherwise 0.
     pub(crate) depth_follows: f64,
     pub(crate) wear_per_s: f64,
     pub(crate) fluctuation: Option<[f64; 3]>,
 }
 
 impl Process {
-    /// The process of a job under `causes`.
+    /// The cutting process of a job while `causes` act.
     pub(crate) fn under(causes: &[Cause], job: &Job, machine: &Machine, scale: &Scale) -> Self {
         let mut process = Self {
             cutting_pa: job.cutting_mpa.map(|value| 1e6 * value),
@@ -62,7 +62,7 @@ impl Process {
     }
 }
 
-/// Sizes that process causes are measured by.
+/// Scales of the parameters of causes in the cutting process.
 #[derive(Clone, Debug)]
 pub(crate) struct CutScale {
     pub(crate) job: Job,
@@ -78,7 +78,7 @@ impl CutScale {
 }
 
 impl Cause {
-    /// The parameters of what a cut has.
+    /// True values of the parameters of a cause in the cutting process, by their keys in answers; `None` for other causes.
     pub(crate) fn process_values(
         &self,
         machine: &Machine,
@@ -103,7 +103,7 @@ impl Cause {
                 ("reference_chip_mm", s[1] * job.feed_mm),
             ],
             Kind::Runout => runout(0.2e3 * s[0] * job.feed_mm, s[1], job.teeth),
-            // A damping of half that of the machine, were one tooth always in the cut.
+            // Scale: with one tooth always engaged, process damping would be half the damping of the structure.
             Kind::ProcessDamping => {
                 vec![(
                     "process_damping_n_per_m",
@@ -118,7 +118,7 @@ impl Cause {
     }
 }
 
-/// Offset and direction. Two teeth stand on one line: only what lies along it moves them, and is all that can be said.
+/// Runout as offset and angle. With two teeth only the component along their line changes their radii and is identifiable.
 fn runout(offset_um: f64, angle: f64, teeth: usize) -> Vec<(&'static str, f64)> {
     let (offset_um, angle) = if teeth == 2 {
         let along = offset_um * angle.cos();

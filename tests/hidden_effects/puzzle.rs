@@ -1,4 +1,4 @@
-//! What is handed to the tool: a case, recordings; and beside it what is hidden.
+//! Puzzles: a case and recordings for the diagnosis, and the effects hidden in them.
 
 use std::path::Path;
 
@@ -8,14 +8,14 @@ use rand::seq::IndexedRandom;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::cause::{Cause, STRANGE, Scale};
+use super::cause::{Cause, NOT_IN_LIBRARY, Scale};
 use super::cut::{CutBench, EVERY_FORCE, EVERY_SENSOR};
-use super::judge::{Judge, Lab, Verdict};
 use super::machine::{Machine, between};
+use super::oracle::{Lab, Oracle, Verdict};
 use super::rig::{Bench as RigBench, Output, Rig, Test};
 use super::sensor::letter;
 
-/// The families of the campaign.
+/// Families of puzzles in the campaign.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Family {
     Shaker,
@@ -26,8 +26,8 @@ pub(crate) enum Family {
     Nothing,
     NotInLibrary,
     TwoEffects,
-    /// Cuts in chatter. What their records could tell at best is not known: every trajectory of a motion that grows tells more of the
-    /// machine than can be had from it, so that there is no judge, and no rate is asked for but of what is said with confidence.
+    /// Cuts in chatter. The oracle does not treat them: in a growing motion every trajectory contains more information on the machine than
+    /// a fit can extract. Of rates, only that of answers with high confidence is required.
     Chatter,
 }
 
@@ -44,7 +44,7 @@ impl Family {
         Self::Chatter,
     ];
 
-    /// Its name, by which it is asked for.
+    /// Name of the family, as in `QUIETCUT_FAMILY`.
     pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Shaker => "shaker",
@@ -60,16 +60,16 @@ impl Family {
     }
 }
 
-/// An effect with its parameters by the keys of answers.
+/// A hidden effect with its true parameters by the keys of answers.
 #[derive(Clone, Debug)]
 pub(crate) struct Hidden {
     pub(crate) name: &'static str,
     pub(crate) values: Vec<(&'static str, f64)>,
-    /// Its direction or channels, where it has such.
+    /// Direction or channels of the effect; empty if it acts everywhere.
     pub(crate) places: Vec<String>,
 }
 
-/// One seed of a family.
+/// One puzzle: that of a seed of a family.
 pub(crate) struct Puzzle {
     pub(crate) family: Family,
     pub(crate) seed: u64,
@@ -77,21 +77,22 @@ pub(crate) struct Puzzle {
     case_text: String,
     pub(crate) recordings: Vec<Recording>,
     pub(crate) hidden: Vec<Hidden>,
-    /// Root mean square of the change that each effect makes beside the other, over the noise, in the channel where it is largest.
+    /// By effect: root mean square of the change that it makes in addition to the other effects, over the noise, in the channel where that
+    /// is largest.
     pub(crate) ratios: Vec<f64>,
     pub(crate) verdict: Verdict,
-    /// How many draws before this one were between all verdicts.
+    /// Number of draws that were rejected before this one as borderline.
     pub(crate) redrawn: usize,
 }
 
-/// Noise, as a share of the signal: from that of a good sensor to that of a bad one.
+/// Range of the sensor noise, as a share of the signal: from a good sensor to a bad one.
 const NOISE: [f64; 2] = [3e-4, 0.05];
 
-/// The most in chatter.
+/// Largest sensor noise of puzzles in chatter, as a share of the signal.
 const NOISE_IN_CHATTER: f64 = 0.01;
 
 impl Puzzle {
-    /// The puzzle of a seed: the first draw that is not between the verdicts.
+    /// Draws the puzzle of a seed: the first draw that is not borderline.
     pub(crate) fn draw(family: Family, seed: u64) -> Self {
         let mut redrawn = 0;
         loop {
@@ -104,7 +105,7 @@ impl Puzzle {
         }
     }
 
-    /// Writes case, recordings and what is hidden in them to a folder, for `quietcut diagnose`.
+    /// Writes case, recordings and hidden effects to a folder, for `quietcut diagnose`.
     pub(crate) fn keep(&self, folder: &Path) {
         let name = format!("{}-{}.toml", self.family.name(), self.seed);
         std::fs::write(folder.join(&name), &self.case_text).unwrap();
@@ -135,7 +136,7 @@ impl Puzzle {
                     Family::FreeDecay => Test::FreeDecay,
                     _ => *[Test::Shaker, Test::Sweep, Test::FreeDecay].choose(random)?,
                 };
-                // Two directions cost the judge several times as much; a third of the machines have them.
+                // Two directions cost the oracle several times as much; a third of the machines have them.
                 let directions = if random.random::<f64>() < 0.35 { 2 } else { 1 };
                 let machine = Machine::draw(random, directions);
                 let rig = Rig::draw(random, test, &machine);
@@ -145,34 +146,34 @@ impl Puzzle {
         let lab = bench.lab();
         let hidden = hide(family, lab, random)?;
         let sigma = noise(family, &bench, &hidden, random)?;
-        let judge = Judge::new(lab, &sigma);
+        let oracle = Oracle::new(lab, &sigma);
         let verdict = match &hidden[..] {
             [] => Verdict::Invisible,
             _ if family == Family::Chatter => Verdict::Separable,
-            [one] if STRANGE.contains(&one.kind) => {
-                // As plain as half the noise, in the mean over all samples.
-                let samples = judge.of(&[]).len();
-                if judge.unexplained(&hidden, random) < 0.25 * samples as f64 {
+            [one] if NOT_IN_LIBRARY.contains(&one.kind) => {
+                // An effect that is not in the library must leave at least a quarter of the noise energy unexplained.
+                let samples = oracle.of(&[]).len();
+                if oracle.unexplained(&hidden, random) < 0.25 * samples as f64 {
                     Verdict::Borderline
                 } else {
                     Verdict::Separable
                 }
             }
-            [one] => judge.verdict(one, random),
-            [first, second, ..] => judge.verdict_of_two(&[first.clone(), second.clone()], random),
+            [one] => oracle.verdict(one, random),
+            [first, second, ..] => oracle.verdict_of_two(&[first.clone(), second.clone()], random),
         };
         if verdict == Verdict::Borderline {
             return None;
         }
         let output = lab.output(&hidden);
         if !output.iter().flatten().flatten().all(|value| value.is_finite()) {
-            // A machine that runs away under what is hidden.
+            // With these effects the machine is unstable.
             return None;
         }
         let beside = |gone: usize| {
             let mut others = hidden.clone();
             others.remove(gone);
-            largest_ratio(&output, &lab.output(&others), &judge.noise())
+            largest_ratio(&output, &lab.output(&others), &oracle.noise())
         };
         let ratios = (0..hidden.len()).map(beside).collect();
         let name = format!("{}-{seed}", family.name());
@@ -186,7 +187,7 @@ impl Puzzle {
         Some(Self {
             family,
             seed,
-            case: Case::parse("believed.toml".as_ref(), &case_text).unwrap(),
+            case: Case::parse("baseline.toml".as_ref(), &case_text).unwrap(),
             case_text,
             recordings: match &bench {
                 Bench::Rig(bench) => bench.rig.recordings(&output, &sigma, random, &name),
@@ -200,7 +201,7 @@ impl Puzzle {
     }
 }
 
-/// Where the effects of a puzzle are hidden.
+/// The virtual test or cut in which the effects of a puzzle are hidden.
 enum Bench {
     Rig(RigBench),
     Cut(CutBench),
@@ -221,7 +222,7 @@ impl Bench {
         }
     }
 
-    /// The direction or the channels of a cause, as answers call them; none where it is everywhere.
+    /// Direction or channels of a cause, as answers name them; empty if it acts everywhere.
     fn places_of(&self, cause: &Cause) -> Vec<String> {
         if !cause.kind.of_sensor() {
             let direction = cause.kind.has_direction().then(|| letter(cause.axis).to_string());
@@ -230,7 +231,7 @@ impl Bench {
         match self {
             Self::Rig(bench) => vec![bench.rig.sensors[cause.sensor].name()],
             Self::Cut(bench) if cause.sensor == EVERY_FORCE => bench.force_names(),
-            // All of one are that one.
+            // All channels of a single channel are that channel.
             Self::Cut(bench) if cause.sensor == EVERY_SENSOR => match &bench.motion_names()[..] {
                 [one] => vec![one.clone()],
                 _ => Vec::new(),
@@ -251,7 +252,7 @@ impl Bench {
         }
     }
 
-    /// Noise of what is not a sensor but known from one: the angle that the tachometer tells, the last channel of a cut.
+    /// Standard deviation of the spindle angle, which is the last channel of a cut; `None` for a test of the structure.
     fn angle_sigma(&self) -> Option<f64> {
         match self {
             Self::Rig(_) => None,
@@ -260,11 +261,11 @@ impl Bench {
     }
 }
 
-/// What is hidden in a puzzle of this family.
+/// Draws the effects that are hidden in a puzzle of this family; `None` if the draw is impossible.
 fn hide(family: Family, bench: &dyn Lab, random: &mut ChaCha8Rng) -> Option<Vec<Cause>> {
     let (kinds, count) = match family {
         Family::Nothing => return Some(Vec::new()),
-        Family::NotInLibrary => (STRANGE.to_vec(), 1),
+        Family::NotInLibrary => (NOT_IN_LIBRARY.to_vec(), 1),
         Family::TwoEffects => (bench.kinds(), 2),
         Family::Chatter if random.random::<f64>() < 0.2 => return Some(Vec::new()),
         _ => (bench.kinds(), 1),
@@ -272,7 +273,7 @@ fn hide(family: Family, bench: &dyn Lab, random: &mut ChaCha8Rng) -> Option<Vec<
     let mut hidden: Vec<Cause> = Vec::new();
     while hidden.len() < count {
         let kind = *kinds.choose(random)?;
-        // A kind that this machine cannot have makes another draw, so that kinds stay evenly mixed.
+        // An effect that this machine cannot have makes the draw fail, so that all effects stay equally frequent.
         let (axis, sensor) = *bench.places(kind).choose(random)?;
         if hidden.iter().any(|other| other.kind == kind) {
             return None;
@@ -287,7 +288,8 @@ fn hide(family: Family, bench: &dyn Lab, random: &mut ChaCha8Rng) -> Option<Vec<
     Some(hidden)
 }
 
-/// σ of every sensor, such that the effect is from a third of the noise to sixty times as large, if a sensor can be so good.
+/// Standard deviation of every sensor, such that the effect is between a third of the noise and sixty times the noise, within the range of
+/// real sensors.
 fn noise(family: Family, bench: &Bench, hidden: &[Cause], random: &mut ChaCha8Rng) -> Option<Vec<f64>> {
     let plain = bench.lab().output(&[]);
     let angle = bench.angle_sigma();
@@ -309,7 +311,7 @@ fn noise(family: Family, bench: &Bench, hidden: &[Cause], random: &mut ChaCha8Rn
         };
         (relative / between(random, least, 60.0)).clamp(NOISE[0], NOISE[1])
     };
-    // A motion that ran away, or a direction that does not move.
+    // The motion must be bounded, and every direction must move.
     let moves = size.iter().all(|size| size.is_finite() && *size > 0.0);
     moves.then(|| size.iter().map(|size| size * share).chain(angle).collect())
 }

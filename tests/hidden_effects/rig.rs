@@ -1,4 +1,4 @@
-//! Virtual tests of a machine, and the recordings that their sensors make.
+//! Virtual tests of a machine's structure, and their recordings.
 
 use std::f64::consts::TAU;
 use std::sync::OnceLock;
@@ -9,32 +9,32 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
 use super::cause::{Cause, Kind, STRUCTURAL, Scale};
-use super::judge::Lab;
 use super::machine::{Machine, between};
 use super::motion::{Path, System, first_order, interpolated};
 use super::noise::Whitening;
+use super::oracle::Lab;
 use super::sensor::{Sensor, letter, noisy, read_by, sensors};
 use super::signal::signal;
 
-/// What kind of test.
+/// Kind of a test of the structure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Test {
     /// A shaker with many tones, or a hammer.
     Shaker,
-    /// A gliding frequency, or one after the other.
+    /// A sine sweep, or a step sine.
     Sweep,
-    /// Pulled and let go.
+    /// Free decay from static deflection.
     FreeDecay,
 }
 
 /// One run of a test.
 #[derive(Clone, Debug)]
 pub(crate) struct Run {
-    /// Force at every half step, N along x, y, z; empty where there is none.
+    /// Force along x, y, z at every half integration step, N; empty without force.
     force_n: Vec<[f64; 3]>,
-    /// Which directions are driven.
+    /// Directions in which a force acts.
     driven: Vec<usize>,
-    /// The static force from which the machine is let go, N.
+    /// Static force before a free decay, N.
     pull_n: [f64; 3],
 }
 
@@ -45,22 +45,23 @@ pub(crate) struct Rig {
     pub(crate) runs: Vec<Run>,
     pub(crate) sensors: Vec<Sensor>,
     pub(crate) rate_hz: f64,
-    /// Samples of a run.
+    /// Number of samples of a run.
     pub(crate) samples: usize,
-    /// Steps of the integration per sample.
+    /// Number of integration steps per sample.
     steps: usize,
     pub(crate) scale: Scale,
-    /// Noise of every force sensor, N.
+    /// Standard deviation of each force sensor's noise, N.
     force_noise_n: f64,
-    /// The motions of the machine that is believed: what sensors do to them needs no other.
+    /// Motions of the baseline machine. Sensor errors need no others.
     plain: OnceLock<Vec<Path>>,
 }
 
-/// Noise of a force sensor, as a share of the largest force that it measures, root mean square: of load cells from good to bad.
+/// Range of the standard deviation of a force sensor's noise, as a share of the largest root mean square of the force: from good load cells
+/// to bad ones.
 const FORCE_NOISE: [f64; 2] = [1e-4, 5e-3];
 
 impl Run {
-    /// Root mean square of the force along the direction in which it is largest, N.
+    /// Root mean square of the force along its largest direction, N.
     fn force_rms_n(&self) -> f64 {
         let along = |axis: usize| self.force_n.iter().map(|force| force[axis].powi(2)).sum::<f64>();
         let most = (0..3).map(along).fold(0.0, f64::max);
@@ -68,11 +69,11 @@ impl Run {
     }
 }
 
-/// By run and sensor: samples.
+/// Readings by run, sensor and sample.
 pub(crate) type Output = Vec<Vec<Vec<f64>>>;
 
 impl Rig {
-    /// A test of `machine`, with directions driven apart and together and at two or three levels.
+    /// Draws a test of `machine`, with directions driven one by one and together, at two or three levels.
     pub(crate) fn draw(random: &mut ChaCha8Rng, test: Test, machine: &Machine) -> Self {
         let highest = machine.omega[1] / TAU;
         let rate_hz = highest * random.random_range(18.0..26.0);
@@ -113,7 +114,7 @@ impl Rig {
             shapes.push(machine.axes.clone());
         }
         for (index, shape) in shapes.iter().enumerate() {
-            // Several directions: their last shape, all together, at the largest level only.
+            // The first direction is driven at all levels, any other only at the first level.
             let levels = if index == 0 { levels } else { &levels[..1] };
             for level in levels {
                 let run = rig.run(random, machine, shape);
@@ -125,7 +126,7 @@ impl Rig {
         rig
     }
 
-    /// One sweep along `axis` at a given amplitude, N.
+    /// One sweep along `axis` with the force amplitude `amplitude_n`.
     pub(crate) fn sweep(
         machine: &Machine,
         axis: usize,
@@ -192,7 +193,7 @@ impl Rig {
         run
     }
 
-    /// The run with its force such that the believed machine moves by `level` times what is usual.
+    /// Scales the force of a run so that the baseline machine moves by `level` times its typical amplitude.
     fn scaled(&self, mut run: Run, machine: &Machine, level: f64) -> Run {
         let path = self.path(&run, &self.system_of(machine, &[]));
         let mut factor = f64::INFINITY;
@@ -208,7 +209,7 @@ impl Rig {
         run
     }
 
-    /// The equations of a machine under `causes`.
+    /// Equation of motion of a machine while `causes` act.
     fn system_of(&self, machine: &Machine, causes: &[Cause]) -> System {
         let mut changed = machine.clone();
         for cause in causes {
@@ -228,7 +229,7 @@ impl Rig {
         system
     }
 
-    /// The motion of one run on the grid of the integration.
+    /// Motion of one run on the grid of the integration.
     fn path(&self, run: &Run, system: &System) -> Path {
         let step = 1.0 / (self.rate_hz * self.steps as f64);
         let half = 0.5 * step;
@@ -254,7 +255,7 @@ impl Rig {
         path
     }
 
-    /// What the sensors would say without noise while `causes` act.
+    /// Readings of all sensors without noise while `causes` act.
     pub(crate) fn output(&self, machine: &Machine, causes: &[Cause]) -> Output {
         let moved = |causes: &[Cause]| -> Vec<Path> {
             let system = self.system_of(machine, causes);
@@ -275,7 +276,7 @@ impl Rig {
         }
     }
 
-    /// One sensor's samples.
+    /// Readings of one sensor in a motion while `causes` act.
     fn read(&self, index: usize, machine: &Machine, causes: &[Cause], path: &Path) -> Vec<f64> {
         let sensor = self.sensors[index];
         let tip = if sensor.acceleration { &path.a } else { &path.u };
@@ -305,14 +306,14 @@ impl Rig {
         )
     }
 
-    /// The force of a run along an axis at the samples of its record.
+    /// Force of a run along an axis at the samples of its record, N.
     fn force_of(&self, run: &Run, axis: usize) -> Vec<f64> {
         (0..self.samples)
             .map(|k| run.force_n[2 * k * self.steps][axis])
             .collect()
     }
 
-    /// Recordings of an output with white noise of `sigma` per sensor, and that of the force.
+    /// Recordings of an output, with white noise of the standard deviations `sigma` by sensor and with noise on the forces.
     pub(crate) fn recordings(
         &self,
         output: &Output,
@@ -371,7 +372,7 @@ impl Rig {
     }
 }
 
-/// A machine in its rig.
+/// A machine with the test that is made on it.
 pub(crate) struct Bench {
     pub(crate) machine: Machine,
     pub(crate) rig: Rig,
@@ -384,7 +385,7 @@ impl Lab for Bench {
 
     fn places(&self, kind: Kind) -> Vec<(usize, usize)> {
         let sensors = &self.rig.sensors;
-        // One sensor that is late tells of what is let go no more than a record that begins earlier.
+        // In free decays the delay of the only sensor is equivalent to an earlier start of the record.
         let only_late =
             kind == Kind::SensorDelay && self.rig.kind == TestKind::FreeDecay && sensors.len() == 1;
         if kind == Kind::CommonForce || only_late || !Cause::possible(kind, &self.machine) {
@@ -412,11 +413,11 @@ impl Lab for Bench {
         STRUCTURAL.map(of_machine).to_vec()
     }
 
-    fn is_let_go(&self) -> bool {
+    fn is_free_decay(&self) -> bool {
         self.rig.kind == TestKind::FreeDecay
     }
 
-    /// The free motions of the believed machine, each run's by itself.
+    /// Free decays of the baseline machine, separate for each run.
     fn nuisance(&self, sigma: &[f64]) -> DMatrix<f64> {
         let Machine {
             mass,
@@ -456,7 +457,7 @@ impl Lab for Bench {
         columns
     }
 
-    /// The noise of the force sensors through the receptances of the believed machine.
+    /// Noise of the force sensors, filtered by the receptances of the baseline machine.
     fn whitening(&self, sigma: &[f64]) -> Option<Whitening> {
         let rig = &self.rig;
         if rig.force_noise_n == 0.0 {

@@ -1,4 +1,4 @@
-//! Sensors: what they make of a motion.
+//! Sensors and their readings of a motion.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -8,17 +8,17 @@ use super::cause::{Cause, Kind, Scale};
 use super::machine::Machine;
 use super::motion::interpolated;
 
-/// One sensor of motion.
+/// One sensor of displacement or acceleration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Sensor {
     pub(crate) axis: usize,
     pub(crate) acceleration: bool,
-    /// True where it sits at the spindle housing and not at the tool.
+    /// True if the sensor sits at the spindle housing and not at the tool.
     pub(crate) at_housing: bool,
 }
 
 impl Sensor {
-    /// The name of its channel.
+    /// Name of the sensor's channel.
     pub(crate) fn name(&self) -> String {
         format!(
             "{}{}",
@@ -28,7 +28,7 @@ impl Sensor {
     }
 }
 
-/// What was at a place of the grid; before its start all was at rest where it was let go.
+/// Value of `series` at the fractional index `place`. Before the start the machine was at rest at its initial displacement.
 fn late(series: &[[f64; 3]], place: f64, acceleration: bool) -> [f64; 3] {
     match place {
         place if place >= 0.0 => interpolated(series, place),
@@ -41,7 +41,7 @@ pub(crate) fn letter(axis: usize) -> char {
     ['x', 'y', 'z'][axis]
 }
 
-/// What a sensor reads of a motion, given every `step` of its samples, under causes that are about it.
+/// Readings of a sensor in a motion `series` with `steps` grid points per sample, under the sensor errors `causes`.
 pub(crate) fn read_by(
     machine: &Machine,
     scale: &Scale,
@@ -58,7 +58,7 @@ pub(crate) fn read_by(
         let value = cause.values(machine, scale)[0].1;
         match cause.kind {
             Kind::SensorGain | Kind::SensorOffset => weights = weights.map(|weight| weight * value),
-            // It is in the series.
+            // The series already contains this error.
             Kind::SensorOffsetByMode => {}
             Kind::SensorDelay => delay = value,
             Kind::CrossAxis => weights[usize::from(sensor.axis == 0)] += value,
@@ -90,7 +90,7 @@ pub(crate) fn read_by(
         .collect()
 }
 
-/// With white noise.
+/// The samples with added white noise of standard deviation `sigma`.
 pub(crate) fn noisy(samples: &[f64], sigma: f64, random: &mut ChaCha8Rng) -> Vec<f64> {
     let with_noise = |value: &f64| {
         let noise: f64 = StandardNormal.sample(random);
@@ -99,7 +99,7 @@ pub(crate) fn noisy(samples: &[f64], sigma: f64, random: &mut ChaCha8Rng) -> Vec
     samples.iter().map(with_noise).collect()
 }
 
-/// Displacement, acceleration or both, in every direction.
+/// Draws the sensors: displacement, acceleration or both, in every direction.
 pub(crate) fn sensors(random: &mut ChaCha8Rng, machine: &Machine) -> Vec<Sensor> {
     let kind = random.random::<f64>();
     let housing = random.random::<f64>() < 0.3;

@@ -1,4 +1,4 @@
-//! What shakers and hammers ask for.
+//! Excitation forces of shakers and hammers.
 
 use std::f64::consts::{PI, TAU};
 
@@ -8,7 +8,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::machine::Machine;
 
-/// A force of time, of about unit size, for a test of `kind` that lasts so long.
+/// A force as a function of time, of about unit amplitude, for a test of this kind and duration.
 pub(crate) fn signal(
     kind: TestKind,
     seconds: f64,
@@ -20,13 +20,13 @@ pub(crate) fn signal(
     match kind {
         TestKind::Hammer => {
             let spacing = seconds / 4.0;
-            // Smooth, so that it is known between its samples, of which it has twenty or more.
+            // The pulse is smooth and has at least twenty samples, so that interpolation between samples is accurate.
             let pulse = 1.2 / high;
-            let blows: Vec<(f64, f64)> = (0..4)
+            let impacts: Vec<(f64, f64)> = (0..4)
                 .map(|i| ((0.03 + f64::from(i)) * spacing, random.random_range(0.7..1.3)))
                 .collect();
             Box::new(move |t| {
-                blows
+                impacts
                     .iter()
                     .filter(|(start, _)| (*start..start + pulse).contains(&t))
                     .map(|(start, peak)| peak * (PI * (t - start) / pulse).sin().powi(4))
@@ -47,9 +47,11 @@ pub(crate) fn signal(
             let tones: Vec<f64> = (0..count)
                 .map(|i| 0.8 * low * (1.25 * high / (0.8 * low)).powf(f64::from(i) / f64::from(count - 1)))
                 .collect();
-            // The phase goes on from tone to tone, as that of a generator does.
-            let turns_before = |index: usize| tones[..index].iter().sum::<f64>() * dwell;
-            let steps: Vec<(f64, f64)> = (0..count as usize).map(|i| (tones[i], turns_before(i))).collect();
+            // The phase is continuous from tone to tone, as that of a generator.
+            let cycles_before = |index: usize| tones[..index].iter().sum::<f64>() * dwell;
+            let steps: Vec<(f64, f64)> = (0..count as usize)
+                .map(|i| (tones[i], cycles_before(i)))
+                .collect();
             Box::new(move |t| {
                 let index = ((t / dwell) as usize).min(steps.len() - 1);
                 let (tone, turns) = steps[index];

@@ -153,7 +153,7 @@ pub(crate) const FAR_BEHIND: f64 = 4.0;
 pub(crate) const STUCK: f64 = 1.1;
 
 /// Share of the best reduction of χ² from which on the nonlinear parameters of a candidate model are refined. Unfounded.
-pub(crate) const WORTH_REFINING: f64 = 0.5;
+pub(crate) const REFINED_SHARE: f64 = 0.5;
 
 /// Least gain of χ² of a Gauss–Newton step in the nonlinear parameters: a tenth of a standard deviation.
 pub(crate) const LEAST_REFINEMENT: f64 = 0.01;
@@ -240,7 +240,7 @@ pub(crate) const HIGHEST_CONFIDENCE: f64 = 0.995;
 pub(crate) const COMMON_FACTOR_CONFIDENCE: f64 = 0.25;
 
 /// Least share of the held-out residual energy that a guessed formula explains. Unfounded.
-pub(crate) const LEAST_GUESS: f64 = 0.1;
+pub(crate) const LEAST_EXPLAINED_BY_GUESS: f64 = 0.1;
 
 /// Residual power over that of the noise from which on a bin shows a missing force: six standard deviations of the mean
 /// of nine bins above the noise.
@@ -250,7 +250,7 @@ pub(crate) const MISSING_FORCE_OVER_NOISE: f64 = 3.0;
 pub(crate) const LEAST_AMPLITUDE: f64 = 0.02;
 
 /// Records are shortened if less than this share of their samples is left to search. With more, little time is gained. Unfounded.
-pub(crate) const WORTH_SHORTENING: f64 = 0.5;
+pub(crate) const SHORTENED_SHARE: f64 = 0.5;
 
 /// Immersion angles closer than this, in degrees, belong to the same chart. Unfounded.
 pub(crate) const SAME_IMMERSION_DEG: f64 = 0.5;

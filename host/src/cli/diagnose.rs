@@ -6,7 +6,7 @@ use super::segment::RecordedSegment;
 use super::{Error, Output, progress};
 use crate::case::Case;
 use crate::diagnose::answer::Outcome;
-use crate::diagnose::lobes::{believed, lobes};
+use crate::diagnose::lobes::{baseline_lobes, lobes};
 use crate::diagnose::{DiagnoseError, Diagnosis, Options, Stage, diagnose_watched, recorded_cuts};
 use crate::recording::Recording;
 use crate::report::diagnosis::diagnosis_page;
@@ -76,7 +76,9 @@ fn add_limits(case: &Case, recordings: &[Recording], cuts: &[TestCut], diagnosis
     let found = match diagnosis.extended(case) {
         Some(extended) => lobes(case, &extended, &diagnosis.moved(case), recordings, cuts)
             .map(|found| diagnosis.lobes = Some(found)),
-        None if has_cuts() => believed(case, recordings, cuts).map(|found| diagnosis.believed = Some(found)),
+        None if has_cuts() => {
+            baseline_lobes(case, recordings, cuts).map(|found| diagnosis.baseline_lobes = Some(found))
+        }
         None => Ok(()),
     };
     if let Err(error) = found {
@@ -165,7 +167,7 @@ fn text(diagnosis: &Diagnosis) -> String {
     }
     lines.extend(diagnosis.unexplained.guess.clone());
     lines.extend(diagnosis.lobes.iter().flat_map(sentences));
-    lines.extend(diagnosis.believed.iter().map(trial_cut_counts));
+    lines.extend(diagnosis.baseline_lobes.iter().map(trial_cut_counts));
     if let Some(test) = &diagnosis.next_test {
         lines.push(format!("next test: {}; it {}", test.what(), test.why));
     }

@@ -34,7 +34,7 @@ pub fn diagnosis_page(
             h2 { "Change of the stability lobes" }
             (section(lobes)?)
         }
-        @if let Some(chart) = &diagnosis.believed {
+        @if let Some(chart) = &diagnosis.baseline_lobes {
             h2 { "Lobes and trial cuts" }
             p { (trial_cut_counts(chart)) "." }
             (picture("Lobes of the case", chart, &format!("Method: {}.", chart.method))?)

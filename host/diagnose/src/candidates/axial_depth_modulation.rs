@@ -9,12 +9,12 @@ use crate::records::record::Record;
 use crate::records::study::Study;
 use quietcut_model::effects::EffectName;
 
-pub(super) struct OfDepth;
+pub(super) struct AxialDepthModulationCause;
 
 /// Largest distance from 1 of the coefficient of this effect, which is 1 in theory because the effect is on or off.
 const ROUNDING: f64 = 0.35;
 
-impl Cause for OfDepth {
+impl Cause for AxialDepthModulationCause {
     fn effect(&self) -> EffectName {
         EffectName::AxialDepthModulation
     }

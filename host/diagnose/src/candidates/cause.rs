@@ -182,7 +182,7 @@ pub(crate) type Parameter = (&'static str, f64);
 
 /// One effect name of a cause, with its location, parameters and extension.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Part {
+pub(crate) struct LocatedEffect {
     /// The effect's name, as in `[extension.NAME]`.
     pub name: &'static str,
     /// Where the effect acts.
@@ -215,22 +215,22 @@ pub(crate) trait Cause: Send + Sync {
     fn locations(&self, study: &Study<'_>) -> Vec<Location>;
 
     /// Start values of the nonlinear parameters, as a grid. A cause that is linear in all parameters has one empty set.
-    fn nonlinear_grid(&self, _scene: &Study<'_>, _place: &Location) -> Vec<Vec<f64>> {
+    fn nonlinear_grid(&self, _study: &Study<'_>, _location: &Location) -> Vec<Vec<f64>> {
         vec![Vec::new()]
     }
 
-    /// Further start values of the nonlinear parameters, from the residual `left` that other causes leave: samples by record and channel.
+    /// Further start values of the nonlinear parameters, from the residual `_residual` that other causes leave: samples by record and channel.
     fn nonlinear_grid_beside(
         &self,
-        _scene: &Study<'_>,
-        _place: &Location,
-        _left: &[Vec<Vec<f64>>],
+        _study: &Study<'_>,
+        _location: &Location,
+        _residual: &[Vec<Vec<f64>>],
     ) -> Vec<Vec<f64>> {
         Vec::new()
     }
 
     /// Bounds of the nonlinear parameters: lowest and highest value of each.
-    fn bounds(&self, _scene: &Study<'_>, _place: &Location) -> Vec<[f64; 2]> {
+    fn bounds(&self, _study: &Study<'_>, _location: &Location) -> Vec<[f64; 2]> {
         Vec::new()
     }
 
@@ -254,7 +254,7 @@ pub(crate) trait Cause: Send + Sync {
 
     /// Nonlinear parameters that follow from the fitted coefficients, for a cause whose regressors are exact at those values. They are then
     /// found by fixed-point iteration, not by a search. `None` for other causes.
-    fn settled(&self, _shape: &[f64], _coefficients: &[f64]) -> Option<Vec<f64>> {
+    fn settled(&self, _nonlinear_parameters: &[f64], _coefficients: &[f64]) -> Option<Vec<f64>> {
         None
     }
 
@@ -268,8 +268,8 @@ pub(crate) trait Cause: Send + Sync {
     }
 
     /// Entries of the answer, one for each effect name and axis: parameters and extension.
-    fn parts(&self, location: &Location, parameters: &[Parameter]) -> Vec<Part> {
-        vec![Part {
+    fn located_effects(&self, location: &Location, parameters: &[Parameter]) -> Vec<LocatedEffect> {
+        vec![LocatedEffect {
             name: self.name(),
             location: location.clone(),
             parameters: parameters.to_vec(),
@@ -278,13 +278,13 @@ pub(crate) trait Cause: Send + Sync {
     }
 
     /// Standard deviations, by key, of parameters that another measurement than the fit determines, as the tachometer does.
-    fn known_deviations(&self, _scene: &Study<'_>) -> Vec<Parameter> {
+    fn known_deviations(&self, _study: &Study<'_>) -> Vec<Parameter> {
         Vec::new()
     }
 
     /// Further parameters for the answer that express the same change in other quantities, as a natural frequency instead of a relative
     /// change.
-    fn also(&self, _scene: &Study<'_>, _place: &Location, _parameters: &[Parameter]) -> Vec<Parameter> {
+    fn also(&self, _study: &Study<'_>, _location: &Location, _parameters: &[Parameter]) -> Vec<Parameter> {
         Vec::new()
     }
 }

@@ -61,13 +61,13 @@ impl Cause for Coefficients {
         coefficients: &[f64],
     ) -> Option<Vec<Parameter>> {
         let mut material = cutter(study)?.force.material();
-        let believed = (self.of)(&mut material).map(|value| *value);
+        let baseline = (self.of)(&mut material).map(|value| *value);
         let found: Vec<Parameter> = self
             .keys
             .into_iter()
-            .zip(believed)
+            .zip(baseline)
             .zip(coefficients)
-            .map(|((key, believed), change)| (key, believed + change))
+            .map(|((key, baseline), change)| (key, baseline + change))
             .collect();
         (self.can_be)(found.first()?.1).then_some(found)
     }

@@ -9,18 +9,18 @@ use super::restoring::{Restoring, largest_m, plain};
 use crate::records::domain::Domain;
 use quietcut_model::effects::EffectName;
 
-pub(super) const ALIKE: Restoring = Restoring {
+pub(super) const SYMMETRIC: Restoring = Restoring {
     physical: |fc| fc.iter().all(|fc| *fc > 0.0),
     ..plain(EffectName::CoulombFriction, &["fc_n"])
 };
 
-pub(super) const EACH_WAY: Restoring = Restoring {
+pub(super) const ASYMMETRIC: Restoring = Restoring {
     physical: |fc| fc.iter().all(|fc| *fc >= 0.0),
     ..plain(EffectName::CoulombFriction, &["fc_n", "fc_minus_n"])
 };
 
 /// Friction behind a backlash: after each reversal no force until the gap is crossed, then friction.
-pub(super) const BEHIND_PLAY: Restoring = Restoring {
+pub(super) const BEHIND_BACKLASH: Restoring = Restoring {
     nonlinear_parameters: &["play_mm"],
     nonlinear_grid: |study, axis| {
         let most = 2e3 * largest_m(study, axis);
@@ -30,13 +30,13 @@ pub(super) const BEHIND_PLAY: Restoring = Restoring {
     },
     bounds: |study, axis| vec![[largest_m(study, axis), 1.9e3 * largest_m(study, axis)]],
     physical: |fc| fc.iter().all(|fc| *fc >= 0.0) && fc.iter().any(|fc| *fc > 0.0),
-    behind_play: true,
+    behind_backlash: true,
     ..plain(EffectName::CoulombFriction, &["fc_n", "fc_minus_n"])
 };
 
 /// Friction behind a backlash whose contact closes gradually over `contact_mm`. It is a candidate only if the motion is imposed and every
 /// instant of the force is measured; for a structure that moves freely, hysteresis (Bouc–Wen) describes the same loop.
-pub(super) const BEHIND_CLEARANCE: Restoring = Restoring {
+pub(super) const BEHIND_SOFT_BACKLASH: Restoring = Restoring {
     nonlinear_parameters: &["play_mm", "contact_mm"],
     nonlinear_grid: |study, axis| {
         if !study.all_in(Domain::Force) {
@@ -52,5 +52,5 @@ pub(super) const BEHIND_CLEARANCE: Restoring = Restoring {
         let largest_m = largest_m(study, axis);
         vec![[largest_m, 1.9e3 * largest_m], [largest_m, 1e3 * largest_m]]
     },
-    ..BEHIND_PLAY
+    ..BEHIND_BACKLASH
 };

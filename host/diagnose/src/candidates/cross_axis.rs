@@ -6,7 +6,7 @@
 
 use num_complex::Complex64;
 
-use super::sensor::{channels, in_cut, of_meant};
+use super::sensor::{channels, readings_at, with_chip_of_true_motion};
 use crate::candidates::cause::{Cause, Location, Parameter, Regressor};
 use crate::records::record::Record;
 use crate::records::study::Study;
@@ -51,19 +51,25 @@ impl Cause for CrossAxis {
         };
         let mut weights = [0.0; 3];
         weights[*axis] = 1.0;
-        let read = of_meant(record, location, |_| weights, |_| Complex64::ONE);
+        let read = readings_at(record, location, |_| weights, |_| Complex64::ONE);
         let other = record.motion.clone();
         // The true motion is x = y − p·(the other direction).
-        Some(in_cut(record, location, read, SMALL_FRACTION, |motion, to| {
-            for (to, from) in [
-                (&mut motion.x[to], &other.x[*axis]),
-                (&mut motion.v[to], &other.v[*axis]),
-            ] {
-                to.iter_mut()
-                    .zip(from)
-                    .for_each(|(to, from)| *to -= SMALL_FRACTION * from);
-            }
-        }))
+        Some(with_chip_of_true_motion(
+            record,
+            location,
+            read,
+            SMALL_FRACTION,
+            |motion, to| {
+                for (to, from) in [
+                    (&mut motion.x[to], &other.x[*axis]),
+                    (&mut motion.v[to], &other.v[*axis]),
+                ] {
+                    to.iter_mut()
+                        .zip(from)
+                        .for_each(|(to, from)| *to -= SMALL_FRACTION * from);
+                }
+            },
+        ))
     }
 
     fn parameters(

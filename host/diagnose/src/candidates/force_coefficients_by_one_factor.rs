@@ -3,7 +3,7 @@
 //! In the steady state of a stable linear cut without measured force, one gain of all channels is exactly equivalent.
 
 use super::process::{changed, cutter, everywhere};
-use crate::candidates::cause::{Cause, Location, Parameter, Part, Regressor};
+use crate::candidates::cause::{Cause, LocatedEffect, Location, Parameter, Regressor};
 use crate::records::record::Record;
 use crate::records::study::Study;
 use quietcut_model::effects::EffectName;
@@ -97,11 +97,11 @@ impl Cause for CommonFactor {
         (factor > 0.0).then(|| keys.take(if self.with_edge { 6 } else { 3 }).collect())
     }
 
-    fn parts(&self, location: &Location, parameters: &[Parameter]) -> Vec<Part> {
+    fn located_effects(&self, location: &Location, parameters: &[Parameter]) -> Vec<LocatedEffect> {
         self.names()
             .into_iter()
             .zip(parameters.chunks(3))
-            .map(|(name, parameters)| Part {
+            .map(|(name, parameters)| LocatedEffect {
                 name,
                 location: location.clone(),
                 parameters: parameters.to_vec(),

@@ -32,20 +32,20 @@ const STEP: f64 = 1e-4;
 const VANISHING: f64 = 0.05;
 
 #[derive(Clone, Copy)]
-pub(super) enum Which {
+pub(super) enum StructureMatrix {
     Mass,
     Stiffness,
     Damping,
 }
 
-pub(super) struct Linear(pub(super) Which);
+pub(super) struct LinearChange(pub(super) StructureMatrix);
 
-impl Linear {
+impl LinearChange {
     fn key(&self) -> &'static str {
         match self.0 {
-            Which::Mass => "mass_kg",
-            Which::Stiffness => "stiffness_n_per_m",
-            Which::Damping => "damping_ns_per_m",
+            StructureMatrix::Mass => "mass_kg",
+            StructureMatrix::Stiffness => "stiffness_n_per_m",
+            StructureMatrix::Damping => "damping_ns_per_m",
         }
     }
 
@@ -59,9 +59,9 @@ impl Linear {
             .iter()
             .position(|direction| Some(*direction) == location.direction())?;
         let matrix = match self.0 {
-            Which::Mass => &matrices.mass,
-            Which::Stiffness => &matrices.stiffness,
-            Which::Damping => &matrices.damping,
+            StructureMatrix::Mass => &matrices.mass,
+            StructureMatrix::Stiffness => &matrices.stiffness,
+            StructureMatrix::Damping => &matrices.damping,
         };
         Some(matrix[(index, index)])
     }
@@ -73,12 +73,12 @@ impl Linear {
     }
 }
 
-impl Cause for Linear {
+impl Cause for LinearChange {
     fn effect(&self) -> EffectName {
         match self.0 {
-            Which::Mass => EffectName::Mass,
-            Which::Stiffness => EffectName::Stiffness,
-            Which::Damping => EffectName::Damping,
+            StructureMatrix::Mass => EffectName::Mass,
+            StructureMatrix::Stiffness => EffectName::Stiffness,
+            StructureMatrix::Damping => EffectName::Damping,
         }
     }
 
@@ -231,9 +231,9 @@ impl Cause for Linear {
             return Vec::new();
         };
         match self.0 {
-            Which::Mass => vec![("frequency_hz", mode.frequency_hz / (1.0 + relative).sqrt())],
-            Which::Stiffness => vec![("frequency_hz", mode.frequency_hz * (1.0 + relative).sqrt())],
-            Which::Damping => vec![("damping_ratio", mode.damping_ratio * (1.0 + relative))],
+            StructureMatrix::Mass => vec![("frequency_hz", mode.frequency_hz / (1.0 + relative).sqrt())],
+            StructureMatrix::Stiffness => vec![("frequency_hz", mode.frequency_hz * (1.0 + relative).sqrt())],
+            StructureMatrix::Damping => vec![("damping_ratio", mode.damping_ratio * (1.0 + relative))],
         }
     }
 }

@@ -1,5 +1,5 @@
 //! The mass differs from the case: linear in its relative change.
 
-use super::linear_parameter::{Linear, Which};
+use super::linear_parameter::{LinearChange, StructureMatrix};
 
-pub(super) const CAUSE: Linear = Linear(Which::Mass);
+pub(super) const CAUSE: LinearChange = LinearChange(StructureMatrix::Mass);

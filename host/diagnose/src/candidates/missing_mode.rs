@@ -44,7 +44,7 @@ impl Cause for MissingMode {
                 study
                     .records
                     .iter()
-                    .any(|record| !record.force_n[*axis].is_empty() || is_let_go(record, *axis))
+                    .any(|record| !record.force_n[*axis].is_empty() || is_free_decay_along(record, *axis))
             })
             .map(Location::Axis)
             .collect()
@@ -73,21 +73,21 @@ impl Cause for MissingMode {
             return Vec::new();
         };
         let count = 160;
-        let (bins, releases) = (bins(study, *axis, left), releases(study, *axis, left));
-        let likeness: Vec<Vec<(f64, Vec<f64>)>> = DAMPING
+        let (bins, free_decays) = (bins(study, *axis, left), free_decays(study, *axis, left));
+        let chi_square_reduction: Vec<Vec<(f64, Vec<f64>)>> = DAMPING
             .par_iter()
             .map(|damping| {
                 (0..count)
                     .map(|index| {
                         let frequency = low * (high / low).powf(f64::from(index) / f64::from(count - 1));
-                        let alike = likeness(&bins, &releases, frequency, *damping);
-                        (alike, vec![frequency, *damping])
+                        let reduction = chi_square_reduction(&bins, &free_decays, frequency, *damping);
+                        (reduction, vec![frequency, *damping])
                     })
                     .collect()
             })
             .collect();
         let mut peaks: Vec<(f64, Vec<f64>)> = Vec::new();
-        for of_damping in likeness {
+        for of_damping in chi_square_reduction {
             for (index, (value, nonlinear_parameters)) in of_damping.iter().enumerate() {
                 let below = |other: Option<&(f64, Vec<f64>)>| other.is_none_or(|other| other.0 <= *value);
                 let before = index.checked_sub(1).and_then(|index| of_damping.get(index));
@@ -134,10 +134,10 @@ impl Cause for MissingMode {
         let (Location::Axis(axis), [frequency, damping]) = (location, nonlinear_parameters) else {
             return None;
         };
-        if is_let_go(record, *axis) {
-            let force_n = held_by_n(study, record)?[*axis];
+        if is_free_decay_along(record, *axis) {
+            let force_n = static_force_n(study, record)?[*axis];
             let count = record.grid.count();
-            let of = |channel| released(record, channel, *axis, force_n, [*frequency, *damping]);
+            let of = |channel| free_decay_of_mode(record, channel, *axis, force_n, [*frequency, *damping]);
             let observed = record
                 .channels
                 .iter()
@@ -207,17 +207,17 @@ fn mode(omega: f64, frequency_hz: f64, damping_ratio: f64) -> Complex64 {
 }
 
 /// True for a free decay whose force along `axis` is not measured.
-fn is_let_go(record: &Record, axis: usize) -> bool {
+fn is_free_decay_along(record: &Record, axis: usize) -> bool {
     starts_anywhere(record) && record.force_n[axis].is_empty()
 }
 
 /// The static force that held the baseline before its free decay, N; `None` if it cannot be computed.
-fn held_by_n(study: &Study<'_>, record: &Record) -> Option<Vector3<f64>> {
+fn static_force_n(study: &Study<'_>, record: &Record) -> Option<Vector3<f64>> {
     holding_force_n(study, &study.baseline.first_order, &record.decays.start)
 }
 
 /// Samples of a channel that reads the free decay of a mode with modal mass 1 kg from rest under the static force `force_n` along `axis`.
-fn released<'a>(
+fn free_decay_of_mode<'a>(
     record: &'a Record,
     channel: &'a Observed,
     axis: usize,
@@ -237,16 +237,16 @@ fn released<'a>(
 }
 
 /// A free decay and a channel that reads `axis`: record, channel, residual of the channel, axis, and static force along the axis, N.
-type Release<'a> = (&'a Record, &'a Observed, &'a [f64], usize, f64);
+type FreeDecay<'a> = (&'a Record, &'a Observed, &'a [f64], usize, f64);
 
-fn releases<'a>(study: &'a Study<'_>, axis: usize, left: &'a [Vec<Vec<f64>>]) -> Vec<Release<'a>> {
+fn free_decays<'a>(study: &'a Study<'_>, axis: usize, left: &'a [Vec<Vec<f64>>]) -> Vec<FreeDecay<'a>> {
     let mut all = Vec::new();
     for (record, left) in study.records.iter().zip(left) {
-        let Some(force) = held_by_n(study, record).filter(|_| is_let_go(record, axis)) else {
+        let Some(force) = static_force_n(study, record).filter(|_| is_free_decay_along(record, axis)) else {
             continue;
         };
-        let hears = |(channel, _): &(&Observed, _)| channel.pickup.weights[axis] != 0.0;
-        for (channel, left) in record.channels.iter().zip(left).filter(hears) {
+        let reads = |(channel, _): &(&Observed, _)| channel.pickup.weights[axis] != 0.0;
+        for (channel, left) in record.channels.iter().zip(left).filter(reads) {
             all.push((record, channel, &left[..], axis, force[axis]));
         }
     }
@@ -262,8 +262,8 @@ fn bins(study: &Study<'_>, axis: usize, left: &[Vec<Vec<f64>>]) -> Vec<Bin> {
     let forced = |(record, _): &(&Record, _)| !record.force_n[axis].is_empty();
     for (record, left) in study.records.iter().zip(left).filter(forced) {
         let force = record.grid.spectrum(&record.force_n[axis]);
-        let hears = |(channel, _): &(&Observed, _)| channel.pickup.weights[axis] != 0.0;
-        for (channel, left) in record.channels.iter().zip(left).filter(hears) {
+        let reads = |(channel, _): &(&Observed, _)| channel.pickup.weights[axis] != 0.0;
+        for (channel, left) in record.channels.iter().zip(left).filter(reads) {
             let residual = record.grid.spectrum(left);
             for bin in 1..record.grid.bins() {
                 let omega = record.grid.omega(bin);
@@ -279,15 +279,20 @@ fn bins(study: &Study<'_>, axis: usize, left: &[Vec<Vec<f64>>]) -> Vec<Bin> {
 }
 
 /// Reduction of χ² by a mode of this frequency and damping ratio with the best modal mass; 0 if that mass is negative.
-fn likeness(bins: &[Bin], releases: &[Release<'_>], frequency_hz: f64, damping_ratio: f64) -> f64 {
+fn chi_square_reduction(
+    bins: &[Bin],
+    free_decays: &[FreeDecay<'_>],
+    frequency_hz: f64,
+    damping_ratio: f64,
+) -> f64 {
     let (mut along, mut size) = (0.0, 0.0);
     for (omega, force, residual) in bins {
         let column = mode(*omega, frequency_hz, damping_ratio) * force;
         along += (column.conj() * residual).re;
         size += column.norm_sqr();
     }
-    for (record, channel, residual, axis, force_n) in releases {
-        let column = released(record, channel, *axis, *force_n, [frequency_hz, damping_ratio]);
+    for (record, channel, residual, axis, force_n) in free_decays {
+        let column = free_decay_of_mode(record, channel, *axis, *force_n, [frequency_hz, damping_ratio]);
         for (column, residual) in column.zip(residual.iter()) {
             let power = channel.deviation * channel.deviation;
             along += column * residual / power;

@@ -11,9 +11,9 @@ use crate::records::study::Study;
 use quietcut_model::effects::EffectName;
 use quietcut_simulate::ProcessDamping;
 
-pub(super) struct OfFlank;
+pub(super) struct ProcessDampingCause;
 
-impl Cause for OfFlank {
+impl Cause for ProcessDampingCause {
     fn effect(&self) -> EffectName {
         EffectName::ProcessDamping
     }

@@ -1,7 +1,7 @@
 //! Restoring forces: the equations are those of the simulation, evaluated along the measured motion.
 
 use crate::baseline::terms_of;
-use crate::candidates::cause::{Cause, Location, Parameter, Part, Regressor};
+use crate::candidates::cause::{Cause, LocatedEffect, Location, Parameter, Regressor};
 use crate::records::record::Record;
 use crate::records::study::Study;
 use quietcut_model::effects::EffectName;
@@ -29,7 +29,7 @@ pub(super) struct Restoring {
     /// Bounds of the nonlinear parameters.
     pub(super) bounds: fn(&Study<'_>, usize) -> Vec<[f64; 2]>,
     /// True if the force acts behind a backlash, which the answer then names too.
-    pub(super) behind_play: bool,
+    pub(super) behind_backlash: bool,
     /// True for physically possible coefficients.
     pub(super) physical: fn(coefficients: &[f64]) -> bool,
 }
@@ -46,7 +46,7 @@ pub(super) const fn plain(effect: EffectName, linear: &'static [&'static str]) -
         each: false,
         nonlinear_grid: |_, _| vec![Vec::new()],
         bounds: |_, _| Vec::new(),
-        behind_play: false,
+        behind_backlash: false,
         physical: |_| true,
     }
 }
@@ -87,7 +87,7 @@ fn first_axis(location: &Location) -> usize {
 }
 
 /// The locations that have coefficients of their own: each axis for [`Location::EachOf`], otherwise the location itself.
-fn single_places(location: &Location) -> Vec<Location> {
+fn single_locations(location: &Location) -> Vec<Location> {
     match location {
         Location::EachOf(axes) => axes.iter().map(|axis| Location::Axis(*axis)).collect(),
         one => vec![one.clone()],
@@ -123,16 +123,16 @@ impl Restoring {
     }
 
     /// Entries of the answer for the force along one axis.
-    fn parts_of_one(&self, location: &Location, parameters: &[Parameter]) -> Vec<Part> {
-        let of_play = |(key, _): &&Parameter| self.behind_play && self.nonlinear_parameters.contains(key);
+    fn effects_along_one_axis(&self, location: &Location, parameters: &[Parameter]) -> Vec<LocatedEffect> {
+        let of_play = |(key, _): &&Parameter| self.behind_backlash && self.nonlinear_parameters.contains(key);
         let own: Vec<Parameter> = parameters.iter().filter(|p| !of_play(p)).copied().collect();
-        let mut parts = vec![Part {
+        let mut parts = vec![LocatedEffect {
             name: self.name(),
             location: location.clone(),
             extension: self.extension(location, &own),
             parameters: own,
         }];
-        if self.behind_play {
+        if self.behind_backlash {
             let of_gap = |(key, value): &Parameter| match *key {
                 "play_mm" => ("gap_mm", *value),
                 key => (key, *value),
@@ -144,7 +144,7 @@ impl Restoring {
                 gap.iter()
                     .map(|(key, value)| ((*key).to_owned(), (*value).into())),
             );
-            parts.push(Part {
+            parts.push(LocatedEffect {
                 name: EffectName::Backlash.name(),
                 location: location.clone(),
                 parameters: gap,
@@ -188,20 +188,20 @@ impl Cause for Restoring {
     }
 
     fn names(&self) -> Vec<&'static str> {
-        if self.behind_play {
+        if self.behind_backlash {
             vec![self.name(), EffectName::Backlash.name()]
         } else {
             vec![self.name()]
         }
     }
 
-    fn parts(&self, location: &Location, parameters: &[Parameter]) -> Vec<Part> {
-        let locations = single_places(location);
+    fn located_effects(&self, location: &Location, parameters: &[Parameter]) -> Vec<LocatedEffect> {
+        let locations = single_locations(location);
         let of_one = (parameters.len() / locations.len()).max(1);
         locations
             .iter()
             .zip(parameters.chunks(of_one))
-            .flat_map(|(location, parameters)| self.parts_of_one(location, parameters))
+            .flat_map(|(location, parameters)| self.effects_along_one_axis(location, parameters))
             .collect()
     }
 
@@ -244,7 +244,7 @@ impl Cause for Restoring {
         location: &Location,
         nonlinear_parameters: &[f64],
     ) -> Option<Vec<Regressor>> {
-        single_places(location)
+        single_locations(location)
             .iter()
             .flat_map(|location| (0..self.linear.len()).map(move |index| (location, index)))
             .map(|(location, index)| self.along(study, record, location, nonlinear_parameters, index))

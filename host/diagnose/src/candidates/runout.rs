@@ -14,7 +14,7 @@ use quietcut_model::effects::EffectName;
 use quietcut_model::milling::Runout;
 use quietcut_simulate::Cutter;
 
-pub(super) struct OfTool;
+pub(super) struct RunoutCause;
 
 /// Offsets e of the start values, as shares of the feed per tooth.
 const SHARES_OF_FEED: [f64; 2] = [0.1, 0.25];
@@ -34,7 +34,7 @@ fn offset(along_um: f64, across_um: f64) -> impl Fn(&mut Cutter) {
     }
 }
 
-impl Cause for OfTool {
+impl Cause for RunoutCause {
     fn effect(&self) -> EffectName {
         EffectName::Runout
     }

@@ -49,7 +49,7 @@ pub(super) fn one_or_all(study: &Study<'_>, name: &str) -> Vec<Location> {
     locations
 }
 
-pub(super) fn meant(location: &Location, channel: &Observed) -> bool {
+pub(super) fn is_at(location: &Location, channel: &Observed) -> bool {
     match location.channel() {
         Some(name) => channel.pickup.name == name,
         None => channel.pickup.quantity != Quantity::Force,
@@ -102,14 +102,14 @@ pub(super) fn read(
 }
 
 /// Readings of the channels at `location`, each with its spectrum multiplied by `change`(ω).
-pub(super) fn of_meant(
+pub(super) fn readings_at(
     record: &Record,
     location: &Location,
     weights: impl Fn(&Observed) -> [f64; 3],
     change: impl Fn(f64) -> Complex64,
 ) -> Vec<Regressor> {
     let of = |channel| {
-        if meant(location, channel) {
+        if is_at(location, channel) {
             read(record, channel, weights(channel), &change)
         } else {
             Vec::new()
@@ -120,7 +120,7 @@ pub(super) fn of_meant(
 
 /// Reading of a channel in a cut with its spectrum multiplied by `change`(ω). The response to the cutting force is changed on the upsampled
 /// grid, so that steps stay steps; the rest of the reading is changed at the samples of the record.
-pub(super) fn in_steps(
+pub(super) fn reading_in_cut(
     record: &Record,
     channel: usize,
     change: impl Fn(f64) -> Complex64,
@@ -136,17 +136,17 @@ pub(super) fn in_steps(
     }
     let mut changed = record.read_response(&force, channel);
     let readings = record.readings[channel].iter().zip(&known);
-    let mut besides: Vec<f64> = readings.map(|(all, known)| all - known).collect();
+    let mut rest: Vec<f64> = readings.map(|(all, known)| all - known).collect();
     // A sample that is not compared takes the value before it.
     for &sample in record.skipped[channel].iter().filter(|sample| **sample > 0) {
-        besides[sample] = besides[sample - 1];
+        rest[sample] = rest[sample - 1];
     }
-    let mut spectrum = grid.continued_spectrum(&besides);
+    let mut spectrum = grid.continued_spectrum(&rest);
     for (bin, value) in spectrum.iter_mut().enumerate() {
         *value *= change(grid.omega(bin));
     }
-    for (changed, besides) in changed.iter_mut().zip(grid.samples(&spectrum)) {
-        *changed += besides;
+    for (changed, rest) in changed.iter_mut().zip(grid.samples(&spectrum)) {
+        *changed += rest;
     }
     Some(changed)
 }
@@ -157,7 +157,7 @@ pub(super) fn in_steps(
 ///
 /// With y = S x the reading of the motion x and F the force along a motion, y − H F(y) = (y − x) − H (F(y) − F(x)). If several sensors read
 /// one axis, each has an equal share in its estimated motion.
-pub(super) fn in_cut(
+pub(super) fn with_chip_of_true_motion(
     record: &Record,
     location: &Location,
     mut regressors: Vec<Regressor>,
@@ -178,7 +178,7 @@ pub(super) fn in_cut(
         let (mut all, mut wrong) = (0, 0);
         for channel in readers {
             all += 1;
-            wrong += usize::from(meant(location, channel));
+            wrong += usize::from(is_at(location, channel));
         }
         if wrong == 0 || record.motion.x[axis].is_empty() {
             continue;

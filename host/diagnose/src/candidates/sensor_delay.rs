@@ -6,13 +6,13 @@
 
 use num_complex::Complex64;
 
-use super::sensor::{in_cut, in_steps, meant, of_meant, one_or_all};
+use super::sensor::{is_at, one_or_all, reading_in_cut, readings_at, with_chip_of_true_motion};
 use crate::candidates::cause::{Cause, Location, Parameter, Regressor};
 use crate::records::record::Record;
 use crate::records::study::Study;
 use quietcut_model::effects::EffectName;
 
-pub(super) struct Delay;
+pub(super) struct SensorDelayCause;
 
 /// Longest delay of the search, in periods of the highest frequency of the motion.
 const LONGEST: f64 = 0.4;
@@ -20,7 +20,7 @@ const LONGEST: f64 = 0.4;
 /// Factor between the fitted delay and the delay at which the regressor is computed from which on the fit does not describe a delay.
 const ANOTHER: f64 = 100.0;
 
-impl Cause for Delay {
+impl Cause for SensorDelayCause {
     fn effect(&self) -> EffectName {
         EffectName::SensorDelay
     }
@@ -57,8 +57,8 @@ impl Cause for Delay {
         let change = |omega: f64| (Complex64::ONE - Complex64::cis(omega * delay)) / delay;
         let read = if record.cut.is_some() {
             let of = |channel: usize| {
-                if meant(location, &record.channels[channel]) {
-                    in_steps(record, channel, change)
+                if is_at(location, &record.channels[channel]) {
+                    reading_in_cut(record, channel, change)
                 } else {
                     Some(Vec::new())
                 }
@@ -67,12 +67,18 @@ impl Cause for Delay {
                 (0..record.channels.len()).map(of).collect::<Option<_>>()?,
             )]
         } else {
-            of_meant(record, location, |channel| channel.pickup.weights, change)
+            readings_at(record, location, |channel| channel.pickup.weights, change)
         };
         // The true motion is x(t) = y(t + τ).
-        Some(in_cut(record, location, read, delay, |motion, axis| {
-            motion.advance(axis, delay);
-        }))
+        Some(with_chip_of_true_motion(
+            record,
+            location,
+            read,
+            delay,
+            |motion, axis| {
+                motion.advance(axis, delay);
+            },
+        ))
     }
 
     /// The fitted delay: the regressor is exact at the delay for which it is computed.

@@ -7,13 +7,13 @@
 
 use num_complex::Complex64;
 
-use super::sensor::{in_cut, of_meant, one_or_all};
+use super::sensor::{one_or_all, readings_at, with_chip_of_true_motion};
 use crate::candidates::cause::{Cause, Location, Parameter, Regressor};
 use crate::records::record::Record;
 use crate::records::study::Study;
 use quietcut_model::effects::EffectName;
 
-pub(super) struct Gain;
+pub(super) struct SensorGainCause;
 
 /// Largest share 1 − 1/g: a gain of 50. Beyond it the reading would hardly contain the true value.
 const LARGEST_SHARE: f64 = 0.98;
@@ -27,7 +27,7 @@ pub(super) fn factor(coefficients: &[f64]) -> Option<f64> {
     (share < LARGEST_SHARE).then(|| 1.0 / (1.0 - share))
 }
 
-impl Cause for Gain {
+impl Cause for SensorGainCause {
     fn effect(&self) -> EffectName {
         EffectName::SensorGain
     }
@@ -43,17 +43,23 @@ impl Cause for Gain {
         location: &Location,
         _: &[f64],
     ) -> Option<Vec<Regressor>> {
-        let read = of_meant(
+        let read = readings_at(
             record,
             location,
             |channel| channel.pickup.weights,
             |_| Complex64::ONE,
         );
         // The true motion is x = (1 − share)·y.
-        Some(in_cut(record, location, read, SMALL_SHARE, |motion, axis| {
-            let signals = motion.x[axis].iter_mut().chain(&mut motion.v[axis]);
-            signals.for_each(|value| *value *= 1.0 - SMALL_SHARE);
-        }))
+        Some(with_chip_of_true_motion(
+            record,
+            location,
+            read,
+            SMALL_SHARE,
+            |motion, axis| {
+                let signals = motion.x[axis].iter_mut().chain(&mut motion.v[axis]);
+                signals.for_each(|value| *value *= 1.0 - SMALL_SHARE);
+            },
+        ))
     }
 
     fn parameters(

@@ -5,13 +5,13 @@
 //! drives the structure, the gain of its sensor is equivalent to one gain of all channels of motion. Fit: linear in g − 1. Source: the
 //! calibration factor of ISO 16063; Altintas, Manufacturing Automation (2012), ch. 2, for dynamometers in cuts.
 
-use crate::candidates::cause::{Cause, Location, Parameter, Part, Regressor};
+use crate::candidates::cause::{Cause, LocatedEffect, Location, Parameter, Regressor};
 use crate::records::record::Record;
 use crate::records::study::Study;
 use quietcut_model::effects::EffectName;
 use quietcut_recording::Quantity;
 
-pub(super) struct ForceGain;
+pub(super) struct ForceSensorGainCause;
 
 /// Least gain g: below it the reading would hardly contain the force.
 const LEAST: f64 = 0.02;
@@ -25,7 +25,7 @@ fn names(location: &Location) -> &[String] {
     }
 }
 
-impl Cause for ForceGain {
+impl Cause for ForceSensorGainCause {
     fn effect(&self) -> EffectName {
         EffectName::SensorGain
     }
@@ -79,12 +79,12 @@ impl Cause for ForceGain {
         (gain > LEAST).then(|| vec![("gain", gain)])
     }
 
-    fn parts(&self, location: &Location, parameters: &[Parameter]) -> Vec<Part> {
+    fn located_effects(&self, location: &Location, parameters: &[Parameter]) -> Vec<LocatedEffect> {
         names(location)
             .iter()
             .map(|name| {
                 let location = Location::Channel(name.clone());
-                Part {
+                LocatedEffect {
                     name: self.name(),
                     extension: self.extension(&location, parameters),
                     location,

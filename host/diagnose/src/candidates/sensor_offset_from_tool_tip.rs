@@ -8,7 +8,7 @@
 //! in a cut, where the chip is computed along the motion of this sensor.
 
 use super::sensor::one_or_all;
-use super::sensor_gain::{Gain, factor};
+use super::sensor_gain::{SensorGainCause, factor};
 use crate::baseline::receptance::{Receptance, response};
 use crate::candidates::cause::{Cause, Location, Parameter, Regressor};
 use crate::records::channel::Observed;
@@ -19,7 +19,7 @@ use crate::records::study::Study;
 use quietcut_model::effects::EffectName;
 use quietcut_model::structure::Form;
 
-pub(super) struct Offset;
+pub(super) struct SensorOffsetCause;
 
 /// Keys of the ratios of the modes, in the order of the case. Structures with more modes have one ratio.
 const RATIOS: [&str; 9] = [
@@ -80,7 +80,7 @@ fn read_of(study: &Study<'_>, record: &Record, index: usize, mode: usize) -> Vec
     read
 }
 
-impl Cause for Offset {
+impl Cause for SensorOffsetCause {
     fn effect(&self) -> EffectName {
         EffectName::SensorOffsetFromToolTip
     }
@@ -100,7 +100,7 @@ impl Cause for Offset {
         nonlinear_parameters: &[f64],
     ) -> Option<Vec<Regressor>> {
         let Some((modes, _)) = modes(study, location) else {
-            return Gain.regressors(study, record, location, nonlinear_parameters);
+            return SensorGainCause.regressors(study, record, location, nonlinear_parameters);
         };
         let of_mode = |mode: &usize| {
             let read = |(index, channel): (usize, &Observed)| {

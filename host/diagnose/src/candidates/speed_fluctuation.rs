@@ -15,7 +15,7 @@ use crate::records::study::Study;
 use quietcut_model::effects::EffectName;
 use quietcut_simulate::Fluctuation;
 
-pub(super) struct OfSpindle;
+pub(super) struct SpeedFluctuationCause;
 
 /// Largest distance of the coefficient from 1 at which the records confirm the speed modulation of the tachometer.
 const ROUNDING: f64 = 0.5;
@@ -30,7 +30,7 @@ fn of_tachometer(study: &Study<'_>) -> Option<SpeedModulation> {
     speed_modulation(&spindle_motions)
 }
 
-impl Cause for OfSpindle {
+impl Cause for SpeedFluctuationCause {
     fn effect(&self) -> EffectName {
         EffectName::SpeedFluctuation
     }

@@ -1,5 +1,5 @@
 //! The stiffness differs from the case: linear in its relative change.
 
-use super::linear_parameter::{Linear, Which};
+use super::linear_parameter::{LinearChange, StructureMatrix};
 
-pub(super) const CAUSE: Linear = Linear(Which::Stiffness);
+pub(super) const CAUSE: LinearChange = LinearChange(StructureMatrix::Stiffness);

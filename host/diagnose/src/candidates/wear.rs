@@ -9,9 +9,9 @@ use crate::records::record::Record;
 use crate::records::study::Study;
 use quietcut_model::effects::EffectName;
 
-pub(super) struct OfEdge;
+pub(super) struct WearCause;
 
-impl Cause for OfEdge {
+impl Cause for WearCause {
     fn effect(&self) -> EffectName {
         EffectName::Wear
     }

@@ -236,7 +236,7 @@ pub struct Diagnosis {
     pub lobes: Option<Lobes>,
     /// Stability lobes of the case with the recorded cuts, if there is no extension.
     #[serde(skip)]
-    pub believed: Option<Chart>,
+    pub baseline_lobes: Option<Chart>,
     /// The experiment that separates confounded candidate models.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub next_test: Option<NextTest>,

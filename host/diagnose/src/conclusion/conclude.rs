@@ -65,7 +65,7 @@ fn answer(
             guess: None,
         },
         lobes: None,
-        believed: None,
+        baseline_lobes: None,
         next_test: None,
         warnings: Vec::new(),
         explanations: Vec::new(),

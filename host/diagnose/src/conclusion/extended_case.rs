@@ -6,7 +6,7 @@ use toml::Table;
 
 use crate::candidates::extension_tables::joined;
 use crate::conclusion::answer::{Diagnosis, EstimatedCause, Figure, Outcome};
-use crate::conclusion::lobes::Moved;
+use crate::conclusion::lobes::IntervalEnds;
 use quietcut_model::case::Case;
 
 /// TOML comment with the 90 % intervals of `key` in all `causes` that have it, numbered keys (`ratio_1`, `ratio_2` …) included.
@@ -47,7 +47,7 @@ impl Diagnosis {
 
     /// The extended case with parameters at both ends of the 90 % interval along each principal direction of the covariance, for one cause
     /// after the other. Causes are taken as independent.
-    pub fn moved(&self, case: &Case) -> Vec<Moved> {
+    pub fn moved(&self, case: &Case) -> Vec<IntervalEnds> {
         let found = &self.causes[..self.acting];
         let choices = found
             .iter()

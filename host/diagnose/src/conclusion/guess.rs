@@ -10,7 +10,7 @@ use std::fmt::Write;
 
 use crate::baseline::direction_of;
 use crate::candidates::cause::Regressor;
-use crate::criteria::LEAST_GUESS;
+use crate::criteria::LEAST_EXPLAINED_BY_GUESS;
 use crate::fit::regression::{Regression, Subset};
 use crate::records::study::Study;
 use quietcut_simulate::Effects;
@@ -44,7 +44,7 @@ const YIELDS: [f64; 4] = [0.05, 0.15, 0.4, 0.8];
 
 /// One term φ(x, v) of the formula, along one axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Term {
+enum FormulaTerm {
     Power(i32, i32),
     /// v|v|.
     Drag,
@@ -58,9 +58,9 @@ enum Term {
     Loop(f64),
 }
 
-/// The formula with the share of the held-out residual energy that it explains; `None` if that is less than `LEAST_GUESS`.
+/// The formula with the share of the held-out residual energy that it explains; `None` if that is less than `LEAST_EXPLAINED_BY_GUESS`.
 pub(crate) fn guess(study: &Study<'_>, regression: &mut Regression) -> Option<String> {
-    let mut all: Vec<(usize, Term, usize)> = Vec::new();
+    let mut all: Vec<(usize, FormulaTerm, usize)> = Vec::new();
     for axis in study.driven_axes() {
         for term in terms(study, axis) {
             if let Some(column) = column(study, axis, term) {
@@ -93,8 +93,8 @@ pub(crate) fn guess(study: &Study<'_>, regression: &mut Regression) -> Option<St
     let columns: Vec<usize> = chosen.iter().map(|&index| all[index].2).collect();
     let coefficients = regression.fit(Subset::Fitted, &columns)?.coefficients;
     let left = regression.left(Subset::HeldOut, &columns, coefficients.as_slice());
-    let taken = 1.0 - left / regression.residual(Subset::HeldOut).max(f64::MIN_POSITIVE);
-    if chosen.is_empty() || taken < LEAST_GUESS {
+    let explained = 1.0 - left / regression.residual(Subset::HeldOut).max(f64::MIN_POSITIVE);
+    if chosen.is_empty() || explained < LEAST_EXPLAINED_BY_GUESS {
         return None;
     }
     let mut formula = String::new();
@@ -107,25 +107,32 @@ pub(crate) fn guess(study: &Study<'_>, regression: &mut Regression) -> Option<St
     }
     Some(format!(
         "a guess and no cause: a restoring force of{formula} N (x and v in SI) explains {:.0} % of the held-out residual energy",
-        100.0 * taken
+        100.0 * explained
     ))
 }
 
-fn terms(study: &Study<'_>, axis: usize) -> Vec<Term> {
+fn terms(study: &Study<'_>, axis: usize) -> Vec<FormulaTerm> {
     let largest_m = study
         .records
         .iter()
         .map(|record| record.motion.largest_m(axis))
         .fold(0.0, f64::max);
-    let powers = POWERS.into_iter().map(|(i, j)| Term::Power(i, j));
-    let others = [Term::Drag, Term::Bend, Term::Sign, Term::Rub];
-    let loops = YIELDS.into_iter().map(|share| Term::Loop(share * largest_m));
+    let powers = POWERS.into_iter().map(|(i, j)| FormulaTerm::Power(i, j));
+    let others = [
+        FormulaTerm::Drag,
+        FormulaTerm::Bend,
+        FormulaTerm::Sign,
+        FormulaTerm::Rub,
+    ];
+    let loops = YIELDS
+        .into_iter()
+        .map(|share| FormulaTerm::Loop(share * largest_m));
     powers.chain(others).chain(loops).collect()
 }
 
 /// Contribution of a term to the residual per unit of its coefficient, by record, channel and sample; `None` if the structure cannot have
 /// the term.
-fn column(study: &Study<'_>, axis: usize, term: Term) -> Option<Vec<Vec<Vec<f64>>>> {
+fn column(study: &Study<'_>, axis: usize, term: FormulaTerm) -> Option<Vec<Vec<Vec<f64>>>> {
     let columns: Vec<Vec<Vec<f64>>> = study
         .records
         .iter()
@@ -145,18 +152,18 @@ fn column(study: &Study<'_>, axis: usize, term: Term) -> Option<Vec<Vec<Vec<f64>
     is_finite.then_some(columns)
 }
 
-fn along(study: &Study<'_>, motion: &Motion, axis: usize, term: Term) -> Option<Vec<f64>> {
+fn along(study: &Study<'_>, motion: &Motion, axis: usize, term: FormulaTerm) -> Option<Vec<f64>> {
     let of = |f: &dyn Fn(f64, f64) -> f64| {
         let samples = motion.x[axis].iter().zip(&motion.v[axis]);
         samples.map(|(x, v)| f(*x, *v)).collect()
     };
     Some(match term {
-        Term::Power(i, j) => of(&|x, v| x.powi(i) * v.powi(j)),
-        Term::Drag => of(&|_, v| v * v.abs()),
-        Term::Bend => of(&|x, _| x * x.abs()),
-        Term::Sign => of(&|_, v| v.signum()),
-        Term::Rub => of(&|x, v| x.abs() * v.signum()),
-        Term::Loop(yield_m) => {
+        FormulaTerm::Power(i, j) => of(&|x, v| x.powi(i) * v.powi(j)),
+        FormulaTerm::Drag => of(&|_, v| v * v.abs()),
+        FormulaTerm::Bend => of(&|x, _| x * x.abs()),
+        FormulaTerm::Sign => of(&|_, v| v.signum()),
+        FormulaTerm::Rub => of(&|x, v| x.abs() * v.signum()),
+        FormulaTerm::Loop(yield_m) => {
             let direction = direction_of(axis);
             let texts = [
                 "hysteresis=1".to_owned(),
@@ -176,7 +183,7 @@ fn along(study: &Study<'_>, motion: &Motion, axis: usize, term: Term) -> Option<
     })
 }
 
-fn words(term: Term, direction: &str) -> String {
+fn words(term: FormulaTerm, direction: &str) -> String {
     let power = |name: String, power: i32| match power {
         0 => String::new(),
         1 => name,
@@ -184,15 +191,15 @@ fn words(term: Term, direction: &str) -> String {
     };
     let (x, v) = (direction.to_owned(), format!("v{direction}"));
     match term {
-        Term::Power(i, j) => [power(x, i), power(v, j)]
+        FormulaTerm::Power(i, j) => [power(x, i), power(v, j)]
             .into_iter()
             .filter(|word| !word.is_empty())
             .collect::<Vec<_>>()
             .join("·"),
-        Term::Drag => format!("{v}·|{v}|"),
-        Term::Bend => format!("{x}·|{x}|"),
-        Term::Sign => format!("sign({v})"),
-        Term::Rub => format!("|{x}|·sign({v})"),
-        Term::Loop(yield_m) => format!("z(Bouc–Wen along {x}, yield {:.3} µm)", 1e6 * yield_m),
+        FormulaTerm::Drag => format!("{v}·|{v}|"),
+        FormulaTerm::Bend => format!("{x}·|{x}|"),
+        FormulaTerm::Sign => format!("sign({v})"),
+        FormulaTerm::Rub => format!("|{x}|·sign({v})"),
+        FormulaTerm::Loop(yield_m) => format!("z(Bouc–Wen along {x}, yield {:.3} µm)", 1e6 * yield_m),
     }
 }

@@ -103,12 +103,16 @@ pub struct Lobes {
 }
 
 /// An extended case with parameters at both ends of the 90 % interval along one principal direction of their covariance.
-pub type Moved = [Case; 2];
+pub type IntervalEnds = [Case; 2];
 
 /// The lobes of a case over the speeds of trial cuts, else around those of recorded cuts, else over the speed range of the machine.
 ///
 /// The case has no tool, material or cut, or its limits cannot be computed.
-pub fn believed(case: &Case, recordings: &[Recording], cuts: &[TestCut]) -> Result<Chart, StabilityError> {
+pub fn baseline_lobes(
+    case: &Case,
+    recordings: &[Recording],
+    cuts: &[TestCut],
+) -> Result<Chart, StabilityError> {
     let method = method(case, after_s(&[case], recordings))?;
     let cuts = Cuts::new(case, recordings, cuts);
     let range = Range::new(case, &*method, &cuts, is_costly(case))?;
@@ -118,11 +122,11 @@ pub fn believed(case: &Case, recordings: &[Recording], cuts: &[TestCut]) -> Resu
 /// Stability limits of a case and of its extended case over the same speeds. `moved` holds the extended case at the ends of its parameters'
 /// intervals.
 ///
-/// As [`believed`], and the same for the extended case.
+/// As [`baseline_lobes`], and the same for the extended case.
 pub fn lobes(
     case: &Case,
     extended: &Case,
-    moved: &[Moved],
+    moved: &[IntervalEnds],
     recordings: &[Recording],
     cuts: &[TestCut],
 ) -> Result<Lobes, StabilityError> {
@@ -167,7 +171,7 @@ pub fn lobes(
 
 /// Adds the 90 % intervals of the limits to `speeds`. The principal directions of the parameters are independent: the squares of their
 /// changes of a limit add, separately for increases and decreases.
-fn spread(speeds: &mut [Change], searched_mm: f64, moved: &[Moved], after_s: Option<f64>) {
+fn spread(speeds: &mut [Change], searched_mm: f64, moved: &[IntervalEnds], after_s: Option<f64>) {
     if moved.is_empty() {
         return;
     }
@@ -436,7 +440,7 @@ mod tests {
             outcome,
         };
         let cuts = [cut(2.5, Outcome::Stable), cut(3.0, Outcome::Chatter)];
-        let chart = believed(&case, &[], &cuts).unwrap();
+        let chart = baseline_lobes(&case, &[], &cuts).unwrap();
         let calls: Vec<Call> = chart.cuts.iter().map(|(_, call)| *call).collect();
         assert_eq!(calls, [Call::Right, Call::MissedChatter]);
         assert_eq!(chart.searched_mm, BELOW_CUTS * 3.0);

@@ -8,7 +8,7 @@
 use crate::baseline::Baseline;
 use crate::conclusion::answer::{Diagnosis, Gain, Outcome, Quality};
 use crate::conclusion::conclude;
-use crate::criteria::{NOISE_TOLERANCE, UNEXPLAINED_OF_RESPONSE, WORTH_SHORTENING};
+use crate::criteria::{NOISE_TOLERANCE, SHORTENED_SHARE, UNEXPLAINED_OF_RESPONSE};
 use crate::fit::regression::{Regression, Subset};
 use crate::progress::{Options, Stage};
 use crate::records::study::Study;
@@ -30,12 +30,12 @@ fn beginnings(case: &Case, recordings: &[Recording]) -> Option<[Vec<Recording>; 
     let (shortened, rest): (Vec<Recording>, Vec<Recording>) = recordings
         .iter()
         .map(|recording| {
-            let turns_s = turns_s(recording)?;
+            let revolutions_s = revolutions_s(recording)?;
             let samples = |seconds: f64| (seconds * recording.sample_rate_hz).ceil() as usize;
             // The first part begins after the transient of the tool's entry, which takes as many revolutions as the first part has at
             // least.
-            let from = samples(turns_s);
-            let least = samples((PERIODS / lowest_hz).max(turns_s));
+            let from = samples(revolutions_s);
+            let least = samples((PERIODS / lowest_hz).max(revolutions_s));
             let count = (SEARCHED / recordings.len()).max(least);
             let to = (from + count).min(recording.len());
             let from = to.saturating_sub(count);
@@ -43,11 +43,11 @@ fn beginnings(case: &Case, recordings: &[Recording]) -> Option<[Vec<Recording>; 
         })
         .collect::<Option<_>>()?;
     let left: usize = shortened.iter().map(Recording::len).sum();
-    ((left as f64) < WORTH_SHORTENING * all as f64).then_some([shortened, rest])
+    ((left as f64) < SHORTENED_SHARE * all as f64).then_some([shortened, rest])
 }
 
 /// Least duration of the first part of a cut, s; zero for shaker and hammer; `None` for tests that are not shortened.
-fn turns_s(recording: &Recording) -> Option<f64> {
+fn revolutions_s(recording: &Recording) -> Option<f64> {
     match (recording.sidecar.kind, &recording.sidecar.cut) {
         (Some(TestKind::Shaker | TestKind::Hammer), _) => Some(0.0),
         (Some(TestKind::Cutting), Some(cut)) if cut.last_rpm.is_none() => {

@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 use quietcut_numerics::eigenvalues::of_symmetric;
 
 use crate::baseline::direction_of;
-use crate::candidates::cause::{Location, Part};
+use crate::candidates::cause::{LocatedEffect, Location};
 use crate::conclusion::answer::{EstimatedCause, Figure, NINETY_PERCENT};
 use crate::criteria::{COMMON_FACTOR_CONFIDENCE, EQUIVALENT};
 use crate::fit::candidate_model::CandidateModel;
@@ -34,11 +34,11 @@ pub(crate) fn parameter_estimates(
         let cause = library.cause(choice.candidate);
         let nonlinear_parameters = &candidate.variants[choice.variant].0;
         let coefficients = library.coefficients(model, position);
-        let parts_of = |inner: &[f64]| -> Option<Vec<Part>> {
+        let parts_of = |inner: &[f64]| -> Option<Vec<LocatedEffect>> {
             let (coefficients, nonlinear_parameters) = inner.split_at(coefficients.len());
             let parameters =
                 cause.parameters(study, &candidate.location, nonlinear_parameters, coefficients)?;
-            let mut parts = cause.parts(&candidate.location, &parameters);
+            let mut parts = cause.located_effects(&candidate.location, &parameters);
             parts[0]
                 .parameters
                 .extend(cause.also(study, &candidate.location, &parameters));
@@ -177,11 +177,11 @@ fn figure(value: f64, deviation: f64) -> Figure {
 /// The cause's parts with parameters at both ends of the 90 % interval along each principal direction of its covariance. A parameter set
 /// that is not physical is replaced by the estimate.
 fn moved(
-    parts_of: &dyn Fn(&[f64]) -> Option<Vec<Part>>,
+    parts_of: &dyn Fn(&[f64]) -> Option<Vec<LocatedEffect>>,
     inner: &[f64],
     covariance: &DMatrix<f64>,
     inflation: f64,
-) -> Vec<[Vec<Part>; 2]> {
+) -> Vec<[Vec<LocatedEffect>; 2]> {
     // The principal directions are those of the correlation matrix, because the coefficients have different units.
     let scales: Vec<f64> = covariance
         .diagonal()

@@ -259,7 +259,8 @@ impl Library {
         let parameters = self.parameters(study, model)?;
         let of = |(choice, parameters): (&Choice, Vec<Parameter>)| {
             let location = &self.candidates[choice.candidate].location;
-            self.cause(choice.candidate).parts(location, &parameters)
+            self.cause(choice.candidate)
+                .located_effects(location, &parameters)
         };
         let parts = model.choices.iter().zip(parameters).flat_map(of);
         Some(parts.map(|part| (part.name, part.extension)).collect())

@@ -1,6 +1,6 @@
 //! Refines nonlinear parameters between the points of their start grid.
 
-use crate::criteria::{LEAST_REFINEMENT, WORTH_REFINING};
+use crate::criteria::{LEAST_REFINEMENT, REFINED_SHARE};
 use crate::fit::candidate_model::CandidateModel;
 use crate::fit::library::Library;
 use crate::fit::regression::{Regression, Subset};
@@ -20,11 +20,11 @@ pub(crate) fn refine(
         return;
     };
     let whole = regression.residual(Subset::Whole);
-    let worth: Vec<usize> = (0..found.len())
-        .filter(|index| whole - found[*index].fit.left > WORTH_REFINING * (whole - best))
+    let refined: Vec<usize> = (0..found.len())
+        .filter(|index| whole - found[*index].fit.left > REFINED_SHARE * (whole - best))
         .take(REFINED)
         .collect();
-    for index in worth {
+    for index in refined {
         let mut model = found[index].clone();
         for position in 0..model.choices.len() {
             model = one(study, library, regression, model, position);

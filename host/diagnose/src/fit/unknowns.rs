@@ -83,7 +83,7 @@ impl FitProblem<'_> {
             debug_assert_eq!(moved.len(), nonlinear_parameters.len());
             let cause = library.cause(choice.candidate);
             let parameters = cause.parameters(study, &known.location, moved, coefficients)?;
-            let parts = cause.parts(&known.location, &parameters);
+            let parts = cause.located_effects(&known.location, &parameters);
             tables.extend(parts.into_iter().map(|part| (part.name, part.extension)));
         }
         Effects::of_extensions(tables.iter().map(|(name, table)| (*name, table))).ok()

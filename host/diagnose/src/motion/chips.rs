@@ -185,7 +185,7 @@ impl Chips {
                 back_rad += cutter.teeth[tooth].pitch_rad;
                 tooth = cutter.teeth[tooth].ahead;
             }
-            means.add(back_rad / TAU * spindle_motion.turn_s(), share * slope);
+            means.add(back_rad / TAU * spindle_motion.revolution_s(), share * slope);
             for (axis, square) in means.squares.iter_mut().enumerate() {
                 let column = slope.column(axis);
                 *square += share
@@ -350,7 +350,7 @@ impl Along<'_> {
             let was = at(&self.motion.x, self.recorded(t - delay_s) / self.step_s);
             // The feed axis moves on steadily.
             let feed_m =
-                cutter.feed_per_tooth_m * cutter.teeth.len() as f64 * delay_s / spindle_motion.turn_s();
+                cutter.feed_per_tooth_m * cutter.teeth.len() as f64 * delay_s / spindle_motion.revolution_s();
             let left_m = cutter.reach_m(&even(ahead), place, was) - cutter.recession_m(place, feed_m);
             into.thickness_m.push(reach_m - left_m);
         }
@@ -369,8 +369,8 @@ impl Along<'_> {
         if t >= 0.0 {
             return t;
         }
-        let turn_s = self.spindle_motion.turn_s();
-        let later = t + (-t / turn_s).ceil() * turn_s;
+        let revolution_s = self.spindle_motion.revolution_s();
+        let later = t + (-t / revolution_s).ceil() * revolution_s;
         if later < self.end_s { later } else { 0.0 }
     }
 }

@@ -131,7 +131,7 @@ impl RecordedCut {
     pub(crate) fn first_revolutions(&self) -> usize {
         let passes = self.passes.unwrap_or(1).max(self.cutter.teeth.len());
         let revolutions = passes as f64 / self.cutter.teeth.len() as f64;
-        ((revolutions * self.spindle_motion.turn_s() * self.rate_hz).ceil() as usize).min(self.count)
+        ((revolutions * self.spindle_motion.revolution_s() * self.rate_hz).ceil() as usize).min(self.count)
     }
 
     /// True if a tooth enters or leaves within `UNCERTAIN_SAMPLES` samples of the time `t`.

@@ -36,10 +36,10 @@ impl SpindleMotion {
                 .lacks("channel tacho, whose rising edges give the angle of the teeth (a cut cannot be diagnosed without it)")
         })?;
         let tacho = recording.sidecar.channels.get("tacho");
-        let per_turn = tacho.and_then(|tacho| tacho.pulses_per_rev).unwrap_or(1);
+        let per_revolution = tacho.and_then(|tacho| tacho.pulses_per_rev).unwrap_or(1);
         let missing = tacho.and_then(|tacho| tacho.missing).unwrap_or(0);
         let all_s = rises_s(&level.samples, recording.sample_rate_hz, recording.since_s);
-        let edges_s = firsts_of_turns(&all_s, usize::from(per_turn), usize::from(missing));
+        let edges_s = first_of_each_revolution(&all_s, usize::from(per_revolution), usize::from(missing));
         if edges_s.len() < LEAST_TACHOMETER_EDGES {
             return Err(DiagnoseError::record(
                 &recording.path,
@@ -84,9 +84,9 @@ impl SpindleMotion {
                 tt += (t - mean_t) * (t - mean_t);
                 tk += (t - mean_t) * (k as f64 - mean_k);
             }
-            let turns_per_s = tk / tt;
-            self.rpm = 60.0 * turns_per_s;
-            self.start_rad = TAU * (mean_k - turns_per_s * mean_t);
+            let revolutions_per_s = tk / tt;
+            self.rpm = 60.0 * revolutions_per_s;
+            self.start_rad = TAU * (mean_k - revolutions_per_s * mean_t);
         }
         let steady = Spindle::new(self.rpm);
         self.spindle = self
@@ -128,7 +128,7 @@ impl SpindleMotion {
     }
 
     /// Mean revolution period, s.
-    pub(crate) fn turn_s(&self) -> f64 {
+    pub(crate) fn revolution_s(&self) -> f64 {
         60.0 / self.rpm
     }
 }
@@ -158,7 +158,7 @@ fn rises_s(level: &[f64], rate_hz: f64, since_s: f64) -> Vec<f64> {
 }
 
 /// The first edge of each revolution: the one after the gap of the tachometer wheel, or every `positions`-th without a gap.
-fn firsts_of_turns(edges_s: &[f64], positions: usize, missing: usize) -> Vec<f64> {
+fn first_of_each_revolution(edges_s: &[f64], positions: usize, missing: usize) -> Vec<f64> {
     if positions <= 1 {
         return edges_s.to_vec();
     }
@@ -199,9 +199,9 @@ pub(crate) fn speed_modulation(spindle_motions: &[&SpindleMotion]) -> Option<Spe
         .iter()
         .filter_map(|spindle_motion| Some(spindle_motion.edges_s.last()? - spindle_motion.edges_s.first()?))
         .fold(0.0, f64::max);
-    let turns_per_s = spindle_motions
+    let revolutions_per_s = spindle_motions
         .iter()
-        .map(|spindle_motion| 1.0 / spindle_motion.turn_s())
+        .map(|spindle_motion| 1.0 / spindle_motion.revolution_s())
         .fold(f64::INFINITY, f64::min);
     let edges: usize = spindle_motions
         .iter()
@@ -211,7 +211,7 @@ pub(crate) fn speed_modulation(spindle_motions: &[&SpindleMotion]) -> Option<Spe
     if longest_s <= 0.0 {
         return None;
     }
-    let [low_hz, high_hz] = [0.7 / longest_s, 0.45 * turns_per_s];
+    let [low_hz, high_hz] = [0.7 / longest_s, 0.45 * revolutions_per_s];
     let step_hz = STEP / longest_s;
     let count = ((high_hz - low_hz) / step_hz).max(0.0) as usize;
     let (_, best_hz) = (0..=count)

@@ -9,6 +9,7 @@ use super::reading::Reading;
 use crate::baseline::{Baseline, derivatives};
 use crate::conclusion::residual_views::ResidualView;
 use crate::criteria::ASSUMED_NOISE;
+use crate::motion::recorded_cut::cut_of;
 use crate::signal::noise::rms;
 use quietcut_model::case::Case;
 use quietcut_model::milling::Cut;
@@ -186,16 +187,12 @@ fn measured(
 }
 
 fn cut_so_far(case: &Case, recording: &Recording) -> Option<CutSoFar> {
-    let (said, believed) = (recording.sidecar.cut?, case.cut().ok()?);
+    let given = recording.sidecar.cut?;
     Some(CutSoFar {
-        rpm: said.spindle_rpm?,
-        depth_mm: said.axial_depth_mm?,
-        cut: Cut {
-            start_deg: said.start_deg.unwrap_or(believed.start_deg),
-            exit_deg: said.exit_deg.unwrap_or(believed.exit_deg),
-            feed_per_tooth_mm: said.feed_per_tooth_mm.unwrap_or(believed.feed_per_tooth_mm),
-            feed_direction_deg: believed.feed_direction_deg,
-        },
+        rpm: given.spindle_rpm?,
+        depth_mm: given.axial_depth_mm?,
+        // A case without a cut is refused before this.
+        cut: cut_of(case, recording).ok()?,
     })
 }
 

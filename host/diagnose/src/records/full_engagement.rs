@@ -49,7 +49,7 @@ pub(crate) fn in_full_engagement<'a>(
             continue;
         };
         let [from_s, to_s] = [range.start, range.end].map(|sample| recording.time_s(sample));
-        let revolutions = (to_s - from_s) / SpindleMotion::new(recording, None)?.turn_s();
+        let revolutions = (to_s - from_s) / SpindleMotion::new(recording, None)?.revolution_s();
         if revolutions < LEAST_ENGAGED_REVOLUTIONS {
             return Err(DiagnoseError::record(
                 &recording.path,
@@ -77,21 +77,21 @@ fn range(baseline: &Baseline<'_>, recording: &Recording) -> Option<Range<usize>>
     if !is_of_a_cut(recording) {
         return None;
     }
-    let turn_s = SpindleMotion::new(recording, None).ok()?.turn_s();
+    let revolution_s = SpindleMotion::new(recording, None).ok()?.revolution_s();
     let cutter = cutter(baseline, recording)?;
     let levels = Levels::of(
         baseline,
         recording,
-        turn_s,
-        &Forced::new(baseline, &cutter, turn_s),
+        revolution_s,
+        &Forced::new(baseline, &cutter, revolution_s),
     )?;
     let cut = longest_gap(&levels.in_air(), levels.count)?;
-    let is_engaged = |turn: &usize| levels.smallest(*turn) >= ENGAGED_LEVEL;
+    let is_engaged = |revolution: &usize| levels.smallest(*revolution) >= ENGAGED_LEVEL;
     let first = cut.clone().find(is_engaged)?;
     let last = cut.clone().rev().find(is_engaged)?;
-    let by_diameter = Passage::way_in_s(&cutter, &Spindle::new(60.0 / turn_s)).ok();
+    let by_diameter = Passage::way_in_s(&cutter, &Spindle::new(60.0 / revolution_s)).ok();
     let engaged_after = ENGAGEMENT_AFTER_LEVEL * (first - cut.start) as f64;
-    let way = by_diameter.map_or(engaged_after, |seconds| seconds / turn_s);
+    let way = by_diameter.map_or(engaged_after, |seconds| seconds / revolution_s);
     let from = match cut.start {
         0 => 0.0,
         start => start as f64 + (ENTRY_MARGIN * way).max(engaged_after) + 1.0,
@@ -104,8 +104,9 @@ fn range(baseline: &Baseline<'_>, recording: &Recording) -> Option<Range<usize>>
         let out = if levels.chatters { ENTRY_MARGIN } else { EXIT_SHARE };
         cut.end as f64 - (out * way).max(engaged_before) - 1.0
     };
-    let sample =
-        |turn: f64| ((turn * turn_s * recording.sample_rate_hz).max(0.0) as usize).min(recording.len());
+    let sample = |revolution: f64| {
+        ((revolution * revolution_s * recording.sample_rate_hz).max(0.0) as usize).min(recording.len())
+    };
     let (from, to) = (sample(from), sample(to));
     Some(from..to.max(from))
 }
@@ -127,8 +128,8 @@ struct Forced {
 }
 
 impl Forced {
-    fn new(baseline: &Baseline<'_>, cutter: &Cutter, turn_s: f64) -> Self {
-        let omega = TAU / turn_s;
+    fn new(baseline: &Baseline<'_>, cutter: &Cutter, revolution_s: f64) -> Self {
+        let omega = TAU / revolution_s;
         let forces_n: Vec<Vector3<f64>> = (0..ANGLES)
             .map(|index| TAU * index as f64 / ANGLES as f64)
             .map(|angle_rad| force_n(cutter, angle_rad))
@@ -202,10 +203,15 @@ struct Levels {
 
 impl Levels {
     /// Computes the levels from a recording; `None` if no channel exceeds its noise enough to show air.
-    fn of(baseline: &Baseline<'_>, recording: &Recording, turn_s: f64, forced: &Forced) -> Option<Self> {
+    fn of(
+        baseline: &Baseline<'_>,
+        recording: &Recording,
+        revolution_s: f64,
+        forced: &Forced,
+    ) -> Option<Self> {
         let rate_hz = recording.sample_rate_hz;
-        let per_turn = turn_s * rate_hz;
-        let count = (recording.len() as f64 / per_turn) as usize;
+        let per_revolution = revolution_s * rate_hz;
+        let count = (recording.len() as f64 / per_revolution) as usize;
         let mut levels = Self {
             count,
             chatters: false,
@@ -218,7 +224,10 @@ impl Levels {
             };
             let noise = floor_between_lines(&channel.samples, rms(&channel.samples));
             let revolutions: Vec<f64> = (0..count)
-                .map(|turn| [turn, turn + 1].map(|turn| (turn as f64 * per_turn) as usize))
+                .map(|revolution| {
+                    [revolution, revolution + 1]
+                        .map(|revolution| (revolution as f64 * per_revolution) as usize)
+                })
                 .map(|[from, to]| deviation(&channel.samples[from..to], noise))
                 .collect();
             let (median_level, feed_level) =
@@ -235,29 +244,32 @@ impl Levels {
         (!levels.of.is_empty()).then_some(levels)
     }
 
-    fn smallest(&self, turn: usize) -> f64 {
-        self.of.iter().map(|of| of[turn]).fold(f64::INFINITY, f64::min)
+    fn smallest(&self, revolution: usize) -> f64 {
+        self.of
+            .iter()
+            .map(|of| of[revolution])
+            .fold(f64::INFINITY, f64::min)
     }
 
     /// Ranges of successive revolutions in air.
     fn in_air(&self) -> Vec<Range<usize>> {
         let mut in_air = Vec::new();
-        let mut turn = 0;
-        while turn < self.count {
-            let from = turn;
-            while turn < self.count && self.smallest(turn) < AIR_LEVEL {
-                turn += 1;
+        let mut revolution = 0;
+        while revolution < self.count {
+            let from = revolution;
+            while revolution < self.count && self.smallest(revolution) < AIR_LEVEL {
+                revolution += 1;
             }
-            let is_at_end = from == 0 || turn == self.count;
+            let is_at_end = from == 0 || revolution == self.count;
             let fewest = if is_at_end {
                 LEAST_AIR_AT_ENDS
             } else {
                 LEAST_AIR_WITHIN
             };
-            if turn - from >= fewest && (from > 0 || !self.grows_from_rest()) {
-                in_air.push(from..turn);
+            if revolution - from >= fewest && (from > 0 || !self.grows_from_rest()) {
+                in_air.push(from..revolution);
             }
-            turn += 1;
+            revolution += 1;
         }
         in_air
     }

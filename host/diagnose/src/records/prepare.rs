@@ -16,7 +16,7 @@ use crate::records::domain::Domain;
 use crate::records::record::{Known, Record};
 use crate::records::{checks, cut_prediction, motion_estimate, response_prediction};
 use crate::signal::grid::Grid;
-use crate::signal::noise::{BANDS, quiet_floor, rms, white_floor};
+use crate::signal::noise::{BANDS, floor_between_impacts, rms, white_floor};
 use quietcut_recording::{Quantity, Recording, TestKind};
 use quietcut_simulate::path::Motion;
 
@@ -174,14 +174,14 @@ fn forces(baseline: &Baseline<'_>, recording: &Recording) -> [Vec<f64>; 3] {
 
 fn floor_n(force_n: &[f64], kind: Option<TestKind>) -> f64 {
     let size = rms(force_n);
-    let quiet_n = if kind == Some(TestKind::Hammer) {
-        quiet_floor(force_n)
+    let between_impacts_n = if kind == Some(TestKind::Hammer) {
+        floor_between_impacts(force_n)
     } else {
         f64::INFINITY
     };
     if size > 0.0 {
         white_floor(force_n, size)
-            .min(quiet_n)
+            .min(between_impacts_n)
             .min(LARGEST_FORCE_NOISE * size)
     } else {
         0.0

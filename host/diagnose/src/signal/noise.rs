@@ -127,18 +127,18 @@ fn band_means(residual: &[f64], of_band: fn(&mut [f64]) -> f64) -> Vec<f64> {
         .collect()
 }
 
-/// Number of samples of a window in which [`quiet_floor`] takes a variance.
-const QUIET: usize = 256;
+/// Number of samples of a window in which [`floor_between_impacts`] takes a variance.
+const WINDOW: usize = 256;
 
 /// Standard deviation of the noise of a channel that is zero most of the time, such as the force of a hammer: from the lower quartile of
 /// the variances of windows. The spectrum of impacts reaches to the end of the band and would hide a noise floor. Infinite for a record
 /// that is too short.
-pub(crate) fn quiet_floor(samples: &[f64]) -> f64 {
+pub(crate) fn floor_between_impacts(samples: &[f64]) -> f64 {
     let mut squares: Vec<f64> = samples
-        .chunks_exact(QUIET)
+        .chunks_exact(WINDOW)
         .map(|window| {
-            let mean = window.iter().sum::<f64>() / QUIET as f64;
-            window.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / (QUIET - 1) as f64
+            let mean = window.iter().sum::<f64>() / WINDOW as f64;
+            window.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / (WINDOW - 1) as f64
         })
         .collect();
     let quarter = squares.len() / 4;
@@ -235,7 +235,7 @@ mod tests {
                 noise + if n % 10_000 < 20 { 5000.0 * impact } else { 0.0 }
             })
             .collect();
-        let floor = quiet_floor(&force);
+        let floor = floor_between_impacts(&force);
         // The lower quartile of variances of 256 samples is 6 % below their mean; 156 windows determine it within 1 %.
         assert!((0.95..0.99).contains(&floor), "{floor}");
         assert!(white_floor(&force, rms(&force)) > 1.2);

@@ -1,5 +1,5 @@
-//! Which causes records can tell apart: the distance, in units of the noise, from the hidden truth to the nearest that each
-//! other cause can come to.
+//! Test oracle: which causes a set of records can separate, from the distance, in units of the noise, between the hidden effect and the
+//! best fit of every other cause.
 
 use std::collections::BTreeSet;
 
@@ -10,75 +10,76 @@ use super::cause::{Cause, Kind};
 use super::noise::Whitening;
 use super::rig::Output;
 
-/// Squared distances (those of a χ²) below which nothing can be told, and above which a good judge tells nearly always:
-/// the difference of twice the log-likelihoods of two explanations d apart is d² ± 2d.
+/// Squared distance (χ²) below which two causes cannot be separated.
 const SAME: f64 = 2.0;
+/// Squared distance from which on a good test separates two causes nearly always: the difference of twice the log-likelihoods of two
+/// candidate models at distance d is d² ± 2d.
 const APART: f64 = 60.0;
 
-/// What a judge who knows the truth says of a set of records.
+/// Conclusion of the oracle, which knows the true effect, from a set of records.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Verdict {
-    /// The hidden cause is like no other.
+    /// No other cause explains the records as well.
     Separable,
-    /// These names and no others explain the records equally well; one name alone, at several places.
+    /// Exactly these names explain the records equally well. One name alone means the same cause at several locations.
     Equivalent(BTreeSet<&'static str>),
-    /// Nobody can see the effect.
+    /// The records do not show the effect.
     Invisible,
-    /// Between: chance decides.
+    /// Chance decides whether the records show or separate the effect.
     Borderline,
 }
 
-/// Where effects can be tried out.
+/// A virtual test or cut in which effects can act.
 pub(crate) trait Lab {
-    /// What the sensors say without noise while `causes` act.
+    /// Readings of all sensors without noise while `causes` act.
     fn output(&self, causes: &[Cause]) -> Output;
 
-    /// Where a kind can be: direction and sensor.
+    /// Locations that an effect can have: direction and sensor.
     fn places(&self, kind: Kind) -> Vec<(usize, usize)>;
 
-    /// The kinds of the library that can be here.
+    /// Effects of the library that can act in this test.
     fn kinds(&self) -> Vec<Kind>;
 
-    /// The names that a kind has in answers here.
+    /// Names that an effect has in answers about this test.
     fn names(&self, kind: Kind) -> &'static [&'static str] {
         kind.names()
     }
 
-    /// Motions that the records may hold because the state at their start is not known, run by run and sensor by sensor;
-    /// in units of `sigma`, one column each, not yet orthonormal.
+    /// Contributions of the unknown initial state to the readings, run by run and sensor by sensor. Each is one column in units of `sigma`;
+    /// the columns are not orthonormal.
     fn nuisance(&self, sigma: &[f64]) -> DMatrix<f64>;
 
-    /// True where nobody knows how far the machine was pulled.
-    fn is_let_go(&self) -> bool {
+    /// True for free decays, whose initial displacement is unknown.
+    fn is_free_decay(&self) -> bool {
         false
     }
 
-    /// What the noise of the forces from which motion is predicted adds to `sigma`, where it adds any.
+    /// Noise that measured forces add to the predicted motion, in addition to `sigma`; `None` if they add none.
     fn whitening(&self, _sigma: &[f64]) -> Option<Whitening> {
         None
     }
 }
 
-/// The judge of one set of records.
-pub(crate) struct Judge<'a> {
+/// The test oracle for one set of records.
+pub(crate) struct Oracle<'a> {
     lab: &'a dyn Lab,
-    /// Noise of each sensor.
+    /// Standard deviation of each sensor's noise.
     sigma: &'a [f64],
-    /// What the records cannot say of the state at the start: orthonormal columns.
+    /// Orthonormal columns: contributions of the unknown initial state.
     nuisance: DMatrix<f64>,
     whitening: Option<Whitening>,
 }
 
-impl<'a> Judge<'a> {
-    /// A judge; `sigma` is the noise of each sensor.
+impl<'a> Oracle<'a> {
+    /// Builds the oracle; `sigma` is the standard deviation of each sensor's noise.
     pub(crate) fn new(lab: &'a dyn Lab, sigma: &'a [f64]) -> Self {
         Self::of_starts(lab, sigma, &[])
     }
 
-    /// A judge who knows of what is let go under `hidden` that each run may have begun with more or less of the same motion.
+    /// Builds an oracle for which, in free decays under the causes `hidden`, the initial amplitude of each run is unknown as well.
     fn of_starts(lab: &'a dyn Lab, sigma: &'a [f64], hidden: &[Cause]) -> Self {
         let mut nuisance = lab.nuisance(sigma);
-        if lab.is_let_go() && !hidden.is_empty() {
+        if lab.is_free_decay() && !hidden.is_empty() {
             let output = lab.output(hidden);
             let length = nuisance.nrows() / output.len();
             for (number, run) in output.iter().enumerate() {
@@ -115,7 +116,7 @@ impl<'a> Judge<'a> {
         }
     }
 
-    /// One column, in units of the noise, which is white in it.
+    /// All readings of an output as one column, in units of the noise and whitened.
     fn whitened(&self, output: &Output) -> DVector<f64> {
         let values = output.iter().flat_map(|run| {
             run.iter()
@@ -129,7 +130,7 @@ impl<'a> Judge<'a> {
         all
     }
 
-    /// Root mean square of all noise in what each sensor says beyond what is predicted.
+    /// Standard deviation of all noise in each sensor's residual: its own and that of the predicted motion.
     pub(crate) fn noise(&self) -> Vec<f64> {
         match &self.whitening {
             Some(whitening) => self
@@ -142,7 +143,7 @@ impl<'a> Judge<'a> {
         }
     }
 
-    /// What is seen while `causes` act.
+    /// Whitened readings without noise while `causes` act.
     pub(crate) fn of(&self, causes: &[Cause]) -> DVector<f64> {
         self.whitened(&self.lab.output(causes))
     }
@@ -156,7 +157,7 @@ impl<'a> Judge<'a> {
         value
     }
 
-    /// χ² that is left where the best of `wanted`, from these shares on, stands for the `truth`; and that best.
+    /// Fits `wanted` to the readings `truth`, starting from its parameters: the χ² that remains, and the fitted causes.
     pub(crate) fn nearest(&self, truth: &DVector<f64>, wanted: &[Cause]) -> (f64, Vec<Cause>) {
         let residual = |causes: &[Cause]| self.without_nuisance(truth - self.of(causes));
         let mut best = wanted.to_vec();
@@ -169,7 +170,7 @@ impl<'a> Judge<'a> {
             if round == 0
                 && let Some(step) = normal.clone().lu().solve(&gradient)
             {
-                // To first order most of it is of another shape: this one need not be followed.
+                // To first order most of the difference cannot be fitted: the search stops.
                 let least = before - gradient.dot(&step);
                 if least > 0.5 * before && least > 100.0 * APART {
                     return (least, best);
@@ -187,7 +188,7 @@ impl<'a> Judge<'a> {
                 let mut next = best.clone();
                 let shares = next.iter_mut().flat_map(|cause| cause.shares.iter_mut());
                 for (share, step) in shares.zip(step.iter()) {
-                    // A share is about one where the effect is plain: no step goes beyond that.
+                    // A scaled parameter is about one for a clear effect: a step is at most one.
                     *share -= step.clamp(-1.0, 1.0);
                 }
                 if next.iter().all(Cause::sensible) {
@@ -202,7 +203,7 @@ impl<'a> Judge<'a> {
                 trust = trust.max(1e-3) * 10.0;
             }
             let now = left.norm_squared();
-            // Far away and slow: it will not come near.
+            // The fit is far from the records and converges too slowly.
             let hopeless = now > 3.0 * APART && now > 0.9 * before
                 || round > 1 && now > 100.0 * APART && now > 0.5 * before;
             if !accepted || hopeless || now < 0.1 * SAME || before - now < 0.01 {
@@ -212,7 +213,7 @@ impl<'a> Judge<'a> {
         (left.norm_squared(), best)
     }
 
-    /// All places and starts of a kind.
+    /// Start values of an effect at all its locations.
     pub(crate) fn candidates(&self, kind: Kind, random: &mut ChaCha8Rng) -> Vec<Cause> {
         let mut all = Vec::new();
         for (axis, sensor) in self.lab.places(kind) {
@@ -228,7 +229,7 @@ impl<'a> Judge<'a> {
         all
     }
 
-    /// The kinds that may look like a hidden one: those of the library, and of gains what they are exactly the same as.
+    /// Effects that may resemble the hidden one: those of the library and, for gains, the common factors that are exactly equivalent.
     fn rivals_of(&self, hidden: &Cause) -> Vec<Kind> {
         let mut kinds = self.lab.kinds();
         if matches!(hidden.kind, Kind::SensorGain | Kind::SensorOffset) {
@@ -237,13 +238,13 @@ impl<'a> Judge<'a> {
         kinds
     }
 
-    /// χ² of what is hidden.
+    /// χ² of the hidden effects: squared distance between the readings with and without them.
     pub(crate) fn effect(&self, hidden: &[Cause]) -> f64 {
         self.without_nuisance(self.of(hidden) - self.of(&[]))
             .norm_squared()
     }
 
-    /// What is left of the `hidden` once the best single causes and pairs of those have been taken off.
+    /// χ² of the hidden effects that remains after the best fit of single causes and pairs of the library.
     pub(crate) fn unexplained(&self, hidden: &[Cause], random: &mut ChaCha8Rng) -> f64 {
         let truth = self.of(hidden);
         let mut singles: Vec<(f64, Vec<Cause>)> = Vec::new();
@@ -266,27 +267,27 @@ impl<'a> Judge<'a> {
         least
     }
 
-    /// What can be said of two causes: they are separable where no other cause can take the place of either.
+    /// Conclusion for two causes. They are separable if no other cause can replace either of them.
     pub(crate) fn verdict_of_two(&self, hidden: &[Cause; 2], random: &mut ChaCha8Rng) -> Verdict {
-        let judge = Self::of_starts(self.lab, self.sigma, hidden);
-        let truth = judge.of(hidden);
+        let oracle = Self::of_starts(self.lab, self.sigma, hidden);
+        let truth = oracle.of(hidden);
         for (gone, stays) in [(0, 1), (1, 0)] {
-            let alone = judge.nearest(&truth, &hidden[stays..=stays]).0;
+            let alone = oracle.nearest(&truth, &hidden[stays..=stays]).0;
             if alone < APART {
                 return Verdict::Borderline;
             }
-            for kind in judge.rivals_of(&hidden[gone]) {
+            for kind in oracle.rivals_of(&hidden[gone]) {
                 if kind == hidden[stays].kind || kind.parameters() > hidden[gone].kind.parameters() {
                     continue;
                 }
-                let starts = judge
+                let starts = oracle
                     .candidates(kind, random)
                     .into_iter()
                     .chain(stand_in(kind, &hidden[gone]))
                     .filter(|candidate| !candidate.is_where(&hidden[gone]))
                     .map(|candidate| [candidate, hidden[stays].clone()]);
                 for start in starts.chain(by_common_factor(kind, &hidden[gone], &hidden[stays])) {
-                    if judge.nearest(&truth, &start).0 < APART {
+                    if oracle.nearest(&truth, &start).0 < APART {
                         return Verdict::Borderline;
                     }
                 }
@@ -295,7 +296,7 @@ impl<'a> Judge<'a> {
         Verdict::Separable
     }
 
-    /// What can be said of one cause by the records, without any belief beforehand.
+    /// Conclusion for one cause, from the records alone.
     pub(crate) fn verdict(&self, hidden: &Cause, random: &mut ChaCha8Rng) -> Verdict {
         let effect = self.effect(std::slice::from_ref(hidden));
         if effect < SAME {
@@ -306,7 +307,7 @@ impl<'a> Judge<'a> {
         }
         let truth = self.of(std::slice::from_ref(hidden));
         let mut same: BTreeSet<&'static str> = hidden.kind.names().iter().copied().collect();
-        // The same kind in another direction or sensor.
+        // True if the same effect in another direction or sensor is equivalent.
         let mut elsewhere = false;
         for kind in self.rivals_of(hidden) {
             if kind.parameters() > hidden.kind.parameters() {
@@ -322,7 +323,7 @@ impl<'a> Judge<'a> {
                 }
                 let (left, _) = self.nearest(&truth, &[candidate]);
                 if left < APART && kind.parameters() < hidden.kind.parameters() {
-                    // What a simpler cause explains as well nobody would call by the other.
+                    // A simpler cause explains the records as well and would be preferred.
                     return Verdict::Borderline;
                 }
                 if left < SAME {
@@ -341,7 +342,7 @@ impl<'a> Judge<'a> {
     }
 }
 
-/// Where a simpler kind begins that is what is hidden while the motion is small: within its gap a play is less stiffness.
+/// Start value of a simpler effect that resembles the hidden one at small amplitude: within its gap, backlash is a reduced stiffness.
 fn stand_in(kind: Kind, hidden: &Cause) -> Option<Cause> {
     (kind == Kind::Stiffness && hidden.kind == Kind::Backlash).then(|| Cause {
         kind,
@@ -350,8 +351,8 @@ fn stand_in(kind: Kind, hidden: &Cause) -> Option<Cause> {
     })
 }
 
-/// Two of mass, stiffness and damping, the one of them `kind`, that are one factor away from two others in the same direction: what
-/// is let go moves the same.
+/// Two changes among mass, stiffness and damping in the direction of the hidden two, of which one is `kind`. They differ from the hidden
+/// two by a common factor on the equation of motion, so that free decays are equal.
 fn by_common_factor(kind: Kind, gone: &Cause, stays: &Cause) -> Option<[Cause; 2]> {
     let size = |kind: Kind| match kind {
         Kind::Mass | Kind::Stiffness => Some(0.1),
@@ -373,7 +374,7 @@ fn by_common_factor(kind: Kind, gone: &Cause, stays: &Cause) -> Option<[Cause; 2
     Some([with(kind, factor)?, with(stays.kind, factor * stayed)?])
 }
 
-/// ∂residual/∂shares by differences.
+/// ∂residual/∂(scaled parameters) by finite differences.
 fn jacobian(
     at: &[Cause],
     residual_there: &DVector<f64>,
@@ -395,12 +396,12 @@ fn jacobian(
 }
 
 impl Cause {
-    /// True of the same kind in the same direction and at the same sensor.
+    /// True for the same effect in the same direction and at the same sensor.
     fn is_where(&self, other: &Self) -> bool {
         self.kind == other.kind && self.axis == other.axis && self.sensor == other.sensor
     }
 
-    /// False where a fit has left what a machine can have.
+    /// False if the parameters of a fit are outside the range of real machines.
     fn sensible(&self) -> bool {
         let s = &self.shares;
         match self.kind {
