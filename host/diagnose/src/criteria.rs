@@ -1,271 +1,297 @@
-//! Every threshold by which this crate decides, each with the source of its number.
+//! Thresholds by which this crate decides, each with the source of its number.
 //!
-//! They stand at the ground of the crate, because checks of records, fits and the selection of a candidate model decide alike. A number
-//! without a derivation or a campaign behind it is marked "Unfounded". Step sizes, grids and limits of iterations decide nothing about a
-//! record and stay beside the code that uses them. Thresholds of the fit of cuts in closed loop stand beside that code.
+//! They stand at the root of the crate, because checks of records, fits and the selection of a candidate model use them alike. A number
+//! without a derivation and without a campaign behind it is marked "Unfounded". Step sizes, grids and limits of iterations decide nothing
+//! about a record and stay beside the code that uses them. Thresholds of the fit of cuts in closed loop stand beside that code.
 
 use std::ops::RangeInclusive;
 
 // Signals
 
-/// Least white part of the noise of a band, as a share of all noise there. Less cannot be told from chance in one band. Unfounded.
+/// Least white part of a frequency band's noise, as a share of all noise in the band. Where other known noise is larger than the band's
+/// noise, this share keeps the white part positive. Unfounded.
 pub(crate) const LEAST_WHITE_SHARE: f64 = 0.05;
 
-/// Least noise of a channel over its root mean square: −90 dB, the level to which the integration of a simulation accumulates errors.
+/// Least noise of a channel, as a share of its root mean square: −90 dB, the level to which the integration of a simulation accumulates
+/// errors.
 pub(crate) const LEAST_RELATIVE_NOISE: f64 = 3e-5;
 
 // Recorded cuts
 
-/// Largest difference between the speed of the tachometer and that of the sidecar, relative. A wrong number of pulses per revolution
-/// makes at least a few times as much. Unfounded.
+/// Largest relative difference between the spindle speed from the tachometer and that in the sidecar. A spindle without speed control may
+/// slip by up to 5 % at rated load (NEMA MG 1, induction motors of design A and B); a wrong number of pulses per revolution changes the
+/// speed by more, up to 19 pulses.
 pub(crate) const SPEED_MISMATCH: f64 = 0.05;
 
-/// Fewest edges of the tachometer that determine the spindle angle to a fraction of a sample: a line and two residuals.
+/// Fewest tachometer edges that determine the spindle angle within a fraction of a sample: two for a straight line, and two residuals.
 pub(crate) const LEAST_TACHOMETER_EDGES: usize = 4;
 
-/// Least F-ratio of a speed modulation: edge variance that it explains per parameter over the residual variance per edge. The
-/// largest of 500 F-ratios of pure jitter exceeds 8 once in a hundred records (χ² of three parameters); the rest is margin.
+/// Least F-ratio of a speed modulation: the variance of edge times that it explains per parameter over the residual variance per edge. With
+/// pure jitter, the largest of 500 F-ratios (χ² of three parameters) exceeds 8 in one of a hundred records; the rest of the number is
+/// margin.
 pub(crate) const LEAST_MODULATION_F_RATIO: f64 = 20.0;
 
-/// Largest relative amplitude of a speed modulation: near 1 the spindle would stop.
+/// Largest relative amplitude of a speed modulation. At 1 the spindle would stop; the distance from 1 is unfounded.
 pub(crate) const LARGEST_MODULATION: f64 = 0.9;
 
-/// Samples of force and acceleration nearer than this to an entry or exit of a tooth, in samples, are not compared: the jitter of the
+/// Distance in samples from the entry or exit of a tooth within which samples of force and acceleration are not compared: the jitter of the
 /// tachometer leaves open on which side of the step they lie. Unfounded.
 pub(crate) const UNCERTAIN_SAMPLES: f64 = 0.375;
 
 // Checks of records
 
-/// Fewest samples of a record: with fewer than four for each of its 32 bands no noise floor is estimated.
+/// Fewest samples of a record: four for each of the 32 bands of a noise floor.
 pub(crate) const LEAST_SAMPLES: usize = 128;
 
-/// Fewest periods of the slowest mode in a record. Unfounded.
+/// Least duration of a record, in periods of the lowest natural frequency. Unfounded.
 pub(crate) const LEAST_PERIODS: f64 = 3.0;
 
-/// Share of the samples in flat tops at the end of the range above which a channel is clipped. Unfounded.
+/// Share of a channel's samples in flat tops at an end of its range above which the channel counts as clipped. Unfounded.
 pub(crate) const CLIPPED_SHARE: f64 = 0.002;
 
-/// Equal samples in the flat top of a clipped impact: fewer may be a rounded peak, more are a held force.
+/// Number of equal samples in the flat top of a clipped impact. With less than 3 a peak may be rounded; with more than 64 it may be a held
+/// force. The 64 is unfounded.
 pub(crate) const CLIPPED_IMPACT_SAMPLES: RangeInclusive<usize> = 3..=64;
 
-/// Least step of a clipped impact two samples beside its flat top, in steps of the channel's resolution. A smooth peak with a flat top of
-/// three samples lies at most 12 steps lower there.
+/// Least distance, in steps of the channel's resolution, between the flat top of a clipped impact and the samples two places beside it. A
+/// smooth peak with a flat top of three samples falls by at most 10 steps there.
 pub(crate) const CLIPPED_IMPACT_STEP: f64 = 16.0;
 
-/// Distance of a ratio from that of pounds and newtons, in its logarithm, within which the unit is suspected. Narrow, because stiffness
-/// errors of a baseline reach this factor too. Unfounded.
+/// Largest distance between the logarithms of a channel's ratio to its prediction and of the ratio of pounds and newtons at which that unit
+/// is suspected. It is small, because stiffness errors of a baseline reach this ratio too. Unfounded.
 pub(crate) const POUND_TOLERANCE: f64 = 0.1;
 
-/// The same for all other units, which are factors of 10 and more. Unfounded.
+/// Largest distance between the logarithms of a channel's ratio to its prediction and of the ratio of any other wrong unit at which that
+/// unit is suspected. The ratios of these units are about 10 and more. Unfounded.
 pub(crate) const UNIT_TOLERANCE: f64 = 0.4;
 
-/// Ratio of a measured to a predicted channel from which on a unit is suspected. Unfounded.
+/// Ratio of a measured to a predicted channel from which on a unit is suspected: 4.448/e^0.1 = 4.02, the smallest ratio of a unit in the
+/// list, pounds for newtons, less its tolerance.
 pub(crate) const WRONG_UNIT_RATIO: f64 = 4.0;
 
-/// Ratio of a measured to a predicted channel that no resonance and no nonlinearity of a machine reaches: a damping ratio of 0.2 %
-/// amplifies by 250.
+/// Ratio of a measured to a predicted channel that no resonance and no nonlinearity of a machine reaches: a mode with a damping ratio of
+/// 0.2 % amplifies the static response by 250.
 pub(crate) const IMPOSSIBLE_RATIO: f64 = 250.0;
 
-/// Least ratio of a measured to a predicted channel that friction explains. Below it a unit is suspected; above it newtons read as
-/// pounds are reported as a gain of the sensor. Unfounded.
+/// Ratio of a measured to a predicted channel below which a unit is suspected: e^0.4/9.81 = 0.152, the largest ratio of accelerations in g
+/// read as m/s², with its tolerance. Newtons read as pounds (0.22) lie above, because friction reduces a response as much; they are
+/// reported as a gain of the sensor.
 pub(crate) const FRICTION_RATIO: f64 = 0.15;
 
-/// Relative distance within which an estimated gain is reported as a likely unit. Unfounded.
+/// Largest distance between the logarithms of an estimated gain and of a unit's ratio at which the gain is reported as a likely wrong unit.
+/// Unfounded.
 pub(crate) const GAIN_UNIT_TOLERANCE: f64 = 0.03;
 
-/// Least energy of a predicted channel over that by the noise of the force sensors: an amplitude ratio of 5, below which the prediction
-/// is noise.
+/// Least energy of a predicted channel over that of its response to force-sensor noise, at which its unit is checked: an amplitude ratio of
+/// 5, below which much of the prediction is noise.
 pub(crate) const LEAST_ENERGY_OVER_FORCE_NOISE: f64 = 25.0;
 
-/// Least squared correlation of measured and predicted samples at which a known unit is reported. Unfounded.
+/// Least squared correlation of measured and predicted samples at which a wrong unit is reported, if a known unit has their ratio.
+/// Unfounded.
 pub(crate) const LEAST_CORRELATION_OF_KNOWN_UNIT: f64 = 0.3;
 
-/// The same where no known unit has that ratio. Unfounded.
+/// Least squared correlation of measured and predicted samples at which a wrong unit is reported, if no known unit has their ratio.
+/// Unfounded.
 pub(crate) const LEAST_CORRELATION_OF_UNKNOWN_UNIT: f64 = 0.8;
 
-/// Least root mean square of a channel over its noise for the axis to count as moving: three standard deviations.
+/// Least root mean square of a channel over the standard deviation of its noise at which the axis counts as moving: three standard
+/// deviations.
 pub(crate) const MOVING_OVER_NOISE: f64 = 3.0;
 
-/// Largest noise of a force sensor over the root mean square of the force. A white force has no noise floor of its own; force sensors are
-/// better than this. Unfounded.
+/// Largest standard deviation of a force sensor's noise, as a share of the root mean square of the force. A force with a white spectrum
+/// hides its noise floor, and force sensors are better than this. Unfounded.
 pub(crate) const LARGEST_FORCE_NOISE: f64 = 0.02;
 
-/// Relative error of a predicted cut. The instants at which a tooth enters or leaves are known to a fraction of a sample, and so is the
-/// step of the force there. Unfounded.
+/// Error of a predicted cut, as a share of the signal. The instants at which teeth enter and leave are known to a fraction of a sample, and
+/// the steps of the force with them. Unfounded.
 pub(crate) const RELATIVE_ERROR_OF_CUTS: f64 = 2e-4;
 
 // Full engagement
 
-/// Level of a revolution in air, in some channel, over that in the cut. Unfounded.
+/// Level of a revolution, as a share of the level in the cut, below which it counts as air if one channel is below it. Unfounded.
 pub(crate) const AIR_LEVEL: f64 = 0.2;
 
-/// Level at which the tool is well engaged, in every channel, over that in the cut. Unfounded.
+/// Level of a revolution, as a share of the level in the cut, above which the tool counts as engaged if every channel is above it.
+/// Unfounded.
 pub(crate) const ENGAGED_LEVEL: f64 = 0.8;
 
-/// Time from air to full engagement over that from air to `ENGAGED_LEVEL`: 4/3 for a depth that grows linearly from `AIR_LEVEL`, with
-/// a margin of 5 %.
+/// Time from air to full engagement over the time from air to `ENGAGED_LEVEL`: (1 − 0.2)/(0.8 − 0.2) = 4/3 for a level that grows linearly
+/// from `AIR_LEVEL`, with a margin of 5 %.
 pub(crate) const ENGAGEMENT_AFTER_LEVEL: f64 = 1.4;
 
-/// Margin on the way in: the first contact itself is below `AIR_LEVEL`. Unfounded.
+/// Factor on the time of the tool's entry by its geometry: the first contact itself is below `AIR_LEVEL` and is seen late. Unfounded.
 pub(crate) const ENTRY_MARGIN: f64 = 1.1;
 
-/// Share of the way out that is over when the level falls to `AIR_LEVEL`: the chips are thin at its end. Unfounded.
+/// Share of the tool's exit, by its geometry, that is over when the level falls to `AIR_LEVEL`: the chips are thin at its end. Unfounded.
 pub(crate) const EXIT_SHARE: f64 = 0.7;
 
-/// Level over that by the feed alone at which a cut chatters. Unfounded.
+/// Median level of a cut, as a multiple of the response to the feed alone, above which it counts as chatter. Unfounded.
 pub(crate) const CHATTER_LEVEL: f64 = 2.0;
 
-/// Level in the cut over the noise from which on a channel shows air: three standard deviations.
+/// Level of a channel in the cut over the standard deviation of its noise from which on the channel can show air: three standard
+/// deviations.
 pub(crate) const AIR_OVER_NOISE: f64 = 3.0;
 
-/// Fewest revolutions of air at an end of a recording: one may be a beat of the motion. Unfounded.
+/// Fewest successive revolutions in air at an end of a recording: a single one may be a minimum of beating vibration. Unfounded.
 pub(crate) const LEAST_AIR_AT_ENDS: usize = 2;
 
-/// Fewest revolutions of air within a recording, where chatter may beat. Unfounded.
+/// Fewest successive revolutions in air within a recording, where chatter may beat. Unfounded.
 pub(crate) const LEAST_AIR_WITHIN: usize = 4;
 
-/// Least growth from the first to the second revolution of a resonance that starts from rest. Revolutions in air are alike. Unfounded.
+/// Least factor between the levels of the second and the first revolution of a vibration that starts from rest. Two revolutions in air have
+/// equal levels. Unfounded.
 pub(crate) const GROWTH_FROM_REST: f64 = 2.0;
 
-/// Fewest revolutions of full engagement that are diagnosed. Unfounded.
+/// Fewest revolutions of full engagement with which a cut is diagnosed. Unfounded.
 pub(crate) const LEAST_ENGAGED_REVOLUTIONS: f64 = 8.0;
 
 // Fits
 
-/// Largest distance of a motion from its closed loop, in units of the noise, at which the iteration of a cut has settled:
-/// it adds a thousandth to χ².
+/// Largest difference between the motion of a cut and its closed-loop prediction, in standard deviations of the noise, at which their
+/// iteration has converged: it adds 0.03² = 0.001 of the noise to χ².
 pub(crate) const CLOSED_LOOP_SETTLED: f64 = 0.03;
 
-/// Least gain of χ² per step of a search. A step of a standard deviation gains 1.
+/// Least decrease of χ² by a step of a search. Smaller steps end the search: they are shorter than √0.1 = 0.3 standard deviations.
 pub(crate) const SEARCH_SETTLED: f64 = 0.1;
 
-/// χ² behind that of another candidate model at which a search is given up. A candidate model is not selected if its χ² is 16 behind;
-/// the linear prediction of a search errs by a multiple of that. Unfounded.
+/// Excess of χ² over that of another candidate model at which a search is given up. A candidate model is not selected if its χ² is 16
+/// (`EQUIVALENT`) larger; the linear prediction of a search errs by a multiple of that. Unfounded.
 pub(crate) const HOPELESS_LAG: f64 = 300.0;
 
-/// χ² of a start over that of the regression above which the beginning of each record is fitted first. Unfounded.
+/// χ² of a start value, as a multiple of that of the regression, above which the beginning of each record is fitted first. Unfounded.
 pub(crate) const FAR_START: f64 = 2.0;
 
-/// χ² of a candidate model over the least of all above which its start is not improved. Unfounded.
+/// χ² of a candidate model, as a multiple of the least of all, above which its start value is not improved. Unfounded.
 pub(crate) const FAR_BEHIND: f64 = 4.0;
 
-/// χ² per number at which a search counts as stuck, and over that of another model up to which it is repeated. Unfounded.
+/// χ² per compared value above which a search counts as stuck. It is also the largest factor over the χ² of another candidate model up to
+/// which a stuck search is repeated. Unfounded.
 pub(crate) const STUCK: f64 = 1.1;
 
-/// Share of the best reduction of χ² from which on the nonlinear parameters of a candidate model are refined. Unfounded.
+/// Reduction of χ² by a candidate model, as a share of the best, above which its nonlinear parameters are refined. Unfounded.
 pub(crate) const REFINED_SHARE: f64 = 0.5;
 
-/// Least gain of χ² of a Gauss–Newton step in the nonlinear parameters: a tenth of a standard deviation.
+/// Least decrease of χ² by a Gauss–Newton step in the nonlinear parameters: that of a step of a tenth of a standard deviation.
 pub(crate) const LEAST_REFINEMENT: f64 = 0.01;
 
-/// Least additional variance by noise of the forces, as a share of the variance of a parameter, that widens intervals: 2.5 % of a
+/// Least additional variance of a parameter by force noise, as a share of its variance, with which its interval is widened: 2.5 % of a
 /// standard deviation, less than the draws resolve.
 pub(crate) const LEAST_FORCE_NOISE_VARIANCE: f64 = 0.05;
 
 // Selection
 
-/// Least gain of a further cause: twice the log-likelihood ratio minus the price of its parameters (Schwarz). 20 is an odds
-/// ratio of e¹⁰; why not e⁵ is unfounded.
+/// Least gain of a further cause: decrease of χ² minus the price ln n of each parameter for n values (Schwarz). It bounds false alarms: one
+/// parameter that fits noise gains 20 with the probability P(χ²₁ > 20 + ln n) = 2e-7 for n = 1000, which is one false alarm in 1 000
+/// diagnoses with 5 000 candidate models (pairs of 100 candidates). A gain of 10 would give one in five.
 pub(crate) const LEAST_GAIN: f64 = 20.0;
 
-/// Difference of gains below which two candidate models are equivalent: a likelihood ratio of e⁸. Unfounded.
+/// Difference of gains below which two candidate models are equivalent. At the distance d of two models, twice their log-likelihood ratio
+/// is normal with mean d² and standard deviation 2d: the wrong model leads by 16 with a probability of at most Φ(−√16) = 3e-5 at any d, the
+/// four standard deviations of `CHANCE`.
 pub(crate) const EQUIVALENT: f64 = 16.0;
 
-/// Share of the residual energy that a right candidate model leaves along the measured motion, because sampling hides the motion between
-/// samples. Unfounded.
+/// Share of the baseline's residual energy that the right candidate model leaves along the measured motion, because sampling hides the
+/// motion between samples. Unfounded.
 pub(crate) const SAMPLING_RESIDUAL: f64 = 2e-3;
 
-/// The same of a simulated candidate model, which interpolates only the measured forces. Unfounded.
+/// Share of the baseline's residual energy that the right candidate model leaves if it is simulated: only the measured forces are
+/// interpolated between samples. Unfounded.
 pub(crate) const SAMPLING_RESIDUAL_SIMULATED: f64 = 5e-5;
 
-/// Share of the residual energy by which interpolation between samples biases the comparison of candidate models. Unfounded.
+/// Share of the baseline's residual energy by which interpolation between samples biases the comparison of candidate models. Unfounded.
 pub(crate) const INTERPOLATION_ERROR: f64 = 1e-4;
 
-/// Residual energy above the noise that is not explained, as a share of the noise: the error of the noise floor and chance. Unfounded.
+/// Residual energy above the noise, as a share of the noise, up to which a residual counts as noise: error of the noise floor, and chance.
+/// Unfounded.
 pub(crate) const NOISE_TOLERANCE: f64 = 0.15;
 
-/// Least share of the residual energy above the noise that a further cause explains. With less, one wrong equation compensates for
-/// another. Unfounded.
+/// Least share of the residual energy above the noise that a further cause explains. A cause that explains less may only compensate for a
+/// wrong equation. Unfounded.
 pub(crate) const LEAST_SHARE: f64 = 0.2;
 
-/// Least energy over that of the errors of the computation which is something else: twice their amplitude.
+/// Energy of a residual, as a multiple of the energy of computation errors, above which it has another origin: twice their amplitude.
 pub(crate) const OVER_COMPUTATION_ERROR: f64 = 4.0;
 
-/// Of a cut: least gain of a further cause beside a sufficient model, as a share of the noise. The noise floor and the computation near
+/// Least gain of a further cause of a cut if fewer causes are sufficient, as a share of the noise. The noise floor and the computation near
 /// a resonance err by about as much. Unfounded.
 pub(crate) const LEAST_SHARE_BESIDE_ENOUGH: f64 = 5e-3;
 
-/// Residual energy over the least noise of the sensors below which there is nothing to explain. Unfounded.
+/// Residual energy, as a multiple of the least noise energy of the sensors, below which there is nothing to explain. Unfounded.
 pub(crate) const NOTHING_TO_EXPLAIN: f64 = 0.5;
 
-/// Standard deviations of χ² (√(2n) for n numbers) within which a residual is noise.
+/// Largest excess of χ² over its mean, in its standard deviations √(2n) for n values, that counts as noise: four standard deviations, which
+/// chance exceeds in 3 of 100 000 records.
 pub(crate) const CHANCE: f64 = 4.0;
 
 // Conclusion
 
-/// Largest share of the residual energy above the noise that a candidate model may leave of responses, whose noise is known by its
-/// floor. Unfounded.
+/// Largest share of the baseline's residual energy above the noise that a candidate model may leave, for records in the response domain,
+/// whose noise is known from its floor. Unfounded.
 pub(crate) const UNEXPLAINED_OF_RESPONSE: f64 = 0.012;
 
-/// The same of forces, where derivatives of the motion add noise that is not white. Unfounded.
+/// Largest share of the baseline's residual energy above the noise that a candidate model may leave, for records in the force domain, where
+/// derivatives of the motion add noise that is not white. Unfounded.
 pub(crate) const UNEXPLAINED_OF_FORCE: f64 = 0.15;
 
-/// Factor on `UNEXPLAINED_OF_RESPONSE` for each further cause of a simulated candidate model: two or three terms imitate much, but
-/// leave more than this. Unfounded.
+/// Factor on `UNEXPLAINED_OF_RESPONSE` for each cause after the first of a simulated candidate model. Two or three wrong causes imitate
+/// much of a residual, but leave more than this. Unfounded.
 pub(crate) const UNEXPLAINED_PER_FURTHER_CAUSE: f64 = 0.05;
 
-/// Residual energy above the noise and chance, as a share of the noise, at which a simulated candidate model is not the whole truth.
-/// Unfounded.
+/// Residual energy above noise and chance, as a share of the noise, from which on a simulated candidate model is doubted. Unfounded.
 pub(crate) const DOUBTFUL_RESIDUAL: f64 = 0.03;
 
-/// Standard deviations of χ² that count as chance beside `DOUBTFUL_RESIDUAL`. Unfounded.
+/// Standard deviations of χ² that are added to `DOUBTFUL_RESIDUAL` as chance. Unfounded.
 pub(crate) const CHANCE_OF_DOUBT: f64 = 5.0;
 
-/// Factor on the confidence in a candidate model that leaves `DOUBTFUL_RESIDUAL`. Unfounded.
+/// Factor on the confidence in a candidate model whose residual is larger than `DOUBTFUL_RESIDUAL` and chance. Unfounded.
 pub(crate) const DOUBT: f64 = 0.8;
 
-/// NRMSE of the whole records over that of the held-out segments from which on the user is warned. Unfounded.
+/// NRMSE on the whole records, as a multiple of that on the held-out segments, above which the user is warned. Unfounded.
 pub(crate) const UNLIKE_SEGMENTS: f64 = 3.0;
 
-/// Scale of the logistic function from the difference of gains beside a rival to the confidence. Unfounded.
+/// Width of the logistic function that turns the lead over a rival, as a difference of gains, into a confidence. Bayes' theorem with exact
+/// likelihoods gives 2; the larger width for errors of the models is unfounded.
 pub(crate) const CONFIDENCE_WIDTH: f64 = 6.0;
 
-/// Loss of confidence where the residual is as large as allowed. Unfounded.
+/// Relative loss of confidence if the residual is as large as allowed. Unfounded.
 pub(crate) const CONFIDENCE_LOSS: f64 = 0.5;
 
-/// Highest confidence: no campaign is large enough to support more. Unfounded.
+/// Highest confidence in a cause. In the campaign `hidden-effects` 3 of 925 confident answers are wrong, which is compatible with error
+/// rates of 0.09 to 0.84 % (90 % interval): 0.5 % lies within.
 pub(crate) const HIGHEST_CONFIDENCE: f64 = 0.995;
 
-/// Confidence in mass, stiffness and damping by one factor beside the gain of a sensor that is equivalent. Unfounded.
+/// Confidence in mass, stiffness and damping changed by one factor, if the gain of a sensor is equivalent: one over the four names of the
+/// equivalent causes.
 pub(crate) const COMMON_FACTOR_CONFIDENCE: f64 = 0.25;
 
 /// Least share of the held-out residual energy that a guessed formula explains. Unfounded.
 pub(crate) const LEAST_EXPLAINED_BY_GUESS: f64 = 0.1;
 
-/// Residual power over that of the noise from which on a bin shows a missing force: six standard deviations of the mean
-/// of nine bins above the noise.
+/// Residual power, as a multiple of the noise power, from which on a spectral bin shows a missing force. The mean of nine bins of noise has
+/// a relative standard deviation of 1/3: six standard deviations.
 pub(crate) const MISSING_FORCE_OVER_NOISE: f64 = 3.0;
 
-/// Amplitude of a segment, over the largest, below which its stiffness and damping are not shown. Unfounded.
+/// Amplitude of a segment, as a share of the largest, below which its stiffness and damping are not shown. Unfounded.
 pub(crate) const LEAST_AMPLITUDE: f64 = 0.02;
 
-/// Records are shortened if less than this share of their samples is left to search. With more, little time is gained. Unfounded.
+/// Share of the samples in the first parts of the records below which only these parts are searched. With a larger share, little time is
+/// gained. Unfounded.
 pub(crate) const SHORTENED_SHARE: f64 = 0.5;
 
-/// Immersion angles closer than this, in degrees, belong to the same chart. Unfounded.
+/// Largest difference between immersion angles of one chart, degrees. Unfounded.
 pub(crate) const SAME_IMMERSION_DEG: f64 = 0.5;
 
-/// Feeds closer than this, relative, belong to the same chart. Unfounded.
+/// Largest relative difference between feeds of one chart. Unfounded.
 pub(crate) const SAME_FEED: f64 = 1e-3;
 
 // Next test
 
-/// Squared distance D² of two candidate models at which a test separates them nearly always. The difference of twice their
-/// log-likelihoods is D² ± 2D, and `EQUIVALENT` of it is required.
+/// Squared distance D² of two candidate models at which a test separates them. Twice their log-likelihood ratio is normal with mean D² and
+/// standard deviation 2D. It exceeds `EQUIVALENT` with a probability of Φ((60 − 16)/(2·√60)) = 99.8 %.
 pub(crate) const SEPARATING_DISTANCE: f64 = 60.0;
 
-/// Displacement of a cut over that of the records above which it is not proposed. Unfounded.
+/// Displacement of a cut, as a multiple of the largest in the records, above which the cut is not proposed. Unfounded.
 pub(crate) const LARGEST_PROPOSED_MOTION: f64 = 10.0;
 
-/// Noise of a sensor that no record has, over its root mean square. Unfounded.
+/// Standard deviation of the noise of a sensor that no record has, as a share of its root mean square. Unfounded.
 pub(crate) const ASSUMED_NOISE: f64 = 0.01;

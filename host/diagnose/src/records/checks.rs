@@ -225,9 +225,9 @@ fn clipped(samples: &[f64]) -> Option<f64> {
     })
 }
 
-/// True if a flat top no longer than an impact has steep flanks. A smooth peak that is flat over three samples is at most twelve levels
-/// lower two samples beside them: a parabola with curvature c stays within one level over three samples and falls by 9c up to there, and
-/// one level is added for rounding.
+/// True if a flat top no longer than an impact has steep flanks. A smooth peak that is flat over three samples falls by at most ten levels
+/// two samples beside them: a parabola that stays within one level over three samples has a curvature of c ≤ 1 level and falls by 9c up to
+/// there, and rounding adds one level.
 fn has_cliff(samples: &[f64], at: impl Fn(&f64) -> bool, end: f64, resolution: f64) -> bool {
     let (mut first, mut steepest) = (0, 0.0_f64);
     while first < samples.len() {
