@@ -48,9 +48,9 @@ mod force_law;
 mod immersion;
 pub mod milling;
 pub mod path;
+pub mod restoring_force;
 pub mod spindle;
 pub mod structure;
-pub mod term;
 
 pub use cutter::{Cutter, Tooth};
 pub use dynamics::Dynamics;
@@ -58,5 +58,5 @@ pub use effects::{Effect, EffectError, Effects};
 pub use error::ModelError;
 pub use force_law::{ChipLaw, ForceLaw, ProcessDamping};
 pub use immersion::Immersion;
+pub use restoring_force::{MotionState, Regime, RestoringForce, Slopes};
 pub use spindle::{Fluctuation, Spindle};
-pub use term::{At, Branch, Slopes, Term};

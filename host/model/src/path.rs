@@ -1,6 +1,6 @@
 //! Restoring force along a measured motion.
 
-use super::{At, Branch, Term};
+use super::{MotionState, Regime, RestoringForce};
 
 /// Displacement and velocity of the tool in the machine's axes, sampled at constant intervals. An axis without motion has empty vectors.
 #[derive(Clone, Debug, Default)]
@@ -40,11 +40,11 @@ impl Motion {
     }
 
     /// Time, displacement and velocity of the tool at a sample.
-    pub fn at(&self, sample: usize) -> At {
+    pub fn at(&self, sample: usize) -> MotionState {
         let of = |signal: &[Vec<f64>; 3]| {
             std::array::from_fn(|axis| signal[axis].get(sample).copied().unwrap_or(0.0))
         };
-        At {
+        MotionState {
             t: self.start_s + sample as f64 * self.step_s,
             x: of(&self.x),
             v: of(&self.v),
@@ -94,62 +94,82 @@ pub fn between(samples: &[f64], place: f64) -> f64 {
 ///
 /// Regimes follow the motion as in a simulation. For dry friction without internal states, f_r is interpolated linearly between the two slip
 /// directions while the velocity is below the noise level [`Motion::rest_m_per_s`].
-pub fn restoring_along(term: &dyn Term, motion: &Motion) -> [Vec<f64>; 3] {
-    if let Some(axis) = term.holds().filter(|_| term.states() == 0) {
+pub fn restoring_along(restoring_force: &dyn RestoringForce, motion: &Motion) -> [Vec<f64>; 3] {
+    if let Some(axis) = restoring_force.holds().filter(|_| restoring_force.states() == 0) {
         let mut force: [Vec<f64>; 3] = std::array::from_fn(|_| vec![0.0; motion.len()]);
         for sample in 0..motion.len() {
-            let value = blended(term, axis, &motion.at(sample), motion.rest_m_per_s[axis]);
+            let value = blended(
+                restoring_force,
+                axis,
+                &motion.at(sample),
+                motion.rest_m_per_s[axis],
+            );
             for (signal, value) in force.iter_mut().zip(value) {
                 signal[sample] = value;
             }
         }
         return force;
     }
-    let mut own = vec![0.0; term.states()];
-    term.begin(&motion.at(0), &mut own);
-    restoring_from(term, motion, &mut own)
+    let mut own = vec![0.0; restoring_force.states()];
+    restoring_force.begin(&motion.at(0), &mut own);
+    restoring_from(restoring_force, motion, &mut own)
 }
 
 /// Restoring force f_r, N, along `motion` for a force without locked regime; updates the internal states `own` from the first sample to the
 /// last.
-pub fn restoring_from(term: &dyn Term, motion: &Motion, own: &mut [f64]) -> [Vec<f64>; 3] {
+pub fn restoring_from(
+    restoring_force: &dyn RestoringForce,
+    motion: &Motion,
+    own: &mut [f64],
+) -> [Vec<f64>; 3] {
     let count = motion.len();
     let mut force: [Vec<f64>; 3] = std::array::from_fn(|_| vec![0.0; count]);
-    let mut branch = None;
-    let mut before: Option<At> = None;
+    let mut regime = None;
+    let mut before: Option<MotionState> = None;
     for sample in 0..count {
         let at = motion.at(sample);
-        if let (Some(before), Some(branch)) = (before, branch)
+        if let (Some(before), Some(regime)) = (before, regime)
             && !own.is_empty()
-            && !term.follow(&at, own)
+            && !restoring_force.follow(&at, own)
         {
-            step(term, branch, (&before, &at), motion.step_s, own);
+            step(restoring_force, regime, (&before, &at), motion.step_s, own);
         }
-        let now = settled(term, branch, &at, own);
-        for (signal, value) in force.iter_mut().zip(term.restoring_n(now, &at, own)) {
+        let now = settled(restoring_force, regime, &at, own);
+        for (signal, value) in force.iter_mut().zip(restoring_force.restoring_n(now, &at, own)) {
             signal[sample] = value;
         }
-        (branch, before) = (Some(now), Some(at));
+        (regime, before) = (Some(now), Some(at));
     }
     force
 }
 
-/// The regime of a restoring force at the instant `at`, from its regime `branch` at the previous sample.
-fn settled(term: &dyn Term, branch: Option<Branch>, at: &At, own: &[f64]) -> Branch {
-    let mut now = branch.unwrap_or_else(|| term.next(None, at, own, 0.0));
+/// The regime of a restoring force at the instant `at`, from its `regime` at the previous sample.
+fn settled(
+    restoring_force: &dyn RestoringForce,
+    regime: Option<Regime>,
+    at: &MotionState,
+    own: &[f64],
+) -> Regime {
+    let mut now = regime.unwrap_or_else(|| restoring_force.next(None, at, own, 0.0));
     // Between two samples a motion may pass through several regimes. Four changes bound the loop.
     for _ in 0..4 {
-        if term.margin(now, at, own, 0.0) >= 0.0 {
+        if restoring_force.margin(now, at, own, 0.0) >= 0.0 {
             break;
         }
-        now = term.next(Some(now), at, own, 0.0);
+        now = restoring_force.next(Some(now), at, own, 0.0);
     }
     now
 }
 
 /// Integrates the internal states from one sample to the next with two steps of Heun's method; the motion is linear between samples.
-fn step(term: &dyn Term, branch: Branch, (from, to): (&At, &At), step_s: f64, own: &mut [f64]) {
-    let mix = |share: f64| At {
+fn step(
+    restoring_force: &dyn RestoringForce,
+    regime: Regime,
+    (from, to): (&MotionState, &MotionState),
+    step_s: f64,
+    own: &mut [f64],
+) {
+    let mix = |share: f64| MotionState {
         t: from.t + share * step_s,
         x: std::array::from_fn(|axis| from.x[axis] + share * (to.x[axis] - from.x[axis])),
         v: std::array::from_fn(|axis| from.v[axis] + share * (to.v[axis] - from.v[axis])),
@@ -157,26 +177,31 @@ fn step(term: &dyn Term, branch: Branch, (from, to): (&At, &At), step_s: f64, ow
     let (mut first, mut second) = (vec![0.0; own.len()], vec![0.0; own.len()]);
     let half = 0.5 * step_s;
     for share in [0.0, 0.5] {
-        let now = settled(term, Some(branch), &mix(share), own);
-        term.rate(now, &mix(share), own, &mut first);
+        let now = settled(restoring_force, Some(regime), &mix(share), own);
+        restoring_force.rate(now, &mix(share), own, &mut first);
         let ahead: Vec<f64> = own
             .iter()
             .zip(&first)
             .map(|(own, rate)| own + half * rate)
             .collect();
-        term.rate(now, &mix(share + 0.5), &ahead, &mut second);
+        restoring_force.rate(now, &mix(share + 0.5), &ahead, &mut second);
         for ((own, first), second) in own.iter_mut().zip(&first).zip(&second) {
             *own += 0.5 * half * (first + second);
         }
-        term.confine(own);
+        restoring_force.confine(own);
     }
 }
 
-fn blended(term: &dyn Term, axis: usize, at: &At, rest_m_per_s: f64) -> [f64; 3] {
+fn blended(
+    restoring_force: &dyn RestoringForce,
+    axis: usize,
+    at: &MotionState,
+    rest_m_per_s: f64,
+) -> [f64; 3] {
     let moving = |sign: f64| {
         let mut at = *at;
         at.v[axis] = sign * at.v[axis].abs().max(f64::MIN_POSITIVE);
-        term.restoring_n(term.next(None, &at, &[], 0.0), &at, &[])
+        restoring_force.restoring_n(restoring_force.next(None, &at, &[], 0.0), &at, &[])
     };
     let share = if rest_m_per_s > 0.0 {
         (at.v[axis] / rest_m_per_s).clamp(-1.0, 1.0)

@@ -47,7 +47,7 @@ pub enum SimulateError {
     #[error(
         "at {time_s:.6} s no regime of the restoring forces (friction, backlash) is consistent with the motion: two of them act against each other"
     )]
-    BranchUndecided {
+    RegimeUndecided {
         /// Simulated time at which the run stopped, s.
         time_s: f64,
     },

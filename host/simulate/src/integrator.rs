@@ -5,7 +5,7 @@ use super::error::SimulateError;
 use super::model::{Model, StepContext};
 use super::segment::{Segment, Workspace};
 use super::settings::Settings;
-use quietcut_model::term::{self, At, Branch, Branches};
+use quietcut_model::restoring_force::{self, MotionState, Regime, Regimes};
 use quietcut_numerics::crossing::first_below_zero;
 use quietcut_numerics::dormand_prince::{DormandPrince, Quartic, at};
 
@@ -19,7 +19,7 @@ pub struct Statistics {
     /// Number of times that a tooth lost or regained contact.
     pub contact_changes: u64,
     /// Number of times that a restoring force changed its regime, such as from stick to slip.
-    pub branch_changes: u64,
+    pub regime_changes: u64,
 }
 
 /// Time integration of a model in progress: time, states, regimes and the last step.
@@ -37,7 +37,7 @@ pub(super) struct Integrator<'a> {
     statistics: Statistics,
     workspace: Workspace,
     /// The regime of each restoring force of the model, such as stick or slip.
-    branches: Vec<Branch>,
+    regimes: Vec<Regime>,
     /// Start and end of the evaluated step, s, moved inwards by a rounding margin.
     within: [f64; 2],
 }
@@ -48,7 +48,7 @@ enum Event {
     /// A tooth loses or regains contact.
     Contact(Change),
     /// Restoring force `index` leaves its regime at the fraction `u` of the step.
-    Term { index: usize, u: f64 },
+    RegimeEnd { index: usize, u: f64 },
 }
 
 impl Event {
@@ -56,7 +56,7 @@ impl Event {
     fn u(self) -> f64 {
         match self {
             Self::Contact(change) => change.u,
-            Self::Term { u, .. } => u,
+            Self::RegimeEnd { u, .. } => u,
         }
     }
 }
@@ -85,7 +85,7 @@ impl<'a> Integrator<'a> {
             displacement: [[0.0; 5]; 3],
             next_h: 0.0,
             statistics: Statistics::default(),
-            branches: vec![0; model.terms.len()],
+            regimes: vec![0; model.restoring_forces.len()],
             workspace: Workspace::new(model),
             within: [0.0; 2],
         }
@@ -99,8 +99,8 @@ impl<'a> Integrator<'a> {
     ) -> Result<Statistics, SimulateError> {
         // A safely small first step; error control enlarges it within a few steps.
         self.next_h = 1e-3 * self.longest_step(end_s);
-        for index in 0..self.branches.len() {
-            self.branches[index] = self.next_branch(index, None);
+        for index in 0..self.regimes.len() {
+            self.regimes[index] = self.next_regime(index, None);
         }
         self.start();
         let mut stuck = 0;
@@ -147,14 +147,14 @@ impl<'a> Integrator<'a> {
                     });
                 }
             }
-            Event::Term { index, .. } => {
-                self.statistics.branch_changes += 1;
-                self.branches[index] = self.next_branch(index, Some(self.branches[index]));
+            Event::RegimeEnd { index, .. } => {
+                self.statistics.regime_changes += 1;
+                self.regimes[index] = self.next_regime(index, Some(self.regimes[index]));
                 // A restoring force that has just changed counts as within its regime (see `first_below_zero`): many
                 // changes without a step between them mean that no regime is consistent with the motion.
                 *stuck += 1;
                 if *stuck > 10 * STUCK {
-                    return Err(SimulateError::BranchUndecided { time_s: self.t });
+                    return Err(SimulateError::RegimeUndecided { time_s: self.t });
                 }
             }
         }
@@ -162,22 +162,22 @@ impl<'a> Integrator<'a> {
     }
 
     /// The regime of a restoring force at the current time; an axis that begins to stick gets zero velocity.
-    fn next_branch(&mut self, index: usize, before: Option<Branch>) -> Branch {
-        let term = &self.model.terms[index];
+    fn next_regime(&mut self, index: usize, before: Option<Regime>) -> Regime {
+        let restoring_force = &self.model.restoring_forces[index];
         let (at, place) = (self.at(self.t, &self.y), self.place(index));
         let holding_n = self.holding_n(index, self.t, &self.y.clone());
-        let branch = term.next(before, &at, &self.y[place], holding_n);
-        if let Some(axis) = term.holds().filter(|_| term.locked(branch)) {
+        let regime = restoring_force.next(before, &at, &self.y[place], holding_n);
+        if let Some(axis) = restoring_force.holds().filter(|_| restoring_force.locked(regime)) {
             let order = self.model.dynamics.order();
             self.model.dynamics.halt(axis, &mut self.y[..order]);
         }
-        branch
+        regime
     }
 
-    fn at(&self, t: f64, y: &[f64]) -> At {
+    fn at(&self, t: f64, y: &[f64]) -> MotionState {
         let dynamics = &self.model.dynamics;
         let structure = &y[..dynamics.order()];
-        At {
+        MotionState {
             t,
             x: dynamics.displacement(structure),
             v: dynamics.velocity_under(structure, [0.0; 3]),
@@ -186,14 +186,14 @@ impl<'a> Integrator<'a> {
 
     /// Range of the internal states of a restoring force in y.
     fn place(&self, index: usize) -> std::ops::Range<usize> {
-        let terms = &self.model.terms;
-        let from = self.model.dynamics.order() + term::states(&terms[..index]);
-        from..from + terms[index].states()
+        let restoring_forces = &self.model.restoring_forces;
+        let from = self.model.dynamics.order() + restoring_force::states(&restoring_forces[..index]);
+        from..from + restoring_forces[index].states()
     }
 
     /// The force f_r, N, that keeps the axis of a restoring force at rest at the time `t`; 0 if it cannot stick.
     fn holding_n(&mut self, index: usize, t: f64, y: &[f64]) -> f64 {
-        let Some(axis) = self.model.terms[index].holds() else {
+        let Some(axis) = self.model.restoring_forces[index].holds() else {
             return 0.0;
         };
         let mut rate = std::mem::take(&mut self.workspace.rate);
@@ -207,30 +207,32 @@ impl<'a> Integrator<'a> {
         let x = model.dynamics.displacement(&y[..model.dynamics.order()]);
         let context = self.context();
         let force = model.force_n(context, t, x, y);
-        let held = term::rate(
+        let held = restoring_force::rate(
             &model.dynamics,
-            &model.terms,
-            context.branches,
+            &model.restoring_forces,
+            context.regimes,
             (t, x),
             force,
             y,
             rate,
         );
-        if model.terms[index].locked(self.branches[index]) {
+        if model.restoring_forces[index].locked(self.regimes[index]) {
             return held[axis];
         }
         // `rate` already contains the friction force of slip: the holding force is that force plus the remaining unbalanced force.
         let at = self.at(t, y);
-        let sliding = model.terms[index].restoring_n(self.branches[index], &at, &y[self.place(index)]);
+        let sliding =
+            model.restoring_forces[index].restoring_n(self.regimes[index], &at, &y[self.place(index)]);
         let locked = std::array::from_fn(|other| other == axis);
-        sliding[axis] + term::holding_n(&model.dynamics, locked, &rate[..model.dynamics.order()])[axis]
+        sliding[axis]
+            + restoring_force::holding_n(&model.dynamics, locked, &rate[..model.dynamics.order()])[axis]
     }
 
     fn context(&self) -> StepContext<'_> {
         StepContext {
             contact: self.contact.as_ref(),
             within: self.within,
-            branches: Branches(&self.branches),
+            regimes: Regimes(&self.regimes),
         }
     }
 
@@ -241,7 +243,7 @@ impl<'a> Integrator<'a> {
         let context = StepContext {
             contact: self.contact.as_ref(),
             within: self.within,
-            branches: Branches(&self.branches),
+            regimes: Regimes(&self.regimes),
         };
         self.step.start(self.t, &self.y, |t, y, rate| {
             model.rate(context, (t, model.dynamics.displacement(y)), y, rate);
@@ -315,19 +317,21 @@ impl<'a> Integrator<'a> {
             .and_then(|contact| contact.first_change(self.t, h, &self.displacement))
             .map(Event::Contact);
         let mut workspace = std::mem::take(&mut self.workspace);
-        let terms: Option<Event> = (0..self.branches.len())
-            .filter_map(|index| self.end_of_branch(index, h, &mut workspace))
+        let restoring_forces: Option<Event> = (0..self.regimes.len())
+            .filter_map(|index| self.end_of_regime(index, h, &mut workspace))
             .min_by(|a, b| a.u().total_cmp(&b.u()));
         self.workspace = workspace;
-        match (contact, terms) {
-            (Some(contact), Some(term)) if contact.u() > term.u() => Some(term),
+        match (contact, restoring_forces) {
+            (Some(contact), Some(restoring_force)) if contact.u() > restoring_force.u() => {
+                Some(restoring_force)
+            }
             (Some(contact), _) => Some(contact),
-            (None, term) => term,
+            (None, restoring_force) => restoring_force,
         }
     }
 
-    fn end_of_branch(&self, index: usize, h: f64, workspace: &mut Workspace) -> Option<Event> {
-        let (term, branch) = (&self.model.terms[index], self.branches[index]);
+    fn end_of_regime(&self, index: usize, h: f64, workspace: &mut Workspace) -> Option<Event> {
+        let (restoring_force, regime) = (&self.model.restoring_forces[index], self.regimes[index]);
         let place = self.place(index);
         let workspace = std::cell::RefCell::new(workspace);
         let margin = |u: f64| {
@@ -337,13 +341,13 @@ impl<'a> Integrator<'a> {
                 *state = at(quartic, u);
             }
             let t = self.t + u * h;
-            let holding_n = match term.holds().filter(|_| term.locked(branch)) {
+            let holding_n = match restoring_force.holds().filter(|_| restoring_force.locked(regime)) {
                 Some(axis) => self.held_n(index, axis, (t, state), rate),
                 None => 0.0,
             };
-            term.margin(branch, &self.at(t, state), &state[place.clone()], holding_n)
+            restoring_force.margin(regime, &self.at(t, state), &state[place.clone()], holding_n)
         };
-        first_below_zero(margin).map(|u| Event::Term { index, u })
+        first_below_zero(margin).map(|u| Event::RegimeEnd { index, u })
     }
 
     /// Attempts one step of length `h`, s, and its dense output; returns the error divided by the tolerance.
@@ -353,7 +357,7 @@ impl<'a> Integrator<'a> {
         let context = StepContext {
             contact: self.contact.as_ref(),
             within: self.within,
-            branches: Branches(&self.branches),
+            regimes: Regimes(&self.regimes),
         };
         self.step.attempt(self.t, h, &self.y, |t, y, rate| {
             model.rate(context, (t, model.dynamics.displacement(y)), y, rate);
@@ -404,7 +408,7 @@ impl<'a> Integrator<'a> {
         let context = StepContext {
             contact: Some(contact),
             within: self.within,
-            branches: Branches(&self.branches),
+            regimes: Regimes(&self.regimes),
         };
         self.model.rate(
             context,
@@ -444,8 +448,8 @@ impl<'a> Integrator<'a> {
     }
 
     fn is_held(&self) -> bool {
-        let mut branches = self.model.terms.iter().zip(&self.branches);
-        branches.any(|(term, branch)| term.locked(*branch))
+        let mut regimes = self.model.restoring_forces.iter().zip(&self.regimes);
+        regimes.any(|(restoring_force, regime)| restoring_force.locked(*regime))
     }
 
     /// A step of about `h`, s, chosen so that no very short step is left before `stop_s`.

@@ -76,8 +76,8 @@ pub(crate) mod tests;
 
 pub use quietcut_model::effects::{self as effect, Effect, EffectError, Effects};
 pub use quietcut_model::{
-    At, Branch, ChipLaw, Cutter, Dynamics, Fluctuation, ForceLaw, Immersion, ModelError, ProcessDamping,
-    Slopes, Spindle, Term, Tooth, path,
+    ChipLaw, Cutter, Dynamics, Fluctuation, ForceLaw, Immersion, ModelError, MotionState, ProcessDamping,
+    Regime, RestoringForce, Slopes, Spindle, Tooth, path,
 };
 
 pub use cutting::{Cutting, Regeneration};

@@ -5,8 +5,8 @@ use nalgebra::{Matrix3, Vector3};
 use super::contact::Contact;
 use super::cutting::Cutting;
 use super::drive::Drive;
-use quietcut_model::term::{self, Branches};
-use quietcut_model::{Dynamics, Term};
+use quietcut_model::restoring_force::{self, Regimes};
+use quietcut_model::{Dynamics, RestoringForce};
 
 /// Equation of motion M ẍ + C ẋ + K x + f_r = F: structure, cutting force, external excitation and added restoring forces f_r.
 pub struct Model {
@@ -17,7 +17,7 @@ pub struct Model {
     /// External excitation force besides the cutting force; `None` if there is none.
     pub drive: Option<Box<dyn Drive>>,
     /// Restoring forces f_r besides those of the structure: friction, backlash, nonlinear springs and others.
-    pub terms: Vec<Box<dyn Term>>,
+    pub restoring_forces: Vec<Box<dyn RestoringForce>>,
 }
 
 /// Quantities that are fixed during one integration step: contact of the teeth and regimes of the restoring forces.
@@ -26,13 +26,13 @@ pub(super) struct StepContext<'a> {
     pub(super) contact: Option<&'a Contact<'a>>,
     /// Start and end of the step, s, moved inwards by a rounding margin: the excitation force may jump at either.
     pub(super) within: [f64; 2],
-    pub(super) branches: Branches<'a>,
+    pub(super) regimes: Regimes<'a>,
 }
 
 impl Model {
     /// Number of states: those of [`Dynamics`], followed by the internal states of the restoring forces in their order.
     pub fn order(&self) -> usize {
-        self.dynamics.order() + term::states(&self.terms)
+        self.dynamics.order() + restoring_force::states(&self.restoring_forces)
     }
 
     /// Force on the tool from cut and excitation, N.
@@ -87,13 +87,13 @@ impl Model {
         rate: &mut [f64],
     ) -> [f64; 3] {
         let force = self.force_n(context, t, x, y);
-        if self.terms.is_empty() {
+        if self.restoring_forces.is_empty() {
             self.dynamics.rate(y, force, rate);
         } else {
-            term::rate(
+            restoring_force::rate(
                 &self.dynamics,
-                &self.terms,
-                context.branches,
+                &self.restoring_forces,
+                context.regimes,
                 (t, x),
                 force,
                 y,

@@ -154,8 +154,9 @@ impl VirtualCut {
         }
         let spindle = effects.spindle(self.spindle_motion());
         let passage = self.passage(&cutter, &spindle)?;
-        let (dynamics, terms) = effects.dynamics(case.structure()?)?;
-        if cutter.force.process_damping.is_some() && dynamics.velocity_jumps() && !terms.is_empty() {
+        let (dynamics, restoring_forces) = effects.dynamics(case.structure()?)?;
+        if cutter.force.process_damping.is_some() && dynamics.velocity_jumps() && !restoring_forces.is_empty()
+        {
             return Err(EffectError::Cut {
                 name: EffectName::ProcessDamping.name(),
                 what: "the modes of this structure add up to no mass, so that its velocity jumps with the force; the \
@@ -174,7 +175,7 @@ impl VirtualCut {
                 pores: self.pores,
             }),
             drive: None,
-            terms,
+            restoring_forces,
         })
     }
 

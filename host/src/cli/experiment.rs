@@ -148,7 +148,7 @@ pub(super) fn run(
         seconds: rig.signal.duration_s(),
         largest_displacement_mm: 1e3 * largest,
         steps: statistics.steps,
-        branch_changes: statistics.branch_changes,
+        branch_changes: statistics.regime_changes,
     };
     let text = format!(
         "{}: {} samples at {:.1} Hz, force in {}; largest displacement of the tool {:.4} mm",

@@ -3,7 +3,7 @@
 use nalgebra::Matrix3;
 
 use quietcut_model::structure::{Form, Structure};
-use quietcut_simulate::{At, Branch, Term};
+use quietcut_simulate::{MotionState, Regime, RestoringForce};
 
 #[derive(Debug)]
 struct CubicMatrices {
@@ -13,7 +13,7 @@ struct CubicMatrices {
 
 /// The restoring force of a structure's cubic matrices along x, y and z; `None` without such matrices. Rows and columns of rotations are
 /// omitted, because the state `At` holds translations only.
-pub(crate) fn cubic_term(structure: &Structure) -> Option<Box<dyn Term>> {
+pub(crate) fn cubic_term(structure: &Structure) -> Option<Box<dyn RestoringForce>> {
     let Form::Matrices(matrices) = &structure.form else {
         return None;
     };
@@ -39,8 +39,8 @@ pub(crate) fn cubic_term(structure: &Structure) -> Option<Box<dyn Term>> {
     }))
 }
 
-impl Term for CubicMatrices {
-    fn restoring_n(&self, _: Branch, at: &At, _: &[f64]) -> [f64; 3] {
+impl RestoringForce for CubicMatrices {
+    fn restoring_n(&self, _: Regime, at: &MotionState, _: &[f64]) -> [f64; 3] {
         let cube = |x: [f64; 3]| nalgebra::Vector3::from(x.map(|x| x * x * x));
         (self.stiffness * cube(at.x) + self.damping * cube(at.v)).into()
     }

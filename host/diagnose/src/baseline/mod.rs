@@ -9,7 +9,7 @@ use self::receptance::Receptance;
 use crate::error::DiagnoseError;
 use quietcut_model::case::Case;
 use quietcut_model::structure::{Direction, FirstOrder, Structure};
-use quietcut_model::{Effects, ModelError, Term};
+use quietcut_model::{Effects, ModelError, RestoringForce};
 use quietcut_simulate::effect::Pickup;
 
 /// The baseline model (case file with its extensions).
@@ -23,7 +23,7 @@ pub(crate) struct Baseline<'a> {
     /// Structure with the mass, damping and stiffness that the extensions change.
     pub altered: Structure,
     /// Restoring forces that the linear structure does not contain.
-    pub terms: Vec<Box<dyn Term>>,
+    pub terms: Vec<Box<dyn RestoringForce>>,
     /// The linear structure with all linear extensions, in first-order form.
     pub first_order: FirstOrder,
     /// Receptance of the linear structure.
@@ -138,10 +138,10 @@ fn pickup_of(name: &str) -> Option<Pickup> {
 pub(crate) fn terms_of(
     effects: &Effects,
     structure: &Structure,
-) -> Result<Vec<Box<dyn Term>>, quietcut_simulate::EffectError> {
+) -> Result<Vec<Box<dyn RestoringForce>>, quietcut_simulate::EffectError> {
     let mut terms = Vec::new();
     for effect in &effects.0 {
-        terms.extend(effect.terms(structure)?);
+        terms.extend(effect.restoring_forces(structure)?);
     }
     Ok(terms)
 }

@@ -11,7 +11,7 @@ use crate::records::study::Study;
 use crate::signal::grid::{Grid, catmull_rom};
 use quietcut_model::structure::FirstOrder;
 use quietcut_recording::TestKind;
-use quietcut_simulate::{At, Drive, Dynamics, Effects, Model, Reading, Settings};
+use quietcut_simulate::{Drive, Dynamics, Effects, Model, MotionState, Reading, Settings};
 
 /// Instants between two samples at which a force is interpolated without changing its band; between these by cubics.
 const FINER: usize = 8;
@@ -180,25 +180,25 @@ impl ClosedLoop {
 
     fn model(&self, study: &Study<'_>, record: usize, effects: &Effects) -> Option<Model> {
         let all = study.baseline.effects.clone().and(effects);
-        let (dynamics, terms) = all.dynamics(study.baseline.structure).ok()?;
+        let (dynamics, restoring_forces) = all.dynamics(study.baseline.structure).ok()?;
         Some(Model {
             dynamics,
             cutting: None,
             drive: Some(Box::new(Shared(self.drives[record].clone()))),
-            terms,
+            restoring_forces,
         })
     }
 
     /// True where a term can hold an axis, as dry friction does.
     pub(crate) fn holds(&self, study: &Study<'_>, effects: &Effects) -> Option<bool> {
         let model = self.model(study, 0, effects)?;
-        Some(model.terms.iter().any(|term| term.holds().is_some()))
+        Some(model.restoring_forces.iter().any(|term| term.holds().is_some()))
     }
 
     /// True where the extended case has terms of its own beside the linear structure.
     pub(crate) fn is_nonlinear(&self, study: &Study<'_>, effects: &Effects) -> bool {
         self.model(study, 0, effects)
-            .is_some_and(|model| !model.terms.is_empty())
+            .is_some_and(|model| !model.restoring_forces.is_empty())
     }
 
     /// The states of the extended case where those of the baseline are `structure`: what it has more is let go with it
@@ -216,12 +216,12 @@ impl ClosedLoop {
         let mut states = structure.to_vec();
         states.resize(order, 0.0);
         let_go(study, &model.dynamics, &mut states);
-        let at = At {
+        let at = MotionState {
             t: 0.0,
             x: model.dynamics.displacement(&states),
             v: model.dynamics.velocity_under(&states, [0.0; 3]),
         };
-        for term in &model.terms {
+        for term in &model.restoring_forces {
             let from = states.len();
             states.resize(from + term.states(), 0.0);
             term.begin(&at, &mut states[from..]);

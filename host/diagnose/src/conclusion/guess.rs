@@ -171,7 +171,11 @@ fn along(study: &Study<'_>, motion: &Motion, axis: usize, term: FormulaTerm) -> 
                 format!("hysteresis.direction={direction}"),
             ];
             let effects = Effects::parse(texts.iter().map(String::as_str)).ok()?;
-            let terms = effects.0.first()?.terms(study.baseline.structure).ok()?;
+            let terms = effects
+                .0
+                .first()?
+                .restoring_forces(study.baseline.structure)
+                .ok()?;
             // The effect's restoring force is z − x; adding x gives z.
             let difference = restoring_along(&**terms.first()?, motion).into_iter().nth(axis)?;
             difference

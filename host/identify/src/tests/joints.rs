@@ -45,7 +45,7 @@ pub(super) fn whole_jacobian(robot: &Robot) -> DMatrix<f64> {
     let place = |offset: Vector3<f64>| {
         let mut other = robot.clone();
         other.tool_m += offset;
-        other.tool_place_m() - robot.tool_place_m()
+        other.tool_position_m() - robot.tool_position_m()
     };
     let e = [place(Vector3::x()), place(Vector3::y()), place(Vector3::z())];
     for joint in 0..6 {

@@ -6,12 +6,12 @@ use std::sync::Arc;
 
 use num_complex::Complex64;
 
-use super::place::{along, axis_of, static_stiffness};
+use super::location::{along, axis_of, static_stiffness};
 use super::{
     Argument, Class, Effect, EffectError, EffectName, EffectSpec, Locations, Parameter, Prior, Treatment,
 };
 use crate::structure::{Direction, Structure};
-use crate::{At, Branch, Term};
+use crate::{MotionState, Regime, RestoringForce};
 
 /// The specification.
 pub(super) const BACKLASH: EffectSpec = EffectSpec {
@@ -83,25 +83,25 @@ struct Backlash {
 }
 
 #[derive(Debug)]
-struct Play {
+struct BacklashSpring {
     half_gap_m: f64,
     stiffness: f64,
     axis: usize,
 }
 
-const WITHIN: Branch = 0;
-const ABOVE: Branch = 1;
-const BELOW: Branch = 2;
+const WITHIN: Regime = 0;
+const ABOVE: Regime = 1;
+const BELOW: Regime = 2;
 
 impl Effect for Backlash {
     fn id(&self) -> EffectName {
         EffectName::Backlash
     }
 
-    fn terms(&self, structure: &Structure) -> Result<Vec<Box<dyn Term>>, EffectError> {
+    fn restoring_forces(&self, structure: &Structure) -> Result<Vec<Box<dyn RestoringForce>>, EffectError> {
         let axis = axis_of(structure, self.direction, self.name())?;
         let stiffness = static_stiffness(structure, self.name())?[(axis, axis)];
-        Ok(vec![Box::new(Play {
+        Ok(vec![Box::new(BacklashSpring {
             half_gap_m: self.half_gap_m,
             stiffness: self.fraction * stiffness,
             axis,
@@ -109,9 +109,9 @@ impl Effect for Backlash {
     }
 }
 
-impl Term for Play {
-    fn restoring_n(&self, branch: Branch, at: &At, _: &[f64]) -> [f64; 3] {
-        let missing = match branch {
+impl RestoringForce for BacklashSpring {
+    fn restoring_n(&self, regime: Regime, at: &MotionState, _: &[f64]) -> [f64; 3] {
+        let missing = match regime {
             ABOVE => self.half_gap_m,
             BELOW => -self.half_gap_m,
             _ => at.x[self.axis],
@@ -123,16 +123,16 @@ impl Term for Play {
         Some(self.stiffness * describing_function(amplitude_m, self.half_gap_m))
     }
 
-    fn margin(&self, branch: Branch, at: &At, _: &[f64], _: f64) -> f64 {
+    fn margin(&self, regime: Regime, at: &MotionState, _: &[f64], _: f64) -> f64 {
         let x = at.x[self.axis];
-        match branch {
+        match regime {
             ABOVE => x - self.half_gap_m,
             BELOW => -x - self.half_gap_m,
             _ => self.half_gap_m - x.abs(),
         }
     }
 
-    fn next(&self, before: Option<Branch>, at: &At, _: &[f64], _: f64) -> Branch {
+    fn next(&self, before: Option<Regime>, at: &MotionState, _: &[f64], _: f64) -> Regime {
         let x = at.x[self.axis];
         match before {
             None if x > self.half_gap_m => ABOVE,

@@ -12,13 +12,13 @@ use std::sync::Arc;
 
 use num_complex::Complex64;
 
-use super::place::{along, axis_of};
+use super::location::{along, axis_of};
 use super::{
     Argument, Class, Effect, EffectError, EffectName, EffectSpec, Locations, Parameter, Prior, Treatment,
     Value, Values,
 };
 use crate::structure::{Direction, Structure};
-use crate::{At, Branch, Term};
+use crate::{MotionState, Regime, RestoringForce};
 
 /// The specification.
 pub(super) const COULOMB_FRICTION: EffectSpec = EffectSpec {
@@ -92,7 +92,7 @@ pub fn describing_function(amplitude: f64) -> Complex64 {
 ///
 /// # Errors
 /// The key `before` names another effect, or there is no friction.
-pub(super) fn take_play(all: &mut Vec<Values>) -> Result<(), EffectError> {
+pub(super) fn take_backlash(all: &mut Vec<Values>) -> Result<(), EffectError> {
     let Some(index) = all
         .iter()
         .position(|known| known.effect() == EffectName::Backlash)
@@ -135,9 +135,9 @@ struct Friction {
     axis: usize,
 }
 
-const STICKS: Branch = 0;
-const FORWARD: Branch = 1;
-const BACKWARD: Branch = 2;
+const STICK: Regime = 0;
+const SLIP_FORWARD: Regime = 1;
+const SLIP_BACKWARD: Regime = 2;
 
 /// Slider of the friction, which the tool moves while their distance is `reach_m`.
 #[derive(Debug)]
@@ -148,30 +148,30 @@ struct Slider {
 
 /// Friction in series with a backlash: no force within the backlash; stick is possible at either of its ends.
 #[derive(Debug)]
-struct BehindPlay {
+struct FrictionBehindBacklash {
     friction: Friction,
     slider: Slider,
 }
 
 /// Friction in series with a clearance whose contact is soft: the tool never sticks, since the contact is elastic.
 #[derive(Debug)]
-struct BehindClearance {
+struct FrictionBehindClearance {
     friction: Friction,
     /// Its `reach_m` is half the clearance plus the depth to which the friction force can indent the contact.
     slider: Slider,
     contact_m: f64,
 }
 
-const WITHIN: Branch = 0;
-const STICKS_AHEAD: Branch = 3;
-const STICKS_BEHIND: Branch = 4;
+const WITHIN: Regime = 0;
+const STICKS_AT_FRONT: Regime = 3;
+const STICKS_AT_BACK: Regime = 4;
 
 impl Effect for CoulombFriction {
     fn id(&self) -> EffectName {
         EffectName::CoulombFriction
     }
 
-    fn terms(&self, structure: &Structure) -> Result<Vec<Box<dyn Term>>, EffectError> {
+    fn restoring_forces(&self, structure: &Structure) -> Result<Vec<Box<dyn RestoringForce>>, EffectError> {
         let axis = axis_of(structure, self.direction, self.name())?;
         let friction = Friction {
             plus_n: self.plus_n,
@@ -183,13 +183,13 @@ impl Effect for CoulombFriction {
             reach_m: self.half_play_m + self.contact_m,
         };
         Ok(vec![if self.contact_m > 0.0 {
-            Box::new(BehindClearance {
+            Box::new(FrictionBehindClearance {
                 friction,
                 slider,
                 contact_m: self.contact_m,
             })
         } else if self.half_play_m > 0.0 {
-            Box::new(BehindPlay { friction, slider })
+            Box::new(FrictionBehindBacklash { friction, slider })
         } else {
             Box::new(friction)
         }])
@@ -197,19 +197,19 @@ impl Effect for CoulombFriction {
 }
 
 impl Friction {
-    fn sliding(&self, branch: Branch) -> [f64; 3] {
-        let force = match branch {
-            FORWARD => self.plus_n,
-            BACKWARD => -self.minus_n,
+    fn sliding(&self, regime: Regime) -> [f64; 3] {
+        let force = match regime {
+            SLIP_FORWARD => self.plus_n,
+            SLIP_BACKWARD => -self.minus_n,
             _ => 0.0,
         };
         along(self.axis, force)
     }
 }
 
-impl Term for Friction {
-    fn restoring_n(&self, branch: Branch, _: &At, _: &[f64]) -> [f64; 3] {
-        self.sliding(branch)
+impl RestoringForce for Friction {
+    fn restoring_n(&self, regime: Regime, _: &MotionState, _: &[f64]) -> [f64; 3] {
+        self.sliding(regime)
     }
 
     /// If the friction force differs between the two directions of motion, the fundamental is that of their mean.
@@ -221,124 +221,128 @@ impl Term for Friction {
         Some(self.axis)
     }
 
-    fn locked(&self, branch: Branch) -> bool {
-        branch == STICKS
+    fn locked(&self, regime: Regime) -> bool {
+        regime == STICK
     }
 
-    fn margin(&self, branch: Branch, at: &At, _: &[f64], holding_n: f64) -> f64 {
-        match branch {
-            FORWARD => at.v[self.axis],
-            BACKWARD => -at.v[self.axis],
+    fn margin(&self, regime: Regime, at: &MotionState, _: &[f64], holding_n: f64) -> f64 {
+        match regime {
+            SLIP_FORWARD => at.v[self.axis],
+            SLIP_BACKWARD => -at.v[self.axis],
             _ => (self.plus_n - holding_n).min(self.minus_n + holding_n),
         }
     }
 
-    fn next(&self, before: Option<Branch>, at: &At, _: &[f64], holding_n: f64) -> Branch {
+    fn next(&self, before: Option<Regime>, at: &MotionState, _: &[f64], holding_n: f64) -> Regime {
         let moving = before.is_none() && at.v[self.axis] != 0.0;
         // The integrator finds the end of stick, where the holding force equals fc, to rounding only. A relative margin of 1e-9
         // above rounding makes sure that slip follows.
-        let beyond = if before == Some(STICKS) { -1e-9 } else { 0.0 };
+        let rounding = if before == Some(STICK) { -1e-9 } else { 0.0 };
         if moving {
-            if at.v[self.axis] > 0.0 { FORWARD } else { BACKWARD }
-        } else if holding_n > self.plus_n * (1.0 + beyond) {
-            FORWARD
-        } else if holding_n < -self.minus_n * (1.0 + beyond) {
-            BACKWARD
+            if at.v[self.axis] > 0.0 {
+                SLIP_FORWARD
+            } else {
+                SLIP_BACKWARD
+            }
+        } else if holding_n > self.plus_n * (1.0 + rounding) {
+            SLIP_FORWARD
+        } else if holding_n < -self.minus_n * (1.0 + rounding) {
+            SLIP_BACKWARD
         } else {
-            STICKS
+            STICK
         }
     }
 }
 
 impl Slider {
     /// Displacement of the tool minus that of the slider, m.
-    fn ahead_m(&self, at: &At, own: &[f64]) -> f64 {
+    fn lead_m(&self, at: &MotionState, own: &[f64]) -> f64 {
         at.x[self.axis] - own[0]
     }
 
     /// Initial position of the slider: if the tool moves, it trails the tool by `reach_m`; if the tool is at rest, it is taken to be at the tool.
-    fn begin(&self, at: &At, own: &mut [f64]) {
+    fn begin(&self, at: &MotionState, own: &mut [f64]) {
         let moving = at.v[self.axis].signum() * f64::from(u8::from(at.v[self.axis] != 0.0));
         own[0] = at.x[self.axis] - self.reach_m * moving;
     }
 
     /// The play operator: the slider stays at rest while the tool is within `reach_m` of it, with a relative margin of 1e-9 for rounding.
-    fn follow(&self, at: &At, own: &mut [f64]) {
+    fn follow(&self, at: &MotionState, own: &mut [f64]) {
         let reach_m = self.reach_m * (1.0 + 1e-9);
         let x = at.x[self.axis];
         own[0] = own[0].clamp(x - reach_m, x + reach_m);
     }
 
-    fn rate(&self, branch: Branch, at: &At, rate: &mut [f64]) {
-        rate[0] = match branch {
-            FORWARD | BACKWARD => at.v[self.axis],
+    fn rate(&self, regime: Regime, at: &MotionState, rate: &mut [f64]) {
+        rate[0] = match regime {
+            SLIP_FORWARD | SLIP_BACKWARD => at.v[self.axis],
             _ => 0.0,
         };
     }
 
-    fn margin(&self, branch: Branch, at: &At, own: &[f64]) -> f64 {
-        match branch {
-            FORWARD => at.v[self.axis],
-            BACKWARD => -at.v[self.axis],
-            _ => self.reach_m - self.ahead_m(at, own).abs(),
+    fn margin(&self, regime: Regime, at: &MotionState, own: &[f64]) -> f64 {
+        match regime {
+            SLIP_FORWARD => at.v[self.axis],
+            SLIP_BACKWARD => -at.v[self.axis],
+            _ => self.reach_m - self.lead_m(at, own).abs(),
         }
     }
 
     /// Regime in which the tool moves the slider, if their distance is `reach_m`; `None` within the backlash.
-    fn taken(&self, at: &At, own: &[f64]) -> Option<Branch> {
-        let ahead_m = self.ahead_m(at, own);
-        let is_at_end = ahead_m.abs() >= self.reach_m * (1.0 - 1e-9);
-        is_at_end.then_some(if ahead_m > 0.0 { FORWARD } else { BACKWARD })
+    fn dragged(&self, at: &MotionState, own: &[f64]) -> Option<Regime> {
+        let lead_m = self.lead_m(at, own);
+        let is_at_end = lead_m.abs() >= self.reach_m * (1.0 - 1e-9);
+        is_at_end.then_some(if lead_m > 0.0 { SLIP_FORWARD } else { SLIP_BACKWARD })
     }
 }
 
-impl Term for BehindPlay {
+impl RestoringForce for FrictionBehindBacklash {
     fn states(&self) -> usize {
         1
     }
 
-    fn begin(&self, at: &At, own: &mut [f64]) {
+    fn begin(&self, at: &MotionState, own: &mut [f64]) {
         self.slider.begin(at, own);
     }
 
-    fn restoring_n(&self, branch: Branch, _: &At, _: &[f64]) -> [f64; 3] {
-        self.friction.sliding(branch)
+    fn restoring_n(&self, regime: Regime, _: &MotionState, _: &[f64]) -> [f64; 3] {
+        self.friction.sliding(regime)
     }
 
-    fn follow(&self, at: &At, own: &mut [f64]) -> bool {
+    fn follow(&self, at: &MotionState, own: &mut [f64]) -> bool {
         self.slider.follow(at, own);
         true
     }
 
-    fn rate(&self, branch: Branch, at: &At, _: &[f64], rate: &mut [f64]) {
-        self.slider.rate(branch, at, rate);
+    fn rate(&self, regime: Regime, at: &MotionState, _: &[f64], rate: &mut [f64]) {
+        self.slider.rate(regime, at, rate);
     }
 
     fn holds(&self) -> Option<usize> {
         Some(self.friction.axis)
     }
 
-    fn locked(&self, branch: Branch) -> bool {
-        branch == STICKS_AHEAD || branch == STICKS_BEHIND
+    fn locked(&self, regime: Regime) -> bool {
+        regime == STICKS_AT_FRONT || regime == STICKS_AT_BACK
     }
 
-    fn margin(&self, branch: Branch, at: &At, own: &[f64], holding_n: f64) -> f64 {
+    fn margin(&self, regime: Regime, at: &MotionState, own: &[f64], holding_n: f64) -> f64 {
         let Friction { plus_n, minus_n, .. } = self.friction;
-        match branch {
-            STICKS_AHEAD => (plus_n - holding_n).min(holding_n),
-            STICKS_BEHIND => (minus_n + holding_n).min(-holding_n),
-            _ => self.slider.margin(branch, at, own),
+        match regime {
+            STICKS_AT_FRONT => (plus_n - holding_n).min(holding_n),
+            STICKS_AT_BACK => (minus_n + holding_n).min(-holding_n),
+            _ => self.slider.margin(regime, at, own),
         }
     }
 
-    fn next(&self, before: Option<Branch>, at: &At, own: &[f64], holding_n: f64) -> Branch {
+    fn next(&self, before: Option<Regime>, at: &MotionState, own: &[f64], holding_n: f64) -> Regime {
         let Friction { plus_n, minus_n, .. } = self.friction;
         match before {
-            None | Some(WITHIN) => self.slider.taken(at, own).unwrap_or(WITHIN),
-            Some(FORWARD) if holding_n > 0.0 => STICKS_AHEAD,
-            Some(BACKWARD) if holding_n < 0.0 => STICKS_BEHIND,
-            Some(STICKS_AHEAD) if holding_n > 0.5 * plus_n => FORWARD,
-            Some(STICKS_BEHIND) if holding_n < -0.5 * minus_n => BACKWARD,
+            None | Some(WITHIN) => self.slider.dragged(at, own).unwrap_or(WITHIN),
+            Some(SLIP_FORWARD) if holding_n > 0.0 => STICKS_AT_FRONT,
+            Some(SLIP_BACKWARD) if holding_n < 0.0 => STICKS_AT_BACK,
+            Some(STICKS_AT_FRONT) if holding_n > 0.5 * plus_n => SLIP_FORWARD,
+            Some(STICKS_AT_BACK) if holding_n < -0.5 * minus_n => SLIP_BACKWARD,
             _ => WITHIN,
         }
     }
@@ -347,39 +351,39 @@ impl Term for BehindPlay {
 /// Exponent of Hertz's law, force over indentation, for contacts of non-conforming bodies.
 const HERTZ: f64 = 1.5;
 
-impl Term for BehindClearance {
+impl RestoringForce for FrictionBehindClearance {
     fn states(&self) -> usize {
         1
     }
 
-    fn begin(&self, at: &At, own: &mut [f64]) {
+    fn begin(&self, at: &MotionState, own: &mut [f64]) {
         self.slider.begin(at, own);
     }
 
-    fn restoring_n(&self, _: Branch, at: &At, own: &[f64]) -> [f64; 3] {
-        let ahead_m = self.slider.ahead_m(at, own);
-        let pressed_m = ahead_m.abs() - (self.slider.reach_m - self.contact_m);
+    fn restoring_n(&self, _: Regime, at: &MotionState, own: &[f64]) -> [f64; 3] {
+        let lead_m = self.slider.lead_m(at, own);
+        let pressed_m = lead_m.abs() - (self.slider.reach_m - self.contact_m);
         let share = (pressed_m / self.contact_m).clamp(0.0, 1.0).powf(HERTZ);
-        let way = if ahead_m > 0.0 { FORWARD } else { BACKWARD };
-        self.friction.sliding(way).map(|force| share * force)
+        let direction = if lead_m > 0.0 { SLIP_FORWARD } else { SLIP_BACKWARD };
+        self.friction.sliding(direction).map(|force| share * force)
     }
 
-    fn follow(&self, at: &At, own: &mut [f64]) -> bool {
+    fn follow(&self, at: &MotionState, own: &mut [f64]) -> bool {
         self.slider.follow(at, own);
         true
     }
 
-    fn rate(&self, branch: Branch, at: &At, _: &[f64], rate: &mut [f64]) {
-        self.slider.rate(branch, at, rate);
+    fn rate(&self, regime: Regime, at: &MotionState, _: &[f64], rate: &mut [f64]) {
+        self.slider.rate(regime, at, rate);
     }
 
-    fn margin(&self, branch: Branch, at: &At, own: &[f64], _: f64) -> f64 {
-        self.slider.margin(branch, at, own)
+    fn margin(&self, regime: Regime, at: &MotionState, own: &[f64], _: f64) -> f64 {
+        self.slider.margin(regime, at, own)
     }
 
-    fn next(&self, before: Option<Branch>, at: &At, own: &[f64], _: f64) -> Branch {
+    fn next(&self, before: Option<Regime>, at: &MotionState, own: &[f64], _: f64) -> Regime {
         match before {
-            None | Some(WITHIN) => self.slider.taken(at, own).unwrap_or(WITHIN),
+            None | Some(WITHIN) => self.slider.dragged(at, own).unwrap_or(WITHIN),
             _ => WITHIN,
         }
     }

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::sensor_gain::meant;
+use super::sensor_gain::acts_on;
 use super::{Class, Effect, EffectName, EffectSpec, Locations, Parameter, Pickup, Treatment};
 use crate::structure::Direction;
 
@@ -51,7 +51,7 @@ impl Effect for CrossAxis {
 
     fn alter_channel(&self, channel: &mut Pickup) {
         if let Some(axis) = self.direction.axis()
-            && meant(self.channel.as_deref(), channel)
+            && acts_on(self.channel.as_deref(), channel)
             // Without a named channel, the channels of that direction itself are left as they are.
             && (self.channel.is_some() || channel.weights[axis] == 0.0)
         {

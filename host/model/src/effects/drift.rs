@@ -4,12 +4,12 @@ use std::sync::Arc;
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::place::{axis_of, static_stiffness};
+use super::location::{axis_of, static_stiffness};
 use super::{
     Argument, Class, Effect, EffectError, EffectName, EffectSpec, Locations, Parameter, Prior, Treatment,
 };
 use crate::structure::{Direction, Structure};
-use crate::{At, Branch, Term};
+use crate::{MotionState, Regime, RestoringForce};
 
 /// The specification.
 pub(super) const DRIFT: EffectSpec = EffectSpec {
@@ -48,28 +48,28 @@ pub(super) const DRIFT: EffectSpec = EffectSpec {
         let direction = values.direction()?;
         let time_constant = values.number("time_constant_s")?;
         let law = match (time_constant, values.number("relative_change")?) {
-            (Some(time_constant_s), Some(change)) => Law::Settles {
+            (Some(time_constant_s), Some(change)) => DriftLaw::Settles {
                 change,
                 time_constant_s,
             },
-            (Some(time_constant_s), None) => Law::Settles {
+            (Some(time_constant_s), None) => DriftLaw::Settles {
                 change: values.main("relative_change")?,
                 time_constant_s,
             },
             (None, Some(_)) => return Err(values.missing("time_constant_s beside relative_change")),
-            (None, None) => Law::Rate(values.rate("relative_rate_per_s")?),
+            (None, None) => DriftLaw::Rate(values.rate("relative_rate_per_s")?),
         };
         Ok(Arc::new(Drift { law, direction }))
     },
 };
 
 #[derive(Clone, Copy, Debug)]
-enum Law {
+enum DriftLaw {
     Rate(f64),
     Settles { change: f64, time_constant_s: f64 },
 }
 
-impl Law {
+impl DriftLaw {
     fn relative_change(self, t: f64) -> f64 {
         match self {
             Self::Rate(rate) => rate * t,
@@ -83,13 +83,13 @@ impl Law {
 
 #[derive(Clone, Copy, Debug)]
 struct Drift {
-    law: Law,
+    law: DriftLaw,
     direction: Option<Direction>,
 }
 
 #[derive(Debug)]
-struct Spring {
-    law: Law,
+struct DriftingSpring {
+    law: DriftLaw,
     stiffness: Matrix3<f64>,
 }
 
@@ -98,7 +98,7 @@ impl Effect for Drift {
         EffectName::Drift
     }
 
-    fn terms(&self, structure: &Structure) -> Result<Vec<Box<dyn Term>>, EffectError> {
+    fn restoring_forces(&self, structure: &Structure) -> Result<Vec<Box<dyn RestoringForce>>, EffectError> {
         let mut stiffness = static_stiffness(structure, self.name())?;
         if self.direction.is_some() {
             let axis = axis_of(structure, self.direction, self.name())?;
@@ -106,15 +106,15 @@ impl Effect for Drift {
             stiffness.fill(0.0);
             stiffness[(axis, axis)] = own;
         }
-        Ok(vec![Box::new(Spring {
+        Ok(vec![Box::new(DriftingSpring {
             law: self.law,
             stiffness,
         })])
     }
 }
 
-impl Term for Spring {
-    fn restoring_n(&self, _: Branch, at: &At, _: &[f64]) -> [f64; 3] {
+impl RestoringForce for DriftingSpring {
+    fn restoring_n(&self, _: Regime, at: &MotionState, _: &[f64]) -> [f64; 3] {
         (self.stiffness * Vector3::from(at.x) * self.law.relative_change(at.t)).into()
     }
 }

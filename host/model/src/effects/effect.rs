@@ -5,7 +5,7 @@ use std::fmt::Debug;
 use super::pickup::Pickup;
 use super::{EffectError, EffectName};
 use crate::structure::Structure;
-use crate::{Cutter, Dynamics, ModelError, Spindle, Term};
+use crate::{Cutter, Dynamics, ModelError, RestoringForce, Spindle};
 
 /// An effect with values for its parameters. It acts through one or more of the methods that change a model; by default they do nothing.
 pub trait Effect: Debug + Send + Sync {
@@ -37,7 +37,7 @@ pub trait Effect: Debug + Send + Sync {
     ///
     /// # Errors
     /// The structure does not have the direction of the effect, or its static stiffness is not known.
-    fn terms(&self, _structure: &Structure) -> Result<Vec<Box<dyn Term>>, EffectError> {
+    fn restoring_forces(&self, _structure: &Structure) -> Result<Vec<Box<dyn RestoringForce>>, EffectError> {
         Ok(Vec::new())
     }
 

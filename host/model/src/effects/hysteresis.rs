@@ -7,12 +7,12 @@ use std::sync::Arc;
 
 use num_complex::Complex64;
 
-use super::place::{along, axis_of};
+use super::location::{along, axis_of};
 use super::{
     Argument, Class, Effect, EffectError, EffectName, EffectSpec, Locations, Parameter, Prior, Treatment,
 };
 use crate::structure::{Direction, Structure};
-use crate::{At, Branch, Term};
+use crate::{MotionState, Regime, RestoringForce};
 
 /// The specification.
 pub(super) const HYSTERESIS: EffectSpec = EffectSpec {
@@ -118,34 +118,34 @@ struct BoucWen {
 }
 
 /// Bit of a regime that is set for negative velocity.
-const BACKWARD: Branch = 1;
+const BACKWARD: Regime = 1;
 /// Bit of a regime that is set for negative z.
-const NEGATIVE: Branch = 2;
+const NEGATIVE: Regime = 2;
 
 impl Effect for Hysteresis {
     fn id(&self) -> EffectName {
         EffectName::Hysteresis
     }
 
-    fn terms(&self, structure: &Structure) -> Result<Vec<Box<dyn Term>>, EffectError> {
+    fn restoring_forces(&self, structure: &Structure) -> Result<Vec<Box<dyn RestoringForce>>, EffectError> {
         let axis = axis_of(structure, self.direction, self.name())?;
         Ok(vec![Box::new(BoucWen { effect: *self, axis })])
     }
 }
 
 impl BoucWen {
-    fn signs(branch: Branch) -> (f64, f64) {
-        let sign = |bit| if branch & bit == 0 { 1.0 } else { -1.0 };
+    fn signs(regime: Regime) -> (f64, f64) {
+        let sign = |bit| if regime & bit == 0 { 1.0 } else { -1.0 };
         (sign(BACKWARD), sign(NEGATIVE))
     }
 }
 
-impl Term for BoucWen {
+impl RestoringForce for BoucWen {
     fn states(&self) -> usize {
         1
     }
 
-    fn restoring_n(&self, _: Branch, at: &At, own: &[f64]) -> [f64; 3] {
+    fn restoring_n(&self, _: Regime, at: &MotionState, own: &[f64]) -> [f64; 3] {
         along(self.axis, self.effect.stiffness * (own[0] - at.x[self.axis]))
     }
 
@@ -154,8 +154,8 @@ impl Term for BoucWen {
         has_closed_form.then(|| self.effect.stiffness * describing_function(amplitude_m, self.effect.yield_m))
     }
 
-    fn rate(&self, branch: Branch, at: &At, own: &[f64], rate: &mut [f64]) {
-        let (of_velocity, of_z) = Self::signs(branch);
+    fn rate(&self, regime: Regime, at: &MotionState, own: &[f64], rate: &mut [f64]) {
+        let (of_velocity, of_z) = Self::signs(regime);
         let Hysteresis {
             yield_m,
             exponent,
@@ -175,21 +175,21 @@ impl Term for BoucWen {
         own[0] = own[0].clamp(-self.effect.yield_m, self.effect.yield_m);
     }
 
-    fn margin(&self, branch: Branch, at: &At, own: &[f64], _: f64) -> f64 {
-        let (of_velocity, of_z) = Self::signs(branch);
+    fn margin(&self, regime: Regime, at: &MotionState, own: &[f64], _: f64) -> f64 {
+        let (of_velocity, of_z) = Self::signs(regime);
         // Velocity and z have different units, but only the sign of the margin is used.
         (of_velocity * at.v[self.axis]).min(of_z * own[0])
     }
 
-    fn next(&self, before: Option<Branch>, at: &At, own: &[f64], _: f64) -> Branch {
-        let mut branch = 0;
+    fn next(&self, before: Option<Regime>, at: &MotionState, own: &[f64], _: f64) -> Regime {
+        let mut regime = 0;
         if at.v[self.axis] < 0.0 {
-            branch |= BACKWARD;
+            regime |= BACKWARD;
         }
         if own[0] < 0.0 {
-            branch |= NEGATIVE;
+            regime |= NEGATIVE;
         }
-        let Some(before) = before else { return branch };
+        let Some(before) = before else { return regime };
         // A regime ends where velocity or z becomes zero; that quantity changes its sign.
         let (of_velocity, of_z) = Self::signs(before);
         let (v, z) = (of_velocity * at.v[self.axis], of_z * own[0]);

@@ -25,13 +25,13 @@ pub(super) enum Matrix {
 enum Change {
     Relative(f64),
     /// Absolute value of a diagonal entry of the matrix, in SI units.
-    Entry(f64),
+    DiagonalEntry(f64),
     /// Absolute value of the natural frequency, Hz, or of the damping ratio of the only mode.
-    OfMode(f64),
+    ModeValue(f64),
 }
 
 #[derive(Clone, Copy, Debug)]
-struct Linear {
+struct LinearChange {
     matrix: Matrix,
     change: Change,
     direction: Option<Direction>,
@@ -45,22 +45,22 @@ pub(super) fn build(matrix: Matrix, values: &mut Values) -> Result<Arc<dyn Effec
         Matrix::Damping => ("damping_ns_per_m", Some("damping_ratio")),
     };
     let change = if let Some(value) = values.number(entry)? {
-        Change::Entry(value)
+        Change::DiagonalEntry(value)
     } else if let Some(value) = of_mode.map(|key| values.number(key)).transpose()?.flatten() {
-        Change::OfMode(value)
+        Change::ModeValue(value)
     } else {
         let named = values.number("relative_change")?;
         let bare = values.number("")?;
         Change::Relative(named.or(bare).ok_or_else(|| values.missing(entry))?)
     };
-    Ok(Arc::new(Linear {
+    Ok(Arc::new(LinearChange {
         matrix,
         change,
         direction,
     }))
 }
 
-impl Linear {
+impl LinearChange {
     fn refused(&self, what: &str) -> EffectError {
         EffectError::Structure {
             name: self.name(),
@@ -68,7 +68,7 @@ impl Linear {
         }
     }
 
-    fn of_matrix(&self, matrix: &mut DMatrix<f64>, directions: &[Direction]) -> Result<(), EffectError> {
+    fn change_matrix(&self, matrix: &mut DMatrix<f64>, directions: &[Direction]) -> Result<(), EffectError> {
         let index = match self.direction {
             Some(direction) => Some(
                 directions
@@ -82,18 +82,18 @@ impl Linear {
         match (self.change, index) {
             (Change::Relative(change), Some(index)) => matrix[(index, index)] *= 1.0 + change,
             (Change::Relative(change), None) => *matrix *= 1.0 + change,
-            (Change::Entry(value), Some(index)) => matrix[(index, index)] = value,
-            (Change::Entry(_), None) => {
+            (Change::DiagonalEntry(value), Some(index)) => matrix[(index, index)] = value,
+            (Change::DiagonalEntry(_), None) => {
                 return Err(self.refused("an absolute value needs a direction (direction = \"x\")"));
             }
-            (Change::OfMode(_), _) => {
+            (Change::ModeValue(_), _) => {
                 return Err(self.refused("frequency and damping ratio are for structures of modes"));
             }
         }
         Ok(())
     }
 
-    fn of_modes(&self, modes: &mut [Mode]) -> Result<(), EffectError> {
+    fn change_modes(&self, modes: &mut [Mode]) -> Result<(), EffectError> {
         if self.direction.is_some() {
             return Err(self.refused("modes are changed as a whole: leave the direction out"));
         }
@@ -122,7 +122,7 @@ impl Linear {
                     }
                 }
             }
-            Change::OfMode(value) => {
+            Change::ModeValue(value) => {
                 let [mode] = modes else {
                     return Err(self.refused("the structure has several modes: say a relative change"));
                 };
@@ -131,7 +131,7 @@ impl Linear {
                     _ => mode.damping_ratio = value,
                 }
             }
-            Change::Entry(_) => {
+            Change::DiagonalEntry(_) => {
                 return Err(
                     self.refused("modes have frequencies and damping ratios, not masses and stiffnesses")
                 );
@@ -147,7 +147,7 @@ impl Linear {
     }
 }
 
-impl Effect for Linear {
+impl Effect for LinearChange {
     fn id(&self) -> EffectName {
         match self.matrix {
             Matrix::Mass => EffectName::Mass,
@@ -164,9 +164,9 @@ impl Effect for Linear {
                     Matrix::Stiffness => &mut matrices.stiffness,
                     Matrix::Damping => &mut matrices.damping,
                 };
-                self.of_matrix(matrix, &structure.directions)
+                self.change_matrix(matrix, &structure.directions)
             }
-            Form::Modes(modes) => self.of_modes(modes),
+            Form::Modes(modes) => self.change_modes(modes),
             Form::Joints(_) => Err(EffectError::Structure {
                 name: self.name(),
                 what:

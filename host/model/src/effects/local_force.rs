@@ -2,10 +2,10 @@
 
 use num_complex::Complex64;
 
-use super::place::{along, axis_of};
+use super::location::{along, axis_of};
 use super::{Effect, EffectError, EffectName};
 use crate::structure::{Direction, Structure};
-use crate::{At, Branch, Slopes, Term};
+use crate::{MotionState, Regime, RestoringForce, Slopes};
 
 /// Force law: f_r, N, from up to two coefficients, the displacement x, m, and the velocity v, m/s.
 pub(super) type Law = fn([f64; 2], f64, f64) -> f64;
@@ -23,14 +23,14 @@ pub(super) struct LocalForce {
     pub(super) law: Law,
     /// Derivatives ∂f_r/∂x, N/m, and ∂f_r/∂v, N s/m, of the force law.
     pub(super) slopes: fn([f64; 2], f64, f64) -> [f64; 2],
-    /// Describing function N(X, ω) of the force law: see [`Term::describing_function`].
+    /// Describing function N(X, ω) of the force law: see [`RestoringForce::describing_function`].
     pub(super) describing_function: DescribingFunction,
     /// Direction of the force; `None` for the only direction of a structure.
     pub(super) direction: Option<Direction>,
 }
 
 #[derive(Debug)]
-struct Force {
+struct ForceAlongAxis {
     coefficients: [f64; 2],
     law: Law,
     slopes: fn([f64; 2], f64, f64) -> [f64; 2],
@@ -43,8 +43,8 @@ impl Effect for LocalForce {
         self.id
     }
 
-    fn terms(&self, structure: &Structure) -> Result<Vec<Box<dyn Term>>, EffectError> {
-        Ok(vec![Box::new(Force {
+    fn restoring_forces(&self, structure: &Structure) -> Result<Vec<Box<dyn RestoringForce>>, EffectError> {
+        Ok(vec![Box::new(ForceAlongAxis {
             coefficients: self.coefficients,
             law: self.law,
             slopes: self.slopes,
@@ -54,13 +54,13 @@ impl Effect for LocalForce {
     }
 }
 
-impl Term for Force {
-    fn restoring_n(&self, _: Branch, at: &At, _: &[f64]) -> [f64; 3] {
+impl RestoringForce for ForceAlongAxis {
+    fn restoring_n(&self, _: Regime, at: &MotionState, _: &[f64]) -> [f64; 3] {
         let force = (self.law)(self.coefficients, at.x[self.axis], at.v[self.axis]);
         along(self.axis, force)
     }
 
-    fn slopes(&self, at: &At) -> Option<Slopes> {
+    fn slopes(&self, at: &MotionState) -> Option<Slopes> {
         let [by_x, by_v] = (self.slopes)(self.coefficients, at.x[self.axis], at.v[self.axis]);
         let mut slopes = Slopes::default();
         slopes.stiffness[self.axis][self.axis] = by_x;

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::place::axis_of;
+use super::location::axis_of;
 use super::{Class, Effect, EffectError, EffectName, EffectSpec, Locations, Parameter, Prior, Treatment};
 use crate::Dynamics;
 use crate::structure::{Direction, Structure};

@@ -21,13 +21,13 @@ mod hysteresis;
 mod linear_change;
 mod list;
 mod local_force;
+mod location;
 mod mass;
 mod missing_mode;
 mod mode_coupling;
 pub(crate) mod nearest;
 mod parameter;
 mod pickup;
-mod place;
 mod process_damping;
 mod quadratic_damping;
 mod quadratic_stiffness;
@@ -58,7 +58,7 @@ pub use set::Effects;
 pub use spec::{Argument, Class, EffectSpec, Locations, Treatment};
 pub use values::{Value, Values};
 
-/// Describing functions of laws with a coefficient of 1: see [`Term::describing_function`](crate::Term::describing_function).
+/// Describing functions of laws with a coefficient of 1: see [`RestoringForce::describing_function`](crate::RestoringForce::describing_function).
 pub mod describing_functions {
     pub use super::backlash::describing_function as backlash;
     pub use super::coulomb_friction::describing_function as coulomb_friction;

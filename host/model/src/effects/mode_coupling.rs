@@ -4,10 +4,10 @@
 
 use std::sync::Arc;
 
-use super::place::axis_of;
+use super::location::axis_of;
 use super::{Argument, Class, Effect, EffectError, EffectName, EffectSpec, Locations, Parameter, Treatment};
 use crate::structure::{Direction, Structure};
-use crate::{At, Branch, Slopes, Term};
+use crate::{MotionState, Regime, RestoringForce, Slopes};
 
 /// The specification.
 pub(super) const MODE_COUPLING: EffectSpec = EffectSpec {
@@ -57,7 +57,7 @@ struct ModeCoupling {
 }
 
 #[derive(Debug)]
-struct Shared {
+struct CouplingPotential {
     quartic: f64,
     cubic: f64,
     axes: [usize; 2],
@@ -68,7 +68,7 @@ impl Effect for ModeCoupling {
         EffectName::ModeCoupling
     }
 
-    fn terms(&self, structure: &Structure) -> Result<Vec<Box<dyn Term>>, EffectError> {
+    fn restoring_forces(&self, structure: &Structure) -> Result<Vec<Box<dyn RestoringForce>>, EffectError> {
         let axes = match self.directions {
             Some([a, b]) => [
                 axis_of(structure, Some(a), self.name())?,
@@ -88,7 +88,7 @@ impl Effect for ModeCoupling {
                 }
             }
         };
-        Ok(vec![Box::new(Shared {
+        Ok(vec![Box::new(CouplingPotential {
             quartic: self.quartic,
             cubic: self.cubic,
             axes,
@@ -96,8 +96,8 @@ impl Effect for ModeCoupling {
     }
 }
 
-impl Term for Shared {
-    fn restoring_n(&self, _: Branch, at: &At, _: &[f64]) -> [f64; 3] {
+impl RestoringForce for CouplingPotential {
+    fn restoring_n(&self, _: Regime, at: &MotionState, _: &[f64]) -> [f64; 3] {
         let (x, y) = (at.x[self.axes[0]], at.x[self.axes[1]]);
         let mut force = [0.0; 3];
         force[self.axes[0]] = x * y * (self.quartic * y + 2.0 * self.cubic);
@@ -105,7 +105,7 @@ impl Term for Shared {
         force
     }
 
-    fn slopes(&self, at: &At) -> Option<Slopes> {
+    fn slopes(&self, at: &MotionState) -> Option<Slopes> {
         let [a, b] = self.axes;
         let (x, y) = (at.x[a], at.x[b]);
         let mut slopes = Slopes::default();

@@ -32,7 +32,7 @@ pub(super) const PROCESS_DAMPING: EffectSpec = EffectSpec {
     source: "Altintas, Eynian and Onozuka, CIRP Annals 57 (2008)",
     example: "process_damping_n_per_m = 2e5\nfriction = 0.3",
     build: |values| {
-        Ok(Arc::new(OfFlank(ProcessDamping {
+        Ok(Arc::new(FlankDamping(ProcessDamping {
             n_per_m: values.main("process_damping_n_per_m")?,
             friction: values.number("friction")?.unwrap_or(0.0),
         })))
@@ -40,9 +40,9 @@ pub(super) const PROCESS_DAMPING: EffectSpec = EffectSpec {
 };
 
 #[derive(Clone, Copy, Debug)]
-struct OfFlank(ProcessDamping);
+struct FlankDamping(ProcessDamping);
 
-impl Effect for OfFlank {
+impl Effect for FlankDamping {
     fn id(&self) -> EffectName {
         EffectName::ProcessDamping
     }

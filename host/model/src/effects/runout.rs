@@ -32,7 +32,7 @@ pub(super) const RUNOUT: EffectSpec = EffectSpec {
     source: "Kline and DeVor, Int. J. Mach. Tool Des. Res. 23 (1983)",
     example: "runout_um = 12.0\nangle_deg = 30.0",
     build: |values| {
-        Ok(Arc::new(OfTool(Runout {
+        Ok(Arc::new(ToolRunout(Runout {
             offset_um: values.main("runout_um")?,
             angle_deg: values.number("angle_deg")?.unwrap_or(0.0),
         })))
@@ -40,9 +40,9 @@ pub(super) const RUNOUT: EffectSpec = EffectSpec {
 };
 
 #[derive(Clone, Copy, Debug)]
-struct OfTool(Runout);
+struct ToolRunout(Runout);
 
-impl Effect for OfTool {
+impl Effect for ToolRunout {
     fn id(&self) -> EffectName {
         EffectName::Runout
     }

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::sensor_gain::meant;
+use super::sensor_gain::acts_on;
 use super::{Class, Effect, EffectName, EffectSpec, Locations, Parameter, Pickup, Treatment};
 
 /// The specification.
@@ -41,7 +41,7 @@ impl Effect for SensorDelay {
     }
 
     fn alter_channel(&self, channel: &mut Pickup) {
-        if meant(self.channel.as_deref(), channel) {
+        if acts_on(self.channel.as_deref(), channel) {
             channel.delay_s += self.delay_s;
         }
     }

@@ -48,7 +48,7 @@ impl Effect for SensorGain {
     }
 
     fn alter_channel(&self, channel: &mut Pickup) {
-        if meant(self.channel.as_deref(), channel) {
+        if acts_on(self.channel.as_deref(), channel) {
             for weight in &mut channel.weights {
                 *weight *= self.gain;
             }
@@ -57,7 +57,7 @@ impl Effect for SensorGain {
 }
 
 /// True if a sensor effect acts on `channel`: the channel of that name, or without a name every channel of motion.
-pub(super) fn meant(name: Option<&str>, channel: &Pickup) -> bool {
+pub(super) fn acts_on(name: Option<&str>, channel: &Pickup) -> bool {
     match name {
         Some(name) => channel.name == name,
         None => channel.quantity != Quantity::Force,

@@ -4,7 +4,7 @@
 
 use std::sync::Arc;
 
-use super::sensor_gain::meant;
+use super::sensor_gain::acts_on;
 use super::{
     Class, Effect, EffectError, EffectName, EffectSpec, Locations, Parameter, Pickup, Treatment, ValueKind,
 };
@@ -77,7 +77,7 @@ impl Effect for SensorOffset {
     }
 
     fn alter_channel(&self, channel: &mut Pickup) {
-        if !meant(self.channel.as_deref(), channel) {
+        if !acts_on(self.channel.as_deref(), channel) {
             return;
         }
         if let [ratio] = self.ratios[..] {

@@ -7,7 +7,7 @@ use super::pickup::Pickup;
 use super::values::{Value, Values};
 use super::{EffectError, EffectName, coulomb_friction};
 use crate::structure::Structure;
-use crate::{Cutter, Dynamics, ModelError, Spindle, Term};
+use crate::{Cutter, Dynamics, ModelError, RestoringForce, Spindle};
 
 /// The effects of one simulation, in the order in which they act.
 #[derive(Clone, Debug, Default)]
@@ -75,7 +75,7 @@ impl Effects {
     }
 
     fn build(mut all: Vec<Values>) -> Result<Self, EffectError> {
-        coulomb_friction::take_play(&mut all)?;
+        coulomb_friction::take_backlash(&mut all)?;
         let by_location: Vec<Vec<Values>> = all
             .into_iter()
             .map(Values::by_location)
@@ -114,18 +114,25 @@ impl Effects {
     ///
     /// # Errors
     /// An effect that is not possible for this structure, or an indefinite structure.
-    pub fn dynamics(&self, structure: &Structure) -> Result<(Dynamics, Vec<Box<dyn Term>>), ModelError> {
+    pub fn dynamics(
+        &self,
+        structure: &Structure,
+    ) -> Result<(Dynamics, Vec<Box<dyn RestoringForce>>), ModelError> {
         let structure = self.altered(structure)?;
         let mut dynamics = Dynamics::new(&structure)?;
-        let mut terms = Vec::new();
+        let mut restoring_forces = Vec::new();
         for effect in &self.0 {
             effect.alter_dynamics(&structure, &mut dynamics)?;
-            terms.extend(effect.terms(&structure)?);
+            restoring_forces.extend(effect.restoring_forces(&structure)?);
         }
-        if dynamics.velocity_jumps() && terms.iter().any(|term| term.holds().is_some()) {
+        if dynamics.velocity_jumps()
+            && restoring_forces
+                .iter()
+                .any(|restoring_force| restoring_force.holds().is_some())
+        {
             return Err(EffectError::NoInertia.into());
         }
-        Ok((dynamics, terms))
+        Ok((dynamics, restoring_forces))
     }
 
     /// The tool in its cut with the changes of these effects.

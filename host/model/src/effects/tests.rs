@@ -109,13 +109,13 @@ fn closed_forms_of_describing_functions_are_the_sums() {
         &["hysteresis=2e5", "hysteresis.yield_m=1e-5"],
     ] {
         let effects = Effects::parse(texts.iter().copied()).unwrap();
-        for term in effects
+        for restoring_force in effects
             .0
             .iter()
-            .flat_map(|effect| effect.terms(&structure).unwrap())
+            .flat_map(|effect| effect.restoring_forces(&structure).unwrap())
         {
-            let closed = term.describing_function(amplitude, omega).unwrap();
-            let force = &restoring_along(&*term, &motion)[1];
+            let closed = restoring_force.describing_function(amplitude, omega).unwrap();
+            let force = &restoring_along(&*restoring_force, &motion)[1];
             let last = (periods - 1) * count as usize..periods * count as usize;
             let part = |of: fn(f64) -> f64| {
                 let sum: f64 = last.clone().map(|n| force[n] * of(angle(n))).sum();

@@ -59,7 +59,7 @@ impl Value {
         }
     }
 
-    pub(super) fn said(&self) -> String {
+    pub(super) fn in_words(&self) -> String {
         match self {
             Self::Number(number) => number.to_string(),
             Self::Text(text) => text.clone(),
@@ -284,7 +284,7 @@ impl Values {
         EffectError::Value {
             name: self.effect.name(),
             key: key.into(),
-            found: found.said(),
+            found: found.in_words(),
             needed,
         }
     }

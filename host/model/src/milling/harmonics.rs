@@ -51,13 +51,13 @@ fn exponentials(vector: &RotatingVector) -> [Vector3<Complex64>; 3] {
 /// (1/θ) ∫ e^{imφ} e^{−ikN(φ − start)} dφ from start to exit, with N = 2π/θ.
 fn integral(engagement: &Engagement, m: i32, k: i32) -> Complex64 {
     let Engagement { start, exit, pitch } = *engagement;
-    let (m, turns) = (f64::from(m), f64::from(k) * std::f64::consts::TAU / pitch);
-    let rate = m - turns;
+    let (m, harmonic_rate) = (f64::from(m), f64::from(k) * std::f64::consts::TAU / pitch);
+    let rate = m - harmonic_rate;
     let sum = if rate.abs() < 1e-9 {
         // N is an integer, so that the rate is zero or at least one in magnitude.
-        Complex64::cis(turns * start) * (exit - start)
+        Complex64::cis(harmonic_rate * start) * (exit - start)
     } else {
-        let at_exit = Complex64::cis(m * exit - turns * (exit - start));
+        let at_exit = Complex64::cis(m * exit - harmonic_rate * (exit - start));
         (at_exit - Complex64::cis(m * start)) / Complex64::new(0.0, rate)
     };
     sum / pitch

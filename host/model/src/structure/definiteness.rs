@@ -97,18 +97,18 @@ impl fmt::Display for Remedy {
 /// The test uses the symmetric parts, since only these store or dissipate energy. Mass must be positive definite, stiffness
 /// and damping at least positive semidefinite.
 pub(super) fn indefinite(matrices: &Matrices, directions: &[Direction]) -> Vec<Indefinite> {
-    let judged = [
+    let requirements = [
         ("mass", &matrices.mass, true),
         ("stiffness", &matrices.stiffness, false),
         ("damping", &matrices.damping, false),
     ];
-    judged
+    requirements
         .into_iter()
-        .filter_map(|(name, matrix, strict)| judge(name, matrix, strict, &matrices.mass, directions))
+        .filter_map(|(name, matrix, strict)| violation(name, matrix, strict, &matrices.mass, directions))
         .collect()
 }
 
-fn judge(
+fn violation(
     name: &'static str,
     matrix: &DMatrix<f64>,
     strict: bool,
@@ -180,7 +180,7 @@ fn remedy(
         direction: directions[row],
     };
     for &entry in &signs {
-        if is_definite(&with_turned_sign(symmetric, entry), strict) {
+        if is_definite(&with_reversed_sign(symmetric, entry), strict) {
             return vec![sign(entry)];
         }
     }
@@ -190,9 +190,9 @@ fn remedy(
         }
     }
     for &entry in &signs {
-        let turned = with_turned_sign(symmetric, entry);
+        let reversed = with_reversed_sign(symmetric, entry);
         for row in 0..size {
-            if let Some(above) = least_diagonal(&turned, row, strict) {
+            if let Some(above) = least_diagonal(&reversed, row, strict) {
                 return vec![sign(entry), diagonal(row, above)];
             }
         }
@@ -200,11 +200,11 @@ fn remedy(
     Vec::new()
 }
 
-fn with_turned_sign(symmetric: &DMatrix<f64>, (i, j): (usize, usize)) -> DMatrix<f64> {
-    let mut turned = symmetric.clone();
-    turned[(i, j)] = -turned[(i, j)];
-    turned[(j, i)] = -turned[(j, i)];
-    turned
+fn with_reversed_sign(symmetric: &DMatrix<f64>, (i, j): (usize, usize)) -> DMatrix<f64> {
+    let mut reversed = symmetric.clone();
+    reversed[(i, j)] = -reversed[(i, j)];
+    reversed[(j, i)] = -reversed[(j, i)];
+    reversed
 }
 
 /// Lower bound of the diagonal entry `row` for a definite matrix, sᵀ R⁻¹ s (Schur complement): s is the remainder of the row, R the matrix

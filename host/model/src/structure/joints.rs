@@ -49,7 +49,7 @@ pub struct Robot {
 }
 
 /// Positions and orientations of joints, links and tool at a posture, in the base frame.
-struct Placed {
+struct PostureGeometry {
     /// For each joint, the direction of its axis and a point on that axis, m.
     axes: Vec<(Vector3<f64>, Vector3<f64>)>,
     /// For each link, its rotation from the zero position and its centre of mass, m.
@@ -66,7 +66,7 @@ impl Robot {
         }
     }
 
-    fn placed(&self) -> Placed {
+    fn geometry(&self) -> PostureGeometry {
         let (mut rotation, mut shift) = (Rotation3::identity(), Vector3::zeros());
         let mut axes = Vec::with_capacity(self.joints.len());
         let mut links = Vec::with_capacity(self.joints.len());
@@ -75,13 +75,13 @@ impl Robot {
                 rotation * joint.axis.into_inner(),
                 rotation * joint.point_m + shift,
             ));
-            let turn = Rotation3::from_axis_angle(&joint.axis, *angle);
-            // This joint maps x to turn (x − point) + point, before the joints between it and the base act.
-            shift += rotation * (joint.point_m - turn * joint.point_m);
-            rotation *= turn;
+            let rotation_of_joint = Rotation3::from_axis_angle(&joint.axis, *angle);
+            // This joint maps x to rotation_of_joint (x − point) + point, before the joints between it and the base act.
+            shift += rotation * (joint.point_m - rotation_of_joint * joint.point_m);
+            rotation *= rotation_of_joint;
             links.push((rotation, rotation * joint.center_m + shift));
         }
-        Placed {
+        PostureGeometry {
             axes,
             links,
             tool_m: rotation * self.tool_m + shift,
@@ -89,37 +89,40 @@ impl Robot {
     }
 
     /// Position of the tool centre point in the base frame, m.
-    pub fn tool_place_m(&self) -> Vector3<f64> {
-        self.placed().tool_m
+    pub fn tool_position_m(&self) -> Vector3<f64> {
+        self.geometry().tool_m
     }
 
     /// Jacobian J, 3 × n: displacement of the tool centre point, m, per joint angle, rad.
     pub fn jacobian(&self) -> Matrix3xX<f64> {
-        let placed = self.placed();
-        jacobian(&placed, self.joints.len(), placed.tool_m)
+        let geometry = self.geometry();
+        jacobian(&geometry, self.joints.len(), geometry.tool_m)
     }
 
     /// Displacement of the centre of mass of the last link, m, per joint angle, rad.
     pub fn payload_jacobian(&self) -> Matrix3xX<f64> {
-        let placed = self.placed();
-        let center = placed.links.last().map_or(placed.tool_m, |(_, center)| *center);
-        jacobian(&placed, self.joints.len(), center)
+        let geometry = self.geometry();
+        let center = geometry
+            .links
+            .last()
+            .map_or(geometry.tool_m, |(_, center)| *center);
+        jacobian(&geometry, self.joints.len(), center)
     }
 
     /// Mass matrix M(q₀) of the equation of motion in joint angles, kg m².
     pub fn mass(&self) -> DMatrix<f64> {
-        let placed = self.placed();
+        let geometry = self.geometry();
         let mut mass = DMatrix::from_diagonal(&self.of_joints(|joint| joint.rotor_kg_m2).diagonal());
-        for (index, (joint, (rotation, center))) in self.joints.iter().zip(&placed.links).enumerate() {
-            let moved = jacobian(&placed, index + 1, *center);
-            let turned = Matrix3xX::from_columns(
-                &placed.axes[..=index]
+        for (index, (joint, (rotation, center))) in self.joints.iter().zip(&geometry.links).enumerate() {
+            let moved = jacobian(&geometry, index + 1, *center);
+            let axes = Matrix3xX::from_columns(
+                &geometry.axes[..=index]
                     .iter()
                     .map(|(axis, _)| *axis)
                     .collect::<Vec<_>>(),
             );
             let inertia = rotation.matrix() * joint.inertia_kg_m2 * rotation.matrix().transpose();
-            let own = moved.tr_mul(&moved) * joint.mass_kg + turned.tr_mul(&(inertia * &turned));
+            let own = moved.tr_mul(&moved) * joint.mass_kg + axes.tr_mul(&(inertia * &axes));
             let mut part = mass.view_mut((0, 0), (index + 1, index + 1));
             part += own;
         }
@@ -153,8 +156,8 @@ impl Robot {
 }
 
 /// Displacement of a point, m, per angle of each of the first `count` joints, rad; these joints carry the point.
-fn jacobian(placed: &Placed, count: usize, point: Vector3<f64>) -> Matrix3xX<f64> {
-    let columns: Vec<Vector3<f64>> = placed.axes[..count]
+fn jacobian(geometry: &PostureGeometry, count: usize, point: Vector3<f64>) -> Matrix3xX<f64> {
+    let columns: Vec<Vector3<f64>> = geometry.axes[..count]
         .iter()
         .map(|(axis, on_axis)| axis.cross(&(point - on_axis)))
         .collect();
@@ -184,7 +187,7 @@ pub(crate) mod tests {
         let moved = |joint: usize, by: f64| {
             let mut angles = robot.angles_rad.clone();
             angles[joint] += by;
-            robot.at(&angles).placed()
+            robot.at(&angles).geometry()
         };
         for joint in 0..6 {
             let (low, high) = (moved(joint, -h), moved(joint, h));
@@ -195,9 +198,9 @@ pub(crate) mod tests {
             let mut twice = robot.joints[joint].rotor_kg_m2;
             for (link, body) in robot.joints.iter().enumerate() {
                 let speed = (high.links[link].1 - low.links[link].1) / (2.0 * h);
-                let rotation = robot.placed().links[link].0;
-                let turned = (high.links[link].0.matrix() - low.links[link].0.matrix()) / (2.0 * h);
-                let spin = turned * rotation.matrix().transpose();
+                let rotation = robot.geometry().links[link].0;
+                let derivative = (high.links[link].0.matrix() - low.links[link].0.matrix()) / (2.0 * h);
+                let spin = derivative * rotation.matrix().transpose();
                 let spin = Vector3::new(spin[(2, 1)], spin[(0, 2)], spin[(1, 0)]);
                 let local = rotation.inverse() * spin;
                 twice += body.mass_kg * speed.norm_squared() + local.dot(&(body.inertia_kg_m2 * local));

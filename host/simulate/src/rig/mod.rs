@@ -92,7 +92,7 @@ impl Rig {
             .ok_or(SimulateError::NoDirection {
                 direction: self.direction,
             })?;
-        let (dynamics, terms) = self.effects.dynamics(structure)?;
+        let (dynamics, restoring_forces) = self.effects.dynamics(structure)?;
         let model = Model {
             dynamics,
             cutting: None,
@@ -101,7 +101,7 @@ impl Rig {
                 signal: self.signal.clone(),
                 drop_ns_per_m: self.drop_ns_per_m,
             })),
-            terms,
+            restoring_forces,
         };
         let seconds = self.signal.duration_s();
         let count = (seconds * self.sample_rate_hz).floor() as usize;

@@ -147,7 +147,7 @@ fn dry_friction_takes_the_same_from_every_half_swing_and_then_holds() {
     }
     let last = y[y.len() - 1];
     assert!((last - wanted).abs() < 1e-9 && samples(&recording, "vy")[y.len() - 1] == 0.0);
-    assert!(swings > 5 && statistics.branch_changes >= swings as u64);
+    assert!(swings > 5 && statistics.regime_changes >= swings as u64);
 }
 
 #[test]

@@ -14,7 +14,7 @@ fn oscillator(drive: Option<Box<dyn Drive>>) -> Model {
         dynamics: Dynamics::new(case("insperger-1dof-ad1").structure().unwrap()).unwrap(),
         cutting: None,
         drive,
-        terms: Vec::new(),
+        restoring_forces: Vec::new(),
     }
 }
 

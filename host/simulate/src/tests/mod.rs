@@ -43,7 +43,7 @@ fn steady(case: &Case, spindle_rpm: f64, depth_mm: f64) -> Model {
             pores: None,
         }),
         drive: None,
-        terms: Vec::new(),
+        restoring_forces: Vec::new(),
     }
 }
 

@@ -134,7 +134,7 @@ fn the_sensor_sees_the_acceleration_without_delay_up_to_its_band() {
         dynamics: Dynamics::new(case.structure().unwrap()).unwrap(),
         cutting: None,
         drive: Some(Box::new(Slow)),
-        terms: Vec::new(),
+        restoring_forces: Vec::new(),
     };
     let mut sampler = Sampler::new(&model, Accelerometer::IIS3DWB_16G);
     model

@@ -30,7 +30,7 @@ use crate::limits::point::CutStability;
 use crate::limits::speed_line::{SpeedLine, Switch};
 use crate::process::extension::not_smooth;
 use crate::spectrum::stability_loss::StabilityLoss;
-use quietcut_model::Term;
+use quietcut_model::RestoringForce;
 use quietcut_model::case::Case;
 use quietcut_model::effects::{ALL, Treatment};
 
@@ -59,7 +59,7 @@ const NONE_MM: f64 = 1e-4;
 pub struct EquivalentProblem {
     /// Forced problem without the terms that are not smooth.
     smooth: ForcedProblem,
-    terms: Vec<Box<dyn Term>>,
+    terms: Vec<Box<dyn RestoringForce>>,
     feed_direction_deg: f64,
     /// Matrix from the states to the displacement along the machine's axes, 3 × n.
     displacement: DMatrix<f64>,

@@ -12,7 +12,7 @@ use crate::process::extension::{about_orbit, radial_m};
 use crate::process::treatment::is_not_smooth;
 use quietcut_model::case::Case;
 use quietcut_model::structure::FirstOrder;
-use quietcut_model::{At, ChipLaw, ProcessDamping, Term};
+use quietcut_model::{ChipLaw, MotionState, ProcessDamping, RestoringForce};
 
 /// Equation of the forced orbit, eqs 6.1 and 3.6 in first-order form:
 ///
@@ -79,7 +79,7 @@ impl Uneven {
 /// Smooth restoring forces f_r along the machine's axes.
 #[derive(Clone, Debug)]
 struct Smooth {
-    terms: Vec<Arc<dyn Term>>,
+    terms: Vec<Arc<dyn RestoringForce>>,
     /// Input matrix B in the machine's axes.
     b: DMatrix<f64>,
     /// Displacement matrix C and velocity matrix C A in the machine's axes.
@@ -97,7 +97,7 @@ struct Flank {
 }
 
 impl Smooth {
-    fn new(terms: Vec<Arc<dyn Term>>, machine: &FirstOrder) -> Self {
+    fn new(terms: Vec<Arc<dyn RestoringForce>>, machine: &FirstOrder) -> Self {
         let part = |rows: usize, columns: usize, of: &dyn Fn(usize, usize) -> f64| {
             DMatrix::from_fn(rows, columns, of)
         };
@@ -112,10 +112,10 @@ impl Smooth {
         }
     }
 
-    fn at(&self, state: &[f64]) -> At {
+    fn at(&self, state: &[f64]) -> MotionState {
         let row =
             |matrix: &DMatrix<f64>, axis: usize| matrix.row(axis).iter().zip(state).map(|(a, b)| a * b).sum();
-        At {
+        MotionState {
             t: 0.0,
             x: std::array::from_fn(|axis| row(&self.displacement, axis)),
             v: std::array::from_fn(|axis| row(&self.velocity, axis)),

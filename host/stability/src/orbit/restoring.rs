@@ -6,7 +6,7 @@ use nalgebra::DMatrix;
 
 use super::periodic_orbit::{Orbit, SubintervalNodes};
 use crate::criteria::{DISTURBANCE, DISTURBANCE_PERIODS};
-use quietcut_model::Term;
+use quietcut_model::RestoringForce;
 use quietcut_model::path::{Motion, restoring_along, restoring_from};
 
 /// Number of samples of the orbit in each subinterval of the mesh. The phase angle of the fastest motion over a
@@ -108,7 +108,7 @@ impl Samples {
     /// Force of a term over a period, once its hysteresis loop is closed.
     ///
     /// An internal state is the fixed point of its map over a period, by the secant method.
-    fn force_n(&self, term: &dyn Term) -> [Vec<f64>; 3] {
+    fn force_n(&self, term: &dyn RestoringForce) -> [Vec<f64>; 3] {
         if term.states() == 0 {
             return restoring_along(term, &self.motion(1, 0, |_| [0.0; 2]));
         }
@@ -168,7 +168,11 @@ fn share(a: &[f64], b: &[f64]) -> f64 {
 
 /// Equivalent spring, damper and mean force of all terms along the orbit, by axis. A damper of `most_damping` means
 /// that friction sticks and holds the tool.
-pub(super) fn equivalent(terms: &[Box<dyn Term>], samples: &Samples, most_damping: [f64; 3]) -> [Spring; 3] {
+pub(super) fn equivalent(
+    terms: &[Box<dyn RestoringForce>],
+    samples: &Samples,
+    most_damping: [f64; 3],
+) -> [Spring; 3] {
     let mut force: [Vec<f64>; 3] = std::array::from_fn(|_| vec![0.0; samples.len()]);
     for term in terms {
         for (sum, added) in force.iter_mut().zip(samples.force_n(&**term)) {
@@ -198,7 +202,7 @@ pub(super) fn equivalent(terms: &[Box<dyn Term>], samples: &Samples, most_dampin
 /// parts of the force change in phase with its displacement and with its velocity. An axis that sticks in `springs`
 /// also sticks for the disturbance.
 pub(super) fn incremental(
-    terms: &[Box<dyn Term>],
+    terms: &[Box<dyn RestoringForce>],
     samples: &Samples,
     frequency_hz: f64,
     springs: &[Spring; 3],
@@ -261,7 +265,7 @@ mod tests {
         }
     }
 
-    fn terms(effects: &[&str]) -> Vec<Box<dyn Term>> {
+    fn terms(effects: &[&str]) -> Vec<Box<dyn RestoringForce>> {
         let case = quietcut_testkit::case("kuka-kr90-half");
         let effects = Effects::parse(effects.iter().copied()).unwrap();
         effects.dynamics(case.structure().unwrap()).unwrap().1

@@ -7,7 +7,7 @@ use quietcut_model::case::Case;
 use quietcut_model::effects::{Class, EffectSpec, Treatment};
 use quietcut_model::milling::Material;
 use quietcut_model::structure::FirstOrder;
-use quietcut_model::{Cutter, Effects, ForceLaw, ModelError, Term};
+use quietcut_model::{Cutter, Effects, ForceLaw, ModelError, RestoringForce};
 
 /// Effects of a case whose specification fulfils `wanted`.
 fn effects(case: &Case, wanted: impl Fn(&EffectSpec) -> bool) -> Result<Effects, StabilityError> {
@@ -92,7 +92,7 @@ pub(crate) fn about_orbit(case: &Case) -> Result<AboutOrbit, StabilityError> {
     let mut terms = Vec::new();
     for effect in &effects(case, |spec| spec.treatment == Treatment::Smooth)?.0 {
         let found = effect
-            .terms(structure)
+            .restoring_forces(structure)
             .map_err(|cause| wrong(case, cause.into()))?;
         terms.extend(found.into_iter().map(Arc::from));
     }
@@ -106,7 +106,7 @@ pub(crate) fn about_orbit(case: &Case) -> Result<AboutOrbit, StabilityError> {
 ///
 /// # Errors
 /// An extension cannot be applied to the case.
-pub(crate) fn not_smooth(case: &Case) -> Result<Vec<Box<dyn Term>>, StabilityError> {
+pub(crate) fn not_smooth(case: &Case) -> Result<Vec<Box<dyn RestoringForce>>, StabilityError> {
     let structure = case.structure()?;
     let wanted =
         |spec: &EffectSpec| matches!(spec.treatment, Treatment::LinearStructure | Treatment::Equivalent);
@@ -122,6 +122,6 @@ pub(crate) fn not_smooth(case: &Case) -> Result<Vec<Box<dyn Term>>, StabilityErr
 
 /// Extensions that are linearized about a forced orbit: smooth restoring forces, the chip law and process damping.
 pub(crate) struct AboutOrbit {
-    pub(crate) terms: Vec<Arc<dyn Term>>,
+    pub(crate) terms: Vec<Arc<dyn RestoringForce>>,
     pub(crate) law: ForceLaw,
 }

@@ -9,7 +9,7 @@ use super::Dynamics;
 
 /// Time, displacement and velocity of the tool at one instant, in the machine's x, y, z.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct At {
+pub struct MotionState {
     /// Time, s.
     pub t: f64,
     /// Displacement of the tool, m.
@@ -29,14 +29,14 @@ pub struct Slopes {
 }
 
 /// Regime of a restoring force, numbered by each force itself: within a regime, such as stick or slip, f_r is smooth.
-pub type Branch = u8;
+pub type Regime = u8;
 
 /// A restoring force f_r, N, along x, y, z in the equation of motion M ẍ + C ẋ + K x + f_r = F.
 ///
-/// A restoring force may have internal states and several regimes (branches), in each of which it is smooth. The integrator ends a step
-/// exactly where [`Term::margin`] falls below zero; [`Term::next`] then selects the next regime. A [`Term::locked`] regime keeps one axis
-/// at rest, as sticking friction does: f_r then balances all other forces on that axis.
-pub trait Term: Debug + Send + Sync {
+/// A restoring force may have internal states and several regimes, such as stick and slip, in each of which it is smooth. The integrator ends
+/// a step exactly where [`RestoringForce::margin`] falls below zero; [`RestoringForce::next`] then selects the next regime. A
+/// [`RestoringForce::locked`] regime keeps one axis at rest, as sticking friction does: f_r then balances all other forces on that axis.
+pub trait RestoringForce: Debug + Send + Sync {
     /// Number of internal states. Each is a displacement in m, which the error control of the integrator assumes.
     fn states(&self) -> usize {
         0
@@ -44,7 +44,7 @@ pub trait Term: Debug + Send + Sync {
 
     /// Updates the internal states `own` to the displacement of `at`, if they depend on the path of the displacement only. Returns false if
     /// they depend on its rate and must be integrated.
-    fn follow(&self, _at: &At, _own: &mut [f64]) -> bool {
+    fn follow(&self, _at: &MotionState, _own: &mut [f64]) -> bool {
         false
     }
 
@@ -52,13 +52,13 @@ pub trait Term: Debug + Send + Sync {
     fn confine(&self, _own: &mut [f64]) {}
 
     /// Sets the internal states `own` at the first sample of a recording, which may begin during a motion; a simulation begins with zeros.
-    fn begin(&self, _at: &At, _own: &mut [f64]) {}
+    fn begin(&self, _at: &MotionState, _own: &mut [f64]) {}
 
-    /// Restoring force f_r, N, in the regime `branch`, which is not locked.
-    fn restoring_n(&self, branch: Branch, at: &At, own: &[f64]) -> [f64; 3];
+    /// Restoring force f_r, N, in `regime`, which is not a locked one.
+    fn restoring_n(&self, regime: Regime, at: &MotionState, own: &[f64]) -> [f64; 3];
 
     /// Jacobian of f_r; `None` for a force that is not differentiable everywhere or has internal states.
-    fn slopes(&self, _at: &At) -> Option<Slopes> {
+    fn slopes(&self, _at: &MotionState) -> Option<Slopes> {
         None
     }
 
@@ -69,37 +69,40 @@ pub trait Term: Debug + Send + Sync {
     }
 
     /// Time derivatives of the internal states, m/s.
-    fn rate(&self, _branch: Branch, _at: &At, _own: &[f64], _rate: &mut [f64]) {}
+    fn rate(&self, _regime: Regime, _at: &MotionState, _own: &[f64], _rate: &mut [f64]) {}
 
     /// The axis that a locked regime keeps at rest; `None` for a force without a locked regime.
     fn holds(&self) -> Option<usize> {
         None
     }
 
-    /// True if `branch` keeps the axis of [`Self::holds`] at rest (stick); [`Self::restoring_n`] is not evaluated in such a regime.
-    fn locked(&self, _branch: Branch) -> bool {
+    /// True if `regime` keeps the axis of [`Self::holds`] at rest (stick); [`Self::restoring_n`] is not evaluated in such a regime.
+    fn locked(&self, _regime: Regime) -> bool {
         false
     }
 
-    /// Event function of the regime `branch`: negative from the end of the regime on. `holding_n` is the force f_r, N, that keeps the axis at
+    /// Event function of `regime`: negative from the end of the regime on. `holding_n` is the force f_r, N, that keeps the axis at
     /// rest; 0 without a locked regime.
-    fn margin(&self, _branch: Branch, _at: &At, _own: &[f64], _holding_n: f64) -> f64 {
+    fn margin(&self, _regime: Regime, _at: &MotionState, _own: &[f64], _holding_n: f64) -> f64 {
         f64::INFINITY
     }
 
     /// The regime that holds from now on: the first one (`before` = `None`), or the one that follows the ended regime `before`.
-    fn next(&self, _before: Option<Branch>, _at: &At, _own: &[f64], _holding_n: f64) -> Branch {
+    fn next(&self, _before: Option<Regime>, _at: &MotionState, _own: &[f64], _holding_n: f64) -> Regime {
         0
     }
 }
 
 /// The current regime of each restoring force of a model, in their order.
 #[derive(Clone, Copy, Debug)]
-pub struct Branches<'a>(pub &'a [Branch]);
+pub struct Regimes<'a>(pub &'a [Regime]);
 
 /// Number of internal states of all restoring forces `terms`.
-pub fn states(terms: &[Box<dyn Term>]) -> usize {
-    terms.iter().map(|term| term.states()).sum()
+pub fn states(restoring_forces: &[Box<dyn RestoringForce>]) -> usize {
+    restoring_forces
+        .iter()
+        .map(|restoring_force| restoring_force.states())
+        .sum()
 }
 
 /// Writes ẏ of structure and restoring forces under the external `force`, N, at the time `t`, s, and displacement `x`, m.
@@ -108,8 +111,8 @@ pub fn states(terms: &[Box<dyn Term>]) -> usize {
 /// of sticking axes along x, y, z.
 pub fn rate(
     dynamics: &Dynamics,
-    terms: &[Box<dyn Term>],
-    branches: Branches<'_>,
+    restoring_forces: &[Box<dyn RestoringForce>],
+    regimes: Regimes<'_>,
     (t, x): (f64, [f64; 3]),
     force: [f64; 3],
     y: &[f64],
@@ -117,19 +120,19 @@ pub fn rate(
 ) -> [f64; 3] {
     let order = dynamics.order();
     let (own_y, own_rate) = (&y[order..], order);
-    let mut at = At {
+    let mut at = MotionState {
         t,
         x,
         v: dynamics.velocity_under(&y[..order], force),
     };
-    let mut left = minus(force, restoring(terms, branches, &at, own_y));
+    let mut left = minus(force, restoring(restoring_forces, regimes, &at, own_y));
     if dynamics.velocity_jumps() {
         // Here the velocity depends on the force, and the force on the velocity. A fixed-point iteration solves for both; it
         // converges where damping forces are small compared with inertial forces.
         for _ in 0..40 {
             let before = at.v;
             at.v = dynamics.velocity_under(&y[..order], left);
-            left = minus(force, restoring(terms, branches, &at, own_y));
+            left = minus(force, restoring(restoring_forces, regimes, &at, own_y));
             let moved = (0..3)
                 .map(|axis| (at.v[axis] - before[axis]).abs())
                 .fold(0.0, f64::max);
@@ -140,13 +143,19 @@ pub fn rate(
     }
     dynamics.rate(&y[..order], left, &mut rate[..order]);
     let mut place = 0;
-    for (term, branch) in terms.iter().zip(branches.0) {
-        let own = place..place + term.states();
+    for (restoring_force, regime) in restoring_forces.iter().zip(regimes.0) {
+        let own = place..place + restoring_force.states();
         let range = own_rate + own.start..own_rate + own.end;
-        term.rate(*branch, &at, &own_y[own.clone()], &mut rate[range]);
+        restoring_force.rate(*regime, &at, &own_y[own.clone()], &mut rate[range]);
         place = own.end;
     }
-    hold(dynamics, terms, branches, (&y[..order], left), &mut rate[..order])
+    hold(
+        dynamics,
+        restoring_forces,
+        regimes,
+        (&y[..order], left),
+        &mut rate[..order],
+    )
 }
 
 fn minus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
@@ -154,15 +163,20 @@ fn minus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
 }
 
 /// Sum of f_r, N, of all restoring forces that are not locked.
-fn restoring(terms: &[Box<dyn Term>], branches: Branches<'_>, at: &At, own: &[f64]) -> [f64; 3] {
+fn restoring(
+    restoring_forces: &[Box<dyn RestoringForce>],
+    regimes: Regimes<'_>,
+    at: &MotionState,
+    own: &[f64],
+) -> [f64; 3] {
     let mut sum = [0.0; 3];
     let mut place = 0;
-    for (term, branch) in terms.iter().zip(branches.0) {
-        let end = place + term.states();
-        if !term.locked(*branch) {
+    for (restoring_force, regime) in restoring_forces.iter().zip(regimes.0) {
+        let end = place + restoring_force.states();
+        if !restoring_force.locked(*regime) {
             for (sum, force) in sum
                 .iter_mut()
-                .zip(term.restoring_n(*branch, at, &own[place..end]))
+                .zip(restoring_force.restoring_n(*regime, at, &own[place..end]))
             {
                 *sum += force;
             }
@@ -175,14 +189,17 @@ fn restoring(terms: &[Box<dyn Term>], branches: Branches<'_>, at: &At, own: &[f6
 /// Sets the accelerations of the locked (sticking) axes to zero in `rate`; returns the holding force f_r, N, that does so.
 fn hold(
     dynamics: &Dynamics,
-    terms: &[Box<dyn Term>],
-    branches: Branches<'_>,
+    restoring_forces: &[Box<dyn RestoringForce>],
+    regimes: Regimes<'_>,
     (y, force): (&[f64], [f64; 3]),
     rate: &mut [f64],
 ) -> [f64; 3] {
     let mut locked = [false; 3];
-    for (term, branch) in terms.iter().zip(branches.0) {
-        if let Some(axis) = term.holds().filter(|_| term.locked(*branch)) {
+    for (restoring_force, regime) in restoring_forces.iter().zip(regimes.0) {
+        if let Some(axis) = restoring_force
+            .holds()
+            .filter(|_| restoring_force.locked(*regime))
+        {
             locked[axis] = true;
         }
     }
