@@ -11,7 +11,7 @@ fn number(value: &Value) -> f64 {
 }
 
 #[test]
-fn chatter_is_heard_and_the_advised_cut_is_quiet() {
+fn chatter_is_detected_and_the_advised_cut_is_quiet() {
     let folder = folder();
     let answer = quietcut(folder.path(), &["demo", "--out", "shown", "--json"]).json();
     // What is promised, on two cores; a busy machine may need longer than the two seconds that were measured.

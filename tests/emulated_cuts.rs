@@ -19,11 +19,11 @@ const REPORTS: Subscription = Subscription {
 
 /// Runs the signal chain over the cut on host and emulator; returns the outputs of the emulator.
 fn emulated(cut: &AcceptanceCut) -> Said {
-    let heard = cut
+    let sensed = cut
         .cut
-        .hear(&cut.case, cut.accelerometer, cut.tachometer, cut.seed)
+        .sense(&cut.case, cut.accelerometer, cut.tachometer, cut.seed)
         .expect("a cut that can be simulated");
-    let steps = steps(heard);
+    let steps = steps(sensed);
     let host = Said::on_host(cut.settings(), None, None, &steps);
     let memory = Memory::erased();
     let mut emulator = Emulator::start(&memory);

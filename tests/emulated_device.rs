@@ -51,7 +51,7 @@ fn the_command_uploads_tells_and_asks() {
 fn the_command_replays_a_recording() {
     let memory = Memory::erased();
     let emulator = Emulator::start(&memory);
-    scenario::a_recording_is_heard_there_as_it_is_here(emulator.serial_device().path());
+    scenario::a_recording_gives_the_same_reports_there_as_here(emulator.serial_device().path());
 }
 
 #[test]

@@ -17,7 +17,7 @@ const DAMPING: f64 = 0.02;
 const MASS_KG: f64 = 60.0;
 
 /// Acceleration at the sensor after impacts along y of one sample each: exact impulse responses of the structure.
-fn blows(ratio: f64) -> Recording {
+fn impacts(ratio: f64) -> Recording {
     let samples = (50.0 * RATE) as usize;
     let mut force = vec![0.0; samples];
     let mut acceleration = vec![0.0; samples];
@@ -25,7 +25,7 @@ fn blows(ratio: f64) -> Recording {
     let pole = own * Complex64::new(-DAMPING, (1.0 - DAMPING * DAMPING).sqrt());
     for (at, newtons) in [(1.0, 300.0), (13.0, 400.0), (25.5, 350.0), (37.5, 500.0)] {
         let first = (at * RATE) as usize;
-        // Eight samples as a raised cosine: of a blow, nothing is left beyond a fifth of the rate.
+        // Eight samples as a raised cosine: the spectrum of an impact vanishes above a fifth of the rate.
         let pulse: Vec<f64> = (0..9)
             .map(|k| newtons * 0.5 * (1.0 - (TAU * f64::from(k) / 8.0).cos()))
             .collect();
@@ -71,8 +71,8 @@ fn truth(hertz: f64) -> Complex64 {
 fn a_hammer_test_becomes_tables_and_pictures() {
     let folder = folder();
     let at = |name: &str| folder.path().join(name);
-    blows(1.0).write(&at("hammer.csv")).expect("written");
-    blows(1.0)
+    impacts(1.0).write(&at("hammer.csv")).expect("written");
+    impacts(1.0)
         .write_uff(&at("hammer.uff"), quietcut::recording::UffForm::Binary)
         .expect("written");
     let answer = quietcut(
@@ -149,7 +149,7 @@ fn a_sensor_on_the_housing_is_calibrated_to_the_tool_tip() {
     let ratio = 0.7;
     for (name, ratio) in [("tip", 1.0), ("housing", ratio)] {
         let path = folder.path().join(format!("{name}-test.csv"));
-        blows(ratio).write(&path).expect("written");
+        impacts(ratio).write(&path).expect("written");
         let (record, out) = (format!("{name}-test.csv"), format!("{name}.csv"));
         quietcut(
             folder.path(),
@@ -191,7 +191,7 @@ fn a_sensor_on_the_housing_is_calibrated_to_the_tool_tip() {
 fn what_cannot_be_measured_is_refused_with_the_reason() {
     let folder = folder();
     let here: &Path = folder.path();
-    blows(1.0).write(&here.join("hammer.csv")).expect("written");
+    impacts(1.0).write(&here.join("hammer.csv")).expect("written");
     std::fs::write(here.join("idle.csv"), "t [s],ax [m/s^2]\n0,0\n0.1,1\n0.2,0\n").expect("written");
     quietcut(here, &["frf", "idle.csv"]).refused(&["idle.csv", "no force"]);
     quietcut(here, &["frf", "none.csv"]).refused(&["none.csv"]);

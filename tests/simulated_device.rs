@@ -111,7 +111,7 @@ fn a_table_with_a_wrong_crc_does_not_replace_the_last_good_one() {
 fn the_command_replays_a_recording() {
     let folder = folder();
     let device = device(&folder.path().join("device.bin"));
-    scenario::a_recording_is_heard_there_as_it_is_here(device.path());
+    scenario::a_recording_gives_the_same_reports_there_as_here(device.path());
 }
 
 #[test]
@@ -185,21 +185,21 @@ fn a_port_in_use_is_said_to_be() {
 #[test]
 fn monitor_answers_with_one_object() {
     let folder = folder();
-    let heard = quietcut(
+    let replayed = quietcut(
         folder.path(),
         &["monitor", "simulated", "--seconds", "1", "--json"],
     )
     .json();
     assert!(
-        heard["summary"]["blocks"]
+        replayed["summary"]["blocks"]
             .as_u64()
             .is_some_and(|blocks| blocks > 50),
-        "{heard}"
+        "{replayed}"
     );
     assert!(
-        heard["verdicts"]
+        replayed["verdicts"]
             .as_array()
             .is_some_and(|verdicts| !verdicts.is_empty()),
-        "{heard}"
+        "{replayed}"
     );
 }

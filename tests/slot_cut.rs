@@ -26,12 +26,12 @@ fn the_tone_of_the_measured_slot_cut_is_detected() {
         }
     }
     let (first_s, first_hz) = chatter[0];
-    println!("first heard at {first_s} s, {first_hz} Hz");
+    println!("first detected at {first_s} s, {first_hz} Hz");
     // In cut from 3.5 to 4.9 s. The tone falls from 740 to 684 Hz while it grows; the hum at 146 Hz, louder at first, is always there.
     assert!((3.5..4.3).contains(&first_s), "{first_s}");
     assert!((690.0..740.0).contains(&first_hz), "{first_hz}");
     for (at_s, hz) in chatter {
         assert!((675.0..760.0).contains(&hz), "{hz} Hz at {at_s} s");
-        assert!(at_s < 5.5, "still heard at {at_s} s");
+        assert!(at_s < 5.5, "still detected at {at_s} s");
     }
 }

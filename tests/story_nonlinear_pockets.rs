@@ -28,7 +28,7 @@ use quietcut::stability::{
     Chart, Collocation, CubicTerms, FrequencyProblem, Method, MultiFrequency, Problem, chart,
 };
 use quietcut::structure::{Form, Matrices};
-use quietcut::trial_cuts::{Calls, Outcome, TestCut};
+use quietcut::trial_cuts::{Calls, Outcome, TrialCut};
 use quietcut_tests::command::{cases, folder, quietcut};
 use rayon::prelude::*;
 
@@ -153,7 +153,7 @@ fn judged(case: &Case, rpm: f64, depth_mm: f64, teeth: usize) -> Judged {
 }
 
 /// The campaign: every speed at every depth.
-fn campaign(case: &Case, speeds_rpm: &[f64], depths_mm: &[f64], teeth: usize) -> Vec<(TestCut, Judged)> {
+fn campaign(case: &Case, speeds_rpm: &[f64], depths_mm: &[f64], teeth: usize) -> Vec<(TrialCut, Judged)> {
     let points: Vec<(f64, f64)> = depths_mm
         .iter()
         .flat_map(|&depth_mm| speeds_rpm.iter().map(move |&rpm| (rpm, depth_mm)))
@@ -164,10 +164,11 @@ fn campaign(case: &Case, speeds_rpm: &[f64], depths_mm: &[f64], teeth: usize) ->
             let judged = judged(case, rpm, depth_mm, teeth);
             let outcome = judged.outcome;
             (
-                TestCut {
+                TrialCut {
                     rpm,
                     depth_mm,
                     outcome,
+                    chatter_hz: None,
                 },
                 judged,
             )
@@ -185,7 +186,7 @@ fn depths_mm() -> Vec<f64> {
     (0..8).map(|i| 2.0 + 1.5 * f64::from(i)).collect()
 }
 
-fn print_table(cuts: &[(TestCut, Judged)], speeds: usize) {
+fn print_table(cuts: &[(TrialCut, Judged)], speeds: usize) {
     print!("{:>8}", "mm");
     for (cut, _) in &cuts[..speeds] {
         print!("{:>6.0}", cut.rpm);
@@ -210,7 +211,7 @@ fn pictures() -> Option<PathBuf> {
     std::env::var_os("QUIETCUT_STORY").map(PathBuf::from)
 }
 
-fn draw(folder: &Path, name: &str, title: &str, chart: &Chart, cuts: &[(TestCut, Judged)]) {
+fn draw(folder: &Path, name: &str, title: &str, chart: &Chart, cuts: &[(TrialCut, Judged)]) {
     let columns: Vec<Column> = chart.speeds.iter().map(Column::from).collect();
     let marks: Vec<Mark> = cuts.iter().map(|(cut, _)| Mark::from(cut)).collect();
     let svg = lobe_chart(title, &columns, DEPTH_MM, &marks).expect("a picture");
@@ -252,7 +253,7 @@ fn identified(folder: &Path) -> Case {
 }
 
 /// What `diagnose` makes of the belief, of a short step-sine test in each direction and of the cuts.
-fn diagnosed(folder: &Path, cuts: &[(TestCut, Judged)]) -> serde_json::Value {
+fn diagnosed(folder: &Path, cuts: &[(TrialCut, Judged)]) -> serde_json::Value {
     let [truth, belief] = [TRUTH, BELIEF].map(|name| cases().join(format!("{name}.toml")));
     for (direction, frequencies, forces, seed) in [
         ("x", "19.2:20.6:3", "3,9,15", 1),
@@ -380,7 +381,7 @@ fn print_limits(what: &str, limits_mm: &[f64]) {
 }
 
 /// Small vibrations of cuts grow and decay as the largest multiplier about the forced orbit says.
-fn check_growth(method: &ForcedProblem, cuts: &[(TestCut, Judged)]) {
+fn check_growth(method: &ForcedProblem, cuts: &[(TrialCut, Judged)]) {
     // Above the errors of the integration, and small enough that the equations about the orbit are linear.
     let small = cuts
         .iter()
@@ -433,7 +434,7 @@ fn lobes_of_the_linear_part_call_cuts_in_the_pockets_wrong_and_those_with_cubic_
     }
     let cuts = campaign(&truth, &speeds_rpm(), &depths_mm(), 400);
     print_table(&cuts, speeds_rpm().len());
-    let only: Vec<TestCut> = cuts.iter().map(|(cut, _)| *cut).collect();
+    let only: Vec<TrialCut> = cuts.iter().map(|(cut, _)| *cut).collect();
     let calls: Vec<Calls> = methods
         .iter()
         .map(|(what, method)| {
@@ -461,7 +462,7 @@ fn lobes_of_the_linear_part_call_cuts_in_the_pockets_wrong_and_those_with_cubic_
     };
     for index in 0..limits[0].len() {
         let off = |of: &[f64], from: &[f64]| (of[index] / from[index] - 1.0).abs();
-        // Blows of 60 N move the tool by 0.03 mm: that much of the cubic terms is in the receptances.
+        // Impacts of 60 N move the tool by 0.03 mm: that much of the cubic terms is in the receptances.
         assert!(off(by_hammer, by_linear_part) < 0.03, "{index}");
         // Half a percent of noise.
         assert!(off(by_found, by_truth) < 0.005, "{index}");

@@ -33,8 +33,8 @@ impl Cut {
             entry,
             ..VirtualCut::new(spindle_rpm, depth_mm, seconds)
         };
-        let heard = cut
-            .hear(&case, accelerometer, tachometer, seed)
+        let sensed = cut
+            .sense(&case, accelerometer, tachometer, seed)
             .expect("a cut that can be simulated");
         let cut = case.cut().expect("a cut");
         Self {
@@ -52,7 +52,7 @@ impl Cut {
                 feed_per_tooth: Millimeters(cut.feed_per_tooth_mm as f32),
                 posture: 0,
             },
-            steps: steps(heard),
+            steps: steps(sensed),
         }
     }
 }

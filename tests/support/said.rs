@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use quietcut::device::{Client, Event};
-use quietcut::simulate::Heard;
+use quietcut::simulate::SensedCut;
 use quietcut_core::acceleration::Block;
 use quietcut_core::detector::Verdict;
 use quietcut_core::lobes::LobeTable;
@@ -26,11 +26,11 @@ pub const ALL: Subscription = Subscription {
 pub type Step = (Block, Vec<Edge>);
 
 /// Splits a sensor signal into steps; a tachometer edge belongs to the last block that starts before it.
-pub fn steps(heard: Heard) -> Vec<Step> {
-    let mut edges = heard.edges.into_iter().peekable();
-    let ends: Vec<_> = heard.blocks.iter().skip(1).map(|block| block.time).collect();
+pub fn steps(sensed: SensedCut) -> Vec<Step> {
+    let mut edges = sensed.edges.into_iter().peekable();
+    let ends: Vec<_> = sensed.blocks.iter().skip(1).map(|block| block.time).collect();
     let ends = ends.into_iter().chain([Nanoseconds(u64::MAX)]);
-    let steps = heard.blocks.into_iter().zip(ends).map(|(block, end)| {
+    let steps = sensed.blocks.into_iter().zip(ends).map(|(block, end)| {
         let mine = std::iter::from_fn(|| edges.next_if(|edge| edge.time < end));
         let mine = mine.collect();
         (block, mine)

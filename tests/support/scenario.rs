@@ -66,7 +66,7 @@ pub fn the_command_uploads_tells_and_asks(port: &str) {
 
 /// Replays a recording with chatter on the device at the serial port `port`: the output equals, to the last digit, that of the signal
 /// chain on the host, and the device keeps its settings except for the table.
-pub fn a_recording_is_heard_there_as_it_is_here(port: &str) {
+pub fn a_recording_gives_the_same_reports_there_as_here(port: &str) {
     let folder = folder();
     let run = |arguments: &[&str]| {
         let ran = quietcut(folder.path(), arguments);

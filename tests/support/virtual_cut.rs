@@ -4,7 +4,7 @@ use std::fmt;
 
 use quietcut::case::Case;
 use quietcut::simulate::{
-    Accelerometer, Heard, Model, Regeneration, Sampler, Segment, Settings, Spindle, Statistics,
+    Accelerometer, Model, Regeneration, Sampler, Segment, SensedCut, Settings, Spindle, Statistics,
     TachometerModel, VirtualCut, Workspace,
 };
 use quietcut_core::detector::Verdict;
@@ -80,7 +80,7 @@ impl fmt::Display for Outcome {
     }
 }
 
-/// A cut that is simulated once, to be heard with many seeds of the sensors' noise.
+/// A cut that is simulated once, to be sampled with many seeds of the sensors' noise.
 pub struct SimulatedCut {
     settings: monitor::Settings,
     cut: VirtualCut,
@@ -146,7 +146,7 @@ impl SimulatedCut {
     /// What the pipeline says of it. `seed` is that of the sensors' noise.
     pub fn judged(&self, seed: u64) -> Outcome {
         let Self { cut, tachometer, .. } = self;
-        let heard = Heard {
+        let sensed = SensedCut {
             blocks: self.sampler.blocks(seed),
             edges: tachometer.edges(&Spindle::new(cut.spindle_rpm), cut.seconds, seed),
             statistics: self.statistics,
@@ -154,7 +154,7 @@ impl SimulatedCut {
         let monitor = Monitor::new(self.settings).expect("settings that can be");
         let mut state = State::default();
         let mut verdicts: Vec<(f64, Verdict, Option<f32>)> = Vec::new();
-        for (block, edges) in &steps(heard) {
+        for (block, edges) in &steps(sensed) {
             let report = monitor.step(&mut state, block, edges, None, None);
             let judgement = report.judgement;
             if verdicts.last().is_none_or(|last| last.1 != judgement.verdict) {

@@ -8,7 +8,7 @@ use super::driven::Driven;
 const BOUNCE_S: f64 = 0.4;
 
 /// Smallest peak of an impact, as a fraction of the largest force of the record. A choice.
-const BLOW: f64 = 0.1;
+const IMPACT: f64 = 0.1;
 
 /// Smallest second pulse that makes an impact double, as a fraction of the peak of the impact. A choice, above the ringing of
 /// anti-aliasing filters.
@@ -23,7 +23,7 @@ const BEFORE: f64 = 0.01;
 
 /// One impact of the hammer.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Blow {
+pub struct MeasuredImpact {
     /// Time of the force peak, s, from the start of the record.
     pub time_s: f64,
     /// Peak force, N, with sign.
@@ -67,9 +67,9 @@ pub(super) struct BlowSegments {
     /// Number of samples of each segment.
     pub(super) length: usize,
     /// Single impacts, whose segments are evaluated.
-    pub(super) used: Vec<Blow>,
+    pub(super) used: Vec<MeasuredImpact>,
     /// Double impacts, whose segments are not evaluated.
-    pub(super) double: Vec<Blow>,
+    pub(super) double: Vec<MeasuredImpact>,
     /// Largest amplitude of a response at the end of a segment, as a fraction of the peak of that response in the segment.
     pub(super) left_over: f64,
 }
@@ -85,36 +85,37 @@ pub(super) fn segments(driven: &Driven<'_>, windows: HammerWindows) -> Result<Bl
         path: driven.recording.path.clone(),
         what,
     };
-    let mut blows = blows(&force.samples, rate);
-    if blows.is_empty() {
+    let mut impacts = impacts(&force.samples, rate);
+    if impacts.is_empty() {
         return Err(refused(format!(
-            "{} has no blow of a hammer: no pulse stands out of the noise",
+            "{} has no impact of a hammer: no pulse stands out of the noise",
             force.name
         )));
     }
     let samples = force.samples.len();
-    let longest = longest_segment(&blows, samples);
+    let longest = longest_segment(&impacts, samples);
     let length = match windows.segment_s {
         Some(seconds) => (seconds * rate).round() as usize,
         None => longest,
     } & !1;
     let before = (BEFORE * length as f64) as usize;
-    blows.retain(|blow| blow.first >= before && blow.first - before + length <= samples);
-    if length < 16 || blows.is_empty() {
+    impacts.retain(|impact| impact.first >= before && impact.first - before + length <= samples);
+    if length < 16 || impacts.is_empty() {
         return Err(refused(format!(
-            "no blow has {:.3} s of record after it; the blows are {:.3} s apart at least",
+            "no impact has {:.3} s of record after it; the impacts are {:.3} s apart at least",
             length as f64 / rate,
             longest as f64 / rate
         )));
     }
-    for blow in &mut blows {
-        blow.second = second_pulse(&force.samples, blow, blow.first - before + length, rate);
+    for impact in &mut impacts {
+        impact.second = second_pulse(&force.samples, impact, impact.first - before + length, rate);
     }
-    let (double, used): (Vec<Blow>, Vec<Blow>) = blows.into_iter().partition(|blow| blow.second.is_some());
+    let (double, used): (Vec<MeasuredImpact>, Vec<MeasuredImpact>) =
+        impacts.into_iter().partition(|impact| impact.second.is_some());
     let Some(first) = used.first() else {
         let (delay_s, part) = double[0].second.unwrap_or_default();
         return Err(refused(format!(
-            "all {} blows are double (the first at {:.3} s has a second pulse of {:.0} % {:.1} ms later); strike again, or take shorter segments",
+            "all {} impacts are double (the first at {:.3} s has a second pulse of {:.0} % {:.1} ms later); strike again, or take shorter segments",
             double.len(),
             double[0].time_s,
             100.0 * part,
@@ -133,15 +134,15 @@ pub(super) fn segments(driven: &Driven<'_>, windows: HammerWindows) -> Result<Bl
         used: Vec::new(),
         double,
     };
-    for blow in used {
-        let start = blow.first - before;
+    for impact in used {
+        let start = impact.first - before;
         for (index, signal) in driven.signals().into_iter().enumerate() {
             let segment = &signal[start..start + length];
             let is_force = index == 0;
             let offset = segment[..before].iter().sum::<f64>() / before.max(1) as f64;
             let windowed = segment.iter().enumerate().map(|(k, sample)| {
                 let force_window = if is_force {
-                    pulse_weight(&blow, start + k)
+                    pulse_weight(&impact, start + k)
                 } else {
                     1.0
                 };
@@ -155,7 +156,7 @@ pub(super) fn segments(driven: &Driven<'_>, windows: HammerWindows) -> Result<Bl
                 cut.left_over = cut.left_over.max(left_over(&cut.signals[index][at..]));
             }
         }
-        cut.used.push(blow);
+        cut.used.push(impact);
     }
     Ok(cut)
 }
@@ -174,12 +175,12 @@ fn left_over(segment: &[f64]) -> f64 {
 
 /// Weight of the force window at a sample: 1 over the force pulse and one pulse width after it, then a half-cosine taper to 0, since the
 /// force signal after the contact is noise only.
-fn pulse_weight(blow: &Blow, sample: usize) -> f64 {
-    let width = (blow.last - blow.first).max(4);
-    let outside = if sample < blow.first {
-        blow.first - sample
+fn pulse_weight(impact: &MeasuredImpact, sample: usize) -> f64 {
+    let width = (impact.last - impact.first).max(4);
+    let outside = if sample < impact.first {
+        impact.first - sample
     } else {
-        sample.saturating_sub(blow.last + width)
+        sample.saturating_sub(impact.last + width)
     };
     if outside >= width {
         0.0
@@ -189,12 +190,12 @@ fn pulse_weight(blow: &Blow, sample: usize) -> f64 {
 }
 
 /// Length, in samples, of the longest segments that do not overlap between impacts.
-fn longest_segment(blows: &[Blow], samples: usize) -> usize {
-    let ends = blows.iter().skip(1).map(|blow| blow.first).chain([samples]);
-    let shortest = blows
+fn longest_segment(impacts: &[MeasuredImpact], samples: usize) -> usize {
+    let ends = impacts.iter().skip(1).map(|impact| impact.first).chain([samples]);
+    let shortest = impacts
         .iter()
         .zip(ends)
-        .map(|(blow, end)| end - blow.first)
+        .map(|(impact, end)| end - impact.first)
         .min()
         .unwrap_or(0);
     // A segment also includes the fraction `BEFORE` of its length before the impact.
@@ -202,14 +203,14 @@ fn longest_segment(blows: &[Blow], samples: usize) -> usize {
 }
 
 /// Detects all impacts of a force signal; pulses within [`BOUNCE_S`] after an impact belong to it.
-fn blows(force: &[f64], rate: f64) -> Vec<Blow> {
+fn impacts(force: &[f64], rate: f64) -> Vec<MeasuredImpact> {
     let middle = median(force.to_vec());
     let noise = noise(force, middle);
     let largest = force
         .iter()
         .fold(0.0_f64, |largest, f| largest.max((f - middle).abs()));
-    let threshold = (BLOW * largest).max(NOISE * noise);
-    let mut blows: Vec<Blow> = Vec::new();
+    let threshold = (IMPACT * largest).max(NOISE * noise);
+    let mut impacts: Vec<MeasuredImpact> = Vec::new();
     let mut k = 0;
     while k < force.len() {
         if (force[k] - middle).abs() <= threshold {
@@ -229,11 +230,11 @@ fn blows(force: &[f64], rate: f64) -> Vec<Blow> {
         let peak = (first..=last)
             .max_by(|&a, &b| (force[a] - middle).abs().total_cmp(&(force[b] - middle).abs()))
             .unwrap_or(k);
-        let follows = blows
+        let follows = impacts
             .last()
             .is_some_and(|before| ((first - before.first) as f64) < BOUNCE_S * rate);
         if !follows {
-            blows.push(Blow {
+            impacts.push(MeasuredImpact {
                 time_s: peak as f64 / rate,
                 peak_n: force[peak] - middle,
                 second: None,
@@ -243,22 +244,22 @@ fn blows(force: &[f64], rate: f64) -> Vec<Blow> {
         }
         k = last + 1;
     }
-    blows
+    impacts
 }
 
 /// Largest second force pulse before sample `end`: delay after the peak of the impact, s, and height as a fraction of that peak. `None` if no
 /// pulse exceeds the threshold of a double impact.
-fn second_pulse(force: &[f64], blow: &Blow, end: usize, rate: f64) -> Option<(f64, f64)> {
+fn second_pulse(force: &[f64], impact: &MeasuredImpact, end: usize, rate: f64) -> Option<(f64, f64)> {
     let middle = median(force.to_vec());
-    let width = (blow.last - blow.first).max(4);
+    let width = (impact.last - impact.first).max(4);
     // One pulse width after the first pulse is skipped, since anti-aliasing filters ring there.
-    let from = (blow.last + width).min(end);
+    let from = (impact.last + width).min(end);
     let (at, size) = (from..end.min(force.len()))
         .map(|k| (k, (force[k] - middle).abs()))
         .max_by(|a, b| a.1.total_cmp(&b.1))?;
-    let threshold = (SECOND * blow.peak_n.abs()).max(NOISE * noise(force, middle));
-    let delay_s = at as f64 / rate - blow.time_s;
-    (size > threshold).then(|| (delay_s, size / blow.peak_n.abs()))
+    let threshold = (SECOND * impact.peak_n.abs()).max(NOISE * noise(force, middle));
+    let delay_s = at as f64 / rate - impact.time_s;
+    (size > threshold).then(|| (delay_s, size / impact.peak_n.abs()))
 }
 
 /// Standard deviation of the force noise: 1.4826 · median absolute deviation from `middle`, which holds for Gaussian noise. Rare impacts do

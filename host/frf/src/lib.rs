@@ -55,7 +55,7 @@ mod window;
 pub use error::FrfError;
 pub use estimate::Estimator;
 pub use excitation::Excitation;
-pub use hammer::{Blow, HammerWindows, true_damping};
+pub use hammer::{HammerWindows, MeasuredImpact, true_damping};
 pub use interpolation::Interpolation;
 pub use measurement::{Measurement, Part, measure};
 pub use measurement_settings::MeasurementSettings;

@@ -185,7 +185,7 @@ fn part(
         averages: 0.0,
         left_out_hz: Vec::new(),
         least_singular: 1.0,
-        blows: None,
+        impacts: None,
     };
     let mut warnings: Vec<String> = members
         .iter()

@@ -21,16 +21,17 @@ pub enum Outcome {
     Marginal,
 }
 
-/// A cut that was tried.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TriedCut {
+/// Trial cut: spindle speed, axial depth, observed outcome, and the chatter frequency if it was measured.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct TrialCut {
     /// Spindle speed, rev/min.
     pub rpm: f64,
     /// Axial depth, mm.
     pub depth_mm: f64,
-    /// Its outcome.
+    /// Observed outcome.
     pub outcome: Outcome,
-    /// Chatter frequency, Hz; `None` where it was not measured, or nothing chattered.
+    /// Chatter frequency, Hz; `None` for a stable cut, or if it was not measured. Outputs leave it out.
+    #[serde(skip)]
     pub chatter_hz: Option<f64>,
 }
 
@@ -77,7 +78,7 @@ const TITLES: [[&str; 2]; 4] = [
 ///
 /// # Errors
 /// The file cannot be read, has other columns, or a speed, depth, frequency or outcome that cannot be.
-pub fn read(path: &Path) -> Result<Vec<TriedCut>, CutTableError> {
+pub fn read(path: &Path) -> Result<Vec<TrialCut>, CutTableError> {
     parse(path, &read_text(path)?)
 }
 
@@ -85,7 +86,7 @@ pub fn read(path: &Path) -> Result<Vec<TriedCut>, CutTableError> {
 ///
 /// # Errors
 /// As [`read`].
-pub fn parse(path: &Path, text: &str) -> Result<Vec<TriedCut>, CutTableError> {
+pub fn parse(path: &Path, text: &str) -> Result<Vec<TrialCut>, CutTableError> {
     let wrong = |line: u64, what: String| CutTableError::Line {
         path: path.into(),
         line: line.max(1),
@@ -154,7 +155,7 @@ impl Places {
         })
     }
 
-    fn cut(&self, head: &csv::StringRecord, row: &csv::StringRecord) -> Result<TriedCut, String> {
+    fn cut(&self, head: &csv::StringRecord, row: &csv::StringRecord) -> Result<TrialCut, String> {
         if row.len() != head.len() {
             return Err(format!(
                 "{} values, but the header has {} columns",
@@ -179,7 +180,7 @@ impl Places {
         };
         let measured = self.chatter_hz.filter(|&column| !row[column].is_empty());
         let chatter_hz = measured.map(positive).transpose()?;
-        Ok(TriedCut {
+        Ok(TrialCut {
             rpm: positive(self.rpm)?,
             depth_mm: positive(self.depth_mm)?,
             outcome: *outcome,
@@ -192,13 +193,13 @@ impl Places {
 mod tests {
     use super::*;
 
-    fn read(text: &str) -> Result<Vec<TriedCut>, String> {
+    fn read(text: &str) -> Result<Vec<TrialCut>, String> {
         parse(Path::new("cuts.csv"), text).map_err(|error| error.to_string())
     }
 
     #[test]
     fn both_heads_say_the_same() {
-        let cut = |depth_mm, outcome, chatter_hz| TriedCut {
+        let cut = |depth_mm, outcome, chatter_hz| TrialCut {
             rpm: 900.0,
             depth_mm,
             outcome,

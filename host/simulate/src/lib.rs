@@ -92,4 +92,4 @@ pub use record::Recorder;
 pub use segment::{Motion, Segment, Workspace};
 pub use sensor::{Accelerometer, STANDARD_GRAVITY, Sampler, TachometerModel};
 pub use settings::Settings;
-pub use virtual_cut::{Entry, Heard, VirtualCut, VirtualCutError};
+pub use virtual_cut::{Entry, SensedCut, VirtualCut, VirtualCutError};

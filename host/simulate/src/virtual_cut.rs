@@ -105,7 +105,7 @@ pub enum VirtualCutError {
 
 /// Output of accelerometer and tachometer in a virtual cut, and the statistics of its integration.
 #[derive(Clone, Debug)]
-pub struct Heard {
+pub struct SensedCut {
     /// Acceleration samples in blocks, as the sensor delivers them.
     pub blocks: Vec<Block>,
     /// Edges of the tachometer in the order of time.
@@ -260,19 +260,19 @@ impl VirtualCut {
     ///
     /// # Errors
     /// As [`Self::model`] and [`Model::run`].
-    pub fn hear(
+    pub fn sense(
         &self,
         case: &Case,
         accelerometer: Accelerometer,
         tachometer: TachometerModel,
         seed: u64,
-    ) -> Result<Heard, VirtualCutError> {
+    ) -> Result<SensedCut, VirtualCutError> {
         let model = self.model(case)?;
         let mut sampler = Sampler::new(&model, accelerometer);
         let statistics = model.run(self.seconds + sampler.tail_s(), Settings::default(), |segment| {
             sampler.observe(segment);
         })?;
-        Ok(Heard {
+        Ok(SensedCut {
             blocks: sampler.blocks(seed),
             edges: tachometer.edges(&self.spindle(case)?, self.seconds, seed),
             statistics,

@@ -11,7 +11,7 @@ use crate::diagnose::{DiagnoseError, Diagnosis, Options, Stage, diagnose_watched
 use crate::recording::Recording;
 use crate::report::diagnosis::diagnosis_page;
 use crate::report::lobes_change::{sentences, trial_cut_counts};
-use crate::trial_cuts::{self, TestCut};
+use crate::trial_cuts::{self, TrialCut};
 
 /// Finds why the simulation of a case differs from recordings, extends the case, and states the gain in prediction error.
 #[derive(Debug, clap::Args)]
@@ -71,7 +71,7 @@ pub fn run(args: Args) -> Result<(), Error> {
 
 /// Adds the stability limits to the diagnosis: before and after the extension, or only those of the case if there is no
 /// extension but there are trial cuts. A failure becomes a warning.
-fn add_limits(case: &Case, recordings: &[Recording], cuts: &[TestCut], diagnosis: &mut Diagnosis) {
+fn add_limits(case: &Case, recordings: &[Recording], cuts: &[TrialCut], diagnosis: &mut Diagnosis) {
     let has_cuts = || !cuts.is_empty() || !recorded_cuts(case, recordings).is_empty();
     let found = match diagnosis.extended(case) {
         Some(extended) => lobes(case, &extended, &diagnosis.moved(case), recordings, cuts)

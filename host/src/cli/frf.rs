@@ -379,9 +379,9 @@ impl ColumnsAnswer {
             averages: part.averages,
             least_singular_value: part.least_singular,
             left_out_hz: part.left_out_hz.clone(),
-            blows: part.blows.as_ref().map(|(used, double)| ImpactCounts {
+            blows: part.impacts.as_ref().map(|(used, double)| ImpactCounts {
                 used: used.len(),
-                double_s: double.iter().map(|blow| blow.time_s).collect(),
+                double_s: double.iter().map(|impact| impact.time_s).collect(),
             }),
         }
     }

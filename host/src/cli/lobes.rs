@@ -14,7 +14,7 @@ use crate::report::lobe_chart::{Column, lobe_chart};
 use crate::report::marks::Mark;
 use crate::report::page::{figure, page};
 use crate::stability::{Chart, CutStability, Label, LimitSpread, Method, SpeedLine, Uncertainty, chart};
-use crate::trial_cuts::{self, Calls, TestCut};
+use crate::trial_cuts::{self, Calls, TrialCut};
 
 /// Computes stability limits over the spindle speed, or the dominant Floquet multiplier at given points.
 #[derive(Debug, clap::Args)]
@@ -138,7 +138,7 @@ struct ChartRequest {
     rpm: Range,
     depth_mm: Range,
     probability: bool,
-    cuts: Option<Vec<TestCut>>,
+    cuts: Option<Vec<TrialCut>>,
 }
 
 #[derive(Serialize)]

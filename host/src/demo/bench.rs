@@ -11,7 +11,7 @@ use quietcut_core::units::Nanoseconds;
 use super::trace::Trace;
 use super::trial::Trial;
 use crate::device::{Client, DeviceError, Event, Pace, Setup, SimulatedDevice, SimulatedPort, VirtualCell};
-use crate::simulate::{Heard, VirtualCutError};
+use crate::simulate::{SensedCut, VirtualCutError};
 
 /// Failure of a cut on the test bench.
 #[derive(Debug, thiserror::Error)]
@@ -36,7 +36,7 @@ const CUT_SECONDS: f64 = 16.0;
 /// Test bench with a virtual cell, a simulated device and its client.
 pub struct Bench {
     cell: VirtualCell,
-    cuts: Sender<Heard>,
+    cuts: Sender<SensedCut>,
     client: Client,
     serial_port: String,
     /// Sequence number of the first block of the next simulated cut; the numbering continues from cut to cut.

@@ -20,7 +20,7 @@ use super::flash_file::FlashFile;
 use super::port::{Port, SIMULATED, SerialLine};
 use super::pseudo_terminal::PseudoTerminal;
 use super::virtual_spindle::VirtualSpindle;
-use crate::simulate::Heard;
+use crate::simulate::SensedCut;
 
 /// Time scale of the virtual spindle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -54,7 +54,7 @@ impl SimulatedDevice {
     ///
     /// # Errors
     /// No pseudo-terminal is free, the state file cannot be used, or the number of teeth is too large.
-    pub fn start(setup: Setup<'_>, cuts: Receiver<Heard>) -> Result<Self, DeviceError> {
+    pub fn start(setup: Setup<'_>, cuts: Receiver<SensedCut>) -> Result<Self, DeviceError> {
         let terminal = PseudoTerminal::new()?;
         let flash = match setup.state {
             Some(path) => FlashFile::open(path)?,

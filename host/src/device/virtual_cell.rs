@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::mpsc::{Receiver, sync_channel};
 
 use crate::case::{Case, CaseError};
-use crate::simulate::{Accelerometer, Heard, TachometerModel, VirtualCut, VirtualCutError};
+use crate::simulate::{Accelerometer, SensedCut, TachometerModel, VirtualCut, VirtualCutError};
 
 /// Path of the case file of the cell; the program contains its text.
 const CASE_NAME: &str = "tests/cases/kuka-kr90-acetal.toml";
@@ -57,12 +57,12 @@ impl VirtualCell {
         depth_mm: f64,
         seconds: f64,
         seed: u64,
-    ) -> Result<Heard, VirtualCutError> {
+    ) -> Result<SensedCut, VirtualCutError> {
         let accelerometer = Accelerometer {
             clock_error: CLOCK_ERROR,
             ..Accelerometer::IIS3DWB_16G
         };
-        virtual_cut(spindle_rpm, depth_mm, seconds).hear(
+        virtual_cut(spindle_rpm, depth_mm, seconds).sense(
             &self.case,
             accelerometer,
             TachometerModel::ONE_MARK,
@@ -84,17 +84,17 @@ impl VirtualCell {
     }
 
     /// Endless sequence of three cuts: period doubling, stable, Hopf. Each cut is computed while the previous one is played.
-    pub fn endless_cuts(self) -> Receiver<Heard> {
+    pub fn endless_cuts(self) -> Receiver<SensedCut> {
         const CUTS: [(f64, f64); 3] = [(1045.0, 2.0), (1045.0, 1.0), (900.0, 2.0)];
         const SECONDS: f64 = 12.0;
         let (send, receive) = sync_channel(1);
         std::thread::spawn(move || {
             for (seed, (spindle_rpm, depth_mm)) in (1..).zip(CUTS.into_iter().cycle()) {
-                let Ok(heard) = self.cut(spindle_rpm, depth_mm, SECONDS, seed) else {
+                let Ok(sensed) = self.cut(spindle_rpm, depth_mm, SECONDS, seed) else {
                     return;
                 };
                 // Sending fails after the device has been dropped.
-                if send.send(heard).is_err() {
+                if send.send(sensed).is_err() {
                     return;
                 }
             }

@@ -7,21 +7,21 @@ use quietcut_core::acceleration::Block;
 use quietcut_core::tachometer::Edge;
 use quietcut_core::units::Nanoseconds;
 
-use crate::simulate::Heard;
+use crate::simulate::SensedCut;
 
 /// Block of samples with the tachometer edges before the next block.
 pub(super) type Step = (Block, Vec<Edge>);
 
 /// Joins cuts, each of which starts at its own time 0 and block 0, to one sequence of blocks.
 pub(super) struct VirtualSpindle {
-    cuts: Receiver<Heard>,
+    cuts: Receiver<SensedCut>,
     steps: VecDeque<Step>,
     next_sequence: u32,
     next_time: u64,
 }
 
 impl VirtualSpindle {
-    pub(super) fn new(cuts: Receiver<Heard>) -> Self {
+    pub(super) fn new(cuts: Receiver<SensedCut>) -> Self {
         Self {
             cuts,
             steps: VecDeque::new(),
@@ -33,10 +33,10 @@ impl VirtualSpindle {
     /// Next block without removing it; `None` while the spindle stands still. A cut after a pause starts at `now`.
     pub(super) fn peek(&mut self, now: Nanoseconds) -> Option<&Step> {
         if self.steps.is_empty() {
-            let heard = self.cuts.try_recv().ok()?;
+            let sensed = self.cuts.try_recv().ok()?;
             // A pause of the spindle is no gap in the samples: the sensor was off.
             self.next_time = self.next_time.max(now.0);
-            self.append(heard);
+            self.append(sensed);
         }
         self.steps.front()
     }
@@ -46,19 +46,19 @@ impl VirtualSpindle {
         self.steps.pop_front()
     }
 
-    fn append(&mut self, heard: Heard) {
+    fn append(&mut self, sensed: SensedCut) {
         let (offset, first) = (self.next_time, self.next_sequence);
-        let period = block_period(&heard.blocks);
-        let mut edges = heard
+        let period = block_period(&sensed.blocks);
+        let mut edges = sensed
             .edges
             .iter()
             .map(|edge| Edge {
                 time: Nanoseconds(edge.time.0 + offset),
             })
             .peekable();
-        let starts = heard.blocks.iter().skip(1).map(|block| block.time.0 + offset);
+        let starts = sensed.blocks.iter().skip(1).map(|block| block.time.0 + offset);
         let ends = starts.chain(std::iter::once(u64::MAX));
-        for (block, end) in heard.blocks.iter().zip(ends) {
+        for (block, end) in sensed.blocks.iter().zip(ends) {
             let mut own = Vec::new();
             while let Some(edge) = edges.next_if(|edge| edge.time.0 < end) {
                 own.push(edge);
@@ -92,13 +92,13 @@ mod tests {
     use super::*;
     use crate::simulate::Statistics;
 
-    fn heard(blocks: u32, edges_ms: &[u64]) -> Heard {
+    fn sensed(blocks: u32, edges_ms: &[u64]) -> SensedCut {
         let block = |sequence: u32| Block {
             sequence,
             time: Nanoseconds(u64::from(sequence) * 1_000_000),
             ..Block::default()
         };
-        Heard {
+        SensedCut {
             blocks: (0..blocks).map(block).collect(),
             edges: edges_ms
                 .iter()
@@ -113,8 +113,8 @@ mod tests {
     #[test]
     fn cuts_follow_one_another_without_a_gap() {
         let (send, receive) = channel();
-        send.send(heard(3, &[0, 2])).unwrap();
-        send.send(heard(2, &[1])).unwrap();
+        send.send(sensed(3, &[0, 2])).unwrap();
+        send.send(sensed(2, &[1])).unwrap();
         let mut spindle = VirtualSpindle::new(receive);
         let now = Nanoseconds(0);
         let mut steps = Vec::new();
@@ -132,7 +132,7 @@ mod tests {
         ];
         assert_eq!(steps, expected);
         // After a pause the next cut starts at the current time.
-        send.send(heard(1, &[])).unwrap();
+        send.send(sensed(1, &[])).unwrap();
         let (block, _) = spindle.peek(Nanoseconds(9_000_000)).unwrap();
         assert_eq!((block.sequence, block.time), (5, Nanoseconds(9_000_000)));
     }

@@ -5,7 +5,7 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 use plotters::style::{Color, RGBColor};
 
 use super::picture::{Axes, CHATTER, Canvas, INK, ORANGE, PictureError, QUIET, text};
-use crate::trial_cuts::{Outcome, TestCut};
+use crate::trial_cuts::{Outcome, TrialCut};
 
 /// Outcome of a marked cut.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -35,8 +35,8 @@ pub struct Mark {
     pub wrong: bool,
 }
 
-impl From<&TestCut> for Mark {
-    fn from(cut: &TestCut) -> Self {
+impl From<&TrialCut> for Mark {
+    fn from(cut: &TrialCut) -> Self {
         Self {
             rpm: cut.rpm,
             depth_mm: cut.depth_mm,

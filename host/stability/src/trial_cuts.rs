@@ -1,30 +1,16 @@
 //! Trial cuts with observed outcomes, and how often a method predicts them correctly.
 
-use std::path::Path;
-
 use serde::Serialize;
 
 use crate::error::StabilityError;
 use crate::limits::method::Method;
 use crate::limits::speed_line::SpeedLine;
-use quietcut_recording::cut_table::{self, CutTableError};
 
-pub use quietcut_recording::cut_table::Outcome;
+pub use quietcut_recording::cut_table::{Outcome, TrialCut, read};
 
 /// Number of steps in depth at which Floquet multipliers are computed. A choice: half more than the least number of a
 /// chart, 40.
 const SAMPLES: usize = 60;
-
-/// Trial cut: spindle speed, axial depth and observed outcome.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct TestCut {
-    /// Spindle speed, rev/min.
-    pub rpm: f64,
-    /// Axial depth, mm.
-    pub depth_mm: f64,
-    /// Observed outcome.
-    pub outcome: Outcome,
-}
 
 /// Number of correct and wrong predictions of a method over trial cuts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
@@ -44,24 +30,8 @@ pub struct Calls {
 /// Columns of a file of trial cuts.
 const HEADER: [&str; 3] = ["rpm [rev/min]", "depth [mm]", "outcome"];
 
-/// Reads the trial cuts of a table; the chatter frequency is not kept.
-///
-/// # Errors
-/// The file cannot be read, has other columns, or a speed, depth or outcome that cannot be.
-pub fn read(path: &Path) -> Result<Vec<TestCut>, CutTableError> {
-    let cuts = cut_table::read(path)?;
-    Ok(cuts
-        .iter()
-        .map(|cut| TestCut {
-            rpm: cut.rpm,
-            depth_mm: cut.depth_mm,
-            outcome: cut.outcome,
-        })
-        .collect())
-}
-
-/// Trial cuts as the text of a CSV file; the inverse of [`read`].
-pub fn text(cuts: &[TestCut]) -> String {
+/// Trial cuts as the text of a CSV file without chatter frequencies; [`read`] reads it.
+pub fn text(cuts: &[TrialCut]) -> String {
     let lines = cuts.iter().map(|cut| {
         let outcome = match cut.outcome {
             Outcome::Stable => "stable",
@@ -80,7 +50,7 @@ impl Calls {
     ///
     /// # Errors
     /// As [`Method::lines`].
-    pub fn new<M: Method + ?Sized>(method: &M, cuts: &[TestCut]) -> Result<Self, StabilityError> {
+    pub fn new<M: Method + ?Sized>(method: &M, cuts: &[TrialCut]) -> Result<Self, StabilityError> {
         Ok(Self::of(&calls(method, cuts)?))
     }
 
@@ -122,7 +92,7 @@ impl Call {
 ///
 /// # Errors
 /// As [`Method::lines`].
-pub fn calls<M: Method + ?Sized>(method: &M, cuts: &[TestCut]) -> Result<Vec<Call>, StabilityError> {
+pub fn calls<M: Method + ?Sized>(method: &M, cuts: &[TrialCut]) -> Result<Vec<Call>, StabilityError> {
     let mut speeds_rpm: Vec<f64> = cuts.iter().map(|cut| cut.rpm).collect();
     speeds_rpm.sort_by(f64::total_cmp);
     speeds_rpm.dedup();
@@ -133,7 +103,7 @@ pub fn calls<M: Method + ?Sized>(method: &M, cuts: &[TestCut]) -> Result<Vec<Cal
 
 /// Compares the prediction for one cut with its outcome. One of the lines must have the speed of the cut and reach its
 /// depth; otherwise the cut counts as predicted unstable.
-pub fn call(lines: &[SpeedLine], cut: &TestCut) -> Call {
+pub fn call(lines: &[SpeedLine], cut: &TrialCut) -> Call {
     let line = lines.iter().find(|line| line.rpm == cut.rpm);
     let within = |of: fn(&SpeedLine) -> &Vec<[f64; 2]>| {
         let mut intervals = line.into_iter().flat_map(of);
@@ -158,10 +128,11 @@ mod tests {
     #[test]
     fn written_trial_cuts_are_read_again_and_compared() {
         // Chapter 7: the limit is 3.174 mm at 600 rev/min.
-        let cut = |depth_mm, outcome| TestCut {
+        let cut = |depth_mm, outcome| TrialCut {
             rpm: 600.0,
             depth_mm,
             outcome,
+            chatter_hz: None,
         };
         let cuts = [
             cut(2.5, Outcome::Stable),

@@ -8,7 +8,7 @@ use quietcut_model::case::Case;
 use quietcut_model::effects::Treatment;
 use quietcut_recording::{Recording, TestKind};
 use quietcut_stability::orbit::{ForcedProblem, collocation_of};
-use quietcut_stability::trial_cuts::{Call, Calls, TestCut, call, calls};
+use quietcut_stability::trial_cuts::{Call, Calls, TrialCut, call, calls};
 use quietcut_stability::{
     CubicTerms, Limit, Method, Pitched, SpeedLine, StabilityError, StabilityLoss, after, chart,
     default_speeds, needs_orbit, spaced,
@@ -76,7 +76,7 @@ pub struct Chart {
     /// The stability limits, by spindle speed.
     pub lines: Vec<SpeedLine>,
     /// Trial cuts and recorded cuts, each with the comparison of its outcome with the prediction.
-    pub cuts: Vec<(TestCut, Call)>,
+    pub cuts: Vec<(TrialCut, Call)>,
 }
 
 /// Stability limits of the case and of the extended case.
@@ -111,7 +111,7 @@ pub type IntervalEnds = [Case; 2];
 pub fn baseline_lobes(
     case: &Case,
     recordings: &[Recording],
-    cuts: &[TestCut],
+    cuts: &[TrialCut],
 ) -> Result<Chart, StabilityError> {
     let method = method(case, after_s(&[case], recordings))?;
     let cuts = Cuts::new(case, recordings, cuts);
@@ -128,7 +128,7 @@ pub fn lobes(
     extended: &Case,
     moved: &[IntervalEnds],
     recordings: &[Recording],
-    cuts: &[TestCut],
+    cuts: &[TrialCut],
 ) -> Result<Lobes, StabilityError> {
     let after_s = after_s(&[case, extended], recordings);
     let methods = [method(case, after_s)?, method(extended, after_s)?];
@@ -210,14 +210,14 @@ fn spread(speeds: &mut [Change], searched_mm: f64, moved: &[IntervalEnds], after
 
 /// The trial cuts and recorded cuts of a chart.
 struct Cuts<'a> {
-    tried: &'a [TestCut],
-    recorded: Vec<TestCut>,
+    tried: &'a [TrialCut],
+    recorded: Vec<TrialCut>,
     /// Speeds of all recorded cuts, rev/min, including cuts whose immersion or feed belongs to another chart.
     recorded_rpm: Vec<f64>,
 }
 
 impl<'a> Cuts<'a> {
-    fn new(case: &Case, recordings: &[Recording], tried: &'a [TestCut]) -> Self {
+    fn new(case: &Case, recordings: &[Recording], tried: &'a [TrialCut]) -> Self {
         Self {
             tried,
             recorded: recorded_cuts(case, recordings),
@@ -229,7 +229,7 @@ impl<'a> Cuts<'a> {
         }
     }
 
-    fn all(&self) -> impl Iterator<Item = &TestCut> {
+    fn all(&self) -> impl Iterator<Item = &TrialCut> {
         self.tried.iter().chain(&self.recorded)
     }
 }
@@ -334,7 +334,7 @@ fn method(case: &Case, after_s: Option<f64>) -> Result<Box<dyn Method>, Stabilit
 /// recorded cuts are always among them.
 fn speeds(
     case: &Case,
-    cuts: &[TestCut],
+    cuts: &[TrialCut],
     recorded_rpm: &[f64],
     count: usize,
 ) -> Result<Vec<f64>, StabilityError> {
@@ -434,10 +434,11 @@ mod tests {
     fn without_an_extension_the_case_predicts_the_cuts() {
         let case = quietcut_testkit::case("kuka-kr90-acetal");
         // Chapter 7: the limit is 3.174 mm at 600 rev/min.
-        let cut = |depth_mm, outcome| TestCut {
+        let cut = |depth_mm, outcome| TrialCut {
             rpm: 600.0,
             depth_mm,
             outcome,
+            chatter_hz: None,
         };
         let cuts = [cut(2.5, Outcome::Stable), cut(3.0, Outcome::Chatter)];
         let chart = baseline_lobes(&case, &[], &cuts).unwrap();

@@ -6,19 +6,20 @@ use quietcut_core::monitor::{Monitor, State};
 
 use quietcut_model::case::Case;
 use quietcut_recording::{RecordedCut, Recording, Sensed, SpindleSettings, TestKind};
-use quietcut_stability::trial_cuts::{Outcome, TestCut};
+use quietcut_stability::trial_cuts::{Outcome, TrialCut};
 
 /// The recorded cuts that belong to the chart of a case: with the immersion and feed of the case, and one given speed and depth.
-pub fn recorded_cuts(case: &Case, recordings: &[Recording]) -> Vec<TestCut> {
+pub fn recorded_cuts(case: &Case, recordings: &[Recording]) -> Vec<TrialCut> {
     recordings
         .iter()
         .filter(|recording| recording.sidecar.kind == Some(TestKind::Cutting))
         .filter_map(|recording| {
             let given = recording.sidecar.cut?;
-            Some(TestCut {
+            Some(TrialCut {
                 rpm: given.spindle_rpm.filter(|_| is_on_chart(case, &given))?,
                 depth_mm: given.axial_depth_mm?,
                 outcome: outcome(recording, case.tool.as_ref().map(|tool| tool.teeth)),
+                chatter_hz: None,
             })
         })
         .collect()

@@ -5,7 +5,7 @@ use num_complex::Complex64;
 use crate::driven::Driven;
 use crate::estimate::Line;
 use crate::excitation::Excitation;
-use crate::hammer::Blow;
+use crate::hammer::MeasuredImpact;
 use crate::table::Frf;
 use quietcut_model::structure::Direction;
 
@@ -26,7 +26,7 @@ pub struct Part {
     /// single force.
     pub least_singular: f64,
     /// Single impacts (used) and double impacts (left out) of a hammer test; `None` for other excitation.
-    pub blows: Option<(Vec<Blow>, Vec<Blow>)>,
+    pub impacts: Option<(Vec<MeasuredImpact>, Vec<MeasuredImpact>)>,
 }
 
 /// Receptances of one group, with their standard deviations, at the frequencies of the group.

@@ -4,7 +4,7 @@ use super::part::Part;
 use crate::cross_spectra::{CrossSpectra, Segments, averaged};
 use crate::driven::Driven;
 use crate::error::FrfError;
-use crate::hammer::{self, Blow};
+use crate::hammer::{self, MeasuredImpact};
 use crate::measurement_settings::{MeasurementSettings, band};
 
 /// Auto- and cross-spectra of hammer tests with one segment for each single impact; one result for each recording.
@@ -39,7 +39,7 @@ pub(super) fn struck(
         .map(|cut| {
             let segments = Segments {
                 weights: vec![1.0; cut.length],
-                starts: (0..cut.used.len()).map(|blow| blow * cut.length).collect(),
+                starts: (0..cut.used.len()).map(|impact| impact * cut.length).collect(),
                 without_mean: false,
                 averages: cut.used.len() as f64,
             };
@@ -54,7 +54,7 @@ pub(super) fn struck(
     if !double.is_empty() {
         let times: Vec<String> = double
             .iter()
-            .map(|blow: &Blow| format!("{:.3}", blow.time_s))
+            .map(|impact: &MeasuredImpact| format!("{:.3}", impact.time_s))
             .collect();
         warnings.push(format!("double impacts are left out: at {} s", times.join(", ")));
     }
@@ -76,7 +76,7 @@ pub(super) fn struck(
             1.0 / tau
         ));
     }
-    part.blows = Some((used, double));
+    part.impacts = Some((used, double));
     Ok(spectra)
 }
 

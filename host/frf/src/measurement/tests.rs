@@ -429,7 +429,7 @@ fn dependent_forces_are_refused_and_further_tests_make_them_independent() {
 }
 
 /// Adds an impact at `at_s` to the force: a half sine of 8 ms.
-fn blow(force: &mut [f64], at_s: f64, newtons: f64) {
+fn impact(force: &mut [f64], at_s: f64, newtons: f64) {
     let (first, width) = ((at_s * RATE) as usize, (0.03 * RATE) as usize);
     for k in 0..=width {
         force[first + k] += newtons * (std::f64::consts::PI * k as f64 / width as f64).sin().powi(2);
@@ -441,13 +441,13 @@ fn impacts_become_segments_and_double_impacts_are_left_out() {
     let mut random = random(30);
     let mut force = vec![0.0; (64.0 * RATE) as usize];
     for (index, at_s) in [1.0, 13.1, 25.3, 37.2, 49.4].into_iter().enumerate() {
-        blow(&mut force, at_s, 200.0 + 30.0 * index as f64);
+        impact(&mut force, at_s, 200.0 + 30.0 * index as f64);
     }
-    blow(&mut force, 25.3 + 0.11, 40.0);
+    impact(&mut force, 25.3 + 0.11, 40.0);
     let mut recording = record(TestKind::Hammer, along_y(force), 0.002, &mut random);
     recording.channels[0].samples = with_noise(&recording.channels[0].samples, 0.002, &mut random);
     let measurement = measure(std::slice::from_ref(&recording), &in_band()).unwrap();
-    let (used, double) = measurement.parts[0].blows.clone().unwrap();
+    let (used, double) = measurement.parts[0].impacts.clone().unwrap();
     assert_eq!((used.len(), double.len()), (4, 1));
     assert!((used[0].peak_n - 200.0).abs() < 5.0 && (used[0].time_s - 1.015).abs() < 0.005);
     let (delay_s, part) = double[0].second.unwrap();
@@ -465,7 +465,7 @@ fn an_exponential_window_moves_the_poles_by_its_decay_and_nothing_else() {
     let mut random = random(31);
     let mut force = vec![0.0; (26.0 * RATE) as usize];
     for at_s in [1.0, 5.1, 9.3, 13.2, 17.4, 21.5] {
-        blow(&mut force, at_s, 200.0);
+        impact(&mut force, at_s, 200.0);
     }
     let recording = record(TestKind::Hammer, along_y(force), 0.0, &mut random);
     let tau = 0.8;
@@ -673,7 +673,7 @@ fn records_that_cannot_be_measured_are_refused_with_the_reason() {
                 .for_each(|(k, f)| *f = f64::from((k % 7) as u32)),
             &hammer
         )
-        .contains("blow")
+        .contains("impact")
     );
     let stepped = MeasurementSettings {
         excitation: Some(Excitation::StepSine),

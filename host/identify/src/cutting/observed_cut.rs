@@ -1,6 +1,6 @@
 //! Trial cuts with the observed side of the stability limit.
 
-use quietcut_recording::cut_table::{Outcome, TriedCut};
+use quietcut_recording::cut_table::{Outcome, TrialCut};
 
 /// A trial cut with its observed outcome.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -17,7 +17,7 @@ pub struct ObservedCut {
 
 impl ObservedCut {
     /// The observation in a row of a table of trial cuts; `None` for a marginal cut, which may lie on either side of the limit.
-    pub fn new(cut: &TriedCut) -> Option<Self> {
+    pub fn new(cut: &TrialCut) -> Option<Self> {
         Some(Self {
             rpm: cut.rpm,
             depth_mm: cut.depth_mm,

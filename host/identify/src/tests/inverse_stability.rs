@@ -79,8 +79,8 @@ fn cuts(
             };
             if cut.chatters {
                 let error: f64 = StandardNormal.sample(random);
-                let heard = machine.point(rpm, real_mm).unwrap().chatter_hz;
-                cut.chatter_hz = heard.map(|hz| hz * (1.0 + ERRORS.frequency * error));
+                let chatter_hz = machine.point(rpm, real_mm).unwrap().chatter_hz;
+                cut.chatter_hz = chatter_hz.map(|hz| hz * (1.0 + ERRORS.frequency * error));
                 cuts.extend(last);
                 cuts.push(cut);
                 break;

@@ -146,7 +146,7 @@ fn hammered(structure: &Structure, angles_rad: &[f64], seed: u64) -> PostureFrf 
                 measured: vec![Quantity::Displacement],
                 ..Rig::new(*direction, signal, 2048.0)
             };
-            let (mut recording, _) = rig.record(structure, Path::new("blows.csv")).unwrap();
+            let (mut recording, _) = rig.record(structure, Path::new("impacts.csv")).unwrap();
             let noise = Noise {
                 relative: 0.01,
                 ..Noise::default()

@@ -10,7 +10,7 @@ fn cut(rpm: f64, seconds: f64) -> VirtualCut {
 }
 
 #[test]
-fn what_is_recorded_replays_as_what_was_heard() {
+fn a_recording_replays_as_the_simulated_samples() {
     // The same cut straight to blocks, and by way of a recording.
     let case = case("kuka-kr90-acetal");
     let accelerometer = Accelerometer {
@@ -23,7 +23,7 @@ fn what_is_recorded_replays_as_what_was_heard() {
         ..TachometerModel::ONE_MARK
     };
     let cut = cut(900.0, 3.0);
-    let heard = cut.hear(&case, accelerometer, tachometer, 7).unwrap();
+    let simulated = cut.sense(&case, accelerometer, tachometer, 7).unwrap();
     let recorder = Recorder::Sensor {
         accelerometer,
         seed: 7,
@@ -46,7 +46,7 @@ fn what_is_recorded_replays_as_what_was_heard() {
     // The recording is scaled anew: samples agree to a count of the coarser of the two.
     let fine = f64::from(sensed.settings.sensor.meters_per_second2_per_count);
     let coarse = f64::from(accelerometer.sensor().meters_per_second2_per_count);
-    for (a, b) in heard.blocks.iter().zip(&sensed.blocks) {
+    for (a, b) in simulated.blocks.iter().zip(&sensed.blocks) {
         assert!(a.time.0.abs_diff(b.time.0) <= 1);
         for (a, b) in a.counts.iter().zip(&b.counts) {
             for (a, b) in a.iter().zip(b) {
@@ -56,7 +56,7 @@ fn what_is_recorded_replays_as_what_was_heard() {
     }
     // Edges to a hundredth of a sample, once the detector knows the swing: the record begins in the middle of an
     // edge, and it learns by a quarter per turn.
-    let edges: Vec<u64> = heard.edges.iter().map(|edge| edge.time.0).collect();
+    let edges: Vec<u64> = simulated.edges.iter().map(|edge| edge.time.0).collect();
     let found: Vec<u64> = sensed.edges.iter().map(|edge| edge.time.0).collect();
     assert!(
         found.len() + 2 >= edges.len(),

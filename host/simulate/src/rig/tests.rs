@@ -293,7 +293,7 @@ fn a_missing_mode_adds_to_the_receptance() {
 
 #[test]
 fn coupling_comes_from_one_potential() {
-    // Energy is kept: without damping the sum of kinetic and all potential energy stays what the blow gave.
+    // Energy is kept: without damping the sum of kinetic and all potential energy is that which the impact gave.
     let structure = case("kuka-kr90-half").structure.unwrap();
     let effects = [
         "damping=-0.99999999",

@@ -4,12 +4,12 @@ use quietcut_core::tachometer::Wheel;
 
 use super::*;
 
-fn heard(accelerometer: Accelerometer, seed: u64) -> Heard {
+fn sensed(accelerometer: Accelerometer, seed: u64) -> SensedCut {
     let cut = VirtualCut {
         entry: Entry::None,
         ..VirtualCut::new(900.0, 1.0, 1.0)
     };
-    cut.hear(
+    cut.sense(
         &case("kuka-kr90-acetal"),
         accelerometer,
         TachometerModel::ONE_MARK,
@@ -18,8 +18,8 @@ fn heard(accelerometer: Accelerometer, seed: u64) -> Heard {
     .unwrap()
 }
 
-fn counts(heard: &Heard, axis: usize) -> Vec<f64> {
-    heard
+fn counts(sensed: &SensedCut, axis: usize) -> Vec<f64> {
+    sensed
         .blocks
         .iter()
         .flat_map(|block| block.counts.iter().map(move |counts| f64::from(counts[axis])))
@@ -29,9 +29,9 @@ fn counts(heard: &Heard, axis: usize) -> Vec<f64> {
 #[test]
 fn the_same_seed_repeats_and_another_does_not() {
     let sensor = Accelerometer::IIS3DWB_16G;
-    assert_eq!(heard(sensor, 5).blocks, heard(sensor, 5).blocks);
-    assert_ne!(heard(sensor, 5).blocks, heard(sensor, 6).blocks);
-    assert_eq!(heard(sensor, 5).edges, heard(sensor, 5).edges);
+    assert_eq!(sensed(sensor, 5).blocks, sensed(sensor, 5).blocks);
+    assert_ne!(sensed(sensor, 5).blocks, sensed(sensor, 6).blocks);
+    assert_eq!(sensed(sensor, 5).edges, sensed(sensor, 5).edges);
 }
 
 #[test]
@@ -41,11 +41,11 @@ fn blocks_are_stamped_by_the_true_clock() {
         stamp_jitter_s: 0.0,
         ..Accelerometer::IIS3DWB_16G
     };
-    let heard = heard(sensor, 1);
+    let sensed = sensed(sensor, 1);
     // Whole blocks and a rest, over one second at 25 867 Hz.
-    let samples: usize = heard.blocks.iter().map(|block| block.counts.len()).sum();
+    let samples: usize = sensed.blocks.iter().map(|block| block.counts.len()).sum();
     assert!(samples.abs_diff(25_867) <= 2, "{samples}");
-    for (number, block) in heard.blocks.iter().enumerate() {
+    for (number, block) in sensed.blocks.iter().enumerate() {
         assert_eq!(block.sequence, number as u32);
         let expected_ns = number as f64 * 64.0 / (26_667.0 * 0.97) * 1e9;
         assert!((block.time.0 as f64 - expected_ns).abs() < 1.0);
@@ -67,7 +67,7 @@ fn noise_has_its_density_and_quiet_is_quiet() {
             range_g: 2.0,
             ..Accelerometer::IIS3DWB_16G
         };
-        cut.hear(&case, sensor, TachometerModel::ONE_MARK, 3).unwrap()
+        cut.sense(&case, sensor, TachometerModel::ONE_MARK, 3).unwrap()
     };
     // The first half second is air.
     let quiet = counts(&listen(0.0), 1);
@@ -89,16 +89,16 @@ fn a_small_range_clips_and_says_so() {
         range_g: 2.0,
         ..Accelerometer::IIS3DWB_16G
     };
-    let heard = cut
-        .hear(
+    let sensed = cut
+        .sense(
             &case("insperger-2dof-ad0.05"),
             sensor,
             TachometerModel::ONE_MARK,
             1,
         )
         .unwrap();
-    let clipped: usize = heard.blocks.iter().map(|block| usize::from(block.clipped)).sum();
-    let at_end = heard
+    let clipped: usize = sensed.blocks.iter().map(|block| usize::from(block.clipped)).sum();
+    let at_end = sensed
         .blocks
         .iter()
         .flat_map(|block| &block.counts)

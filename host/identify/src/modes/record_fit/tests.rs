@@ -296,9 +296,9 @@ fn records_that_do_not_fit_the_receptances_are_refused() {
     let records = spectra(&clean, BAND_HZ).unwrap();
     let refused = refine_by_records(&two, &records).unwrap_err().to_string();
     assert!(refused.contains("other directions"), "{refused}");
-    let mut blows = clean;
-    blows.sidecar.kind = Some(TestKind::Hammer);
-    assert!(spectra(&blows, BAND_HZ).is_none());
+    let mut impacts = clean;
+    impacts.sidecar.kind = Some(TestKind::Hammer);
+    assert!(spectra(&impacts, BAND_HZ).is_none());
 }
 
 /// Record without noise of a porous cut, as `simulate --experiment porous` makes it, or of a speed sweep.
