@@ -7,8 +7,8 @@
 
 use quietcut::case::Case;
 use quietcut::simulate::{
-    Cutter, Cutting, Drive, Dynamics, Entry, Model, Motion, Passage, Regeneration, Settings, Spindle,
-    VirtualCut, Workspace,
+    Cutter, Cutting, Drive, Dynamics, Entry, Model, Motion, Regeneration, Settings, Spindle, VirtualCut,
+    WorkpieceTraverse, Workspace,
 };
 use quietcut::stability::orbit::ForcedProblem;
 use quietcut::stability::{self, CubicTerms, Method, Pitched, Problem, RevolutionCollocation};
@@ -33,7 +33,7 @@ fn steady(case: &Case, spindle_rpm: f64, depth_mm: f64) -> Model {
         cutting: Some(Cutting {
             cutter: cutter(case, depth_mm),
             spindle: Spindle::new(spindle_rpm),
-            passage: Passage::Steady,
+            traverse: WorkpieceTraverse::Steady,
             regeneration: Regeneration::AllPasses,
             pores: None,
         }),

@@ -4,7 +4,7 @@ use std::fmt;
 
 use quietcut::case::Case;
 use quietcut::simulate::{
-    Accelerometer, Model, Regeneration, Sampler, Segment, SensedCut, Settings, Spindle, Statistics,
+    Accelerometer, DenseStep, Model, Regeneration, Sampler, SensedCut, Settings, Spindle, Statistics,
     TachometerModel, VirtualCut, Workspace,
 };
 use quietcut_core::detector::Verdict;
@@ -219,7 +219,7 @@ impl Sizes {
         }
     }
 
-    fn observe(&mut self, segment: &Segment<'_>) {
+    fn observe(&mut self, segment: &DenseStep<'_>) {
         while self.taken as f64 * self.every_s <= segment.to_s() {
             let t = self.taken as f64 * self.every_s;
             let x = segment.motion(t, &mut self.workspace).displacement_m;

@@ -4,8 +4,8 @@ use std::collections::VecDeque;
 use std::f64::consts::TAU;
 
 use super::cutting::{Cutting, Regeneration};
-use super::passage::MaterialWindows;
 use super::surface::{SURFACE_NODES, Surface};
+use super::workpiece_traverse::MaterialWindows;
 use quietcut_model::cutter::{Immersion, Tooth};
 use quietcut_numerics::crossing::first_below_zero;
 use quietcut_numerics::dormand_prince::{Quartic, at};
@@ -47,7 +47,7 @@ struct ToothState {
     next_switch_s: f64,
     /// Number of the tooth passing, from the spindle angle.
     pass: f64,
-    spans: MaterialWindows,
+    windows: MaterialWindows,
     in_material: bool,
     /// True while the edge cuts or touches the surface; otherwise the surface of the earlier passing persists.
     at_surface: bool,
@@ -63,7 +63,7 @@ struct ToothState {
 pub(super) struct Chip {
     /// Chip thickness, m: distance from the surface in front to the edge; negative out of contact.
     pub(super) thickness_m: f64,
-    place: Immersion,
+    immersion: Immersion,
 }
 
 /// The first change of contact in a step.
@@ -113,7 +113,7 @@ impl<'a> Contact<'a> {
             }
         }
         for index in 0..contact.teeth.len() {
-            contact.teeth[index].in_material = contact.teeth[index].spans.contain(contact.same_time_s);
+            contact.teeth[index].in_material = contact.teeth[index].windows.contain(contact.same_time_s);
         }
         // The surface may have a step at t = 0: before that time a tool at rest left it.
         contact.kink_of_motion(0.0, 0);
@@ -139,7 +139,9 @@ impl<'a> Contact<'a> {
         for tooth in self.cutting_teeth() {
             let chip = self.chip(tooth, t, x);
             let depths_m = self.shares(tooth, t).map(|share| depth_m * share);
-            let force = cutter.force.force_of_n(chip.place, chip.thickness_m, depths_m);
+            let force = cutter
+                .force
+                .force_of_n(chip.immersion, chip.thickness_m, depths_m);
             for (sum, force) in sum.iter_mut().zip(force) {
                 *sum += force;
             }
@@ -159,7 +161,7 @@ impl<'a> Contact<'a> {
             let depth_m = depth_m * self.shares(tooth, t)[1];
             let damping = cutter
                 .force
-                .damping_ns_per_m(self.place(tooth, t), depth_m, speed_m_per_s);
+                .damping_ns_per_m(self.immersion(tooth, t), depth_m, speed_m_per_s);
             for (sum, damping) in sum.as_flattened_mut().iter_mut().zip(damping.as_flattened()) {
                 *sum += damping * cutter.force.wear(t);
             }
@@ -186,7 +188,7 @@ impl<'a> Contact<'a> {
     /// Axial depth of cut at the time `t`, m.
     fn depth_m(&self, t: f64, x: [f64; 3]) -> f64 {
         let cutter = &self.cutting.cutter;
-        cutter.depth_at_m(cutter.depth_m * self.cutting.passage.depth_share(t), x[2])
+        cutter.depth_at_m(cutter.depth_m * self.cutting.traverse.depth_share(t), x[2])
     }
 
     /// Feed, m, during the regenerative delay of `tooth` at the time `t`. The feed axis moves at constant speed even if the spindle speed varies.
@@ -195,26 +197,30 @@ impl<'a> Contact<'a> {
     }
 
     fn chip(&self, tooth: &Tooth, t: f64, x: [f64; 3]) -> Chip {
-        let place = self.place(tooth, t);
+        let immersion = self.immersion(tooth, t);
         let cutter = &self.cutting.cutter;
         let thickness_m = if self.cutting.regeneration == Regeneration::None {
             let ahead = &cutter.teeth[tooth.ahead];
-            let at_rest = cutter.reach_m(tooth, place, [0.0; 3]) - cutter.reach_m(ahead, place, [0.0; 3]);
-            at_rest + cutter.recession_m(place, self.feed_m(tooth, t))
+            let at_rest =
+                cutter.reach_m(tooth, immersion, [0.0; 3]) - cutter.reach_m(ahead, immersion, [0.0; 3]);
+            at_rest + cutter.recession_m(immersion, self.feed_m(tooth, t))
         } else {
-            cutter.reach_m(tooth, place, x) - self.in_front_m(tooth, place, t)
+            cutter.reach_m(tooth, immersion, x) - self.surface_in_front_m(tooth, immersion, t)
         };
-        Chip { thickness_m, place }
+        Chip {
+            thickness_m,
+            immersion,
+        }
     }
 
-    fn place(&self, tooth: &Tooth, t: f64) -> Immersion {
+    fn immersion(&self, tooth: &Tooth, t: f64) -> Immersion {
         self.cutting
             .cutter
             .immersion(self.cutting.spindle.angle_rad(t) + tooth.angle_rad)
     }
 
     /// Height of the surface in front of a tooth, m: the surface of the tooth ahead minus the feed during the regenerative delay.
-    fn in_front_m(&self, tooth: &Tooth, place: Immersion, t: f64) -> f64 {
+    fn surface_in_front_m(&self, tooth: &Tooth, immersion: Immersion, t: f64) -> f64 {
         let cutter = &self.cutting.cutter;
         let spindle = &self.cutting.spindle;
         let delay_s = spindle.delay_s(t, tooth.pitch_rad);
@@ -222,8 +228,8 @@ impl<'a> Contact<'a> {
         let ahead = &cutter.teeth[tooth.ahead];
         let left = self.teeth[tooth.ahead]
             .surface
-            .height_m(cutter, ahead, place, t - delay_s, within);
-        left - cutter.recession_m(place, self.feed_m(tooth, t))
+            .height_m(cutter, ahead, immersion, t - delay_s, within);
+        left - cutter.recession_m(immersion, self.feed_m(tooth, t))
     }
 
     /// The first time after `t`, s, at which a tooth enters or leaves the engagement arc or the material, or meets a kink of the surface.
@@ -231,11 +237,11 @@ impl<'a> Contact<'a> {
         let after = t + self.same_time_s;
         let of_teeth = self.teeth.iter().map(|state| {
             let kink = state.kinks.front().map_or(f64::INFINITY, |kink| kink.0);
-            state.next_switch_s.min(kink).min(state.spans.next_edge(after))
+            state.next_switch_s.min(kink).min(state.windows.next_edge(after))
         });
         of_teeth
             .fold(f64::INFINITY, f64::min)
-            .min(self.cutting.passage.next_knot(after))
+            .min(self.cutting.traverse.next_knot(after))
     }
 
     /// Applies the entries, exits and kinks at the time `t` of [`Self::next_switch_s`]; `x`, m, and `v`, m/s, are the motion of the tool.
@@ -245,7 +251,7 @@ impl<'a> Contact<'a> {
         for index in 0..self.teeth.len() {
             let entered = self.switch_arc(index, now);
             let state = &mut self.teeth[index];
-            let in_material = state.in_arc && state.spans.contain(now);
+            let in_material = state.in_arc && state.windows.contain(now);
             force_jumps |= in_material != state.in_material || entered;
             state.in_material = in_material;
             if entered {
@@ -257,7 +263,7 @@ impl<'a> Contact<'a> {
         }
         if force_jumps {
             self.kink_of_force(t, 0);
-            self.touch(t, x, v);
+            self.decide_contact_after_entry(t, x, v);
         }
     }
 
@@ -294,9 +300,9 @@ impl<'a> Contact<'a> {
         let state = &mut self.teeth[index];
         state.in_arc = true;
         state.next_switch_s = close_s;
-        state.spans = cutting
-            .passage
-            .spans(&cutting.cutter, &cutting.spindle, open_s, close_s);
+        state.windows = cutting
+            .traverse
+            .windows(&cutting.cutter, &cutting.spindle, open_s, close_s);
     }
 
     /// Moves a tooth out of the engagement arc; its next entry is that of tooth passing number `pass`.
@@ -306,12 +312,12 @@ impl<'a> Contact<'a> {
         state.in_arc = false;
         state.in_material = false;
         state.next_switch_s = open_s;
-        state.spans = MaterialWindows::default();
+        state.windows = MaterialWindows::default();
     }
 
     /// Decides for each tooth that has just entered the engagement arc whether it is in contact, from the sign of its chip thickness shortly
     /// afterwards.
-    fn touch(&mut self, t: f64, x: [f64; 3], v: [f64; 3]) {
+    fn decide_contact_after_entry(&mut self, t: f64, x: [f64; 3], v: [f64; 3]) {
         if self.cutting.regeneration != Regeneration::AllPasses {
             return;
         }
@@ -332,7 +338,7 @@ impl<'a> Contact<'a> {
         if self.cutting.regeneration != Regeneration::AllPasses
             || self
                 .cutting
-                .passage
+                .traverse
                 .is_over(t, &self.cutting.cutter, &self.cutting.spindle)
         {
             return None;
@@ -388,7 +394,7 @@ impl<'a> Contact<'a> {
                 let tooth = &self.cutting.cutter.teeth[index];
                 let heights = SURFACE_NODES.map(|u| {
                     let t = t + u * h;
-                    self.in_front_m(tooth, self.place(tooth, t), t)
+                    self.surface_in_front_m(tooth, self.immersion(tooth, t), t)
                 });
                 self.teeth[index].surface.push_uncut(t, t + h, heights);
             }
@@ -455,7 +461,7 @@ impl ToothState {
             in_arc: false,
             next_switch_s: f64::INFINITY,
             pass: 0.0,
-            spans: MaterialWindows::default(),
+            windows: MaterialWindows::default(),
             in_material: false,
             at_surface: true,
             changed_s: f64::NEG_INFINITY,

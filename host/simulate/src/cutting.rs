@@ -1,7 +1,7 @@
 //! The cutting process of one simulated cut.
 
-use super::passage::Passage;
 use super::pores::Pores;
+use super::workpiece_traverse::WorkpieceTraverse;
 use quietcut_model::{Cutter, Spindle};
 
 /// The cutting process of one simulated cut: cutter, spindle, traverse of the workpiece and regeneration.
@@ -12,7 +12,7 @@ pub struct Cutting {
     /// Spindle angle over time.
     pub spindle: Spindle,
     /// Entry into the workpiece, full engagement and exit.
-    pub passage: Passage,
+    pub traverse: WorkpieceTraverse,
     /// Earlier tooth passings that determine the chip thickness.
     pub regeneration: Regeneration,
     /// Pores of the workpiece material; `None` for solid material.

@@ -1,9 +1,9 @@
 //! Error-controlled integration with event location: steps end where the right-hand side is not smooth.
 
 use super::contact::{Change, Contact};
+use super::dense_step::{DenseStep, Workspace};
 use super::error::SimulateError;
 use super::model::{Model, StepContext};
-use super::segment::{Segment, Workspace};
 use super::settings::Settings;
 use quietcut_model::restoring_force::{self, MotionState, Regime, Regimes};
 use quietcut_numerics::crossing::first_below_zero;
@@ -95,7 +95,7 @@ impl<'a> Integrator<'a> {
     pub(super) fn run(
         mut self,
         end_s: f64,
-        mut observe: impl FnMut(&Segment<'_>),
+        mut observe: impl FnMut(&DenseStep<'_>),
     ) -> Result<Statistics, SimulateError> {
         // A safely small first step; error control enlarges it within a few steps.
         self.next_h = 1e-3 * self.longest_step(end_s);
@@ -164,9 +164,9 @@ impl<'a> Integrator<'a> {
     /// The regime of a restoring force at the current time; an axis that begins to stick gets zero velocity.
     fn next_regime(&mut self, index: usize, before: Option<Regime>) -> Regime {
         let restoring_force = &self.model.restoring_forces[index];
-        let (at, place) = (self.at(self.t, &self.y), self.place(index));
+        let (at, state_range) = (self.at(self.t, &self.y), self.state_range(index));
         let holding_n = self.holding_n(index, self.t, &self.y.clone());
-        let regime = restoring_force.next(before, &at, &self.y[place], holding_n);
+        let regime = restoring_force.next(before, &at, &self.y[state_range], holding_n);
         if let Some(axis) = restoring_force.holds().filter(|_| restoring_force.locked(regime)) {
             let order = self.model.dynamics.order();
             self.model.dynamics.halt(axis, &mut self.y[..order]);
@@ -185,7 +185,7 @@ impl<'a> Integrator<'a> {
     }
 
     /// Range of the internal states of a restoring force in y.
-    fn place(&self, index: usize) -> std::ops::Range<usize> {
+    fn state_range(&self, index: usize) -> std::ops::Range<usize> {
         let restoring_forces = &self.model.restoring_forces;
         let from = self.model.dynamics.order() + restoring_force::states(&restoring_forces[..index]);
         from..from + restoring_forces[index].states()
@@ -222,7 +222,7 @@ impl<'a> Integrator<'a> {
         // `rate` already contains the friction force of slip: the holding force is that force plus the remaining unbalanced force.
         let at = self.at(t, y);
         let sliding =
-            model.restoring_forces[index].restoring_n(self.regimes[index], &at, &y[self.place(index)]);
+            model.restoring_forces[index].restoring_n(self.regimes[index], &at, &y[self.state_range(index)]);
         let locked = std::array::from_fn(|other| other == axis);
         sliding[axis]
             + restoring_force::holding_n(&model.dynamics, locked, &rate[..model.dynamics.order()])[axis]
@@ -332,7 +332,7 @@ impl<'a> Integrator<'a> {
 
     fn end_of_regime(&self, index: usize, h: f64, workspace: &mut Workspace) -> Option<Event> {
         let (restoring_force, regime) = (&self.model.restoring_forces[index], self.regimes[index]);
-        let place = self.place(index);
+        let state_range = self.state_range(index);
         let workspace = std::cell::RefCell::new(workspace);
         let margin = |u: f64| {
             let mut workspace = workspace.borrow_mut();
@@ -345,7 +345,7 @@ impl<'a> Integrator<'a> {
                 Some(axis) => self.held_n(index, axis, (t, state), rate),
                 None => 0.0,
             };
-            restoring_force.margin(regime, &self.at(t, state), &state[place.clone()], holding_n)
+            restoring_force.margin(regime, &self.at(t, state), &state[state_range.clone()], holding_n)
         };
         first_below_zero(margin).map(|u| Event::RegimeEnd { index, u })
     }
@@ -379,11 +379,11 @@ impl<'a> Integrator<'a> {
             .fold(0.0, f64::max)
     }
 
-    fn accept(&mut self, h: f64, observe: &mut impl FnMut(&Segment<'_>)) -> Result<(), SimulateError> {
+    fn accept(&mut self, h: f64, observe: &mut impl FnMut(&DenseStep<'_>)) -> Result<(), SimulateError> {
         if self.amplitude_m() > self.settings.largest_m {
             return Err(self.diverged());
         }
-        observe(&Segment {
+        observe(&DenseStep {
             model: self.model,
             context: self.context(),
             quartics: &self.quartics,

@@ -4,7 +4,7 @@
 //! angles. The chip thickness follows from the surface that *all* earlier tooth passings left (eqs 6.20 to 6.27). A tooth that does not reach
 //! the surface has no force.
 //!
-//! Main types: [`VirtualCut`] describes a cut of a case, [`Model`] is its equation of motion, [`Segment`] the motion over one step with dense
+//! Main types: [`VirtualCut`] describes a cut of a case, [`Model`] is its equation of motion, [`DenseStep`] the motion over one step with dense
 //! output, [`rig::Rig`] a test with shaker, hammer or free decay, [`Recorder`] the recording of a cut.
 //!
 //! ```
@@ -42,8 +42,8 @@
 //! let model = VirtualCut::new(900.0, 1.0, 4.0).model(&case)?;
 //! let mut workspace = Workspace::new(&model);
 //! let mut largest_m: f64 = 0.0;
-//! model.run(4.0, Settings::default(), |segment| {
-//!     let motion = segment.motion(segment.to_s(), &mut workspace);
+//! model.run(4.0, Settings::default(), |step| {
+//!     let motion = step.motion(step.to_s(), &mut workspace);
 //!     largest_m = largest_m.max(motion.displacement_m[1].abs());
 //! })?;
 //! assert!(largest_m > 1e-6 && largest_m < 1e-2);
@@ -55,21 +55,21 @@
 mod anti_aliasing;
 mod contact;
 mod cutting;
+mod dense_step;
 mod drive;
 mod error;
 mod integrator;
 mod model;
-mod passage;
 mod pores;
 mod reading;
 mod record;
 pub mod rig;
 mod run;
-mod segment;
 mod sensor;
 mod settings;
 mod surface;
 mod virtual_cut;
+mod workpiece_traverse;
 
 #[cfg(test)]
 pub(crate) mod tests;
@@ -81,15 +81,15 @@ pub use quietcut_model::{
 };
 
 pub use cutting::{Cutting, Regeneration};
+pub use dense_step::{DenseStep, Motion, Workspace};
 pub use drive::Drive;
 pub use error::SimulateError;
 pub use integrator::Statistics;
 pub use model::Model;
-pub use passage::Passage;
 pub use pores::Pores;
 pub use reading::Reading;
 pub use record::Recorder;
-pub use segment::{Motion, Segment, Workspace};
 pub use sensor::{Accelerometer, STANDARD_GRAVITY, Sampler, TachometerModel};
 pub use settings::Settings;
 pub use virtual_cut::{Entry, SensedCut, VirtualCut, VirtualCutError};
+pub use workpiece_traverse::WorkpieceTraverse;

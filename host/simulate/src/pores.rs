@@ -37,13 +37,13 @@ impl Pores {
     /// Solid fraction at a point of the workpiece times the relative tangential, radial and axial pressure.
     pub(super) fn at(&self, x_m: f64, y_m: f64) -> [f64; 3] {
         let cell = LatticeCell::at(x_m / self.size_m, y_m / self.size_m);
-        let solid = cell.interpolate(|i, j| f64::from(self.chance(i, j, 0) >= self.share));
+        let solid = cell.interpolate(|i, j| f64::from(self.node_chance(i, j, 0) >= self.share));
         if self.strength == 0.0 || solid == 0.0 {
             return [solid; 3];
         }
         [1, 2, 3].map(|direction| {
             let sign = cell.interpolate(|i, j| {
-                if self.chance(i, j, direction) < 0.5 {
+                if self.node_chance(i, j, direction) < 0.5 {
                     -1.0
                 } else {
                     1.0
@@ -54,8 +54,8 @@ impl Pores {
     }
 
     /// A uniform random number from 0 to 1 that depends on the node, the purpose and the seed only.
-    fn chance(&self, i: i64, j: i64, purpose: u64) -> f64 {
-        let bits = mixed(self.seed ^ mixed((i as u64) ^ mixed((j as u64) ^ mixed(purpose))));
+    fn node_chance(&self, i: i64, j: i64, purpose: u64) -> f64 {
+        let bits = hashed(self.seed ^ hashed((i as u64) ^ hashed((j as u64) ^ hashed(purpose))));
         // The upper 53 bits.
         (bits >> 11) as f64 / (1_u64 << 53) as f64
     }
@@ -89,7 +89,7 @@ fn smooth(u: f64) -> f64 {
 }
 
 /// The finalizer of SplitMix64 (Steele, Lea and Flood, 2014): each input bit flips half of the output bits on average.
-fn mixed(bits: u64) -> u64 {
+fn hashed(bits: u64) -> u64 {
     let mut z = bits.wrapping_add(0x9e37_79b9_7f4a_7c15);
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);

@@ -1,8 +1,8 @@
 //! Samples of one channel, taken from the simulated motion by an ideal sensor with a constant delay.
 
 use super::Model;
+use super::dense_step::{DenseStep, Motion, Workspace};
 use super::effect::Pickup;
-use super::segment::{Motion, Segment, Workspace};
 use quietcut_recording::Quantity;
 
 /// Samples of one channel, collected while the motion is integrated.
@@ -35,7 +35,7 @@ impl Reading {
 
     /// Takes the samples that lie in the newest integration step. A delay of the sensor places the first samples before t = 0, where the tool
     /// is at rest at its initial displacement.
-    pub fn observe(&mut self, segment: &Segment<'_>) {
+    pub fn observe(&mut self, step: &DenseStep<'_>) {
         let (early, count) = if self.is_mean {
             (0.5, self.count + 1)
         } else {
@@ -43,10 +43,10 @@ impl Reading {
         };
         while self.values.len() < count {
             let t = (self.values.len() as f64 - early) / self.rate_hz - self.pickup.delay_s;
-            if t > segment.to_s() {
+            if t > step.to_s() {
                 break;
             }
-            let motion = segment.motion(t.max(0.0), &mut self.workspace);
+            let motion = step.motion(t.max(0.0), &mut self.workspace);
             let value = if t < 0.0 {
                 self.read_before(&motion)
             } else {

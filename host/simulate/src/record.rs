@@ -8,7 +8,7 @@ use quietcut_core::tachometer::Wheel;
 use super::anti_aliasing::decimated;
 use super::effect::{Effects, Pickup};
 use super::sensor::{Accelerometer, Sampler, TachometerModel};
-use super::{Model, Reading, Segment, Settings, Spindle, Statistics, VirtualCut, VirtualCutError};
+use super::{DenseStep, Model, Reading, Settings, Spindle, Statistics, VirtualCut, VirtualCutError};
 use quietcut_model::case::Case;
 use quietcut_model::structure::Direction;
 use quietcut_recording::{Channel, Quantity, RecordedChannel, RecordedCut, Recording, Sidecar, TestKind};
@@ -86,9 +86,9 @@ impl VirtualCut {
             .collect();
         let mut sensors = Sensors::new(&model, recorder, &pickups);
         let tail_s = sensors.tail_s().max(1.0 / rate_hz);
-        let statistics = model.run(self.seconds + tail_s, Settings::default(), |segment| {
-            readings.iter_mut().for_each(|reading| reading.observe(segment));
-            sensors.observe(segment);
+        let statistics = model.run(self.seconds + tail_s, Settings::default(), |step| {
+            readings.iter_mut().for_each(|reading| reading.observe(step));
+            sensors.observe(step);
         })?;
         let seed = match recorder {
             Recorder::Sensor { seed, .. } => Some(seed),
@@ -268,9 +268,9 @@ impl Sensors {
             .fold(0.0, f64::max)
     }
 
-    fn observe(&mut self, segment: &Segment<'_>) {
+    fn observe(&mut self, step: &DenseStep<'_>) {
         for (_, sampler) in &mut self.samplers {
-            sampler.observe(segment);
+            sampler.observe(step);
         }
     }
 

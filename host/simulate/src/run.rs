@@ -1,11 +1,11 @@
 //! Time integration of a model from its initial state.
 
+use super::dense_step::DenseStep;
 use super::error::SimulateError;
 use super::integrator::{Integrator, Statistics};
 use super::model::Model;
-use super::passage::Passage;
-use super::segment::Segment;
 use super::settings::Settings;
+use super::workpiece_traverse::WorkpieceTraverse;
 
 impl Model {
     /// Integrates from rest at t = 0 to `end_s`, s; `observe` receives every integration step in the order of time.
@@ -19,7 +19,7 @@ impl Model {
         &self,
         end_s: f64,
         settings: Settings,
-        observe: impl FnMut(&Segment<'_>),
+        observe: impl FnMut(&DenseStep<'_>),
     ) -> Result<Statistics, SimulateError> {
         self.run_from(vec![0.0; self.order()], end_s, settings, observe)
     }
@@ -33,10 +33,10 @@ impl Model {
         y: Vec<f64>,
         end_s: f64,
         settings: Settings,
-        observe: impl FnMut(&Segment<'_>),
+        observe: impl FnMut(&DenseStep<'_>),
     ) -> Result<Statistics, SimulateError> {
         if let Some(cutting) = &self.cutting
-            && matches!(cutting.passage, Passage::Feed { .. })
+            && matches!(cutting.traverse, WorkpieceTraverse::Feed { .. })
             && cutting.cutter.radius_m.is_none()
         {
             return Err(SimulateError::NoDiameter);

@@ -9,7 +9,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use super::{Model, Segment, Spindle, Workspace};
+use super::{DenseStep, Model, Spindle, Workspace};
 
 /// Standard gravity, m/s².
 pub const STANDARD_GRAVITY: f64 = 9.806_65;
@@ -132,16 +132,16 @@ impl Sampler {
     }
 
     /// Takes the samples that lie in the newest integration step.
-    pub fn observe(&mut self, segment: &Segment<'_>) {
+    pub fn observe(&mut self, step: &DenseStep<'_>) {
         loop {
             let t = (self.taken as f64 - 0.5) * self.step_s - self.delay_s;
-            if t > segment.to_s() {
+            if t > step.to_s() {
                 return;
             }
             let velocity = if t < 0.0 {
                 [0.0; 3]
             } else {
-                segment.motion(t, &mut self.workspace).velocity_m_per_s
+                step.motion(t, &mut self.workspace).velocity_m_per_s
             };
             self.take(velocity);
         }

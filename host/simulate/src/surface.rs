@@ -74,7 +74,7 @@ impl Surface {
         &self,
         cutter: &Cutter,
         tooth: &Tooth,
-        place: Immersion,
+        immersion: Immersion,
         t: f64,
         within: [f64; 2],
     ) -> f64 {
@@ -83,13 +83,13 @@ impl Surface {
         let arc = match self.arcs.get(index).or(self.arcs.back()) {
             // Before the first recorded piece, the surface is that of a tool with zero displacement.
             Some(arc) if index > 0 || arc.from_s <= key => arc,
-            _ => return cutter.reach_m(tooth, place, [0.0; 3]),
+            _ => return cutter.reach_m(tooth, immersion, [0.0; 3]),
         };
         let u = ((t - arc.from_s) / (arc.to_s - arc.from_s)).clamp(0.0, 1.0);
         match &arc.profile {
             Profile::Cut(displacement) => {
                 let x = std::array::from_fn(|axis| at(&displacement[axis], u));
-                cutter.reach_m(tooth, place, x)
+                cutter.reach_m(tooth, immersion, x)
             }
             Profile::Uncut(differences) => differences
                 .iter()

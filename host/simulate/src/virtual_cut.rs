@@ -7,7 +7,8 @@ use super::Statistics;
 use super::effect::{EffectError, EffectName, Effects};
 use super::sensor::{Accelerometer, Sampler, TachometerModel};
 use super::{
-    Cutter, Cutting, Model, ModelError, Passage, Pores, Regeneration, Settings, SimulateError, Spindle,
+    Cutter, Cutting, Model, ModelError, Pores, Regeneration, Settings, SimulateError, Spindle,
+    WorkpieceTraverse,
 };
 use quietcut_model::case::{Case, CaseError};
 use quietcut_recording::Quantity;
@@ -153,7 +154,7 @@ impl VirtualCut {
             return Err(SimulateError::NoDiameter.into());
         }
         let spindle = effects.spindle(self.spindle_motion());
-        let passage = self.passage(&cutter, &spindle)?;
+        let traverse = self.traverse(&cutter, &spindle)?;
         let (dynamics, restoring_forces) = effects.dynamics(case.structure()?)?;
         if cutter.force.process_damping.is_some() && dynamics.velocity_jumps() && !restoring_forces.is_empty()
         {
@@ -170,7 +171,7 @@ impl VirtualCut {
             cutting: Some(Cutting {
                 cutter,
                 spindle,
-                passage,
+                traverse,
                 regeneration: Regeneration::AllPasses,
                 pores: self.pores,
             }),
@@ -206,25 +207,25 @@ impl VirtualCut {
         let Some(cutting) = &model.cutting else {
             return Ok(whole);
         };
-        Ok(match cutting.passage {
-            Passage::Air => [0.0, 0.0],
-            Passage::Steady => whole,
-            Passage::Ramp {
+        Ok(match cutting.traverse {
+            WorkpieceTraverse::Air => [0.0, 0.0],
+            WorkpieceTraverse::Steady => whole,
+            WorkpieceTraverse::Ramp {
                 start_s,
                 ramp_s,
                 end_s,
             } => [start_s + ramp_s, end_s - ramp_s],
-            Passage::Feed { start_s, end_s } => {
-                let way_s = Passage::way_in_s(&cutting.cutter, &cutting.spindle)?;
-                [start_s + way_s, end_s]
+            WorkpieceTraverse::Feed { start_s, end_s } => {
+                let entry_s = WorkpieceTraverse::entry_duration_s(&cutting.cutter, &cutting.spindle)?;
+                [start_s + entry_s, end_s]
             }
         })
     }
 
-    fn passage(&self, cutter: &Cutter, spindle: &Spindle) -> Result<Passage, VirtualCutError> {
+    fn traverse(&self, cutter: &Cutter, spindle: &Spindle) -> Result<WorkpieceTraverse, VirtualCutError> {
         let (start_s, end_s) = (self.air_s, self.seconds - self.air_s);
-        let long_enough = |way_s: f64| {
-            let needed_s = 2.0 * (self.air_s + way_s);
+        let long_enough = |entry_s: f64| {
+            let needed_s = 2.0 * (self.air_s + entry_s);
             if needed_s < self.seconds {
                 Ok(())
             } else {
@@ -236,21 +237,21 @@ impl VirtualCut {
             }
         };
         match self.entry {
-            Entry::None => Ok(Passage::Steady),
+            Entry::None => Ok(WorkpieceTraverse::Steady),
             Entry::Ramp { seconds } => {
                 long_enough(seconds)?;
-                Ok(Passage::Ramp {
+                Ok(WorkpieceTraverse::Ramp {
                     start_s,
                     ramp_s: seconds,
                     end_s,
                 })
             }
             Entry::Feed => {
-                let way_s = Passage::way_in_s(cutter, spindle)?;
-                long_enough(way_s)?;
-                Ok(Passage::Feed {
+                let entry_s = WorkpieceTraverse::entry_duration_s(cutter, spindle)?;
+                long_enough(entry_s)?;
+                Ok(WorkpieceTraverse::Feed {
                     start_s,
-                    end_s: end_s - way_s,
+                    end_s: end_s - entry_s,
                 })
             }
         }
@@ -269,8 +270,8 @@ impl VirtualCut {
     ) -> Result<SensedCut, VirtualCutError> {
         let model = self.model(case)?;
         let mut sampler = Sampler::new(&model, accelerometer);
-        let statistics = model.run(self.seconds + sampler.tail_s(), Settings::default(), |segment| {
-            sampler.observe(segment);
+        let statistics = model.run(self.seconds + sampler.tail_s(), Settings::default(), |step| {
+            sampler.observe(step);
         })?;
         Ok(SensedCut {
             blocks: sampler.blocks(seed),

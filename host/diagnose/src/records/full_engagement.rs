@@ -25,7 +25,7 @@ use crate::signal::noise::{floor_between_lines, median, rms};
 use quietcut_model::case::Case;
 use quietcut_recording::{Quantity, Recording, TestKind};
 use quietcut_simulate::effect::Pickup;
-use quietcut_simulate::{Cutter, Passage, Spindle};
+use quietcut_simulate::{Cutter, Spindle, WorkpieceTraverse};
 
 /// Number of angles per revolution at which the cutting force is evaluated.
 const ANGLES: usize = 512;
@@ -89,7 +89,7 @@ fn range(baseline: &Baseline<'_>, recording: &Recording) -> Option<Range<usize>>
     let is_engaged = |revolution: &usize| levels.smallest(*revolution) >= ENGAGED_LEVEL;
     let first = cut.clone().find(is_engaged)?;
     let last = cut.clone().rev().find(is_engaged)?;
-    let by_diameter = Passage::way_in_s(&cutter, &Spindle::new(60.0 / revolution_s)).ok();
+    let by_diameter = WorkpieceTraverse::entry_duration_s(&cutter, &Spindle::new(60.0 / revolution_s)).ok();
     let engaged_after = ENGAGEMENT_AFTER_LEVEL * (first - cut.start) as f64;
     let way = by_diameter.map_or(engaged_after, |seconds| seconds / revolution_s);
     let from = match cut.start {

@@ -110,8 +110,8 @@ impl Rig {
             .into_iter()
             .map(|pickup| Reading::new(&model, pickup, self.sample_rate_hz, count))
             .collect();
-        let statistics = model.run(seconds, Settings::default(), |segment| {
-            readings.iter_mut().for_each(|reading| reading.observe(segment));
+        let statistics = model.run(seconds, Settings::default(), |step| {
+            readings.iter_mut().for_each(|reading| reading.observe(step));
         })?;
         let recording = Recording {
             path: path.into(),

@@ -427,13 +427,9 @@ fn difference_with(
     let mut motions = Vec::new();
     let mut workspace = Workspace::new(&model);
     let statistics = model
-        .run(when_s(turns * points / 2 + 1), Settings::default(), |segment| {
-            while motions.len() <= turns * points / 2 && when_s(motions.len()) <= segment.to_s() {
-                motions.push(
-                    segment
-                        .motion(when_s(motions.len()), &mut workspace)
-                        .displacement_m,
-                );
+        .run(when_s(turns * points / 2 + 1), Settings::default(), |step| {
+            while motions.len() <= turns * points / 2 && when_s(motions.len()) <= step.to_s() {
+                motions.push(step.motion(when_s(motions.len()), &mut workspace).displacement_m);
             }
         })
         .unwrap();

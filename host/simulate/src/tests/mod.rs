@@ -38,7 +38,7 @@ fn steady(case: &Case, spindle_rpm: f64, depth_mm: f64) -> Model {
         cutting: Some(Cutting {
             cutter: cutter(case, depth_mm),
             spindle: Spindle::new(spindle_rpm),
-            passage: Passage::Steady,
+            traverse: WorkpieceTraverse::Steady,
             regeneration: Regeneration::AllPasses,
             pores: None,
         }),
@@ -64,13 +64,13 @@ fn motions_from(
     let mut found: Vec<Motion> = Vec::new();
     let mut workspace = Workspace::new(model);
     model
-        .run_from(states, end_s, settings, |segment| {
+        .run_from(states, end_s, settings, |step| {
             loop {
                 let t = first_s + found.len() as f64 * every_s;
-                if t > segment.to_s() {
+                if t > step.to_s() {
                     break;
                 }
-                found.push(segment.motion(t, &mut workspace));
+                found.push(step.motion(t, &mut workspace));
             }
         })
         .unwrap();

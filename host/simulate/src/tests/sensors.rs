@@ -138,7 +138,7 @@ fn the_sensor_sees_the_acceleration_without_delay_up_to_its_band() {
     };
     let mut sampler = Sampler::new(&model, Accelerometer::IIS3DWB_16G);
     model
-        .run(0.1, Settings::default(), |segment| sampler.observe(segment))
+        .run(0.1, Settings::default(), |step| sampler.observe(step))
         .unwrap();
     for (number, sample) in sampler.samples().iter().enumerate().skip(20) {
         let t = number as f64 / 26_667.0;

@@ -6,7 +6,7 @@ use quietcut_model::spindle::Spindle;
 
 /// Traverse of the workpiece: entry, full engagement and exit of the tool. Times in s.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Passage {
+pub enum WorkpieceTraverse {
     /// The tool never meets the workpiece.
     Air,
     /// Full engagement at all times; the surface at t = 0 is that of a tool at rest.
@@ -33,13 +33,13 @@ pub enum Passage {
 /// The times at which a tooth has material in front of it during one passing: at most two windows, s.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct MaterialWindows {
-    spans: [Option<[f64; 2]>; 2],
+    windows: [Option<[f64; 2]>; 2],
 }
 
 impl MaterialWindows {
     /// True if the time `t`, s, lies in one of the windows.
     pub fn contain(&self, t: f64) -> bool {
-        self.spans
+        self.windows
             .iter()
             .flatten()
             .any(|[from, to]| (*from..*to).contains(&t))
@@ -47,7 +47,7 @@ impl MaterialWindows {
 
     /// The first start or end of a window after `t`, s; infinite if there is none.
     pub fn next_edge(&self, t: f64) -> f64 {
-        let edges = self.spans.iter().flatten().flatten();
+        let edges = self.windows.iter().flatten().flatten();
         edges
             .copied()
             .filter(|edge| *edge > t)
@@ -55,12 +55,12 @@ impl MaterialWindows {
     }
 }
 
-impl Passage {
+impl WorkpieceTraverse {
     /// Time from the first contact with the front face of the workpiece to full engagement, s; the exit through the end face takes as long.
     ///
     /// # Errors
     /// The tool has no diameter.
-    pub fn way_in_s(cutter: &Cutter, spindle: &Spindle) -> Result<f64, SimulateError> {
+    pub fn entry_duration_s(cutter: &Cutter, spindle: &Spindle) -> Result<f64, SimulateError> {
         let radius_m = cutter.radius_m.ok_or(SimulateError::NoDiameter)?;
         // Of all points of the engagement arc, one of its two ends reaches a face of the workpiece last.
         let last = cutter.start_rad.sin().min(cutter.exit_rad.sin());
@@ -129,13 +129,15 @@ impl Passage {
     }
 
     /// The times at which a tooth has material in front of it, if it passes the start angle at `open_s` and the exit angle at `close_s`, s.
-    pub fn spans(&self, cutter: &Cutter, spindle: &Spindle, open_s: f64, close_s: f64) -> MaterialWindows {
+    pub fn windows(&self, cutter: &Cutter, spindle: &Spindle, open_s: f64, close_s: f64) -> MaterialWindows {
         let whole = Some([open_s, close_s]);
         match *self {
             Self::Air => MaterialWindows::default(),
-            Self::Steady => MaterialWindows { spans: [whole, None] },
+            Self::Steady => MaterialWindows {
+                windows: [whole, None],
+            },
             Self::Ramp { start_s, end_s, .. } => MaterialWindows {
-                spans: [intersection(whole, Some([start_s, end_s])), None],
+                windows: [intersection(whole, Some([start_s, end_s])), None],
             },
             Self::Feed { start_s, end_s } => {
                 let radius_m = cutter.radius_m.unwrap_or(f64::INFINITY);
@@ -149,7 +151,7 @@ impl Passage {
                 let behind_end = positive(|t| sin(t) - (1.0 - speed * (t - end_s)), window);
                 let [before, after] = complement(behind_end, window);
                 MaterialWindows {
-                    spans: [
+                    windows: [
                         intersection(behind_front, before),
                         intersection(behind_front, after),
                     ],
@@ -234,12 +236,12 @@ mod tests {
             let radius_m = 6.35e-3;
             let feed_m_per_s = 0.15e-3 * 30.0;
             let (start_s, end_s) = (1.0, 5.0);
-            let passage = Passage::Feed { start_s, end_s };
+            let traverse = WorkpieceTraverse::Feed { start_s, end_s };
             let revolution_s = 60.0 / 900.0;
             for pass in 0..120 {
                 let open_s = f64::from(pass) * revolution_s + cutter.start_rad / spindle.speed_rad_per_s();
                 let close_s = f64::from(pass) * revolution_s + cutter.exit_rad / spindle.speed_rad_per_s();
-                let spans = passage.spans(&cutter, &spindle, open_s, close_s);
+                let windows = traverse.windows(&cutter, &spindle, open_s, close_s);
                 // The geometric condition, evaluated at many instants.
                 for i in 0..500 {
                     let t = open_s + (close_s - open_s) * (f64::from(i) + 0.5) / 500.0;
@@ -249,23 +251,23 @@ mod tests {
                     // Points within rounding of a face are not compared.
                     if (x_m - front_m).abs() > 1e-9 && (x_m - end_m).abs() > 1e-9 {
                         assert_eq!(
-                            spans.contain(t),
+                            windows.contain(t),
                             x_m > front_m && x_m < end_m,
                             "pass {pass}, {t} s"
                         );
                     }
                 }
             }
-            let way_s = Passage::way_in_s(&cutter, &spindle).unwrap();
-            assert!((way_s - radius_m / feed_m_per_s).abs() < 1e-12);
-            assert!(!passage.is_over(end_s + way_s, &cutter, &spindle));
-            assert!(passage.is_over(end_s + 2.0 * way_s, &cutter, &spindle));
+            let entry_s = WorkpieceTraverse::entry_duration_s(&cutter, &spindle).unwrap();
+            assert!((entry_s - radius_m / feed_m_per_s).abs() < 1e-12);
+            assert!(!traverse.is_over(end_s + entry_s, &cutter, &spindle));
+            assert!(traverse.is_over(end_s + 2.0 * entry_s, &cutter, &spindle));
         }
     }
 
     #[test]
     fn the_depth_of_a_ramp_grows_linearly_to_its_full_value_and_back() {
-        let ramp = Passage::Ramp {
+        let ramp = WorkpieceTraverse::Ramp {
             start_s: 1.0,
             ramp_s: 0.5,
             end_s: 4.0,

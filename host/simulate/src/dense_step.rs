@@ -5,7 +5,7 @@ use quietcut_model::Dynamics;
 use quietcut_numerics::dormand_prince::{Quartic, at};
 
 /// The newest integration step: the motion of the tool at any instant between its two ends (dense output).
-pub struct Segment<'a> {
+pub struct DenseStep<'a> {
     pub(super) model: &'a Model,
     pub(super) context: StepContext<'a>,
     pub(super) quartics: &'a [Quartic],
@@ -57,7 +57,7 @@ impl Workspace {
     }
 }
 
-impl Segment<'_> {
+impl DenseStep<'_> {
     /// Start time of the step, s.
     pub fn from_s(&self) -> f64 {
         self.from_s
