@@ -8,7 +8,7 @@ use quietcut::case::Case;
 use quietcut::diagnose::answer::Outcome;
 use quietcut::diagnose::{Diagnosis, Options, diagnose};
 use quietcut::identify::response;
-use quietcut::identify::restoring_force::{Record, Term};
+use quietcut::identify::restoring_force::{ForceTerm, Record};
 use quietcut::recording::{Channel, Quantity, Recording, Sidecar, TestKind};
 use quietcut_testkit::measured;
 
@@ -120,10 +120,10 @@ fn the_measured_silverbox_has_a_cubic_spring() {
     let (mass, damping) = (1.0 / (omega * omega), 2.0 * 0.0486 / omega);
     let missed_mv = |k3: f64, gain: f64| {
         let law = [
-            (Term::Mass, mass),
-            (Term::Damping, damping),
-            (Term::Stiffness, 1.0),
-            (Term::CubicStiffness, k3),
+            (ForceTerm::Mass, mass),
+            (ForceTerm::Damping, damping),
+            (ForceTerm::Stiffness, 1.0),
+            (ForceTerm::CubicStiffness, k3),
         ];
         let motion = response::displacement(&law, &force[..arrow], SILVERBOX_RATE_HZ).unwrap();
         let missed = motion.iter().zip(&displacement).map(|(x, y)| gain * x - y);
@@ -177,10 +177,10 @@ fn the_measured_positioning_stage_has_dry_friction() {
         of("coulomb-friction", "fc_minus_n"),
     );
     let law = [
-        (Term::Mass, 95.208),
-        (Term::Damping, of("damping", "damping_ns_per_m")),
-        (Term::CoulombFriction, 0.5 * (plus + minus)),
-        (Term::Offset, 0.5 * (plus - minus)),
+        (ForceTerm::Mass, 95.208),
+        (ForceTerm::Damping, of("damping", "damping_ns_per_m")),
+        (ForceTerm::CoulombFriction, 0.5 * (plus + minus)),
+        (ForceTerm::Offset, 0.5 * (plus - minus)),
     ];
     // On the whole record, as such errors are published.
     let whole = Record {
@@ -189,8 +189,8 @@ fn the_measured_positioning_stage_has_dry_friction() {
         quantity: Quantity::Displacement,
         rate_hz: 1000.0,
     };
-    let error = |law: &[(Term, f64)]| whole.force_error(law, [0.0, BAND_HZ], 0.1);
-    let believed = error(&[(Term::Mass, 95.208), (Term::Damping, 411.26)]);
+    let error = |law: &[(ForceTerm, f64)]| whole.force_error(law, [0.0, BAND_HZ], 0.1);
+    let believed = error(&[(ForceTerm::Mass, 95.208), (ForceTerm::Damping, 411.26)]);
     let extended = error(&law);
     println!(
         "force error of the whole record {:.2} % -> {:.2} %",

@@ -20,7 +20,7 @@ use quietcut::case::Case;
 use quietcut::identify::dwell::Dwell;
 use quietcut::identify::harmonic_balance::{Grid, Problem};
 use quietcut::identify::hfrf::{self, HfrfFit, Response};
-use quietcut::identify::law::{Extra, Law, Role};
+use quietcut::identify::law::{Law, NonlinearTerm, Role};
 use quietcut::identify::steady::{Settling, steady};
 use quietcut::identify::steady_fit::{Data, Fit};
 use quietcut::simulate::rig::{Rig, Signal};
@@ -46,7 +46,7 @@ const SETS: [(&str, [f64; 3], [f64; 2]); 2] = [
 ];
 
 fn law() -> Law {
-    Law::new(1, &[Extra::CubicStiffness, Extra::CubicDamping])
+    Law::new(1, &[NonlinearTerm::CubicStiffness, NonlinearTerm::CubicDamping])
 }
 
 fn matrices(case: &Case) -> &Matrices {

@@ -19,7 +19,7 @@ use num_complex::Complex64;
 use quietcut::case::Case;
 use quietcut::frf::FrfTable;
 use quietcut::identify::harmonic_balance::{Grid, Problem as HarmonicProblem};
-use quietcut::identify::law::{Extra, Law, Role};
+use quietcut::identify::law::{Law, NonlinearTerm, Role};
 use quietcut::orbit::ForcedProblem;
 use quietcut::report::lobe_chart::{Column, lobe_chart};
 use quietcut::report::marks::Mark;
@@ -520,7 +520,7 @@ fn balanced(case: &Case, amplitude_m: f64) -> (f64, f64, f64) {
     let parts = matrices(case);
     let one = |matrix: &nalgebra::DMatrix<f64>| matrix[(0, 0)];
     let cubic = |matrix: &Option<nalgebra::DMatrix<f64>>| one(matrix.as_ref().expect("cubic terms"));
-    let law = Law::new(1, &[Extra::CubicStiffness, Extra::CubicDamping]);
+    let law = Law::new(1, &[NonlinearTerm::CubicStiffness, NonlinearTerm::CubicDamping]);
     let mut theta = vec![0.0; law.parameters.len()];
     for (role, value) in [
         (Role::Mass(0, 0), one(&parts.mass)),

@@ -73,7 +73,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_slow_tone_comes_through_in_its_place() {
+    fn the_trace_keeps_amplitude_and_time_of_a_slow_tone() {
         let (rate_hz, tone_hz, counts) = (26_667.0 * 1.02, 17.4, 1000.0);
         let blocks: Vec<Block> = (0..800_u32)
             .map(|sequence| {

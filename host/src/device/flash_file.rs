@@ -144,7 +144,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_written_is_in_the_file_at_once() {
+    fn flash_writes_reach_the_file_at_once() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("flash.bin");
         let mut flash = FlashFile::open(&path).unwrap();
@@ -162,7 +162,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_that_is_none_is_left_alone() {
+    fn a_file_of_another_kind_is_not_changed() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("case.toml");
         std::fs::write(&path, "name = 1").unwrap();

@@ -115,7 +115,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn its_cuts_can_be_made() {
+    fn cuts_of_the_virtual_cell_can_be_simulated() {
         let cuts = VirtualCell::new().unwrap().endless_cuts();
         for _ in 0..3 {
             assert!(cuts.recv().unwrap().blocks.len() > 1000);

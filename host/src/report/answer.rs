@@ -201,7 +201,7 @@ mod tests {
     }
 
     #[test]
-    fn advice_that_moves_a_little_is_the_same_advice() {
+    fn a_small_change_of_the_advised_speed_is_the_same_advice() {
         let advice = |rpm| AdviceAnswer {
             action: "speed",
             rpm,

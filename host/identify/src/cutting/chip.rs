@@ -20,7 +20,7 @@ pub struct Chip {
 /// A point of the surface. `reach_m` is its height along the chip thickness direction, relative to a tooth without runout, in the
 /// feed position of the current tooth passing.
 #[derive(Clone, Copy)]
-struct Point {
+struct SurfacePoint {
     phi: f64,
     reach_m: f64,
     owner: usize,
@@ -39,7 +39,7 @@ pub fn chips(test: &CuttingTest, runout_m: &[f64]) -> Vec<Vec<Chip>> {
     let pitch = test.pitch();
     let passes = ((first - test.exit) / pitch).floor() as i64..=((last - test.start) / pitch).ceil() as i64;
     let (sin_edge, cos_edge) = test.edge_angle.sin_cos();
-    let mut surface: Vec<Point> = Vec::new();
+    let mut surface: Vec<SurfacePoint> = Vec::new();
     for pass in passes {
         let turned = pass as f64 * pitch;
         let tooth = (-pass).rem_euclid(test.teeth as i64) as usize;
@@ -53,7 +53,7 @@ pub fn chips(test: &CuttingTest, runout_m: &[f64]) -> Vec<Vec<Chip>> {
             let own = (sin * u.x + cos * u.y) * sin_edge - u.z * cos_edge;
             let recession = test.feed_per_tooth_m * sin * sin_edge;
             // Where no earlier tooth passing is recorded, the surface is that of a tooth passing without vibration.
-            let before = at(&surface, phi, &mut place).unwrap_or(Point {
+            let before = surface_at(&surface, phi, &mut place).unwrap_or(SurfacePoint {
                 phi,
                 reach_m: 0.0,
                 owner: (tooth + 1) % test.teeth,
@@ -67,13 +67,13 @@ pub fn chips(test: &CuttingTest, runout_m: &[f64]) -> Vec<Vec<Chip>> {
                     tooth,
                     ahead: before.owner,
                 });
-                left.push(Point {
+                left.push(SurfacePoint {
                     phi,
                     reach_m: own,
                     owner: tooth,
                 });
             } else {
-                left.push(Point {
+                left.push(SurfacePoint {
                     phi,
                     reach_m: before.reach_m - recession,
                     owner: before.owner,
@@ -87,7 +87,7 @@ pub fn chips(test: &CuttingTest, runout_m: &[f64]) -> Vec<Vec<Chip>> {
 
 /// The surface at the angle `phi`: by the cubic through four neighbouring points that one tooth left, else by a straight line.
 /// `place` is the index of the last point before `phi` and only grows.
-fn at(surface: &[Point], phi: f64, place: &mut usize) -> Option<Point> {
+fn surface_at(surface: &[SurfacePoint], phi: f64, place: &mut usize) -> Option<SurfacePoint> {
     while *place + 1 < surface.len() && surface[*place + 1].phi <= phi {
         *place += 1;
     }
@@ -98,11 +98,11 @@ fn at(surface: &[Point], phi: f64, place: &mut usize) -> Option<Point> {
         (is_one && phi > left.phi).then(|| interpolated(points, phi))
     };
     let reach_m = around(1, 2).or_else(|| around(0, 1)).unwrap_or(left.reach_m);
-    Some(Point { reach_m, ..left })
+    Some(SurfacePoint { reach_m, ..left })
 }
 
 /// Value at `phi` of the polynomial through all points (Lagrange).
-fn interpolated(points: &[Point], phi: f64) -> f64 {
+fn interpolated(points: &[SurfacePoint], phi: f64) -> f64 {
     let weight = |i: usize| -> f64 {
         let others = points.iter().enumerate().filter(|(j, _)| *j != i);
         others

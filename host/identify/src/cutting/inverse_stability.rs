@@ -3,7 +3,7 @@
 //! The mode shapes are those of a first guess; natural frequencies, damping ratios and stiffnesses are unknown. At every cut the
 //! structure has a dominant Floquet multiplier μ (characteristic multiplier): the cut chatters if |μ| > 1, at the frequency given
 //! by μ. With the errors of the set depth and the measured frequency every structure has a likelihood. The posterior distribution,
-//! with a log-uniform prior within [`Before`], is sampled by sequential Monte Carlo (Del Moral, Doucet and Jasra 2006). With few
+//! with a log-uniform prior within [`PriorFactors`], is sampled by sequential Monte Carlo (Del Moral, Doucet and Jasra 2006). With few
 //! cuts the intervals are wide. If several separate regions explain the cuts, the sample contains all of them.
 
 use std::f64::consts::TAU;
@@ -28,7 +28,7 @@ use quietcut_stability::{Problem, StabilityError, point};
 
 /// Width of the prior: largest factor, up or down, between a parameter and its first guess.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Before {
+pub struct PriorFactors {
     /// Largest factor of natural frequencies.
     pub frequency: f64,
     /// Largest factor of damping ratios.
@@ -37,7 +37,7 @@ pub struct Before {
     pub stiffness: f64,
 }
 
-impl Default for Before {
+impl Default for PriorFactors {
     fn default() -> Self {
         Self {
             frequency: 1.25,
@@ -49,7 +49,7 @@ impl Default for Before {
 
 /// Measurement errors of the trial cuts.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Errors {
+pub struct CutErrors {
     /// Relative standard deviation of depths.
     pub depth: f64,
     /// Relative standard deviation of chatter frequencies.
@@ -58,16 +58,16 @@ pub struct Errors {
 
 /// Prior and posterior distribution of a modal parameter.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Spread {
+pub struct Posterior {
     /// Median of the posterior.
     pub value: f64,
     /// 5 % and 95 % quantiles of the posterior.
     pub ci90: [f64; 2],
     /// 5 % and 95 % quantiles of the prior.
-    pub before: [f64; 2],
+    pub prior: [f64; 2],
 }
 
-impl Spread {
+impl Posterior {
     /// Standard deviation of the logarithm, from the posterior interval of a normal distribution.
     pub fn deviation(&self) -> f64 {
         (self.ci90[1] / self.ci90[0]).ln() / (2.0 * NINETY_PERCENT)
@@ -77,7 +77,7 @@ impl Spread {
     /// parameter.
     pub fn is_vague(&self) -> bool {
         let width = |[low, high]: [f64; 2]| (high / low).ln();
-        width(self.ci90) > VAGUE_SHARE * width(self.before)
+        width(self.ci90) > VAGUE_SHARE * width(self.prior)
     }
 }
 
@@ -85,11 +85,11 @@ impl Spread {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InverseMode {
     /// Natural frequency, Hz.
-    pub frequency_hz: Spread,
+    pub frequency_hz: Posterior,
     /// Damping ratio.
-    pub damping_ratio: Spread,
+    pub damping_ratio: Posterior,
     /// Static stiffness of this mode alone in its softest direction, N/m.
-    pub stiffness_n_per_m: Spread,
+    pub stiffness_n_per_m: Posterior,
     /// Static stiffness of the mode in the first guess, N/m.
     pub start_stiffness_n_per_m: f64,
 }
@@ -127,8 +127,8 @@ struct Family<'a> {
     modes: Vec<(Complex64, DMatrix<Complex64>)>,
     /// The trial cuts, those with a chatter frequency first: they restrict the structure most.
     cuts: Vec<ObservedCut>,
-    errors: Errors,
-    /// Logarithms of the prior factors of [`Before`]: frequency, damping and stiffness for each mode.
+    errors: CutErrors,
+    /// Logarithms of the prior factors of [`PriorFactors`]: frequency, damping and stiffness for each mode.
     half_widths: Vec<f64>,
 }
 
@@ -139,8 +139,8 @@ struct Family<'a> {
 pub fn modes(
     start: &Problem,
     cuts: &[ObservedCut],
-    errors: Errors,
-    before: Before,
+    errors: CutErrors,
+    prior: PriorFactors,
     seed: u64,
 ) -> Result<Vec<InverseMode>, InverseError> {
     let modes: Vec<_> = start
@@ -157,7 +157,7 @@ pub fn modes(
     if modes.is_empty() {
         return Err(InverseError::NoModes);
     }
-    let of_mode = [before.frequency.ln(), before.damping.ln(), before.stiffness.ln()];
+    let of_mode = [prior.frequency.ln(), prior.damping.ln(), prior.stiffness.ln()];
     let mut ordered = cuts.to_vec();
     ordered.sort_by_key(|cut| cut.chatter_hz.is_none());
     let family = Family {
@@ -173,7 +173,7 @@ pub fn modes(
     }
     let particles = family.draw(seed);
     family.check(&particles)?;
-    Ok(family.told(&particles))
+    Ok(family.posteriors(&particles))
 }
 
 /// The modes of `start` in the directions of the machine, with the posterior medians `found`, for a case file.
@@ -188,13 +188,14 @@ pub fn identified_modes(start: &FirstOrder, found: &[InverseMode]) -> (Vec<Direc
     let names = [Direction::X, Direction::Y, Direction::Z];
     let shared: Vec<(usize, usize)> = (0..axes.len()).map(|place| (place, place)).collect();
     let mut modes = Vec::new();
-    for (part, told) in start.modal_parts().iter().zip(found) {
-        let at_start = (part.omega() / TAU, told.start_stiffness_n_per_m);
-        let scale = told.frequency_hz.value / at_start.0 / (told.stiffness_n_per_m.value / at_start.1);
-        let share = told
+    for (part, posterior) in start.modal_parts().iter().zip(found) {
+        let at_start = (part.omega() / TAU, posterior.start_stiffness_n_per_m);
+        let scale =
+            posterior.frequency_hz.value / at_start.0 / (posterior.stiffness_n_per_m.value / at_start.1);
+        let share = posterior
             .frequency_hz
             .deviation()
-            .hypot(told.stiffness_n_per_m.deviation());
+            .hypot(posterior.stiffness_n_per_m.deviation());
         let whole = part.residue(start) * Complex64::from(scale);
         let mut rest = DMatrix::from_fn(axes.len(), axes.len(), |i, j| whole[(axes[i], axes[j])]);
         let all = rest.norm();
@@ -207,16 +208,16 @@ pub fn identified_modes(start: &FirstOrder, found: &[InverseMode]) -> (Vec<Direc
             rest -= taken;
             normalize(&mut right, &mut left, &shared);
             modes.push(IdentifiedMode {
-                frequency_std_hz: told.frequency_hz.value * told.frequency_hz.deviation(),
-                damping_ratio_std: told.damping_ratio.value * told.damping_ratio.deviation(),
+                frequency_std_hz: posterior.frequency_hz.value * posterior.frequency_hz.deviation(),
+                damping_ratio_std: posterior.damping_ratio.value * posterior.damping_ratio.deviation(),
                 left_std: left
                     .iter()
                     .map(|z| [z.re, z.im].map(|x| share * x.abs()))
                     .collect(),
                 right_std: vec![[0.0; 2]; right.len()],
                 mode: Mode {
-                    frequency_hz: told.frequency_hz.value,
-                    damping_ratio: told.damping_ratio.value,
+                    frequency_hz: posterior.frequency_hz.value,
+                    damping_ratio: posterior.damping_ratio.value,
                     left,
                     right,
                 },
@@ -383,7 +384,7 @@ impl Family<'_> {
         }
     }
 
-    fn told(&self, particles: &[Vec<f64>]) -> Vec<InverseMode> {
+    fn posteriors(&self, particles: &[Vec<f64>]) -> Vec<InverseMode> {
         let structure = &self.start.structure;
         self.modes
             .iter()
@@ -399,10 +400,10 @@ impl Family<'_> {
                     let mut values: Vec<f64> = particles.iter().map(|theta| theta[index]).collect();
                     values.sort_by(f64::total_cmp);
                     let quantile = |share: f64| at_start * quantile(&values, share).exp();
-                    Spread {
+                    Posterior {
                         value: quantile(0.5),
                         ci90: [quantile(0.05), quantile(0.95)],
-                        before: [at_start * (-half).exp(), at_start * half.exp()],
+                        prior: [at_start * (-half).exp(), at_start * half.exp()],
                     }
                 };
                 InverseMode {

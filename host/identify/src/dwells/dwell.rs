@@ -33,14 +33,14 @@ pub struct Dwell {
     /// of the coefficients of that channel.
     pub gram_inverse: DMatrix<f64>,
     /// Fourier coefficients of the force channels.
-    pub forces: Vec<Line>,
+    pub forces: Vec<FourierSeries>,
     /// Fourier coefficients of the motion channels.
-    pub motions: Vec<Line>,
+    pub motions: Vec<FourierSeries>,
 }
 
 /// Fourier coefficients of one channel: 1, cos, sin, cos 2 …, with the phase zero at the middle of the segment.
 #[derive(Clone, Debug)]
-pub struct Line {
+pub struct FourierSeries {
     /// The direction of the channel.
     pub direction: Direction,
     /// The quantity that the channel measures.
@@ -51,7 +51,7 @@ pub struct Line {
     pub variance: f64,
 }
 
-impl Line {
+impl FourierSeries {
     /// Amplitude of harmonic h, in the unit of the channel.
     pub fn amplitude(&self, h: usize) -> f64 {
         self.coefficients[2 * h - 1].hypot(self.coefficients[2 * h])
@@ -98,13 +98,13 @@ pub fn dwell_segments(recording: &Recording) -> Vec<DwellSegment> {
         .collect();
     let mut sorted = sizes.clone();
     sorted.sort_by(f64::total_cmp);
-    let (Some(&quietest), Some(&loudest)) = (sorted.get(sorted.len() / 50), sorted.last()) else {
+    let (Some(&quietest), Some(&strongest)) = (sorted.get(sorted.len() / 50), sorted.last()) else {
         return Vec::new();
     };
     // The threshold of the block level lies between the noise and the lowest force level.
     let threshold = (FORCE_ABOVE_NOISE * quietest)
-        .min(FORCE_BELOW_LARGEST[1] * loudest)
-        .max(FORCE_BELOW_LARGEST[0] * loudest);
+        .min(FORCE_BELOW_LARGEST[1] * strongest)
+        .max(FORCE_BELOW_LARGEST[0] * strongest);
     let mut found = Vec::new();
     let mut start = None;
     for index in 0..=sizes.len() {
@@ -231,7 +231,7 @@ impl Dwell {
                     slope += by_omega.dot(&residual) / variance;
                     weight += by_omega.norm_squared() / variance;
                 }
-                lines.push(Line {
+                lines.push(FourierSeries {
                     direction: *direction,
                     quantity: channel.quantity,
                     coefficients,
@@ -263,7 +263,7 @@ impl Dwell {
     }
 
     /// The force channel with the largest fundamental.
-    pub fn force(&self) -> Option<&Line> {
+    pub fn force(&self) -> Option<&FourierSeries> {
         self.forces
             .iter()
             .max_by(|a, b| a.amplitude(1).total_cmp(&b.amplitude(1)))
@@ -304,7 +304,7 @@ fn slope_by_omega(coefficients: &DVector<f64>, design: &DMatrix<f64>, rate_hz: f
 
 /// Pools the noise variance of each channel over all dwells of a recording.
 pub fn pool_variances(dwells: &mut [Dwell]) {
-    type Pick = fn(&mut Dwell) -> &mut Vec<Line>;
+    type Pick = fn(&mut Dwell) -> &mut Vec<FourierSeries>;
     let picks: [Pick; 2] = [|dwell| &mut dwell.forces, |dwell| &mut dwell.motions];
     for pick in picks {
         let lines = dwells

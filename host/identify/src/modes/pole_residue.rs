@@ -15,13 +15,13 @@ use quietcut_frf::rational_fit::residues;
 
 /// A pole with its right and left shape.
 #[derive(Clone, Debug)]
-pub(super) struct Shaped {
+pub(super) struct ShapedPole {
     pub(super) pole: Complex64,
     pub(super) right: Vec<Complex64>,
     pub(super) left: Vec<Complex64>,
 }
 
-impl Shaped {
+impl ShapedPole {
     /// Number of real parameters of the mode: pole, right and left shape.
     pub(super) fn width(&self) -> usize {
         2 + 2 * (self.right.len() + self.left.len())
@@ -31,7 +31,7 @@ impl Shaped {
 /// Parameters of the modal fit: modes, and terms of the modes outside the band.
 #[derive(Clone, Debug)]
 pub(super) struct PoleResidue {
-    pub(super) modes: Vec<Shaped>,
+    pub(super) modes: Vec<ShapedPole>,
     /// U and L of each receptance: compliance, m/N, and inertia term, 1/kg.
     pub(super) outside: Vec<[f64; 2]>,
 }
@@ -50,7 +50,7 @@ impl PoleResidue {
             .map(|(r, &pole)| {
                 let (mut right, mut left, _) = shape::rank_one(&matrix_of(data, &fit.residues, r))?;
                 shape::normalize(&mut right, &mut left, &shared(data));
-                Some(Shaped { pole, right, left })
+                Some(ShapedPole { pole, right, left })
             })
             .collect::<Option<Vec<_>>>()
             .ok_or(ModesError::NotConverged(poles.len()))?;
@@ -154,7 +154,7 @@ impl PoleResidue {
         row.fill(Complex64::ZERO);
         let (p, q) = data.places[k];
         let rights = data.responses.len();
-        let width = self.modes.first().map_or(0, Shaped::width);
+        let width = self.modes.first().map_or(0, ShapedPole::width);
         for (r, mode) in self.modes.iter().enumerate() {
             let (a, b) = ((s - mode.pole).inv(), (s - mode.pole.conj()).inv());
             let mut put = |at: usize, factor: Complex64, a: Complex64, b: Complex64| {

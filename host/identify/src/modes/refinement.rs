@@ -38,7 +38,7 @@ pub(super) fn refine(data: &Receptances, start: PoleResidue) -> Option<Refined> 
     let mut weights = Weights::of(&data.deviation);
     let mut fit = least_squares(data, &weights, start)?;
     for _ in 0..ROUNDS {
-        weights.again(data, &fit);
+        weights.update(data, &fit);
         fit = least_squares(data, &weights, fit)?;
     }
     for mode in &mut fit.modes {

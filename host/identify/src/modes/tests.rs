@@ -79,7 +79,7 @@ fn normalized(mode: &Mode) -> (Vec<Complex64>, Vec<Complex64>) {
 }
 
 #[test]
-fn the_modes_of_table_7_1_come_back_from_their_receptances() {
+fn the_modes_of_table_7_1_are_identified_from_their_receptances() {
     let structure = case("kuka-kr90-acetal").structure.unwrap();
     let (table, _) = table(&structure, &grid(10.0, 28.0, 181), &AXES, 0.0, 1);
     let data = Receptances::new(&table, None, None).unwrap();
@@ -178,7 +178,7 @@ fn structure(modes: Vec<Mode>) -> Structure {
 }
 
 #[test]
-fn close_modes_are_told_apart_and_modes_outside_the_band_are_residuals() {
+fn close_modes_are_separated_and_modes_outside_the_band_are_residuals() {
     // Two close modes a third of a half-power bandwidth apart with different shapes, one mode far below and one far above.
     let close = [
         mode(
@@ -225,7 +225,7 @@ fn close_modes_are_told_apart_and_modes_outside_the_band_are_residuals() {
 }
 
 #[test]
-fn noise_is_no_mode_and_it_is_said_why() {
+fn noise_is_rejected_as_a_mode_with_a_reason() {
     let lone = [mode(17.0, 0.03, [[3.0, -3.0]; 3], [[3.0, -3.0]; 3])];
     for seed in 0..20 {
         let (table, deviation) = table(
@@ -274,7 +274,7 @@ fn one_force_gives_right_shapes_and_its_entry_of_the_left_ones() {
 }
 
 #[test]
-fn what_holds_no_mode_is_refused() {
+fn data_without_a_mode_are_refused() {
     let structure = case("kuka-kr90-acetal").structure.unwrap();
     let (whole, _) = table(&structure, &grid(10.0, 28.0, 181), &AXES, 0.0, 1);
     let refused = |table: &FrfTable, band, options: &Options| {

@@ -74,7 +74,7 @@ impl Weights {
     }
 
     /// Updates the standard deviations and the whitening matrix from the residual of a fit.
-    pub(super) fn again(&mut self, data: &Receptances, fit: &PoleResidue) {
+    pub(super) fn update(&mut self, data: &Receptances, fit: &PoleResidue) {
         let mut left = Vec::with_capacity(data.values.len());
         for k in 0..data.values.len() {
             let values = fit.left_of(data, &self.deviation, k);

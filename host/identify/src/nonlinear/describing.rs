@@ -63,7 +63,7 @@ mod tests {
     }
 
     #[test]
-    fn closed_forms_are_the_sums() {
+    fn describing_functions_equal_numerical_sums() {
         let (x, w) = (1.3, 2.0);
         let gap = 0.4;
         let pairs = [
@@ -81,7 +81,7 @@ mod tests {
     }
 
     #[test]
-    fn hysteresis_is_nothing_small_and_friction_large() {
+    fn hysteresis_vanishes_at_small_and_is_friction_at_large_amplitude() {
         // At amplitudes X far below the yield displacement z_y, z = x up to a relative error of X/z_y.
         assert!(hysteresis(1e-3, 1.0).norm() < 2e-3);
         // At amplitudes X far above z_y the stiffness −1 cancels the spring and friction of the force z_y remains; rounded corners

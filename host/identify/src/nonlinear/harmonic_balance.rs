@@ -256,10 +256,10 @@ impl Solution {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::nonlinear::law::{Extra, Role};
+    use crate::nonlinear::law::{NonlinearTerm, Role};
 
     fn duffing() -> (Law, Vec<f64>) {
-        let law = Law::new(1, &[Extra::CubicStiffness, Extra::CubicDamping]);
+        let law = Law::new(1, &[NonlinearTerm::CubicStiffness, NonlinearTerm::CubicDamping]);
         let mut theta = vec![0.0; law.parameters.len()];
         for (role, value) in [
             (Role::Mass(0, 0), 188.0),

@@ -7,7 +7,7 @@ use crate::criteria::LEAST_LEVELS;
 use crate::dwells::differentiation::derivative;
 use crate::dwells::dwell::Dwell;
 use crate::least_squares::{scaled_inverse, scaled_least_squares};
-use crate::nonlinear::law::{Extra, Law, Role};
+use crate::nonlinear::law::{Law, NonlinearTerm, Role};
 
 /// H₁, H₃(ω, ω, −ω) and H₅(ω, ω, ω, −ω, −ω) at one frequency, m/N, m/N³, m/N⁵.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -134,7 +134,7 @@ pub fn fit(responses: &[Response]) -> Result<HfrfFit, HfrfError> {
     }
     let (of_linear, linear_std) = regression(&linear, &linear_right)?;
     let (of_cubic, cubic_std) = regression(&cubic, &cubic_right)?;
-    let law = Law::new(1, &[Extra::CubicStiffness, Extra::CubicDamping]);
+    let law = Law::new(1, &[NonlinearTerm::CubicStiffness, NonlinearTerm::CubicDamping]);
     let mut theta = DVector::zeros(law.parameters.len());
     let mut deviations = DVector::zeros(law.parameters.len());
     let found = [

@@ -97,7 +97,7 @@ pub struct Monomial {
 
 /// Nonlinear terms that a law may contain in addition to mass, damping and stiffness.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, clap::ValueEnum)]
-pub enum Extra {
+pub enum NonlinearTerm {
     /// k2·x² in every direction.
     QuadraticStiffness,
     /// k3·x³ in every direction.
@@ -112,7 +112,7 @@ pub enum Extra {
 
 impl Law {
     /// Full symmetric M, C, K of `dofs` degrees of freedom and the nonlinear terms of `extras`.
-    pub fn new(dofs: usize, extras: &[Extra]) -> Self {
+    pub fn new(dofs: usize, extras: &[NonlinearTerm]) -> Self {
         let mut parameters = Vec::new();
         type Make = fn(usize, usize) -> Role;
         let kinds: [(Make, usize); 3] = [(Role::Mass, 2), (Role::Damping, 1), (Role::Stiffness, 0)];
@@ -145,20 +145,20 @@ impl Law {
         };
         let has = |extra| extras.contains(&extra);
         for i in 0..dofs {
-            if has(Extra::QuadraticStiffness) {
+            if has(NonlinearTerm::QuadraticStiffness) {
                 parameters.push(power(Role::QuadraticStiffness(i), i, 2));
             }
-            if has(Extra::CubicStiffness) || has(Extra::SofteningHardening) {
+            if has(NonlinearTerm::CubicStiffness) || has(NonlinearTerm::SofteningHardening) {
                 parameters.push(power(Role::CubicStiffness(i), i, 3));
             }
-            if has(Extra::SofteningHardening) {
+            if has(NonlinearTerm::SofteningHardening) {
                 parameters.push(power(Role::QuinticStiffness(i), i, 5));
             }
-            if has(Extra::CubicDamping) {
+            if has(NonlinearTerm::CubicDamping) {
                 parameters.push(power(Role::CubicDamping(i), dofs + i, 3));
             }
         }
-        if has(Extra::ModeCoupling) {
+        if has(NonlinearTerm::ModeCoupling) {
             for i in 0..dofs {
                 for j in i + 1..dofs {
                     parameters.extend(couplings(i, j));

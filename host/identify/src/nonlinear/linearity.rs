@@ -13,7 +13,7 @@ use crate::criteria::{
     LINEAR_DEVIATIONS, QUADRATIC_STIFFNESS_RATIO, SAME_STEP,
 };
 use crate::dwells::differentiation::derivative;
-use crate::dwells::dwell::{Dwell, Line};
+use crate::dwells::dwell::{Dwell, FourierSeries};
 use crate::nonlinear::describing::{self, Nonlinearity};
 use crate::nonlinear::homogeneity::line;
 
@@ -65,7 +65,7 @@ pub enum LinearityError {
 
 /// Dynamic stiffness F/X measured in one dwell.
 #[derive(Clone, Copy, Debug)]
-struct Point {
+struct DwellStiffness {
     group: usize,
     omega: f64,
     amplitude: f64,
@@ -78,7 +78,7 @@ struct Point {
 ///
 /// # Errors
 /// No frequency at two levels.
-pub fn judge(dwells: &[Dwell]) -> Result<Verdict, LinearityError> {
+pub fn verdict(dwells: &[Dwell]) -> Result<Verdict, LinearityError> {
     let points = points(dwells);
     let several = points
         .iter()
@@ -86,10 +86,10 @@ pub fn judge(dwells: &[Dwell]) -> Result<Verdict, LinearityError> {
     if !several {
         return Err(LinearityError::OneLevel { dwells: dwells.len() });
     }
-    let base = Base::new(&points);
+    let base = LinearModel::new(&points);
     let alone = base.sum_of_squares(&[]);
     let free = base.free();
-    let mut best = Choice {
+    let mut best = KindSet {
         kinds: Vec::new(),
         parameters: 0,
         sum: alone,
@@ -102,7 +102,7 @@ pub fn judge(dwells: &[Dwell]) -> Result<Verdict, LinearityError> {
     }
     let mut kinds = best.kinds;
     if second {
-        if is_shadow_of_quadratic(&points, dwells) {
+        if is_due_to_quadratic_spring(&points, dwells) {
             kinds.retain(|kind| {
                 !matches!(
                     kind,
@@ -125,11 +125,11 @@ pub fn judge(dwells: &[Dwell]) -> Result<Verdict, LinearityError> {
     })
 }
 
-fn differ(a: &Point, b: &Point) -> bool {
+fn differ(a: &DwellStiffness, b: &DwellStiffness) -> bool {
     (a.amplitude / b.amplitude - 1.0).abs() > DIFFERENT_LEVELS
 }
 
-fn pair(dwell: &Dwell) -> Option<(&Line, &Line)> {
+fn pair(dwell: &Dwell) -> Option<(&FourierSeries, &FourierSeries)> {
     let force = dwell.force()?;
     let motion = dwell
         .motions
@@ -138,8 +138,8 @@ fn pair(dwell: &Dwell) -> Option<(&Line, &Line)> {
     Some((force, motion))
 }
 
-fn points(dwells: &[Dwell]) -> Vec<Point> {
-    let mut points: Vec<Point> = dwells
+fn points(dwells: &[Dwell]) -> Vec<DwellStiffness> {
+    let mut points: Vec<DwellStiffness> = dwells
         .iter()
         .filter_map(|dwell| {
             let (force, motion) = pair(dwell)?;
@@ -148,7 +148,7 @@ fn points(dwells: &[Dwell]) -> Vec<Point> {
             let x = y / Complex64::new(0.0, dwell.omega).powi(i32::from(derivative(motion.quantity)));
             let stiffness = f / x;
             let relative = per_unit * (force.variance / f.norm_sqr() + motion.variance / y.norm_sqr());
-            Some(Point {
+            Some(DwellStiffness {
                 group: 0,
                 omega: dwell.omega,
                 amplitude: x.norm(),
@@ -172,13 +172,13 @@ fn points(dwells: &[Dwell]) -> Vec<Point> {
 
 /// Linear model of the test: one free complex stiffness per frequency. The candidate kinds explain the change of stiffness with the
 /// level.
-struct Base<'a> {
-    points: &'a [Point],
+struct LinearModel<'a> {
+    points: &'a [DwellStiffness],
     groups: usize,
 }
 
-impl<'a> Base<'a> {
-    fn new(points: &'a [Point]) -> Self {
+impl<'a> LinearModel<'a> {
+    fn new(points: &'a [DwellStiffness]) -> Self {
         Self {
             points,
             groups: points.last().map_or(0, |point| point.group + 1),
@@ -233,18 +233,18 @@ impl<'a> Base<'a> {
 }
 
 #[derive(Clone, Debug)]
-struct Choice {
+struct KindSet {
     kinds: Vec<Nonlinearity>,
     parameters: usize,
     sum: f64,
 }
 
 /// The set of one or two kinds with the fewest parameters that explains the level dependence; `nothing` if no kind is significant.
-fn choose(base: &Base<'_>, points: &[Point], nothing: Choice) -> Choice {
+fn choose(base: &LinearModel<'_>, points: &[DwellStiffness], nothing: KindSet) -> KindSet {
     let candidates = candidates(base, points);
-    let mut all: Vec<Choice> = candidates
+    let mut all: Vec<KindSet> = candidates
         .iter()
-        .map(|candidate| Choice {
+        .map(|candidate| KindSet {
             kinds: vec![candidate.kind],
             parameters: candidate.parameters,
             sum: base.sum_of_squares(&candidate.features),
@@ -252,14 +252,14 @@ fn choose(base: &Base<'_>, points: &[Point], nothing: Choice) -> Choice {
         .collect();
     all.retain(|choice| nothing.sum - choice.sum > KIND_EVIDENCE * choice.parameters as f64);
     for (i, a) in candidates.iter().enumerate() {
-        for b in candidates[i + 1..].iter().filter(|b| a.goes_with(b)) {
+        for b in candidates[i + 1..].iter().filter(|b| a.can_act_with(b)) {
             let features: Vec<_> = a.features.iter().chain(&b.features).cloned().collect();
             let sum = base.sum_of_squares(&features);
             let needs = |other: &Candidate, parameters: usize| {
                 base.sum_of_squares(&other.features) - sum > KIND_EVIDENCE * parameters as f64
             };
             if needs(a, b.parameters) && needs(b, a.parameters) {
-                all.push(Choice {
+                all.push(KindSet {
                     kinds: vec![a.kind, b.kind],
                     parameters: a.parameters + b.parameters,
                     sum,
@@ -282,7 +282,7 @@ fn choose(base: &Base<'_>, points: &[Point], nothing: Choice) -> Choice {
 
 impl Candidate {
     /// True if two kinds may act together: a nonlinear spring and a nonlinear damping. Hysteresis contains both already.
-    fn goes_with(&self, other: &Self) -> bool {
+    fn can_act_with(&self, other: &Self) -> bool {
         self.spring != other.spring
             && self.kind != Nonlinearity::Hysteresis
             && other.kind != Nonlinearity::Hysteresis
@@ -296,8 +296,9 @@ struct Candidate {
     features: Vec<Vec<Complex64>>,
 }
 
-fn candidates(base: &Base<'_>, points: &[Point]) -> Vec<Candidate> {
-    let feature = |of: &dyn Fn(&Point) -> Complex64| -> Vec<Complex64> { points.iter().map(of).collect() };
+fn candidates(base: &LinearModel<'_>, points: &[DwellStiffness]) -> Vec<Candidate> {
+    let feature =
+        |of: &dyn Fn(&DwellStiffness) -> Complex64| -> Vec<Complex64> { points.iter().map(of).collect() };
     let cubic = feature(&|p| describing::cubic_stiffness(p.amplitude));
     let quintic = feature(&|p| describing::quintic_stiffness(p.amplitude));
     let candidate = |kind, spring, parameters, features| Candidate {
@@ -309,7 +310,7 @@ fn candidates(base: &Base<'_>, points: &[Point]) -> Vec<Candidate> {
     // Gap and yield displacement are searched from far below the smallest to just above the largest measured amplitude.
     let sizes = points.iter().map(|point| point.amplitude);
     let (least, largest) = sizes.fold((f64::INFINITY, 0.0_f64), |(a, b), x| (a.min(x), b.max(x)));
-    let scan = |of: &dyn Fn(&Point, f64) -> Complex64| {
+    let scan = |of: &dyn Fn(&DwellStiffness, f64) -> Complex64| {
         let features = |size: f64| {
             vec![
                 points
@@ -369,7 +370,7 @@ fn candidates(base: &Base<'_>, points: &[Point]) -> Vec<Candidate> {
 ///
 /// Harmonic balance of k₂x² near resonance: a₀ = −k₂X²/2k, X₂ = k₂X²/6k. The stiffness changes by k₂(2a₀ + X₂) = −(5/6)k₂²X²/k =
 /// −30·k·(X₂/X)². k follows from the change of F/X with frequency at the lowest level.
-fn is_shadow_of_quadratic(points: &[Point], dwells: &[Dwell]) -> bool {
+fn is_due_to_quadratic_spring(points: &[DwellStiffness], dwells: &[Dwell]) -> bool {
     let shares: Vec<(f64, f64, f64)> = dwells
         .iter()
         .filter_map(|dwell| {
@@ -381,13 +382,13 @@ fn is_shadow_of_quadratic(points: &[Point], dwells: &[Dwell]) -> bool {
             Some((dwell.omega, size, share))
         })
         .collect();
-    let share_of = |point: &Point| {
+    let share_of = |point: &DwellStiffness| {
         shares
             .iter()
             .find(|(omega, size, _)| *omega == point.omega && (size / point.amplitude - 1.0).abs() < 1e-9)
             .map(|(_, _, share)| share * share)
     };
-    let mut lowest: Vec<&Point> = Vec::new();
+    let mut lowest: Vec<&DwellStiffness> = Vec::new();
     for point in points {
         match lowest.last_mut() {
             Some(last) if last.group == point.group => {
@@ -420,7 +421,7 @@ fn is_shadow_of_quadratic(points: &[Point], dwells: &[Dwell]) -> bool {
     (-most..-least).contains(&ratio)
 }
 
-fn level_dependence(points: &[Point]) -> f64 {
+fn level_dependence(points: &[DwellStiffness]) -> f64 {
     let mut largest = 0.0_f64;
     for a in points {
         for b in points.iter().filter(|b| b.group == a.group) {
@@ -431,7 +432,7 @@ fn level_dependence(points: &[Point]) -> f64 {
 }
 
 /// Amplitude |X(hω)| of harmonic h, and its standard deviation from noise.
-fn at_harmonic(line: &Line, dwell: &Dwell, h: usize) -> Option<(f64, f64)> {
+fn at_harmonic(line: &FourierSeries, dwell: &Dwell, h: usize) -> Option<(f64, f64)> {
     let place = 2 * h - 1;
     if line.coefficients.len() <= place + 1 {
         return None;

@@ -14,7 +14,7 @@ use quietcut_numerics::singular_values::{Vectors, decompose};
 use rustfft::{Fft, FftPlanner};
 
 use crate::least_squares::scaled_least_squares;
-use crate::nonlinear::restoring_force::{Term, deviations};
+use crate::nonlinear::restoring_force::{ForceTerm, deviations};
 
 /// One period of a periodic test.
 #[derive(Clone, Copy, Debug)]
@@ -29,7 +29,7 @@ pub struct Period<'a> {
 #[derive(Clone, Debug)]
 pub struct PeriodicFit {
     /// The terms of the law with their coefficients, SI.
-    pub law: Vec<(Term, f64)>,
+    pub law: Vec<(ForceTerm, f64)>,
     /// Standard deviations of the coefficients.
     pub deviations: Vec<f64>,
     /// NRMSE of the predicted motion.
@@ -62,7 +62,7 @@ pub enum PeriodicError {
 const DENSER: usize = 2;
 
 struct Balance {
-    terms: Vec<Term>,
+    terms: Vec<ForceTerm>,
     rate_hz: f64,
     forward: Arc<dyn Fft<f64>>,
     inverse: Arc<dyn Fft<f64>>,
@@ -71,7 +71,7 @@ struct Balance {
 }
 
 impl Balance {
-    fn new(terms: &[Term], samples: usize, rate_hz: f64) -> Self {
+    fn new(terms: &[ForceTerm], samples: usize, rate_hz: f64) -> Self {
         let size = DENSER * samples;
         let mut planner = FftPlanner::new();
         let omega = (0..size)
@@ -140,7 +140,7 @@ impl Balance {
             .collect()
     }
 
-    fn of(&self, theta: &DVector<f64>, wanted: Term) -> f64 {
+    fn of(&self, theta: &DVector<f64>, wanted: ForceTerm) -> f64 {
         let place = self.terms.iter().position(|term| *term == wanted);
         place.map_or(0.0, |index| theta[index])
     }
@@ -149,12 +149,12 @@ impl Balance {
     fn slopes(&self, theta: &DVector<f64>, x: &[f64]) -> [Vec<f64>; 2] {
         let v = self.derivative(x, 1);
         let (k2, k3) = (
-            self.of(theta, Term::QuadraticStiffness),
-            self.of(theta, Term::CubicStiffness),
+            self.of(theta, ForceTerm::QuadraticStiffness),
+            self.of(theta, ForceTerm::CubicStiffness),
         );
         let (k5, c3) = (
-            self.of(theta, Term::QuinticStiffness),
-            self.of(theta, Term::CubicDamping),
+            self.of(theta, ForceTerm::QuinticStiffness),
+            self.of(theta, ForceTerm::CubicDamping),
         );
         let by_x = x
             .iter()
@@ -165,9 +165,9 @@ impl Balance {
 
     fn linear(&self, theta: &DVector<f64>, more: [f64; 2]) -> impl Fn(f64) -> Complex64 + use<> {
         let (m, c, k) = (
-            self.of(theta, Term::Mass),
-            self.of(theta, Term::Damping),
-            self.of(theta, Term::Stiffness),
+            self.of(theta, ForceTerm::Mass),
+            self.of(theta, ForceTerm::Damping),
+            self.of(theta, ForceTerm::Stiffness),
         );
         move |omega: f64| Complex64::new(k + more[0] - m * omega * omega, (c + more[1]) * omega)
     }
@@ -273,14 +273,14 @@ fn gmres(apply: impl Fn(&[f64]) -> Vec<f64>, right: &[f64]) -> Option<Vec<f64>> 
 ///
 /// # Errors
 /// See [`PeriodicError`].
-pub fn fit(periods: &[Period<'_>], rate_hz: f64, terms: &[Term]) -> Result<PeriodicFit, PeriodicError> {
+pub fn fit(periods: &[Period<'_>], rate_hz: f64, terms: &[ForceTerm]) -> Result<PeriodicFit, PeriodicError> {
     if let Some(term) = terms
         .iter()
-        .find(|term| matches!(term, Term::CoulombFriction | Term::Offset))
+        .find(|term| matches!(term, ForceTerm::CoulombFriction | ForceTerm::Offset))
     {
         return Err(PeriodicError::NotSmooth(term.key()));
     }
-    if [Term::Mass, Term::Damping, Term::Stiffness]
+    if [ForceTerm::Mass, ForceTerm::Damping, ForceTerm::Stiffness]
         .iter()
         .any(|term| !terms.contains(term))
     {

@@ -3,7 +3,7 @@
 use num_complex::Complex64;
 use rustfft::FftPlanner;
 
-use crate::nonlinear::restoring_force::Term;
+use crate::nonlinear::restoring_force::ForceTerm;
 
 /// Number of instants per sample at which the force is interpolated; a Runge–Kutta step uses two of them, so it must be even.
 const FINER: usize = 8;
@@ -29,10 +29,14 @@ pub enum ResponseError {
 ///
 /// # Errors
 /// No mass, or a motion without bound.
-pub fn displacement(law: &[(Term, f64)], force: &[f64], rate_hz: f64) -> Result<Vec<f64>, ResponseError> {
+pub fn displacement(
+    law: &[(ForceTerm, f64)],
+    force: &[f64],
+    rate_hz: f64,
+) -> Result<Vec<f64>, ResponseError> {
     let mass: f64 = law
         .iter()
-        .filter(|(term, _)| *term == Term::Mass)
+        .filter(|(term, _)| *term == ForceTerm::Mass)
         .map(|(_, m)| m)
         .sum();
     if mass == 0.0 || !mass.is_finite() {
@@ -43,7 +47,7 @@ pub fn displacement(law: &[(Term, f64)], force: &[f64], rate_hz: f64) -> Result<
     let acceleration = |x: f64, v: f64, f: f64| {
         let restoring: f64 = law
             .iter()
-            .filter(|(term, _)| *term != Term::Mass)
+            .filter(|(term, _)| *term != ForceTerm::Mass)
             .map(|(term, theta)| theta * term.value(x, v, 0.0))
             .sum();
         (f - restoring) / mass

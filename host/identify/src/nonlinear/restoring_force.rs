@@ -17,7 +17,7 @@ use quietcut_recording::Quantity;
 
 /// A term of a force law along one direction q.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Term {
+pub enum ForceTerm {
     /// m q̈.
     Mass,
     /// c q̇.
@@ -38,7 +38,7 @@ pub enum Term {
     Offset,
 }
 
-impl Term {
+impl ForceTerm {
     /// Key of the term in answers and cases.
     pub fn key(self) -> &'static str {
         match self {
@@ -93,7 +93,7 @@ pub struct Record<'a> {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Options {
     /// The terms of the law.
-    pub terms: Vec<Term>,
+    pub terms: Vec<ForceTerm>,
     /// The mass if it is given, kg. Required for a record without force.
     pub mass_kg: Option<f64>,
     /// Frequency band of the fit, Hz; `None` takes the band in which the motion exceeds its noise.
@@ -117,7 +117,7 @@ pub struct Motion {
 #[derive(Clone, Debug)]
 pub struct Surface {
     /// The fitted terms.
-    pub terms: Vec<Term>,
+    pub terms: Vec<ForceTerm>,
     /// Coefficients of the terms, SI.
     pub theta: DVector<f64>,
     /// Standard deviations of the coefficients, from the residual and its correlation in time.
@@ -203,11 +203,11 @@ impl Record<'_> {
             .zip(&motion.a)
             .map(|(f, a)| f - mass * a)
             .collect();
-        let terms: Vec<Term> = options
+        let terms: Vec<ForceTerm> = options
             .terms
             .iter()
             .copied()
-            .filter(|term| options.mass_kg.is_none() || *term != Term::Mass)
+            .filter(|term| options.mass_kg.is_none() || *term != ForceTerm::Mass)
             .collect();
         let range = self.kept(options.trim_s);
         let needed = SAMPLES_PER_TERM * terms.len();
@@ -248,7 +248,7 @@ impl Record<'_> {
         };
         let mut force_error = left.norm() / scale;
         // A free decay is a transient: a weight as narrow as the resonance would spread it over the ends of the record.
-        if driven && terms.contains(&Term::Stiffness) {
+        if driven && terms.contains(&ForceTerm::Stiffness) {
             for _ in 0..REWEIGHTINGS {
                 let receptance = receptance(&terms, &theta, mass);
                 let weighted = regress(&receptance)?;
@@ -260,7 +260,7 @@ impl Record<'_> {
         let deviations = deviations(&matrix, &left).ok_or(SurfaceError::Undetermined)?;
         let found_mass = terms
             .iter()
-            .position(|term| *term == Term::Mass)
+            .position(|term| *term == ForceTerm::Mass)
             .map_or(mass, |index| theta[index]);
         let kept = |samples: &[f64]| samples[range.clone()].to_vec();
         let motion = Motion {
@@ -286,12 +286,13 @@ impl Record<'_> {
 
     /// Relative residual force of a given law, ‖f − Σ θ·term‖/‖f‖ within `band_hz`: [`Surface::force_error`] of a law that was
     /// fitted elsewhere.
-    pub fn force_error(&self, law: &[(Term, f64)], band_hz: [f64; 2], trim_s: f64) -> f64 {
+    pub fn force_error(&self, law: &[(ForceTerm, f64)], band_hz: [f64; 2], trim_s: f64) -> f64 {
         let motion = self.motion([0.0, 0.5 * self.rate_hz]);
         let left: Vec<f64> = (0..self.motion.len())
             .map(|i| {
-                let of =
-                    |(term, theta): &(Term, f64)| theta * term.value(motion.x[i], motion.v[i], motion.a[i]);
+                let of = |(term, theta): &(ForceTerm, f64)| {
+                    theta * term.value(motion.x[i], motion.v[i], motion.a[i])
+                };
                 self.force[i] - law.iter().map(of).sum::<f64>()
             })
             .collect();
@@ -312,13 +313,13 @@ impl Record<'_> {
 }
 
 /// Magnitude of the receptance of the linear terms over frequency in Hz, relative to the static compliance.
-fn receptance(terms: &[Term], theta: &DVector<f64>, mass: f64) -> impl Fn(f64) -> f64 + use<> {
-    let of = |term: Term| {
+fn receptance(terms: &[ForceTerm], theta: &DVector<f64>, mass: f64) -> impl Fn(f64) -> f64 + use<> {
+    let of = |term: ForceTerm| {
         let place = terms.iter().position(|known| *known == term);
         place.map_or(0.0, |index| theta[index])
     };
-    let mass = if mass > 0.0 { mass } else { of(Term::Mass) };
-    let (damping, stiffness) = (of(Term::Damping), of(Term::Stiffness));
+    let mass = if mass > 0.0 { mass } else { of(ForceTerm::Mass) };
+    let (damping, stiffness) = (of(ForceTerm::Damping), of(ForceTerm::Stiffness));
     move |frequency: f64| {
         let omega = TAU * frequency;
         let stiff = stiffness - mass * omega * omega;
@@ -374,7 +375,7 @@ impl Surface {
     }
 
     /// The coefficient of a term; `None` if the law does not have it.
-    pub fn value(&self, term: Term) -> Option<f64> {
+    pub fn value(&self, term: ForceTerm) -> Option<f64> {
         self.terms
             .iter()
             .position(|known| *known == term)

@@ -24,7 +24,7 @@ pub struct Spectral {
 
 /// Continuation of a record beyond its ends.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Turn {
+enum Continuation {
     /// Point reflection about its ends, after the straight line through them is subtracted: value and slope are continuous.
     Points,
     /// Mirror reflection: the value is continuous. The integral of such a record does not drift.
@@ -55,12 +55,12 @@ impl Spectral {
         signed * self.rate_hz / self.period as f64
     }
 
-    /// The record filtered with the frequency response `filter`(f), f in Hz. [`Turn::Points`] subtracts a straight line first;
+    /// The record filtered with the frequency response `filter`(f), f in Hz. [`Continuation::Points`] subtracts a straight line first;
     /// `of_line` maps the value of that line at the middle of the record and its slope per second to those of the filtered line.
     fn through(
         &self,
         samples: &[f64],
-        turn: Turn,
+        turn: Continuation,
         filter: impl Fn(f64) -> Complex64,
         of_line: impl Fn(f64, f64) -> [f64; 2],
     ) -> Vec<f64> {
@@ -68,8 +68,8 @@ impl Spectral {
             return Vec::new();
         };
         let (sign, first, slope) = match turn {
-            Turn::Points => (-1.0, first, (last - first) / (self.length.max(2) - 1) as f64),
-            Turn::Mirror => (1.0, 0.0, 0.0),
+            Continuation::Points => (-1.0, first, (last - first) / (self.length.max(2) - 1) as f64),
+            Continuation::Mirror => (1.0, 0.0, 0.0),
         };
         let rest = |i: usize| samples[i] - first - slope * i as f64;
         let mut line: Vec<Complex64> = (0..self.length)
@@ -116,13 +116,13 @@ impl Spectral {
             }
         };
         let turn = if band_hz[0] > 0.0 {
-            Turn::Mirror
+            Continuation::Mirror
         } else {
-            Turn::Points
+            Continuation::Points
         };
         self.through(samples, turn, filter, |level, slope| match (turn, order) {
-            (Turn::Points, 0) => [level, slope],
-            (Turn::Points, 1) => [slope, 0.0],
+            (Continuation::Points, 0) => [level, slope],
+            (Continuation::Points, 1) => [slope, 0.0],
             _ => [0.0, 0.0],
         })
     }
@@ -132,7 +132,7 @@ impl Spectral {
         let still = weight(0.0);
         self.through(
             samples,
-            Turn::Points,
+            Continuation::Points,
             |frequency| Complex64::new(weight(frequency.abs()), 0.0),
             |level, slope| [still * level, still * slope],
         )
@@ -169,20 +169,20 @@ fn smooth_power(samples: &[f64], rate_hz: f64) -> (Vec<f64>, f64) {
     (smooth, width as f64 * rate_hz / length as f64)
 }
 
-fn loudest(smooth: &[f64]) -> usize {
-    let mut loudest = 0;
+fn strongest(smooth: &[f64]) -> usize {
+    let mut strongest = 0;
     for (index, power) in smooth.iter().enumerate() {
-        if *power > smooth[loudest] {
-            loudest = index;
+        if *power > smooth[strongest] {
+            strongest = index;
         }
     }
-    loudest
+    strongest
 }
 
 /// The frequency with the largest smoothed power, Hz, with a resolution of 1/400 of the sample rate.
 pub fn dominant_frequency_hz(samples: &[f64], rate_hz: f64) -> f64 {
     let (smooth, width_hz) = smooth_power(samples, rate_hz);
-    (loudest(&smooth) as f64 + 0.5) * width_hz
+    (strongest(&smooth) as f64 + 0.5) * width_hz
 }
 
 /// Frequency band in which a record exceeds its noise, Hz: the contiguous intervals around the dominant frequency whose smoothed
@@ -194,13 +194,17 @@ pub fn band_of(samples: &[f64], rate_hz: f64, margin: f64) -> [f64; 2] {
     let mut sorted = smooth.clone();
     sorted.sort_by(f64::total_cmp);
     let floor = sorted.get(sorted.len() / 20).copied().unwrap_or(0.0);
-    let loudest = loudest(&smooth);
+    let strongest = strongest(&smooth);
     let stands = |index: &usize| smooth[*index] > margin * floor;
-    let last = (loudest..smooth.len())
+    let last = (strongest..smooth.len())
         .take_while(stands)
         .last()
-        .unwrap_or(loudest);
-    let first = (0..=loudest).rev().take_while(stands).last().unwrap_or(loudest);
+        .unwrap_or(strongest);
+    let first = (0..=strongest)
+        .rev()
+        .take_while(stands)
+        .last()
+        .unwrap_or(strongest);
     [
         first as f64 * width_hz,
         ((last + 1) as f64 * width_hz).min(0.5 * rate_hz),

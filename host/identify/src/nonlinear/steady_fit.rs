@@ -8,12 +8,12 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::dwells::differentiation::{derivative, undo};
-use crate::dwells::dwell::{Dwell, Line};
+use crate::dwells::dwell::{Dwell, FourierSeries};
 pub use crate::least_squares::FitError;
 use crate::least_squares::{Normal, Spread, minimum, scaled_least_squares};
 use crate::nonlinear::harmonic_balance::{Grid, Problem, Solution};
 use crate::nonlinear::law::Law;
-use crate::nonlinear::whitening::Seen;
+use crate::nonlinear::whitening::OutputMap;
 use crate::student::NINETY_PERCENT;
 use quietcut_model::structure::Direction;
 
@@ -46,26 +46,26 @@ pub struct Data<'a> {
 }
 
 impl Data<'_> {
-    fn degree_of(&self, line: &Line) -> Option<usize> {
+    fn degree_of(&self, line: &FourierSeries) -> Option<usize> {
         self.directions
             .iter()
             .position(|direction| *direction == line.direction)
     }
 
-    /// Output matrix S of [`Seen`]: every degree of freedom is the displacement in one direction.
+    /// Output matrix S of [`OutputMap`]: every degree of freedom is the displacement in one direction.
     fn unit(&self) -> DMatrix<f64> {
         DMatrix::identity(self.law.dofs, self.law.dofs)
     }
 
-    fn seen<'b>(&'b self, shape: &'b DMatrix<f64>) -> Seen<'b> {
-        Seen {
+    fn output_map<'b>(&'b self, shape: &'b DMatrix<f64>) -> OutputMap<'b> {
+        OutputMap {
             directions: self.directions,
             shape,
         }
     }
 
     fn force(&self, dwell: &Dwell) -> DVector<f64> {
-        self.seen(&self.unit()).force(dwell, self.grid.width())
+        self.output_map(&self.unit()).force(dwell, self.grid.width())
     }
 
     /// Fourier coefficients of the measured displacement of every degree of freedom; `None` if one of them is not measured.
@@ -124,7 +124,7 @@ impl Data<'_> {
     /// Whitened residual of a dwell, and its derivative by θ; `None` if the law has no motion near the measured one.
     fn whitened(&self, dwell: &Dwell, theta: &DVector<f64>) -> Option<(DVector<f64>, DMatrix<f64>)> {
         let solution = self.solve(dwell, theta, &self.displacement(dwell)?)?;
-        self.seen(&self.unit())
+        self.output_map(&self.unit())
             .whitened(dwell, &solution, self.grid.width())
     }
 

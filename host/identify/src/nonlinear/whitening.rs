@@ -3,21 +3,21 @@
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 use crate::dwells::differentiation::derivative;
-use crate::dwells::dwell::{Dwell, Line};
+use crate::dwells::dwell::{Dwell, FourierSeries};
 use crate::nonlinear::harmonic_balance::Solution;
 use quietcut_model::structure::Direction;
 
 /// Measured directions u = S q and generalized forces Sᵀ F of a structure with the degrees of freedom q.
 #[derive(Clone, Copy)]
-pub(crate) struct Seen<'a> {
+pub(crate) struct OutputMap<'a> {
     /// The directions of the entries of u and F.
     pub(crate) directions: &'a [Direction],
     /// The matrix S: a row for each direction, a column for each degree of freedom.
     pub(crate) shape: &'a DMatrix<f64>,
 }
 
-impl Seen<'_> {
-    fn row(&self, line: &Line) -> Option<usize> {
+impl OutputMap<'_> {
+    fn row(&self, line: &FourierSeries) -> Option<usize> {
         self.directions
             .iter()
             .position(|direction| *direction == line.direction)
@@ -62,7 +62,7 @@ impl Seen<'_> {
         solution: &Solution,
         width: usize,
     ) -> Option<(DVector<f64>, DMatrix<f64>)> {
-        let lines: Vec<(&Line, usize)> = dwell
+        let lines: Vec<(&FourierSeries, usize)> = dwell
             .motions
             .iter()
             .filter_map(|line| Some((line, self.row(line)?)))

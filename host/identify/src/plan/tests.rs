@@ -299,7 +299,7 @@ fn check([inside, ratio]: [f64; 2], draws: u64) {
 }
 
 #[test]
-fn what_is_promised_of_a_few_machines_comes_true() {
+fn planned_intervals_cover_the_limits_of_a_few_machines() {
     let (plan, errors) = campaign(&[800.0, 1200.0, 1700.0], 0.12, 16);
     assert!(plan.reached && !plan.tests.is_empty());
     check(shares(&errors), 16);
@@ -308,7 +308,7 @@ fn what_is_promised_of_a_few_machines_comes_true() {
 /// Run with `cargo test --release -p quietcut-identify --lib plan -- --ignored --nocapture`.
 #[test]
 #[ignore = "takes minutes: 400 machines"]
-fn what_is_promised_of_many_machines_comes_true() {
+fn planned_intervals_cover_the_limits_of_many_machines() {
     let speeds: Vec<f64> = (0..8).map(|i| 800.0 + 150.0 * f64::from(i)).collect();
     let (_, errors) = campaign(&speeds, 0.12, 400);
     let found = shares(&errors);
@@ -367,7 +367,7 @@ fn no_set_of_up_to_three_tests_is_cheaper() {
 }
 
 #[test]
-fn what_belongs_to_a_mode_of_matrices_moves_that_mode_alone() {
+fn a_change_of_one_mode_of_matrices_leaves_the_other_modes() {
     for name in ["kuka-kr90-half", "staubli-tx200"] {
         let case = case(name);
         let prior = Prior {

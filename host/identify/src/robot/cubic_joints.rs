@@ -19,8 +19,8 @@ use crate::dwells::differentiation::derivative;
 use crate::dwells::dwell::Dwell;
 use crate::least_squares::{Normal, Spread, minimum, nearer};
 use crate::nonlinear::harmonic_balance::Problem;
-use crate::nonlinear::law::Extra;
-use crate::robot::cubic_model::{AXES, Model, Placed};
+use crate::nonlinear::law::NonlinearTerm;
+use crate::robot::cubic_model::{AXES, Model, PostureMatrices};
 use crate::robot::joints::{self, JointFitError, JointParameter, PostureFrf};
 use quietcut_frf::{Frf, FrfTable};
 use quietcut_model::structure::{Direction, Robot};
@@ -61,7 +61,7 @@ pub struct CubicJointFit {
 pub fn fit(
     start: &Robot,
     postures: &[PostureDwells],
-    terms: &[Extra],
+    terms: &[NonlinearTerm],
     payload: bool,
     harmonics: usize,
 ) -> Result<CubicJointFit, JointFitError> {
@@ -69,11 +69,11 @@ pub fn fit(
     let start = first_guess(start, postures, payload)?;
     let parameters = parameters(count, terms, payload);
     let model = Model::new(count, &parameters, terms, harmonics);
-    let placed: Vec<Placed> = postures
+    let placed: Vec<PostureMatrices> = postures
         .iter()
-        .map(|posture| Placed::new(&start.at(&posture.angles_rad), &parameters))
+        .map(|posture| PostureMatrices::new(&start.at(&posture.angles_rad), &parameters))
         .collect();
-    let all: Vec<(&Placed, &Dwell)> = placed
+    let all: Vec<(&PostureMatrices, &Dwell)> = placed
         .iter()
         .zip(postures)
         .flat_map(|(placed, posture)| posture.dwells.iter().map(move |dwell| (placed, dwell)))
@@ -144,9 +144,9 @@ pub fn fit(
 
 /// Normal equations summed over all dwells, always in the same order, so that the number of threads does not change the result.
 fn sums(
-    all: &[(&Placed, &Dwell)],
+    all: &[(&PostureMatrices, &Dwell)],
     parameters: usize,
-    of: impl Fn(&Placed, &Dwell) -> Option<(DVector<f64>, DMatrix<f64>)> + Sync,
+    of: impl Fn(&PostureMatrices, &Dwell) -> Option<(DVector<f64>, DMatrix<f64>)> + Sync,
 ) -> Normal {
     let found: Vec<_> = all.par_iter().map(|(placed, dwell)| of(placed, dwell)).collect();
     let mut normal = Normal::new(parameters);
@@ -156,13 +156,13 @@ fn sums(
     normal
 }
 
-fn parameters(joints: usize, terms: &[Extra], payload: bool) -> Vec<JointParameter> {
+fn parameters(joints: usize, terms: &[NonlinearTerm], payload: bool) -> Vec<JointParameter> {
     let mut parameters: Vec<JointParameter> = (0..joints).map(JointParameter::Stiffness).collect();
     parameters.extend((0..joints).map(JointParameter::Damping));
-    if terms.contains(&Extra::CubicStiffness) {
+    if terms.contains(&NonlinearTerm::CubicStiffness) {
         parameters.extend((0..joints).map(JointParameter::CubicStiffness));
     }
-    if terms.contains(&Extra::CubicDamping) {
+    if terms.contains(&NonlinearTerm::CubicDamping) {
         parameters.extend((0..joints).map(JointParameter::CubicDamping));
     }
     if payload {
@@ -250,14 +250,14 @@ impl CubicJointFit {
         force_n: Vector3<f64>,
     ) -> Option<(Vector3<Complex64>, Vector3<f64>)> {
         let robot = self.robot.at(angles_rad);
-        let placed = Placed::new(&robot, &self.parameters);
+        let placed = PostureMatrices::new(&robot, &self.parameters);
         let has = |of: fn(usize) -> JointParameter| self.parameters.contains(&of(0));
         let mut terms = Vec::new();
         if has(JointParameter::CubicStiffness) {
-            terms.push(Extra::CubicStiffness);
+            terms.push(NonlinearTerm::CubicStiffness);
         }
         if has(JointParameter::CubicDamping) {
-            terms.push(Extra::CubicDamping);
+            terms.push(NonlinearTerm::CubicDamping);
         }
         let model = Model::new(robot.joints.len(), &self.parameters, &terms, self.harmonics);
         let values = DVector::from_iterator(

@@ -5,10 +5,10 @@ use num_complex::Complex64;
 
 use crate::criteria::LINEARIZATION_ERROR;
 use crate::dwells::differentiation::derivative;
-use crate::dwells::dwell::{Dwell, Line};
+use crate::dwells::dwell::{Dwell, FourierSeries};
 use crate::nonlinear::harmonic_balance::{Grid, Problem, Solution};
-use crate::nonlinear::law::{Extra, Law, Role};
-use crate::nonlinear::whitening::Seen;
+use crate::nonlinear::law::{Law, NonlinearTerm, Role};
+use crate::nonlinear::whitening::OutputMap;
 use crate::robot::joint_parameter::JointParameter;
 use quietcut_model::structure::{Direction, Robot};
 
@@ -22,14 +22,14 @@ pub(super) struct Model<'a> {
 }
 
 /// A posture with the matrices that do not depend on the parameters.
-pub(super) struct Placed {
+pub(super) struct PostureMatrices {
     /// Jacobian of the tool center point: 3 rows (x, y, z), a column per joint.
     pub(super) jacobian: DMatrix<f64>,
     /// Mass matrix without the fitted payload, kg m², and mass matrix per kilogram of payload, m².
     pub(super) mass: [DMatrix<f64>; 2],
 }
 
-impl Placed {
+impl PostureMatrices {
     /// The matrices of `robot` at its posture; the payload counts as given unless it is among `parameters`.
     pub(super) fn new(robot: &Robot, parameters: &[JointParameter]) -> Self {
         let payload = robot.payload_jacobian();
@@ -44,8 +44,8 @@ impl Placed {
         }
     }
 
-    pub(super) fn seen(&self) -> Seen<'_> {
-        Seen {
+    pub(super) fn output_map(&self) -> OutputMap<'_> {
+        OutputMap {
             directions: &AXES,
             shape: &self.jacobian,
         }
@@ -58,7 +58,7 @@ fn dynamic(matrix: &Matrix3xX<f64>) -> DMatrix<f64> {
 
 /// For every motion channel: its axis, the fundamental of its displacement, m, and the standard deviation of that, m.
 pub(super) fn displacements(dwell: &Dwell) -> Vec<(usize, Complex64, f64)> {
-    let of = |line: &Line| {
+    let of = |line: &FourierSeries| {
         let order = i32::from(derivative(line.quantity));
         let factor = Complex64::new(0.0, dwell.omega).powi(order);
         let noise = (line.variance * dwell.gram_inverse[(1, 1)]).sqrt();
@@ -75,7 +75,7 @@ impl<'a> Model<'a> {
     pub(super) fn new(
         joints: usize,
         parameters: &'a [JointParameter],
-        terms: &[Extra],
+        terms: &[NonlinearTerm],
         harmonics: usize,
     ) -> Self {
         let mut law = Law::new(joints, terms);
@@ -92,7 +92,7 @@ impl<'a> Model<'a> {
     }
 
     /// Coefficients θ of the equation of motion at a posture, from the values of the joint parameters.
-    pub(super) fn theta(&self, placed: &Placed, values: &DVector<f64>) -> DVector<f64> {
+    pub(super) fn theta(&self, placed: &PostureMatrices, values: &DVector<f64>) -> DVector<f64> {
         let mut theta = self.chain(placed) * values;
         let mass = self.law.parameters.iter().zip(theta.iter_mut());
         for (parameter, theta) in mass {
@@ -104,7 +104,7 @@ impl<'a> Model<'a> {
     }
 
     /// Derivative of θ by the joint parameters; θ is linear in them.
-    pub(super) fn chain(&self, placed: &Placed) -> DMatrix<f64> {
+    pub(super) fn chain(&self, placed: &PostureMatrices) -> DMatrix<f64> {
         DMatrix::from_fn(
             self.law.parameters.len(),
             self.parameters.len(),
@@ -124,7 +124,7 @@ impl<'a> Model<'a> {
     /// Joint angles per unit force on the tool in x, y and z, without the cubic terms: Z⁻¹ Jᵀ, rad/N.
     pub(super) fn linear(
         &self,
-        placed: &Placed,
+        placed: &PostureMatrices,
         theta: &DVector<f64>,
         omega: f64,
     ) -> Option<DMatrix<Complex64>> {
@@ -162,7 +162,7 @@ impl<'a> Model<'a> {
     /// directions that were measured.
     pub(super) fn measured(
         &self,
-        placed: &Placed,
+        placed: &PostureMatrices,
         dwell: &Dwell,
         linear: &DMatrix<Complex64>,
     ) -> Option<DVector<Complex64>> {
@@ -179,8 +179,13 @@ impl<'a> Model<'a> {
     }
 
     /// Periodic motion under the measured force, found by Newton's method from the measured motion; `None` if there is none nearby.
-    pub(super) fn solve(&self, placed: &Placed, dwell: &Dwell, theta: &DVector<f64>) -> Option<Solution> {
-        let force = placed.seen().force(dwell, self.grid.width());
+    pub(super) fn solve(
+        &self,
+        placed: &PostureMatrices,
+        dwell: &Dwell,
+        theta: &DVector<f64>,
+    ) -> Option<Solution> {
+        let force = placed.output_map().force(dwell, self.grid.width());
         let linear = self.linear(placed, theta, dwell.omega)?;
         let problem = Problem {
             law: &self.law,
@@ -196,7 +201,7 @@ impl<'a> Model<'a> {
     /// That error is relative, so off-resonance lines weigh as much as peaks, and the fit converges from a distant start.
     pub(super) fn linearized(
         &self,
-        placed: &Placed,
+        placed: &PostureMatrices,
         dwell: &Dwell,
         values: &DVector<f64>,
     ) -> Option<(DVector<f64>, DMatrix<f64>)> {
@@ -254,16 +259,18 @@ impl<'a> Model<'a> {
 
     pub(super) fn whitened(
         &self,
-        placed: &Placed,
+        placed: &PostureMatrices,
         dwell: &Dwell,
         values: &DVector<f64>,
     ) -> Option<(DVector<f64>, DMatrix<f64>)> {
         let solution = self.solve(placed, dwell, &self.theta(placed, values))?;
-        let (residual, slope) = placed.seen().whitened(dwell, &solution, self.grid.width())?;
+        let (residual, slope) = placed
+            .output_map()
+            .whitened(dwell, &solution, self.grid.width())?;
         Some((residual, slope * self.chain(placed)))
     }
 
-    pub(super) fn relative_error(&self, all: &[(&Placed, &Dwell)], values: &DVector<f64>) -> f64 {
+    pub(super) fn relative_error(&self, all: &[(&PostureMatrices, &Dwell)], values: &DVector<f64>) -> f64 {
         let (mut left, mut whole) = (0.0, 0.0);
         for (placed, dwell) in all {
             let Some(solution) = self.solve(placed, dwell, &self.theta(placed, values)) else {
@@ -279,7 +286,7 @@ impl<'a> Model<'a> {
     }
 
     /// Fundamental of the motion of the tool, m, from the Fourier coefficients `x` of the joint angles.
-    pub(super) fn tool(&self, placed: &Placed, x: &DVector<f64>) -> Vector3<Complex64> {
+    pub(super) fn tool(&self, placed: &PostureMatrices, x: &DVector<f64>) -> Vector3<Complex64> {
         let width = self.grid.width();
         Vector3::from_fn(|axis, _| {
             placed

@@ -73,7 +73,7 @@ pub enum JointFitError {
 }
 
 /// A posture with the matrices that do not depend on the parameters.
-struct Placed<'a> {
+struct PostureMatrices<'a> {
     frf: &'a PostureFrf,
     jacobian: Matrix3xX<f64>,
     payload: Matrix3xX<f64>,
@@ -114,7 +114,7 @@ pub fn fit(start: &Robot, postures: &[PostureFrf], payload: bool) -> Result<Join
     if payload {
         parameters.push(JointParameter::Payload);
     }
-    let placed: Vec<Placed<'_>> = postures.iter().map(|frf| place(start, frf)).collect();
+    let placed: Vec<PostureMatrices<'_>> = postures.iter().map(|frf| place(start, frf)).collect();
     let mut robot = start.clone();
     first_guess(&mut robot, &placed);
     let mut normal = sums(&robot, &placed, &parameters);
@@ -186,11 +186,11 @@ impl JointFit {
     }
 }
 
-fn place<'a>(robot: &Robot, frf: &'a PostureFrf) -> Placed<'a> {
+fn place<'a>(robot: &Robot, frf: &'a PostureFrf) -> PostureMatrices<'a> {
     let robot = robot.at(&frf.angles_rad);
     let payload = robot.payload_jacobian();
     let carried = robot.joints.last().map_or(0.0, |joint| joint.mass_kg);
-    Placed {
+    PostureMatrices {
         jacobian: robot.jacobian(),
         mass: robot.mass() - payload.tr_mul(&payload) * carried,
         payload,
@@ -223,7 +223,7 @@ fn weights(receptance: &[Complex64], deviation: &[f64]) -> Vec<f64> {
 }
 
 /// Sets the stiffnesses of the first guess from nearly static receptances. Damping stays that of `robot`.
-fn first_guess(robot: &mut Robot, placed: &[Placed<'_>]) {
+fn first_guess(robot: &mut Robot, placed: &[PostureMatrices<'_>]) {
     let joints = robot.joints.len();
     let (mut rows, mut right) = (Vec::new(), Vec::new());
     for posture in placed {
@@ -358,7 +358,7 @@ impl Model {
     }
 }
 
-fn sums(robot: &Robot, placed: &[Placed<'_>], parameters: &[JointParameter]) -> Normal {
+fn sums(robot: &Robot, placed: &[PostureMatrices<'_>], parameters: &[JointParameter]) -> Normal {
     let of_postures: Vec<Normal> = placed
         .par_iter()
         .map(|posture| sums_of(robot, posture, parameters))
@@ -390,7 +390,7 @@ fn empty(size: usize) -> Normal {
     }
 }
 
-fn sums_of(robot: &Robot, posture: &Placed<'_>, parameters: &[JointParameter]) -> Normal {
+fn sums_of(robot: &Robot, posture: &PostureMatrices<'_>, parameters: &[JointParameter]) -> Normal {
     let table = &posture.frf.table;
     let mut normal = empty(parameters.len());
     let carried = robot.joints.last().map_or(0.0, |joint| joint.mass_kg);

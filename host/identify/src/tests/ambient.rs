@@ -198,7 +198,7 @@ fn coverage_of_output_only() {
 }
 
 #[test]
-fn what_the_record_cannot_tell_is_said() {
+fn short_and_noisy_records_are_refused_with_a_reason() {
     let short = Ambient::new(&recording(10.0, 1), BAND_HZ[1]).unwrap();
     let error = modes(&short, BAND_HZ).unwrap_err();
     assert!(matches!(error, AmbientError::TooShort { .. }), "{error}");

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use crate::dwells::dwell::{Dwell, dwell_segments, pool_variances};
 use crate::nonlinear::harmonic_balance::Grid;
-use crate::nonlinear::law::{Extra, Law, Role};
+use crate::nonlinear::law::{Law, NonlinearTerm, Role};
 use crate::nonlinear::steady_fit::Data;
 use quietcut_model::case::Case;
 use quietcut_model::structure::{Direction, Structure};
@@ -103,7 +103,7 @@ fn peaks(data: &Data<'_>, theta: &nalgebra::DVector<f64>, direction: usize) -> [
 }
 
 #[test]
-fn coupled_modes_predict_the_peaks_at_forces_that_they_have_not_seen() {
+fn coupled_modes_predict_peaks_at_untested_forces() {
     let tests: Vec<(Direction, f64)> = DIRECTIONS
         .iter()
         .flat_map(|direction| [4.0, 7.5, 10.0, 13.0, 16.0].map(|level| (*direction, level)))
@@ -114,7 +114,11 @@ fn coupled_modes_predict_the_peaks_at_forces_that_they_have_not_seen() {
         .collect();
     let coupled = Law::new(
         2,
-        &[Extra::CubicStiffness, Extra::CubicDamping, Extra::ModeCoupling],
+        &[
+            NonlinearTerm::CubicStiffness,
+            NonlinearTerm::CubicDamping,
+            NonlinearTerm::ModeCoupling,
+        ],
     );
     let grid = Grid::new(5, coupled.degree());
     let held_out = |level: f64| level == 7.5 || level == 13.0;
@@ -144,7 +148,7 @@ fn coupled_modes_predict_the_peaks_at_forces_that_they_have_not_seen() {
             "{role:?}: {found}"
         );
     }
-    let apart = Law::new(2, &[Extra::CubicStiffness, Extra::CubicDamping]);
+    let apart = Law::new(2, &[NonlinearTerm::CubicStiffness, NonlinearTerm::CubicDamping]);
     let without = data(&apart, &seen, &grid);
     let other = without.fit(without.first_guess().unwrap());
     for ((direction, level), recording) in tests.iter().zip(&recordings).filter(|(test, _)| held_out(test.1))

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use super::joints::{posture, tool_space, whole_jacobian};
 use crate::dwells::dwell::{Dwell, DwellSegment, dwell_segments, pool_variances};
-use crate::nonlinear::law::Extra;
+use crate::nonlinear::law::NonlinearTerm;
 use crate::robot::cubic_joints::{CubicJointFit, PostureDwells, fit};
 use crate::robot::joints::JointParameter;
 use crate::student::NINETY_PERCENT;
@@ -132,7 +132,7 @@ fn trained(seed: u64) -> (CubicJointFit, ChaCha8Rng) {
         joint.stiffness_nm_per_rad *= random.random_range(0.75..1.33);
         joint.damping_nms_per_rad *= random.random_range(0.5..2.0);
     }
-    let terms = [Extra::CubicStiffness, Extra::CubicDamping];
+    let terms = [NonlinearTerm::CubicStiffness, NonlinearTerm::CubicDamping];
     (fit(&guess, &tests, &terms, false, HARMONICS).unwrap(), random)
 }
 
@@ -156,7 +156,7 @@ fn judged(fit: &CubicJointFit, seed: u64) -> [usize; 2] {
 }
 
 #[test]
-fn cubic_joints_come_back_and_tell_peaks_at_unseen_postures() {
+fn cubic_joints_are_identified_and_predict_peaks_at_other_postures() {
     let seed = 4;
     let (fit, mut random) = trained(seed);
     println!(
@@ -246,7 +246,7 @@ fn one_posture_and_one_level_give_wide_intervals_and_no_wrong_numbers() {
     let few = fit(
         &robot(),
         &[tests],
-        &[Extra::CubicStiffness, Extra::CubicDamping],
+        &[NonlinearTerm::CubicStiffness, NonlinearTerm::CubicDamping],
         false,
         HARMONICS,
     )

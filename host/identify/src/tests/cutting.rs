@@ -87,7 +87,7 @@ fn truth() -> [f64; 6] {
 }
 
 #[test]
-fn coefficients_and_runout_come_back_from_virtual_cuts() {
+fn coefficients_and_runout_are_identified_from_virtual_cuts() {
     let tests: Vec<CuttingTest> = [0.06, 0.12]
         .map(|feed| CuttingTest::new(&record(feed, Entry::Feed, 3.0), SETUP).unwrap())
         .into();
@@ -107,7 +107,7 @@ fn coefficients_and_runout_come_back_from_virtual_cuts() {
 }
 
 #[test]
-fn mean_forces_of_a_tool_that_runs_true_give_the_same() {
+fn mean_forces_without_runout_give_the_same_coefficients() {
     let tests: Vec<CuttingTest> = [0.06, 0.12]
         .map(|feed_mm| {
             let mut case = case(feed_mm);
@@ -126,7 +126,7 @@ fn mean_forces_of_a_tool_that_runs_true_give_the_same() {
 }
 
 #[test]
-fn without_the_displacement_the_vibration_is_missed_and_with_it_it_is_not() {
+fn vibration_biases_the_coefficients_unless_displacement_is_measured() {
     let with: Vec<Recording> = [0.06, 0.12].map(|feed| record(feed, Entry::None, 0.6)).into();
     let without = with.iter().map(|recording| {
         let mut recording = recording.clone();
@@ -145,7 +145,7 @@ fn without_the_displacement_the_vibration_is_missed_and_with_it_it_is_not() {
 }
 
 #[test]
-fn what_the_tests_cannot_tell_is_refused() {
+fn tests_that_do_not_determine_the_coefficients_are_refused() {
     let recording = record(0.1, Entry::None, 0.4);
     let mut planar = recording.clone();
     planar.channels.retain(|channel| channel.name != "fz");

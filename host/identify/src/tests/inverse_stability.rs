@@ -8,14 +8,14 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 
-use crate::cutting::inverse_stability::{Before, Errors, InverseMode, modes};
+use crate::cutting::inverse_stability::{CutErrors, InverseMode, PriorFactors, modes};
 use crate::cutting::observed_cut::ObservedCut;
 use quietcut_model::case::Case;
 use quietcut_numerics::statistics::binomial_interval;
 use quietcut_stability::{CubicTerms, Method, Pitched, Problem, Sdm, SdmOrder, SemiDiscretization};
 use quietcut_testkit::results::Campaign;
 
-const ERRORS: Errors = Errors {
+const ERRORS: CutErrors = CutErrors {
     depth: 0.02,
     frequency: 0.003,
 };
@@ -36,11 +36,11 @@ const GUESS: (f64, f64, f64) = (900.0, 0.02, 1.5e6);
 
 /// True frequency, damping ratio and stiffness, drawn by a seed within the prior.
 fn truth(random: &mut ChaCha8Rng) -> (f64, f64, f64) {
-    let Before {
+    let PriorFactors {
         frequency,
         damping,
         stiffness,
-    } = Before::default();
+    } = PriorFactors::default();
     let mut around = |value: f64, factor: f64| value * factor.powf(random.random_range(-0.9..0.9));
     (
         around(GUESS.0, frequency),
@@ -92,9 +92,9 @@ fn cuts(
     cuts
 }
 
-fn told(cuts: &[ObservedCut], seed: u64) -> InverseMode {
+fn posteriors(cuts: &[ObservedCut], seed: u64) -> InverseMode {
     let start = Problem::new(&case(GUESS.0, GUESS.1, GUESS.2), CubicTerms::Refuse).unwrap();
-    modes(&start, cuts, ERRORS, Before::default(), seed).unwrap()[0]
+    modes(&start, cuts, ERRORS, PriorFactors::default(), seed).unwrap()[0]
 }
 
 const SPEEDS: [f64; 5] = [9000.0, 11_000.0, 13_500.0, 17_000.0, 22_000.0];
@@ -104,7 +104,7 @@ fn coverage(speeds: &[f64], seeds: u64) -> [(f64, f64); 3] {
     let of_seed = |seed: u64| {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let truth = truth(&mut random);
-        let mode = told(&cuts(truth, speeds, &mut random), seed);
+        let mode = posteriors(&cuts(truth, speeds, &mut random), seed);
         [
             (truth.0, mode.frequency_hz),
             (truth.1, mode.damping_ratio),
@@ -117,8 +117,8 @@ fn coverage(speeds: &[f64], seeds: u64) -> [(f64, f64); 3] {
     };
     let all: Vec<[(bool, f64); 3]> = (0..seeds).into_par_iter().map(of_seed).collect();
     std::array::from_fn(|index| {
-        let held = all.iter().filter(|told| told[index].0).count() as f64;
-        let width: f64 = all.iter().map(|told| told[index].1).sum();
+        let held = all.iter().filter(|posterior| posterior[index].0).count() as f64;
+        let width: f64 = all.iter().map(|posterior| posterior[index].1).sum();
         (held / seeds as f64, width / seeds as f64)
     })
 }
@@ -143,11 +143,11 @@ fn measured(speeds: &[f64], seeds: u64) -> ([(f64, f64); 3], f64) {
 }
 
 #[test]
-fn a_few_cuts_tell_the_mode_and_one_does_not() {
+fn a_few_cuts_identify_the_mode_and_one_does_not() {
     let mut random = ChaCha8Rng::seed_from_u64(7);
     let truth = (922.0, 0.011, 1.34e6);
     let all = cuts(truth, &SPEEDS, &mut random);
-    let mode = told(&all, 7);
+    let mode = posteriors(&all, 7);
     for (truth, spread) in [
         (truth.0, mode.frequency_hz),
         (truth.1, mode.damping_ratio),
@@ -166,7 +166,7 @@ fn a_few_cuts_tell_the_mode_and_one_does_not() {
         "{mode:?}"
     );
     // One stable cut carries little information, and the answer reports vague parameters.
-    let one = told(&all[..1], 7);
+    let one = posteriors(&all[..1], 7);
     assert!(
         one.damping_ratio.is_vague() && one.stiffness_n_per_m.is_vague(),
         "{one:?}"

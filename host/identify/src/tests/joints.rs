@@ -334,7 +334,7 @@ fn coverage_of_joints() {
 }
 
 #[test]
-fn joint_angles_and_the_directions_of_the_tool_are_one_robot() {
+fn joint_space_and_tool_space_give_the_same_receptances() {
     let mut random = ChaCha8Rng::seed_from_u64(5);
     for _ in 0..5 {
         let robot = robot().at(&posture(&mut random));

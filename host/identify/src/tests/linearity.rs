@@ -8,7 +8,7 @@ use crate::dwells::dwell::{Dwell, dwell_segments, pool_variances};
 use crate::dwells::steady::windows;
 use crate::nonlinear::describing::Nonlinearity;
 use crate::nonlinear::homogeneity::regions;
-use crate::nonlinear::linearity::{Verdict, judge};
+use crate::nonlinear::linearity::{self, Verdict};
 use quietcut_model::structure::{Direction, Form, Structure};
 use quietcut_recording::{Quantity, Recording};
 use quietcut_simulate::Effects;
@@ -64,11 +64,11 @@ fn verdict(recordings: &[Recording], seed: u64) -> Verdict {
         pool_variances(&mut of_level);
         dwells.extend(of_level);
     }
-    judge(&dwells).unwrap()
+    linearity::verdict(&dwells).unwrap()
 }
 
 #[test]
-fn linear_rigs_are_called_linear_98_times_in_a_hundred() {
+fn linear_rigs_are_recognized_98_times_in_a_hundred() {
     let one = steps(&linear(), &[], Direction::Y, 17.45);
     // Three complex modes without a mass matrix: the thesis's robot in process.
     let three = steps(
@@ -88,7 +88,7 @@ fn linear_rigs_are_called_linear_98_times_in_a_hundred() {
 }
 
 #[test]
-fn nonlinear_rigs_are_called_by_their_kind() {
+fn nonlinear_rigs_are_recognized_by_their_kind() {
     let rigs: [(&[&str], &[Nonlinearity]); 8] = [
         (&["cubic-stiffness=-3e12"], &[Nonlinearity::CubicStiffness]),
         (&["cubic-stiffness=3e12"], &[Nonlinearity::CubicStiffness]),

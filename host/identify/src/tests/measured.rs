@@ -2,7 +2,7 @@
 
 use crate::nonlinear::periodic_fit::{self, Period};
 use crate::nonlinear::response;
-use crate::nonlinear::restoring_force::{Options, Record, Surface, Term};
+use crate::nonlinear::restoring_force::{ForceTerm, Options, Record, Surface};
 use quietcut_recording::Quantity;
 use quietcut_testkit::measured;
 
@@ -29,7 +29,7 @@ fn silverbox() -> [Vec<f64>; 2] {
 const RATE_HZ: f64 = 610.35;
 
 /// RMS prediction error on the arrow signal, V, and the ratio k3/k1 of a law.
-fn judge_silverbox(surface: &[(Term, f64)], [u, y]: &[Vec<f64>; 2], what: &str) -> (f64, f64) {
+fn judge_silverbox(surface: &[(ForceTerm, f64)], [u, y]: &[Vec<f64>; 2], what: &str) -> (f64, f64) {
     let arrow = 40_585;
     let predicted = response::displacement(surface, &u[..arrow], RATE_HZ).unwrap();
     let sum: f64 = predicted.iter().zip(y).map(|(a, b)| (a - b) * (a - b)).sum();
@@ -40,7 +40,7 @@ fn judge_silverbox(surface: &[(Term, f64)], [u, y]: &[Vec<f64>; 2], what: &str) 
             .find(|(term, _)| *term == wanted)
             .map_or(0.0, |(_, value)| *value)
     };
-    let ratio = of(Term::CubicStiffness) / of(Term::Stiffness);
+    let ratio = of(ForceTerm::CubicStiffness) / of(ForceTerm::Stiffness);
     println!(
         "{what}: {:.3} mV on the arrow, k3/k1 = {ratio:.4} 1/V²",
         1e3 * rmse
@@ -48,7 +48,7 @@ fn judge_silverbox(surface: &[(Term, f64)], [u, y]: &[Vec<f64>; 2], what: &str) 
     (rmse, ratio)
 }
 
-fn law_of(surface: &Surface) -> Vec<(Term, f64)> {
+fn law_of(surface: &Surface) -> Vec<(ForceTerm, f64)> {
     surface
         .terms
         .iter()
@@ -69,7 +69,12 @@ fn silverbox_by_its_restoring_force() {
         rate_hz: RATE_HZ,
     }
     .surface(&Options {
-        terms: vec![Term::Mass, Term::Damping, Term::Stiffness, Term::CubicStiffness],
+        terms: vec![
+            ForceTerm::Mass,
+            ForceTerm::Damping,
+            ForceTerm::Stiffness,
+            ForceTerm::CubicStiffness,
+        ],
         mass_kg: None,
         band_hz: None,
         trim_s: 1.0,
@@ -85,7 +90,7 @@ fn silverbox_by_its_restoring_force() {
     // The linear law has a fifteen times larger prediction error.
     let linear: Vec<_> = law_of(&surface)
         .into_iter()
-        .filter(|(term, _)| *term != Term::CubicStiffness)
+        .filter(|(term, _)| *term != ForceTerm::CubicStiffness)
         .collect();
     assert!(judge_silverbox(&linear, &data, "linear").0 > 10e-3);
 }
@@ -102,7 +107,12 @@ fn silverbox_by_harmonic_balance() {
             displacement: &data[1][end - 8192..*end],
         })
         .collect();
-    let terms = [Term::Mass, Term::Damping, Term::Stiffness, Term::CubicStiffness];
+    let terms = [
+        ForceTerm::Mass,
+        ForceTerm::Damping,
+        ForceTerm::Stiffness,
+        ForceTerm::CubicStiffness,
+    ];
     let fit = periodic_fit::fit(&periods, RATE_HZ, &terms).unwrap();
     for ((term, value), deviation) in fit.law.iter().zip(&fit.deviations) {
         println!("{} = {value:.6e} ± {deviation:.1e}", term.key());
@@ -131,7 +141,12 @@ fn the_positioning_stage_has_its_published_friction() {
         rate_hz: 1000.0,
     }
     .surface(&Options {
-        terms: vec![Term::Mass, Term::Damping, Term::CoulombFriction, Term::Offset],
+        terms: vec![
+            ForceTerm::Mass,
+            ForceTerm::Damping,
+            ForceTerm::CoulombFriction,
+            ForceTerm::Offset,
+        ],
         mass_kg: None,
         band_hz: None,
         trim_s: 0.1,
@@ -142,9 +157,9 @@ fn the_positioning_stage_has_its_published_friction() {
         surface.band_hz, surface.force_error
     );
     let published = [
-        (Term::Mass, 95.109),
-        (Term::Damping, 203.50),
-        (Term::CoulombFriction, 20.394),
+        (ForceTerm::Mass, 95.109),
+        (ForceTerm::Damping, 203.50),
+        (ForceTerm::CoulombFriction, 20.394),
     ];
     for (term, truth) in published {
         let found = surface.value(term).unwrap();

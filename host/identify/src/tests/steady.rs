@@ -8,14 +8,14 @@ use rayon::prelude::*;
 
 use crate::dwells::dwell::{Dwell, DwellSegment, dwell_segments, pool_variances};
 use crate::nonlinear::harmonic_balance::Grid;
-use crate::nonlinear::law::{Extra, Law, Role};
+use crate::nonlinear::law::{Law, NonlinearTerm, Role};
 use crate::nonlinear::steady_fit::{Data, Fit};
 use quietcut_model::structure::{Form, Structure};
 use quietcut_recording::{Quantity, Recording};
 use quietcut_simulate::rig::{Noise, Rig, Signal};
 use quietcut_testkit::case;
 
-const EXTRAS: [Extra; 2] = [Extra::CubicStiffness, Extra::CubicDamping];
+const EXTRAS: [NonlinearTerm; 2] = [NonlinearTerm::CubicStiffness, NonlinearTerm::CubicDamping];
 
 /// Frequencies, within ±4 % of the natural frequency, and force levels of the test of a mode, as in the thesis.
 pub(crate) fn test_plan(name: &str) -> (Vec<f64>, Vec<f64>) {
@@ -190,7 +190,7 @@ fn judge(seeds: std::ops::Range<u64>) -> (f64, f64, BTreeMap<String, f64>) {
 /// Every parameter lies within 2 % of the truth, and its intervals have the stated coverage, with the force levels of the thesis
 /// and 1 % noise per sample.
 #[test]
-fn modes_come_back_within_two_percent() {
+fn modes_are_identified_within_two_percent() {
     let (worst, pooled, _) = judge(0..12);
     assert!(worst < 0.02, "{worst}");
     // 60 fits of 5 correlated parameters: the standard deviation of the share is about 3 %; three standard deviations are allowed.

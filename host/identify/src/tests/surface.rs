@@ -2,18 +2,18 @@
 
 use std::path::Path;
 
-use crate::nonlinear::restoring_force::{Options, Record, Surface, Term};
+use crate::nonlinear::restoring_force::{ForceTerm, Options, Record, Surface};
 use quietcut_model::structure::Direction;
 use quietcut_recording::{Quantity, Recording};
 use quietcut_simulate::rig::{Noise, Rig, Signal};
 use quietcut_testkit::case;
 
-const TERMS: [Term; 5] = [
-    Term::Mass,
-    Term::Damping,
-    Term::Stiffness,
-    Term::CubicStiffness,
-    Term::CubicDamping,
+const TERMS: [ForceTerm; 5] = [
+    ForceTerm::Mass,
+    ForceTerm::Damping,
+    ForceTerm::Stiffness,
+    ForceTerm::CubicStiffness,
+    ForceTerm::CubicDamping,
 ];
 /// True m, c, k, k3, c3 of the mode at 17.5 Hz, the set for lower forces.
 const TRUTH: [f64; 5] = [188.0, 305.0, 2.26e6, -5.05e12, 2.53e6];
@@ -106,7 +106,7 @@ fn slices_show_the_cubic_spring_and_damper() {
 }
 
 #[test]
-fn a_free_record_with_known_mass_gives_the_law() {
+fn a_free_decay_with_given_mass_gives_the_law() {
     let release = Signal::Release {
         force_n: 220.0,
         pull_s: 2.0,

@@ -6,11 +6,11 @@ use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 
 use super::steady::{step_sine, test_plan, truth};
-use crate::dwells::dwell::{Dwell, Line};
+use crate::dwells::dwell::{Dwell, FourierSeries};
 use crate::dwells::steady::{Settling, steady};
 use crate::nonlinear::harmonic_balance::{Grid, Problem};
 use crate::nonlinear::hfrf;
-use crate::nonlinear::law::{Extra, Law, Role};
+use crate::nonlinear::law::{Law, NonlinearTerm, Role};
 use crate::nonlinear::ncma::{Curve, Map};
 use crate::nonlinear::steady_fit::Data;
 use quietcut_model::structure::Direction;
@@ -42,7 +42,7 @@ fn exact(
                 force: &force,
             };
             x = grid.solve(problem, &x).unwrap().x;
-            let line = |quantity, coefficients: &DVector<f64>| Line {
+            let line = |quantity, coefficients: &DVector<f64>| FourierSeries {
                 direction: structure.directions[0],
                 quantity,
                 coefficients: coefficients.clone(),
@@ -62,7 +62,7 @@ fn exact(
 }
 
 fn law() -> Law {
-    Law::new(1, &[Extra::CubicStiffness, Extra::CubicDamping])
+    Law::new(1, &[NonlinearTerm::CubicStiffness, NonlinearTerm::CubicDamping])
 }
 
 /// Frequencies of thesis section 5.2.3: 16.6 to 17.9 Hz in steps of 0.05 Hz.

@@ -7,7 +7,7 @@ use clap::ValueEnum;
 use super::mode_options::ModeOptions;
 use crate::cli::segment::RecordedSegment;
 use crate::cli::{Error, Output, finite, non_negative, positive};
-use crate::identify::law::Extra;
+use crate::identify::law::NonlinearTerm;
 
 /// Identifies structural or cutting parameters with 90 % intervals from recordings, and reports the misfit.
 #[derive(Debug, clap::Args)]
@@ -33,7 +33,7 @@ pub struct Args {
         value_delimiter = ',',
         default_value = "cubic-stiffness,cubic-damping"
     )]
-    pub(super) terms: Vec<Extra>,
+    pub(super) terms: Vec<NonlinearTerm>,
     /// Number of harmonics of the response in the harmonic balance and in the fit.
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u8).range(1..=40))]
     pub(super) harmonics: u8,

@@ -9,7 +9,7 @@ use super::methods::settling;
 use super::records::along;
 use crate::identify::dwell::Dwell;
 use crate::identify::homogeneity::regions;
-use crate::identify::linearity::judge;
+use crate::identify::linearity::verdict;
 use crate::identify::reciprocity;
 use crate::identify::steady::{steady, windows};
 use crate::identify::sweep::{Spectra, compare};
@@ -51,7 +51,7 @@ pub(super) fn linearity(args: &Args, recordings: &[Recording]) -> Result<Identif
         if tones.is_empty() {
             continue;
         }
-        match judge(&tones) {
+        match verdict(&tones) {
             Ok(verdict) => {
                 let points: Vec<(f64, f64)> = rising.iter().filter(driven).filter_map(response).collect();
                 let (regions, jumps_n) = if points.is_empty() {

@@ -15,7 +15,7 @@ use crate::identify::case_file;
 use crate::identify::cubic_joints::{self, PostureDwells};
 use crate::identify::dwell::Dwell;
 use crate::identify::joints::{self, JointParameter, PostureFrf};
-use crate::identify::law::Extra;
+use crate::identify::law::NonlinearTerm;
 use crate::identify::steady::{Settling, steady};
 use crate::identify::student::NINETY_PERCENT;
 use crate::recording::{Recording, TestKind};
@@ -124,7 +124,7 @@ fn by_tones(
     if let Some(other) = args
         .terms
         .iter()
-        .find(|term| !matches!(term, Extra::CubicStiffness | Extra::CubicDamping))
+        .find(|term| !matches!(term, NonlinearTerm::CubicStiffness | NonlinearTerm::CubicDamping))
     {
         let name = other.to_possible_value();
         return Err(Error::input(format!(

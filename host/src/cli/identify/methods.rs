@@ -12,7 +12,7 @@ use crate::identify::case_file::Estimate;
 use crate::identify::dwell::Dwell;
 use crate::identify::harmonic_balance::Grid;
 use crate::identify::hfrf as higher_order;
-use crate::identify::law::{Extra, Law, Role};
+use crate::identify::law::{Law, NonlinearTerm, Role};
 use crate::identify::ncma::{Curve, Map};
 use crate::identify::steady::{Settling, slowest_decay, steady};
 use crate::identify::steady_fit::{Data, Fit, FitError};
@@ -79,7 +79,7 @@ pub(super) fn settling(args: &Args) -> Settling {
     args.settle_s.map_or(Settling::Half, Settling::Seconds)
 }
 
-fn fit_steady(args: &Args, recordings: &[Recording], extras: &[Extra]) -> Result<SteadyFit, Error> {
+fn fit_steady(args: &Args, recordings: &[Recording], extras: &[NonlinearTerm]) -> Result<SteadyFit, Error> {
     let harmonics = usize::from(args.harmonics);
     let first = steady(recordings, harmonics, settling(args));
     let directions = directions(&first.dwells);
@@ -146,7 +146,11 @@ fn estimates(law: &Law, directions: &[Direction], theta: &DVector<f64>, deviatio
 }
 
 pub(super) fn hfrf(args: &Args, recordings: &[Recording]) -> Result<IdentifyOutput, Error> {
-    let found = fit_steady(args, recordings, &[Extra::CubicStiffness, Extra::CubicDamping])?;
+    let found = fit_steady(
+        args,
+        recordings,
+        &[NonlinearTerm::CubicStiffness, NonlinearTerm::CubicDamping],
+    )?;
     let [direction] = found.directions[..] else {
         return Err(Error::input(
             "higher-order FRFs hold for one direction at a time (eq. 5.5); give recordings of one direction",

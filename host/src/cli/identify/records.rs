@@ -4,9 +4,9 @@ use super::Error;
 use super::answer::{Figure, IdentifyOutput, Slices};
 use super::args::{Args, SurfaceTerm, band};
 use crate::identify::case_file::Estimate;
-use crate::identify::law::Extra;
+use crate::identify::law::NonlinearTerm;
 use crate::identify::periodic_fit::{self, Period};
-use crate::identify::restoring_force::{Options, Record, Slice, Surface, Term};
+use crate::identify::restoring_force::{ForceTerm, Options, Record, Slice, Surface};
 use crate::recording::{Quantity, Recording};
 use crate::structure::Direction;
 
@@ -51,14 +51,16 @@ pub(super) fn multisine(
             "the recordings of a multisine must have one direction and one sample rate",
         ));
     }
-    let mut terms = vec![Term::Mass, Term::Damping, Term::Stiffness];
+    let mut terms = vec![ForceTerm::Mass, ForceTerm::Damping, ForceTerm::Stiffness];
     for extra in &args.terms {
         match extra {
-            Extra::QuadraticStiffness => terms.push(Term::QuadraticStiffness),
-            Extra::CubicStiffness => terms.push(Term::CubicStiffness),
-            Extra::SofteningHardening => terms.extend([Term::CubicStiffness, Term::QuinticStiffness]),
-            Extra::CubicDamping => terms.push(Term::CubicDamping),
-            Extra::ModeCoupling => {
+            NonlinearTerm::QuadraticStiffness => terms.push(ForceTerm::QuadraticStiffness),
+            NonlinearTerm::CubicStiffness => terms.push(ForceTerm::CubicStiffness),
+            NonlinearTerm::SofteningHardening => {
+                terms.extend([ForceTerm::CubicStiffness, ForceTerm::QuinticStiffness])
+            }
+            NonlinearTerm::CubicDamping => terms.push(ForceTerm::CubicDamping),
+            NonlinearTerm::ModeCoupling => {
                 return Err(Error::input(
                     "--terms mode-coupling: a multisine test has one direction",
                 ));
@@ -141,7 +143,7 @@ pub(super) fn restoring_force(args: &Args, recordings: &[Recording]) -> Result<I
         .collect();
     if let Some(mass) = args.mass_kg {
         estimates.push(Estimate {
-            key: Term::Mass.key(),
+            key: ForceTerm::Mass.key(),
             directions: vec![direction],
             value: mass,
             deviation: 0.0,
@@ -168,13 +170,13 @@ fn slices(surface: &Surface, share: f64) -> Option<Slices> {
     Some(Slices {
         stiffness: figures(
             &surface.stiffness_slice(share)?,
-            Term::Stiffness.key(),
-            Term::CubicStiffness.key(),
+            ForceTerm::Stiffness.key(),
+            ForceTerm::CubicStiffness.key(),
         ),
         damping: figures(
             &surface.damping_slice(share)?,
-            Term::Damping.key(),
-            Term::CubicDamping.key(),
+            ForceTerm::Damping.key(),
+            ForceTerm::CubicDamping.key(),
         ),
     })
 }
@@ -221,17 +223,17 @@ pub(super) fn along(recording: &Recording) -> Result<Along<'_>, Error> {
 }
 
 impl SurfaceTerm {
-    fn term(self) -> Term {
+    fn term(self) -> ForceTerm {
         match self {
-            Self::Mass => Term::Mass,
-            Self::Damping => Term::Damping,
-            Self::Stiffness => Term::Stiffness,
-            Self::QuadraticStiffness => Term::QuadraticStiffness,
-            Self::CubicStiffness => Term::CubicStiffness,
-            Self::QuinticStiffness => Term::QuinticStiffness,
-            Self::CubicDamping => Term::CubicDamping,
-            Self::CoulombFriction => Term::CoulombFriction,
-            Self::Offset => Term::Offset,
+            Self::Mass => ForceTerm::Mass,
+            Self::Damping => ForceTerm::Damping,
+            Self::Stiffness => ForceTerm::Stiffness,
+            Self::QuadraticStiffness => ForceTerm::QuadraticStiffness,
+            Self::CubicStiffness => ForceTerm::CubicStiffness,
+            Self::QuinticStiffness => ForceTerm::QuinticStiffness,
+            Self::CubicDamping => ForceTerm::CubicDamping,
+            Self::CoulombFriction => ForceTerm::CoulombFriction,
+            Self::Offset => ForceTerm::Offset,
         }
     }
 }

@@ -5,7 +5,9 @@ use super::answer::{EstimatedMode, Figure, IdentifyOutput};
 use super::args::Args;
 use crate::case::Case;
 use crate::identify::ambient::Ambient;
-use crate::identify::inverse_stability::{Before, Errors, InverseMode, Spread, identified_modes, modes};
+use crate::identify::inverse_stability::{
+    CutErrors, InverseMode, Posterior, PriorFactors, identified_modes, modes,
+};
 use crate::identify::observed_cut::ObservedCut;
 use crate::identify::{case_file, subspace};
 use crate::recording::{Recording, TestKind, cut_table};
@@ -116,19 +118,19 @@ pub(super) fn inverse_stability(args: &Args) -> Result<IdentifyOutput, Error> {
     };
     let case = Case::read(start)?;
     let problem = Problem::new(&case, CubicTerms::Refuse)?;
-    let errors = Errors {
+    let errors = CutErrors {
         depth: 0.01 * args.depth_error_percent,
         frequency: 0.01 * args.chatter_error_percent,
     };
-    let before = Before::default();
-    let found = modes(&problem, &cuts, errors, before, args.seed)
+    let prior = PriorFactors::default();
+    let found = modes(&problem, &cuts, errors, prior, args.seed)
         .map_err(|error| Error::input(format!("{}: {error}", path.display())))?;
     let of_modes: Vec<EstimatedMode> = found.iter().map(of_mode).collect();
     let mut lines = vec![format!(
         "{} cuts; prior range: frequencies within a factor of {}, damping ratios and stiffnesses within a factor of {} of the initial structure",
         cuts.len(),
-        before.frequency,
-        before.damping
+        prior.frequency,
+        prior.damping
     )];
     lines.extend(said(&of_modes));
     let machine = case
@@ -158,7 +160,7 @@ pub(super) fn inverse_stability(args: &Args) -> Result<IdentifyOutput, Error> {
 }
 
 fn of_mode(mode: &InverseMode) -> EstimatedMode {
-    let figure = |spread: &Spread| Figure {
+    let figure = |spread: &Posterior| Figure {
         value: spread.value,
         ci90: spread.ci90,
     };

@@ -7,7 +7,7 @@ use super::variances::{ChannelNoise, Variances};
 use crate::criteria::{LEAST_RECORD_LINES, MOST_RECORD_LINES};
 use crate::modes::error::ModesError;
 use crate::modes::model::ModalModel;
-use crate::modes::pole_residue::{PoleResidue, Shaped};
+use crate::modes::pole_residue::{PoleResidue, ShapedPole};
 use quietcut_frf::{ChannelLines, RecordSpectra};
 use quietcut_model::structure::Direction;
 
@@ -73,7 +73,7 @@ impl<'a> Data<'a> {
     }
 
     pub(super) fn start(&self, model: &ModalModel) -> Unknowns {
-        let modes = model.modes.iter().map(|found| Shaped {
+        let modes = model.modes.iter().map(|found| ShapedPole {
             pole: found.mode.pole(),
             right: found.mode.right.clone(),
             left: found.mode.left.clone(),

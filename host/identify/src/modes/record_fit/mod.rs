@@ -71,7 +71,7 @@ pub fn refine_by_records(
         unknowns = least_squares(&data, &variances, unknowns).ok_or_else(broke)?;
         let mut change = 0.0_f64;
         for (record, variances) in variances.iter_mut().enumerate() {
-            change = change.max(noise::again(&data, record, &unknowns, variances));
+            change = change.max(noise::update(&data, record, &unknowns, variances));
         }
         if change < SAME_NOISE {
             break;

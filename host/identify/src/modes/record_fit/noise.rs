@@ -74,7 +74,7 @@ fn mean_square(lines: &[Complex64]) -> f64 {
 }
 
 /// Updates the noise variances of a record. Returns the largest relative change of the residual covariance.
-pub(super) fn again(data: &Data<'_>, record: usize, unknowns: &Unknowns, variances: &mut Variances) -> f64 {
+pub(super) fn update(data: &Data<'_>, record: usize, unknowns: &Unknowns, variances: &mut Variances) -> f64 {
     let before = variances.clone();
     let responses = variances.responses.len();
     let spectra = &data.records[record];

@@ -264,7 +264,7 @@ fn neither_windows_nor_noise_on_nearly_dependent_forces_move_the_modes_of_record
 }
 
 #[test]
-fn forces_that_are_not_measured_are_no_noise_of_those_that_are() {
+fn unmeasured_forces_do_not_count_as_noise_of_measured_forces() {
     let truth = table_7_1();
     let mut tally = Tally::default();
     const SEEDS: u64 = 8;
