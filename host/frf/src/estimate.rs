@@ -27,7 +27,7 @@ pub(super) const DEPENDENT: f64 = 1e-2;
 
 /// FRF estimate at one frequency line.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Line {
+pub(super) struct FrfLine {
     pub(super) frequency_hz: f64,
     /// FRF matrix, rows responses, columns forces; responses as measured, before integration to displacement.
     pub(super) h: Matrix,
@@ -41,7 +41,7 @@ pub(super) struct Line {
 
 /// Number of force and response channels; the forces come first.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Shape {
+pub(super) struct ChannelCounts {
     /// Number of forces.
     pub(super) forces: usize,
     /// Number of responses.
@@ -54,10 +54,10 @@ pub(super) struct Shape {
 ///
 /// Random error (Bendat and Piersol, generalised to H = Σ S_xf,i W_i): var H_pq = Σ_i S_ee,p (W_iᴴ S_ff,i W_i)_qq / n_i, with the residual
 /// spectrum S_ee of the responses and n_i averages of test i. For one force: ε[|H|] = √(1 − γ²) / (|γ| √(2n)).
-pub(super) fn lines(tests: &[CrossSpectra], shape: Shape, estimator: Estimator) -> Vec<Line> {
+pub(super) fn lines(tests: &[CrossSpectra], counts: ChannelCounts, estimator: Estimator) -> Vec<FrfLine> {
     let count = tests.first().map_or(0, |test| test.frequency_hz.len());
     (0..count)
-        .filter_map(|index| line(tests, shape, estimator, index))
+        .filter_map(|index| line(tests, counts, estimator, index))
         .collect()
 }
 
@@ -69,7 +69,7 @@ struct Powers {
     xx: Matrix,
 }
 
-fn powers(test: &CrossSpectra, shape: Shape, index: usize) -> Powers {
+fn powers(test: &CrossSpectra, counts: ChannelCounts, index: usize) -> Powers {
     let block = |rows: (usize, usize), columns: (usize, usize)| {
         let mut block = ZERO;
         for (i, row) in block.iter_mut().enumerate().take(rows.1) {
@@ -79,7 +79,7 @@ fn powers(test: &CrossSpectra, shape: Shape, index: usize) -> Powers {
         }
         block
     };
-    let (forces, responses) = ((0, shape.forces), (shape.forces, shape.responses));
+    let (forces, responses) = ((0, counts.forces), (counts.forces, counts.responses));
     Powers {
         averages: test.averages,
         ff: block(forces, forces),
@@ -88,8 +88,13 @@ fn powers(test: &CrossSpectra, shape: Shape, index: usize) -> Powers {
     }
 }
 
-fn line(tests: &[CrossSpectra], shape: Shape, estimator: Estimator, index: usize) -> Option<Line> {
-    let powers: Vec<Powers> = tests.iter().map(|test| powers(test, shape, index)).collect();
+fn line(
+    tests: &[CrossSpectra],
+    counts: ChannelCounts,
+    estimator: Estimator,
+    index: usize,
+) -> Option<FrfLine> {
+    let powers: Vec<Powers> = tests.iter().map(|test| powers(test, counts, index)).collect();
     let averages: f64 = powers.iter().map(|test| test.averages).sum();
     let total = |of: fn(&Powers) -> &Matrix| {
         powers.iter().fold(ZERO, |total, test| {
@@ -102,10 +107,10 @@ fn line(tests: &[CrossSpectra], shape: Shape, estimator: Estimator, index: usize
         total(|test| &test.xx),
     );
     let (weights, singular) = match estimator {
-        Estimator::PseudoInverse => stacked(&powers, shape.forces)?,
+        Estimator::PseudoInverse => stacked(&powers, counts.forces)?,
         _ => {
-            let (least, most) = extreme_eigenvalues(&ff, shape.forces);
-            let inverse = inverse(&ff, shape.forces)?;
+            let (least, most) = extreme_eigenvalues(&ff, counts.forces);
+            let inverse = inverse(&ff, counts.forces)?;
             let weights = powers
                 .iter()
                 .map(|test| scaled(&inverse, test.averages / averages))
@@ -113,43 +118,43 @@ fn line(tests: &[CrossSpectra], shape: Shape, estimator: Estimator, index: usize
             (weights, (least.max(0.0).sqrt(), most.max(0.0).sqrt()))
         }
     };
-    let first = powers
+    let h1 = powers
         .iter()
         .zip(&weights)
         .fold(ZERO, |h, (test, weight): (_, &Matrix)| {
             sum(&h, &product(&test.xf, weight))
         });
     let h = match estimator {
-        Estimator::H1 | Estimator::PseudoInverse => first,
-        Estimator::H2 => second(&xf, &xx, shape)?,
-        Estimator::Mean => scaled(&sum(&first, &second(&xf, &xx, shape)?), 0.5),
+        Estimator::H1 | Estimator::PseudoInverse => h1,
+        Estimator::H2 => h2(&xf, &xx, counts)?,
+        Estimator::Mean => scaled(&sum(&h1, &h2(&xf, &xx, counts)?), 0.5),
     };
     // Power of the residual X − H1 F of the responses: S_xx − 2 Re(S_xf Hᴴ) + H S_ff Hᴴ.
-    let explained = product_adjoint(&xf, &first);
-    let modelled = product_adjoint(&product(&first, &ff), &first);
-    let unbiased = averages / (averages - shape.forces as f64).max(1.0);
-    let mut line = Line {
+    let explained = product_adjoint(&xf, &h1);
+    let modelled = product_adjoint(&product(&h1, &ff), &h1);
+    let unbiased = averages / (averages - counts.forces as f64).max(1.0);
+    let mut line = FrfLine {
         frequency_hz: tests.first()?.frequency_hz[index],
         h,
         coherence: [0.0; 3],
         deviation: [[0.0; 3]; 3],
         singular,
     };
-    for p in 0..shape.responses {
+    for p in 0..counts.responses {
         let power = xx[p][p].re;
-        let rest = (power - 2.0 * explained[p][p].re + modelled[p][p].re).max(0.0);
+        let residual = (power - 2.0 * explained[p][p].re + modelled[p][p].re).max(0.0);
         line.coherence[p] = if power > 0.0 {
-            (1.0 - rest / power).clamp(0.0, 1.0)
+            (1.0 - residual / power).clamp(0.0, 1.0)
         } else {
             0.0
         };
-        for q in 0..shape.forces {
+        for q in 0..counts.forces {
             let variance: f64 = powers
                 .iter()
                 .zip(&weights)
                 .map(|(test, weight)| {
                     let spread = product(&adjoint(weight), &product(&test.ff, weight));
-                    rest * unbiased * spread[q][q].re / test.averages
+                    residual * unbiased * spread[q][q].re / test.averages
                 })
                 .sum();
             line.deviation[p][q] = (0.5 * variance.max(0.0)).sqrt();
@@ -159,16 +164,16 @@ fn line(tests: &[CrossSpectra], shape: Shape, estimator: Estimator, index: usize
 }
 
 /// Estimate H2 = S_xx S_fx⁻¹. With one force, H2 is computed separately for each response.
-fn second(xf: &Matrix, xx: &Matrix, shape: Shape) -> Option<Matrix> {
-    if shape.forces == 1 {
+fn h2(xf: &Matrix, xx: &Matrix, counts: ChannelCounts) -> Option<Matrix> {
+    if counts.forces == 1 {
         let mut h = ZERO;
-        for p in 0..shape.responses {
+        for p in 0..counts.responses {
             let fx = xf[p][0].conj();
             h[p][0] = if fx.norm() > 0.0 { xx[p][p] / fx } else { xf[p][0] };
         }
         return Some(h);
     }
-    let inverse = inverse(&adjoint(xf), shape.forces)?;
+    let inverse = inverse(&adjoint(xf), counts.forces)?;
     Some(product(xx, &inverse))
 }
 

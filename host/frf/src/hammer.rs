@@ -1,7 +1,7 @@
 //! Impacts of a hammer test: detection, double impacts, and the windows of force and response.
 
 use super::FrfError;
-use super::driven::Driven;
+use super::test_channels::TestChannels;
 
 /// Longest time from an impact to a bounce of the hammer, s; a pulse within it belongs to the same impact. A choice, below the interval of
 /// deliberate strikes.
@@ -61,7 +61,7 @@ pub fn true_damping(frequency_hz: f64, damping_ratio: f64, exponential_s: f64) -
 }
 
 /// Windowed segments of the impacts of one record.
-pub(super) struct BlowSegments {
+pub(super) struct ImpactSegments {
     /// Windowed signals: the force, then the responses. The segments of each signal are concatenated.
     pub(super) signals: Vec<Vec<f64>>,
     /// Number of samples of each segment.
@@ -71,18 +71,21 @@ pub(super) struct BlowSegments {
     /// Double impacts, whose segments are not evaluated.
     pub(super) double: Vec<MeasuredImpact>,
     /// Largest amplitude of a response at the end of a segment, as a fraction of the peak of that response in the segment.
-    pub(super) left_over: f64,
+    pub(super) end_amplitude: f64,
 }
 
 /// Cuts a record into one windowed segment per single impact; double impacts are left out.
 ///
 /// # Errors
 /// The record has several forces, no impact, or only double impacts; or the segments are longer than the record.
-pub(super) fn segments(driven: &Driven<'_>, windows: HammerWindows) -> Result<BlowSegments, FrfError> {
-    let force = driven.only_force("a hammer test")?;
-    let rate = driven.recording.sample_rate_hz;
+pub(super) fn segments(
+    channels: &TestChannels<'_>,
+    windows: HammerWindows,
+) -> Result<ImpactSegments, FrfError> {
+    let force = channels.only_force("a hammer test")?;
+    let rate = channels.recording.sample_rate_hz;
     let refused = |what: String| FrfError::Content {
-        path: driven.recording.path.clone(),
+        path: channels.recording.path.clone(),
         what,
     };
     let mut impacts = impacts(&force.samples, rate);
@@ -123,20 +126,20 @@ pub(super) fn segments(driven: &Driven<'_>, windows: HammerWindows) -> Result<Bl
         )));
     };
     debug_assert!(first.last >= first.first);
-    let mut cut = BlowSegments {
-        signals: driven
+    let mut cut = ImpactSegments {
+        signals: channels
             .signals()
             .iter()
             .map(|_| Vec::with_capacity(used.len() * length))
             .collect(),
         length,
-        left_over: 0.0,
+        end_amplitude: 0.0,
         used: Vec::new(),
         double,
     };
     for impact in used {
         let start = impact.first - before;
-        for (index, signal) in driven.signals().into_iter().enumerate() {
+        for (index, signal) in channels.signals().into_iter().enumerate() {
             let segment = &signal[start..start + length];
             let is_force = index == 0;
             let offset = segment[..before].iter().sum::<f64>() / before.max(1) as f64;
@@ -153,7 +156,7 @@ pub(super) fn segments(driven: &Driven<'_>, windows: HammerWindows) -> Result<Bl
             cut.signals[index].extend(windowed);
             if !is_force {
                 let at = cut.signals[index].len() - length;
-                cut.left_over = cut.left_over.max(left_over(&cut.signals[index][at..]));
+                cut.end_amplitude = cut.end_amplitude.max(end_amplitude(&cut.signals[index][at..]));
             }
         }
         cut.used.push(impact);
@@ -162,7 +165,7 @@ pub(super) fn segments(driven: &Driven<'_>, windows: HammerWindows) -> Result<Bl
 }
 
 /// Amplitude (√2 · RMS) of the last twentieth of a segment of a response, as a fraction of the peak of the segment.
-fn left_over(segment: &[f64]) -> f64 {
+fn end_amplitude(segment: &[f64]) -> f64 {
     let tail = &segment[segment.len() - segment.len() / 20..];
     let power = tail.iter().map(|x| x * x).sum::<f64>() / tail.len().max(1) as f64;
     let peak = segment.iter().fold(0.0_f64, |peak, x| peak.max(x.abs()));

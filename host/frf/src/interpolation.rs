@@ -71,7 +71,7 @@ impl Interpolation {
     }
 
     /// The receptances in feed, normal and axial direction, Rᵀ H R, for a feed at `angle_deg` degrees from x towards y.
-    pub fn turned(&self, angle_deg: f64) -> Self {
+    pub fn rotated(&self, angle_deg: f64) -> Self {
         let machine_from_feed = feed_axes(angle_deg).map(Complex64::from);
         Self {
             frequency_hz: self.frequency_hz.clone(),

@@ -34,7 +34,6 @@
 //! Of a structure, this crate uses only the names of its directions: no modal model, no cutting force, no stability.
 
 mod cross_spectra;
-mod driven;
 mod error;
 mod estimate;
 mod excitation;
@@ -49,6 +48,7 @@ mod step_sine;
 mod table;
 mod table_file;
 mod table_uff;
+mod test_channels;
 mod tool_tip;
 mod window;
 
@@ -57,7 +57,7 @@ pub use estimate::Estimator;
 pub use excitation::Excitation;
 pub use hammer::{HammerWindows, MeasuredImpact, true_damping};
 pub use interpolation::Interpolation;
-pub use measurement::{Measurement, Part, measure};
+pub use measurement::{Measurement, RecordingGroup, measure};
 pub use measurement_settings::MeasurementSettings;
 pub use record_spectra::{ChannelLines, RecordSpectra, record_spectra};
 pub use table::{Frf, FrfTable};

@@ -1,6 +1,6 @@
 //! Measurement of receptances from recordings, with coherence and random error.
 
-mod part;
+mod recording_group;
 mod steady;
 mod stepped;
 mod struck;
@@ -12,21 +12,21 @@ use std::path::Path;
 
 use num_complex::Complex64;
 
-pub use part::Part;
+pub use recording_group::RecordingGroup;
 
-use super::driven::Driven;
 use super::error::FrfError;
-use super::estimate::{self, Estimator, Shape};
+use super::estimate::{self, ChannelCounts, Estimator};
 use super::excitation::Excitation;
 use super::measurement_settings::MeasurementSettings;
 use super::table::{Frf, FrfTable};
-use part::{Measured, receptances};
+use super::test_channels::TestChannels;
 use quietcut_model::structure::Direction;
 use quietcut_recording::Recording;
+use recording_group::{MeasuredGroup, receptances};
 use steady::steady;
 use stepped::stepped;
 use struck::struck;
-use usable_lines::{independent, keep_driven};
+use usable_lines::{independent, keep_excited};
 
 /// Measured receptances with their statistics.
 #[derive(Clone, Debug)]
@@ -36,7 +36,7 @@ pub struct Measurement {
     /// Standard deviation of |H| of each entry of the table at each frequency, m/N.
     pub deviation: Vec<Vec<f64>>,
     /// Groups of recordings that were evaluated together.
-    pub parts: Vec<Part>,
+    pub groups: Vec<RecordingGroup>,
     /// Warnings for the user, such as of double impacts or of responses that had not settled.
     pub warnings: Vec<String>,
 }
@@ -50,28 +50,28 @@ pub struct Measurement {
 /// A recording has no force or no response, or is too short for the resolution; the forces are dependent; the recordings have no common
 /// frequencies.
 pub fn measure(recordings: &[Recording], settings: &MeasurementSettings) -> Result<Measurement, FrfError> {
-    let driven = recordings
+    let channels = recordings
         .iter()
-        .map(|recording| Driven::of(recording, &settings.channels))
+        .map(|recording| TestChannels::of(recording, &settings.channels))
         .collect::<Result<Vec<_>, _>>()?;
-    let mut groups: Vec<(Excitation, Vec<Driven<'_>>)> = Vec::new();
-    for driven in driven {
+    let mut groups: Vec<(Excitation, Vec<TestChannels<'_>>)> = Vec::new();
+    for channels in channels {
         let excitation = settings
             .excitation
-            .unwrap_or_else(|| Excitation::of(&driven.recording.sidecar));
+            .unwrap_or_else(|| Excitation::of(&channels.recording.sidecar));
         let same = groups.iter_mut().find(|(other, members)| {
-            members[0].force_directions() == driven.force_directions()
-                && members[0].response_kinds() == driven.response_kinds()
+            members[0].force_directions() == channels.force_directions()
+                && members[0].response_kinds() == channels.response_kinds()
                 && *other == excitation
         });
         match same {
-            Some((_, members)) => members.push(driven),
-            None => groups.push((excitation, vec![driven])),
+            Some((_, members)) => members.push(channels),
+            None => groups.push((excitation, vec![channels])),
         }
     }
     let measured = groups
         .iter()
-        .map(|(excitation, members)| part(*excitation, members, settings))
+        .map(|(excitation, members)| measure_group(*excitation, members, settings))
         .collect::<Result<Vec<_>, _>>()?;
     let path = recordings
         .first()
@@ -80,7 +80,7 @@ pub fn measure(recordings: &[Recording], settings: &MeasurementSettings) -> Resu
 }
 
 /// Combines all groups at their common frequencies.
-fn merged(path: &Path, measured: Vec<Measured>) -> Result<Measurement, FrfError> {
+fn merged(path: &Path, measured: Vec<MeasuredGroup>) -> Result<Measurement, FrfError> {
     let refused = |what: String| FrfError::Content {
         path: path.into(),
         what,
@@ -96,11 +96,11 @@ fn merged(path: &Path, measured: Vec<Measured>) -> Result<Measurement, FrfError>
     };
     let most = measured
         .iter()
-        .map(|part| part.frequency_hz.len())
+        .map(|group| group.frequency_hz.len())
         .max()
         .unwrap_or(0);
-    for part in &measured {
-        common.retain(|&hertz| near(&part.frequency_hz, hertz).is_some());
+    for group in &measured {
+        common.retain(|&hertz| near(&group.frequency_hz, hertz).is_some());
     }
     if common.len() * 2 < most || common.is_empty() {
         return Err(refused(format!(
@@ -112,16 +112,16 @@ fn merged(path: &Path, measured: Vec<Measured>) -> Result<Measurement, FrfError>
         // A table cannot be empty; this placeholder is replaced below.
         table: FrfTable::new(path, vec![0.0], vec![placeholder()])?,
         deviation: Vec::new(),
-        parts: Vec::new(),
+        groups: Vec::new(),
         warnings: Vec::new(),
     };
     let mut entries: Vec<Frf> = Vec::new();
-    for part in measured {
+    for group in measured {
         let lines: Vec<usize> = common
             .iter()
-            .filter_map(|&hertz| near(&part.frequency_hz, hertz))
+            .filter_map(|&hertz| near(&group.frequency_hz, hertz))
             .collect();
-        for (entry, deviation) in part.entries {
+        for (entry, deviation) in group.entries {
             if let Some(twice) = entries.iter().find(|other| other.name() == entry.name()) {
                 return Err(refused(format!(
                     "h{} comes from two kinds of recordings; measure them one by one",
@@ -139,8 +139,8 @@ fn merged(path: &Path, measured: Vec<Measured>) -> Result<Measurement, FrfError>
                 .deviation
                 .push(lines.iter().map(|&line| deviation[line]).collect());
         }
-        measurement.parts.push(part.part);
-        measurement.warnings.extend(part.warnings);
+        measurement.groups.push(group.group);
+        measurement.warnings.extend(group.warnings);
     }
     measurement.table = FrfTable::new(path, common, entries)?;
     Ok(measurement)
@@ -157,11 +157,11 @@ fn placeholder() -> Frf {
 }
 
 /// Measures the receptances of one group of recordings with the same forces and excitation.
-fn part(
+fn measure_group(
     excitation: Excitation,
-    members: &[Driven<'_>],
+    members: &[TestChannels<'_>],
     settings: &MeasurementSettings,
-) -> Result<Measured, FrfError> {
+) -> Result<MeasuredGroup, FrfError> {
     let first = &members[0];
     let rate = first.recording.sample_rate_hz;
     let refused = |what: String| FrfError::Content {
@@ -178,7 +178,7 @@ fn part(
             other.recording.sample_rate_hz
         )));
     }
-    let mut part = Part {
+    let mut group = RecordingGroup {
         recordings: members.len(),
         forces: first.force_directions(),
         excitation,
@@ -189,40 +189,40 @@ fn part(
     };
     let mut warnings: Vec<String> = members
         .iter()
-        .flat_map(|driven| driven.warnings.clone())
+        .flat_map(|channels| channels.warnings.clone())
         .collect();
     if excitation == Excitation::StepSine {
-        return stepped(part, members, settings, warnings);
+        return stepped(group, members, settings, warnings);
     }
-    let shape = Shape {
+    let counts = ChannelCounts {
         forces: first.forces.len(),
         responses: first.responses.len(),
     };
     let two_sided = matches!(settings.estimator, Estimator::H2 | Estimator::Mean);
-    if two_sided && shape.forces > 1 && shape.forces != shape.responses {
+    if two_sided && counts.forces > 1 && counts.forces != counts.responses {
         return Err(refused(format!(
             "H2 of {} forces needs as many responses, but there are {}; take H1",
-            shape.forces, shape.responses
+            counts.forces, counts.responses
         )));
     }
     let spectra = match excitation {
-        Excitation::Hammer => struck(&mut part, members, settings, &mut warnings)?,
+        Excitation::Hammer => struck(&mut group, members, settings, &mut warnings)?,
         _ => members
             .iter()
-            .map(|driven| steady(excitation, driven, members, settings))
+            .map(|channels| steady(excitation, channels, members, settings))
             .collect::<Result<Vec<_>, _>>()?,
     };
-    part.averages = spectra.iter().map(|test| test.averages).sum();
-    if part.averages < shape.forces as f64 + 0.5 && excitation != Excitation::Hammer {
+    group.averages = spectra.iter().map(|test| test.averages).sum();
+    if group.averages < counts.forces as f64 + 0.5 && excitation != Excitation::Hammer {
         return Err(refused(format!(
             "{:.1} independent averages for {} forces; a longer record or a coarser resolution is needed",
-            part.averages, shape.forces
+            group.averages, counts.forces
         )));
     }
-    let mut lines = estimate::lines(&spectra, shape, settings.estimator);
+    let mut lines = estimate::lines(&spectra, counts, settings.estimator);
     if excitation == Excitation::Sweep {
-        keep_driven(&mut lines, &spectra, shape);
+        keep_excited(&mut lines, &spectra, counts);
     }
-    independent(&mut lines, &mut part, shape).map_err(refused)?;
-    Ok(receptances(part, &lines, first, warnings))
+    independent(&mut lines, &mut group, counts).map_err(refused)?;
+    Ok(receptances(group, &lines, first, warnings))
 }

@@ -46,7 +46,7 @@ pub struct RationalFit {
     /// Residues R_kr, m/(N s): one row for each function, one column for each pole.
     pub residues: Vec<Vec<Complex64>>,
     /// RMS residual of the fit over all functions, each divided by its own RMS.
-    pub(crate) rest: f64,
+    pub(crate) residual: f64,
 }
 
 impl RationalFit {
@@ -83,7 +83,7 @@ pub(super) fn fit(
         })
         .collect();
     for _ in 0..ROUNDS {
-        poles = moved(frequency_hz, functions, &poles)?;
+        poles = relocated(frequency_hz, functions, &poles)?;
     }
     poles.sort_by(|a, b| a.im.total_cmp(&b.im));
     residues(frequency_hz, functions, poles)
@@ -116,7 +116,7 @@ fn undetermined(frequency_hz: &[f64], functions: &[&[Complex64]], modes: usize) 
 
 /// Relocated poles: the zeros of σ(s) = 1 + Σ c_n φ_n(s), with the coefficients c_n for which σH is best fitted by a sum over the previous
 /// poles.
-fn moved(
+fn relocated(
     frequency_hz: &[f64],
     functions: &[&[Complex64]],
     poles: &[Complex64],
@@ -229,7 +229,7 @@ pub fn residues(
     let norms: Vec<f64> = matrix.column_iter().map(|column| column.norm()).collect();
     balance(&mut matrix, width);
     let decomposed = decompose(matrix.clone(), Vectors::Both)?;
-    let (mut all, mut rest) = (0.0, 0.0);
+    let (mut all, mut residual) = (0.0, 0.0);
     let mut residues = Vec::with_capacity(functions.len());
     for function in functions {
         let values = function.iter().flat_map(|h| [h.re, h.im]);
@@ -240,7 +240,7 @@ pub fn residues(
         // Residual of each function relative to the function itself, so that all functions have equal weight.
         let norm = right.norm_squared();
         if norm > 0.0 {
-            rest += (&matrix * &solution - &right).norm_squared() / norm;
+            residual += (&matrix * &solution - &right).norm_squared() / norm;
             all += 1.0;
         }
         let residue = |mode: usize| {
@@ -254,7 +254,7 @@ pub fn residues(
     Ok(RationalFit {
         poles,
         residues,
-        rest: if all > 0.0 { (rest / all).sqrt() } else { 0.0 },
+        residual: if all > 0.0 { (residual / all).sqrt() } else { 0.0 },
     })
 }
 
@@ -303,7 +303,7 @@ mod tests {
         };
         let (a, b) = (function(0), function(1));
         let fit = fit(&frequency_hz, &[&a, &b], 3).unwrap();
-        assert!(fit.rest < 1e-9, "{}", fit.rest);
+        assert!(fit.residual < 1e-9, "{}", fit.residual);
         for (k, row) in residues.iter().enumerate() {
             for (mode, (pole, (re, im))) in poles.iter().zip(row).enumerate() {
                 // Tolerance: rounding errors.

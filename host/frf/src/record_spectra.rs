@@ -7,9 +7,9 @@ use num_complex::Complex64;
 use realfft::RealFftPlanner;
 
 use super::FrfError;
-use super::driven::Driven;
 use super::excitation::Excitation;
 use super::measurement_settings::MeasurementSettings;
+use super::test_channels::TestChannels;
 use quietcut_model::structure::Direction;
 use quietcut_recording::{Quantity, Recording};
 
@@ -56,24 +56,24 @@ pub fn record_spectra(
     recordings: &[Recording],
     settings: &MeasurementSettings,
 ) -> Result<Option<Vec<RecordSpectra>>, FrfError> {
-    let goes_on = |recording: &Recording| {
+    let is_continuous = |recording: &Recording| {
         let excitation = settings
             .excitation
             .unwrap_or_else(|| Excitation::of(&recording.sidecar));
         matches!(excitation, Excitation::Random | Excitation::Sweep)
     };
-    if !recordings.iter().all(goes_on) {
+    if !recordings.iter().all(is_continuous) {
         return Ok(None);
     }
     let spectra = recordings.iter().map(|recording| {
-        let driven = Driven::of(recording, &settings.channels)?;
-        Ok(of_record(&driven, settings.band_hz))
+        let channels = TestChannels::of(recording, &settings.channels)?;
+        Ok(of_record(&channels, settings.band_hz))
     });
     spectra.collect::<Result<Vec<_>, _>>().map(Some)
 }
 
-fn of_record(driven: &Driven<'_>, band_hz: Option<(f64, f64)>) -> RecordSpectra {
-    let recording = driven.recording;
+fn of_record(channels: &TestChannels<'_>, band_hz: Option<(f64, f64)>) -> RecordSpectra {
+    let recording = channels.recording;
     let samples = recording.len();
     let seconds = samples as f64 / recording.sample_rate_hz;
     let (low, high) = band_hz.unwrap_or((0.0, f64::INFINITY));
@@ -106,12 +106,12 @@ fn of_record(driven: &Driven<'_>, band_hz: Option<(f64, f64)>) -> RecordSpectra 
         path: recording.path.clone(),
         seconds,
         frequency_hz: (first..end).map(|line| line as f64 / seconds).collect(),
-        forces: driven
+        forces: channels
             .forces
             .iter()
             .map(|(direction, force)| channel(force, *direction, 0))
             .collect(),
-        responses: driven
+        responses: channels
             .responses
             .iter()
             .map(|response| channel(response.channel, response.direction, response.derivatives))
@@ -120,29 +120,29 @@ fn of_record(driven: &Driven<'_>, band_hz: Option<(f64, f64)>) -> RecordSpectra 
 }
 
 /// Number of adjacent bands of the spectrum whose mean powers are compared to find the noise plateau. A choice.
-const PARTS: usize = 64;
+const BANDS: usize = 64;
 
 /// Smallest number of bands with equal power that form a noise plateau. A choice.
-const ALIKE: usize = 3;
+const PLATEAU_BANDS: usize = 3;
 
 /// Smallest number of lines per band. A choice: the mean power of a band then has a standard deviation of 14 %.
-const LINES_MIN: usize = 50;
+const LINES_PER_BAND_MIN: usize = 50;
 
 /// Noise plateau of a spectrum: the median over the bands whose mean power exceeds that of the lowest band by at most six standard deviations
 /// (1/√n of the power for n lines). White noise has equal power in all bands, and bands without signal contain nothing else.
 fn plateau(lines: &[Complex64], scale: f64) -> Option<f64> {
-    let count = lines.len() / PARTS;
-    if count < LINES_MIN {
+    let count = lines.len() / BANDS;
+    if count < LINES_PER_BAND_MIN {
         return None;
     }
     let mut powers: Vec<f64> = lines[1..]
         .chunks_exact(count)
-        .map(|part| scale * part.iter().map(|line| line.norm_sqr()).sum::<f64>() / count as f64)
+        .map(|band| scale * band.iter().map(|line| line.norm_sqr()).sum::<f64>() / count as f64)
         .collect();
     powers.sort_by(f64::total_cmp);
     let most = powers.first()? * (1.0 + 6.0 / (count as f64).sqrt());
-    let alike = powers.iter().take_while(|power| **power < most).count();
-    (alike >= ALIKE).then(|| powers[alike / 2])
+    let equal = powers.iter().take_while(|power| **power < most).count();
+    (equal >= PLATEAU_BANDS).then(|| powers[equal / 2])
 }
 
 impl RecordSpectra {

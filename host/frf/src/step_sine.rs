@@ -6,7 +6,7 @@ use nalgebra::{Matrix4, Vector4};
 use num_complex::Complex64;
 
 use super::FrfError;
-use super::driven::Driven;
+use super::test_channels::TestChannels;
 
 /// Smallest number of periods of a frequency step. A choice: the scatter of the period needs several.
 const PERIODS_MIN: usize = 8;
@@ -21,7 +21,7 @@ const FORGET: f64 = 3.0;
 const FORGET_S: f64 = 1.0;
 
 /// Number of subsegments of a step that are demodulated separately, to estimate noise and settling. A choice.
-const PIECES: usize = 8;
+const SUBSEGMENTS: usize = 8;
 
 /// Largest relative deviation of the phasor ratio (response/force) of a settled response from its mean over the second half. A choice: 0.2 %.
 const SETTLED: f64 = 2e-3;
@@ -32,7 +32,7 @@ const NOISE: f64 = 3.0;
 
 /// Result of one frequency step.
 #[derive(Clone, Debug)]
-pub(super) struct Step {
+pub(super) struct FrequencyStep {
     pub(super) frequency_hz: f64,
     /// Number of samples of the frequency step.
     samples: usize,
@@ -50,11 +50,11 @@ pub(super) struct Step {
 
 /// All steps of a record at one force level.
 #[derive(Clone, Debug)]
-pub(super) struct Level {
+pub(super) struct ForceLevel {
     /// Median of the force amplitudes of the steps, N.
     pub(super) force_n: f64,
     /// Steps by ascending frequency. Of several steps at one frequency the longest is kept; of steps of about equal length, the last.
-    pub(super) steps: Vec<Step>,
+    pub(super) steps: Vec<FrequencyStep>,
 }
 
 /// Largest ratio of forces that count as one force level. A choice.
@@ -64,23 +64,23 @@ const SAME_LEVEL: f64 = 1.05;
 ///
 /// # Errors
 /// The record has several forces, or no segment of constant frequency.
-pub(super) fn levels(driven: &Driven<'_>) -> Result<Vec<Level>, FrfError> {
-    let force = driven.only_force("a step-sine test")?;
-    let rate = driven.recording.sample_rate_hz;
-    let steps: Vec<Step> = stretches(&force.samples, rate)
+pub(super) fn levels(channels: &TestChannels<'_>) -> Result<Vec<ForceLevel>, FrfError> {
+    let force = channels.only_force("a step-sine test")?;
+    let rate = channels.recording.sample_rate_hz;
+    let steps: Vec<FrequencyStep> = tone_segments(&force.samples, rate)
         .into_iter()
-        .filter_map(|stretch| demodulated(driven, &force.samples, stretch, rate))
+        .filter_map(|tone| demodulated(channels, &force.samples, tone, rate))
         .collect();
     if steps.is_empty() {
         return Err(FrfError::Content {
-            path: driven.recording.path.clone(),
+            path: channels.recording.path.clone(),
             what: format!(
                 "{} has no stretch of {PERIODS_MIN} periods of one frequency; is it a step-sine test?",
                 force.name
             ),
         });
     }
-    let mut levels: Vec<Level> = Vec::new();
+    let mut levels: Vec<ForceLevel> = Vec::new();
     for pass in passes(steps) {
         let force_n = median_force(&pass);
         let same = levels
@@ -88,7 +88,7 @@ pub(super) fn levels(driven: &Driven<'_>) -> Result<Vec<Level>, FrfError> {
             .find(|level| (level.force_n / force_n).ln().abs() < SAME_LEVEL.ln());
         match same {
             Some(level) => level.steps.extend(pass),
-            None => levels.push(Level { force_n, steps: pass }),
+            None => levels.push(ForceLevel { force_n, steps: pass }),
         }
     }
     for level in &mut levels {
@@ -98,12 +98,12 @@ pub(super) fn levels(driven: &Driven<'_>) -> Result<Vec<Level>, FrfError> {
 }
 
 /// Divides the steps into passes through the frequency range: a new pass begins when the frequency of an earlier step returns.
-fn passes(steps: Vec<Step>) -> Vec<Vec<Step>> {
-    let mut passes: Vec<Vec<Step>> = Vec::new();
+fn passes(steps: Vec<FrequencyStep>) -> Vec<Vec<FrequencyStep>> {
+    let mut passes: Vec<Vec<FrequencyStep>> = Vec::new();
     for step in steps {
-        let goes_on = |pass: &[Step]| match pass {
+        let goes_on = |pass: &[FrequencyStep]| match pass {
             [earlier @ .., last] => {
-                is_same(last, &step) || !earlier.iter().any(|other| is_same(other, &step))
+                is_same_frequency(last, &step) || !earlier.iter().any(|other| is_same_frequency(other, &step))
             }
             [] => true,
         };
@@ -115,22 +115,22 @@ fn passes(steps: Vec<Step>) -> Vec<Vec<Step>> {
     passes
 }
 
-fn is_same(a: &Step, b: &Step) -> bool {
+fn is_same_frequency(a: &FrequencyStep, b: &FrequencyStep) -> bool {
     (a.frequency_hz - b.frequency_hz).abs() < STEP * a.frequency_hz
 }
 
-fn median_force(steps: &[Step]) -> f64 {
+fn median_force(steps: &[FrequencyStep]) -> f64 {
     let mut forces: Vec<f64> = steps.iter().map(|step| step.force_n).collect();
     forces.sort_by(f64::total_cmp);
     forces[forces.len() / 2]
 }
 
-fn by_frequency(mut steps: Vec<Step>) -> Vec<Step> {
+fn by_frequency(mut steps: Vec<FrequencyStep>) -> Vec<FrequencyStep> {
     steps.sort_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz));
-    let mut kept: Vec<Step> = Vec::with_capacity(steps.len());
+    let mut kept: Vec<FrequencyStep> = Vec::with_capacity(steps.len());
     for step in steps {
         match kept.last_mut() {
-            Some(last) if is_same(last, &step) => {
+            Some(last) if is_same_frequency(last, &step) => {
                 if step.samples as f64 > 0.9 * last.samples as f64 {
                     *last = step;
                 }
@@ -143,16 +143,16 @@ fn by_frequency(mut steps: Vec<Step>) -> Vec<Step> {
 
 /// Segment of constant frequency: first and last sample, and period in samples, from the upward zero crossings of the force.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Stretch {
+struct ToneSegment {
     first: usize,
     last: usize,
     period: f64,
 }
 
-fn stretches(force: &[f64], rate: f64) -> Vec<Stretch> {
+fn tone_segments(force: &[f64], rate: f64) -> Vec<ToneSegment> {
     let crossings = crossings(force, rate);
     let periods: Vec<f64> = crossings.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    let mut stretches = Vec::new();
+    let mut tone_segments = Vec::new();
     let mut from = 0;
     while from + PERIODS_MIN <= periods.len() {
         let mut to = from + PERIODS_MIN;
@@ -179,7 +179,7 @@ fn stretches(force: &[f64], rate: f64) -> Vec<Stretch> {
             to += 1;
         }
         if to - from >= PERIODS_MIN {
-            stretches.push(Stretch {
+            tone_segments.push(ToneSegment {
                 first: crossings[from].ceil() as usize,
                 last: crossings[to].floor() as usize,
                 period: mean(to),
@@ -187,7 +187,7 @@ fn stretches(force: &[f64], rate: f64) -> Vec<Stretch> {
         }
         from = to + 1;
     }
-    stretches
+    tone_segments
 }
 
 /// Robust standard deviation of `periods`, in samples: 1.4826 · median absolute deviation.
@@ -230,47 +230,63 @@ fn crossings(force: &[f64], rate: f64) -> Vec<f64> {
 }
 
 /// Phasor ratios over the settled part of a segment; `None` if the segment is too short.
-fn demodulated(driven: &Driven<'_>, force: &[f64], stretch: Stretch, rate: f64) -> Option<Step> {
-    let period = refined(force, stretch);
-    let periods = ((stretch.last - stretch.first) as f64 / period).floor() as usize;
+fn demodulated(
+    channels: &TestChannels<'_>,
+    force: &[f64],
+    tone: ToneSegment,
+    rate: f64,
+) -> Option<FrequencyStep> {
+    let period = refined(force, tone);
+    let periods = ((tone.last - tone.first) as f64 / period).floor() as usize;
     // Whole number of periods in each subsegment.
-    let per_piece = (periods / PIECES).max(1);
-    let pieces = periods / per_piece;
-    let length = (per_piece as f64 * period).round() as usize;
-    if pieces < 4 || length < 5 {
+    let periods_per_subsegment = (periods / SUBSEGMENTS).max(1);
+    let subsegments = periods / periods_per_subsegment;
+    let length = (periods_per_subsegment as f64 * period).round() as usize;
+    if subsegments < 4 || length < 5 {
         return None;
     }
     let phasors = |signal: &[f64]| -> Option<Vec<Phasor>> {
-        (0..pieces)
-            .map(|piece| {
+        (0..subsegments)
+            .map(|subsegment| {
                 // Subsegments are aligned with the end of the step, since transients are at its start.
-                let end =
-                    stretch.last - ((pieces - 1 - piece) as f64 * per_piece as f64 * period).round() as usize;
+                let end = tone.last
+                    - ((subsegments - 1 - subsegment) as f64 * periods_per_subsegment as f64 * period).round()
+                        as usize;
                 phasor(signal, end.checked_sub(length)?, length, period)
             })
             .collect()
     };
     let forces = phasors(force)?;
-    let responses: Vec<Vec<Phasor>> = driven
+    let responses: Vec<Vec<Phasor>> = channels
         .responses
         .iter()
         .map(|response| phasors(&response.channel.samples))
         .collect::<Option<_>>()?;
     let ratios: Vec<Vec<Phasor>> = responses
         .iter()
-        .map(|response| response.iter().zip(&forces).map(|(x, f)| x.by(*f)).collect())
+        .map(|response| {
+            response
+                .iter()
+                .zip(&forces)
+                .map(|(x, f)| x.divided_by(*f))
+                .collect()
+        })
         .collect();
     let from = settled_from(&ratios);
-    let mut step = Step {
+    let mut step = FrequencyStep {
         frequency_hz: rate / period,
-        samples: stretch.last - stretch.first,
-        force_n: forces.iter().map(|piece| piece.value.norm()).sum::<f64>() / pieces as f64,
+        samples: tone.last - tone.first,
+        force_n: forces
+            .iter()
+            .map(|subsegment| subsegment.value.norm())
+            .sum::<f64>()
+            / subsegments as f64,
         h: Vec::new(),
         coherence: Vec::new(),
         deviation: Vec::new(),
         is_settled: from.is_some(),
     };
-    let used = from.unwrap_or(pieces / 2)..pieces;
+    let used = from.unwrap_or(subsegments / 2)..subsegments;
     for response in &responses {
         let (h, coherence, deviation) = averaged(&forces[used.clone()], &response[used.clone()]);
         step.h.push(h);
@@ -288,13 +304,13 @@ fn averaged(forces: &[Phasor], responses: &[Phasor]) -> (Complex64, f64, f64) {
     let xf: Complex64 = pairs().map(|(x, f)| x * f.conj()).sum();
     let h = xf / ff;
     let xx: f64 = pairs().map(|(x, _)| x.norm_sqr()).sum();
-    let rest: f64 = pairs().map(|(x, f)| (x - h * f).norm_sqr()).sum();
+    let residual: f64 = pairs().map(|(x, f)| (x - h * f).norm_sqr()).sum();
     let coherence = if xx > 0.0 {
-        (1.0 - rest / xx).clamp(0.0, 1.0)
+        (1.0 - residual / xx).clamp(0.0, 1.0)
     } else {
         0.0
     };
-    let variance = rest / (count - 1.0).max(1.0) / ff;
+    let variance = residual / (count - 1.0).max(1.0) / ff;
     (h, coherence, (0.5 * variance).sqrt())
 }
 
@@ -302,34 +318,34 @@ fn averaged(forces: &[Phasor], responses: &[Phasor]) -> (Complex64, f64, f64) {
 ///
 /// Settled: the phasor ratio differs from its mean over the second half by less than [`SETTLED`] (relative) or [`NOISE`] standard deviations.
 fn settled_from(ratios: &[Vec<Phasor>]) -> Option<usize> {
-    let pieces = ratios.first()?.len();
+    let subsegments = ratios.first()?.len();
     let first = |ratio: &Vec<Phasor>| {
-        let half = &ratio[pieces / 2..];
-        let mean = half.iter().map(|piece| piece.value).sum::<Complex64>() / half.len() as f64;
-        let is_off = |piece: &Phasor| {
-            (piece.value - mean).norm() > (SETTLED * mean.norm()).max(NOISE * piece.variance.sqrt())
+        let half = &ratio[subsegments / 2..];
+        let mean = half.iter().map(|subsegment| subsegment.value).sum::<Complex64>() / half.len() as f64;
+        let is_off = |subsegment: &Phasor| {
+            (subsegment.value - mean).norm() > (SETTLED * mean.norm()).max(NOISE * subsegment.variance.sqrt())
         };
         ratio.iter().rposition(is_off).map_or(0, |last| last + 1)
     };
     let from = ratios.iter().map(first).max()?;
-    (from <= pieces / 2).then_some(from)
+    (from <= subsegments / 2).then_some(from)
 }
 
 /// Refined period of the force in a segment, in samples, from the phase shift between the two halves of the segment.
-fn refined(force: &[f64], stretch: Stretch) -> f64 {
-    let mut period = stretch.period;
+fn refined(force: &[f64], tone: ToneSegment) -> f64 {
+    let mut period = tone.period;
     for _ in 0..3 {
-        let half = (stretch.last - stretch.first) / 2;
+        let half = (tone.last - tone.first) / 2;
         let length = ((half as f64 / period).floor() * period).round() as usize;
         let (Some(a), Some(b)) = (
-            phasor(force, stretch.first, length, period),
-            phasor(force, stretch.first + half, length, period),
+            phasor(force, tone.first, length, period),
+            phasor(force, tone.first + half, length, period),
         ) else {
             return period;
         };
         // The phases of all phasors refer to sample 0 of the record. The two halves have equal phases if the period is exact.
-        let turned = (b.value * a.value.conj()).arg();
-        period = 1.0 / (1.0 / period + turned / TAU / half as f64);
+        let phase_shift = (b.value * a.value.conj()).arg();
+        period = 1.0 / (1.0 / period + phase_shift / TAU / half as f64);
     }
     period
 }
@@ -343,7 +359,7 @@ struct Phasor {
 
 impl Phasor {
     /// Ratio of this phasor to `other`, with the variance propagated from both.
-    fn by(self, other: Self) -> Self {
+    fn divided_by(self, other: Self) -> Self {
         let value = self.value / other.value;
         Self {
             value,
@@ -367,7 +383,7 @@ fn phasor(signal: &[f64], first: usize, length: usize, period: f64) -> Option<Ph
         right += row * *sample;
     }
     let solution = normal.cholesky()?.solve(&right);
-    let rest: f64 = samples
+    let residual: f64 = samples
         .iter()
         .enumerate()
         .map(|(k, sample)| (sample - row(k).dot(&solution)).powi(2))
@@ -376,6 +392,6 @@ fn phasor(signal: &[f64], first: usize, length: usize, period: f64) -> Option<Ph
     Some(Phasor {
         value: Complex64::new(solution[0], solution[1]),
         // Sum of the variances of real and imaginary part, 2σ²/n each, with the residual variance σ².
-        variance: 4.0 * rest / (count - 4.0).max(1.0) / count,
+        variance: 4.0 * residual / (count - 4.0).max(1.0) / count,
     })
 }

@@ -11,35 +11,35 @@ use quietcut_recording::{Quantity, Unit};
 
 /// Content of a column of an FRF table, from its header.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Content {
+enum ColumnContent {
     Frequency,
     Receptance {
-        pair: Pair,
-        part: Part,
-        unit: Compliance,
+        pair: DirectionPair,
+        part: ComplexPart,
+        unit: FrfUnit,
     },
-    Coherence(Pair),
+    Coherence(DirectionPair),
 }
 
 /// Directions of displacement and force of a receptance.
-type Pair = (Direction, Direction);
+type DirectionPair = (Direction, Direction);
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Part {
+enum ComplexPart {
     Real,
     Imaginary,
 }
 
 /// Unit of an FRF: conversion factor to SI, and order of the time derivative of displacement (0 receptance, 1 mobility, 2 accelerance).
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Compliance {
+struct FrfUnit {
     factor: f64,
     derivatives: i32,
 }
 
 struct Column {
     title: String,
-    content: Content,
+    content: ColumnContent,
     values: Vec<f64>,
 }
 
@@ -147,24 +147,24 @@ fn column(path: &Path, title: &str) -> Result<Column, FrfError> {
     let part = |name: &str| {
         let (pair, part) = name.strip_prefix('h')?.split_once('_')?;
         let part = match part {
-            "re" => Part::Real,
-            "im" => Part::Imaginary,
+            "re" => ComplexPart::Real,
+            "im" => ComplexPart::Imaginary,
             _ => return None,
         };
         Some((pair_of(pair)?, part))
     };
     let content = if name == "frequency_hz" && unit.is_none_or(|unit| unit == "Hz") {
-        Content::Frequency
+        ColumnContent::Frequency
     } else if let Some((pair, part)) = part(name) {
-        Content::Receptance {
+        ColumnContent::Receptance {
             pair,
             part,
-            unit: unit.map_or(Ok(Compliance::SI), compliance).map_err(wrong)?,
+            unit: unit.map_or(Ok(FrfUnit::SI), frf_unit).map_err(wrong)?,
         }
     } else if let Some(pair) = name.strip_prefix("coherence_").and_then(pair_of)
         && unit.is_none_or(|unit| unit == "1")
     {
-        Content::Coherence(pair)
+        ColumnContent::Coherence(pair)
     } else {
         return Err(wrong(
             "no column of a table of frequency response functions; frequency_hz, hxy_re [m/N], hxy_im [m/N] and \
@@ -180,7 +180,7 @@ fn column(path: &Path, title: &str) -> Result<Column, FrfError> {
 }
 
 /// Parses directions such as `xy`: displacement in x, force in y.
-fn pair_of(text: &str) -> Option<Pair> {
+fn pair_of(text: &str) -> Option<DirectionPair> {
     let axis = |text: &str| {
         let direction: Direction = text.parse().ok()?;
         direction.axis().map(|_| direction)
@@ -189,7 +189,7 @@ fn pair_of(text: &str) -> Option<Pair> {
     Some((axis(response)?, axis(force)?))
 }
 
-impl Compliance {
+impl FrfUnit {
     const SI: Self = Self {
         factor: 1.0,
         derivatives: 0,
@@ -204,7 +204,7 @@ impl Compliance {
 }
 
 /// Parses the unit of an FRF, such as `um/N`, `m/s^2/N` or `g/N`.
-fn compliance(text: &str) -> Result<Compliance, String> {
+fn frf_unit(text: &str) -> Result<FrfUnit, String> {
     let wrong = || {
         format!(
             "\"{text}\" is no unit of it; a displacement, velocity or acceleration per force such as m/N, um/N or \
@@ -227,7 +227,7 @@ fn compliance(text: &str) -> Result<Compliance, String> {
     if force.quantity != Quantity::Force {
         return Err(wrong());
     }
-    Ok(Compliance {
+    Ok(FrfUnit {
         factor: response.factor / force.factor,
         derivatives,
     })
@@ -255,11 +255,11 @@ fn push_line(path: &Path, columns: &mut [Column], record: &csv::StringRecord) ->
             _ => return Err(needed("a number")),
         };
         match column.content {
-            Content::Frequency if value < 0.0 => return Err(needed("a frequency of 0 or more")),
-            Content::Frequency if previous.is_some_and(|previous| previous >= value) => {
+            ColumnContent::Frequency if value < 0.0 => return Err(needed("a frequency of 0 or more")),
+            ColumnContent::Frequency if previous.is_some_and(|previous| previous >= value) => {
                 return Err(needed("a frequency above that of the line before"));
             }
-            Content::Coherence(_) if !(0.0..=1.0).contains(&value) => {
+            ColumnContent::Coherence(_) if !(0.0..=1.0).contains(&value) => {
                 return Err(needed("a number from 0 to 1"));
             }
             _ => column.values.push(value),
@@ -276,8 +276,8 @@ fn assemble(path: &Path, columns: Vec<Column>) -> Result<FrfTable, FrfError> {
     for (index, column) in columns.iter().enumerate() {
         let same = |other: &Column| match (column.content, other.content) {
             (
-                Content::Receptance { pair, part, .. },
-                Content::Receptance {
+                ColumnContent::Receptance { pair, part, .. },
+                ColumnContent::Receptance {
                     pair: others,
                     part: other,
                     ..
@@ -291,17 +291,17 @@ fn assemble(path: &Path, columns: Vec<Column>) -> Result<FrfTable, FrfError> {
     }
     let frequency_hz = columns
         .iter()
-        .find(|column| column.content == Content::Frequency)
+        .find(|column| column.content == ColumnContent::Frequency)
         .ok_or_else(|| lacks("there is no column frequency_hz".into()))?
         .values
         .clone();
     let mut entries: Vec<Frf> = Vec::new();
     for column in &columns {
-        let Content::Receptance { pair, part, unit } = column.content else {
+        let ColumnContent::Receptance { pair, part, unit } = column.content else {
             continue;
         };
         let other = columns.iter().find_map(|other| match other.content {
-            Content::Receptance {
+            ColumnContent::Receptance {
                 pair: others,
                 part: other_part,
                 unit,
@@ -315,7 +315,7 @@ fn assemble(path: &Path, columns: Vec<Column>) -> Result<FrfTable, FrfError> {
             )));
         };
         // The receptance is created once, at the column of its real part.
-        if part == Part::Imaginary {
+        if part == ComplexPart::Imaginary {
             continue;
         }
         if unit != other_unit {
@@ -344,7 +344,7 @@ fn assemble(path: &Path, columns: Vec<Column>) -> Result<FrfTable, FrfError> {
         });
     }
     if let Some(orphan) = columns.iter().find(
-        |column| matches!(column.content, Content::Coherence(pair) if !entries.iter().any(|e| (e.response, e.force) == pair)),
+        |column| matches!(column.content, ColumnContent::Coherence(pair) if !entries.iter().any(|e| (e.response, e.force) == pair)),
     ) {
         return Err(lacks(format!(
             "column \"{}\" has no receptance it belongs to",
@@ -354,10 +354,10 @@ fn assemble(path: &Path, columns: Vec<Column>) -> Result<FrfTable, FrfError> {
     FrfTable::new(path, frequency_hz, entries)
 }
 
-fn coherence_of(columns: &[Column], pair: Pair) -> Option<Vec<f64>> {
+fn coherence_of(columns: &[Column], pair: DirectionPair) -> Option<Vec<f64>> {
     columns
         .iter()
-        .find(|column| column.content == Content::Coherence(pair))
+        .find(|column| column.content == ColumnContent::Coherence(pair))
         .map(|column| column.values.clone())
 }
 

@@ -14,16 +14,16 @@ use quietcut_model::structure::Direction;
 const MODES_MAX: usize = 8;
 
 /// Smallest relative decrease of the residual by which a further mode is accepted. A choice.
-const WORTH: f64 = 0.3;
+const LEAST_DECREASE: f64 = 0.3;
 
 /// Relative residual below which no further mode is added. A choice, near the noise of a clean measurement.
-const GOOD: f64 = 2e-3;
+const SMALL_RESIDUAL: f64 = 2e-3;
 
 /// Largest shift of a natural frequency between calibration and cut, |ln(f₁/f₂)|. A choice.
-const SAME: f64 = 0.15;
+const SAME_MODE: f64 = 0.15;
 
 /// Smallest peak of a mode, as a fraction of the largest peak; a pole with a lower peak is noise. A choice.
-const MODE: f64 = 2e-3;
+const LEAST_PEAK: f64 = 2e-3;
 
 /// Ratio of the mode shape at tool tip and sensor, for one mode and response direction.
 #[derive(Clone, Debug, PartialEq)]
@@ -95,7 +95,7 @@ fn nearest(ratios: &[ModeRatio], hertz: f64, response: Direction) -> Option<&Mod
     let off = |ratio: &ModeRatio| (ratio.frequency_hz / hertz).ln().abs();
     ratios
         .iter()
-        .filter(|ratio| ratio.response == response && off(ratio) < SAME)
+        .filter(|ratio| ratio.response == response && off(ratio) < SAME_MODE)
         .min_by(|a, b| off(a).total_cmp(&off(b)))
 }
 
@@ -150,12 +150,12 @@ fn ratios(housing: &FrfTable, tip: &FrfTable) -> Result<Vec<ModeRatio>, FrfError
                 continue;
             }
             let ratio = residues.iter().map(|(s, t)| (t * s.conj()).re).sum::<f64>() / power;
-            let rest: f64 = residues.iter().map(|(s, t)| (t - s * ratio).norm_sqr()).sum();
+            let residual: f64 = residues.iter().map(|(s, t)| (t - s * ratio).norm_sqr()).sum();
             ratios.push(ModeRatio {
                 frequency_hz: modes.frequency_hz(mode),
                 response,
                 ratio,
-                misfit: (rest / power).sqrt() / ratio.abs(),
+                misfit: (residual / power).sqrt() / ratio.abs(),
             });
         }
     }
@@ -168,7 +168,7 @@ fn modes(frequency_hz: &[f64], functions: &[&[Complex64]]) -> Result<RationalFit
     let mut best: Option<RationalFit> = None;
     let mut refused = None;
     // Number of successive mode counts without improvement. The search stops after two, since a further mode may help only with the next.
-    let mut in_vain = 0;
+    let mut without_improvement = 0;
     for count in 1..=MODES_MAX {
         let next = match fit(frequency_hz, functions, count) {
             Ok(next) => next,
@@ -179,13 +179,15 @@ fn modes(frequency_hz: &[f64], functions: &[&[Complex64]]) -> Result<RationalFit
             }
         };
         match &best {
-            Some(before) if next.rest > (1.0 - WORTH) * before.rest => in_vain += 1,
+            Some(before) if next.residual > (1.0 - LEAST_DECREASE) * before.residual => {
+                without_improvement += 1
+            }
             _ => {
                 best = Some(next);
-                in_vain = 0;
+                without_improvement = 0;
             }
         }
-        if in_vain == 2 || best.as_ref().is_some_and(|best| best.rest < GOOD) {
+        if without_improvement == 2 || best.as_ref().is_some_and(|best| best.residual < SMALL_RESIDUAL) {
             break;
         }
     }
@@ -212,7 +214,7 @@ fn mode_numbers(modes: &RationalFit) -> Vec<usize> {
             pole.re.abs() < 0.3 * pole.norm()
                 && functions
                     .clone()
-                    .any(|function| height(function, mode) > MODE * highest[function])
+                    .any(|function| height(function, mode) > LEAST_PEAK * highest[function])
         })
         .collect()
 }

@@ -11,7 +11,7 @@ use super::{Error, Output, finite, positive};
 use crate::file;
 use crate::frf::{
     Estimator, Excitation, FrfError, FrfTable, HammerWindows, Measurement, MeasurementSettings, ModeRatio,
-    Part, Window, calibrate, measure,
+    RecordingGroup, Window, calibrate, measure,
 };
 use crate::identify::student::NINETY_PERCENT;
 use crate::recording::UffForm;
@@ -312,7 +312,7 @@ impl FrfOutput {
             // An FRF table has at least one frequency line.
             frequency_hz: [frequency_hz[0], frequency_hz[frequency_hz.len() - 1]],
             lines: frequency_hz.len(),
-            parts: measurement.parts.iter().map(ColumnsAnswer::new).collect(),
+            parts: measurement.groups.iter().map(ColumnsAnswer::new).collect(),
             receptances,
             calibration: calibration
                 .iter()
@@ -371,7 +371,7 @@ impl FrfOutput {
 }
 
 impl ColumnsAnswer {
-    fn new(part: &Part) -> Self {
+    fn new(part: &RecordingGroup) -> Self {
         Self {
             forces: part.forces.iter().map(|direction| direction.name()).collect(),
             excitation: part.excitation.name(),

@@ -1,28 +1,28 @@
 //! Spectra of records with continuous excitation: random, cuts and sweeps.
 
 use crate::cross_spectra::{CrossSpectra, Segments, averaged, smoothed};
-use crate::driven::Driven;
 use crate::error::FrfError;
 use crate::excitation::Excitation;
 use crate::measurement_settings::{MeasurementSettings, band};
+use crate::test_channels::TestChannels;
 use crate::window::fast_length;
 
 /// Auto- and cross-spectra of a record with continuous excitation, at the frequency lines of the band to evaluate.
 pub(super) fn steady(
     excitation: Excitation,
-    driven: &Driven<'_>,
-    members: &[Driven<'_>],
+    channels: &TestChannels<'_>,
+    members: &[TestChannels<'_>],
     settings: &MeasurementSettings,
 ) -> Result<CrossSpectra, FrfError> {
-    let rate = driven.recording.sample_rate_hz;
+    let rate = channels.recording.sample_rate_hz;
     let samples = members
         .iter()
         .map(|member| member.recording.len())
         .min()
         .unwrap_or(0);
-    let forces = driven.forces.len();
+    let forces = channels.forces.len();
     let too_short = |needed: usize| FrfError::Content {
-        path: driven.recording.path.clone(),
+        path: channels.recording.path.clone(),
         what: format!(
             "{samples} samples ({:.3} s), but a resolution of {} Hz needs {needed}",
             samples as f64 / rate,
@@ -30,7 +30,7 @@ pub(super) fn steady(
         ),
     };
     if excitation == Excitation::Sweep {
-        let length = fast_length(driven.recording.len());
+        let length = fast_length(channels.recording.len());
         let width = match settings.resolution_hz {
             Some(hertz) => (hertz * length as f64 / rate).round() as usize,
             None => LINES_PER_FORCE * forces,
@@ -39,7 +39,7 @@ pub(super) fn steady(
             return Err(too_short((rate / settings.resolution_hz.unwrap_or(1.0)) as usize));
         }
         let band = band(settings, rate, length);
-        return Ok(smoothed(&driven.signals(), rate, TAPER, width, band));
+        return Ok(smoothed(&channels.signals(), rate, TAPER, width, band));
     }
     let length = match settings.resolution_hz {
         Some(hertz) => (rate / hertz).round() as usize,
@@ -52,10 +52,10 @@ pub(super) fn steady(
     let segments = Segments::overlapping(
         settings.window.weights(length),
         settings.overlap,
-        driven.recording.len(),
+        channels.recording.len(),
     );
     Ok(averaged(
-        &driven.signals(),
+        &channels.signals(),
         rate,
         &segments,
         band(settings, rate, length),

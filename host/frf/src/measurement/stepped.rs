@@ -1,19 +1,19 @@
 //! Receptances of a step-sine test: one phasor ratio per frequency step.
 
-use super::part::{Measured, Part, receptances};
-use crate::driven::Driven;
+use super::recording_group::{MeasuredGroup, RecordingGroup, receptances};
 use crate::error::FrfError;
-use crate::estimate::Line;
+use crate::estimate::FrfLine;
 use crate::measurement_settings::MeasurementSettings;
-use crate::step_sine::{self, Level};
+use crate::step_sine::{self, ForceLevel};
+use crate::test_channels::TestChannels;
 
 /// Measures the receptances of a step-sine test, one frequency line per step.
 pub(super) fn stepped(
-    mut part: Part,
-    members: &[Driven<'_>],
+    mut group: RecordingGroup,
+    members: &[TestChannels<'_>],
     settings: &MeasurementSettings,
     mut warnings: Vec<String>,
-) -> Result<Measured, FrfError> {
+) -> Result<MeasuredGroup, FrfError> {
     let first = &members[0];
     if let [_, second, ..] = members {
         return Err(FrfError::Content {
@@ -46,11 +46,11 @@ pub(super) fn stepped(
         ));
     }
     let (low, high) = settings.band_hz.unwrap_or((0.0, f64::INFINITY));
-    let lines: Vec<Line> = steps
+    let lines: Vec<FrfLine> = steps
         .iter()
         .filter(|step| (low..=high).contains(&step.frequency_hz))
         .map(|step| {
-            let mut line = Line {
+            let mut line = FrfLine {
                 frequency_hz: step.frequency_hz,
                 h: crate::small_matrix::ZERO,
                 coherence: [0.0; 3],
@@ -65,18 +65,18 @@ pub(super) fn stepped(
             line
         })
         .collect();
-    part.averages = 1.0;
-    Ok(receptances(part, &lines, first, warnings))
+    group.averages = 1.0;
+    Ok(receptances(group, &lines, first, warnings))
 }
 
 /// Force level to evaluate: the only level of the test, or the level nearest to `force_n`, N.
-fn level(driven: &Driven<'_>, force_n: Option<f64>) -> Result<Level, FrfError> {
-    let mut levels = step_sine::levels(driven)?;
+fn level(channels: &TestChannels<'_>, force_n: Option<f64>) -> Result<ForceLevel, FrfError> {
+    let mut levels = step_sine::levels(channels)?;
     let all: Vec<String> = levels
         .iter()
         .map(|level| format!("{:.4}", level.force_n))
         .collect();
-    let off = |level: &Level, wanted: f64| (level.force_n / wanted).ln().abs();
+    let off = |level: &ForceLevel, wanted: f64| (level.force_n / wanted).ln().abs();
     let found = match force_n {
         None if levels.len() == 1 => Some(0),
         None => None,
@@ -87,7 +87,7 @@ fn level(driven: &Driven<'_>, force_n: Option<f64>) -> Result<Level, FrfError> {
     match found {
         Some(index) => Ok(levels.swap_remove(index)),
         None => Err(FrfError::Content {
-            path: driven.recording.path.clone(),
+            path: channels.recording.path.clone(),
             what: format!(
                 "a step-sine test at {} N; say by --force-n which of these is meant",
                 all.join(", ")

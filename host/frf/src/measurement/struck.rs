@@ -1,16 +1,16 @@
 //! Spectra of hammer tests.
 
-use super::part::Part;
+use super::recording_group::RecordingGroup;
 use crate::cross_spectra::{CrossSpectra, Segments, averaged};
-use crate::driven::Driven;
 use crate::error::FrfError;
 use crate::hammer::{self, MeasuredImpact};
 use crate::measurement_settings::{MeasurementSettings, band};
+use crate::test_channels::TestChannels;
 
 /// Auto- and cross-spectra of hammer tests with one segment for each single impact; one result for each recording.
 pub(super) fn struck(
-    part: &mut Part,
-    members: &[Driven<'_>],
+    group: &mut RecordingGroup,
+    members: &[TestChannels<'_>],
     settings: &MeasurementSettings,
     warnings: &mut Vec<String>,
 ) -> Result<Vec<CrossSpectra>, FrfError> {
@@ -20,7 +20,7 @@ pub(super) fn struck(
     }
     let mut cuts = members
         .iter()
-        .map(|driven| hammer::segments(driven, windows))
+        .map(|channels| hammer::segments(channels, windows))
         .collect::<Result<Vec<_>, _>>()?;
     let rate = members[0].recording.sample_rate_hz;
     let length = cuts.iter().map(|cut| cut.length).min().unwrap_or(0);
@@ -29,11 +29,11 @@ pub(super) fn struck(
         windows.segment_s = Some(length as f64 / rate);
         cuts = members
             .iter()
-            .map(|driven| hammer::segments(driven, windows))
+            .map(|channels| hammer::segments(channels, windows))
             .collect::<Result<Vec<_>, _>>()?;
     }
     let (mut used, mut double) = (Vec::new(), Vec::new());
-    let mut left_over = 0.0_f64;
+    let mut end_amplitude = 0.0_f64;
     let spectra = cuts
         .into_iter()
         .map(|cut| {
@@ -47,7 +47,7 @@ pub(super) fn struck(
             let spectra = averaged(&signals, rate, &segments, band(settings, rate, cut.length));
             used.extend(cut.used);
             double.extend(cut.double);
-            left_over = left_over.max(cut.left_over);
+            end_amplitude = end_amplitude.max(cut.end_amplitude);
             spectra
         })
         .collect();
@@ -64,10 +64,10 @@ pub(super) fn struck(
             used.len()
         ));
     }
-    if left_over > LEFT_OVER {
+    if end_amplitude > END_AMPLITUDE {
         warnings.push(format!(
             "the response still is {:.0} % of its peak where segments end, which biases resonances; longer segments or an exponential window help",
-            100.0 * left_over
+            100.0 * end_amplitude
         ));
     }
     if let Some(tau) = windows.exponential_s {
@@ -76,10 +76,10 @@ pub(super) fn struck(
             1.0 / tau
         ));
     }
-    part.impacts = Some((used, double));
+    group.impacts = Some((used, double));
     Ok(spectra)
 }
 
 /// Largest amplitude at the end of a segment without a warning, as a fraction of the peak. Truncation biases a resonance by about twice this
 /// fraction. A choice.
-const LEFT_OVER: f64 = 0.02;
+const END_AMPLITUDE: f64 = 0.02;

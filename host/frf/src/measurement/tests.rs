@@ -195,9 +195,9 @@ fn welch_finds_the_receptances_of_one_force() {
         let error = error(&measurement, name);
         assert!(error < 0.03, "{name}: {error}");
     }
-    let part = &measurement.parts[0];
+    let group = &measurement.groups[0];
     // 59 segments that overlap by half are worth 1/18 less.
-    assert!((part.averages - 56.8).abs() < 2.5, "{}", part.averages);
+    assert!((group.averages - 56.8).abs() < 2.5, "{}", group.averages);
 }
 
 #[test]
@@ -348,7 +348,7 @@ fn three_forces_at_once_give_nine_receptances_and_intervals_that_cover() {
         };
         let measurement = measure(std::slice::from_ref(&recording), &settings).unwrap();
         assert_eq!(measurement.table.entries().len(), 9);
-        assert!((0.5..1.0).contains(&measurement.parts[0].least_singular));
+        assert!((0.5..1.0).contains(&measurement.groups[0].least_singular));
         for (entry, deviation) in measurement.table.entries().iter().zip(&measurement.deviation) {
             let (p, q) = (entry.response.axis().unwrap(), entry.force.axis().unwrap());
             // The noise is there everywhere; away from resonances the window has no bias of its own.
@@ -447,7 +447,7 @@ fn impacts_become_segments_and_double_impacts_are_left_out() {
     let mut recording = record(TestKind::Hammer, along_y(force), 0.002, &mut random);
     recording.channels[0].samples = with_noise(&recording.channels[0].samples, 0.002, &mut random);
     let measurement = measure(std::slice::from_ref(&recording), &in_band()).unwrap();
-    let (used, double) = measurement.parts[0].impacts.clone().unwrap();
+    let (used, double) = measurement.groups[0].impacts.clone().unwrap();
     assert_eq!((used.len(), double.len()), (4, 1));
     assert!((used[0].peak_n - 200.0).abs() < 5.0 && (used[0].time_s - 1.015).abs() < 0.005);
     let (delay_s, part) = double[0].second.unwrap();

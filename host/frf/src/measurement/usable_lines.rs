@@ -1,13 +1,13 @@
 //! Selection of the frequency lines with sufficient and independent forces.
 
-use super::part::Part;
+use super::recording_group::RecordingGroup;
 use crate::cross_spectra::CrossSpectra;
-use crate::estimate::{DEPENDENT, Line, Shape};
+use crate::estimate::{ChannelCounts, DEPENDENT, FrfLine};
 
 /// Removes the frequency lines outside the range of a sweep, where the force is too small.
-pub(super) fn keep_driven(lines: &mut Vec<Line>, spectra: &[CrossSpectra], shape: Shape) {
+pub(super) fn keep_excited(lines: &mut Vec<FrfLine>, spectra: &[CrossSpectra], counts: ChannelCounts) {
     let power = |line: usize| -> f64 {
-        let forces = (0..shape.forces).map(|force| {
+        let forces = (0..counts.forces).map(|force| {
             spectra
                 .iter()
                 .map(|test| test.at(line, force, force).re)
@@ -17,26 +17,30 @@ pub(super) fn keep_driven(lines: &mut Vec<Line>, spectra: &[CrossSpectra], shape
     };
     let frequency_hz = spectra.first().map_or(&[][..], |test| &test.frequency_hz);
     let largest = (0..frequency_hz.len()).map(power).fold(0.0, f64::max);
-    let is_driven = |line: &Line| {
+    let is_excited = |line: &FrfLine| {
         let at = frequency_hz.partition_point(|&hertz| hertz < line.frequency_hz);
-        at < frequency_hz.len() && power(at) > DRIVEN * largest
+        at < frequency_hz.len() && power(at) > EXCITED * largest
     };
-    lines.retain(is_driven);
+    lines.retain(is_excited);
 }
 
 /// Smallest force power of a line within the range of a sweep, as a fraction of the largest. At resonances the force of a shaker drops to
 /// about 1e-2 of the largest power.
-const DRIVEN: f64 = 1e-3;
+const EXCITED: f64 = 1e-3;
 
 /// Removes the frequency lines at which the forces are linearly dependent; an error if these are more than half of all lines.
-pub(super) fn independent(lines: &mut Vec<Line>, part: &mut Part, shape: Shape) -> Result<(), String> {
+pub(super) fn independent(
+    lines: &mut Vec<FrfLine>,
+    group: &mut RecordingGroup,
+    counts: ChannelCounts,
+) -> Result<(), String> {
     let count = lines.len();
-    let dependent: Vec<Line> = lines
+    let dependent: Vec<FrfLine> = lines
         .iter()
         .filter(|line| line.singular.0 < DEPENDENT)
         .copied()
         .collect();
-    let names: Vec<String> = part
+    let names: Vec<String> = group
         .forces
         .iter()
         .map(|direction| format!("f{direction}"))
@@ -56,9 +60,9 @@ pub(super) fn independent(lines: &mut Vec<Line>, part: &mut Part, shape: Shape) 
         ));
     }
     lines.retain(|line| line.singular.0 >= DEPENDENT);
-    part.left_out_hz = dependent.iter().map(|line| line.frequency_hz).collect();
-    if shape.forces > 1 {
-        part.least_singular = lines
+    group.left_out_hz = dependent.iter().map(|line| line.frequency_hz).collect();
+    if counts.forces > 1 {
+        group.least_singular = lines
             .iter()
             .map(|line| line.singular.0)
             .fold(f64::INFINITY, f64::min);

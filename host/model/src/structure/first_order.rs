@@ -51,7 +51,7 @@ impl FirstOrder {
     /// The same structure in the axes of a feed direction at `angle_deg` from x towards y, degrees.
     ///
     /// Force and displacement are then in feed, normal and axial direction.
-    pub fn turned(&self, angle_deg: f64) -> Self {
+    pub fn rotated(&self, angle_deg: f64) -> Self {
         let machine_from_feed = feed_axes(angle_deg);
         Self {
             a: self.a.clone(),
@@ -237,12 +237,12 @@ mod tests {
         let case = case("kuka-kr90-full");
         let first_order = case.structure().unwrap().first_order().unwrap();
         let machine = first_order.receptance(100.0).unwrap();
-        let turned = first_order.turned(90.0).receptance(100.0).unwrap();
+        let rotated = first_order.rotated(90.0).receptance(100.0).unwrap();
         let close = |p: Complex64, q: Complex64| (p - q).norm() < 1e-12 * machine.norm();
         // The feed is the machine's y, the normal its −x.
-        assert!(close(turned[(0, 0)], machine[(1, 1)]));
-        assert!(close(turned[(1, 1)], machine[(0, 0)]));
-        assert!(close(turned[(0, 1)], -machine[(1, 0)]));
+        assert!(close(rotated[(0, 0)], machine[(1, 1)]));
+        assert!(close(rotated[(1, 1)], machine[(0, 0)]));
+        assert!(close(rotated[(0, 1)], -machine[(1, 0)]));
     }
 
     #[test]

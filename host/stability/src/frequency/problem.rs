@@ -72,7 +72,7 @@ impl FrequencyProblem {
     /// lines.
     pub fn of_table(case: &Case, table: &FrfTable) -> Result<Self, StabilityError> {
         let (process, teeth) = cutting(case, Treated::LinearProcess)?;
-        let interpolation = Interpolation::new(table)?.turned(case.cut()?.feed_direction_deg);
+        let interpolation = Interpolation::new(table)?.rotated(case.cut()?.feed_direction_deg);
         Ok(Self {
             receptance: Receptance::Table(interpolation),
             process,

@@ -130,7 +130,7 @@ impl EquivalentProblem {
             });
         }
         let feed_direction_deg = case.cut()?.feed_direction_deg;
-        let machine = smooth.linear.structure.turned(-feed_direction_deg);
+        let machine = smooth.linear.structure.rotated(-feed_direction_deg);
         let order = machine.order();
         let at_rest = machine.receptance(0.0);
         let stiffness = std::array::from_fn(|axis| {

@@ -176,7 +176,7 @@ impl ForcedProblem {
             _ => None,
         };
         let about = about_orbit(case)?;
-        let machine = linear.structure.turned(-case.cut()?.feed_direction_deg);
+        let machine = linear.structure.rotated(-case.cut()?.feed_direction_deg);
         let jump = (&machine.c * &machine.b).amax();
         let inertial = jump <= 1e-6 * machine.c.amax() * machine.b.amax() * machine.order() as f64;
         if !inertial && (about.law.process_damping.is_some() || !about.terms.is_empty()) {
@@ -237,7 +237,7 @@ impl ForcedProblem {
         damping: [f64; 3],
         force_n: [f64; 3],
     ) -> Self {
-        let machine = self.linear.structure.turned(-feed_direction_deg);
+        let machine = self.linear.structure.rotated(-feed_direction_deg);
         let mut changed = self.clone();
         for axis in 0..3 {
             let displacement = machine.c.row(axis);

@@ -75,7 +75,7 @@ impl Problem {
             });
         }
         Ok(Self {
-            structure: extension::structure(case)?.turned(case.cut()?.feed_direction_deg),
+            structure: extension::structure(case)?.rotated(case.cut()?.feed_direction_deg),
             process,
             teeth,
         })

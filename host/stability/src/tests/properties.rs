@@ -234,7 +234,7 @@ proptest! {
         let turn = DMatrix::from_fn(2, 2, |i, j| axes[(i, j)]);
         let turned = machine.matrices().map(|matrix| &turn * matrix * turn.transpose());
         let mut problem = machine.problem_of(turned, 1.0);
-        problem.structure = problem.structure.turned(angle_deg);
+        problem.structure = problem.structure.rotated(angle_deg);
         let (rpm, depth_mm) = (machine.rpm(), machine.depth_mm());
         let (a, b) = (depths(&machine.problem(), rpm, depth_mm), depths(&problem, rpm, depth_mm));
         prop_assert!(same(&a, 1.0, &b, depth_mm, LIMIT), "{a:?} {b:?}");

@@ -7,7 +7,7 @@ use super::FrfError;
 
 /// Force and response channels of one recording, for the measurement of FRFs.
 #[derive(Clone, Debug)]
-pub(super) struct Driven<'a> {
+pub(super) struct TestChannels<'a> {
     /// The recording.
     pub(super) recording: &'a Recording,
     /// Force channels with directions, in the order x, y, z.
@@ -27,7 +27,7 @@ pub(super) struct Response<'a> {
     pub(super) derivatives: i32,
 }
 
-impl<'a> Driven<'a> {
+impl<'a> TestChannels<'a> {
     /// Selects forces and responses; `chosen` restricts them to the named channels.
     ///
     /// Forces are the channels that the sidecar names as inputs; without that key, all force channels that are not constant. Of several
@@ -50,21 +50,21 @@ impl<'a> Driven<'a> {
             !chosen.iter().any(of_this_kind) || chosen.contains(&channel.name)
         };
         let (responses, warnings) = responses(recording, is_chosen);
-        let driven = Self {
+        let channels = Self {
             forces: forces(recording, is_chosen)?,
             responses,
             recording,
             warnings,
         };
-        if driven.forces.is_empty() {
+        if channels.forces.is_empty() {
             return Err(refused(recording.lacks("force fx, fy or fz that drives it")));
         }
-        if driven.responses.is_empty() {
+        if channels.responses.is_empty() {
             return Err(refused(recording.lacks(
                 "response: a displacement x, y, z, a velocity vx … or an acceleration ax …",
             )));
         }
-        Ok(driven)
+        Ok(channels)
     }
 
     /// Directions of the forces.

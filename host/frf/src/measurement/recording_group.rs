@@ -2,16 +2,16 @@
 
 use num_complex::Complex64;
 
-use crate::driven::Driven;
-use crate::estimate::Line;
+use crate::estimate::FrfLine;
 use crate::excitation::Excitation;
 use crate::hammer::MeasuredImpact;
 use crate::table::Frf;
+use crate::test_channels::TestChannels;
 use quietcut_model::structure::Direction;
 
 /// Group of recordings with the same forces and excitation, evaluated together.
 #[derive(Clone, Debug)]
-pub struct Part {
+pub struct RecordingGroup {
     /// Number of recordings in the group.
     pub recordings: usize,
     /// Directions of the forces.
@@ -30,8 +30,8 @@ pub struct Part {
 }
 
 /// Receptances of one group, with their standard deviations, at the frequencies of the group.
-pub(super) struct Measured {
-    pub(super) part: Part,
+pub(super) struct MeasuredGroup {
+    pub(super) group: RecordingGroup,
     pub(super) frequency_hz: Vec<f64>,
     pub(super) entries: Vec<(Frf, Vec<f64>)>,
     pub(super) warnings: Vec<String>,
@@ -39,23 +39,23 @@ pub(super) struct Measured {
 
 /// Converts FRF lines to receptances in m/N: integrates velocities and accelerations.
 pub(super) fn receptances(
-    part: Part,
-    lines: &[Line],
-    driven: &Driven<'_>,
+    group: RecordingGroup,
+    lines: &[FrfLine],
+    channels: &TestChannels<'_>,
     mut warnings: Vec<String>,
-) -> Measured {
+) -> MeasuredGroup {
     let frequency_hz: Vec<f64> = lines.iter().map(|line| line.frequency_hz).collect();
-    if !part.left_out_hz.is_empty() {
+    if !group.left_out_hz.is_empty() {
         warnings.push(format!(
             "the forces are not independent at {} frequencies, which are left out (the first is {:.3} Hz)",
-            part.left_out_hz.len(),
-            part.left_out_hz[0]
+            group.left_out_hz.len(),
+            group.left_out_hz[0]
         ));
     }
     let mut entries = Vec::new();
-    for (p, response) in driven.responses.iter().enumerate() {
-        for (q, &force) in part.forces.iter().enumerate() {
-            let integrated = |line: &Line| {
+    for (p, response) in channels.responses.iter().enumerate() {
+        for (q, &force) in group.forces.iter().enumerate() {
+            let integrated = |line: &FrfLine| {
                 Complex64::new(0.0, std::f64::consts::TAU * line.frequency_hz).powi(-response.derivatives)
             };
             let entry = Frf {
@@ -71,8 +71,8 @@ pub(super) fn receptances(
             entries.push((entry, deviation));
         }
     }
-    Measured {
-        part,
+    MeasuredGroup {
+        group,
         frequency_hz,
         entries,
         warnings,
