@@ -1,7 +1,7 @@
-//! Chapter 3 of the thesis, side by side: averaged and periodic coefficients, eq. 3.7 and the whole of eq. 3.6 linearized
-//! about its forced orbit, for the Staubli TX200, with what the thesis states.
+//! Chapter 3 of the thesis: first limits of the Staubli TX200 from averaged coefficients, from periodic coefficients with eq.
+//! 3.7, and from the whole of eq. 3.6 linearized about its forced orbit, compared with the printed limits.
 //!
-//! To see the table: `cargo test --release -p quietcut-tests --test chapter_3 -- --nocapture`
+//! To print the table: `cargo test --release -p quietcut-tests --test chapter_3 -- --nocapture`
 
 #![allow(clippy::expect_used)]
 
@@ -11,7 +11,7 @@ use quietcut::case::Case;
 use quietcut::orbit::ForcedProblem;
 use quietcut::stability::{Collocation, CubicTerms, FrequencyProblem, Method, MultiFrequency, Problem, Zoa};
 
-/// First limits at one speed, mm.
+/// First stability limits at one spindle speed, mm.
 struct Limits {
     averaged_bare: f64,
     averaged: f64,
@@ -96,7 +96,7 @@ fn chapter_3_side_by_side() {
         "the thesis, averaged eq. 3.7 to simulated eq. 3.6", "+6 %", "-9 %"
     );
 
-    // Half a unit of the last printed digit.
+    // The tolerance is half a unit of the last printed digit.
     for (found, printed) in [
         (fast.averaged_bare, 0.6527),
         (fast.averaged, 0.6534),
@@ -113,7 +113,7 @@ fn chapter_3_side_by_side() {
         (bare_slow + 9.2).abs() < 0.06 && (period_slow + 9.3).abs() < 0.06,
         "{period_slow}"
     );
-    // The multi-frequency solution settles to 1e-4.
+    // The multi-frequency solution converges to a relative error of 1e-4.
     assert!(percent(fast.periodic, fast.harmonics).abs() < 1e-2);
     assert!(percent(slow.periodic, slow.harmonics).abs() < 1e-2);
 }

@@ -1,5 +1,5 @@
-//! Wrong input: one clear message that names file, line or key, the value found and what would be right; exit status 2;
-//! and nothing is written.
+//! Wrong input gives one message that names file, line or key, the wrong value and the valid values. The exit status is 2, and
+//! no file is written.
 #![allow(clippy::expect_used)]
 
 use std::fs;
@@ -13,7 +13,7 @@ fn case_text() -> String {
     fs::read_to_string(cases().join("kuka-kr90-acetal.toml")).expect("the case is there")
 }
 
-/// Runs `quietcut lobes` on the case file after one text of it was replaced.
+/// Runs `quietcut lobes` on a case file in which the text `right` is replaced by `wrong`.
 fn with(folder: &Path, right: &str, wrong: &str) -> Outcome {
     let text = case_text();
     assert!(text.contains(right), "{right}");
@@ -170,7 +170,7 @@ fn samples_that_are_no_numbers_are_refused_or_left_out_by_every_verb() {
         ]);
         with(&["--from-s", "0.0001"]).refused(&["a.csv", "\"ax\"", "sample 3 at 0.0002 s is NaN"]);
         with(&["--until-s", "0.0001"]).refused(&["a.csv", "--until-s 0.0001 leaves 1 samples", "0.0003 s"]);
-        // The part before has too little in it, but nothing of it is refused as no number.
+        // The segment before the NaN may be refused as too short, but it contains no NaN that a message could name.
         let before = with(&["--until-s", "0.0002"]);
         assert!(
             !before.stderr.contains("NaN") && !before.stderr.contains("nan"),
@@ -198,7 +198,7 @@ fn wrong_sidecars_of_recordings() {
 }
 
 #[test]
-fn tables_that_are_none() {
+fn files_that_are_no_tables() {
     let folder = folder();
     let run = |arguments: &[&str]| quietcut(folder.path(), arguments);
     let good = quietcut_tests::small_table::table("good", 1.5, 20);

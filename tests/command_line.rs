@@ -1,4 +1,4 @@
-//! The command as a user meets it: help that runs, exit status, one clear message for each wrong input.
+//! The command line: examples of the help run, exit statuses, and one message for each wrong input.
 
 #![allow(clippy::expect_used)]
 
@@ -90,7 +90,7 @@ fn a_virtual_cut_that_cannot_be_is_refused_and_leaves_no_file() {
     let left: Vec<_> = std::fs::read_dir(folder.path()).expect("the folder").collect();
     assert!(left.is_empty(), "{left:?}");
 
-    // The sidecar must not be written over a case of the same name.
+    // A case with the name of the sidecar must not be overwritten by it.
     std::fs::copy(&acetal, folder.path().join("cut.toml")).expect("a copy of the case");
     let own = ["simulate", "cut.toml", "--rpm", "900", "--out", "cut.csv"];
     quietcut(folder.path(), &[&own[..], &long[..]].concat()).refused(&["cut.toml", "overwrite the case"]);
@@ -135,7 +135,7 @@ fn the_same_seed_cuts_the_same_file_and_it_replays() {
 
 #[test]
 fn examples_run() {
-    // Beside each other: examples of one verb use what the line before has made.
+    // The verbs run in parallel. The examples of one verb run in order, because later ones use files of earlier ones.
     std::thread::scope(|scope| {
         for verb in VERBS {
             scope.spawn(move || {

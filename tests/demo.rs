@@ -14,22 +14,22 @@ fn number(value: &Value) -> f64 {
 fn chatter_is_detected_and_the_advised_cut_is_quiet() {
     let folder = folder();
     let answer = quietcut(folder.path(), &["demo", "--out", "shown", "--json"]).json();
-    // What is promised, on two cores; a busy machine may need longer than the two seconds that were measured.
+    // Largest time that the help promises, on two cores. Two seconds were measured on an idle machine.
     assert!(number(&answer["seconds"]) < 60.0, "{answer}");
 
     let stories = answer["stories"].as_array().expect("stories");
     assert_eq!(stories.len(), 2);
     for (story, rpm, verdict, chatter_hz) in [
-        // Half the tooth passing.
+        // The chatter frequency of a flip is half the tooth-passing frequency.
         (&stories[0], 1045.0, "period-doubling", 1045.0 / 60.0),
-        // The angle of the dominant multiplier there.
+        // The chatter frequency of a Hopf bifurcation, from the angle of the dominant Floquet multiplier.
         (&stories[1], 900.0, "hopf", 17.4718),
     ] {
         let (first, advised) = (&story["first"], &story["advised"]);
         assert_eq!((number(&first["rpm"]), number(&first["depth_mm"])), (rpm, 2.0));
         let alarm = &first["alarm"];
         assert_eq!(alarm["verdict"], verdict, "{first}");
-        // A tenth of a bin of the device's spectrum, 0.8 Hz.
+        // The tolerance is a tenth of a bin of the device's spectrum: 0.8 Hz.
         assert!(
             (number(&alarm["chatter_hz"]) - chatter_hz).abs() < 0.08,
             "{alarm}"
@@ -46,12 +46,12 @@ fn chatter_is_detected_and_the_advised_cut_is_quiet() {
             let axes = trial["vibration_m_per_s2"].as_array().expect("three axes");
             axes.iter().map(number).fold(0.0, f64::max)
         };
-        // The advised cut vibrates with its teeth, the first one with more than that.
+        // The first cut has chatter besides the forced vibration, the advised cut only the forced vibration.
         assert!(loudest(first) > 2.0 * loudest(advised), "{story}");
     }
 
     let report = fs::read_to_string(folder.path().join("shown/report.html")).expect("the report is there");
-    // One chart; a signal, a spectrum and samples once per tooth for each of four cuts.
+    // The report has one chart, and for each of four cuts a signal, a spectrum and the samples once per tooth.
     assert_eq!(report.matches("<svg").count(), 13);
     assert!(report.trim_end().ends_with("</html>"));
     for outside in ["<script", "<link", "src=", "url("] {
@@ -66,7 +66,7 @@ fn chatter_is_detected_and_the_advised_cut_is_quiet() {
 }
 
 #[test]
-fn the_story_is_told_and_repeats() {
+fn the_demo_prints_its_results_and_a_second_run_repeats_them() {
     let folder = folder();
     let tell = |out: &str| {
         let told = quietcut(folder.path(), &["demo", "--out", out]);

@@ -1,6 +1,7 @@
 //! Error rates of the chatter detector over many noise seeds.
 //!
-//! The whole table, with so many seeds for each line (20 take some minutes), or of the lines that contain a text (`QUIETCUT_LINES=shaken`):
+//! Prints the whole table, with QUIETCUT_SEEDS seeds per line (20 take some minutes). With `QUIETCUT_LINES=shaken` it prints
+//! only the lines whose name contains this text:
 //!
 //! ```text
 //! QUIETCUT_SEEDS=20 cargo test --release -p quietcut-tests --test detector_rates -- --ignored --nocapture
@@ -33,8 +34,8 @@ fn check(rates: &[Rates]) {
 }
 
 #[test]
-fn hard_cuts_are_judged_right_with_other_seeds() {
-    // The flip, the slow torus beside it, and the largest forced vibration.
+fn verdicts_on_hard_cuts_are_right_with_other_seeds() {
+    // Three speeds: the flip, the torus with slow growth next to it, and the largest forced vibration.
     let lines = [3, 4, 9].into_iter().flat_map(Line::pair);
     check(&run(lines.collect(), 4));
 }

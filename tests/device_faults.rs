@@ -1,4 +1,4 @@
-//! The command with faulty devices: each fault has its own message and exit status 2.
+//! Faulty devices: the command answers each fault with its own message and exit status 2.
 #![allow(clippy::expect_used)]
 
 use std::fs;
@@ -193,7 +193,7 @@ fn frames_out_of_order() {
             },
         ))
     });
-    // The first frame may have any number; the next ones may not.
+    // The first frame may have any sequence number; each further frame must have the next one.
     device.info().refused(&[&device.path, "settings", "was due"]);
 }
 
@@ -224,7 +224,7 @@ fn a_port_that_is_unplugged() {
     let device = FaultyDevice::new(|_, _| Act::Unplug);
     device.info().refused(&[&device.path, "unplugged"]);
 
-    // In the middle of a session.
+    // The port is unplugged in the middle of a session, after the subscription.
     let mut sequence = Sequence::default();
     let mut subscribed = false;
     let device = FaultyDevice::new(move |request, asked| {
@@ -259,7 +259,7 @@ fn unplugged_at(is_last: fn(&Request) -> bool) -> FaultyDevice {
 }
 
 #[test]
-fn a_plug_pulled_in_the_middle_of_an_upload_or_a_replay() {
+fn a_device_unplugged_during_an_upload_or_a_replay() {
     let folder = folder();
     let run = |arguments: &[&str]| quietcut(folder.path(), arguments);
     fs::write(folder.path().join("a.qct"), table("good", 1.5, 50)).expect("a file");
@@ -276,7 +276,7 @@ fn a_plug_pulled_in_the_middle_of_an_upload_or_a_replay() {
 }
 
 #[test]
-fn ports_that_are_none() {
+fn paths_that_are_no_ports() {
     let folder = folder();
     let run = |port: &str| quietcut(folder.path(), &["info", port]);
     run("/dev/no-such-port").refused(&["/dev/no-such-port", "no such serial port", "simulated"]);

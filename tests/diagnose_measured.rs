@@ -1,4 +1,4 @@
-//! `quietcut diagnose` on records that others measured: `QUIETCUT_DATA` names the folder.
+//! `quietcut diagnose` on published measured records. `QUIETCUT_DATA` names their folder.
 
 #![allow(clippy::unwrap_used)]
 
@@ -58,7 +58,7 @@ fn names(diagnosis: &Diagnosis) -> Vec<&'static str> {
     diagnosis.causes.iter().map(|cause| cause.name).collect()
 }
 
-/// What is found stays found: with it in the baseline it is not named again.
+/// A cause that is added to the baseline is not found a second time.
 fn not_again(text: &str, found: &Diagnosis, recordings: &[Recording]) {
     let extended = found.extended_case(text).unwrap();
     let again = ask(&extended, recordings);
@@ -87,8 +87,8 @@ fn the_measured_silverbox_has_a_cubic_spring() {
         let mean = column.iter().sum::<f64>() / column.len() as f64;
         column.into_iter().map(|x| x - mean).collect::<Vec<f64>>()
     });
-    // The linear case: natural frequency and damping of small motion as published with the record, a spring of 1 N/m (the
-    // record is in volts).
+    // The linear baseline has the natural frequency and damping ratio of small motions that were published with the record. The
+    // stiffness is 1 N/m, because the record is in volts.
     let omega = std::f64::consts::TAU * 68.33;
     let believed = case_text(1.0 / (omega * omega), 2.0 * 0.0486 / omega, 1.0);
     let train = recording(
@@ -104,7 +104,7 @@ fn the_measured_silverbox_has_a_cubic_spring() {
     let k3 = found.causes[0].parameters["k3_n_per_m3"].value;
     assert!((k3 / 3.99 - 1.0).abs() < 0.02, "{k3}");
     not_again(&believed, &found, std::slice::from_ref(&train));
-    // As an extension it may not be named a second time; as a term of the structure it could be.
+    // Above, the cubic term was an extension of the case. As a term of the structure it must not be named again either.
     let inside = ask(
         &format!("{believed}cubic_stiffness = [[{k3:e}]]\n"),
         std::slice::from_ref(&train),
@@ -115,7 +115,7 @@ fn the_measured_silverbox_has_a_cubic_spring() {
         names(&inside)
     );
 
-    // The arrow is not part of the record above.
+    // Index of the first sample of the arrow-shaped signal, which is not part of the record above.
     let arrow = 40_585;
     let (mass, damping) = (1.0 / (omega * omega), 2.0 * 0.0486 / omega);
     let missed_mv = |k3: f64, gain: f64| {
@@ -136,7 +136,7 @@ fn the_measured_silverbox_has_a_cubic_spring() {
     assert!(before > 14.0 && after <= 0.96, "{before} {after}");
 }
 
-/// Up to here the motion of the stage stands out of its noise, Hz (as `identify` finds): the band in which its force is judged.
+/// Band in which the force is compared, Hz: up to here the motion of the stage exceeds its noise, as `identify` finds.
 const BAND_HZ: f64 = 40.0;
 
 #[test]
@@ -144,10 +144,10 @@ const BAND_HZ: f64 = 40.0;
 fn the_measured_positioning_stage_has_dry_friction() {
     let raw = Recording::read(measured("emps/DATA_EMPS.mat")).unwrap();
     let samples = |name: &str| raw.channel(name).unwrap().samples.clone();
-    // gtau of the file.
+    // The factor from volts to newtons is `gtau` of the file.
     let force: Vec<f64> = samples("vir").iter().map(|volts| 35.150_651_88 * volts).collect();
     let record = recording("emps.csv", 1000.0, &force, &samples("qm"), None);
-    // What a fit of mass and viscous damping alone gives.
+    // The baseline has the mass and the viscous damping that fit best without friction.
     let believed = case_text(95.208, 411.26, 0.0);
     let found = ask(&believed, std::slice::from_ref(&record));
     assert_eq!(names(&found), ["damping", "coulomb-friction"]);
@@ -157,7 +157,7 @@ fn the_measured_positioning_stage_has_dry_friction() {
         println!("{name}.{key}: {value:.2}, published {published:.2}");
         assert!((value / published - 1.0).abs() < 0.03, "{name}.{key}: {value}");
     };
-    // Published are 20.394 N both ways and an offset of −3.165 N.
+    // The published friction is 20.394 N in both directions, with an offset of −3.165 N.
     near("damping", "damping_ns_per_m", 203.50);
     near("coulomb-friction", "fc_n", 20.394 - 3.165);
     near("coulomb-friction", "fc_minus_n", 20.394 + 3.165);
@@ -166,7 +166,7 @@ fn the_measured_positioning_stage_has_dry_friction() {
     let (before, after) = (found.baseline.nrmse_heldout, again.baseline.nrmse_heldout);
     println!("force error {:.2} % -> {:.2} %", 100.0 * before, 100.0 * after);
     assert!(names(&again).is_empty(), "{:?}", names(&again));
-    // On what is held out, a third of the record.
+    // NRMSE on the held-out segments, a third of the record.
     assert!(before > 0.167 && after < 0.3 * before, "{before} {after}");
     let of = |name: &str, key: &str| {
         let cause = found.causes.iter().find(|cause| cause.name == name).unwrap();
@@ -182,7 +182,7 @@ fn the_measured_positioning_stage_has_dry_friction() {
         (ForceTerm::CoulombFriction, 0.5 * (plus + minus)),
         (ForceTerm::Offset, 0.5 * (plus - minus)),
     ];
-    // On the whole record, as such errors are published.
+    // The published errors refer to the whole record.
     let whole = Record {
         force: &force,
         motion: &samples("qm"),
@@ -201,7 +201,7 @@ fn the_measured_positioning_stage_has_dry_friction() {
 }
 const DAMPER_RATE_HZ: f64 = 1024.0;
 
-/// Inches to meters, kips to newtons.
+/// Factors from inches to meters and from kips to newtons.
 const INCH_M: f64 = 0.0254;
 const KIP_N: f64 = 4_448.221_6;
 
@@ -225,7 +225,7 @@ fn damper_record(folder: &Path, name: &str) -> Recording {
     )
 }
 
-/// Travel after a reversal over which the force stays below a share of what it is in sliding, in inches: the middle one of all.
+/// Median travel, in inches, after a reversal over which the force stays below this share of the sliding force.
 fn plateau_in(record: &Recording, share: f64) -> f64 {
     let smooth = |name: &str| -> Vec<f64> {
         let samples = &record.channel(name).unwrap().samples;
@@ -246,7 +246,7 @@ fn plateau_in(record: &Recording, share: f64) -> f64 {
         high[high.len() / 2]
     };
     let (plus, minus) = (sliding(1.0), sliding(-1.0));
-    // From where it has let go of one side to where it has taken hold of the other.
+    // Each width is the travel from the last sample with force on one side to the first sample with force on the other side.
     let mut widths = Vec::new();
     let (mut side, mut left_at) = (0.0, 0.0);
     for i in 0..x.len() {
@@ -268,7 +268,7 @@ fn plateau_in(record: &Recording, share: f64) -> f64 {
     widths[widths.len() / 2]
 }
 
-/// The play of the damper, in.
+/// The published backlash of the damper, in.
 const PUBLISHED_IN: f64 = 0.125;
 
 #[test]
@@ -277,7 +277,7 @@ fn the_measured_banded_damper_has_friction_behind_a_backlash() {
     let folder = measured("friction_backlash");
     let records =
         ["0.5Hz25lbtension", "1Hz35lbtension", "1Hz70lbtension"].map(|name| damper_record(&folder, name));
-    // A rod that slides: no spring and hardly a dashpot.
+    // The baseline is a sliding rod without spring and with a small viscous damper.
     let believed = case_text(1.0, 1e3, 1e3);
     let mut gaps_in = Vec::new();
     for some in [&records[..1], &records[1..2], &records[2..], &records[..]] {
@@ -291,13 +291,13 @@ fn the_measured_banded_damper_has_friction_behind_a_backlash() {
             some.len()
         );
         assert!(removed > 0.95, "{removed}");
-        // The loop is there to be looked at.
+        // The loop of force and displacement is part of the views of the answer.
         assert!(found.views.iter().all(|view| view.missing.is_some()));
         gaps_in.push([gap_in, from_in, to_in]);
         not_again(&believed, &found, some);
     }
-    // Published is a play of 0.125 in. All records together say it within 10 %, and their interval holds it. Of one record alone it is
-    // less sure: where nothing is said of how little force counts as none it is not a number, since friction takes hold gradually.
+    // The published backlash is 0.125 in. All records together give it within 10 %, with an interval that contains it. One
+    // record alone is less certain: the end of the backlash is gradual, because friction builds up gradually.
     let all = gaps_in.len() - 1;
     let [gap_in, from_in, to_in] = gaps_in[all];
     assert!((gap_in / PUBLISHED_IN - 1.0).abs() < 0.1, "{gap_in}");

@@ -1,4 +1,4 @@
-//! The twenty cuts of `simulated_cuts` in the emulator: its reports equal those of the host bit by bit.
+//! The twenty cuts of `simulated_cuts` in the emulator: its reports equal those of the host to the bit.
 #![allow(clippy::expect_used)]
 
 use std::sync::Mutex;
@@ -10,14 +10,15 @@ use quietcut_tests::acceptance::{ABOVE, AcceptanceCut, BELOW, LIMITS};
 use quietcut_tests::emulator::{Emulator, Memory, PATIENCE};
 use quietcut_tests::said::{Said, steps, stimuli};
 
-/// Subscription to every report; spectra and stroboscopic samples, which take longer to send than to compute, are compared in `emulated_device`.
+/// Subscription to all reports. Spectra and stroboscopic points take longer to send than to compute; `emulated_device` compares
+/// them.
 const REPORTS: Subscription = Subscription {
     reports: Reports::All,
     spectra: false,
     strobes: false,
 };
 
-/// Runs the signal chain over the cut on host and emulator; returns the outputs of the emulator.
+/// Runs the signal chain over the cut on host and emulator. Returns the outputs of the emulator.
 fn emulated(cut: &AcceptanceCut) -> Said {
     let sensed = cut
         .cut
@@ -47,7 +48,7 @@ fn emulated(cut: &AcceptanceCut) -> Said {
 }
 
 #[test]
-fn says_of_all_twenty_what_the_host_says_and_is_right() {
+fn the_verdicts_on_twenty_cuts_are_right_and_equal_those_of_the_host() {
     let cuts = (0..LIMITS.len()).flat_map(|index| [(index, BELOW), (index, ABOVE)]);
     let cuts = Mutex::new(cuts);
     let next = || cuts.lock().expect("no worker panics here").next();

@@ -1,5 +1,5 @@
-//! Hardware in the loop with simulated signals: the ARM image in the emulator, fed by a virtual spindle and asked by the
-//! host's client and by the real command.
+//! Hardware in the loop with simulated signals: the ARM image runs in the emulator, a virtual spindle feeds it, and the host's
+//! client and the real command send requests.
 #![allow(clippy::expect_used, clippy::panic)]
 
 use std::time::{Duration, Instant};
@@ -23,7 +23,7 @@ fn connect(emulator: &Emulator<'_>) -> (Client, Info) {
 }
 
 #[test]
-fn boots_and_says_who_it_is() {
+fn the_board_starts_and_states_its_identity() {
     let memory = Memory::erased();
     let emulator = Emulator::start(&memory);
     assert!(
@@ -41,10 +41,12 @@ fn boots_and_says_who_it_is() {
 }
 
 #[test]
-fn the_command_uploads_tells_and_asks() {
+fn the_command_uploads_a_table_and_sets_and_reads_the_working_point() {
     let memory = Memory::erased();
     let emulator = Emulator::start(&memory);
-    scenario::the_command_uploads_tells_and_asks(emulator.serial_device().path());
+    scenario::the_command_uploads_a_table_and_sets_and_reads_the_working_point(
+        emulator.serial_device().path(),
+    );
 }
 
 #[test]
@@ -55,10 +57,10 @@ fn the_command_replays_a_recording() {
 }
 
 #[test]
-fn bad_frames_are_named_and_harm_nothing() {
+fn invalid_frames_have_their_own_errors_and_change_nothing() {
     let memory = Memory::erased();
     let emulator = Emulator::start(&memory);
-    scenario::bad_frames_are_named_and_harm_nothing(&|| Box::new(emulator.port()));
+    scenario::invalid_frames_have_their_own_errors_and_change_nothing(&|| Box::new(emulator.port()));
 }
 
 #[test]
@@ -82,7 +84,7 @@ fn a_table_survives_a_restart() {
     let emulator = Emulator::start(&memory);
     let (_, info) = connect(&emulator);
     assert_eq!(name_in_use(&info), "lasting");
-    // The payload stands in the flash, byte for byte, behind the header with its own generation.
+    // The flash contains the payload of the file without change, after the header with the device's generation.
     let flash = memory.flash();
     assert!(
         flash
@@ -120,7 +122,7 @@ fn a_power_cut_leaves_the_old_or_the_new_table() {
                 client.upload(&table, |_, _| ()).is_ok()
             }
         });
-        // Up to a quarter later than an upload takes, so that some get through.
+        // Power fails at a random time up to 1.25 times the duration of an upload, so that some uploads complete.
         let wait = whole.mul_f64(random.random_range(0.0..1.25));
         std::thread::sleep(wait);
         emulator.kill();
@@ -138,7 +140,7 @@ fn a_power_cut_leaves_the_old_or_the_new_table() {
             "cut {cut} after {wait:?}: the upload was done"
         );
         kept += usize::from(found == old);
-        // Whatever the cut left behind: the upload can go on, and ends with the new table.
+        // From every state after the loss of power, the upload can continue and end with the new table.
         assert_eq!(
             name_in_use(&upload(&mut client, &tables[cut % 2])),
             new,
@@ -173,7 +175,7 @@ fn a_damaged_table_is_not_used() {
     assert!(matches!(info.slots[slot], Slot::Damaged(_)), "{info:?}");
 }
 
-/// Configures host and device equally and runs both over the same cut; the device gets it through `feed`.
+/// Configures host and device equally and runs both over the same cut. `feed` passes the cut to the device.
 fn assert_same_to_the_bit(cut: &Cut, feed: impl FnOnce(&mut Emulator<'_>, &[Step]) + Send) -> Cost {
     let memory = Memory::erased();
     let mut emulator = Emulator::start(&memory);
@@ -203,8 +205,8 @@ fn assert_same_to_the_bit(cut: &Cut, feed: impl FnOnce(&mut Emulator<'_>, &[Step
 }
 
 #[test]
-fn says_the_same_as_the_host_to_the_bit() {
-    // A flip, with entry and exit.
+fn outputs_equal_those_of_the_host_to_the_bit() {
+    // A flip, with entry into the material and exit.
     let cut = Cut::new(Entry::Feed, 1045.0, 2.0, 4.0, 1);
     let samples: usize = cut.steps.iter().map(|(block, _)| block.counts.len()).sum();
     let cost = assert_same_to_the_bit(&cut, |emulator, steps| {
@@ -217,13 +219,13 @@ fn says_the_same_as_the_host_to_the_bit() {
     });
     let (stack, room) = (cost.stack_bytes, firmware_image::nucleo_stack_bytes());
     println!("stack: {stack} bytes of {room} on the real board");
-    // The real board's interrupts come on top: four priorities, of which one reads the sensor.
+    // On the real board, interrupts add to the stack: four priorities, one of which reads the sensor.
     assert!(stack + 4096 <= room);
 }
 
 #[test]
-fn hears_blocks_over_its_serial_port() {
-    // A Hopf case; with a block lost, one clipped, and one without edges.
+fn blocks_arrive_over_the_serial_port() {
+    // A Hopf case with one block lost, one block clipped, and one without edges.
     let mut cut = Cut::new(Entry::None, 900.0, 2.0, 0.8, 2);
     cut.steps.remove(50);
     cut.steps[100].0.lost = 3;
@@ -243,7 +245,7 @@ fn hears_blocks_over_its_serial_port() {
 }
 
 #[test]
-fn hears_blocks_over_the_link() {
+fn blocks_arrive_over_the_link() {
     let cut = Cut::new(Entry::None, 1045.0, 2.0, 0.4, 3);
     let memory = Memory::erased();
     let emulator = Emulator::start(&memory);
@@ -264,13 +266,13 @@ fn hears_blocks_over_the_link() {
 }
 
 #[test]
-fn a_refused_stimulus_is_told() {
+fn a_refused_stimulus_is_answered() {
     let memory = Memory::erased();
     let mut emulator = Emulator::start(&memory);
     assert!(!emulator.takes_frame(b"\x03no\x00"));
     let overlong: Vec<u8> = (0..2000).map(|i| u8::from(i < 1999)).collect();
     assert!(!emulator.takes_frame(&overlong));
-    // And the board goes on.
+    // The board continues after the refused stimuli.
     emulator.feed(&stimuli(&Cut::new(Entry::None, 1045.0, 0.5, 0.1, 4).steps[..3]));
 }
 
@@ -289,7 +291,7 @@ fn keeps_up_with_the_sensor() {
     let (mean, most) = emulator.cost().instructions();
     println!("instructions for a block of 64 samples: {mean:.0} in the mean, {most:.0} at most");
     let of_a_block = 64.0 / 26_667.0;
-    // Reading the sensor takes a fifth of the real board's time.
+    // On the real board, reading the sensor takes a fifth of the time.
     assert!(seconds_on_the_board(mean) < 0.8 * of_a_block);
     assert!(seconds_on_the_board(most) < 0.8 * QUEUED_BLOCKS * of_a_block);
 }
@@ -297,7 +299,8 @@ fn keeps_up_with_the_sensor() {
 /// Number of blocks in the queue of the real board.
 const QUEUED_BLOCKS: f64 = 16.0;
 
-/// The real board runs at 160 MHz; an instruction takes it 1.5 cycles or so, its flash and the floating point unit included.
+/// Duration on the real board, which runs at 160 MHz: an instruction takes about 1.5 cycles, including waits for flash and
+/// floating point.
 fn seconds_on_the_board(instructions: f64) -> f64 {
     1.5 * instructions / 160e6
 }
@@ -316,14 +319,14 @@ fn no_request_of_an_upload_takes_longer_than_blocks_can_wait() {
         cost.request_instructions(),
         1e3 * cost.flash_s
     );
-    // A page, of which there is one per request, takes the flash 22.02 ms, 24.47 ms at the worst; then come the words of a chunk.
+    // A request erases at most one page, which takes 22.02 ms, at most 24.47 ms; writing the words of a chunk adds to it.
     assert!((22e-3..26e-3).contains(&cost.flash_s));
-    // The longest request checks the table, byte by byte: for the largest one that many times as long.
+    // The longest request checks every byte of the table, so its duration grows with the length of the table.
     let largest = f64::from(info.slot_capacity) / bytes.len() as f64;
     let at_most_s = seconds_on_the_board(largest * cost.request_instructions());
     println!("the largest table is checked in {:.1} ms", 1e3 * at_most_s);
     let wait_s = 0.8 * QUEUED_BLOCKS * 64.0 / 26_667.0;
-    // The check comes with no page to erase.
+    // The request that checks the table erases no page.
     assert!(at_most_s < wait_s && cost.flash_s * 24.47 / 22.02 < wait_s);
 }
 

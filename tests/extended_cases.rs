@@ -16,7 +16,8 @@ fn run(folder: &Path, line: &str) -> Value {
     answer.json()
 }
 
-/// The answer of a diagnosis of a sweep along x with one effect, in `folder`; beside it `found/extended.toml`.
+/// Diagnoses a simulated sweep along x with one effect, in `folder`. Returns the answer; the command writes
+/// `found/extended.toml`.
 fn diagnosed(folder: &Path, effect: &str) -> Value {
     std::fs::copy(cases().join(CASE), folder.join(CASE)).expect("the case can be copied");
     run(
@@ -43,7 +44,7 @@ fn a_spring_that_was_found_moves_the_limits_and_the_table() {
         .as_f64()
         .expect("a gain");
     assert!(low < gain && gain <= high && low > 0.9, "{low} {gain} {high}");
-    // The extended case cuts what the machine cuts: the same cut by the hidden spring itself.
+    // The extended case must give the cut of the case that contains the hidden spring itself.
     let cut = "--rpm 900 --depth-mm 1 --seconds 3 --ideal";
     let by_hand = format!("simulate {CASE} {cut} {spring} --out truth.csv");
     for line in [
@@ -81,7 +82,7 @@ fn a_spring_that_was_found_moves_the_limits_and_the_table() {
     assert!((from - exact).abs() < error, "{from} {exact} {error}");
 }
 
-/// Lowest limit of a lobe table at 900 rev/min and its stated interpolation error, mm.
+/// Smallest limit of a lobe table at 900 rev/min, and the table's stated interpolation error, both in mm.
 fn lowest(folder: &Path, case: &str) -> [f64; 2] {
     run(
         folder,

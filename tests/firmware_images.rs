@@ -1,4 +1,4 @@
-//! Memory addresses of the firmware images: an image linked for another board builds but does not run.
+//! Memory addresses of the firmware images. An image that is linked for another board builds but does not run.
 #![allow(clippy::expect_used, clippy::panic)]
 
 use std::fs;
@@ -8,7 +8,7 @@ use std::path::Path;
 use object::{Object, ObjectSection, ObjectSegment, ObjectSymbol, SectionKind};
 use quietcut_tests::firmware_image;
 
-/// What the start-up code and the linker agree on.
+/// The addresses of an image that the start-up code and the linker script must agree on.
 struct Image {
     segments: Vec<Range<u64>>,
     vector_table: u64,
@@ -57,7 +57,8 @@ impl Image {
         found.unwrap_or_else(|| panic!("no symbol {name}")).1
     }
 
-    /// Every segment in flash or memory, the vector table at the start of flash, the stack at the end of memory.
+    /// Checks that every segment is in flash or memory, the vector table at the start of flash, and the stack at the end of
+    /// memory.
     fn assert_within(&self, flash: Range<u64>, memory: Range<u64>) {
         assert!(!self.segments.is_empty());
         for segment in &self.segments {

@@ -16,7 +16,7 @@ const FREQUENCY_HZ: f64 = 17.4;
 const DAMPING: f64 = 0.02;
 const MASS_KG: f64 = 60.0;
 
-/// Acceleration at the sensor after impacts along y of one sample each: exact impulse responses of the structure.
+/// Acceleration at the sensor after impacts along y with the length of one sample: exact impulse responses of the structure.
 fn impacts(ratio: f64) -> Recording {
     let samples = (50.0 * RATE) as usize;
     let mut force = vec![0.0; samples];
@@ -25,13 +25,13 @@ fn impacts(ratio: f64) -> Recording {
     let pole = own * Complex64::new(-DAMPING, (1.0 - DAMPING * DAMPING).sqrt());
     for (at, newtons) in [(1.0, 300.0), (13.0, 400.0), (25.5, 350.0), (37.5, 500.0)] {
         let first = (at * RATE) as usize;
-        // Eight samples as a raised cosine: the spectrum of an impact vanishes above a fifth of the rate.
+        // The impact is a raised cosine of eight samples, whose spectrum is negligible above a fifth of the sample rate.
         let pulse: Vec<f64> = (0..9)
             .map(|k| newtons * 0.5 * (1.0 - (TAU * f64::from(k) / 8.0).cos()))
             .collect();
         for (k, value) in pulse.iter().enumerate() {
             force[first + k] += value;
-            // x'' of 1/(m ω_d) e^{−ζωt} sin ω_d t, the direct part f/m apart.
+            // Acceleration of the response 1/(m ω_d) e^{−ζωt} sin ω_d t, without the direct part f/m.
             for (n, sample) in acceleration[first + k..].iter_mut().enumerate() {
                 let t = n as f64 / RATE;
                 let modal = pole * pole * (pole * t).exp() / pole.im;
@@ -99,14 +99,14 @@ fn a_hammer_test_becomes_tables_and_pictures() {
     let peak = &answer["receptances"][0];
     assert_eq!(peak["name"], "yy");
     let value = peak["peak_m_per_n"]["value"].as_f64().expect("a number");
-    // The peak lies up to half a line of 0.085 Hz from a line: 0.6 % of a mode 0.7 Hz wide.
+    // The peak is at most half a line of 0.085 Hz from a line, which changes the peak of a mode 0.7 Hz wide by 0.6 %.
     let expected = truth(FREQUENCY_HZ).norm();
     assert!((value / expected - 1.0).abs() < 0.012, "{value} {expected}");
     let tables = ["a.csv", "a.uff"].map(|name| FrfTable::read(at(name)).expect("a table"));
     for table in &tables {
         let entry = table.entry(Direction::Y, Direction::Y).expect("hyy");
         for (&hertz, h) in table.frequency_hz().iter().zip(&entry.receptance) {
-            // What the rate leaves of the impulse, and what rings at the end of a segment.
+            // The error comes from the band limit of the sampled impulse and from the vibration at the end of a segment.
             assert!(
                 (h - truth(hertz)).norm() < 0.01 * expected,
                 "{hertz}: {h} {}",
@@ -129,7 +129,7 @@ fn a_hammer_test_becomes_tables_and_pictures() {
             "{name}"
         );
     }
-    // The same from the binary file, without a sidecar of its own.
+    // The binary UFF file without a sidecar gives the same table.
     let from_uff = quietcut(
         folder.path(),
         &["frf", "hammer.uff", "--band-hz", "12:24", "--json"],
@@ -139,7 +139,7 @@ fn a_hammer_test_becomes_tables_and_pictures() {
     let again = from_uff["receptances"][0]["peak_m_per_n"]["value"]
         .as_f64()
         .expect("a number");
-    // Nine digits in the CSV file.
+    // The CSV file has nine digits.
     assert!((again / value - 1.0).abs() < 1e-6);
 }
 
@@ -214,8 +214,8 @@ fn what_cannot_be_measured_is_refused_with_the_reason() {
 }
 
 #[test]
-fn a_step_sine_test_at_several_forces_is_measured_at_the_one_that_is_meant() {
-    // A softening mode: its resonance is another at each force.
+fn a_step_sine_test_at_several_forces_is_evaluated_at_the_given_force() {
+    // The stiffness of this mode falls with amplitude, so that its resonance frequency depends on the force level.
     let structure = quietcut_testkit::case("kuka-kr90-y17-low").structure.unwrap();
     let frequencies: Vec<f64> = (0..9).map(|k| 17.0 + 0.1 * f64::from(k)).collect();
     let signal = Signal::step_sine(&frequencies, &[1.8, 9.5], 20.0, 4.0);
@@ -242,6 +242,6 @@ fn a_step_sine_test_at_several_forces_is_measured_at_the_one_that_is_meant() {
         let sizes = table.entries()[0].receptance.iter().map(|h| h.norm());
         sizes.fold(0.0, f64::max)
     });
-    // Cubic damping takes of the peak: at 9.5 N far more than at 1.8 N.
+    // Cubic damping lowers the resonance peak: at 9.5 N far more than at 1.8 N.
     assert!(peaks[1] < 0.9 * peaks[0], "{peaks:?}");
 }

@@ -1,4 +1,4 @@
-//! The guide from tap test to stable cut, as a reader follows it.
+//! The commands of the guide from tap test to stable cut run and print the outputs of the page.
 #![allow(clippy::expect_used, clippy::panic)]
 
 use std::fs;
@@ -38,7 +38,7 @@ fn the_guide_leads_to_a_stable_cut() {
     assert_same_picture(&drawn, &kept);
 }
 
-/// The same words in the same order; numbers may differ by one hundredth of a point.
+/// Asserts that two pictures have the same words in the same order, and numbers that differ by at most one hundredth of a point.
 fn assert_same_picture(drawn: &str, kept: &str) {
     let words = |text: &str| -> Vec<String> {
         text.split(|c: char| c.is_whitespace() || ['"', ',', '<', '>', '/'].contains(&c))

@@ -8,7 +8,7 @@ use std::path::Path;
 use quietcut_tests::command::{cases, folder, quietcut};
 use serde_json::Value;
 
-/// Writes the robot of the cases at a posture and with changed text.
+/// Writes the robot of the cases to `path`, with these joint angles and with each text of `change` replaced.
 fn write_robot(path: &Path, joints_deg: &str, change: &[(&str, &str)]) {
     let mut text = fs::read_to_string(cases().join("six-joint-robot.toml")).expect("the case is there");
     for (from, to) in [&[("[0.0, -70.0, 100.0, 0.0, 20.0, 0.0]", joints_deg)], change].concat() {
@@ -44,7 +44,7 @@ fn limit_mm(folder: &Path, case: &str, rpm: &str) -> f64 {
         .unwrap_or_else(|| panic!("{answer}"))
 }
 
-/// Value and 90 % interval of a parameter; the interval must contain the value and have a positive width.
+/// Value and 90 % interval of a parameter. Asserts that the interval contains the value and has a positive width.
 #[track_caller]
 fn figure(figure: &Value) -> (f64, [f64; 2]) {
     let number = |value: &Value| value.as_f64().unwrap_or_else(|| panic!("{figure}"));
@@ -98,7 +98,7 @@ fn a_robot_goes_from_blows_to_lobes_and_a_table() {
             records.push(record);
         }
     }
-    // A guess that is wrong by a quarter.
+    // The initial guess of a stiffness is 25 % too high.
     let guess = [("stiffness_nm_per_rad = 6.0e6", "stiffness_nm_per_rad = 7.5e6")];
     write_robot(&path.join("guess.toml"), POSTURES[0], &guess);
     let mut arguments = vec!["identify"];
@@ -123,7 +123,8 @@ fn a_robot_goes_from_blows_to_lobes_and_a_table() {
         figure(&joint["parameters"]["stiffness_nm_per_rad"]);
         figure(&joint["parameters"]["damping_nms_per_rad"]);
     }
-    // Tool, material and cut are those of the start, so that the case has lobes: near those of the robot.
+    // The written case has tool, material and cut of the initial case, so that it has lobes. They must be near those of the
+    // robot.
     for rpm in ["600", "900"] {
         let (found, truth) = (
             limit_mm(path, "robot.toml", rpm),
@@ -147,7 +148,7 @@ fn a_robot_goes_from_blows_to_lobes_and_a_table() {
 }
 
 #[test]
-fn cubic_joints_are_told_from_steps_at_two_forces() {
+fn cubic_joints_are_identified_from_step_sine_tests_at_two_forces() {
     let folder = folder();
     let path = folder.path();
     let cubic = [(
@@ -285,7 +286,7 @@ fn modes_from_chatter_become_a_case_with_lobes() {
             limit_mm(path, "machine.toml", rpm),
         );
         println!("{rpm} rev/min: {found:.3} mm, the machine {truth:.3} mm");
-        // The cuts leave 13 % of depth open.
+        // The trial cuts bracket the limit to 13 % of the depth.
         assert!((found / truth - 1.0).abs() < 0.13, "{found} {truth}");
     }
     let written = fs::read_to_string(path.join("found.toml")).expect("a case was written");

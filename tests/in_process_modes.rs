@@ -6,7 +6,7 @@ use std::path::Path;
 use quietcut_tests::command::{cases, folder, quietcut};
 use serde_json::Value;
 
-/// Table 7.1: frequency in Hz and damping ratio.
+/// The modes of Table 7.1 of the thesis: frequency in Hz and damping ratio.
 const TRUTH: [(f64, f64); 2] = [(16.99, 0.0285), (18.48, 0.0996)];
 
 fn case(name: &str) -> String {
@@ -22,7 +22,7 @@ fn number(value: &Value) -> f64 {
     value.as_f64().expect("a number")
 }
 
-/// The modes of the answer: value and half the interval of frequency and damping ratio.
+/// Checks the modes of an answer: the true frequency and damping ratio must lie within the stated intervals.
 fn assert_modes(answer: &Value, way: &str) {
     let modes = answer["complex_modes"].as_array().expect("modes");
     assert_eq!(modes.len(), TRUTH.len(), "{way}: {answer}");
@@ -45,7 +45,7 @@ fn assert_modes(answer: &Value, way: &str) {
     }
 }
 
-/// First limits in mm from 600 to 2 400 rev/min, all speeds times a factor.
+/// First limits in mm from 600 to 2 400 rev/min, with all speeds multiplied by `factor`.
 fn limits(folder: &Path, case: &str, factor: f64) -> Vec<f64> {
     let words = format!(
         "lobes {case} --nominal --rpm {}:{}:37 --depth-mm 0:7:36 --json",
@@ -60,7 +60,8 @@ fn limits(folder: &Path, case: &str, factor: f64) -> Vec<f64> {
         .collect()
 }
 
-/// Whether a limit agrees with the true one: within 3 % in depth, or between the true limits at speeds that differ by 0.3 %.
+/// Asserts that each limit agrees with the true limit: within 3 % in depth, or between the true limits at speeds 0.3 % lower and
+/// higher.
 fn assert_lobes(folder: &Path, found: &str, way: &str) {
     let truth = [0.997, 1.0, 1.003].map(|factor| limits(folder, &case("kuka-kr90-acetal"), factor));
     let mut worst = 0.0_f64;
@@ -87,7 +88,8 @@ fn assert_lobes(folder: &Path, found: &str, way: &str) {
     println!("{way}: at most {:.2} % off in depth", 100.0 * worst);
 }
 
-/// Modes from a porous cut with 1 % noise on every sample of every channel, and their lobes.
+/// Identifies the modes from a cut of porous material, with 1 % noise on every sample of every channel, and checks modes and
+/// lobes.
 fn porous(folder: &Path, measured: &str, seed: u64) {
     let robot = case("kuka-kr90-acetal");
     run(
@@ -111,10 +113,11 @@ fn porous(folder: &Path, measured: &str, seed: u64) {
     assert!(drawn.contains("stable pole") && drawn.contains("Hyy"));
 }
 
-/// Recordings of speed sweeps in three immersions, with 1 % noise on every sample of every channel.
+/// Simulates speed sweeps at three immersions, with 1 % noise on every sample of every channel.
 fn simulate_speed_sweeps(folder: &Path, measured: &str, seed: u64) {
     let robot = case("kuka-kr90-acetal");
-    // Thesis section 7.2.2: central, down- and up-milling; teeth pass at 15 to 23 Hz.
+    // The immersions of section 7.2.2 of the thesis: central, down- and up-milling. The tooth-passing frequency sweeps from 15
+    // to 23 Hz.
     for (index, (start, exit)) in (1..).zip([(68.4, 109.8), (138.6, 180.0), (0.0, 41.4)]) {
         run(
             folder,
@@ -128,7 +131,7 @@ fn simulate_speed_sweeps(folder: &Path, measured: &str, seed: u64) {
     }
 }
 
-/// As [`porous`], from speed sweeps in three immersions.
+/// Identifies the modes from speed sweeps at three immersions, and checks modes and lobes.
 fn speed_sweep(folder: &Path, measured: &str, seed: u64) {
     let robot = case("kuka-kr90-acetal");
     simulate_speed_sweeps(folder, measured, seed);
@@ -187,7 +190,7 @@ fn fresh_seeds_of_both_rigs_with_both_sensors() {
     }
 }
 
-/// First limit in mm at a speed.
+/// First limit of a case in mm at one spindle speed.
 fn limit(folder: &Path, case: &str, rpm: f64) -> f64 {
     let answer = run(
         folder,
@@ -231,8 +234,9 @@ fn compare_hammer_and_cuts(speeds_rpm: &[u32]) {
     for (seed, rpm) in speeds_rpm.iter().map(|&rpm| (rpm, f64::from(rpm))) {
         let truth = limit(folder, &robot, rpm);
         let hammer = limit(folder, "hammered.toml", rpm);
-        // Porous material, of which what is solid is a little less deep than the hammer's lobes allow. Of fine pores: coarse ones
-        // shake the machine, and it stiffens with the shaking, of which the cut of solid material has none.
+        // The solid part of the porous material is slightly less than the depth limit from the hammer test. The pores are fine,
+        // because coarse pores excite large vibration, at which the cubic stiffness differs from that of a cut of solid
+        // material.
         let depth_mm = hammer * 0.95 / 0.7;
         run(
             folder,

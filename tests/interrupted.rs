@@ -1,5 +1,5 @@
-//! Ctrl-C during a long command: the output file is whole or as it was before, no file stays aside, and the exit status is 130.
-//! On a terminal a long command shows that it works.
+//! Ctrl-C during a long command: the output file is complete or unchanged, no temporary file remains, and the exit status is
+//! 130. On a terminal a long command shows its progress.
 #![allow(clippy::expect_used)]
 
 use std::fs::{self, OpenOptions};
@@ -9,17 +9,17 @@ use std::time::{Duration, Instant};
 use quietcut::device::pseudo_terminal::PseudoTerminal;
 use quietcut_tests::command::{Outcome, cases, folder, quietcut, start, start_on};
 
-/// Exit status of a command that was interrupted.
+/// Exit status of a command that was interrupted by Ctrl-C.
 const INTERRUPTED: Option<i32> = Some(130);
 
-/// A command that is interrupted is given up after this time, where nothing appears that the test waits for.
+/// Time after which a test stops to wait for an event and ends the command.
 const PATIENCE: Duration = Duration::from_secs(60);
 
 fn case(folder: &Path) {
     fs::copy(cases().join("kuka-kr90-acetal.toml"), folder.join("case.toml")).expect("the case is there");
 }
 
-/// Names of the files in a folder, in order.
+/// Sorted names of the files in a folder.
 fn files(folder: &Path) -> Vec<String> {
     let mut names: Vec<String> = fs::read_dir(folder)
         .expect("the folder is there")
@@ -35,10 +35,10 @@ fn files(folder: &Path) -> Vec<String> {
     names
 }
 
-/// Computing time before an interrupt, once the command catches it; the tests pass with any value.
+/// Computing time before the interrupt, counted from the installation of the handler. The tests pass with any value.
 const COMPUTING: Duration = Duration::from_millis(300);
 
-/// Runs a command and interrupts it as soon as it catches interrupts and `is_time` is true of its folder.
+/// Runs a command. Interrupts it once it has installed its handler of Ctrl-C and `is_time` is true of its folder.
 fn interrupted(folder: &Path, arguments: &[&str], is_time: impl Fn(&Path) -> bool) -> Outcome {
     let running = start(folder, arguments);
     let began = Instant::now();
@@ -49,7 +49,7 @@ fn interrupted(folder: &Path, arguments: &[&str], is_time: impl Fn(&Path) -> boo
     running.finish()
 }
 
-/// Runs a command and interrupts it after [`COMPUTING`], which begins when it catches interrupts.
+/// Runs a command. Interrupts it [`COMPUTING`] after it has installed its handler of Ctrl-C.
 fn interrupted_while_computing(folder: &Path, arguments: &[&str]) -> Outcome {
     interrupted(folder, arguments, |_| {
         std::thread::sleep(COMPUTING);
@@ -85,7 +85,7 @@ fn an_interrupted_chart_leaves_the_old_file() {
 fn a_recording_that_is_interrupted_while_it_is_written_leaves_nothing() {
     let folder = folder();
     case(folder.path());
-    // At a high rate writing takes long enough to be interrupted.
+    // The sample rate is high, so that writing the file takes long enough to be interrupted.
     let arguments = [
         "simulate",
         "case.toml",

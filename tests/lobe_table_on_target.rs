@@ -1,4 +1,4 @@
-//! Lookup and advice on the emulated Cortex-M4F: the same bits as on the host, and what they cost.
+//! Lookup and advice on the emulated Cortex-M4F: the same bits as on the host, and their cost in instructions.
 #![allow(clippy::expect_used, clippy::indexing_slicing)]
 
 use quietcut_core::lobes::LobeTable;
@@ -14,8 +14,8 @@ fn a_table_of_96_kilobytes_answers_the_same_and_in_time() {
     assert!(LobeTable::parse(table.bytes()).is_ok());
 
     println!("Instructions for a table of {length} bytes, 600 speeds in 6 layers:");
-    // Measured with rustc 1.95.0; a tenth more is left for other versions. The sensor's queue holds 19 ms, 3.2 million
-    // cycles of the board: advice where nothing is stable must come before it is full.
+    // Counts measured with rustc 1.95.0; a tenth more is allowed for other versions. The sensor's queue holds 19 ms, which are
+    // 3.2 million cycles of the board: advice without any stable speed must end before the queue is full.
     for (piece, measured) in [
         ("table-parse", 1_628_821),
         ("table-lookup", 6_888),

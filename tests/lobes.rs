@@ -1,4 +1,4 @@
-//! The verbs `lobes` and `table`: answers, files, and one clear message for each wrong case.
+//! The verbs `lobes` and `table`: answers, files, and one message for each invalid case.
 
 #![allow(clippy::expect_used, clippy::panic)]
 
@@ -33,7 +33,7 @@ fn points_answer_with_multiplier_error_verdict_kind_and_chatter() {
     ]);
     let points = answer["points"].as_array().expect("points");
     assert_eq!(points.len(), 2);
-    // Converged values; the much-quoted 1.0726 and 0.8192 are not.
+    // Converged multipliers. The often quoted values 1.0726 and 0.8192 are not converged.
     for (point, size, verdict) in [
         (&points[0], 1.073_975_59, "unstable"),
         (&points[1], 0.819_742_78, "stable"),
@@ -185,7 +185,7 @@ fn a_table_is_written_whole_and_shown_again() {
         .iter()
         .filter_map(|speed| speed["unstable"][0]["from_mm"].as_f64())
         .fold(f64::INFINITY, f64::min);
-    // The notch of 1.327 mm, to the 0.3 % of 4 mm that the table keeps.
+    // The limit in the notch is 1.327 mm; the table keeps it within 0.3 % of 4 mm.
     assert!((lowest - 1.327).abs() < 0.013, "{lowest}");
     std::fs::write(folder.path().join("bad.qct"), "no table").expect("written");
     quietcut(folder.path(), &["table", "--show", "bad.qct"]).refused(&["bad.qct"]);
@@ -197,7 +197,7 @@ fn a_table_is_written_whole_and_shown_again() {
 }
 
 #[test]
-fn other_methods_say_their_name_settings_and_error() {
+fn other_methods_state_their_name_settings_and_error() {
     let at = |options: &[&str]| {
         let mut arguments = vec!["lobes"];
         let case = case("insperger-1dof-ad1");
@@ -224,7 +224,7 @@ fn other_methods_say_their_name_settings_and_error() {
         let point = &answer["points"][0];
         let (size, error) = (&point["multiplier_abs"], &point["error"]);
         let (size, error) = (size.as_f64().expect("size"), error.as_f64().expect("error"));
-        // 40 to 100 steps are wrong in the second or third digit, and say so.
+        // With 40 to 100 steps the second or third digit is wrong, and the stated error says so.
         assert!(error > 1e-3 && (size - 1.073_975_59).abs() < error, "{point}");
     }
     assert_eq!(at(&[])["method"], "collocation");
@@ -292,7 +292,7 @@ fn deviations_of_a_case_give_percentiles_a_band_and_probabilities() {
     assert_eq!(json["cells_mm"], serde_json::json!([1.0, 2.0, 3.0]));
     let svg = std::fs::read_to_string(folder.path().join("k.svg")).expect("the picture");
     assert!(svg.contains("95 % percentiles of the limit"));
-    // The same draws again; without the deviations the answer that a case without them has.
+    // The same seed gives the same draws. Without deviations the answer equals that of a case without them.
     let again = run(&["--probability"]);
     assert_eq!(again.stdout, answer.stdout);
     let nominal = run(&["--nominal"]);
@@ -332,7 +332,7 @@ fn cells_answer_with_a_grid_and_are_written_in_every_format() {
     for key in ["multiplier_abs", "error", "verdict"] {
         assert_eq!(line[key].as_array().expect("cells").len(), 41, "{key}");
     }
-    // At 1040 rev/min stability is lost near 1.4 mm.
+    // At 1040 rev/min the cut becomes unstable near 1.4 mm.
     assert_eq!(line["verdict"][10], "stable");
     assert_eq!(line["verdict"][20], "unstable");
     for (out, start) in [
@@ -392,7 +392,7 @@ fn tools_with_variable_pitch_have_limits_by_methods_that_agree_and_a_table_witho
 }
 
 #[test]
-fn limits_over_the_feed_direction_are_those_of_cases_turned_so() {
+fn limits_over_the_feed_direction_are_those_of_rotated_cases() {
     let kuka = case("kuka-kr90-acetal");
     let chart = ["--rpm", "1300", "--depth-mm", "1:5:5", "--json"];
     let answer = json(&[&["lobes", &kuka, "--feed-direction-deg", "0:40:2"][..], &chart].concat());
@@ -454,12 +454,12 @@ fn a_table_states_its_error_its_directions_and_its_derivatives() {
         assert_eq!(layer["modes"].as_array().expect("modes").len(), 2);
         for speed in layer["speeds"].as_array().expect("speeds") {
             let limit = &speed["unstable"][0];
-            // Without axial depth modulation a harder material lowers every limit in proportion.
+            // Without modulation of the axial depth, every limit is inversely proportional to the cutting force coefficients.
             let by_force = limit["derivatives"]["by_cutting_force_mm"][0]
                 .as_f64()
                 .expect("mm");
             let depth = limit["from_mm"].as_f64().expect("mm");
-            // Steps of the entries, and the 11 bits of a derivative.
+            // The tolerance covers the depth step of the entries and the 11 bits of a derivative.
             assert!((by_force + depth).abs() < 2e-3 * depth, "{limit}");
         }
     }
@@ -485,7 +485,7 @@ fn a_table_states_its_error_its_directions_and_its_derivatives() {
 fn an_extension_that_acts_along_several_directions_is_as_the_structure_with_its_terms() {
     let folder = folder();
     let read = |name: &str| std::fs::read_to_string(case(name)).expect("the case is there");
-    // Cubic matrices without the terms between the directions, and the same as extensions of the linear part.
+    // The same cubic terms, without coupling between directions, as matrices of the case and as extensions of the linear part.
     let whole = read("kuka-kr90-half-cubic");
     let [k3, c3] = [["-2.4e12", "-5.05e12"], ["4.6e5", "2.5e6"]];
     let matrix = |[x, y]: [&str; 2]| format!("[[{x}, 0.0], [0.0, {y}]]");
@@ -514,7 +514,7 @@ fn an_extension_that_acts_along_several_directions_is_as_the_structure_with_its_
         point("structure.toml", &of_structure),
         point("extensions.toml", &of_extensions),
     ];
-    // Each states an error of 1e-7.
+    // Each method states an error of 1e-7.
     assert!(
         (a[0] - b[0]).abs() < 2e-7 && (a[1] - b[1]).abs() < 2e-7,
         "{a:?} {b:?}"

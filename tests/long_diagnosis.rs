@@ -1,5 +1,5 @@
-//! Computing time of a diagnosis of four records of 60 s at 2 kHz. This command prints it in s:
-//! `cargo test --release -p quietcut-tests --test long_diagnosis -- --ignored --nocapture`.
+//! Computing time of a diagnosis of four records of 60 s at 2 kHz. This command prints it in s: `cargo test --release -p
+//! quietcut-tests --test long_diagnosis -- --ignored --nocapture`.
 #![allow(clippy::expect_used)]
 
 use std::path::Path;
@@ -35,14 +35,14 @@ exit_deg = 180.0
 feed_per_tooth_mm = 0.1
 ";
 
-/// Makes four records by `simulate`, one for each of `differing`, and diagnoses them; the answer must be `cause`.
+/// Simulates four records, one for each of `differing`, and diagnoses them. The only cause of the answer must be `cause`.
 fn diagnose(test: &str, common: &[&str], differing: [&[&str]; 4], cause: &str) {
     let folder = folder();
     let folder: &Path = folder.path();
     std::fs::write(folder.join("case.toml"), MACHINE).expect("written");
     let records: Vec<String> = (0..4).map(|index| format!("{index}.csv")).collect();
     for (index, (record, own)) in records.iter().zip(differing).enumerate() {
-        // One noise in all four would be no noise but something that they have in common.
+        // Each record has its own seed. Equal noise in all four records would be a common signal.
         let seed = index.to_string();
         let mut arguments = vec![
             "simulate",

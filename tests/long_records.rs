@@ -12,7 +12,7 @@ use rand::{RngExt, SeedableRng};
 const RATE_HZ: f64 = 10_240.0;
 const SECONDS: f64 = 60.0;
 
-/// Three independent forces and a structure that answers each of them in its own direction, as noise through a resonator.
+/// Three independent random forces, and a structure with one resonance per force, which responds in its own direction.
 fn recording() -> Recording {
     let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(1);
     let samples = (SECONDS * RATE_HZ) as usize;
@@ -51,7 +51,7 @@ fn recording() -> Recording {
     }
 }
 
-/// Seconds that the standard library takes to make numbers of every line.
+/// Time in s in which the standard library parses the numbers of every line.
 fn plain_pass_s(path: &Path) -> f64 {
     let began = Instant::now();
     let text = std::fs::read_to_string(path).expect("readable");
@@ -84,7 +84,7 @@ fn memory_stays_below_twice_the_file_and_time_near_a_plain_pass_over_it() {
             .expect("it runs");
         let seconds = began.elapsed().as_secs_f64();
         assert!(status.success());
-        // Of all children so far the one with the most, in KiB.
+        // Largest memory of all ended child processes, which the system gives in KiB.
         let used = getrusage(UsageWho::RUSAGE_CHILDREN).expect("known").max_rss() as f64 * 1024.0;
         println!(
             "{ending}: {:.1} MB read and made into 3 x 3 receptances in {seconds:.2} s, with at most {:.1} MB",
@@ -98,7 +98,7 @@ fn memory_stays_below_twice_the_file_and_time_near_a_plain_pass_over_it() {
                 "{ending}: {:.2} of a plain pass of {plain_s:.2} s",
                 seconds / plain_s
             );
-            // A busy machine may be slow in either.
+            // A busy machine may slow down either of the two measurements.
             assert!(seconds < 6.0 * plain_s);
         }
     }

@@ -26,7 +26,7 @@ fn cutter(case: &Case, depth_mm: f64) -> Cutter {
     cutter
 }
 
-/// Simulation of a case at full engagement from the start.
+/// A simulation of a case at full engagement from the start.
 fn steady(case: &Case, spindle_rpm: f64, depth_mm: f64) -> Model {
     Model {
         dynamics: Dynamics::new(case.structure().unwrap()).unwrap(),
@@ -75,13 +75,13 @@ fn exact(relative: f64) -> Settings {
     }
 }
 
-/// The motion at `first_s + k·every_s` up to `end_s`, from rest.
+/// The motion from rest, at the times `first_s + k·every_s` up to `end_s`.
 fn motions(model: &Model, settings: Settings, first_s: f64, every_s: f64, end_s: f64) -> Vec<Motion> {
     let at_rest = vec![0.0; model.dynamics.order()];
     motions_from(model, at_rest, settings, first_s, every_s, end_s)
 }
 
-/// The force of a cut without vibration, thesis eq. 3.6, turned round: with it a tool at rest stays at rest.
+/// The opposite of the cutting force without vibration, thesis eq. 3.6. With it, a tool at rest stays at rest.
 struct Counterforce {
     case: Case,
     spindle_rpm: f64,
@@ -117,13 +117,13 @@ impl Drive for Counterforce {
     }
 }
 
-/// The largest multiplier per tooth of the linear model, from the motion that grows out of a push.
+/// The largest Floquet multiplier of the linear model per tooth passing, from the growth of the motion after a push.
 fn multiplier(case: &Case, spindle_rpm: f64, depth_mm: f64, periods: usize, order: usize) -> f64 {
     let period_s = case.tool().unwrap().tooth_period_s(spindle_rpm);
     multiplier_over(period_s, case, spindle_rpm, depth_mm, periods, order)
 }
 
-/// The same over any period of the equations.
+/// The largest Floquet multiplier over any period of the equations, from the growth of the motion after a push.
 fn multiplier_over(
     period_s: f64,
     case: &Case,
@@ -136,7 +136,7 @@ fn multiplier_over(
     let cutting = model.cutting.as_mut().unwrap();
     cutting.regeneration = Regeneration::LastPass;
     if case.axial_depth_modulation() {
-        // The feed acts on the growth: it must stay, and be balanced.
+        // The feed influences the growth, so it is kept and its force is balanced.
         model.drive = Some(Box::new(Counterforce {
             case: case.clone(),
             spindle_rpm,
@@ -145,24 +145,24 @@ fn multiplier_over(
     } else {
         cutting.cutter = cutting.cutter.clone().with_feed_per_tooth_m(0.0);
     }
-    // A push in all states, so small that the square of z in chapter 3 is nothing.
+    // The push acts on all states. It is so small that the terms quadratic in z of chapter 3 vanish.
     let push = (0..model.dynamics.order())
         .map(|i| 1e-10 * (1.0 + 0.3 * i as f64))
         .collect();
     let settings = Settings {
-        // Balanced forces leave a rounding of 1e-20 m.
+        // Balanced forces leave a rounding error of 1e-20 m.
         absolute_m: if model.drive.is_some() { 1e-18 } else { 1e-300 },
         relative: 1e-9,
         largest_m: f64::INFINITY,
         ..Settings::default()
     };
-    // Not where a tooth enters or leaves: velocities may jump there.
+    // The end is not at an entry or exit of a tooth, where velocities may jump.
     let end_s = (periods as f64 + 0.5) * period_s;
     let motions = motions_from(&model, push, settings, 0.37 * period_s, period_s, end_s);
     largest_root(&motions[periods / 2..], order)
 }
 
-/// The largest root of the linear recurrence of this order that the motion obeys from sample to sample.
+/// The largest root of the linear recurrence of this order that fits the sampled motion.
 fn largest_root(motions: &[Motion], order: usize) -> f64 {
     let size = |values: &[[f64; 3]]| values.iter().flatten().fold(0.0_f64, |a, b| a.max(b.abs()));
     let mut rows: Vec<Vec<f64>> = Vec::new();
@@ -193,7 +193,7 @@ fn largest_root(motions: &[Motion], order: usize) -> f64 {
 
 #[test]
 fn small_motions_grow_as_the_multipliers_say() {
-    // Case, rev/min, mm, |μ|; teeth passed, order of the recurrence.
+    // Columns: case, rev/min, mm, |μ|; number of tooth passings, order of the recurrence.
     let rows = [
         ("insperger-1dof-ad1", 5000.0, 0.1, 0.7369621522396909, 200, 2),
         ("insperger-1dof-ad1", 5000.0, 2.0, 1.760635957779129, 200, 2),
@@ -247,7 +247,7 @@ fn small_motions_grow_as_the_multipliers_say() {
     ];
     for (name, spindle_rpm, depth_mm, expected, periods, order) in rows {
         let found = multiplier(&case(name), spindle_rpm, depth_mm, periods, order);
-        // The integration is good to 1e-8 per tooth; the fit leaves what other multipliers still contribute.
+        // The integration error is 1e-8 per tooth passing. The fit adds the contribution of other multipliers.
         assert!(
             (found - expected).abs() < 1e-5 * expected,
             "{name} {spindle_rpm} rev/min {depth_mm} mm: {found}, not {expected}"
@@ -255,7 +255,7 @@ fn small_motions_grow_as_the_multipliers_say() {
     }
 }
 
-/// Short force pulse during a simulation.
+/// A short force pulse during a simulation.
 struct Push {
     at_s: f64,
     length_s: f64,
@@ -281,8 +281,8 @@ impl Drive for Push {
 
 #[test]
 fn a_small_disturbance_of_a_real_cut_grows_as_the_multiplier_says() {
-    // With feed, remembered surface and possible loss of contact: on a forced orbit there is none, and a disturbance
-    // too small to cause it grows as in the linear model.
+    // The simulation has feed, surface memory and possible loss of contact. The forced orbit does not lose contact, and a small
+    // disturbance of it grows as in the linear model.
     for (name, spindle_rpm, depth_mm, expected, order) in [
         ("kuka-kr90-acetal", 800.0, 1.5, 0.9879978476611608, 4),
         ("kuka-kr90-acetal", 1600.0, 1.5, 0.9420456657415937, 4),
@@ -291,7 +291,7 @@ fn a_small_disturbance_of_a_real_cut_grows_as_the_multiplier_says() {
         let case = case(name);
         let model = steady(&case, spindle_rpm, depth_mm);
         let found = growth_of_a_push(model, tooth_period_s(&case, spindle_rpm), expected, order);
-        // The share of other multipliers, and of what loss of contact the disturbance still causes.
+        // The tolerance covers the contribution of other multipliers, and loss of contact caused by the disturbance.
         assert!(
             (found - expected).abs() < 1e-4,
             "{name} {spindle_rpm}: {found}, not {expected}"
@@ -303,12 +303,13 @@ fn tooth_period_s(case: &Case, spindle_rpm: f64) -> f64 {
     case.tool().unwrap().tooth_period_s(spindle_rpm)
 }
 
-/// The multiplier of a small disturbance of a cut over a period, `expected` about as large.
+/// The Floquet multiplier of a cut over a period, from the growth of a small disturbance. `expected` is its approximate value.
 fn growth_of_a_push(mut model: Model, period_s: f64, expected: f64, order: usize) -> f64 {
     let cutting = model.cutting.as_ref().unwrap();
-    // Transients to 1e-10 of the feed, or as far as errors allow; a push of 1e-5 of the feed or so.
+    // Number of periods after which transients have decayed to 1e-10 of the feed, with an upper bound. The push is about 1e-5 of
+    // the feed.
     let calm = (-23.0 / f64::ln(expected)).min(1500.0);
-    // Until a thousandth of it is left.
+    // Number of periods until a thousandth of the disturbance is left.
     let watched = (-7.0 / f64::ln(expected)).min(60.0);
     let force_n = cutting.cutter.depth_m;
     let mut run = |force_n: f64| {
@@ -359,8 +360,8 @@ fn disturbances_of_unequal_teeth_with_cubic_terms_grow_as_their_multipliers_say(
         model.cutting.as_mut().unwrap().regeneration = Regeneration::LastPass;
         let found = growth_of_a_push(model, 60.0 / rpm, expected, 4);
         println!("{pitch_deg:?} {runout:?}: {found} {expected}, equal teeth {equal}");
-        // The share of other multipliers and of the square of the disturbance; what unequal teeth change is ten times that and
-        // more.
+        // The error has contributions of other multipliers and of the square of the disturbance. The change due to unequal pitch
+        // is at least ten times as large.
         let (error, change) = ((found - expected).abs(), (equal - expected).abs());
         assert!(error < 3e-5, "{pitch_deg:?}: {found} {expected}");
         assert!(change > 10.0 * error, "{pitch_deg:?}: {equal} {expected}");
@@ -392,7 +393,7 @@ fn disturbances_of_extended_cases_grow_as_their_multipliers_say() {
         (two, material),
     ] {
         let path = cases().join(format!("{name}.toml"));
-        // Where the chip ends in nothing a chip law has no slope: between 60 and 120 degrees it has one.
+        // At zero chip thickness a chip law has no derivative. Between 60 and 120 degrees the chip thickness is positive.
         let text = std::fs::read_to_string(&path).unwrap();
         let text = text
             .replace("teeth = 2", "teeth = 2\ndiameter_mm = 20.0")
@@ -402,14 +403,14 @@ fn disturbances_of_extended_cases_grow_as_their_multipliers_say() {
         let rpm = 6200.0;
         let at = |depth_mm: f64| {
             if stability::needs_orbit(&extended) {
-                // An orbit may be lost in a fold before this depth: then there is nothing to disturb.
+                // The orbit may vanish in a fold below this depth. Then there is nothing to disturb.
                 ForcedProblem::new(&extended).unwrap().point(rpm, depth_mm).ok()
             } else {
                 let problem = Problem::new(&extended, CubicTerms::Refuse).unwrap();
                 Some(stability::point(&problem, rpm, depth_mm).unwrap())
             }
         };
-        // Deep enough that a disturbance lives long enough to be measured.
+        // The depth is large enough that the disturbance decays slowly and can be measured.
         let (depth_mm, expected) = (1..20)
             .map(|step| 0.1 * f64::from(step))
             .filter_map(|depth_mm| Some((depth_mm, at(depth_mm)?)))
@@ -433,8 +434,9 @@ fn disturbances_of_extended_cases_grow_as_their_multipliers_say() {
             "{name} {extension}: {found} {} plain {}",
             expected.multiplier_abs, plain.multiplier_abs
         );
-        // The share of the other direction's multiplier, nearly as large; the extension itself moves the multiplier by far more.
-        // The slope of quadratic damping has a kink where the velocity changes sign: found is a difference of 4e-3, of a change of 7e-2.
+        // The error comes from the multiplier of the other direction, which is almost as large. The extension changes the
+        // multiplier by far more. The force of quadratic damping has a kink at zero velocity: the error is 4e-3, the change
+        // 7e-2.
         let tolerance = if extension == squared { 6e-3 } else { 1e-3 };
         assert!(
             (found - expected.multiplier_abs).abs() < tolerance,
@@ -449,7 +451,7 @@ fn disturbances_of_extended_cases_grow_as_their_multipliers_say() {
 
 #[test]
 fn small_motions_of_tools_with_variable_pitch_grow_as_collocation_over_the_revolution_says() {
-    // Case, pitches, rev/min, mm, order of the recurrence.
+    // Columns: case, pitches, rev/min, mm, order of the recurrence.
     let rows: [(&str, &[f64], f64, f64, usize); 4] = [
         ("insperger-1dof-ad1", &[170.0, 190.0], 5000.0, 0.5, 2),
         ("insperger-1dof-ad0.1", &[100.0, 125.0, 135.0], 7500.0, 2.0, 2),
@@ -473,7 +475,7 @@ fn small_motions_of_tools_with_variable_pitch_grow_as_collocation_over_the_revol
         let expected = method.point(spindle_rpm, depth_mm).unwrap().multiplier_abs;
         let found = multiplier_over(60.0 / spindle_rpm, &case, spindle_rpm, depth_mm, 60, order);
         println!("{name} {pitch_deg:?}: {found} {expected}");
-        // Integration to 1e-9 per step over some hundred steps in a revolution.
+        // The integration error is 1e-9 per step, over some hundred steps per revolution.
         assert!(
             (found / expected - 1.0).abs() < 1e-5,
             "{name} {pitch_deg:?}: {found} {expected}"

@@ -12,7 +12,7 @@ fn run(folder: &tempfile::TempDir, verb: &str, case: &str, options: &str) -> Out
 }
 
 #[test]
-fn a_plan_says_what_to_do_and_what_is_known_after_it() {
+fn a_plan_lists_tests_and_the_widths_after_each() {
     let folder = folder();
     let options = "--rpm 700:2000:14 --depth-mm 0:6:60 --width-percent 15 --out plan.html --json";
     let answer = run(&folder, "plan", "kuka-kr90-acetal", options).json();
@@ -25,7 +25,7 @@ fn a_plan_says_what_to_do_and_what_is_known_after_it() {
         .filter_map(|test| test["cuts_or_tests"].as_u64())
         .sum();
     assert_eq!(answer["cuts_and_tests"].as_u64(), Some(counted));
-    // Each test narrows, and the last one does what was asked for.
+    // Each test narrows the widest interval, and the last test reaches the requested width.
     let widest = |at: &serde_json::Value| at["widest_percent"].as_f64().expect("a width");
     let mut before = widest(&answer["before"]);
     for test in tests {
@@ -46,7 +46,7 @@ fn a_plan_says_what_to_do_and_what_is_known_after_it() {
 }
 
 #[test]
-fn what_no_set_of_tests_reaches_is_said_with_the_reason() {
+fn a_width_that_no_set_of_tests_reaches_is_stated_with_the_reason() {
     let folder = folder();
     let options = "--rpm 800:1600:5 --depth-mm 0:6:60 --width-percent 0.01 --json";
     let answer = run(&folder, "plan", "kuka-kr90-acetal", options).json();
@@ -73,7 +73,7 @@ fn what_cannot_be_planned_is_refused() {
 #[test]
 fn cuts_are_drawn_into_the_chart_and_counted() {
     let folder = folder();
-    // The limits are 1.664 mm at 800 and 2.041 mm at 1200 rev/min.
+    // The true limits are 1.664 mm at 800 rev/min and 2.041 mm at 1200 rev/min.
     let cuts = "rpm [rev/min],depth [mm],outcome\n800,1.5,stable\n800,1.6,chatter\n1200,1.9,marginal\n1200,2.2,stable\n";
     std::fs::write(folder.path().join("cuts.csv"), cuts).expect("the folder is there");
     let options = "--rpm 700:1300:7 --depth-mm 0:4:40 --cuts cuts.csv --out lobes.svg --json";

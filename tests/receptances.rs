@@ -20,7 +20,7 @@ fn text(path: &Path) -> String {
     path.display().to_string()
 }
 
-/// Writes the receptances of the acetal robot, in the given directions, as a tap test would find them without noise.
+/// Writes the receptances of the acetal robot in these directions, as from a tap test without noise.
 fn write_table(path: &Path, axes: &[Direction], (first_hz, last_hz, step_hz): (f64, f64, f64)) {
     let case = Case::read(case("kuka-kr90-acetal")).expect("the case is there");
     let structure = case
@@ -54,7 +54,7 @@ fn write_table(path: &Path, axes: &[Direction], (first_hz, last_hz, step_hz): (f
 
 const ALL: [Direction; 3] = [Direction::X, Direction::Y, Direction::Z];
 
-/// The case without its structure: tool, material and cut are enough where receptances are measured.
+/// Writes the case without its structure. With measured receptances, tool, material and cut are sufficient.
 fn write_case_without_structure(path: &Path) {
     let whole = fs::read_to_string(case("kuka-kr90-acetal")).expect("the case is there");
     let (_, rest) = whole.split_once("[tool]").expect("a tool");
@@ -76,7 +76,7 @@ fn depths(answer: &Value) -> Vec<f64> {
 }
 
 #[test]
-fn every_method_answers_and_averaged_ones_say_what_they_are_blind_to() {
+fn every_method_answers_and_averaged_ones_state_what_they_neglect() {
     let case = text(&case("kuka-kr90-acetal"));
     let folder = folder();
     let by = |method: &str| {
@@ -144,7 +144,7 @@ fn a_table_stands_for_the_structure() {
     let folder = folder();
     let (case_path, table) = (folder.path().join("cut.toml"), folder.path().join("frf.csv"));
     write_case_without_structure(&case_path);
-    // Ten lines per half bandwidth: 0.006 % of the peak between lines.
+    // The table has ten lines per half bandwidth: interpolation errs by 0.006 % of the peak.
     write_table(&table, &ALL, (1.0, 400.0, 0.05));
     let (case_path, table) = (text(&case_path), text(&table));
     for (rpm, method, expected) in [
@@ -172,15 +172,15 @@ fn a_table_stands_for_the_structure() {
         let found = depths(&answer);
         assert_eq!(found.len(), expected.len(), "{rpm} {method}: {found:?}");
         for (found, expected) in found.iter().zip(&expected) {
-            // 1e-4 of the harmonics and as much of the table: what a structure does above 100 Hz and below 2 Hz, and
-            // between lines.
+            // The error is 1e-4 from the number of harmonics and as much from the table: receptances above 100 Hz and below 2
+            // Hz, and interpolation between lines.
             assert!(
                 (found / expected - 1.0).abs() < 5e-4,
                 "{rpm} {method}: {found} {expected}"
             );
         }
     }
-    // Without a method it is the one that sees flips. Far below the limit, and at a point.
+    // Without --method the command uses the method that includes flips. The point is far below the limit.
     let answer = json(
         folder.path(),
         &["lobes", &case_path, "--frf", &table, "--at", "1045,2", "--json"],
@@ -202,7 +202,7 @@ fn a_table_stands_for_the_structure() {
 }
 
 #[test]
-fn what_a_table_lacks_is_said() {
+fn missing_entries_of_a_table_are_named() {
     let folder = folder();
     let table = folder.path().join("frf.csv");
     write_table(&table, &[Direction::X, Direction::Y], (5.0, 60.0, 0.5));
@@ -224,11 +224,11 @@ fn what_a_table_lacks_is_said() {
     run(&["--harmonics", "0", "--at", "900,1"]).refused(&["--harmonics", "zoa"]);
     run(&["--harmonics", "x", "--at", "900,1"]).refused(&["`x`", "400"]);
 
-    // A table that ends below the chatter frequency does not know the limit.
+    // A table that ends below the chatter frequency cannot give the limit.
     write_table(&table, &ALL, (5.0, 16.0, 0.1));
     run(&["--method", "zoa", "--rpm", "900", "--depth-mm", "0.1:9:40"]).refused(&["16 Hz", "9 mm", "gain"]);
     run(&["--at", "900,9"]).refused(&["16 Hz", "9 mm", "gain"]);
-    // One that begins above it says so.
+    // A table that begins above the chatter frequency is refused with this reason.
     write_table(&table, &ALL, (17.5, 100.0, 0.1));
     let answer = run(&["--method", "zoa", "--at", "900,0.1"]);
     assert!(

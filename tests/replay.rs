@@ -1,5 +1,5 @@
-//! A real slot cut with chatter: 4 flutes, 5000 rev/min, 10 kHz, in the cut from 3.5 to 4.9 s, a tone between 740 and
-//! 690 Hz beside the 333.3 Hz of the tooth passing.
+//! A measured slot cut with chatter: 4 flutes, 5000 rev/min, 10 kHz, in the cut from 3.5 to 4.9 s. The chatter tone falls from
+//! 740 to 690 Hz; the tooth-passing frequency is 333.3 Hz.
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 

@@ -1,4 +1,4 @@
-//! The signal chain on the emulated Cortex-M4F: the same bits as on the host, and what it costs.
+//! The signal chain on the emulated Cortex-M4F: the same bits as on the host, and its cost in instructions.
 #![allow(clippy::expect_used, clippy::indexing_slicing)]
 
 use std::collections::BTreeMap;
@@ -16,7 +16,7 @@ fn counts() -> &'static BTreeMap<String, u64> {
     COUNTS.get_or_init(emulator::count_instructions)
 }
 
-/// Elementary functions, decimation, both transforms, spectra and the search in them.
+/// Compares elementary functions, decimation, both transforms, the spectra, and the search for a tone in them.
 #[test]
 fn target_and_host_compute_the_same_bits() {
     let mut memory = Box::new(chain_bits::Memory::new());
@@ -29,7 +29,7 @@ fn target_and_host_compute_the_same_bits() {
     }
 }
 
-/// The compiler that made the counting image, as it says in the image.
+/// The compiler that built the instruction counter, as the image contains it.
 fn compiler() -> String {
     let bytes = fs::read(firmware_image::count_instructions()).expect("the counting image");
     let elf = object::File::parse(&*bytes).expect("an ELF file");
@@ -39,7 +39,8 @@ fn compiler() -> String {
     version.expect("the name of the compiler").to_owned()
 }
 
-/// Signal to noise in decibel of the 1024-point transform for a tone between two bins, quantized to 16 bits, against an exact transform.
+/// Signal-to-noise ratio in decibel of the 1024-point transform, compared with an exact transform, for a 16-bit tone between two
+/// bins.
 fn snr_db(dbfs: f64) -> f64 {
     const POINTS: usize = 1024;
     let amplitude = 32767.0 * 10f64.powf(dbfs / 20.0);
@@ -98,9 +99,9 @@ fn cost_and_accuracy_of_the_transform() {
     ] {
         println!("{piece}: {}", counts[piece]);
     }
-    // 145 and 143 dB are what the tests of the transform find for a tone between two bins.
+    // The tests of the transform give 145 and 143 dB for a tone between two bins.
     assert!(loud >= 140.0 && quiet >= 138.0, "{loud} dB, {quiet} dB");
-    // Measured with rustc 1.95.0; a tenth more is left for other versions.
+    // Counts measured with rustc 1.95.0; a tenth more is allowed for other versions.
     for (piece, measured) in [
         ("rfft-1024", 45_225),
         ("microfft-1024", 50_059),

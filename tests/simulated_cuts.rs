@@ -10,7 +10,7 @@ const IN_TIME: f64 = 5.0;
 /// Largest allowed error of the chatter frequency in the first alarm, Hz: at 1100 rev/min, where the aliases lie closest together, they are 1.3 Hz apart.
 const SAME_HZ: f64 = 0.5;
 
-/// Cut at this depth relative to the stability limit; sensors differ between the speeds.
+/// Simulates a cut at this depth relative to the stability limit. The sensors differ between the speeds.
 fn cut(index: usize, share: f64) -> Outcome {
     let acceptance = AcceptanceCut::new(index, share);
     let outcome = SimulatedCut::of(&acceptance).judged(acceptance.seed);
@@ -33,7 +33,7 @@ fn a_fifth_above_the_limit_the_right_kind_is_called_in_time() {
     let missed: Vec<String> = (0..LIMITS.len())
         .map(|index| (index, cut(index, ABOVE)))
         .filter(|(index, outcome)| {
-            // Where loss of contact keeps the vibration below that, while it is cut at all.
+            // If loss of contact limits the vibration to a smaller ratio, the alarm must come before the end of the cut.
             let deadline_s = outcome.grown_to(IN_TIME).unwrap_or(outcome.full_cut_s[1]);
             let (.., kind, chatter_hz) = LIMITS[*index];
             !outcome.first_alarm().is_some_and(|(t, verdict, found_hz)| {

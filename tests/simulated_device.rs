@@ -59,7 +59,7 @@ fn a_table_outlives_the_command_and_a_wrong_one_does_not_replace_it() {
     assert_eq!(first["table"]["name"], "kuka-kr90-acetal");
     assert_eq!(first["slots"][0]["state"], "in-use");
 
-    // One bit, the end, the name of another file.
+    // Four wrong files: a flipped bit, missing bytes at the end, a case in place of a table, and no bytes.
     let mut wrong = bytes.clone();
     wrong[bytes.len() / 2] ^= 4;
     for (name, content, words) in [
@@ -94,10 +94,10 @@ fn line(device: &SimulatedDevice) -> Box<dyn Port> {
 }
 
 #[test]
-fn bad_frames_are_named_and_harm_nothing() {
+fn invalid_frames_have_their_own_errors_and_change_nothing() {
     let folder = folder();
     let device = device(&folder.path().join("device.bin"));
-    scenario::bad_frames_are_named_and_harm_nothing(&|| line(&device));
+    scenario::invalid_frames_have_their_own_errors_and_change_nothing(&|| line(&device));
 }
 
 #[test]
@@ -120,7 +120,7 @@ fn an_interrupted_upload_goes_on() {
     let bytes = table(folder.path());
     let parsed = LobeTable::parse(&bytes).expect("a table");
     let state = folder.path().join("device.bin");
-    // Until the flash has kept a page of it.
+    // The upload is interrupted once the flash holds a complete page.
     {
         let device = device(&state);
         let mut host = RawHost::new(line(&device));
@@ -165,10 +165,10 @@ fn an_interrupted_upload_goes_on() {
 }
 
 #[test]
-fn the_working_point_is_told_and_kept_while_the_device_is_on() {
+fn the_working_point_is_set_and_kept_while_the_device_is_on() {
     let folder = folder();
     let device = device(&folder.path().join("device.bin"));
-    scenario::the_command_uploads_tells_and_asks(device.path());
+    scenario::the_command_uploads_a_table_and_sets_and_reads_the_working_point(device.path());
     let (mut client, _) = scenario::connect(&|| line(&device));
     client.set_working_point(None).expect("the device forgets");
     assert_eq!(client.status().expect("a status").working_point, None);

@@ -1,4 +1,4 @@
-//! A real cut: a slot with four flutes at 5 000 rev/min that begins to chatter, one channel of unknown unit, no tachometer.
+//! A measured slot cut with chatter: four flutes at 5 000 rev/min, one channel of unknown unit, no tachometer.
 
 #![allow(clippy::unwrap_used)]
 
@@ -27,7 +27,8 @@ fn the_tone_of_the_measured_slot_cut_is_detected() {
     }
     let (first_s, first_hz) = chatter[0];
     println!("first detected at {first_s} s, {first_hz} Hz");
-    // In cut from 3.5 to 4.9 s. The tone falls from 740 to 684 Hz while it grows; the hum at 146 Hz, louder at first, is always there.
+    // The tool is in the cut from 3.5 to 4.9 s. The chatter tone falls from 740 to 684 Hz while it grows. The tone at 146 Hz,
+    // first the larger one, is present all the time.
     assert!((3.5..4.3).contains(&first_s), "{first_s}");
     assert!((690.0..740.0).contains(&first_hz), "{first_hz}");
     for (at_s, hz) in chatter {

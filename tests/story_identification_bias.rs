@@ -1,12 +1,13 @@
-//! Story: an identified model with a large prediction error on its own data.
+//! Story: a model that is identified from higher-order FRFs has a large prediction error on its own data.
 //!
-//! One mode of a milling robot with cubic stiffness and damping is measured as in chapter 5 of the thesis: step-sine at
-//! three force levels, without any noise. Higher-order FRF (eqs 5.15 to 5.17) give parameters that are wrong by up to a fifth and
-//! responses that miss the record; harmonic balance gives back the truth. Why: eq. 5.15 cuts the Volterra series of the
-//! response after F⁵, where at these levels the term in F³ is as large as that in F, or eleven times as large, near the
-//! resonance: the series hardly converges there, or not at all. At small levels what is cut, ~F⁷, is taken for a part of
-//! H₃F³, and the cubic terms err by ~F⁴.
+//! One mode of a milling robot with cubic stiffness and damping is measured as in chapter 5 of the thesis: step-sine at three
+//! force levels, without noise. Higher-order FRFs (eqs 5.15 to 5.17) give parameters with errors of up to a fifth and a model
+//! with a large prediction error. Harmonic balance gives the true parameters. The reason: eq. 5.15 truncates the Volterra series
+//! of the response after F⁵. At these levels the term in F³ is as large as the term in F near the resonance, or eleven times as
+//! large, so that the series converges slowly or not at all. At small levels the truncated term F⁷ is attributed to H₃F³, and
+//! the cubic terms have an error proportional to F⁴.
 //!
+//! To print the table: `cargo test --release -p quietcut-tests --test story_identification_bias -- --nocapture`
 //! To see the table: `cargo test --release -p quietcut-tests --test story_identification_bias -- --nocapture`
 
 #![allow(clippy::expect_used, clippy::panic)]
@@ -27,7 +28,7 @@ use quietcut::simulate::rig::{Rig, Signal};
 use quietcut::structure::{Direction, Form, Matrices};
 use quietcut_tests::command::cases;
 
-/// The law's parameters in words of the case file.
+/// The parameters of the model with their keys in the case file.
 const ROLES: [(Role, &str); 5] = [
     (Role::Mass(0, 0), "m"),
     (Role::Damping(0, 0), "c"),
@@ -36,10 +37,10 @@ const ROLES: [(Role, &str); 5] = [
     (Role::CubicStiffness(0), "k3"),
 ];
 
-/// Harmonics that are taken from each dwell.
+/// Number of harmonics that are fitted to each dwell.
 const HARMONICS: usize = 5;
 
-/// A set of the thesis: a case, its force levels in N, and the bias of c₃ and k₃ that eqs 5.15 to 5.17 have there.
+/// A test of the thesis: the case, its force levels in N, and the bias of c₃ and k₃ from eqs 5.15 to 5.17.
 const SETS: [(&str, [f64; 3], [f64; 2]); 2] = [
     ("kuka-kr90-y17-low", [1.8, 5.8, 9.5], [-0.09, -0.21]),
     ("kuka-kr90-y17-high", [12.6, 15.6, 17.2], [-0.10, -0.19]),
@@ -69,12 +70,12 @@ fn truth(case: &Case, role: Role) -> f64 {
     }
 }
 
-/// 16.6 to 17.9 Hz in steps of 0.05 Hz, as in section 5.2.3.
+/// Frequencies from 16.6 to 17.9 Hz in steps of 0.05 Hz, as in section 5.2.3 of the thesis.
 fn frequencies_hz() -> Vec<f64> {
     (0..27).map(|step| 16.6 + 0.05 * f64::from(step)).collect()
 }
 
-/// The thesis's test: every frequency at each level, the displacement recorded.
+/// The test of the thesis: the displacement at every frequency and level.
 fn measured(case: &Case, levels_n: &[f64]) -> Vec<Dwell> {
     let frequencies_hz = frequencies_hz();
     let signal = Signal::step_sine(&frequencies_hz, levels_n, 36.0, 12.0);
@@ -88,11 +89,11 @@ fn measured(case: &Case, levels_n: &[f64]) -> Vec<Dwell> {
     found.dwells
 }
 
-/// Estimates of both methods from the same dwells.
+/// Estimates of both methods, from the same dwells.
 struct Identified {
     responses: Vec<Response>,
     hfrf: HfrfFit,
-    /// What the model by higher-order FRF leaves of the data it comes from, as a share of them.
+    /// NRMSE of the model from higher-order FRFs on its own data.
     hfrf_error: f64,
     balance: Fit,
 }
@@ -116,13 +117,13 @@ fn identified(dwells: &[Dwell]) -> Identified {
     }
 }
 
-/// Relative error of a parameter.
+/// Relative error of an identified parameter.
 fn bias(case: &Case, theta: &DVector<f64>, role: Role) -> f64 {
     let index = law().index(role).expect("the law has it");
     theta[index] / truth(case, role) - 1.0
 }
 
-/// H₁ and H₃(ω, ω, −ω) of the true parameters: eqs 5.16 and 5.17 read from right to left.
+/// H₁ and H₃(ω, ω, −ω) of the true parameters, from eqs 5.16 and 5.17 solved for the kernels.
 fn true_kernels(case: &Case, omega: f64) -> [Complex64; 2] {
     let of = |role| truth(case, role);
     let dynamic = Complex64::new(
@@ -137,7 +138,7 @@ fn true_kernels(case: &Case, omega: f64) -> [Complex64; 2] {
     [h1, -cubic * h1.powi(3) * h1.conj()]
 }
 
-/// Responses that follow the series of eq. 5.15 without anything beyond F⁵, with the true H₁ and H₃.
+/// Responses of the series of eq. 5.15 without terms beyond F⁵, with the true H₁ and H₃.
 fn cut_series(case: &Case, identified: &Identified) -> Vec<Response> {
     let pairs = identified.responses.iter().zip(&identified.hfrf.estimates);
     pairs
@@ -182,7 +183,7 @@ fn higher_order_frf_mispredict_the_data_they_come_from() {
             &found.balance.theta,
             found.balance.relative_error,
         );
-        // Stated to a percent; the records are finite and sampled, which moves the last digit.
+        // The bias is stated to a percent. The records are finite and sampled, which changes the last digit.
         let (c3, k3) = (
             bias(&case, &found.hfrf.theta, Role::CubicDamping(0)),
             bias(&case, &found.hfrf.theta, Role::CubicStiffness(0)),
@@ -202,7 +203,8 @@ fn higher_order_frf_mispredict_the_data_they_come_from() {
         let largest = largest_term(&case, &found.responses);
         println!("  the term in F³ of the series is up to {largest:.1} times that in F");
         assert!(largest > 0.8, "{largest}");
-        // Without what eq. 5.15 cuts the same equations give the truth: nothing else is wrong with them.
+        // For responses without the terms that eq. 5.15 truncates, the same equations give the true parameters. The truncation
+        // is the only error.
         let exact = hfrf::fit(&cut_series(&case, &found)).expect("three levels");
         for (role, letter) in ROLES {
             let off = bias(&case, &exact.theta, role);
@@ -214,7 +216,7 @@ fn higher_order_frf_mispredict_the_data_they_come_from() {
     }
 }
 
-/// The largest ratio of the term in F³ of the true series to that in F.
+/// Largest ratio of the term in F³ of the true series to the term in F.
 fn largest_term(case: &Case, responses: &[Response]) -> f64 {
     let ratio = |response: &Response| {
         let [h1, h3] = true_kernels(case, response.omega);
@@ -224,7 +226,7 @@ fn largest_term(case: &Case, responses: &[Response]) -> f64 {
     responses.iter().map(ratio).fold(0.0, f64::max)
 }
 
-/// Steady responses of the true law by harmonic balance: to rounding also where a simulation is not.
+/// Steady responses of the true model by harmonic balance, which are exact to rounding.
 fn exact(case: &Case, levels_n: &[f64]) -> Vec<Response> {
     let law = law();
     let grid = Grid::new(HARMONICS, law.degree());
@@ -276,10 +278,10 @@ fn the_bias_vanishes_with_the_fourth_power_of_the_force() {
     for (large, small) in biases[3].iter().zip(&biases[4]) {
         let power = (large / small).log2();
         println!("power of the force: {power:.2}");
-        // The leading term is F⁴; at an eighth of the levels the next still has a share of a fifth.
+        // The leading error is proportional to F⁴. At an eighth of the levels the next term contributes a fifth.
         assert!((3.5..4.5).contains(&power), "{large} {small} {power}");
     }
-    // From a fifth at the thesis's levels to less than a thousandth at a sixteenth of them.
+    // The error falls from a fifth at the levels of the thesis to less than a thousandth at a sixteenth of them.
     assert!(
         biases[0][1].abs() > 0.2 && biases[4].iter().all(|bias| bias.abs() < 1e-3),
         "{biases:?}"

@@ -1,10 +1,10 @@
-//! Story: why the lobes of a linear model are wrong between the lobes at large depths (in the pockets).
+//! Story: the lobes of a linear model are wrong in the pockets, between the lobes at large depths.
 //!
-//! The thesis's own campaign, on a virtual robot with the cubic terms of Table 6.2. A hammer test identifies its linear
-//! part, whose lobes are the baseline. Ten speeds from 480 to 620 rev/min by eight depths are cut at half immersion; each cut is
-//! judged by its own vibration once per tooth. Circles, crosses and squares are set against the lobes, before and after the
-//! cubic terms are identified. Then `diagnose` is given what is believed, shaker records and the cuts: it names the cubic terms,
-//! and says how it would have called the cuts.
+//! The campaign of the thesis on a virtual robot with the cubic terms of Table 6.2. A hammer test identifies its linear part,
+//! whose lobes are the baseline. Cuts at half immersion have ten speeds from 480 to 620 rev/min and eight depths. Each cut is
+//! called stable or unstable from its vibration once per tooth. These calls are compared with the lobes before and after the
+//! cubic terms are identified. `diagnose` then gets the baseline, shaker records and the cuts. It names the cubic terms and
+//! predicts the calls of the cuts.
 //!
 //! To see the tables, and pictures in a folder: `QUIETCUT_STORY=DIR cargo test --release -p quietcut-tests --test
 //! story_nonlinear_pockets -- --nocapture`
@@ -37,7 +37,7 @@ const TRUTH: &str = "kuka-kr90-half-cubic";
 /// Baseline case of the robot from a tap test.
 const BELIEF: &str = "kuka-kr90-half";
 
-/// Depths of the chart, mm.
+/// Largest depth of the chart, mm.
 const DEPTH_MM: f64 = 18.0;
 
 fn case(name: &str) -> Case {
@@ -61,26 +61,27 @@ fn forced(case: &Case) -> ForcedProblem {
     ForcedProblem::new(case).expect("a forced problem")
 }
 
-/// How a cut is judged: by displacements once per tooth, of which the motion that every stable cut comes to is one point.
+/// The call of a cut from displacements sampled once per tooth. In a stable cut these converge to one point.
 #[derive(Clone, Copy, Debug)]
 struct Judged {
-    /// Root mean square of the steps from tooth to tooth in the last eighth of the cut, over the feed per tooth.
+    /// Root mean square of the steps from tooth to tooth in the last eighth of the cut, divided by the feed per tooth.
     unrest: f64,
-    /// Growth of these steps per tooth over the last three eighths: about the largest multiplier while they are small.
+    /// Growth of these steps per tooth over the last three eighths of the cut. For small steps it is about the largest Floquet
+    /// multiplier.
     growth: f64,
-    /// Half of what the tool moves to and fro in x and y in the last eighth, m.
+    /// Half the peak-to-peak displacement in x and y in the last eighth of the cut, m.
     swing_m: [f64; 2],
     outcome: Outcome,
 }
 
-/// Instants of a tooth period at which the tool is looked at.
+/// Number of instants per tooth period at which the displacement is sampled.
 const INSTANTS: usize = 16;
 
-/// Steps smaller than this share of the feed are no chatter, and larger than the other are not quiet.
+/// Steps smaller than this share of the feed per tooth count as stable; steps larger than the second one count as chatter.
 const QUIET: f64 = 1e-3;
 const LOUD: f64 = 0.05;
 
-/// A cut from rest, whole from the start, over so many teeth.
+/// Simulates a cut from rest with full engagement from the start, over `teeth` tooth passings.
 fn judged(case: &Case, rpm: f64, depth_mm: f64, teeth: usize) -> Judged {
     let period_s = 60.0 / (rpm * case.tool().expect("a tool").teeth as f64);
     let seconds = period_s * (teeth as f64 + 1.5);
@@ -126,7 +127,8 @@ fn judged(case: &Case, rpm: f64, depth_mm: f64, teeth: usize) -> Judged {
     };
     let (earlier, unrest) = (size(2), size(0));
     let growth = (unrest / earlier).powf(1.0 / (2 * eighth) as f64);
-    // What decays would be quiet by and by: it is told by its growth. A torus breathes, so that growth near one says little.
+    // A decaying vibration would become small only later, so that its growth decides. The amplitude of a torus varies, so that a
+    // growth near 1 decides little.
     let at_end = unrest * growth.powi(4 * teeth as i32);
     let outcome = if unrest < QUIET || (growth < 0.995 && at_end < QUIET) {
         Outcome::Stable
@@ -152,7 +154,7 @@ fn judged(case: &Case, rpm: f64, depth_mm: f64, teeth: usize) -> Judged {
     }
 }
 
-/// The campaign: every speed at every depth.
+/// The cuts of the campaign, at every speed and every depth.
 fn campaign(case: &Case, speeds_rpm: &[f64], depths_mm: &[f64], teeth: usize) -> Vec<(TrialCut, Judged)> {
     let points: Vec<(f64, f64)> = depths_mm
         .iter()
@@ -176,12 +178,12 @@ fn campaign(case: &Case, speeds_rpm: &[f64], depths_mm: &[f64], teeth: usize) ->
         .collect()
 }
 
-/// Ten speeds.
+/// The ten spindle speeds of the campaign.
 fn speeds_rpm() -> Vec<f64> {
     (0..10).map(|i| 480.0 + 140.0 / 9.0 * f64::from(i)).collect()
 }
 
-/// Eight depths.
+/// The eight depths of the campaign.
 fn depths_mm() -> Vec<f64> {
     (0..8).map(|i| 2.0 + 1.5 * f64::from(i)).collect()
 }
@@ -206,7 +208,7 @@ fn print_table(cuts: &[(TrialCut, Judged)], speeds: usize) {
     }
 }
 
-/// Where pictures are wanted.
+/// The folder for pictures, if one is set.
 fn pictures() -> Option<PathBuf> {
     std::env::var_os("QUIETCUT_STORY").map(PathBuf::from)
 }
@@ -218,14 +220,15 @@ fn draw(folder: &Path, name: &str, title: &str, chart: &Chart, cuts: &[(TrialCut
     std::fs::write(folder.join(format!("{name}.svg")), svg).expect("the folder is there");
 }
 
-/// Runs the command in `folder`, which must do what it is asked to.
+/// Runs the command in `folder`. It must end with success.
 fn done(folder: &Path, arguments: &str) {
     let arguments: Vec<&str> = arguments.split_whitespace().collect();
     let outcome = quietcut(folder, &arguments);
     assert_eq!(outcome.status, Some(0), "{arguments:?}: {outcome:?}");
 }
 
-/// The model that step-sine tests of the robot at three levels give: matrices with cubic terms, and the job of the truth.
+/// The model from step-sine tests of the robot at three levels: matrices with cubic terms, and tool, material and cut of the
+/// true case.
 fn identified(folder: &Path) -> Case {
     let truth = cases().join(format!("{TRUTH}.toml"));
     let path = truth.display();
@@ -252,7 +255,7 @@ fn identified(folder: &Path) -> Case {
     Case::parse(&folder.join("found.toml"), &found).expect("a case")
 }
 
-/// What `diagnose` makes of the belief, of a short step-sine test in each direction and of the cuts.
+/// The answer of `diagnose` for the baseline, a short step-sine test in each direction, and the cuts.
 fn diagnosed(folder: &Path, cuts: &[(TrialCut, Judged)]) -> serde_json::Value {
     let [truth, belief] = [TRUTH, BELIEF].map(|name| cases().join(format!("{name}.toml")));
     for (direction, frequencies, forces, seed) in [
@@ -291,7 +294,8 @@ fn diagnosed(folder: &Path, cuts: &[(TrialCut, Judged)]) -> serde_json::Value {
     quietcut(folder, &arguments).json()
 }
 
-/// Both cubic terms along both directions, each with its number; and the cuts that were called wrong are called right.
+/// Both cubic terms are found along both directions, each with its value, and all cuts that were called wrong before are called
+/// right.
 fn check_diagnosis(answer: &serde_json::Value, truth: &Case, wrong_before: usize) {
     assert_eq!(answer["outcome"], "cause", "{answer}");
     let parts = matrices(truth);
@@ -310,7 +314,7 @@ fn check_diagnosis(answer: &serde_json::Value, truth: &Case, wrong_before: usize
             "{name} {direction}: {found:.4e}, {:+.2} %",
             100.0 * (found / there - 1.0)
         );
-        // Half a percent of noise, and cubic terms between the directions that no cause has.
+        // The error comes from half a percent of noise, and from cubic coupling between the directions, which no cause contains.
         assert!((found / there - 1.0).abs() < 0.01, "{name} {direction}: {found}");
         named.push((name, direction));
     }
@@ -336,7 +340,7 @@ fn check_diagnosis(answer: &serde_json::Value, truth: &Case, wrong_before: usize
     assert_eq!(wrong("after"), 0);
 }
 
-/// Frequency in Hz and damping ratio of a mode that moves by A cos ωt: stiffness k + ¾k₃A², damping c + ¾c₃ω²A².
+/// Frequency in Hz and damping ratio of a mode with the motion A cos ωt: stiffness k + ¾k₃A², damping c + ¾c₃ω²A².
 fn equivalent(case: &Case, amplitude_m: f64) -> (f64, f64) {
     let parts = matrices(case);
     let of = |matrix: &Option<nalgebra::DMatrix<f64>>| matrix.as_ref().expect("cubic terms")[(0, 0)];
@@ -347,7 +351,7 @@ fn equivalent(case: &Case, amplitude_m: f64) -> (f64, f64) {
     (omega / TAU, 0.5 * damping / (mass * omega))
 }
 
-/// Receptances by a hammer, as a table in `folder`.
+/// Writes the receptances from a hammer test as a table in `folder`.
 fn tapped(folder: &Path) {
     let truth = cases().join(format!("{TRUTH}.toml"));
     for direction in ["x", "y"] {
@@ -363,7 +367,7 @@ fn tapped(folder: &Path) {
     done(folder, "frf hx.csv hy.csv --band-hz 8:40 --out frf.csv");
 }
 
-/// First limits in mm at the campaign's speeds.
+/// First limits in mm at the speeds of the campaign.
 fn limits_mm(method: &dyn Method) -> Vec<f64> {
     let lines = method.lines(&speeds_rpm(), DEPTH_MM, 60).expect("a chart");
     lines
@@ -380,9 +384,9 @@ fn print_limits(what: &str, limits_mm: &[f64]) {
     println!();
 }
 
-/// Small vibrations of cuts grow and decay as the largest multiplier about the forced orbit says.
+/// Checks that small vibrations of cuts grow or decay with the largest Floquet multiplier of the forced orbit.
 fn check_growth(method: &ForcedProblem, cuts: &[(TrialCut, Judged)]) {
-    // Above the errors of the integration, and small enough that the equations about the orbit are linear.
+    // The vibration exceeds the integration error and is small enough for the linearization about the orbit.
     let small = cuts
         .iter()
         .filter(|(_, judged)| (1e-6..1e-2).contains(&judged.unrest));
@@ -393,7 +397,7 @@ fn check_growth(method: &ForcedProblem, cuts: &[(TrialCut, Judged)]) {
         count += 1;
     }
     println!("{count} cuts still decay at the end: growth per tooth is the multiplier within {worst:.4}");
-    // Over an eighth of a cut, 50 teeth, two motions of nearly the same decay beat.
+    // Over an eighth of a cut, 50 tooth passings, two motions of nearly the same decay rate beat.
     assert!(count >= 5 && worst < 0.01, "{count} {worst}");
 }
 
@@ -462,12 +466,12 @@ fn lobes_of_the_linear_part_call_cuts_in_the_pockets_wrong_and_those_with_cubic_
     };
     for index in 0..limits[0].len() {
         let off = |of: &[f64], from: &[f64]| (of[index] / from[index] - 1.0).abs();
-        // Impacts of 60 N move the tool by 0.03 mm: that much of the cubic terms is in the receptances.
+        // Impacts of 60 N move the tool by 0.03 mm. At this amplitude the cubic terms change the receptances.
         assert!(off(by_hammer, by_linear_part) < 0.03, "{index}");
-        // Half a percent of noise.
+        // The error comes from half a percent of noise.
         assert!(off(by_found, by_truth) < 0.005, "{index}");
     }
-    // The cuts know nothing of multipliers: that they agree with those of the robot is what makes both of them right.
+    // The calls of the cuts use no Floquet multipliers, so that their agreement with the limits of the true robot confirms both.
     assert_eq!(calls[3].wrong, 0);
     assert!(calls[0].wrong >= 8 && calls[1].wrong >= 8, "{calls:?}");
     assert_eq!(
@@ -494,12 +498,12 @@ fn the_pockets_are_where_the_cubic_terms_act() {
         };
         let found = first(&after) / first(&before);
         println!("{rpm} rev/min: times {found:.3}");
-        // Stated to a unit of the last digit.
+        // The factors are stated to a unit of the last digit.
         assert!((found - factor).abs() < 0.006, "{rpm} {found}");
     }
 }
 
-/// Amplitude at which something of a mode reaches a value, by halving; it must lie on the way up to 0.7 mm.
+/// Amplitude at which a quantity of a mode reaches a value, by bisection up to 0.7 mm.
 fn amplitude_m(reached: impl Fn(f64) -> bool) -> f64 {
     let (mut low, mut high) = (0.0, 0.7e-3);
     assert!(!reached(low) && reached(high));
@@ -514,8 +518,8 @@ fn amplitude_m(reached: impl Fn(f64) -> bool) -> f64 {
     high
 }
 
-/// Stiffness and damping that the mode has at a steady motion of about this amplitude, by harmonic balance: F/X − (k − mω²
-/// + iωc) of the fundamental; and the amplitude.
+/// Equivalent stiffness and damping of the mode in a steady motion of about this amplitude, by harmonic balance, from F/X − (k −
+/// mω² + iωc) of the fundamental; and the amplitude.
 fn balanced(case: &Case, amplitude_m: f64) -> (f64, f64, f64) {
     let parts = matrices(case);
     let one = |matrix: &nalgebra::DMatrix<f64>| matrix[(0, 0)];
@@ -535,7 +539,7 @@ fn balanced(case: &Case, amplitude_m: f64) -> (f64, f64, f64) {
     let omega = TAU * hz;
     let grid = Grid::new(7, law.degree());
     let mut force = DVector::zeros(grid.width());
-    // At its own frequency the mode needs c ω A; the start is that motion, a quarter turn behind.
+    // At its natural frequency the mode needs the force c ω A. The initial guess is this motion, 90° behind the force.
     force[1] = 2.0 * ratio * one(&parts.mass) * omega * omega * amplitude_m;
     let mut start = DVector::zeros(grid.width());
     start[2] = amplitude_m;
@@ -551,8 +555,8 @@ fn balanced(case: &Case, amplitude_m: f64) -> (f64, f64, f64) {
     (x[1].hypot(x[2]), stiffness, dynamic.im / omega)
 }
 
-/// Chapter 7 finds a mode of 18.48 Hz with 9.96 % of damping in process (Table 7.1), where a hammer finds one near 20 Hz with
-/// 2.2 %. Can cubic terms (Table 5.2) make the one of the other?
+/// Chapter 7 finds a mode of 18.48 Hz with a damping ratio of 9.96 % in process (Table 7.1). A hammer test finds one near 20 Hz
+/// with 2.2 %. The test checks whether cubic terms (Table 5.2) explain the difference.
 #[test]
 fn cubic_terms_do_not_explain_the_heavily_damped_mode_of_chapter_7() {
     const IN_PROCESS: (f64, f64) = (18.48, 0.0996);
@@ -572,7 +576,7 @@ fn cubic_terms_do_not_explain_the_heavily_damped_mode_of_chapter_7() {
         1e3 * of_damping,
         at_damping.0
     );
-    // The second way: harmonics and all.
+    // A second computation, by harmonic balance with all harmonics.
     for amplitude in [1e-4, 2e-4, of_frequency] {
         let (found, stiffness, damping) = balanced(&mode, amplitude);
         let parts = matrices(&mode);
@@ -580,7 +584,7 @@ fn cubic_terms_do_not_explain_the_heavily_damped_mode_of_chapter_7() {
         let omega = TAU * hz;
         let expected = omega * omega * parts.mass[(0, 0)];
         let expected_damping = 2.0 * ratio * omega * parts.mass[(0, 0)];
-        // The third harmonic is a hundredth of the first where the spring has lost a sixth of its stiffness.
+        // If the stiffness has fallen by a sixth, the third harmonic is a hundredth of the first.
         assert!(
             (stiffness / expected - 1.0).abs() < 0.02,
             "{stiffness} {expected}"
@@ -590,8 +594,7 @@ fn cubic_terms_do_not_explain_the_heavily_damped_mode_of_chapter_7() {
             "{damping} {expected_damping}"
         );
     }
-    // How far does the tool swing in x in cuts that do not chatter, in acetal as in chapter 7, half of the way to the limit
-    // and just below it?
+    // Amplitude in x of cuts without chatter in acetal, as in chapter 7, at half the limit and just below it.
     let acetal = case("kuka-kr90-acetal");
     let mut robot = case(TRUTH);
     robot.material = acetal.material;
@@ -615,8 +618,8 @@ fn cubic_terms_do_not_explain_the_heavily_damped_mode_of_chapter_7() {
         1e3 * largest,
         100.0 * ratio
     );
-    // At no amplitude both: where the frequency fits, half of the damping is missing, and where the damping fits, the
-    // frequency has long gone by. And no quiet cut swings that far.
+    // No amplitude explains both. At the amplitude that gives the frequency, half of the damping is missing; at the amplitude
+    // that gives the damping, the frequency is far too low. No stable cut reaches this amplitude.
     assert!((at_frequency.1 - 0.051).abs() < 0.001 && (at_damping.0 - 14.2).abs() < 0.1);
     assert!(largest < 0.5 * of_frequency && ratio < 0.04, "{largest} {ratio}");
 }

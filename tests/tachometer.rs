@@ -1,4 +1,5 @@
-//! A real tachometer: a 60−2 wheel on a crank, recorded with an oscilloscope at 10 kHz, whose base line varies once per revolution.
+//! A measured tachometer signal: a 60−2 wheel on a crankshaft, recorded with an oscilloscope at 10 kHz. Its base line varies
+//! once per revolution.
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 
@@ -8,7 +9,7 @@ use quietcut_core::tachometer::{
 use quietcut_core::units::Nanoseconds;
 use quietcut_testkit::measured;
 
-/// Levels of the recording.
+/// The voltage samples of the recording.
 fn levels() -> Vec<f32> {
     let path = measured("tachometer/crank_60-2.csv");
     let text = std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
@@ -19,7 +20,7 @@ fn levels() -> Vec<f32> {
         .collect()
 }
 
-/// Spindle speed of each revolution, from levels sampled at 10 kHz.
+/// Spindle speed of each revolution, from voltages sampled at 10 kHz.
 fn turn_speeds(levels: impl Iterator<Item = f32>) -> (Vec<f32>, TachometerState) {
     let tachometer = Tachometer::new(Wheel {
         positions: 60,
@@ -27,7 +28,7 @@ fn turn_speeds(levels: impl Iterator<Item = f32>) -> (Vec<f32>, TachometerState)
     })
     .unwrap();
     let mut state = TachometerState::default();
-    // A tenth of the volt that a tooth makes.
+    // The threshold is a tenth of the amplitude of a tooth, one volt.
     let detector = LevelDetector { least_swing: 0.1 };
     let mut level_state = LevelDetectorState::default();
     let mut speeds = Vec::new();
@@ -49,7 +50,7 @@ fn turn_speeds(levels: impl Iterator<Item = f32>) -> (Vec<f32>, TachometerState)
 #[ignore = "measured records: QUIETCUT_DATA names their folder"]
 fn measured_crank_wheel_runs_at_160_7_rpm() {
     let levels = levels();
-    // A variable-reluctance sensor may be wired either way round.
+    // A variable-reluctance sensor may have either polarity.
     for sign in [1.0, -1.0] {
         let (speeds, state) = turn_speeds(levels.iter().map(|level| sign * level));
         println!(
@@ -57,7 +58,7 @@ fn measured_crank_wheel_runs_at_160_7_rpm() {
             state.rejected(),
             state.missed()
         );
-        // The record holds 16 gaps; the first comes before the regular interval is known: 14 whole turns.
+        // The record has 16 gaps. The first comes before the regular interval is known, which leaves 14 complete revolutions.
         assert_eq!(speeds.len(), 14);
         assert_eq!((state.losses(), state.missed()), (0, 0));
         let mean = speeds.iter().sum::<f32>() / speeds.len() as f32;

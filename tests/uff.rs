@@ -1,4 +1,4 @@
-//! UFF 58 files of quietcut, read with the independent reader pyuff.
+//! UFF 58 files that quietcut writes are read by the independent reader pyuff.
 #![allow(clippy::expect_used)]
 
 use std::path::{Path, PathBuf};
@@ -9,7 +9,7 @@ use quietcut::recording::{Channel, Quantity, Recording, Sidecar, UffForm};
 use quietcut::structure::Direction;
 use serde_json::Value;
 
-/// Prints what pyuff finds in the file of the first argument.
+/// Python program that prints the content of a UFF file as pyuff reads it.
 const SCRIPT: &str = r#"
 import json, sys, pyuff
 file = pyuff.UFF(sys.argv[1])
@@ -33,7 +33,7 @@ for kind, data in zip(file.get_set_types(), file.read_sets()):
 print(json.dumps(sets))
 "#;
 
-/// The Python to which `tests/install-tools` gives pyuff.
+/// The Python interpreter for which `tests/install-tools` has installed pyuff.
 fn python() -> PathBuf {
     let python = Path::new(env!("CARGO_MANIFEST_DIR")).join("../target/tools/bin/python");
     assert!(
@@ -66,7 +66,7 @@ fn numbers(value: &Value) -> Vec<f64> {
         .collect()
 }
 
-/// `digits` that may differ after the first.
+/// Asserts that numbers agree to this number of digits after the first.
 fn assert_same(found: &Value, expected: impl IntoIterator<Item = f64>, digits: i32, what: &str) {
     let found = numbers(found);
     let expected: Vec<f64> = expected.into_iter().collect();
@@ -122,7 +122,7 @@ fn recordings_are_read_by_pyuff() {
             assert_eq!(set["response"][0], name.as_str());
             assert_eq!(set["response"][1], direction, "{name}");
             assert_eq!((&set["kinds"][0], &set["units"][0]), (&kind.into(), &unit.into()));
-            // The step of time has seven digits.
+            // The file stores the time step with seven digits.
             assert_same(
                 &set["x"],
                 (0..25).map(|k| 0.25 + f64::from(k) / 10_240.0),
@@ -167,7 +167,7 @@ fn frequency_response_functions_are_read_by_pyuff() {
             assert_eq!(frf["units"], serde_json::json!(["m", "N"]));
             let entry = &table.entries()[0];
             for set in [frf, coherence] {
-                // As text, seven digits.
+                // In the text form the file stores seven digits.
                 assert_same(&set["x"], frequency_hz.iter().copied(), 6, "frequency");
             }
             assert_same(&frf["re"], entry.receptance.iter().map(|h| h.re), 12, "real");

@@ -1,4 +1,4 @@
-//! Table slots: uploads, resumption, and a loss of power at every operation.
+//! The table slots: uploads, resumed uploads, and a loss of power at every operation.
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 mod support;
@@ -16,7 +16,7 @@ use support::{content_of, table};
 
 const HEADER: usize = 32;
 
-/// Flash like the board's, but small: 16 pages of 256 bytes, words of 8.
+/// Flash like that of the board, but smaller: 16 pages of 256 bytes, words of 8 bytes.
 type Flash = FlashModel<Vec<u8>, 8, 256>;
 const BYTES: usize = 16 * 256;
 
@@ -24,7 +24,7 @@ fn empty() -> Flash {
     Flash::new(vec![0xFF; BYTES])
 }
 
-/// Sends a table from where the device says in pieces of this size, as a host does.
+/// Uploads a table like a host: from the offset that the device states, in chunks of `piece` bytes.
 fn send<M: TableMemory>(storage: &mut Storage<M>, file: &[u8], piece: usize) -> Result<(), Refusal> {
     let mut upload = storage.begin(Header::read(file).unwrap())?;
     while (upload.received as usize) < file.len() {
@@ -100,13 +100,13 @@ fn every_word_and_page_size_works() {
     check::<4, 256>();
     check::<8, 2048>();
     check::<16, 512>();
-    // More pages than the journal has room for marks.
+    // The table has more pages than the journal has room for marks.
     check::<32, 96>();
     check::<8, 96>();
 }
 
 #[test]
-fn generations_come_round() {
+fn generation_numbers_wrap() {
     let mut bytes = vec![0xFF; BYTES];
     for (slot, generation) in [(0, u32::MAX), (1, 0)] {
         let file = table(&format!("generation-{generation}"), 2.0, 60);
@@ -125,7 +125,7 @@ fn generations_come_round() {
 }
 
 #[test]
-fn what_is_refused_leaves_the_table_in_use() {
+fn a_refused_upload_leaves_the_table_in_use() {
     let old = table("old", 1.0, 60);
     let mut storage = Storage::new(empty());
     send(&mut storage, &old, 100).unwrap();
@@ -182,7 +182,7 @@ fn what_is_refused_leaves_the_table_in_use() {
             length
         })
     );
-    // Asked and begun again it goes on.
+    // The upload continues after it was begun again.
     assert_eq!(
         storage.upload(),
         Ok(Upload {
@@ -202,7 +202,7 @@ fn what_is_refused_leaves_the_table_in_use() {
     assert_eq!(storage.slots()[1], Slot::Empty);
     assert_holds(&storage, &old);
 
-    // A byte that changed on the way.
+    // A byte has changed during the upload.
     let mut damaged = new.clone();
     damaged[200] ^= 1;
     let Err(Refusal::Table(TableError::Crc { .. })) = send(&mut storage, &damaged, 256) else {
@@ -211,7 +211,7 @@ fn what_is_refused_leaves_the_table_in_use() {
     assert_holds(&storage, &old);
     assert_eq!(storage.slots()[1], Slot::Empty);
 
-    // A table that is none, with a right CRC: no teeth.
+    // An invalid table with a valid CRC: the number of teeth is 0.
     let mut toothless = new.clone();
     toothless[HEADER] = 0;
     let crc = Header::read(&toothless)
@@ -227,7 +227,7 @@ fn what_is_refused_leaves_the_table_in_use() {
     assert_holds(&storage, &old);
 }
 
-/// Flash that counts the pages it erases.
+/// Flash that counts its erased pages.
 struct Counting {
     flash: Flash,
     erased: Rc<Cell<u32>>,
@@ -272,7 +272,8 @@ impl TableMemory for Counting {
 
 #[test]
 fn no_request_erases_more_than_a_page() {
-    // An eighth of a page, as the longest chunk is of the board's: more would touch two pages from their second word on.
+    // An eighth of a page, as the longest chunk is of a page of the board. A longer piece would touch two pages from their
+    // second word on.
     const PIECE: usize = 32;
     let erased = Rc::new(Cell::new(0));
     let mut storage = Storage::new(Counting {
@@ -296,7 +297,7 @@ fn no_request_erases_more_than_a_page() {
                 .unwrap();
             all += spent();
         }
-        // The third is given up.
+        // The upload of the third table is aborted.
         if name == "third" {
             storage.abort().unwrap();
         } else {
@@ -317,7 +318,7 @@ fn no_request_erases_more_than_a_page() {
         Err(Refusal::Table(TableError::Crc { .. }))
     ));
     all += spent();
-    // Three to five pages of each table, and journals.
+    // Each table has three to five pages; journals add to them.
     assert!(all > 20, "{all} pages");
 }
 
@@ -352,7 +353,7 @@ fn another_table_replaces_an_unfinished_one() {
 }
 
 #[test]
-fn a_damaged_slot_is_seen_and_the_other_is_used() {
+fn a_damaged_slot_is_detected_and_the_other_is_used() {
     let mut storage = Storage::new(empty());
     send(&mut storage, &table("old", 1.0, 60), 100).unwrap();
     send(&mut storage, &table("new", 2.0, 60), 100).unwrap();
@@ -378,7 +379,8 @@ fn a_memory_too_small_holds_nothing() {
     assert!(storage.table().is_none());
 }
 
-/// Cuts power within every write and erase of an upload in pieces of this size, with many leftovers each.
+/// Cuts the power during every write and erase of an upload in chunks of `piece` bytes, with several random contents left behind
+/// each time.
 fn cut_power_everywhere(piece: usize) {
     let (old, new) = (table("old", 1.0, 60), table("new", 2.0, 90));
     let mut with_old = Storage::new(empty());
@@ -422,7 +424,7 @@ fn cut_power_everywhere(piece: usize) {
                 assert_eq!(upload.header, Header::read(&new).unwrap());
                 resumed += u32::from(upload.received > HEADER as u32);
             }
-            // Whatever was left: the upload goes through now.
+            // After every loss of power the upload succeeds.
             send(&mut storage, &new, piece).unwrap();
             assert_holds(&storage, &new);
         }
@@ -432,13 +434,13 @@ fn cut_power_everywhere(piece: usize) {
         }
     }
     println!("pieces of {piece}: {cuts} cuts, {resumed} resumed, new table in use after {new_in_use}");
-    // Most cuts fall behind the first page; only the very last, in the header, may come too late to hurt.
+    // Most losses of power come after the first page. Only the last one, within the header, may come too late to have an effect.
     assert!(resumed > cuts / 2 && new_in_use < 64);
 }
 
 #[test]
 fn power_may_fail_at_every_operation() {
-    // Pieces that end within words, at words, and at pages.
+    // Chunks that end within words, at words, and at pages.
     for piece in [45, 100, 128, 256] {
         cut_power_everywhere(piece);
     }
@@ -455,7 +457,7 @@ proptest! {
         let mut bytes = vec![0xFF; BYTES];
         let mut in_use: Option<usize> = None;
         for (index, (operations, noise, piece)) in cuts.into_iter().enumerate() {
-            // Sometimes the same table again, sometimes another.
+            // The next upload is the same table or another one.
             let which = (index / 2) % files.len();
             let mut flash = Flash::new(bytes);
             flash.fail_after(operations, noise);

@@ -1,4 +1,4 @@
-//! The sample clock against streams whose rate is known.
+//! The sample clock, tested on streams of blocks whose sample rate is known.
 
 #![allow(clippy::unwrap_used)]
 
@@ -7,7 +7,7 @@ use quietcut_core::units::Nanoseconds;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// Blocks of a sensor whose clock is off, stamped with jitter.
+/// Blocks of a sensor whose clock deviates from the nominal rate, with time stamps that have jitter.
 struct Stream {
     rate: f64,
     jitter: f64,
@@ -70,16 +70,16 @@ fn a_clock_off_by_three_percent_is_fitted() {
                 let first = stream.sample;
                 clock.observe(&mut state, &stream.block(samples));
                 if n * samples > 30_000 {
-                    // Stamps are late by half the jitter in the mean: nothing can tell that.
+                    // Stamps are late by half the jitter in the mean. No estimator can remove this offset.
                     let truth = stream.time(first + 5) + 0.5 * jitter;
                     worst = worst.max(error_of(&state, 5, truth).abs());
                 }
             }
             let rate = f64::from(state.rate().unwrap().0);
             let off_by = (rate / stream.rate - 1.0).abs();
-            // 30 µs uniform is 8.7 µs rms, averaged over 256 blocks; the line's end is known to 2/√256 of that,
-            // its slope to √12/256^1.5 per block. Four of those each; the period in f32 has a step of 2⁻⁸ ns, 64 of
-            // which per block stand against a gain of 2/256: 100 ns. Times are whole ns: 5e-6 of a block of 16.
+            // Uniform jitter of 30 µs has 8.7 µs rms. Averaged over 256 blocks, the end of the line has 2/√256 of that and its
+            // slope √12/256^1.5 per block; the bounds are four standard deviations. The period in f32 has a step of 2⁻⁸ ns: 64
+            // steps per block against a gain of 2/256 give 100 ns. Times are whole ns: 5e-6 of a block of 16 samples.
             let memory = 256.0_f64;
             let sigma = jitter / 12f64.sqrt();
             assert!(worst < 4.0 * 2.0 / memory.sqrt() * sigma + 100e-9, "{worst}");
@@ -91,14 +91,14 @@ fn a_clock_off_by_three_percent_is_fitted() {
 }
 
 #[test]
-fn gaps_are_counted_and_time_goes_on() {
+fn gaps_are_counted_and_the_time_stays_right() {
     let clock = Sensor::IIS3DWB_16G.clock();
     let mut stream = Stream::new(26_100.0, 20e-6, 2);
     let mut state = SampleClockState::default();
     for _ in 0..400 {
         clock.observe(&mut state, &stream.block(64));
     }
-    // The sensor says what it lost.
+    // The block states the number of lost samples.
     stream.sample += 37;
     let mut block = stream.block(64);
     block.lost = 37;
@@ -107,7 +107,7 @@ fn gaps_are_counted_and_time_goes_on() {
         clock.observe(&mut state, &stream.block(64)),
         Continuity::Contiguous
     );
-    // Blocks of unknown length are lost: the clock counts.
+    // Whole blocks of unknown length are lost: the number of samples comes from the clock.
     for lengths in [vec![64], vec![64, 3, 20], vec![1], vec![64; 40]] {
         for _ in 0..400 {
             assert_eq!(
@@ -128,7 +128,7 @@ fn gaps_are_counted_and_time_goes_on() {
     }
     assert_eq!(state.lost(), 37 + 64 + 87 + 1 + 64 * 40);
     assert_eq!(state.gaps(), 5);
-    // A pause of a minute cannot be counted.
+    // The samples lost in a pause of one minute cannot be counted.
     stream.sample += 60 * 26_100;
     stream.sequence += 1;
     assert_eq!(
@@ -139,7 +139,7 @@ fn gaps_are_counted_and_time_goes_on() {
 }
 
 #[test]
-fn a_loss_that_no_one_declared_is_found() {
+fn an_undeclared_loss_is_found() {
     let clock = Sensor::IIS3DWB_16G.clock();
     let mut stream = Stream::new(27_000.0, 10e-6, 3);
     let mut state = SampleClockState::default();

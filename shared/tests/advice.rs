@@ -1,4 +1,4 @@
-//! Advice: what to do about chatter, with and without a table.
+//! Advice against chatter, with and without a lobe table.
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 // Each test file uses its part of it.
@@ -17,10 +17,10 @@ use support::{Owned, acetal, interval, table, validity, working_point};
 
 const TOOL: Tool = Tool { teeth: 2 };
 
-/// The speed that is found is at most a step of the search away from the nearest one: 1/4 of the band.
+/// Largest distance of the found speed from the nearest quiet speed, relative: one step of the search, 1/4 of the speed band.
 const SEARCH_STEP: f32 = SPEED_BAND / 4.0;
 
-/// Smaller depths are looked for in steps of half the band, and at one speed of a band.
+/// Relative distance of the speeds whose smaller depths are compared: half the width of a speed band.
 const DEPTH_SEARCH_STEP: f32 = SPEED_BAND;
 
 fn heard(verdict: Verdict, chatter_hz: f32) -> Judgement {
@@ -44,7 +44,7 @@ fn limits(rpm_min: f32, rpm_max: f32) -> Limits {
     }
 }
 
-/// A table of one layer, 0 to 6 mm, without limits of its own.
+/// A table of one layer with depths from 0 to 6 mm and without speed limits.
 fn table_of(columns: &[(f32, Vec<Interval>)]) -> Vec<u8> {
     Owned {
         limits: None,
@@ -60,7 +60,7 @@ fn table_of(columns: &[(f32, Vec<Interval>)]) -> Vec<u8> {
     .unwrap()
 }
 
-/// Hopf from a limit that rises linearly with the speed: 1 mm at 1 000, 3 mm at 2 000 rev/min.
+/// Columns whose Hopf limit rises linearly with the speed: 1 mm at 1 000 rev/min, 3 mm at 2 000 rev/min.
 fn ramp() -> Vec<u8> {
     let above = |from_mm| vec![interval(from_mm, 6.0, IntervalKind::Hopf, 30.0)];
     table_of(&[(1000.0, above(1.0)), (2000.0, above(3.0))])
@@ -90,7 +90,7 @@ fn assert_near(found: f32, expected: f32, relative: f32) {
 }
 
 #[test]
-fn what_does_not_chatter_is_kept() {
+fn without_chatter_speed_and_depth_are_kept() {
     for verdict in [
         Verdict::AirCut,
         Verdict::Stable,
@@ -108,7 +108,7 @@ fn what_does_not_chatter_is_kept() {
 
 #[test]
 fn the_nearest_speed_that_is_stable_with_margin() {
-    // 2.2 mm are stable from 1 600 rev/min on, which must be the lower end of the band.
+    // A depth of 2.2 mm is stable from 1 600 rev/min on. This speed must be the lower end of the speed band.
     let advice = ask(&ramp(), &hopf(30.0), 1100.0, 2.0, None);
     assert_eq!((advice.action, advice.source), (Action::Speed, Source::Table));
     assert_eq!(
@@ -119,21 +119,21 @@ fn the_nearest_speed_that_is_stable_with_margin() {
 }
 
 #[test]
-fn the_nearer_of_two_pockets_wins() {
+fn the_nearer_of_two_pockets_is_advised() {
     let above = |from_mm| vec![interval(from_mm, 6.0, IntervalKind::Hopf, 30.0)];
-    // Pockets of 3 mm around 1 000 and 1 300 rev/min, 1 mm between and beside them.
+    // Pockets with a limit of 3 mm around 1 000 and 1 300 rev/min; the limit is 1 mm elsewhere.
     let pockets = [
         900.0, 949.0, 950.0, 1050.0, 1051.0, 1249.0, 1250.0, 1350.0, 1351.0, 1400.0,
     ];
     let limits_mm = [1.0, 1.0, 3.0, 3.0, 1.0, 1.0, 3.0, 3.0, 1.0, 1.0];
     let columns: Vec<_> = pockets.into_iter().zip(limits_mm.map(above)).collect();
     let bytes = table_of(&columns);
-    // From 1 130: down to 1 050/1.01 is a factor of 1.087, up to 1 250/0.99 one of 1.117.
+    // Speed ratios from 1 130 rev/min: 1.087 down to 1 050/1.01, 1.117 up to 1 250/0.99.
     let advice = ask(&bytes, &hopf(30.0), 1130.0, 2.0, None);
     assert_near(advice.speed.0, 1050.0 / (1.0 + SPEED_BAND), SEARCH_STEP);
     let advice = ask(&bytes, &hopf(30.0), 1170.0, 2.0, None);
     assert_near(advice.speed.0, 1250.0 / (1.0 - SPEED_BAND), SEARCH_STEP);
-    // The limits of the machine cut the nearer one off.
+    // The speed limits of the machine exclude the nearer pocket.
     let advice = ask(&bytes, &hopf(30.0), 1130.0, 2.0, Some(limits(1045.0, 2000.0)));
     assert_eq!(advice.action, Action::Speed);
     let advice = ask(&bytes, &hopf(30.0), 1130.0, 2.0, Some(limits(1060.0, 2000.0)));
@@ -143,19 +143,21 @@ fn the_nearer_of_two_pockets_wins() {
 #[test]
 fn at_the_limit_of_the_machine_the_band_ends() {
     let bytes = ramp();
-    // 2.2 mm from 1 600 on: a machine that can do just 1 605 can go there, since it cannot go beyond.
+    // A depth of 2.2 mm is stable from 1 600 rev/min on. A machine with a largest speed just above 1 605 may use that speed,
+    // because it cannot go beyond.
     let advice = ask(&bytes, &hopf(30.0), 1100.0, 2.0, Some(limits(1000.0, 1617.0)));
     assert_eq!(advice.action, Action::Speed);
     assert!(advice.speed.0 <= 1617.0);
-    // At the end of the table it cannot: nothing is known beyond. 2.69 mm are stable from 1 980 on.
+    // At the end of the table the speed band must lie inside: nothing is known beyond. A depth of 2.69 mm is stable from 1 980
+    // rev/min on.
     let advice = ask(&bytes, &hopf(30.0), 1100.0, 2.69, None);
     assert_eq!(advice.action, Action::Depth);
 }
 
 #[test]
-fn a_narrow_pocket_is_no_advice() {
+fn a_pocket_narrower_than_the_speed_band_is_not_advised() {
     let above = |from_mm| vec![interval(from_mm, 6.0, IntervalKind::Hopf, 30.0)];
-    // 10 rev/min wide at 1 000: half of the band.
+    // A pocket at 1 000 rev/min with a width of 10 rev/min: half of the speed band.
     let speeds = [900.0, 994.0, 995.0, 1005.0, 1006.0, 1100.0];
     let columns: Vec<_> = speeds
         .into_iter()
@@ -182,19 +184,20 @@ fn a_pocket_above_a_flip_island_is_used() {
         (1101.0, hopf_from(1.0)),
         (1200.0, hopf_from(1.0)),
     ]);
-    // 2.5 mm: 2.25 to 2.75 lie between the island and the Hopf limit. 2.1 mm do not: 1.89 lies in the island.
+    // The margin of 2.5 mm, 2.25 to 2.75 mm, lies between the island and the Hopf limit. That of 2.1 mm begins at 1.89 mm, in
+    // the island.
     let advice = ask(&bytes, &hopf(19.0), 950.0, 2.5, None);
     assert_eq!(advice.action, Action::Speed);
     assert_near(advice.speed.0, 1001.0 / (1.0 - SPEED_BAND), SEARCH_STEP);
     let advice = ask(&bytes, &hopf(19.0), 950.0, 2.1, None);
     assert_eq!(advice.action, Action::Depth);
-    // Below the island: 1.5/1.1 mm there are more than 1.0/1.1 mm at 950.
+    // Below the island 1.5/1.1 mm are quiet, which is more than 1.0/1.1 mm at 950 rev/min.
     assert_near(advice.depth.unwrap().0, 1.5 / (1.0 + DEPTH_MARGIN), 1e-3);
     assert_near(advice.speed.0, 1001.0 / (1.0 - SPEED_BAND), DEPTH_SEARCH_STEP);
 }
 
 #[test]
-fn a_smaller_depth_elsewhere_must_earn_the_change() {
+fn a_smaller_depth_at_another_speed_must_be_larger_by_the_factor_better() {
     let above = |from_mm| vec![interval(from_mm, 6.0, IntervalKind::Hopf, 30.0)];
     let far_limit = |mm| {
         let far = [(1060.0, above(mm)), (1100.0, above(mm))];
@@ -224,8 +227,8 @@ fn undecided_depths_are_not_advised() {
 }
 
 #[test]
-fn a_table_that_is_contradicted_gives_way_to_the_rule() {
-    // Chatter is heard where the table is quiet with margin. The rule: 60*40/2 = 1 200 rev/min per tooth wave.
+fn a_contradicted_table_is_replaced_by_the_rule() {
+    // Chatter is detected where the table is stable with margin. The tooth-passing rule gives 60·40/2 = 1 200 rev/min over k.
     let advice = ask(&ramp(), &hopf(40.0), 1700.0, 1.0, None);
     assert_eq!(
         (advice.action, advice.source),
@@ -233,7 +236,7 @@ fn a_table_that_is_contradicted_gives_way_to_the_rule() {
     );
     assert_eq!(advice.obstacle, Some(Obstacle::Contradicted));
     assert_near(advice.speed.0, 1200.0, 1e-6);
-    // Where the table calls that speed unstable it is not advised.
+    // A speed of the rule that is unstable in the table is not advised.
     let advice = ask(&ramp(), &hopf(40.0), 1900.0, 2.0, Some(limits(1000.0, 2000.0)));
     assert_eq!(
         (advice.action, advice.source),
@@ -246,7 +249,7 @@ fn a_table_that_is_contradicted_gives_way_to_the_rule() {
 }
 
 #[test]
-fn a_cut_that_the_table_does_not_know_falls_to_the_rule_and_says_why() {
+fn a_cut_outside_the_table_gets_advice_from_the_rule_with_the_reason() {
     let bytes = ramp();
     let table = LobeTable::parse(&bytes).unwrap();
     let why = |at: WorkingPoint, tool: Tool| {
@@ -282,17 +285,17 @@ fn a_cut_that_the_table_does_not_know_falls_to_the_rule_and_says_why() {
     ));
     let teeth = NotKnown::Teeth { asked: 3, table: 2 };
     assert_eq!(why(base, Tool { teeth: 3 }), Some(Obstacle::Table(teeth)));
-    // A speed outside of the table is no obstacle: the way into it is known.
+    // A present speed outside of the table does not prevent advice: speeds inside are known.
     let advice = ask(&bytes, &hopf(30.0), 800.0, 1.0, None);
     assert_eq!((advice.action, advice.source), (Action::Speed, Source::Table));
 }
 
 #[test]
-fn without_a_working_point_it_says_what_it_assumes() {
+fn without_a_working_point_the_assumed_one_is_stated() {
     let bytes = acetal().encode().unwrap();
     let table = LobeTable::parse(&bytes).unwrap();
     let advice = |judgement, rpm| advise(&judgement, Rpm(rpm), Some(&table), None, None, &TOOL);
-    // The least depth with a flip at 1 045 rev/min is 1.327 mm, with a Hopf 4.023.
+    // The smallest depths with chatter at 1 045 rev/min are 1.327 mm for a flip and 4.023 mm for a Hopf bifurcation.
     let flip = advice(heard(Verdict::PeriodDoubling, 17.4), 1045.0);
     assert_eq!(
         (flip.action, flip.source, flip.depth),
@@ -312,10 +315,10 @@ fn without_a_working_point_it_says_what_it_assumes() {
         4.023,
         1e-4,
     );
-    // Where the table has no such kind, any chatter of it will do.
+    // If the table has no chatter of the detected kind, chatter of another kind gives the assumed depth.
     let other = advice(heard(Verdict::PeriodDoubling, 15.0), 900.0);
     assert_near(other.assumed.unwrap().axial_depth.0, 1.723, 1e-4);
-    // Where it has none at all, it is contradicted.
+    // If the table has no chatter at this speed, it contradicts the detected chatter.
     let none = advice(hopf(40.0), 3000.0);
     assert_eq!(
         (none.source, none.obstacle),
@@ -332,9 +335,10 @@ fn without_a_working_point_it_says_what_it_assumes() {
 #[test]
 fn the_tooth_passing_rule() {
     let flip = |chatter_hz| heard(Verdict::PeriodDoubling, chatter_hz);
-    // Judgement, speed, limits, advised speed. Two teeth: one wave per tooth is at 30 times the chatter frequency.
+    // Columns: judgement, present speed, limits, advised speed. With two teeth, one wave per tooth is at 30 times the chatter
+    // frequency.
     let cases = [
-        // Benchmark at 5 000 rev/min: 5.67 waves per tooth; six are nearer than five.
+        // Benchmark at 5 000 rev/min: 5.67 waves per tooth, so that six waves are nearer than five.
         (hopf(945.3), 5000.0, None, Some(945.3 * 30.0 / 6.0)),
         (
             hopf(945.3),
@@ -344,19 +348,19 @@ fn the_tooth_passing_rule() {
         ),
         (hopf(945.3), 5000.0, Some((4800.0, 5600.0)), None),
         (hopf(945.3), 5300.0, None, Some(945.3 * 30.0 / 5.0)),
-        // At a speed of the rule already: only the deeper pockets at higher speeds are left.
+        // The present speed is a speed of the rule. Only pockets at higher speeds are candidates.
         (hopf(945.3), 4726.5, None, Some(945.3 * 30.0 / 5.0)),
         (hopf(945.3), 4750.0, None, Some(945.3 * 30.0 / 5.0)),
         (hopf(945.3), 28_359.0, None, None),
-        // The acetal robot at 900 rev/min: half a wave per tooth; the only speed of the rule is far below.
+        // The acetal robot at 900 rev/min has half a wave per tooth. The only speed of the rule is far below.
         (hopf(17.44), 900.0, Some((300.0, 2400.0)), Some(17.44 * 30.0)),
         (hopf(17.44), 900.0, Some((600.0, 2400.0)), None),
-        // Flips: 1/2, 3/2 and 5/2 waves per tooth.
+        // Flips with 1/2, 3/2 and 5/2 waves per tooth.
         (flip(17.4), 1044.0, None, Some(522.0)),
         (flip(300.0), 6000.0, None, Some(4500.0)),
         (flip(300.0), 6000.0, Some((5000.0, 10_000.0)), Some(9000.0)),
         (flip(250.0), 3000.0, None, Some(2500.0)),
-        // Slow: pockets beyond the twentieth are none.
+        // At low speed the rule ends at the twentieth pocket.
         (hopf(945.3), 1000.0, None, Some(945.3 * 30.0 / 20.0)),
     ];
     for (judgement, rpm, range, expected) in cases {
@@ -410,8 +414,8 @@ fn without_a_chatter_frequency_or_a_speed_there_is_no_advice() {
 }
 
 #[test]
-fn limits_that_leave_nothing_are_no_harm() {
-    // The table's own limits are 600 to 2 400.
+fn speed_limits_without_a_speed_of_the_table_lead_to_a_smaller_depth() {
+    // The speed limits in the table are 600 to 2 400 rev/min.
     let bytes = acetal().encode().unwrap();
     for (from, to) in [
         (3000.0, 4000.0),
@@ -431,7 +435,7 @@ proptest! {
         let chatter = Hertz(waves * rpm / 60.0 * f32::from(teeth));
         let tool = Tool { teeth };
         let speed = tooth_passing_speed(Rpm(rpm), chatter, &tool, |_| true).unwrap();
-        // Whole waves per tooth at the new speed, half-odd at the old one.
+        // The number of waves per tooth is whole at the new speed, and odd multiples of 1/2 at the present speed of a flip.
         let new_waves = chatter.0 / (speed.0 / 60.0 * f32::from(teeth));
         prop_assert!((new_waves - new_waves.round()).abs() < 1e-4);
         prop_assert!((speed.0 / rpm - 1.0).abs() > 0.99 / (2.0 * waves + 1.0));
@@ -455,7 +459,7 @@ proptest! {
         let of_table = content.limits;
         for limits in limits.iter().chain(&of_table) {
             let is_inside = advice.speed >= limits.rpm_min && advice.speed <= limits.rpm_max;
-            // Where the present speed is kept it is what it is.
+            // If the present speed is kept, it equals the given speed.
             prop_assert!(is_inside || advice.speed == Rpm(rpm), "{:?}", advice);
         }
         let Some(mut at) = working_point.copied().or(advice.assumed) else { return Ok(()) };
@@ -474,7 +478,8 @@ proptest! {
         let answer = table.lookup(advice.speed, &at);
         prop_assert!(!matches!(answer, TabulatedStability::Unstable { .. }), "{advice:?} {answer:?}");
         if advice.source == Source::Table {
-            // Margin in depth and band in speed, but for rounding; the band is cut off at the limits.
+            // All depths within the margin and all speeds within the band must be stable, except for rounding. The band is
+            // clipped at the speed limits.
             let range = limits.into_iter().chain(of_table).fold((0.0, f32::INFINITY), |(from, to), limits| {
                 (f32::max(from, limits.rpm_min.0), f32::min(to, limits.rpm_max.0))
             });
@@ -498,7 +503,7 @@ proptest! {
         let depth_mm = content.depth_from_mm + depth * (content.depth_to_mm - content.depth_from_mm);
         let at = working_point(&validity(0.05), depth_mm);
         let advice = advise(&hopf(17.0), Rpm(rpm), Some(&table), Some(&at), None, &TOOL);
-        // By brute force, with half as much margin again: what that calls quiet the search must not have missed.
+        // Brute force with 1.5 times the margin: the search must find a speed that is quiet by this stricter rule.
         let is_quiet = |centre: f32, factor: f32| {
             (-12_i8..=12).all(|step| {
                 let speed = Rpm(centre * (1.0 + factor * SPEED_BAND * f32::from(step) / 12.0));
@@ -508,7 +513,7 @@ proptest! {
                 })
             })
         };
-        // A cut that is quiet as it is contradicts the table: nothing is looked for then.
+        // If the present cut is quiet, it contradicts the table, and no speed is searched.
         if is_quiet(rpm, 0.99) { return Ok(()) }
         let found = match (advice.action, advice.source) {
             (Action::Speed, Source::Table) => f32::max(advice.speed.0 / rpm, rpm / advice.speed.0),
@@ -522,7 +527,7 @@ proptest! {
     }
 
     #[test]
-    fn a_table_damaged_after_it_was_checked_holds_nothing_up(
+    fn the_search_ends_in_a_table_damaged_after_its_check(
         content in table(), damage in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..30),
         rpm in 400.0_f32..2500.0, depth_mm in 0.0_f32..10.0, is_told in any::<bool>(),
     ) {

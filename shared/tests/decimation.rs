@@ -1,4 +1,4 @@
-//! The half-band cascade: response, delay, exactness, steadiness.
+//! The half-band cascade: frequency response, delay, exactness, independence of blocks.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a test may fail
 
 use std::f64::consts::TAU;
@@ -10,7 +10,7 @@ use quietcut_core::units::Hertz;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// Input rates with every layout of the cascade, from none to five stages.
+/// Input rates that give every layout of the cascade, from none to five stages.
 const RATES: [f32; 12] = [
     1_000.0, 2_048.0, 3_200.0, 6_400.0, 10_000.0, 12_800.0, 25_600.0, 26_667.0, 32_000.0, 51_200.0, 78_000.0,
     102_400.0,
@@ -24,13 +24,13 @@ fn run(decimation: &Decimation, counts: impl IntoIterator<Item = Counts>) -> Vec
         .collect()
 }
 
-/// The two bands as impulse responses at the input rate: the answer to impulses at all positions relative to the output grid.
+/// Impulse responses of both bands at the input rate, from impulses at all positions relative to the output samples.
 struct Responses {
     tool: Vec<f64>,
     structure: Vec<f64>,
 }
 
-/// Measured with an impulse of the largest count at each phase of the decimation, on x; y and z stay silent.
+/// Measures the impulse responses of axis x with an impulse of the largest count. Axes y and z are zero.
 fn impulse_responses(decimation: &Decimation) -> Responses {
     let height = i16::MAX;
     // A symmetric filter is twice as long as its delay.
@@ -60,7 +60,7 @@ fn impulse_responses(decimation: &Decimation) -> Responses {
     responses
 }
 
-/// |H| in decibel at `hertz` by direct evaluation of Σ h[n]·exp(−2πi·f·n/rate).
+/// |H| in decibel at `hertz`, from the sum Σ h[n]·exp(−2πi·f·n/rate).
 fn gain_db(response: &[f64], hertz: f64, rate: f64) -> f64 {
     let (mut re, mut im) = (0.0, 0.0);
     for (n, h) in response.iter().enumerate() {
@@ -71,7 +71,7 @@ fn gain_db(response: &[f64], hertz: f64, rate: f64) -> f64 {
     20.0 * re.hypot(im).log10()
 }
 
-/// Largest deviation from 0 dB up to `flat_hz`, and the least rejection of what folds there.
+/// Largest deviation from 0 dB up to `flat_hz`, and smallest attenuation of the frequencies that alias into this range.
 fn ripple_and_rejection_db(response: &[f64], rate: f64, divisor: u32, flat_hz: f64) -> (f64, f64) {
     let points = 100;
     let output_rate = rate / f64::from(divisor);
@@ -93,8 +93,8 @@ fn ripple_and_rejection_db(response: &[f64], rate: f64, divisor: u32, flat_hz: f
     (ripple, rejection)
 }
 
-/// Ripple at most 0.001 dB (2⁻¹³ of one count's worth of rounding in the measured taps is far less) and 90 dB, with the
-/// sensor's clock nominal and 3 % slow: the bands are wide enough for that.
+/// The ripple is at most 0.001 dB and aliases are attenuated by 90 dB, for the nominal sample clock and for one that is 3 %
+/// slow. The rounding of the measured taps is far smaller.
 #[test]
 fn bands_are_flat_and_free_of_aliases() {
     for rate in RATES {
@@ -150,7 +150,8 @@ fn rates_of_the_bands() {
     }
 }
 
-/// A linear-phase filter passes a straight line unchanged but for its delay: the delay must be exact to the rounding.
+/// A linear-phase filter passes a straight line without change except for its delay, so that the delay must be exact to the
+/// rounding.
 #[test]
 fn delay_is_exact() {
     for rate in RATES {
@@ -168,7 +169,7 @@ fn delay_is_exact() {
                 let Some(sample) = sample else { continue };
                 let line = (n - delay as i32) << FRACTION_BITS;
                 for (value, expected) in sample.into_iter().zip([line, -line, 3 * line]) {
-                    // Half a unit of rounding per stage.
+                    // Each stage rounds by half a unit.
                     assert!(
                         (value - expected).abs() <= 3,
                         "{rate} Hz at {n}: {value} for {expected}"
@@ -179,7 +180,7 @@ fn delay_is_exact() {
     }
 }
 
-/// Gain at 0 Hz is 1 to the bit, from the very first sample on.
+/// The gain at 0 Hz is exactly 1, from the first sample on.
 #[test]
 fn gravity_passes_unchanged_and_makes_no_step() {
     for rate in RATES {
@@ -201,7 +202,8 @@ fn gravity_passes_unchanged_and_makes_no_step() {
     }
 }
 
-/// The input that drives a band as high as any can, to the absolute sum of its response, stays below twice full scale.
+/// The input with the largest possible output, the sum of the magnitudes of the impulse response, gives less than twice full
+/// scale.
 #[test]
 fn worst_case_input_does_not_overflow() {
     for rate in RATES {
@@ -211,7 +213,7 @@ fn worst_case_input_does_not_overflow() {
             (&responses.tool, decimation.tool_divisor(), false),
             (&responses.structure, decimation.structure_divisor(), true),
         ] {
-            // Outputs come with the first sample and every `divisor` samples after it.
+            // An output comes with the first sample and then every `divisor` samples.
             let end = response.len().next_multiple_of(divisor as usize);
             let counts = (0..=end).map(|n| {
                 let h = response.get(end - n).copied().unwrap_or(0.0);
@@ -227,7 +229,7 @@ fn worst_case_input_does_not_overflow() {
             let gain: f64 = response.iter().map(|h| h.abs()).sum();
             for value in [x, -y] {
                 let found = f64::from(value) / f64::from(1 << (15 + FRACTION_BITS));
-                // The measured responses are rounded to 2⁻²⁷ each.
+                // The measured responses are rounded to 2⁻²⁷.
                 assert!((found - gain).abs() < 1e-3, "{rate} Hz: {found} for {gain}");
                 assert!(value < 2 << (15 + FRACTION_BITS), "{rate} Hz");
             }
@@ -236,9 +238,9 @@ fn worst_case_input_does_not_overflow() {
     }
 }
 
-/// After a gap the cascade is as new.
+/// After a reset the cascade is in its initial state.
 #[test]
-fn reset_forgets_everything() {
+fn reset_gives_the_initial_state() {
     let seed = 5;
     println!("seed {seed}");
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -256,7 +258,7 @@ fn reset_forgets_everything() {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 32, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// However the stream is cut into blocks, and whatever else runs between them, the same bits come out.
+    /// The outputs do not depend on the lengths of the blocks, nor on another cascade that runs between them.
     #[test]
     fn blocks_do_not_matter(
         counts in proptest::collection::vec(any::<Counts>(), 1..600),

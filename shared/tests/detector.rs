@@ -1,4 +1,4 @@
-//! Virtual cuts through the whole pipeline: the right verdict, in time, and no other.
+//! Virtual cuts through the whole signal chain: the right verdict in time, and no other chatter verdict.
 
 #![allow(clippy::unwrap_used)]
 
@@ -43,7 +43,7 @@ fn stable_robot_cuts_raise_no_alarm() {
 }
 
 #[test]
-fn robot_chatter_is_heard_and_named() {
+fn robot_chatter_is_detected_with_its_kind() {
     for (rpm, limit_mm, verdict, chatter_hz) in [
         (900.0, 1.723, Verdict::Hopf, 17.46),
         (1050.0, 1.356, Verdict::PeriodDoubling, 17.5),
@@ -57,13 +57,13 @@ fn robot_chatter_is_heard_and_named() {
         );
         let frequency = f64::from(first.judgement.chatter.unwrap().0);
         assert!((frequency - chatter_hz).abs() < 0.1, "{frequency}");
-        // Out of the material again.
+        // At the end the tool has left the material.
         assert_eq!(heard.last().unwrap().judgement.verdict, Verdict::AirCut);
     }
 }
 
 #[test]
-fn a_state_that_was_reset_is_a_new_one() {
+fn a_reset_state_equals_a_new_one() {
     let with = VirtualSensor::usual(3);
     let (robot, tool) = (robot(1050.0), machine_tool(5000.0));
     let chatter = run(&robot, 2e-3, COURSE, 64, &with);

@@ -1,4 +1,4 @@
-//! The fixed-point transform against an exact one.
+//! The fixed-point transform compared with an exact transform.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a test may fail
 
 use std::f64::consts::TAU;
@@ -10,7 +10,7 @@ use rand_chacha::ChaCha8Rng;
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex64;
 
-/// Calls the transform of the right size and returns X[0] … X[N/2] as floats.
+/// Calls the transform for this number of samples. Returns X[0] … X[N/2] as floats.
 fn transform(samples: &[i32]) -> Vec<Complex64> {
     fn unpack(t: Transform<'_>) -> Vec<Complex64> {
         let scale = f64::from(t.exponent).exp2();
@@ -31,7 +31,7 @@ fn transform(samples: &[i32]) -> Vec<Complex64> {
     }
 }
 
-/// The same spectrum in double precision.
+/// The exact spectrum X[0] … X[N/2], in double precision.
 fn exact(samples: &[i32]) -> Vec<Complex64> {
     let mut data: Vec<_> = samples
         .iter()
@@ -42,7 +42,7 @@ fn exact(samples: &[i32]) -> Vec<Complex64> {
     data
 }
 
-/// Signal to noise of the transform in decibel: energy of the exact spectrum to energy of the difference.
+/// Signal-to-noise ratio of the transform in decibel: energy of the exact spectrum over energy of the difference.
 fn snr_db(samples: &[i32]) -> f64 {
     let (ours, exact) = (transform(samples), exact(samples));
     let signal: f64 = exact.iter().map(|z| z.norm_sqr()).sum();
@@ -50,7 +50,7 @@ fn snr_db(samples: &[i32]) -> f64 {
     10.0 * (signal / noise).log10()
 }
 
-/// A tone of `dbfs` relative to the 16-bit full scale, `bin` cycles per block, quantized to 16 bits.
+/// A tone with `dbfs` relative to the 16-bit full scale and `bin` cycles per block, rounded to 16 bits.
 fn tone(points: usize, dbfs: f64, bin: f64, phase: f64) -> Vec<i32> {
     let amplitude = 32767.0 * 10f64.powf(dbfs / 20.0);
     (0..points)
@@ -60,8 +60,8 @@ fn tone(points: usize, dbfs: f64, bin: f64, phase: f64) -> Vec<i32> {
 
 const SIZES: [usize; 5] = [256, 512, 1024, 2048, 4096];
 
-/// Every size, tones on and off the bins, and noise: the figures of the issue are 130 and 90 dB for 1024 points;
-/// 130 dB is what the word length gives for 4096 points (a tone of 2³⁰ against a few units of rounding in each of N results).
+/// Accuracy for all sizes, with tones on and between bins and with noise. The required figures are 130 and 90 dB for 1024
+/// points. For 4096 points the word length allows 130 dB: a tone of 2³⁰ against a few units of rounding in each of N results.
 #[test]
 fn accuracy_against_the_exact_transform() {
     for points in SIZES {
@@ -98,7 +98,7 @@ fn accuracy_against_the_exact_transform() {
     }
 }
 
-/// The exact transform used here is itself the sum of the definition.
+/// The exact transform of this test equals the sum of the definition.
 #[test]
 fn reference_is_the_definition() {
     let samples: Vec<i32> = (0..256).map(|n| (n * n * 31 + 7 * n) % 1009 - 500).collect();
@@ -110,7 +110,7 @@ fn reference_is_the_definition() {
     }
 }
 
-/// Blocks that drive single bins, sums of bins and inner values of the butterflies as high as any input can.
+/// Blocks that give the largest possible values of single bins, of sums of bins and inside of the butterflies.
 fn extreme_blocks(points: usize, high: i32, low: i32) -> Vec<(String, Vec<i32>)> {
     let mut blocks = vec![
         ("all high".into(), vec![high; points]),
@@ -126,7 +126,7 @@ fn extreme_blocks(points: usize, high: i32, low: i32) -> Vec<(String, Vec<i32>)>
                 .collect(),
         ),
     ];
-    // The sign of a tone drives its bin to the sum of all |cos|: bins at and near the fractions of the sample rate.
+    // The sign of a tone gives its bin the sum of all |cos|. Bins at and near fractions of the sample rate are used.
     for part in [2, 3, 4, 5, 6, 8, 12, 16, 32, points] {
         for bin in [points / part, points / part - 1, points / 2 - points / part + 1] {
             for phase in [0.0, 0.125, 0.25, 0.3] {
@@ -140,13 +140,13 @@ fn extreme_blocks(points: usize, high: i32, low: i32) -> Vec<(String, Vec<i32>)>
     blocks
 }
 
-/// Runs with overflow checks in the dev profile: an overflow ends the test.
+/// With overflow checks, an overflow ends the test.
 ///
-/// The exact result proves that nothing wraps in the release profile either.
+/// Without them, the comparison with the exact result shows that nothing wraps.
 #[test]
 fn extreme_inputs_neither_overflow_nor_lose_accuracy() {
     for points in SIZES {
-        // 16-bit full scale, the largest block that needs no shift, one bit more, and all of 32 bits.
+        // 16-bit full scale, the largest block that needs no shift, one bit more, and full 32 bits.
         let bits = points.trailing_zeros();
         let radix4_passes = 2 + (bits - 7) / 2;
         let largest = 1 << (31 + radix4_passes - bits);
@@ -158,7 +158,8 @@ fn extreme_inputs_neither_overflow_nor_lose_accuracy() {
         ] {
             for (name, block) in extreme_blocks(points, high, low) {
                 let snr = snr_db(&block);
-                // A lone impulse has N times less energy than a tone as high: it ends near 2¹⁸ with 4096 points.
+                // A single impulse has N times less energy than a tone of the same amplitude. With 4096 points its spectrum is
+                // near 2¹⁸.
                 assert!(
                     snr >= 105.0,
                     "{points} points, {high} … {low}, {name}: {snr:.1} dB"
@@ -172,7 +173,7 @@ fn extreme_inputs_neither_overflow_nor_lose_accuracy() {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 200, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// Blocks of random extremes, which have more ways to add up than any list has.
+    /// Blocks of random extremes combine in more ways than the list of extreme blocks.
     #[test]
     fn random_extremes_do_not_overflow(
         size in 0..SIZES.len(),
@@ -185,7 +186,7 @@ proptest! {
         prop_assert!(snr >= 120.0, "{snr} dB");
     }
 
-    /// T(a·x + b·y) = a·T(x) + b·T(y) and Σ|x|² = Σ|X|²/N to the accuracy of the word length.
+    /// T(a·x + b·y) = a·T(x) + b·T(y), and Σ|x|² = Σ|X|²/N, to the accuracy of the word length.
     #[test]
     fn linear_and_true_to_energy(
         size in 0..SIZES.len(),
@@ -198,7 +199,7 @@ proptest! {
         let (x, y) = (&x[..points], &y[..points]);
         let sum: Vec<i32> = x.iter().zip(y).map(|(x, y)| a * x + b * y).collect();
         let (tx, ty, ts) = (transform(x), transform(y), transform(&sum));
-        // 130 dB below the largest value that noise of this height has.
+        // The tolerance is 130 dB below the largest value of the spectrum of this noise.
         let tolerance = 32_000.0 * (points as f64).sqrt() * 10f64.powf(-130.0 / 20.0) * 4.0;
         for k in 0..ts.len() {
             let expected = f64::from(a) * tx[k] + f64::from(b) * ty[k];
@@ -211,7 +212,7 @@ proptest! {
     }
 }
 
-/// microfft is another implementation in single precision: both agree to its accuracy, about 120 dB.
+/// The independent single-precision transform of microfft agrees to its accuracy, about 120 dB.
 #[test]
 fn agrees_with_microfft() {
     macro_rules! compare {

@@ -1,4 +1,4 @@
-//! The lobe table: bytes, refusals, lookups.
+//! The lobe table: bytes, refused tables, lookups.
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 mod support;
@@ -23,31 +23,31 @@ fn is_stable(column: &Column, depth_mm: f32) -> bool {
 
 proptest! {
     #[test]
-    fn entries_come_back_within_a_step_to_the_unstable_side(content in table()) {
+    fn decoded_entries_err_by_less_than_a_step_to_the_unstable_side(content in table()) {
         let bytes = content.encode().unwrap();
         let table = LobeTable::parse(&bytes).unwrap();
         prop_assert_eq!(table.name(), "kuka-kr90-acetal");
         prop_assert_eq!(table.teeth(), 2);
         prop_assert_eq!(table.limits(), LIMITS);
         prop_assert_eq!(table.speeds().collect::<Vec<_>>(), content.speeds.clone());
-        // One step, 1/50 of one for snapping, and rounding of an f32 of the size of the depth.
+        // The tolerance is one depth step, 1/50 step for snapping, and the rounding of an f32 of the largest depth.
         let step_mm = table.depth_step().0;
         let (outward_mm, inward_mm) = (1.02 * step_mm, 0.02 * step_mm + 2e-7 * content.depth_to_mm);
         for (layer, (validity, columns)) in content.layers.iter().enumerate() {
             prop_assert_eq!(table.layers().nth(layer), Some(*validity));
             for (speed, column) in columns.iter().enumerate() {
                 let entry = table.entry(layer, speed).unwrap();
-                // Touching intervals of the same kind and frequency are one.
+                // Touching intervals of equal kind and frequency are merged.
                 prop_assert!(entry.intervals().len() <= column.len());
                 if entry.intervals().len() < column.len() { continue }
                 for (read, written) in entry.intervals().iter().zip(column) {
                     prop_assert_eq!(read.kind, written.kind);
                     let from_mm = written.from.0 - read.from.0;
                     let to_mm = read.to.0 - written.to.0;
-                    // An interval that touches the one before begins where that one's end was rounded to.
+                    // An interval that touches the preceding one begins at the rounded end of the preceding one.
                     prop_assert!((-inward_mm - step_mm..=outward_mm).contains(&from_mm), "{} {}", read.from, written.from);
                     prop_assert!((-inward_mm..=outward_mm).contains(&to_mm), "{} {}", read.to, written.to);
-                    // Half a step, and rounding; a frequency above 0 stays above.
+                    // The tolerance is half a step and rounding. A frequency above 0 is not rounded to 0.
                     let tolerance_hz = table.chatter_error().0 * 2.0 + 1e-4;
                     prop_assert!((read.chatter.0 - written.chatter.0).abs() <= tolerance_hz);
                 }
@@ -72,7 +72,7 @@ proptest! {
     }
 
     #[test]
-    fn damaged_bytes_that_were_checked_before_do_no_harm(
+    fn bytes_damaged_after_their_check_are_read_without_panic(
         content in table(), damage in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..20),
         rpm in 400.0_f32..3000.0, depth_mm in -1.0_f32..25.0,
     ) {
@@ -89,7 +89,7 @@ proptest! {
     }
 
     #[test]
-    fn at_the_speeds_of_the_grid_the_entries_come_back(content in table()) {
+    fn at_grid_speeds_the_column_equals_the_entry(content in table()) {
         let bytes = content.encode().unwrap();
         let table = LobeTable::parse(&bytes).unwrap();
         for (layer, validity) in table.layers().enumerate() {
@@ -101,7 +101,7 @@ proptest! {
     }
 
     #[test]
-    fn between_speeds_a_depth_is_what_both_neighbours_agree_on(
+    fn between_different_columns_a_depth_is_stable_if_it_is_in_both(
         content in table(), position in 0.0_f32..1.0, depth in 0.0_f32..1.0,
     ) {
         if content.speeds.len() < 2 { return Ok(()) }
@@ -141,7 +141,7 @@ proptest! {
         };
         let mut sorted = steps;
         sorted.sort_by(f32::total_cmp);
-        // Rounding of an f32 between two of this size.
+        // Rounding of the interpolation between two f32 depths.
         let rounding_mm = 1e-6;
         for pair in sorted.windows(2) {
             let along = |from: (f32, f32), to: (f32, f32), earlier: (f32, f32), later: (f32, f32)| {
@@ -178,7 +178,7 @@ fn every_flipped_bit_and_every_other_length_is_refused() {
 #[test]
 fn each_fault_has_its_own_error() {
     let good = acetal().encode().unwrap();
-    // Changes bytes and makes the CRC right again: what is left to find is the content.
+    // Changes bytes of the content and corrects the CRC, so that only the check of the content can find the error.
     let forged = |offset: usize, with: &[u8]| {
         let mut bytes = good.clone();
         bytes[offset..offset + with.len()].copy_from_slice(with);
@@ -430,7 +430,7 @@ fn six_layers_of_six_hundred_speeds_take_about_a_hundred_kilobytes() {
     );
 }
 
-/// Rounding to a step of 6 mm/65 535.
+/// Tolerance for rounding to a depth step of 6 mm/65 535.
 const STEP_MM: f32 = 1e-4;
 
 fn assert_unstable(answer: TabulatedStability, expected: IntervalKind, hz: f32, depth_margin_mm: f32) {
@@ -484,16 +484,18 @@ fn a_flip_island_at_a_speed_of_the_grid() {
 fn kinds_that_touch_are_one_unstable_range() {
     let bytes = acetal().encode().unwrap();
     let table = LobeTable::parse(&bytes).unwrap();
-    // 4.0 mm at 1 045 rev/min is a flip; above 4.023 it is a Hopf, so the nearest stable depth is 1.327.
+    // At 1 045 rev/min 4.0 mm lies in a flip interval and depths above 4.023 mm in a Hopf interval, so that the nearest stable
+    // depth is 1.327 mm.
     let answer = table.lookup(Rpm(1045.0), &working_point(&validity(0.15), 4.0));
     assert_unstable(answer, IntervalKind::Flip, 17.42, 2.0);
 }
 
 #[test]
-fn between_a_flip_island_and_none_the_island_stays() {
+fn between_a_flip_island_and_none_the_island_remains_unstable() {
     let bytes = acetal().encode().unwrap();
     let table = LobeTable::parse(&bytes).unwrap();
-    // Between 900 (Hopf from 1.723) and 1 036 (flip 1.575 to 2.334, Hopf from 2.712): unstable where either is.
+    // Between 900 (Hopf from 1.723 mm) and 1 036 rev/min (flip 1.575 to 2.334 mm, Hopf from 2.712 mm), a depth is unstable if it
+    // is unstable in one of both columns.
     let at = |depth_mm| table.lookup(Rpm(1000.0), &working_point(&validity(0.15), depth_mm));
     assert!(matches!(at(1.5), TabulatedStability::Stable { .. }));
     assert!(matches!(
@@ -510,7 +512,8 @@ fn between_a_flip_island_and_none_the_island_stays() {
             ..
         }
     ));
-    // Between 1 100 (Hopf from 2.223) and 3 000 (nothing): the same.
+    // Between 1 100 (Hopf from 2.223 mm) and 3 000 rev/min (no interval), a depth is unstable if it is unstable in one of both
+    // columns.
     let at = |depth_mm| table.lookup(Rpm(2999.0), &working_point(&validity(0.15), depth_mm));
     assert!(matches!(at(2.2), TabulatedStability::Stable { .. }));
     assert!(matches!(
@@ -606,7 +609,7 @@ fn outside_of_the_table_the_answer_is_not_known() {
         ask(1000.0, WorkingPoint { posture: 1, ..base }),
         Some(NotKnown::Posture { asked: 1 })
     );
-    // The layer of posture 2 holds for all feeds from 0.15 to 0.3.
+    // The layer of posture 2 is valid for all feeds per tooth from 0.15 to 0.3 mm.
     let posture_2 = WorkingPoint {
         posture: 2,
         feed_per_tooth: Millimeters(0.3),
@@ -633,14 +636,14 @@ fn an_undecided_depth_is_not_known() {
             ..
         }
     ));
-    // Stable in one neighbour, undecided in the other: not known.
+    // A depth that is stable in one neighbour and undecided in the other is not known.
     assert_eq!(ask(1090.0, 1.0), undecided);
     assert_eq!(ask(1050.0, 1.0), undecided);
 }
 
 #[test]
 fn a_full_column_grows_to_the_unstable_side() {
-    // Twelve islands against twelve others in two speeds and two feeds: 48 after joining, more than a column holds.
+    // Twelve islands overlap twelve others, at two speeds and two feeds. They combine to 48 intervals, more than a column holds.
     let islands = |shift_mm: f32| -> Vec<Interval> {
         (0..MAX_INTERVALS as u8)
             .map(|k| {

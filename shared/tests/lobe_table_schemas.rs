@@ -1,7 +1,7 @@
-//! The schemas of the lobe table: frozen bytes, what schema 2 adds, what is refused.
+//! The schemas of the lobe table: frozen bytes, additions of schema 2, refused tables.
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing)]
 
-// Not every test binary uses all of it.
+// Not every test binary uses all of this module.
 #[allow(dead_code)]
 mod support;
 
@@ -16,7 +16,7 @@ use quietcut_core::units::{Degrees, Hertz, Millimeters, Rpm};
 use quietcut_core::working_point::WorkingPoint;
 use support::{Owned, acetal, interval, table, validity, working_point};
 
-/// Bytes of both schemas as they were written when the schema was made, in hexadecimal.
+/// Hexadecimal bytes of tables of both schemas, written when the schema was defined.
 const FROZEN: &str = include_str!("lobe_table_schemas.txt");
 
 const MODES: [LayerMode; 2] = [
@@ -30,7 +30,7 @@ const MODES: [LayerMode; 2] = [
     },
 ];
 
-/// Different numbers for every end, so that none can be taken for another.
+/// Derivatives with a different number for every interval end, so that a confusion is found.
 fn slopes(index: usize, modes: usize) -> IntervalSlopes {
     let end = |first: f32| {
         let mut slopes = Slopes {
@@ -59,7 +59,7 @@ fn all_slopes(owned: &Owned, modes: usize) -> Vec<IntervalSlopes> {
     (0..intervals).map(|index| slopes(index, modes)).collect()
 }
 
-/// The table of `acetal` with everything that schema 2 knows.
+/// The table of `acetal` with all additions of schema 2.
 fn extended() -> Vec<u8> {
     let owned = acetal();
     let slopes = all_slopes(&owned, 2);
@@ -115,7 +115,7 @@ fn a_table_without_additions_is_of_schema_1() {
 }
 
 #[test]
-fn additions_come_back() {
+fn additions_are_decoded_as_encoded() {
     let bytes = extended();
     let table = LobeTable::parse(&bytes).unwrap();
     assert_eq!(table.header().unwrap().schema, SCHEMA);
@@ -126,13 +126,13 @@ fn additions_come_back() {
     let mut index = 0;
     for (speed, column) in acetal().layers[0].1.iter().enumerate() {
         for position in 0..column.len() {
-            // The numbers chosen are exact in 16 bits.
+            // The derivatives are exact in binary16.
             assert_eq!(table.slopes(0, speed, position), Some(slopes(index, 2)));
             index += 1;
         }
         assert_eq!(table.slopes(0, speed, column.len()), None);
     }
-    // What is stored behind the intervals does not change what is read before.
+    // The additions after the intervals do not change the entries.
     let plain = acetal().encode().unwrap();
     let plain = LobeTable::parse(&plain).unwrap();
     for speed in 0..5 {
@@ -232,7 +232,7 @@ fn each_addition_that_cannot_be_is_refused_on_both_sides() {
         forged(96 + 18, &[0xFF, 0xFF]),
         TableError::FeedDirection { layer: 0 }
     );
-    // Six intervals of 20 bytes of derivatives at the end, before them two modes, before these the error.
+    // From the end: six intervals with 20 bytes of derivatives, two modes, the interpolation error.
     let slopes_at = good.len() - 6 * 20;
     let infinite = 0x7C00_u16.to_le_bytes();
     assert_eq!(
@@ -247,7 +247,7 @@ fn each_addition_that_cannot_be_is_refused_on_both_sides() {
         forged(slopes_at - 24, &f32::NAN.to_le_bytes()),
         TableError::InterpolationError { .. }
     ));
-    // A reader of schema 1 that took these bytes for its own would find them too long.
+    // If these bytes claim schema 1, they are too long for its description.
     assert!(matches!(forged(4, &[1]), TableError::Arrays { .. }));
     for bit in 0..8 * good.len() {
         let mut damaged = good.clone();
@@ -258,7 +258,7 @@ fn each_addition_that_cannot_be_is_refused_on_both_sides() {
 
 proptest! {
     #[test]
-    fn damaged_additions_that_were_checked_before_do_no_harm(
+    fn additions_damaged_after_their_check_are_read_without_panic(
         content in table(), modes in 1_usize..=MODES_MAX,
         damage in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..20),
         rpm in 400.0_f32..3000.0, direction in -400.0_f32..400.0,
@@ -299,7 +299,7 @@ proptest! {
         let depths = (Millimeters(0.0), Millimeters(6.0));
         let found = corrected_limit(Millimeters(limit), &slopes, &learned, depths).0;
         let expected = (limit + by[0] * frequency + by[1] * damping + by[2] * force).clamp(0.0, 6.0);
-        // Rounding of single precision in four terms below 20.
+        // Single-precision rounding of four terms below 20.
         prop_assert!((found - expected).abs() < 1e-5, "{} {}", found, expected);
     }
 }
@@ -308,7 +308,8 @@ proptest! {
 fn a_corrected_entry_moves_its_ends_and_keeps_their_order() {
     let bytes = extended();
     let table = LobeTable::parse(&bytes).unwrap();
-    // Speed 1 036: flip 1.575 to 2.334, Hopf from 2.712 to the end; intervals 1 and 2 of the table.
+    // At 1 036 rev/min: a flip from 1.575 to 2.334 mm, a Hopf from 2.712 mm to the end. These are the intervals 1 and 2 of the
+    // table.
     let learned = Learned {
         cutting_force: 0.1,
         ..Learned::default()
@@ -316,11 +317,12 @@ fn a_corrected_entry_moves_its_ends_and_keeps_their_order() {
     let before = table.entry(0, 1).unwrap();
     let after = table.corrected_entry(0, 1, &learned).unwrap();
     let (before, after) = (before.intervals(), after.intervals());
-    // By −2 · 0.1 and +1.5 · 0.1, then −3 · 0.1; the end of the table stays. Rounding of sums below 6.
+    // The shifts are −2 · 0.1, +1.5 · 0.1 and −3 · 0.1 mm; the end of the table is not shifted. The tolerance is the rounding of
+    // sums below 6.
     let near = |a: f32, b: f32| (a - b).abs() < 1e-6;
     assert!(near(after[0].from.0, before[0].from.0 - 0.2) && near(after[0].to.0, before[0].to.0 + 0.15));
     assert!(after[1].from.0 >= after[0].to.0 && after[1].to == before[1].to);
-    // An island that closes is gone: its ends move towards one another.
+    // An island is removed if its ends move past each other.
     let away = Learned {
         cutting_force: -0.5,
         ..Learned::default()
@@ -328,14 +330,14 @@ fn a_corrected_entry_moves_its_ends_and_keeps_their_order() {
     let closed = table.corrected_entry(0, 1, &away).unwrap();
     assert_eq!(closed.intervals().len(), 1);
     assert_eq!(closed.intervals()[0].kind, IntervalKind::Hopf);
-    // A table without derivatives is what it is.
+    // Without derivatives the corrected entries equal the stored ones.
     let plain = acetal().encode().unwrap();
     let plain = LobeTable::parse(&plain).unwrap();
     assert_eq!(plain.corrected_entry(0, 1, &learned), plain.entry(0, 1));
 }
 
 #[test]
-fn what_was_learned_of_a_mode_is_relative() {
+fn learned_changes_of_a_mode_are_relative() {
     let now = LayerMode {
         frequency: Hertz(17.16),
         damping_ratio: 0.0342,
@@ -346,7 +348,7 @@ fn what_was_learned_of_a_mode_is_relative() {
     assert_eq!(Learned::of_mode(MODES_MAX, &MODES[0], &now), Learned::default());
 }
 
-/// Layers whose limit is 1 mm plus a hundredth of the direction, for these directions.
+/// Layers for these feed directions. The limit is 1 mm plus a hundredth of the direction in degrees.
 fn directed(directions: &[Option<f32>], feeds: &[f32]) -> Vec<u8> {
     let mut owned = acetal();
     owned.speeds.truncate(1);
@@ -386,7 +388,7 @@ fn limit_towards(bytes: &[u8], direction: f32, feed: f32) -> Result<f32, NotKnow
 fn between_feed_directions_limits_are_interpolated_and_far_from_them_not_known() {
     let bytes = directed(&[Some(0.0), Some(30.0), Some(60.0)], &[0.0]);
     let is = |found: Result<f32, NotKnown>, expected: f32| {
-        // Steps of 6 mm/65 535, and the nearest of two where the direction is within its tolerance.
+        // The tolerance is some steps of 6 mm/65 535. Within the direction tolerance the nearest layer is used.
         assert!((found.unwrap() - expected).abs() < 3e-4, "{found:?} {expected}");
     };
     is(limit_towards(&bytes, 0.0, 0.0), 1.0);
@@ -403,16 +405,16 @@ fn between_feed_directions_limits_are_interpolated_and_far_from_them_not_known()
             "{direction}"
         );
     }
-    // Too far apart to interpolate.
+    // Directions that are too far apart are not interpolated.
     let sparse = directed(&[Some(0.0), Some(FEED_DIRECTION_SPAN.0 + 1.0)], &[0.0]);
     assert!(matches!(
         limit_towards(&sparse, 20.0, 0.0),
         Err(NotKnown::FeedDirection { .. })
     ));
-    // Across 0.
+    // Interpolation between directions on both sides of 0°.
     let across = directed(&[Some(350.0), Some(20.0)], &[0.0]);
     is(limit_towards(&across, 5.0, 0.0), 1.0 + 0.5 * (3.5 + 0.2));
-    // In feed or in direction, not in both at once.
+    // The table is interpolated in feed or in direction, not in both at once.
     let both = directed(&[Some(0.0), Some(30.0)], &[0.1, 0.2]);
     is(limit_towards(&both, 30.0, 0.15), 1.45);
     is(limit_towards(&both, 15.0, 0.1), 1.25);
@@ -423,7 +425,7 @@ fn between_feed_directions_limits_are_interpolated_and_far_from_them_not_known()
 }
 
 #[test]
-fn a_direction_that_was_not_told_is_the_only_one_or_not_known() {
+fn without_a_set_direction_the_only_one_is_assumed_or_the_result_is_not_known() {
     let at = working_point(&validity(0.0), 0.5);
     let ask = |bytes: &[u8]| LobeTable::parse(bytes).unwrap().lookup(Rpm(900.0), &at);
     assert!(matches!(
@@ -434,7 +436,7 @@ fn a_direction_that_was_not_told_is_the_only_one_or_not_known() {
         ask(&directed(&[Some(30.0), Some(60.0)], &[0.0])),
         TabulatedStability::NotKnown(NotKnown::FeedDirectionNotTold)
     ));
-    // A layer for any direction answers for all of them.
+    // A layer for any direction is used for every direction.
     let any = directed(&[None], &[0.0]);
     assert!((limit_towards(&any, 123.0, 0.0).unwrap() - 1.0).abs() < 3e-4);
 }

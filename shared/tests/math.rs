@@ -1,22 +1,22 @@
-//! The elementary functions against double precision, over their whole domains.
+//! The elementary functions compared with double precision, over their whole domains.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a test may fail
 
 use std::f64::consts::TAU;
 
 use quietcut_core::math;
 
-/// Distance of `value` from the `exact` one, in units of the gap between `f32` numbers there.
+/// Distance of `value` from `exact`, in units of the distance between neighbouring `f32` numbers there.
 fn ulps(value: f32, exact: f64) -> f64 {
     let gap = |x: f32| f64::from(f32::from_bits(x.abs().to_bits() + 1)) - f64::from(x.abs());
     (f64::from(value) - exact).abs() / gap(exact as f32)
 }
 
-/// All positive finite numbers, every `step`-th of them: `step` is odd, so that all mantissa bits vary.
+/// Every `step`-th positive finite number. `step` is odd, so that all mantissa bits vary.
 fn positive(step: usize) -> impl Iterator<Item = f32> {
     (1..f32::INFINITY.to_bits()).step_by(step).map(f32::from_bits)
 }
 
-/// The largest of some errors, with the argument it belongs to.
+/// The largest error. Prints it with its argument.
 fn worst<T: std::fmt::Debug>(errors: impl Iterator<Item = (T, f64)>) -> f64 {
     let (argument, error) = errors.max_by(|a, b| a.1.total_cmp(&b.1)).expect("some arguments");
     println!("worst {error:.3e} at {argument:?}");
@@ -24,7 +24,7 @@ fn worst<T: std::fmt::Debug>(errors: impl Iterator<Item = (T, f64)>) -> f64 {
 }
 
 #[test]
-fn these_tests_find_overflow() {
+fn overflow_checks_are_on() {
     let one = std::hint::black_box(1_u8);
     assert!(
         std::panic::catch_unwind(|| u8::MAX + one).is_err(),
@@ -34,7 +34,7 @@ fn these_tests_find_overflow() {
 
 #[test]
 fn sqrt_is_within_one_ulp() {
-    // Two octaves in full: the algorithm depends on the exponent's parity only.
+    // Every third number of two octaves: the algorithm depends on the exponent through its parity only.
     let two_octaves = (1f32.to_bits()..4f32.to_bits()).step_by(3).map(f32::from_bits);
     let error = worst(
         positive(1009)
@@ -82,7 +82,7 @@ fn sine_and_cosine_hold_for_every_angle() {
         near.chain(positive(2017))
             .chain(positive(2017).map(|x| -x))
             .map(|turns| {
-                // f64 reduces an f32 angle in turns exactly too.
+                // The reduction of an f32 angle in revolutions is exact in f64 too.
                 let angle = TAU * f64::from(turns).fract();
                 let (sin, cos) = math::sin_cos_turns(turns);
                 (
@@ -112,7 +112,7 @@ fn atan2_is_within_two_ulp_and_in_turns_within_three() {
             .flat_map(|x| positive(3_100_001).map(move |y| (x, y)))
             .flat_map(|(x, y)| [(x, y), (-x, y), (x, -y), (-x, -y)])
     };
-    // Angles below the smallest normal number have no relative accuracy left.
+    // Results below the smallest normal number have no relative accuracy.
     let normal = |exact: f64| exact.abs() >= f64::from(f32::MIN_POSITIVE);
     let radians = worst(points().filter_map(|(x, y)| {
         let exact = f64::from(y).atan2(f64::from(x));

@@ -1,10 +1,10 @@
-//! The virtual cut against known limits and multipliers: what tests of the detector rest on must itself be true.
+//! The virtual cut compared with known limits and Floquet multipliers, because tests of the detector rely on it.
 
 mod virtual_cut;
 
 use virtual_cut::milling::{Complex, Cut, Milling, Process, machine_tool, robot};
 
-/// |μ| over one tooth period, from the free motion (no feed) of the linear equations after a push.
+/// |μ| over one tooth period, from the free motion of the linear equations without feed after a push.
 fn multiplier_abs(process: Process, depth_mm: f64, steps: usize) -> f64 {
     let cut = Cut {
         depth_m: depth_mm * 1e-3,
@@ -31,11 +31,12 @@ fn multiplier_abs(process: Process, depth_mm: f64, steps: usize) -> f64 {
     dominant_abs(&states)
 }
 
-/// The larger root of μ² = a·μ + b, where d[k+2] = a·d[k+1] + b·d[k] is fitted to all components of the deviations.
+/// The larger root of μ² = a·μ + b, where d[k+2] = a·d[k+1] + b·d[k] is fitted to all components of the deviations from the
+/// orbit.
 fn dominant_abs(deviations: &[Vec<f64>]) -> f64 {
     let (mut xx, mut xy, mut yy, mut xz, mut yz) = (0.0, 0.0, 0.0, 0.0, 0.0);
     for window in deviations.windows(3) {
-        // Each triple counts alike, however far the deviation has grown or died.
+        // Each triple has the same weight, independent of the growth or decay up to it.
         let weight = 1.0 / window[1].iter().map(|d| d * d).sum::<f64>();
         for ((&y, &x), &z) in window[0].iter().zip(&window[1]).zip(&window[2]) {
             xx += weight * x * x;
@@ -47,7 +48,7 @@ fn dominant_abs(deviations: &[Vec<f64>]) -> f64 {
     }
     let determinant = xx * yy - xy * xy;
     if determinant < 1e-9 * xx * yy {
-        // One real multiplier alone is left.
+        // The deviations have a single real multiplier.
         return (xy / yy).abs();
     }
     let (a, b) = (
@@ -79,7 +80,7 @@ fn robot_limits_are_met() {
         let at = |share: f64| multiplier_abs(robot(rpm), share * limit_mm, 64);
         let (below, on, above) = (at(0.8), at(1.0), at(1.2));
         println!("{rpm}: {below:.4} {on:.5} {above:.4}");
-        // The limit is stated to 0.5 µm; |μ| moves by about 0.1 per relative depth.
+        // The limit is stated to 0.5 µm, and |μ| changes by about 0.1 per relative change of depth.
         assert!((on - 1.0).abs() < 1e-4, "{rpm}: |μ| = {on} at the limit");
         assert!((0.970..0.984).contains(&below) && (1.014..1.031).contains(&above));
     }
@@ -87,7 +88,7 @@ fn robot_limits_are_met() {
 
 #[test]
 fn machine_tool_multipliers_are_met() {
-    // Insperger–Stépán, two degrees of freedom, half immersion: converged reference values.
+    // Converged reference values of the two-degree-of-freedom benchmark of Insperger and Stépán at half immersion.
     for (rpm, depth_mm, reference) in REFERENCE {
         let found = multiplier_abs(machine_tool(rpm), depth_mm, 128);
         println!("{rpm} {depth_mm}: {found:.5} for {reference:.5}");

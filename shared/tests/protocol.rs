@@ -1,4 +1,4 @@
-//! The protocol: frozen bytes, errors that can be told apart, streams with noise in them.
+//! The protocol: frozen bytes, distinct errors, streams with noise.
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 #[path = "protocol/framing.rs"]
@@ -14,7 +14,7 @@ use quietcut_core::protocol::{
 
 use samples::*;
 
-/// Frames of version 1, one per line: name, bytes in hexadecimal. They never change.
+/// Frames of version 1, one per line: name and hexadecimal bytes. They never change.
 const FROZEN_V1: &str = include_str!("protocol_v1.txt");
 
 fn line(name: &str, bytes: &[u8]) -> String {
@@ -55,7 +55,7 @@ fn every_variant_has_a_frozen_frame() {
         firsts.dedup();
         firsts
     };
-    // Behind COBS, version and sequence stands the number of the variant.
+    // The index of the variant follows the COBS byte, the version and the sequence number.
     let variant = |frame: Vec<u8>| {
         let mut raw = [0; MAX_FRAME];
         cobs::decode(&frame, &mut raw).unwrap();
@@ -68,7 +68,7 @@ fn every_variant_has_a_frozen_frame() {
 }
 
 #[test]
-fn messages_come_back() {
+fn messages_are_decoded_as_encoded() {
     for request in requests() {
         assert_eq!(decode_all(&frame_of(&request)), [Ok((SEQUENCE, request))]);
     }
@@ -95,7 +95,7 @@ fn the_largest_message_of_each_kind_fits_a_frame() {
         request <= MAX_FRAME && response <= MAX_FRAME,
         "{request} {response}"
     );
-    // The largest names and numbers that an `Info` can have.
+    // An `Info` with the longest names and largest numbers.
     let long = |length| "x".repeat(length);
     let info = Info {
         protocol: u8::MAX,

@@ -1,4 +1,4 @@
-//! Power spectra and peaks against closed forms.
+//! Power spectra and peaks compared with closed forms.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a test may fail
 
 use std::f64::consts::TAU;
@@ -10,12 +10,12 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 
-/// Acceleration of one unit of a sample: 0.488 mg in 2¹² units.
+/// Acceleration of one unit of a sample: 0.488 mg divided by 2¹².
 const UNIT: f64 = 0.488e-3 * 9.80665 / 4096.0;
 const TOOL_RATE: f64 = 13_333.5;
 const STRUCTURE_RATE: f64 = 1666.6875;
 
-/// x[n] of each axis in m/s² as a block.
+/// A block of samples from the signal x[n] of each axis in m/s².
 fn block<const N: usize>(signal: impl Fn(usize) -> [f64; 3]) -> Overlap<N> {
     let mut overlap = Overlap::new();
     for n in 0..N {
@@ -53,7 +53,7 @@ fn structure<T>(
     ))
 }
 
-/// The definition: window in time, sum, one side, in double precision.
+/// One-sided power by its definition in double precision: window in time, then the sum.
 fn direct_power(samples: &[f64], k: usize) -> f64 {
     let points = samples.len() as f64;
     let mean = samples.iter().sum::<f64>() / points;
@@ -72,7 +72,7 @@ fn direct_power(samples: &[f64], k: usize) -> f64 {
     sides * (re * re + im * im) / (0.5 * points).powi(2)
 }
 
-/// Every bin of both spectra equals the definition, with three loud axes and gravity.
+/// Every bin of both spectra equals the definition, for signals on three axes and gravity.
 #[test]
 fn spectra_equal_their_definition() {
     let seed = 3;
@@ -94,7 +94,7 @@ fn spectra_equal_their_definition() {
             let expected: f64 = (0..3)
                 .map(|axis| direct_power(&samples[..points].iter().map(|s| s[axis]).collect::<Vec<_>>(), k))
                 .sum();
-            // Single precision, and the rounding of the samples to units of 1e-6 m/s².
+            // The tolerance is single precision, and the rounding of samples to units of 1e-6 m/s².
             assert!(
                 (f64::from(found) - expected).abs() <= 2e-5 * expected + 1e-9,
                 "{name}, bin {k}: {found} for {expected} (seed {seed})"
@@ -142,7 +142,7 @@ fn power_is_mean_square_of_a_tone_and_density_of_noise() {
     let density = sigma * sigma / (TOOL_RATE / 2.0);
     let per_bin = density * f64::from(spectrum::HANN_NOISE_BINS) * TOOL_RATE / TOOL_POINTS as f64;
     let found = sum / f64::from(count);
-    // 20 000 bins, two thirds of them independent: 0.9 % standard error.
+    // The standard error over 20 000 bins, two thirds of them independent, is 0.9 %.
     assert!(
         (found / per_bin - 1.0).abs() < 0.03,
         "{found} for {per_bin} (seed {seed})"
@@ -164,11 +164,12 @@ fn blocks_come_due_with_the_hop() {
     assert!(overlap.push([0; 3], 300));
 }
 
-/// A tone in noise, with two as strong ones four to nine bins away.
+/// A tone in noise, with two equally strong tones four to nine bins away.
 ///
-/// A tone that holds 20 dB more power than all the noise of its block stands 42 dB over the noise of its bin: it is found ten times as well as
-/// to a tenth of a bin. One that stands only 20 dB over the noise of its bin (2 dB *less* power than the noise)
-/// has an error of 0.065 bin rms, from the noise alone, so that 0.1 bin is 1.5 standard deviations; from 30 dB on five of them.
+/// A tone with 20 dB more power than all the noise of its block is 42 dB above the noise of its bin. Its frequency is found to a
+/// hundredth of a bin. A tone that is only 20 dB above the noise of its bin (2 dB *less* power than the noise) has a frequency
+/// error of 0.065 bin rms from the noise alone, so that 0.1 bin is 1.5 standard deviations. From 30 dB on it is five standard
+/// deviations.
 #[test]
 fn frequency_is_right_to_a_tenth_of_a_bin() {
     let seed = 23;
@@ -184,7 +185,7 @@ fn frequency_is_right_to_a_tenth_of_a_bin() {
                 bin + rng.random_range(4.0..9.0),
             ]
             .map(|bin| (bin, rng.random_range(0.0..TAU)));
-            // Floor per bin: 3σ²/N; tone in mid-bin: A²/2.
+            // The noise floor per bin is 3σ²/N, the power of a tone in the middle of a bin A²/2.
             let sigma = (TOOL_POINTS as f64 / 6.0 / 10f64.powf(snr_db / 10.0)).sqrt();
             let noise: Vec<f64> = (0..TOOL_POINTS)
                 .map(|_| sigma * rng.sample::<f64, _>(StandardNormal))
@@ -223,7 +224,7 @@ fn frequency_is_right_to_a_tenth_of_a_bin() {
     }
 }
 
-/// The error that strong neighbours cause without any noise: five times stronger ones four bins away still leave a tenth of a bin.
+/// The error from strong neighbours without noise: five times stronger tones four bins away give at most a tenth of a bin.
 #[test]
 fn strong_neighbours_move_a_peak_little() {
     let mut worst = 0f64;
@@ -250,9 +251,9 @@ fn strong_neighbours_move_a_peak_little() {
     assert!(worst <= 0.1, "{worst} bins");
 }
 
-/// Pure noise, and pure harmonics of a spindle with all their side lobes, hold no tone to be found.
+/// In pure noise, and in harmonics of the spindle with all their side lobes, no tone is found.
 #[test]
-fn nothing_is_found_where_nothing_is() {
+fn no_tone_is_found_in_noise_or_in_harmonics() {
     let seed = 41;
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let (from, to) = (Hertz(50.0), Hertz(5_000.0));
@@ -291,9 +292,10 @@ fn nothing_is_found_where_nothing_is() {
     }
 }
 
-/// Neither tones nor gravity raise the floor, and the power near a tone is the tone's wherever it lies between the bins.
+/// Tones and gravity do not raise the noise floor. The mean square near a tone is that of the tone, at any position between the
+/// bins.
 #[test]
-fn floor_is_the_noise_and_power_near_a_tone_is_the_tone() {
+fn the_floor_is_that_of_the_noise_and_the_power_near_a_tone_is_that_of_the_tone() {
     let seed = 43;
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let noise: Vec<f64> = (0..TOOL_POINTS)
@@ -308,12 +310,12 @@ fn floor_is_the_noise_and_power_near_a_tone_is_the_tone() {
         tool(&samples, &[0], |s| s.noise_floor(203))
     };
     let (with, without) = (floor_of(true), floor_of(false));
-    // Halfway to its next peak the side lobes of such a comb lie 58 dB below it, well under this noise.
+    // Halfway between two peaks of this comb, the side lobes are 58 dB below the peaks, far below the noise.
     assert!(
         with < 2.0 * without && without < 2.0 * with,
         "{with} with tones, {without} without (seed {seed})"
     );
-    // The median of an exponential distribution is ln 2 of its mean, 3σ²/N here.
+    // The median of an exponential distribution is ln 2 times its mean, which is 3σ²/N here.
     let expected = 2f32.ln() * 3.0 * 1e-2 / TOOL_POINTS as f32;
     assert!(
         (without / expected - 1.0).abs() < 0.25,
@@ -326,20 +328,20 @@ fn floor_is_the_noise_and_power_near_a_tone_is_the_tone() {
         let found = tool(&samples, &[0], |s| {
             s.mean_square_near(Hertz(bin as f32 * s.bin.0))
         });
-        // Five bins hold all but 0.5 % of the main lobe at worst.
+        // Five bins contain at least 99.5 % of the main lobe.
         assert!((found / 2.0 - 1.0).abs() < 0.005, "bin {bin}: {found}");
     }
 }
 
-/// A comb of spindle harmonics with a weaker tone between two of them, in the structure band.
+/// Spindle harmonics and a weaker tone between two of them, in the structure band.
 #[test]
-fn chatter_is_told_from_harmonics() {
+fn chatter_is_distinguished_from_harmonics() {
     let seed = 31;
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     for trial in 0..60 {
         let spindle = rng.random_range(12.0..40.0f64);
         let order = rng.random_range(1..8u32);
-        // Farther than two bins and the tolerance from both harmonics.
+        // The tone is more than two bins plus the tolerance away from both harmonics.
         let off = rng.random_range(0.25..0.75);
         let chatter = (f64::from(order) + off) * spindle;
         let chatter_amplitude = rng.random_range(0.05..3.0);
@@ -412,7 +414,8 @@ fn harmonics_closer_than_the_resolution_are_not_searched() {
             s.dominant_non_harmonic(rotation, Hertz(100.0), Hertz(5000.0))
         })
     };
-    // Bins of 13 Hz: harmonics of 20 Hz fill all of them; so do those of a spindle that may be anywhere within 40 %.
+    // The bins are 13 Hz wide. Harmonics of 20 Hz fill all of them, as do harmonics of a spindle speed that is known to 40 %
+    // only.
     for rotation in [
         rotation(20.0, 0.0),
         rotation(200.0, 80.0),

@@ -1,4 +1,4 @@
-//! Edges to speed and phase, and levels to edges, on wheels whose motion is known.
+//! Speed and phase from edges, and edges from levels, for wheels with known motion.
 
 #![allow(clippy::unwrap_used)]
 
@@ -24,7 +24,7 @@ fn at(seconds: f64) -> Edge {
     }
 }
 
-/// Edges of a wheel that turns evenly from t = 0.1 s, `turns` times; angle 0 at 0.1 s.
+/// Times of the edges of a wheel with constant speed, from t = 0.1 s at angle 0, over `turns` revolutions.
 fn even_edges(wheel: Wheel, turns_per_second: f64, turns: u32) -> Vec<f64> {
     (0..turns * u32::from(wheel.positions))
         .filter(|i| i % u32::from(wheel.positions) < u32::from(wheel.positions - wheel.missing))
@@ -32,7 +32,7 @@ fn even_edges(wheel: Wheel, turns_per_second: f64, turns: u32) -> Vec<f64> {
         .collect()
 }
 
-/// Distance of two angles on the circle, in turns.
+/// Distance of two angles on the circle, in revolutions.
 fn apart(angle: Turns, turns: f64) -> f64 {
     let difference = f64::from(angle.fraction()) / 4_294_967_296.0 - turns;
     difference - difference.round()
@@ -68,8 +68,8 @@ fn phase_between_the_pulses_of_a_jittery_mark() {
         (squares / f64::from(count)).sqrt(),
         (claimed / f64::from(count)).sqrt(),
     );
-    // Uniform jitter of ±20 µs is 11.5 µs or 2.0e-4 turns rms; a line through about eight edges, extrapolated by
-    // up to one interval, has at most that.
+    // Uniform jitter of ±20 µs has 11.5 µs or 2.0e-4 revolutions rms. A line through about eight edges, extrapolated by at most
+    // one interval, does not exceed it.
     assert!(rms < 2.0e-4 && worst < 8e-4, "rms {rms}, worst {worst}");
     assert!(
         claimed > 0.6 * rms && claimed < 1.7 * rms,
@@ -119,7 +119,7 @@ fn double_and_missing_edges_change_nothing() {
             if settled {
                 let phase = tachometer.phase(&state, at(time).time).unwrap();
                 let error = apart(phase.angle, (time - 0.1) * speed);
-                // 1 ns per edge and f32 rounding of the period.
+                // The tolerance is 1 ns per edge and the f32 rounding of the period.
                 let gap_origin = if wheel.missing > 0 || wheel.positions == 1 {
                     0.0
                 } else {
@@ -135,7 +135,7 @@ fn double_and_missing_edges_change_nothing() {
 }
 
 #[test]
-fn a_stopped_spindle_is_lost_and_found_again() {
+fn a_stopped_spindle_loses_the_lock_and_regains_it() {
     let tachometer = Tachometer::new(ONE_MARK).unwrap();
     let mut state = TachometerState::default();
     for time in even_edges(ONE_MARK, 15.0, 30) {
@@ -161,7 +161,7 @@ fn a_stopped_spindle_is_lost_and_found_again() {
 fn speed_follows_a_ramp() {
     let tachometer = Tachometer::new(ONE_MARK).unwrap();
     let mut state = TachometerState::default();
-    // 600 to 1200 rev/min in 10 s: angle = 10 t + 0.5 t².
+    // From 600 to 1200 rev/min in 10 s: the angle is 10 t + 0.5 t² revolutions.
     for turn in 0..150 {
         let turn = f64::from(turn);
         let time = -10.0 + (100.0 + 2.0 * turn).sqrt();
@@ -169,7 +169,7 @@ fn speed_follows_a_ramp() {
         if turn > 20.0 {
             let speed = f64::from(tachometer.speed(&state).unwrap().0);
             let truth = 60.0 * (10.0 + time);
-            // The line looks back over eight turns: the speed lags by about that half.
+            // The line covers about eight past revolutions, so that the speed lags by about half of them.
             assert!((speed - truth).abs() / truth < 0.05, "{speed} for {truth}");
         }
     }
@@ -177,8 +177,8 @@ fn speed_follows_a_ramp() {
     assert!(state.change_per_turn().unwrap() > 0.002);
 }
 
-/// A variable-reluctance sensor on a 60−2 wheel: a sine per tooth, one deep swing over the gap, a base line that
-/// swings once per turn, noise.
+/// Voltage of a variable-reluctance sensor on a 60−2 wheel: a sine per tooth, one large pulse over the gap, a base line that
+/// varies once per revolution, and noise.
 fn reluctance_level(turns: f64, base: f64) -> f64 {
     let position = turns.rem_euclid(1.0) * 60.0;
     let tau = std::f64::consts::TAU;
@@ -187,7 +187,7 @@ fn reluctance_level(turns: f64, base: f64) -> f64 {
     } else {
         0.0
     };
-    // Over the gap the flux falls and rises once, three times as far.
+    // Over the gap the flux falls and rises once, with three times the amplitude.
     let gap = if (57.5..60.0).contains(&position) {
         -3.0 * (tau * (position - 57.5) / 2.5).sin()
     } else {
@@ -222,23 +222,23 @@ fn edges_are_found_on_a_swinging_base_line() {
         }
         assert!(speeds.len() >= 18, "{} turns", speeds.len());
         for speed in speeds {
-            // Noise of a tenth of the slope 2π per pitch of 6.2 ms moves an edge by 0.1 ms of 373 ms.
+            // Noise of a tenth of the slope, 2π per pitch of 6.2 ms, moves an edge by 0.1 ms; a revolution takes 373 ms.
             assert!((speed - 160.7).abs() < 0.16, "{speed}");
         }
         assert_eq!(state.losses(), 0);
     }
 }
 
-/// One mark per turn: a pulse of a tenth of a turn with sloping sides, from 0 to 1.
+/// Level of a sensor with one mark per revolution: a pulse of a tenth of a revolution with inclined edges, from 0 to 1.
 fn pulse_level(turns: f64) -> f64 {
     let position = turns.rem_euclid(1.0);
     let side = |from: f64| ((position - from) / 0.02).clamp(0.0, 1.0);
     side(0.5) - side(0.6)
 }
 
-/// Times of the edges, in samples, of a pulse every 200 samples; the record begins at `start` of a turn.
+/// Times of the edges, in samples, of a pulse every 200 samples. The record begins at the fraction `start` of a revolution.
 fn pulse_edges(start: f64, noise: f64, seed: u64) -> Vec<f64> {
-    // Noise up to four fifths of the least swing from peak to peak.
+    // The noise has up to four fifths of the smallest accepted peak-to-peak amplitude.
     let detector = LevelDetector {
         least_swing: (2.5 * noise) as f32,
     };
@@ -260,16 +260,17 @@ fn a_record_may_begin_anywhere_on_a_pulse() {
         let start = f64::from(step) / 200.0;
         let edges = pulse_edges(start, 0.02, seed);
         let because = format!("begun at {start} of a turn: {edges:?}");
-        // Twenty turns: a record that begins on a rising side may hold a part of it at both ends, or at none.
+        // Twenty revolutions. A record that begins on a rising edge may have a part of this edge at both ends, or at none.
         let is_on_side = (0.5..0.52).contains(&start);
         let possible = if is_on_side { 19..=21 } else { 20..=20 };
         assert!(possible.contains(&edges.len()), "{because}");
-        // The first edge is found near the foot of the side, the second where a part of the swing was seen: 4 samples of side.
+        // The first edge is found near the foot of the pulse, the second where a part of the amplitude was seen: an error of 4
+        // samples.
         for pair in edges.windows(2) {
             assert!((pair[1] - pair[0] - 200.0).abs() < 4.0, "{because}");
         }
-        // From then on the edges are at half the swing: noise of 0.02 at both ends, the usual swing known to 0.04,
-        // on a slope of 0.25 per sample.
+        // All later edges are at half the amplitude: noise of 0.02 at both ends, and an amplitude known to 0.04, on a slope of
+        // 0.25 per sample.
         for pair in edges.windows(2).skip(2) {
             assert!((pair[1] - pair[0] - 200.0).abs() < 0.5, "{because}");
         }
@@ -277,7 +278,7 @@ fn a_record_may_begin_anywhere_on_a_pulse() {
 }
 
 #[test]
-fn a_signal_that_becomes_smaller_is_found_again() {
+fn edges_are_found_again_after_the_signal_becomes_smaller() {
     let detector = LevelDetector { least_swing: 0.05 };
     let mut state = LevelDetectorState::default();
     let mut late = 0;
@@ -286,7 +287,7 @@ fn a_signal_that_becomes_smaller_is_found_again() {
         let edge = detector.step(&mut state, (size * pulse_level(f64::from(n) / 200.0)) as f32);
         late += usize::from(edge.is_some() && n >= 15_000);
     }
-    // Two silences of eight turns halve the usual swing below twice the small one.
+    // After two pauses of eight revolutions, the estimated amplitude is below twice the small one.
     assert_eq!(late, 25);
 }
 

@@ -9,10 +9,10 @@ use std::process::{Command, Stdio};
 use crate::json::Json;
 use crate::question::Question;
 
-/// Rows of a table that the reference holds, evenly spaced.
+/// Number of evenly spaced rows that the reference holds of a table.
 const SAMPLED_ROWS: usize = 8;
 
-/// Runs the commands of `question` in a new folder in which `tests` is the folder of tests.
+/// Runs the commands of `question` in a new folder, from which the name `tests` leads to the folder of the tests.
 pub(crate) fn answer(command: &Path, tests: &Path, question: &Question) -> Result<Json, String> {
     let folder = tempfile::tempdir().map_err(|error| error.to_string())?;
     std::os::unix::fs::symlink(tests, folder.path().join("tests")).map_err(|error| error.to_string())?;
@@ -51,7 +51,7 @@ fn count(value: impl ToString) -> Json {
     Json::Number(value.to_string())
 }
 
-/// The files in `folder` that are not among `seen`, as values that compare.
+/// The files in `folder` that are not in `seen`, as values that can be compared.
 fn written(folder: &Path, seen: &mut BTreeSet<String>) -> Result<BTreeMap<String, Json>, String> {
     let mut found = BTreeMap::new();
     let mut folders = vec![folder.to_owned()];
@@ -78,7 +78,7 @@ fn written(folder: &Path, seen: &mut BTreeSet<String>) -> Result<BTreeMap<String
                     ("length".to_owned(), count(bytes.len())),
                     ("bytes_hash".to_owned(), hash(&bytes)),
                 ]),
-                // Pictures and reports show numbers of the JSON; the memory of a device holds times.
+                // Pictures and reports repeat numbers of the JSON answer. The memory of a device contains times.
                 _ => continue,
             };
             found.insert(name, value);
@@ -87,7 +87,7 @@ fn written(folder: &Path, seen: &mut BTreeSet<String>) -> Result<BTreeMap<String
     Ok(found)
 }
 
-/// SipHash with fixed keys: the same for the same bytes on every machine.
+/// SipHash with fixed keys, which gives the same value for the same bytes on every machine.
 fn hash(bytes: &[u8]) -> Json {
     let mut hasher = DefaultHasher::new();
     hasher.write(bytes);
@@ -102,7 +102,7 @@ fn cell(text: &str) -> Json {
     }
 }
 
-/// A CSV table: its head, the number of its rows, and of each column the sum of magnitudes and some rows.
+/// A CSV table: its head, the number of its rows, and for each column some rows and the sum of the magnitudes.
 fn table(text: &str) -> Json {
     let mut lines = text.lines().filter(|line| !line.starts_with('#'));
     let head = lines.next().unwrap_or_default();
@@ -116,7 +116,8 @@ fn table(text: &str) -> Json {
         let sum: f64 = cells.iter().filter_map(Json::number).map(f64::abs).sum();
         let step = cells.len().div_ceil(SAMPLED_ROWS).max(1);
         let mut sampled: Vec<Json> = cells.iter().skip(step / 2).step_by(step).cloned().collect();
-        // The sum stands in the same list: it sets the scale, so that noise about zero has a floor.
+        // The sum is in the same list as the cells, so that it sets the scale of their tolerance: noise about zero needs an
+        // absolute one.
         let largest = cells.iter().map(Json::largest).fold(0.0, f64::max);
         sampled.push(Json::Number(format!("{largest:?}")));
         Json::Map(vec![
@@ -135,7 +136,7 @@ fn table(text: &str) -> Json {
     ])
 }
 
-/// A TOML file: under each key, with the header of its section, the words and numbers of its value.
+/// A TOML file as a map: for each key, with the header of its section, the words and numbers of its value.
 fn settings(text: &str) -> Json {
     let mut entries: Vec<(String, Json)> = Vec::new();
     let mut section = String::new();
@@ -156,7 +157,7 @@ fn settings(text: &str) -> Json {
             .filter(|word| !word.is_empty())
             .map(cell);
         match entries.last_mut() {
-            // A value over several lines goes on.
+            // A line without a key continues the value of the preceding line.
             Some((_, Json::List(list))) if key.is_empty() => list.extend(cells),
             _ => entries.push((format!("{section} {key}"), Json::List(cells.collect()))),
         }

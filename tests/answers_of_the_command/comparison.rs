@@ -1,20 +1,20 @@
-//! Two answers to one question, number by number.
+//! Comparison of two answers to one question, number by number.
 
 use crate::json::Json;
 use crate::uncompared;
 
-/// How equal two answers have to be.
+/// Rule of the comparison of two answers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Rule {
-    /// Every number is the same to the bit: two builds on one machine.
+    /// Every number must be the same to the bit: for two builds on one machine.
     Bits,
-    /// Numbers lie within the tolerance; names, verdicts, kinds and counts are the same.
+    /// Numbers must agree within the tolerance; names, verdicts, kinds and counts must be equal.
     Tolerance,
 }
 
 /// Tolerance of a number as a share of its stated half-width.
 ///
-/// It holds the answer far inside its own uncertainty.
+/// A change within it is far smaller than the stated uncertainty of the number.
 const OF_HALF_WIDTH: f64 = 1e-6;
 
 /// Tolerance of a number relative to the larger of itself and the largest number of its array.
@@ -22,7 +22,7 @@ const OF_HALF_WIDTH: f64 = 1e-6;
 /// Sums of 10⁶ terms in double precision are accurate to 10⁶ · 2⁻⁵³ ≈ 1e-10; a changed formula is worse than 1e-9.
 const RELATIVE: f64 = 1e-9;
 
-/// One place where two answers differ.
+/// A value in which two answers differ.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Difference {
     /// Path of the value in the answer.
@@ -33,7 +33,7 @@ pub(crate) struct Difference {
     pub(crate) now: String,
 }
 
-/// All differences between an answer of the reference and the answer of this build.
+/// All differences between the reference's answer and the answer of this build.
 pub(crate) fn differences(before: &Json, now: &Json, rule: Rule) -> Vec<Difference> {
     let command = now.get("command").and_then(Json::text).unwrap_or_default();
     let mut comparison = Comparison {
@@ -45,7 +45,7 @@ pub(crate) fn differences(before: &Json, now: &Json, rule: Rule) -> Vec<Differen
     comparison.found
 }
 
-/// What the tolerance of a number is derived from.
+/// The quantities from which the tolerance of a number follows.
 #[derive(Debug, Clone, Copy, Default)]
 struct Scale {
     half_width: Option<f64>,
@@ -131,7 +131,7 @@ impl Comparison<'_> {
     }
 }
 
-/// The half-width that a map states for one of its keys, and the size of what an error is an error of.
+/// The half-width that a map states for one of its keys, and for an error the magnitude of the number that has this error.
 fn scale_of(key: &str, (map, entries): (&Json, &[(String, Json)])) -> Scale {
     let mut scale = Scale::default();
     if let Some(Json::List(ends)) = map.get("ci90")
@@ -144,7 +144,7 @@ fn scale_of(key: &str, (map, entries): (&Json, &[(String, Json)])) -> Scale {
     let is_error = key == "error" || key == "error_mm";
     let stated = if key.ends_with("_mm") { "error_mm" } else { "error" };
     if is_error {
-        // An error comes from differences of its siblings: it is as accurate as they are.
+        // An error is computed from differences of the other numbers of its map, so that it is as accurate as those.
         let of_siblings = |(k, v): &(String, Json)| match (key, k.as_str()) {
             ("error_mm", k) if k.ends_with("_mm") => v.largest(),
             ("error", "value" | "multiplier" | "multiplier_abs") => v.largest(),
@@ -165,7 +165,7 @@ mod tests {
     const ANSWER: &str = r#"{"verdict":"stable","count":3,"warnings":["one"],"why":"because",
         "limit":{"value":2.0,"ci90":[1.0,3.0]},"hz":17.5,"spectrum":[1000.0,1e-12]}"#;
 
-    /// How many differences there are after `from` was replaced by `to`.
+    /// Number of differences after `from` was replaced by `to`.
     fn changed(from: &str, to: &str, rule: Rule) -> usize {
         assert!(ANSWER.contains(from));
         let read = |text: &str| Json::read(text).unwrap();
@@ -174,7 +174,7 @@ mod tests {
 
     #[test]
     fn a_change_is_found_by_the_rule_that_forbids_it() {
-        // (from, to, found by bits, found by tolerance)
+        // Rows: value before, value after, differences by the rule of bits, differences by the rule of tolerance.
         for (from, to, bits, tolerance) in [
             ("17.5", "17.5", 0, 0),
             ("17.5", "17.500000000000004", 1, 0),

@@ -1,15 +1,15 @@
-//! A JSON value whose numbers keep their text, so that two of them compare to the bit.
+//! JSON values whose numbers keep their text, so that two values can be compared to the bit.
 
-/// One value. A map keeps its keys in the order of the text.
+/// A JSON value. A map keeps its keys in the order of the text.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Json {
     /// No value.
     Null,
     /// A truth value.
     Bool(bool),
-    /// A number as it was written.
+    /// A number, as its text.
     Number(String),
-    /// A string, its escapes resolved.
+    /// A string, with its escapes resolved.
     Text(String),
     /// Values in order.
     List(Vec<Json>),
@@ -18,7 +18,7 @@ pub(crate) enum Json {
 }
 
 impl Json {
-    /// Reads one value that fills `text`.
+    /// Parses `text`, which must be exactly one value.
     pub(crate) fn read(text: &str) -> Result<Self, String> {
         let mut reader = Reader {
             bytes: text.as_bytes(),
@@ -40,7 +40,7 @@ impl Json {
         }
     }
 
-    /// The number; `None` of any other value.
+    /// The number; `None` if the value is no number.
     pub(crate) fn number(&self) -> Option<f64> {
         match self {
             Self::Number(text) => text.parse().ok(),
@@ -48,7 +48,7 @@ impl Json {
         }
     }
 
-    /// The string; `None` of any other value.
+    /// The string; `None` if the value is no string.
     pub(crate) fn text(&self) -> Option<&str> {
         match self {
             Self::Text(text) => Some(text),
@@ -56,7 +56,7 @@ impl Json {
         }
     }
 
-    /// The largest magnitude of the numbers in a list and in lists within it.
+    /// Largest magnitude of all numbers in a list and its nested lists.
     pub(crate) fn largest(&self) -> f64 {
         match self {
             Self::List(values) => values.iter().map(Self::largest).fold(0.0, f64::max),
@@ -64,7 +64,7 @@ impl Json {
         }
     }
 
-    /// The value as text with line breaks; a list without maps stands in one line.
+    /// The value as text with line breaks. A list without maps is written in one line.
     pub(crate) fn write(&self) -> String {
         let mut text = String::new();
         self.append(&mut text, 0);

@@ -1,4 +1,4 @@
-//! Holds what the command says: runs it and compares its answers with a reference or with another build.
+//! Runs the command and compares its answers with the committed reference, or with the answers of another build.
 
 mod answer;
 mod comparison;
@@ -17,7 +17,7 @@ use comparison::{Rule, differences};
 use json::Json;
 use question::Question;
 
-/// How many questions are asked at once.
+/// Number of questions that run at the same time.
 const AT_ONCE: usize = 2;
 
 /// Options of this program.
@@ -72,7 +72,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// The number of differences.
+/// Runs the questions of the options. Returns the number of differences.
 fn run(options: &Options) -> Result<usize, String> {
     let began = Instant::now();
     let data = options.tests.join("data/answers");
@@ -90,7 +90,7 @@ fn run(options: &Options) -> Result<usize, String> {
     };
     questions.retain(|question| {
         let has_pattern = |text: &String| text.contains(&options.only);
-        // A reference file is written whole: there a pattern is the name of its group.
+        // With --record a whole reference file is written: the pattern is then the name of its group.
         let is_group = question.group == options.only;
         options.only.is_empty()
             || is_group
@@ -155,7 +155,7 @@ fn report(answers: &[(Option<Json>, Json)], rule: Rule) -> usize {
     count
 }
 
-/// Results of `ask` for all questions, in their order.
+/// Runs `ask` on all questions; the results keep the order of the questions.
 fn ask_all<T: Send>(
     questions: &[Question],
     ask: impl Fn(&Question) -> Result<T, String> + Sync,

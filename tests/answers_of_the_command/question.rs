@@ -1,4 +1,4 @@
-//! Questions to the command: what is run, in groups of one reference file each.
+//! Questions to the command: the command lines that are run, in groups of one reference file each.
 
 use std::path::Path;
 use std::process::Command;
@@ -6,10 +6,10 @@ use std::process::Command;
 use crate::json::Json;
 use crate::reference::ONLY_FULL;
 
-/// Commands that run one after the other in one folder.
+/// A question: commands that run one after the other in one folder.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Question {
-    /// The reference file that holds the answer.
+    /// Name of the reference file that holds the answer.
     pub(crate) group: String,
     /// Arguments of the command, one line for each run.
     pub(crate) commands: Vec<String>,
@@ -23,7 +23,7 @@ impl Question {
         }
     }
 
-    /// The question as it stands in an answer of the reference.
+    /// The question that an answer of the reference contains.
     pub(crate) fn of_answer(group: &str, answer: &Json) -> Self {
         let commands = match answer {
             Json::List(steps) => steps.iter().filter_map(|s| s.get("command")?.text()).collect(),
@@ -36,7 +36,7 @@ impl Question {
     }
 }
 
-/// Verbs whose examples are not run, each with its reason.
+/// Verbs whose examples are not run, each with the reason.
 const EXAMPLES_LEFT_OUT: &[(&str, &str)] = &[
     (
         "monitor",
@@ -51,7 +51,7 @@ const EXAMPLES_LEFT_OUT: &[(&str, &str)] = &[
 /// Former names of verbs that the command still takes: name in the help, former name.
 const FORMER_NAMES: [(&str, &str); 1] = [("working-point", "work")];
 
-/// Ways to compute limits.
+/// Methods of `lobes`, as arguments of the option --method.
 const METHODS: [&str; 7] = [
     "collocation",
     "sdm",
@@ -62,7 +62,7 @@ const METHODS: [&str; 7] = [
     "mode-coupling",
 ];
 
-/// All questions; with `full` also those that take minutes.
+/// All questions. With `full` also those that take minutes.
 pub(crate) fn questions(command: &Path, tests: &Path, full: bool) -> Result<Vec<Question>, String> {
     let mut all = examples(command)?;
     all.extend(limits(tests)?);
@@ -124,7 +124,7 @@ fn examples(command: &Path) -> Result<Vec<Question>, String> {
     Ok(found)
 }
 
-/// Names of the files in a folder that end in `.ending`, in order, without the ending.
+/// Names without ending of the files in a folder that end in `.ending`, sorted.
 fn names(folder: &Path, ending: &str) -> Result<Vec<String>, String> {
     let entries = std::fs::read_dir(folder).map_err(|error| format!("{}: {error}", folder.display()))?;
     let mut names: Vec<String> = entries
@@ -135,7 +135,7 @@ fn names(folder: &Path, ending: &str) -> Result<Vec<String>, String> {
     Ok(names)
 }
 
-/// Speeds in rev/min and depths in mm of a small grid.
+/// Options of a small grid for a case: speeds in rev/min and depths in mm.
 fn ranges(case: &str) -> (&'static str, &'static str, &'static str) {
     if case.starts_with("insperger") {
         ("6000:14000:3", "0.1:4:10", "9000,1")
@@ -162,7 +162,7 @@ fn limits(tests: &Path) -> Result<Vec<Question>, String> {
     Ok(found)
 }
 
-/// Path of a committed recording, as the command is given it.
+/// Path of a committed recording, as an argument of the command.
 fn recording(name: &str) -> String {
     format!("tests/data/answers/recordings/{name}.csv")
 }
@@ -237,7 +237,7 @@ fn tables() -> Vec<Question> {
     vec![Question::new("tables", &lines), Question::new("tables", &[cells])]
 }
 
-/// Diagnoses of sweeps in which one effect is hidden, 10 effects × 4 seeds.
+/// Diagnoses of simulated sweeps with one hidden effect: 10 effects, 4 seeds each.
 fn seeded_diagnoses() -> Vec<Question> {
     let effects = [
         "--effect cubic-stiffness=-5e12 --effect cubic-stiffness.direction=x",

@@ -1,4 +1,4 @@
-//! The committed answers: one file for each group of questions.
+//! The committed reference: one file of questions and answers for each group.
 
 use std::fs;
 use std::path::Path;
@@ -6,7 +6,7 @@ use std::path::Path;
 use crate::json::Json;
 use crate::question::Question;
 
-/// Groups that only the full run asks: each takes minutes.
+/// Groups of questions that only the full run contains, because each takes minutes.
 pub(crate) const ONLY_FULL: [&str; 2] = ["long-diagnoses", "seeded-diagnoses"];
 
 /// Questions with their answers, in the order of the files.
@@ -48,7 +48,7 @@ pub(crate) fn read(folder: &Path, full: bool) -> Result<Vec<(Question, Json)>, S
     Ok(found)
 }
 
-/// Writes the answers of all groups that were asked; files of other groups stay.
+/// Writes the answers of all groups that have run. Files of other groups are kept.
 pub(crate) fn write(folder: &Path, answered: &[(Question, Json)]) -> Result<(), String> {
     let mut groups: Vec<&str> = answered
         .iter()

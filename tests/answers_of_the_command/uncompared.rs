@@ -2,7 +2,7 @@
 
 use crate::comparison::Rule;
 
-/// Keys that no rule compares.
+/// Keys of an answer that no rule compares.
 const NEVER: &[(&str, &str)] = &[
     ("why", "prose: the reason of an advice or a choice"),
     ("warnings", "prose"),
@@ -15,19 +15,19 @@ const NEVER: &[(&str, &str)] = &[
     ("out", "paths of files; the files themselves are compared"),
 ];
 
-/// Keys that are compared in the answers of all verbs but one: verb, key, reason.
+/// Keys that are not compared in the answers of one verb: verb, key, reason.
 const NEVER_OF_VERB: &[(&str, &str, &str)] = &[
     ("demo", "seconds", "time that the command took"),
     ("info", "uptime_s", "time since the simulated device was started"),
 ];
 
-/// Keys that only the rule of bits compares.
+/// Keys that only the comparison to the bit includes.
 const ONLY_BITS: &[(&str, &str)] = &[(
     "text_hash",
     "hash of all bytes of a table: another processor rounds differently; the reference holds rows and sums",
 )];
 
-/// Whether `rule` passes over the value of `key` in an answer of `verb`.
+/// True if `rule` does not compare the value of `key` in an answer of `verb`.
 pub(crate) fn is_uncompared(verb: &str, key: &str, rule: Rule) -> bool {
     let among = |list: &[(&str, &str)]| list.iter().any(|(name, _)| *name == key);
     let of_verb = NEVER_OF_VERB.iter().any(|(v, k, _)| *v == verb && *k == key);

@@ -5,9 +5,9 @@
 //! cargo bench -p quietcut-tests --bench costs -- --record     # writes them to tests/data/costs.json
 //! ```
 //!
-//! Each stage is a run of the command on one thread. Its cost is the smallest user time of several runs, divided by that of the
-//! loop, which is run between them: so a busy machine, or another clock rate, moves both. Ratios of other processors and compilers
-//! differ; the file names the compiler and the commit.
+//! Each stage is a run of the command on one thread. Its cost is the smallest user time of several runs, divided by the user
+//! time of the fixed loop, which runs between them: a busy machine or another clock rate changes both. Ratios of other
+//! processors and compilers differ. The file names the compiler and the commit.
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 
@@ -23,20 +23,20 @@ use serde::{Deserialize, Serialize};
 use crate::clock::{fixed_loop_s, user_time_of};
 use crate::stage::{Stage, stages};
 
-/// Runs of each stage: the smallest of five differs by less than 3 % between calls on a machine with other work on it.
+/// Number of runs of each stage. The smallest time of five runs varies by less than 3 % on a machine with other work.
 const ROUNDS: usize = 5;
 
-/// What is reported as slower. Three times the scatter above.
+/// Ratio of a cost to the recorded one above which the stage is reported as slower: about three times that variation.
 const SLOWER: f64 = 1.10;
 
-/// Costs as they were recorded.
+/// Recorded costs of all stages.
 #[derive(Serialize, Deserialize)]
 struct Costs {
     /// The commit that was measured.
     commit: String,
     /// The compiler that built the command.
     compiler: String,
-    /// Processor time of each stage over that of the loop.
+    /// Processor time of each stage, divided by that of the fixed loop.
     ratios: BTreeMap<String, f64>,
 }
 
@@ -67,7 +67,7 @@ fn file() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("data/costs.json")
 }
 
-/// The first line that a command prints.
+/// The first line of the standard output of a command.
 fn said(command: &mut Command) -> String {
     let output = command.output().unwrap();
     String::from_utf8_lossy(&output.stdout)

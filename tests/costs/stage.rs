@@ -5,7 +5,7 @@ use std::process::{Command, Stdio};
 
 use quietcut_tests::command::{binary, cases};
 
-/// One stage: commands that make its input, and the command that is timed. `CASES/` stands for the folder of the cases.
+/// A stage: commands that make its input, and the command whose time is measured. `CASES/` stands for the folder of the cases.
 pub(crate) struct Stage {
     pub(crate) name: &'static str,
     input: &'static [&'static str],
@@ -13,14 +13,14 @@ pub(crate) struct Stage {
 }
 
 impl Stage {
-    /// Makes the input.
+    /// Runs the commands that make the input of the stage.
     pub(crate) fn prepare(&self, folder: &Path) {
         for line in self.input {
             quietcut(folder, line);
         }
     }
 
-    /// Runs what is timed.
+    /// Runs the command whose time is measured.
     pub(crate) fn run(&self, folder: &Path) {
         quietcut(folder, self.timed);
     }

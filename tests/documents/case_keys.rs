@@ -1,4 +1,4 @@
-//! `host/CASE.md` lists every key that the parsers of cases and sidecars know, and no other.
+//! `host/CASE.md` lists exactly the keys that the parsers of cases and sidecars accept.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -13,10 +13,10 @@ use quietcut_tests::documents::{assert_generated, text};
 
 const PAGE: &str = "host/CASE.md";
 
-/// A key that no section has.
+/// A key that no section of a case accepts.
 const STRANGER: &str = "no_such_key";
 
-/// The rows of the table under a heading, by columns, without its two head rows.
+/// The rows of the table under a heading of the page, as cells, without the two head rows.
 fn rows(heading: &str) -> Vec<Vec<String>> {
     let page = text(PAGE);
     let rows: Vec<_> = page
@@ -34,7 +34,7 @@ fn rows(heading: &str) -> Vec<Vec<String>> {
     rows
 }
 
-/// The keys of a section as the page has them, those of standard deviations among them.
+/// The keys that the page lists for a section, including those of standard deviations.
 fn keys_on_page(heading: &str) -> BTreeSet<String> {
     rows(heading)
         .iter()
@@ -47,7 +47,7 @@ fn keys_on_page(heading: &str) -> BTreeSet<String> {
         .collect()
 }
 
-/// The words in grave accents that a message says instead of the stranger.
+/// The words in grave accents in the message about an unknown key, without the key itself.
 fn expected(message: &str) -> BTreeSet<String> {
     let (_, expected) = message
         .rsplit_once("expected ")
@@ -106,7 +106,7 @@ fn the_page_has_every_extension_with_an_example_that_reads() {
         };
         let read = case("").unwrap_or_else(|error| panic!("{}: {error}", spec.name));
         Effects::of_case(&read).unwrap_or_else(|error| panic!("{}: {error}", spec.name));
-        // An unknown key is answered with all that the effect has.
+        // The message about an unknown key lists all keys of the effect.
         let stranger = format!("{STRANGER} = 1");
         let message = case(&stranger).expect_err("an unknown key").to_string();
         for key in spec.keys() {

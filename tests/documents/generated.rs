@@ -1,4 +1,4 @@
-//! Parts of pages that are made from the code and from the results of campaigns.
+//! Parts of pages that are generated from the code and from the results of campaigns.
 
 use std::collections::BTreeSet;
 use std::fmt::Write;
@@ -16,7 +16,7 @@ fn first_sentence(source: &str) -> String {
         .take_while(|line| !line.is_empty())
         .collect();
     let head = head.join(" ");
-    // A sentence begins with a capital letter; "eq. 3.7" is none.
+    // A sentence ends before a capital letter, so that "eq. 3.7" does not end one.
     let end = head
         .match_indices(". ")
         .find(|(at, _)| head[at + 2..].starts_with(char::is_uppercase))
@@ -40,7 +40,7 @@ fn the_page_of_tests_lists_every_test() {
     assert_generated("tests/README.md", Some("tests"), &list);
 }
 
-/// A constant of a file `criteria.rs` whose comment has the word "unfounded" stands on the page.
+/// The page lists every constant of a file `criteria.rs` whose comment contains the word "unfounded".
 #[test]
 fn the_page_of_limitations_lists_every_unfounded_number() {
     let mut list = String::new();
@@ -66,7 +66,7 @@ fn the_page_of_limitations_lists_every_unfounded_number() {
             if comment.to_lowercase().contains("unfounded") && item.contains([':', '(']) {
                 let name = item.split([':', '(']).next().unwrap_or(item);
                 let mut comment = comment.split_whitespace().collect::<Vec<_>>().join(" ");
-                // A path beside the file is written from the root.
+                // A path relative to the file's folder is written relative to the root.
                 let spans: Vec<_> = comment.split('`').skip(1).step_by(2).map(str::to_owned).collect();
                 let folder = file.trim_end_matches("/criteria.rs");
                 for span in spans.iter().filter(|span| span.contains('/')) {

@@ -1,4 +1,4 @@
-//! The project's pages are true: their commands run, their links and paths lead somewhere.
+//! The project's pages are correct: their commands run, their links and paths exist.
 #![allow(clippy::expect_used, clippy::panic)]
 
 mod case_keys;
@@ -13,7 +13,7 @@ fn links_and_paths_lead_somewhere() {
     assert!(dead.is_empty(), "{dead:#?}");
 }
 
-/// The guide has a test of its own, which looks at what its commands print.
+/// The commands of all pages run, except those of the guide, which has its own test of the output.
 #[test]
 fn commands_run() {
     for page in PAGES.iter().filter(|page| **page != "host/GUIDE.md") {

@@ -1,6 +1,6 @@
-//! Help texts and short outputs of the command, as `tests/snapshots` holds them.
+//! Help texts and short outputs of the command equal the snapshots in `tests/snapshots`.
 //!
-//! A snapshot holds no path of a machine, no time and no version.
+//! A snapshot contains no path of a machine, no time and no version.
 
 use std::fmt::Write;
 
@@ -80,7 +80,7 @@ fn messages_of_bad_usage_are_as_reviewed() {
     assert_generated("tests/snapshots/bad-usage.txt", None, &text);
 }
 
-/// The shape of each answer with `--json`: its keys and the kinds of their values.
+/// Structure of each answer with `--json`: its keys and the types of their values.
 #[test]
 fn shapes_of_json_answers_are_as_reviewed() {
     let folder = folder();

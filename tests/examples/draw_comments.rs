@@ -1,11 +1,11 @@
-//! Draws comments of the code at random, for a reader who has not seen it and says what each means.
+//! Draws comments of the code at random. A reader who has not seen the code then says what each comment means.
 //!
 //! ```text
 //! cargo run --release -p quietcut-tests --example draw_comments -- SEED [COUNT]
 //! ```
 //!
-//! Prints one JSON object a line: the file, the line, the comment, and the line of code that follows it. Comments of fewer than six
-//! words are left out, and so are tests and the files that are going to be replaced.
+//! Prints one JSON object per line: the file, the line, the comment, and the line of code that follows it. Comments of fewer
+//! than six words, tests, and files that are going to be replaced are excluded.
 
 use std::error::Error;
 use std::path::{Path, PathBuf};
@@ -15,10 +15,10 @@ use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
 
-/// The fewest words of a comment that can be drawn.
+/// Smallest number of words of a comment that can be drawn.
 const FEWEST_WORDS: usize = 6;
 
-/// Comments that are drawn where no count is given.
+/// Number of comments that are drawn if no number is given.
 const COUNT: usize = 60;
 
 /// Files and folders that are going to be replaced: the fits of cuts, and the device's estimators.
@@ -37,7 +37,7 @@ const TO_BE_REPLACED: [&str; 12] = [
     "tachometer",
 ];
 
-/// A comment with where it stands.
+/// A comment with its file and line, and the code that follows it.
 #[derive(Serialize)]
 struct Comment {
     file: PathBuf,
@@ -72,7 +72,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// All source files below a folder that are neither tests nor going to be replaced.
+/// Collects all source files below a folder, except tests and files that are going to be replaced.
 fn collect(folder: &Path, files: &mut Vec<PathBuf>) -> Result<(), Box<dyn Error>> {
     for entry in std::fs::read_dir(folder)? {
         let path = entry?.path();
@@ -93,7 +93,7 @@ fn collect(folder: &Path, files: &mut Vec<PathBuf>) -> Result<(), Box<dyn Error>
     Ok(())
 }
 
-/// The text of a line that is a comment.
+/// The text of a line that is a comment; `None` for other lines.
 fn commented(line: &str) -> Option<&str> {
     let line = line.trim_start();
     ["///", "//!", "//"]

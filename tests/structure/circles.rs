@@ -1,4 +1,4 @@
-//! No file imports, through others, itself.
+//! No file imports itself through other files.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -6,10 +6,11 @@ use std::path::{Path, PathBuf};
 use crate::crates::all;
 use crate::graph::{Arrows, arrows};
 
-/// Circles that are still there: the crate, and a file of the circle. The test asks for the removal of an entry that is not needed.
+/// Circles that are allowed for now: the crate, and a file of the circle. The test requires the removal of entries that are not
+/// needed.
 const STILL_THERE: &[(&str, &str)] = &[];
 
-/// Groups of files that import each other in a loop.
+/// Groups of files that import each other in a circle.
 fn circles(arrows: &Arrows) -> Vec<Vec<PathBuf>> {
     let files: BTreeSet<&PathBuf> = arrows.keys().flat_map(|(from, to)| [from, to]).collect();
     let reach = |start: &PathBuf| {
@@ -78,7 +79,7 @@ fn no_files_import_each_other_in_a_circle() {
     );
 }
 
-/// A crate in a folder: files by name.
+/// Creates a crate in a temporary folder, from names and contents of files.
 fn small_crate(files: &[(&str, &str)]) -> (tempfile::TempDir, PathBuf) {
     let folder = tempfile::tempdir().unwrap();
     for (name, text) in files {

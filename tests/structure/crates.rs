@@ -1,9 +1,9 @@
-//! The crates of the workspace, and which may know which.
+//! The crates of the workspace, and the crates that each may use.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// Each crate with those of the workspace that it may use.
+/// Each crate with the crates of the workspace that it may use.
 const LAYERS: [(&str, &[&str]); 13] = [
     ("quietcut-core", &[]),
     ("quietcut-firmware", &["quietcut-core"]),
@@ -100,7 +100,7 @@ impl Member {
         }
     }
 
-    /// The root files of the library and of its programs.
+    /// The root files of the crate's library and programs.
     pub(crate) fn roots(&self) -> Vec<PathBuf> {
         let source = self.folder.join("src");
         ["lib.rs", "main.rs"]
@@ -110,7 +110,7 @@ impl Member {
             .collect()
     }
 
-    /// The crates of the workspace that it depends on, tests aside.
+    /// The crates of the workspace on which the crate depends, without dev-dependencies.
     fn uses(&self) -> Vec<String> {
         let Some(table) = self.manifest.get("dependencies").and_then(toml::Value::as_table) else {
             return Vec::new();
@@ -123,7 +123,8 @@ impl Member {
     }
 }
 
-/// The root of the workspace. Cargo names the folder of the tests also when they run: so a built test serves for another checkout.
+/// The root of the workspace. Cargo sets the folder of the tests at run time too, so that a built test can check another
+/// checkout.
 pub(crate) fn root() -> PathBuf {
     let tests = std::env::var("CARGO_MANIFEST_DIR").unwrap_or_else(|_| env!("CARGO_MANIFEST_DIR").to_owned());
     Path::new(&tests).join("..").canonicalize().unwrap()
@@ -157,7 +158,7 @@ fn crates_know_only_the_layers_below_them() {
     }
 }
 
-/// The model and the lobes are to run where there are no files, in a browser for one.
+/// The crates of model and stability must run without a file system, for example in a browser.
 #[test]
 fn model_and_stability_open_no_file() {
     for member in all() {

@@ -1,17 +1,17 @@
-//! Which file of a crate imports which, with the names.
+//! The imports between the files of a crate, with the imported names.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use crate::module::{self, Module};
 
-/// How many re-exports a name may pass through.
+/// Largest number of re-exports through which a name is followed.
 const DEPTH: usize = 12;
 
-/// Arrows between files: what the first takes from the second.
+/// Imports between files: for each pair of files, the names that the first uses from the second.
 pub(crate) type Arrows = BTreeMap<(PathBuf, PathBuf), BTreeSet<String>>;
 
-/// The arrows of the crate with this root file.
+/// The imports between the files of the crate with this root file.
 pub(crate) fn arrows(root: &Path) -> Arrows {
     let tree = module::read(root);
     let mut arrows = Arrows::new();
@@ -32,7 +32,7 @@ fn visit(tree: &Module, module: &Module, place: &mut Vec<String>, arrows: &mut A
         }
     };
     for import in &module.imported {
-        // What is only handed on is no use of it.
+        // A name that a file only re-exports does not count as an import of the file.
         let is_used = !import.is_reexport || module.words.contains(&import.name);
         if is_used {
             add(&import.path);
@@ -54,7 +54,7 @@ fn at<'a>(tree: &'a Module, place: &[String]) -> Option<&'a Module> {
         .try_fold(tree, |module, name| module.children.get(name))
 }
 
-/// The file that defines what a path in the module at `place` names, and the name; `None` where it is not of this crate.
+/// The file that defines the name of a path in the module at `place`, and the name; `None` if the name is not of this crate.
 fn resolve(tree: &Module, place: &[String], path: &[String], depth: usize) -> Option<(PathBuf, String)> {
     if depth > DEPTH {
         return None;
@@ -82,7 +82,7 @@ fn resolve(tree: &Module, place: &[String], path: &[String], depth: usize) -> Op
             return Some((module.file.clone(), name.clone()));
         }
         if let Some(import) = module.imported.iter().find(|import| &import.name == name) {
-            // A name is its own import where the path is that of another crate.
+            // An import that resolves to itself is from another crate.
             if import.path == rest {
                 return None;
             }

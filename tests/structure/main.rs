@@ -1,7 +1,7 @@
-//! The structure of the workspace: crates and rooms in layers, no import circle, files of one noun.
+//! The structure of the workspace: crates and rooms form layers, no import circle exists, and each file holds one noun.
 //!
-//! The import graph is read from the code itself: `use` declarations and paths of every file, without what is compiled for tests
-//! only. A name that a parent module re-exports leads to the file that defines it, so that a page that hands names on is no arrow.
+//! The import graph is read from the code: `use` declarations and paths of every file, without code that is compiled for tests
+//! only. A name that a parent module re-exports is attributed to the file that defines it.
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::expect_used)]
 

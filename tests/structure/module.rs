@@ -1,4 +1,4 @@
-//! The module tree of a crate, with what each module defines and imports.
+//! The module tree of a crate, with the definitions and imports of each module.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -8,20 +8,20 @@ use syn::{Attribute, Item, ItemMod, UseTree, Visibility};
 
 use crate::tokens::{paths_of, words_of};
 
-/// A module: a file, or a part of one in braces.
+/// A module: a file, or a part of a file in braces.
 #[derive(Debug, Default)]
 pub(crate) struct Module {
-    /// The file it stands in, relative to the root of the sources.
+    /// The file that contains the module, relative to the root of the sources.
     pub(crate) file: PathBuf,
-    /// Modules below it, by name.
+    /// The submodules, by name.
     pub(crate) children: BTreeMap<String, Module>,
-    /// Names that it defines itself.
+    /// Names that the module defines.
     pub(crate) defined: Vec<String>,
-    /// Names that it imports, and the path of each. A glob has the name `*`.
+    /// Names that the module imports, with their paths. A glob import has the name `*`.
     pub(crate) imported: Vec<Import>,
-    /// Paths of two or more segments in its code.
+    /// Paths of two or more segments in the code of the module.
     pub(crate) paths: Vec<Vec<String>>,
-    /// Every word of its code outside `use` declarations.
+    /// All identifiers in the code of the module outside of `use` declarations.
     pub(crate) words: Vec<String>,
 }
 
@@ -30,11 +30,11 @@ pub(crate) struct Module {
 pub(crate) struct Import {
     pub(crate) name: String,
     pub(crate) path: Vec<String>,
-    /// Whether others can take the name from here.
+    /// True if other modules can import the name from this one.
     pub(crate) is_reexport: bool,
 }
 
-/// Reads the tree of a crate from its root file.
+/// Reads the module tree of a crate from its root file.
 pub(crate) fn read(root: &Path) -> Module {
     let folder = root.parent().unwrap();
     let mut module = Module {
@@ -50,7 +50,7 @@ fn parsed(path: &Path) -> syn::File {
     syn::parse_file(&text).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
 }
 
-/// Whether an item is compiled for tests only.
+/// True if an item is compiled for tests only.
 fn is_of_tests(attributes: &[Attribute]) -> bool {
     attributes.iter().any(|attribute| {
         let text = attribute.to_token_stream().to_string().replace(' ', "");
@@ -58,7 +58,7 @@ fn is_of_tests(attributes: &[Attribute]) -> bool {
     })
 }
 
-/// `below` is the folder of the modules below this one, relative to `folder`.
+/// Adds items to a module. `below` is the folder of its submodules, relative to `folder`.
 fn fill(module: &mut Module, folder: &Path, below: &Path, items: &[Item]) {
     for item in items {
         match item {
@@ -103,7 +103,7 @@ fn child(item: &ItemMod, file: &Path, folder: &Path, below: &Path) -> Module {
 fn imports(tree: &UseTree, path: &mut Vec<String>, is_reexport: bool, found: &mut Vec<Import>) {
     let mut end = |name: String, last: Option<String>, path: &[String]| {
         let mut path = path.to_vec();
-        // `self` at the end of a list stands for the module before it.
+        // `self` at the end of a list names the module before it.
         path.extend(last.filter(|last| last != "self" || path.is_empty()));
         let name = if name == "self" {
             path.last().cloned().unwrap_or(name)

@@ -1,11 +1,11 @@
-//! The rooms of a crate stand in one order, and each uses only those before it.
+//! The rooms of a crate have an order. Each room uses only rooms before it.
 
 use std::path::Path;
 
 use crate::crates::all;
 use crate::graph::arrows;
 
-/// Crates with their rooms, the ground first. A room is a file or folder beside `lib.rs`.
+/// Crates with their rooms, lowest first. A room is a file or folder beside `lib.rs`.
 const ROOMS: &[(&str, &[&str])] = &[
     (
         "quietcut-diagnose",
@@ -61,7 +61,7 @@ const ROOMS: &[(&str, &[&str])] = &[
     ),
 ];
 
-/// The room of a file: its first folder, or its own name.
+/// The room of a file: its first folder, or its own name without a folder.
 fn room(file: &Path) -> &str {
     let first = file.iter().next().unwrap().to_str().unwrap();
     first.trim_end_matches(".rs")

@@ -1,16 +1,16 @@
-//! A file holds one noun: above 500 lines its head says why.
+//! A file holds one noun. A file above 500 lines gives the reason in its head.
 
 use std::path::{Path, PathBuf};
 
 use crate::crates::all;
 
-/// The longest file that needs no reason.
+/// Largest number of lines of a file that needs no reason.
 const LONGEST: usize = 500;
 
-/// Where a reason is looked for.
+/// Number of lines at the head of a file in which the reason is searched.
 const HEAD: usize = 15;
 
-/// All sources below a folder that are no tests.
+/// All source files below a folder, without tests.
 pub(crate) fn sources(folder: &Path) -> Vec<PathBuf> {
     let mut found = Vec::new();
     for entry in std::fs::read_dir(folder).unwrap() {
@@ -29,7 +29,7 @@ pub(crate) fn sources(folder: &Path) -> Vec<PathBuf> {
     found
 }
 
-/// Files that are still too long. The test asks for the removal of an entry that is not needed.
+/// Files that may exceed the limit for now. The test requires the removal of entries that are not needed.
 const STILL_LONG: &[&str] = &[];
 
 #[test]

@@ -2,10 +2,10 @@
 
 use proc_macro2::{TokenStream, TokenTree};
 
-/// Adds every path of two or more segments, `a::b::c`.
+/// Adds every path of two or more segments, such as `a::b::c`, to `found`.
 pub(crate) fn paths_of(tokens: TokenStream, found: &mut Vec<Vec<String>>) {
     let mut path: Vec<String> = Vec::new();
-    // Colons since the last word of the path.
+    // Number of colons since the last word of the path.
     let mut colons = 0;
     let mut end = |path: &mut Vec<String>| {
         if path.len() > 1 {
@@ -41,7 +41,7 @@ pub(crate) fn paths_of(tokens: TokenStream, found: &mut Vec<Vec<String>>) {
     }
 }
 
-/// Adds every word.
+/// Adds every identifier to `found`.
 pub(crate) fn words_of(tokens: TokenStream, found: &mut Vec<String>) {
     for token in tokens {
         match token {

@@ -1,4 +1,4 @@
-//! The device's log in words: defmt frames and the image whose symbols hold the format strings.
+//! Decoder of the device's log: defmt frames, and the image whose symbols contain the format strings.
 
 use std::collections::HashMap;
 use std::fmt::Write;
@@ -8,7 +8,7 @@ use std::path::Path;
 use defmt_parser::{Fragment, ParserMode, Type};
 use object::{Object, ObjectSymbol};
 
-/// Decodes frames to one line per entry; what cannot be decoded is shown as bytes.
+/// Decodes frames to one line per entry. Frames that cannot be decoded are shown as bytes.
 pub fn decode(image: &Path, frames: &[u8]) -> String {
     let strings = match Strings::read(image) {
         Ok(strings) => strings,
@@ -41,7 +41,7 @@ impl Strings {
             timestamp: None,
         };
         for symbol in elf.symbols() {
-            // Symbols of the log are named by an object with tag and text.
+            // The symbols of the log have JSON objects with tag and text as names.
             let Some(name) = symbol.name().ok().filter(|name| name.starts_with('{')) else {
                 continue;
             };
@@ -70,7 +70,7 @@ impl Strings {
         Some(format!("{time} {level} {}", self.arguments(format, &mut rest)?))
     }
 
-    /// A format string with its arguments, which are read in the order of their indices.
+    /// Inserts the arguments, read in the order of their indices, into a format string.
     fn arguments(&self, format: &str, rest: &mut Bytes<'_>) -> Option<String> {
         let fragments = defmt_parser::parse(format, ParserMode::ForwardsCompatible).ok()?;
         let mut parameters: Vec<_> = fragments
@@ -122,7 +122,7 @@ impl Strings {
             Type::Format => {
                 let (_, format) = self.by_index.get(&u16::from_le_bytes(rest.take()?))?;
                 if format.contains('|') {
-                    // An enum: its variants stand in one string; no image has one with more than 256.
+                    // An enum: the string contains all its variants, and one byte selects the variant.
                     let variant = usize::from(rest.take::<1>()?[0]);
                     self.arguments(format.split('|').nth(variant)?, rest)?
                 } else {

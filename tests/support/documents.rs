@@ -1,6 +1,6 @@
-//! The project's pages: their code blocks, links and paths, as a reader would follow them.
+//! The project's pages: their code blocks, links and paths.
 //!
-//! The first word after the fence is the language, the second says what a test does with the block:
+//! In the info string of a fence, the first word is the language. The second word says what a test does with the block:
 //!
 //! | fence | meaning |
 //! |---|---|
@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 
 use crate::command;
 
-/// The pages that the tests follow, from the root of the repository.
+/// The pages that the tests check, relative to the root of the repository.
 pub const PAGES: [&str; 11] = [
     "CHANGELOG.md",
     "CONTRIBUTING.md",
@@ -31,14 +31,14 @@ pub const PAGES: [&str; 11] = [
     "tests/README.md",
 ];
 
-/// A word behind `sh` and what it asks of a command.
+/// The word after `sh`, which says what a test requires of a command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Handling {
     /// The command runs to its end with exit status 0.
     Run,
     /// Packages, targets and scripts exist.
     Build,
-    /// Packages, targets and names of tests exist.
+    /// Packages, targets and names of tests must exist.
     Campaign,
     /// Verbs and options exist.
     Hardware,
@@ -49,9 +49,9 @@ pub enum Handling {
 pub enum Block {
     /// Commands, one a line, with continued lines joined and comments removed.
     Commands {
-        /// What a test does with them.
+        /// The check that a test does.
         handling: Handling,
-        /// The commands with the number of their line.
+        /// The commands with their line numbers.
         commands: Vec<(usize, String)>,
     },
     /// A file for the commands that follow.
@@ -134,10 +134,10 @@ fn commands(body: &[(usize, &str)]) -> Vec<(usize, String)> {
     commands
 }
 
-/// Runs the commands of a page in order in one temporary folder; returns the folder and what each of them printed.
+/// Runs the commands of a page in order in one temporary folder. Returns the folder and each command with its output.
 ///
 /// # Panics
-/// A command ends with another status than 0, or is none that a test can run.
+/// A command ends with an exit status other than 0, or no test can run it.
 pub fn run(page: &str) -> (tempfile::TempDir, Vec<(String, String)>) {
     let folder = command::folder();
     let cases = folder.path().join("tests/cases");
@@ -180,9 +180,9 @@ pub fn run(page: &str) -> (tempfile::TempDir, Vec<(String, String)>) {
     (folder, printed)
 }
 
-/// Checks a command that no test runs: returns what of it does not exist.
+/// Checks a command that no test runs. Returns its packages, targets, tests and options that do not exist.
 pub fn missing(handling: Handling, command: &str) -> Vec<String> {
-    // Assignments of environment variables stand before the command.
+    // Assignments of environment variables precede the command.
     let words: Vec<_> = command
         .split_whitespace()
         .skip_while(|word| word.contains('=') && !word.starts_with('-'))
@@ -192,7 +192,7 @@ pub fn missing(handling: Handling, command: &str) -> Vec<String> {
         ["cargo", "run", "--release", "--", verb, ref rest @ ..] => missing_of_verb(verb, rest),
         ["cargo", ref rest @ ..] => missing_of_cargo(handling, rest),
         [script, ..] if script.contains('/') && root().join(script).is_file() => Vec::new(),
-        // Programs of others: a debugger, an emulator, a terminal.
+        // Programs outside of the repository: a debugger, an emulator, a terminal.
         [program, ..] if handling == Handling::Hardware && !program.contains('/') => Vec::new(),
         _ => vec![command.into()],
     }
@@ -247,7 +247,7 @@ fn missing_of_cargo(handling: Handling, words: &[&str]) -> Vec<String> {
     missing
 }
 
-/// The files of the repository that satisfy a condition, without those that were built.
+/// The files of the repository that satisfy a condition, without built files.
 pub fn files(folder: &Path, wanted: &dyn Fn(&Path) -> bool) -> Vec<PathBuf> {
     let mut found = Vec::new();
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
@@ -275,7 +275,7 @@ fn sources(ending: &str) -> Vec<(PathBuf, String)> {
         .collect()
 }
 
-/// The relative links of a page that lead nowhere, and the paths in its code spans that do not exist.
+/// The relative links of a page without a target, and the paths in its code spans that do not exist.
 pub fn dead_ends(page: &str) -> Vec<String> {
     let text = text(page);
     let folder = root().join(page);
@@ -317,7 +317,7 @@ pub fn dead_ends(page: &str) -> Vec<String> {
     dead
 }
 
-/// The anchors that a renderer of Markdown makes of the headings of a file.
+/// The anchors that a Markdown renderer generates from the headings of a file.
 fn anchors(file: &Path) -> Vec<String> {
     let text = fs::read_to_string(file).unwrap_or_default();
     text.lines()
@@ -334,12 +334,12 @@ fn anchors(file: &Path) -> Vec<String> {
         .collect()
 }
 
-/// Compares a file, or a part of a page between `<!-- generated: NAME -->` and `<!-- end -->`, with what it should be.
+/// Compares a file, or the part of a page between `<!-- generated: NAME -->` and `<!-- end -->`, with its expected text.
 ///
-/// With `QUIETCUT_WRITE` set it is written instead: that is how pages and snapshots are made anew.
+/// If `QUIETCUT_WRITE` is set, it writes the expected text instead.
 ///
 /// # Panics
-/// They differ, or the page has no such part.
+/// The texts differ, or the page has no such part.
 pub fn assert_generated(page: &str, part: Option<&str>, wanted: &str) {
     let path = root().join(page);
     let old = fs::read_to_string(&path).unwrap_or_default();

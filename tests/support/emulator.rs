@@ -1,7 +1,7 @@
-//! QEMU with the emulated board: start, talk, feed, kill.
+//! QEMU with the emulated board: starts it, exchanges messages, feeds stimuli, ends it.
 //!
-//! The harness listens on sockets of its own and QEMU connects to them, so that no port number can
-//! be taken by another test. Every wait has a limit; the process ends with the [`Emulator`].
+//! The harness listens on its own sockets and QEMU connects to them, so that no other test can take a port number. Every wait
+//! has a limit. The process ends when the [`Emulator`] is dropped.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File, OpenOptions};
@@ -24,28 +24,28 @@ use crate::device_log;
 use crate::firmware_image;
 use crate::pty::Pty;
 
-/// The most that a read from the link or an answer of the virtual sensor may take: a loaded
-/// machine needs some tenths of a second at worst, a stored recording some seconds.
+/// Longest wait for a read from the link or an answer of the virtual sensor. On a busy machine a read takes some tenths of a
+/// second, a stored recording some seconds.
 pub const PATIENCE: Duration = Duration::from_secs(30);
 
-/// Options of QEMU: one instruction takes 2⁶ ns.
+/// Options with which QEMU counts instructions: one instruction takes 2⁶ ns.
 const COUNTING: [&str; 2] = ["-icount", "shift=6"];
 const SECONDS_PER_INSTRUCTION: f64 = 64e-9;
 
-/// Bytes of stimuli that are stored at once: the board takes a second or so for them, far below [`PATIENCE`].
+/// Bytes of stimuli that are stored at a time. The board processes them in about a second, far below [`PATIENCE`].
 const STORED_AT_ONCE: usize = 1024 * 1024;
 const _: () = assert!(STORED_AT_ONCE <= MEMORY_BYTES - STORE_OFFSET);
 
-/// Frames sent ahead of their answers: more make nothing faster, the emulator takes byte by byte.
+/// Number of frames that are sent before their answers arrive. More are not faster, because the emulator takes single bytes.
 const FRAMES_AHEAD: usize = 16;
 
-/// The lasting memory of an emulated board: a file that survives the emulator.
+/// The non-volatile memory of an emulated board: a file that outlives the emulator.
 pub struct Memory {
     directory: TempDir,
 }
 
 impl Memory {
-    /// The memory of a new board: the flash is erased.
+    /// The memory of a new board, with erased flash.
     pub fn erased() -> Self {
         let directory = TempDir::with_prefix("quietcut-memory-").expect("a temporary folder");
         let memory = Self { directory };
@@ -57,7 +57,7 @@ impl Memory {
         memory
     }
 
-    /// What stands in the flash.
+    /// The content of the flash.
     pub fn flash(&self) -> Vec<u8> {
         let mut flash = vec![0; FLASH_BYTES];
         self.open()
@@ -66,7 +66,7 @@ impl Memory {
         flash
     }
 
-    /// Writes over the flash behind the device's back.
+    /// Overwrites bytes of the flash without the device.
     pub fn damage(&self, offset: usize, bytes: &[u8]) {
         assert!(offset + bytes.len() <= FLASH_BYTES, "damage outside of the flash");
         self.open()
@@ -108,7 +108,7 @@ impl<'m> Emulator<'m> {
         Self::start_with(memory, &[])
     }
 
-    /// The same, with a clock that runs by instructions.
+    /// Starts the emulated board with a clock that counts instructions.
     pub fn start_counting(memory: &'m Memory) -> Self {
         Self::start_with(memory, &COUNTING)
     }
@@ -151,10 +151,10 @@ impl<'m> Emulator<'m> {
         emulator
     }
 
-    /// Waits for the first whole entry of the log, which the device writes when its ports are open.
+    /// Waits for the first complete log entry, which the device writes when its ports are open.
     fn wait_for_start(&mut self) {
         let began = Instant::now();
-        // A frame of the log ends with a zero; another zero may stand before it.
+        // A log frame ends with a zero byte; another zero may precede it.
         while !fs::read(self.log_path()).is_ok_and(|log| log.len() > 1 && log.ends_with(&[0])) {
             let end = self.end();
             assert!(
@@ -175,12 +175,12 @@ impl<'m> Emulator<'m> {
         SocketPort(self.link())
     }
 
-    /// The link as a serial device, for programs that open one; not to be used beside [`Self::link`].
+    /// The link as a serial device, for programs that open one. It must not be used together with [`Self::link`].
     pub fn serial_device(&self) -> Pty {
         Pty::to_socket(self.link())
     }
 
-    /// Sends stimuli over the board's serial port; returns once all of them went through the pipeline.
+    /// Sends stimuli over the board's serial port. Returns once the signal chain has processed all of them.
     pub fn feed(&mut self, stimuli: &[Stimulus]) {
         let mut frame = [0; MAX_FRAME_BYTES];
         for ahead in stimuli.chunks(FRAMES_AHEAD) {
@@ -192,7 +192,7 @@ impl<'m> Emulator<'m> {
         }
     }
 
-    /// Sends bytes where a stimulus should come; true where the board takes them for one.
+    /// Sends bytes in place of a stimulus. Returns true if the board accepts them.
     pub fn takes_frame(&mut self, bytes: &[u8]) -> bool {
         self.spindle.write_all(bytes).expect("the emulator takes bytes");
         let mut answer = [0];
@@ -215,7 +215,7 @@ impl<'m> Emulator<'m> {
         self.pass_store(&store);
     }
 
-    /// What the device has cost so far.
+    /// The cost of the device since its start.
     pub fn cost(&mut self) -> Cost {
         self.feed(&[Stimulus::AskCost]);
         let log = self.log();
@@ -228,7 +228,7 @@ impl<'m> Emulator<'m> {
         else {
             panic!("no cost in the log:\n{log}")
         };
-        // 25 MHz.
+        // The board's timer runs at 25 MHz.
         let seconds = |ticks: u64| ticks as f64 / 25e6;
         Cost {
             stack_bytes: stack_bytes as usize,
@@ -257,12 +257,12 @@ impl<'m> Emulator<'m> {
         }
     }
 
-    /// Cuts the power.
+    /// Ends the emulator, which cuts the power of the board.
     pub fn kill(mut self) {
         self.stop();
     }
 
-    /// What the device logged so far, one line per entry.
+    /// The log of the device so far, one line per entry.
     pub fn log(&self) -> String {
         let frames = fs::read(self.log_path()).unwrap_or_default();
         device_log::decode(&firmware_image::qemu_mps2(), &frames)
@@ -272,7 +272,7 @@ impl<'m> Emulator<'m> {
         self.directory.path().join("log")
     }
 
-    /// How the emulator ended, where it has.
+    /// How the emulator has ended, if it has.
     fn end(&mut self) -> String {
         match self.process.try_wait() {
             Ok(Some(status)) => format!("; the emulator has ended: {status}"),
@@ -281,7 +281,7 @@ impl<'m> Emulator<'m> {
     }
 
     fn stop(&mut self) {
-        // Fails where the process has ended by itself.
+        // Fails if the process has already ended.
         let _ = self.process.kill();
         let _ = self.process.wait();
     }
@@ -297,23 +297,23 @@ impl Drop for Emulator<'_> {
     }
 }
 
-/// What the device costs.
+/// Costs of the device.
 #[derive(Clone, Copy, Debug)]
 pub struct Cost {
-    /// The most bytes of stack in use, without the main function's.
+    /// Largest stack depth in bytes, without the frame of the main function.
     pub stack_bytes: usize,
-    /// Mean time of a block, s.
+    /// Mean processing time of a block, s.
     pub mean_s: f64,
-    /// The longest time of a block, s.
+    /// Longest processing time of a block, s.
     pub most_s: f64,
-    /// The longest time of a request, s, but for the flash.
+    /// Longest time of a request without flash operations, s.
     pub request_s: f64,
-    /// The longest time that a request kept the flash busy, s.
+    /// Longest time of the flash operations of one request, s.
     pub flash_s: f64,
 }
 
 impl Cost {
-    /// The time of a block in instructions, where the emulator counts them: mean and most.
+    /// Mean and largest number of instructions of a block, if the emulator counts them.
     pub fn instructions(&self) -> (f64, f64) {
         (
             self.mean_s / SECONDS_PER_INSTRUCTION,
@@ -321,7 +321,7 @@ impl Cost {
         )
     }
 
-    /// The longest request in instructions, where the emulator counts them, but for the flash.
+    /// Largest number of instructions of a request without flash operations, if the emulator counts them.
     pub fn request_instructions(&self) -> f64 {
         self.request_s / SECONDS_PER_INSTRUCTION
     }
@@ -344,7 +344,7 @@ impl Port for SocketPort {
     }
 
     fn receive(&mut self, into: &mut [u8], timeout: Duration) -> Result<usize, DeviceError> {
-        // A socket takes no time of zero for a limit.
+        // A socket refuses a timeout of zero.
         let timeout = timeout.max(Duration::from_micros(1));
         let received = self
             .0
@@ -366,7 +366,7 @@ impl SocketPort {
     }
 }
 
-/// Runs an image that prints lines `NAME COUNT` and ends, counting instructions.
+/// Runs the image that counts instructions until it ends. Returns the printed counts by name.
 pub fn count_instructions() -> BTreeMap<String, u64> {
     let mut command = qemu(&firmware_image::count_instructions());
     command
@@ -425,7 +425,7 @@ fn spawn(mut command: Command) -> Child {
     }
 }
 
-/// Waits until QEMU connects, or says why it does not.
+/// Waits until QEMU connects. Panics with the reason if it ends before.
 fn accept(listener: &UnixListener, process: &mut Child) -> UnixStream {
     listener.set_nonblocking(true).expect("a socket without waiting");
     let began = Instant::now();

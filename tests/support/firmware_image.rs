@@ -1,4 +1,4 @@
-//! The firmware images that `tests/build-firmware` makes.
+//! The firmware images that `tests/build-firmware` builds.
 
 use std::path::{Path, PathBuf};
 use std::{env, fs};
@@ -20,7 +20,7 @@ pub fn count_instructions() -> PathBuf {
     image("examples/count_instructions")
 }
 
-/// Bytes of stack of the real board.
+/// Size in bytes of the stack of the real board.
 pub fn nucleo_stack_bytes() -> usize {
     let bytes = fs::read(nucleo_g474re()).expect("the image");
     let elf = object::File::parse(&*bytes).expect("an ELF file");
@@ -31,7 +31,7 @@ pub fn nucleo_stack_bytes() -> usize {
     (address("_stack_start") - address("_stack_end")) as usize
 }
 
-/// Path of an image; fails the test where it is missing or older than a source it was built from.
+/// Path of an image. Fails the test if the image is missing or older than a source from which it was built.
 fn image(name: &str) -> PathBuf {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     let target = env::var_os("CARGO_TARGET_DIR").map_or_else(|| root.join("target"), PathBuf::from);
@@ -42,7 +42,7 @@ fn image(name: &str) -> PathBuf {
             image.display()
         );
     };
-    // Cargo lists beside the image what went into it.
+    // Beside the image, Cargo lists the sources from which it was built.
     let sources = fs::read_to_string(image.with_extension("d")).unwrap_or_default();
     for source in sources
         .split_once(':')

@@ -33,7 +33,7 @@ pub fn name_in_use(info: &Info) -> &str {
 }
 
 /// Uploads a table with the command to the serial port `port`, sets the working point, and reads both back.
-pub fn the_command_uploads_tells_and_asks(port: &str) {
+pub fn the_command_uploads_a_table_and_sets_and_reads_the_working_point(port: &str) {
     let folder = folder();
     let run = |arguments: &[&str]| quietcut(folder.path(), arguments).json();
     std::fs::write(folder.path().join("kuka.qct"), table("kuka", 1.5, 100)).expect("a file");
@@ -104,7 +104,7 @@ pub fn a_recording_gives_the_same_reports_there_as_here(port: &str) {
 
 /// Truncated, damaged, disordered, oversized frames and frames of another version are refused with their own errors and change neither
 /// table nor slots.
-pub fn bad_frames_are_named_and_harm_nothing(open: Open<'_>) {
+pub fn invalid_frames_have_their_own_errors_and_change_nothing(open: Open<'_>) {
     let (mut client, _) = connect(open);
     upload(&mut client, &table("kept", 1.5, 50));
     drop(client);

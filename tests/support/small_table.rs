@@ -5,7 +5,7 @@
 use quietcut_core::lobes::{Content, Interval, IntervalKind, Layer, Validity, encode, encoded_length};
 use quietcut_core::units::{Degrees, Hertz, Millimeters, Rpm};
 
-/// A table with a Hopf limit at this depth from 600 rev/min on, 10 rev/min apart: `speeds` gives its length.
+/// A table with a Hopf limit at this depth. It has `speeds` grid speeds from 600 rev/min on, 10 rev/min apart.
 pub fn table(name: &str, limit_mm: f32, speeds: u16) -> Vec<u8> {
     let hopf = [Interval {
         from: Millimeters(limit_mm),
@@ -14,7 +14,7 @@ pub fn table(name: &str, limit_mm: f32, speeds: u16) -> Vec<u8> {
         chatter: Hertz(17.4),
     }];
     let speeds: Vec<Rpm> = (0..speeds).map(|k| Rpm(600.0 + 10.0 * f32::from(k))).collect();
-    // Every third speed is quiet to a larger depth, so that there is something to advise.
+    // At every third speed the limit is larger, so that advice has a stable speed.
     let quiet = [Interval {
         from: Millimeters(4.0),
         ..hopf[0]

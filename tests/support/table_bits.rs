@@ -1,5 +1,5 @@
-//! Asks a large lobe table and boils the answers down to one number, as [`chain_bits`](super::chain_bits) does for the
-//! signal chain.
+//! Looks up a large lobe table and computes one digest of the answers, as [`chain_bits`](super::chain_bits) does for the signal
+//! chain.
 
 use quietcut_core::advice::{Action, Advice, advise};
 use quietcut_core::detector::{Judgement, Reason, Verdict};
@@ -11,10 +11,10 @@ use quietcut_core::working_point::{Tool, WorkingPoint};
 
 const SPEEDS: usize = 600;
 const LAYERS: usize = 6;
-/// What [`encode`] needs for 600 speeds, 6 layers and 3 intervals per column.
+/// Length in bytes of the table that [`encode`] writes for 600 speeds, 6 layers and 3 intervals per column.
 const LENGTH: usize = 96_252;
 
-/// Memory of the table and of what it is made from.
+/// Memory for the table and for the content from which it is encoded.
 pub struct Memory {
     intervals: [[Interval; 3]; SPEEDS],
     bytes: [u8; LENGTH],
@@ -35,10 +35,10 @@ impl Memory {
         }
     }
 
-    /// Makes a table of eight lobes from 600 to 2 397 rev/min, with a thin flip and a thin fold below each limit.
+    /// Encodes a table of eight lobes from 600 to 2 397 rev/min, with a narrow flip and a narrow fold interval below each limit.
     pub fn table(&mut self) -> Option<LobeTable<'_>> {
         for (index, column) in self.intervals.iter_mut().enumerate() {
-            // From 1 in a pocket to 0 in the middle of a lobe and back.
+            // Falls from 1 in a pocket to 0 in the middle of a lobe and rises again.
             let depth_of_lobe = ((index % 75) as f32 / 37.5 - 1.0).abs();
             let limit_mm = 0.5 + 1.5 * depth_of_lobe * depth_of_lobe;
             let interval = |from_mm: f32, to_mm, kind| Interval {
@@ -92,7 +92,7 @@ impl Default for Memory {
     }
 }
 
-/// A cut of this depth whose feed lies between two layers.
+/// Working point with this depth and a feed between those of two layers.
 pub fn cut(depth_mm: f32) -> WorkingPoint {
     WorkingPoint {
         axial_depth: Millimeters(depth_mm),
@@ -103,7 +103,7 @@ pub fn cut(depth_mm: f32) -> WorkingPoint {
     }
 }
 
-/// Advice for chatter in that cut.
+/// Advice for chatter at this speed and depth.
 pub fn advice(table: &LobeTable<'_>, rpm: f32, depth_mm: f32) -> Advice {
     let judgement = Judgement {
         verdict: Verdict::Hopf,
@@ -122,7 +122,7 @@ pub fn advice(table: &LobeTable<'_>, rpm: f32, depth_mm: f32) -> Advice {
     )
 }
 
-/// Answers and advice over the whole table.
+/// Digest of lookups and advice over the whole table.
 pub fn of_table(table: &LobeTable<'_>) -> u32 {
     let mut digest = 2_166_136_261_u32;
     let mut word = |word: u32| digest = (digest ^ word).wrapping_mul(16_777_619);

@@ -1,4 +1,4 @@
-//! Virtual cuts through the pipeline: what it says, and how large the vibration is when it says so.
+//! Virtual cuts through the signal chain: its verdicts, and the size of the vibration at each verdict.
 
 use std::fmt;
 
@@ -14,35 +14,35 @@ use crate::acceptance::{AcceptanceCut, settings};
 use crate::said::steps;
 use crate::shaking::Shaking;
 
-/// What came of a cut.
+/// Result of a virtual cut.
 #[derive(Clone, Debug)]
 pub struct Outcome {
     /// Spindle speed, rev/min.
     pub rpm: f64,
     /// Axial depth, mm.
     pub depth_mm: f64,
-    /// In full cut from and to, s.
+    /// Start and end of full engagement, s.
     pub full_cut_s: [f64; 2],
-    /// Every verdict that differs from the one before: when, what, with which chatter frequency in Hz.
+    /// Every verdict that differs from the preceding one: time in s, verdict, chatter frequency in Hz.
     pub verdicts: Vec<(f64, Verdict, Option<f32>)>,
-    /// Largest displacement in each turn of the spindle over that of the forced motion in full cut: end of the turn in
-    /// s, ratio.
+    /// Largest displacement in each revolution, divided by that of the forced vibration at full engagement: end of the
+    /// revolution in s, ratio.
     pub growth: Vec<(f64, f64)>,
 }
 
 impl Outcome {
-    /// The first chatter that was called: when, what, and the frequency in Hz that was told with it.
+    /// The first chatter verdict: time in s, verdict, and stated frequency in Hz.
     pub fn first_alarm(&self) -> Option<(f64, Verdict, f64)> {
         let alarm = self.verdicts.iter().find(|(_, verdict, _)| verdict.is_chatter());
         alarm.map(|(t, verdict, hz)| (*t, *verdict, hz.map_or(f64::NAN, f64::from)))
     }
 
-    /// When the vibration first was this many times the forced one, s.
+    /// Time in s at which the ratio of the vibration to the forced vibration first reaches `ratio`.
     pub fn grown_to(&self, ratio: f64) -> Option<f64> {
         self.growth.iter().find(|turn| turn.1 > ratio).map(|turn| turn.0)
     }
 
-    /// Size of the vibration over the forced one at `t`.
+    /// Ratio of the vibration to the forced vibration at time `t`.
     pub fn ratio_at(&self, t: f64) -> f64 {
         self.growth
             .iter()
@@ -80,7 +80,7 @@ impl fmt::Display for Outcome {
     }
 }
 
-/// A cut that is simulated once, to be sampled with many seeds of the sensors' noise.
+/// A cut that is simulated once and measured with many seeds of the sensor noise.
 pub struct SimulatedCut {
     settings: monitor::Settings,
     cut: VirtualCut,
@@ -92,7 +92,7 @@ pub struct SimulatedCut {
 }
 
 impl SimulatedCut {
-    /// One of the cuts that must be judged right.
+    /// Simulates one of the acceptance cuts.
     pub fn of(acceptance: &AcceptanceCut) -> Self {
         let AcceptanceCut {
             case,
@@ -104,7 +104,7 @@ impl SimulatedCut {
         Self::new(case, cut, *accelerometer, *tachometer, None)
     }
 
-    /// Cuts `case` in front of these sensors, with a force that shakes the structure beside that of the cut.
+    /// Simulates a cut of `case` with these sensors. A further force may excite the structure.
     pub fn new(
         case: &Case,
         cut: &VirtualCut,
@@ -137,13 +137,13 @@ impl SimulatedCut {
         }
     }
 
-    /// The same, where the signal chain is told of another accelerometer than the one that listens.
+    /// Configures the signal chain for another accelerometer than the simulated one.
     pub fn told(mut self, case: &Case, accelerometer: Accelerometer) -> Self {
         self.settings = settings(case, accelerometer, self.tachometer);
         self
     }
 
-    /// What the pipeline says of it. `seed` is that of the sensors' noise.
+    /// Runs the signal chain over the cut. `seed` is the seed of the sensor noise.
     pub fn judged(&self, seed: u64) -> Outcome {
         let Self { cut, tachometer, .. } = self;
         let sensed = SensedCut {
@@ -175,7 +175,7 @@ impl SimulatedCut {
     }
 }
 
-/// Size of the forced motion in full cut, m.
+/// Amplitude of the forced vibration at full engagement, m.
 fn forced_m(case: &Case, cut: &VirtualCut, [from, to]: [f64; 2]) -> f64 {
     let mut forced = cut.model(case).expect("a model");
     if let Some(cutting) = &mut forced.cutting {
@@ -188,24 +188,24 @@ fn forced_m(case: &Case, cut: &VirtualCut, [from, to]: [f64; 2]) -> f64 {
     let settled = sizes
         .turns
         .iter()
-        // In the second half of the full cut the entry has rung down.
+        // In the second half of full engagement the transient of the entry has decayed.
         .filter(|(t, _)| (0.5 * (from + to)..to).contains(t));
     settled.fold(0.0, |largest, turn| largest.max(turn.1))
 }
 
-/// Half the largest peak-to-peak displacement of any axis, turn by turn.
+/// Half the largest peak-to-peak displacement of any axis, for each revolution.
 struct Sizes {
     every_s: f64,
     workspace: Workspace,
     taken: usize,
     low: [f64; 3],
     high: [f64; 3],
-    /// End of the turn in s, size in m.
+    /// End of each revolution in s, size in m.
     turns: Vec<(f64, f64)>,
 }
 
 impl Sizes {
-    /// Displacements taken per turn.
+    /// Number of displacement samples per revolution.
     const PER_TURN: usize = 64;
 
     fn new(model: &Model, rpm: f64) -> Self {

@@ -47,7 +47,7 @@ impl Clock for TestClock {
     }
 }
 
-/// A device with its line and its host.
+/// A device that is connected to a host by a line.
 pub(crate) struct Bench<'a> {
     pub(crate) device: Device<'a, Flash, TestClock>,
     pub(crate) clock: TestClock,
@@ -67,7 +67,7 @@ impl<'a> Bench<'a> {
         }
     }
 
-    /// With a session begun.
+    /// A device whose session has begun.
     pub(crate) fn open(state: &'a mut State, flash: Flash) -> Self {
         let mut bench = Self::new(state, flash);
         assert!(matches!(bench.ask(Request::Hello), Reply::Info(_)));
@@ -77,10 +77,10 @@ impl<'a> Bench<'a> {
     pub(crate) fn exchange(&mut self, bytes: &[u8]) -> Vec<Response> {
         self.wire.to_device.extend(bytes);
         while self.device.poll(&mut self.wire).unwrap() {}
-        self.host.hear(&mut self.wire)
+        self.host.receive(&mut self.wire)
     }
 
-    /// All that comes in answer to a request; the reply must be the last.
+    /// All responses to a request. The reply must be the last of them.
     pub(crate) fn ask_all(&mut self, request: &Request) -> (Vec<Response>, Reply) {
         let (sequence, frame) = self.host.frame(request);
         let mut responses = self.exchange(&frame);
@@ -110,7 +110,7 @@ impl<'a> Bench<'a> {
         }
     }
 
-    /// Sends what is left of a table, up to `until` bytes of it.
+    /// Sends the missing part of a table, up to the offset `until`.
     pub(crate) fn send(&mut self, file: &[u8], until: usize) -> Upload {
         let Reply::Upload(mut upload) = self.ask(Request::UploadBegin(Header::read(file).unwrap())) else {
             panic!("an upload")

@@ -1,7 +1,7 @@
-//! Blocks from the host in the place of the sensor, and what is told of them.
+//! Blocks from the host in place of the sensor, and the reports about them.
 
 use crate::bench::*;
-use crate::heard::*;
+use crate::outputs::*;
 use crate::support::{blocks, table};
 use quietcut_core::lobes::LobeTable;
 use quietcut_core::monitor::State;
@@ -10,20 +10,20 @@ use quietcut_core::tachometer::Edge;
 use quietcut_core::units::Nanoseconds;
 
 #[test]
-fn fed_blocks_say_the_same_to_the_bit() {
+fn fed_blocks_give_equal_outputs_to_the_bit() {
     let file = table("acetal", 1.7, 181);
     let blocks = blocks(400);
-    let expected = straight(&blocks, Some(&LobeTable::parse(&file).unwrap()));
+    let expected = outputs_without_device(&blocks, Some(&LobeTable::parse(&file).unwrap()));
 
     assert!(!expected.spectra.is_empty() && !expected.strobes.is_empty());
-    // On a line that takes all, and on one that takes a few bytes at a time.
+    // One line accepts all bytes, the other a few bytes at a time.
     for takes in [None, Some(7)] {
         let mut state = State::default();
         let mut bench = Bench::open(&mut state, flash());
         bench.upload(&file);
         bench.ask(Request::SetWorkingPoint(Some(POINT)));
         bench.ask(Request::Subscribe(ALL));
-        let mut heard = Heard::default();
+        let mut outputs = Outputs::default();
         for (block, edges) in &blocks {
             let (sequence, frame) = bench.host.frame(&feed(block, edges));
             let mut responses = Vec::new();
@@ -38,19 +38,19 @@ fn fed_blocks_say_the_same_to_the_bit() {
                 reply: Reply::Done,
             };
             assert_eq!(responses.pop(), Some(done));
-            heard.take(responses);
+            outputs.take(responses);
             bench.wire.takes = None;
         }
-        assert_eq!(heard.reports, expected.reports);
-        assert_eq!(heard.strobes, expected.strobes);
-        assert_eq!(heard.spectra, expected.spectra);
+        assert_eq!(outputs.reports, expected.reports);
+        assert_eq!(outputs.strobes, expected.strobes);
+        assert_eq!(outputs.spectra, expected.spectra);
         let status = bench.status();
         assert_eq!((status.blocks, status.dropped, status.is_fed), (400, 0, true));
-        // No frame of the device was lost either.
+        // No frame of the device is missing.
         assert!(
             bench
                 .host
-                .heard
+                .sequences
                 .windows(2)
                 .all(|pair| pair[1] == pair[0].wrapping_add(1))
         );
@@ -65,11 +65,11 @@ fn edges_are_held_for_the_next_block() {
         reports: Reports::All,
         ..ALL
     }));
-    // One edge per 20 blocks: told in `FeedEdges` or in `Feed`, the speed is the same.
+    // One edge per 20 blocks. The speed is the same for edges in `FeedEdges` and in `Feed`.
     let blocks = blocks(200);
     let run = |bench: &mut Bench, before: bool| {
         assert_eq!(bench.ask(Request::Reset), Reply::Done);
-        let mut heard = Heard::default();
+        let mut outputs = Outputs::default();
         for (block, edges) in &blocks {
             if before {
                 assert_eq!(
@@ -78,9 +78,9 @@ fn edges_are_held_for_the_next_block() {
                 );
             }
             let (others, _) = bench.ask_all(&feed(block, if before { &[] } else { edges }));
-            heard.take(others);
+            outputs.take(others);
         }
-        heard
+        outputs
     };
     let (with, before) = (run(&mut bench, false), run(&mut bench, true));
     assert!(
@@ -123,7 +123,7 @@ fn the_host_takes_the_place_of_the_sensor_and_gives_it_back() {
     take(&mut bench);
     let status = bench.status();
     assert_eq!((status.blocks, status.is_fed), (9, false));
-    // A host that goes away while it feeds: the next one finds the sensor.
+    // A host disconnects while it feeds. For the next host, the device uses the sensor again.
     bench.ask(feed(&blocks[0].0, &blocks[0].1));
     assert!(matches!(bench.ask(Request::Hello), Reply::Info(_)));
     take(&mut bench);
@@ -135,7 +135,7 @@ fn the_host_takes_the_place_of_the_sensor_and_gives_it_back() {
 }
 
 #[test]
-fn changes_are_told_once() {
+fn changes_are_reported_once() {
     let mut state = State::default();
     let mut bench = Bench::open(&mut state, flash());
     bench.ask(Request::Subscribe(Subscription {
@@ -147,12 +147,12 @@ fn changes_are_told_once() {
         bench.device.take(block, edges);
     }
     bench.device.poll(&mut bench.wire).unwrap();
-    let mut heard = Heard::default();
-    heard.take(bench.host.hear(&mut bench.wire));
-    let mut expected = straight(&blocks, None).reports;
-    // Without a working point; what is told apart is only verdict, reason and advice.
+    let mut outputs = Outputs::default();
+    outputs.take(bench.host.receive(&mut bench.wire));
+    let mut expected = outputs_without_device(&blocks, None).reports;
+    // Without a working point, a change of verdict, reason or advice is a change of verdict or reason.
     expected.dedup_by_key(|report| (report.judgement.verdict, report.judgement.reason));
-    let said: Vec<_> = heard
+    let said: Vec<_> = outputs
         .reports
         .iter()
         .map(|report| (report.sequence, report.judgement.verdict))

@@ -1,4 +1,4 @@
-//! Frames that are wrong.
+//! Invalid frames.
 
 use crate::bench::*;
 use crate::support::{frame, refused_frame, table};
@@ -7,7 +7,7 @@ use quietcut_core::monitor::State;
 use quietcut_core::protocol::{FrameError, Request, VERSION};
 
 #[test]
-fn frames_that_are_wrong_are_told_apart_and_counted() {
+fn invalid_frames_have_their_own_errors_and_are_counted() {
     let file = table("good", 1.7, 181);
     let mut state = State::default();
     let mut bench = Bench::open(&mut state, flash());
@@ -21,7 +21,7 @@ fn frames_that_are_wrong_are_told_apart_and_counted() {
     };
     let good = frame(&Request::SetWorkingPoint(Some(POINT)), next);
     let mut flipped = good.clone();
-    // A byte of the depth: no overhead byte of COBS.
+    // Position of a byte of the depth, which is no overhead byte of COBS.
     let at = flipped.iter().rposition(|&byte| byte == 0x40).unwrap();
     flipped[at] ^= 0x20;
 
@@ -72,7 +72,7 @@ fn frames_that_are_wrong_are_told_apart_and_counted() {
         }
     );
 
-    // After all that the right frame is done, and the table is there.
+    // After all invalid frames the device accepts a valid one, and the table is unchanged.
     let status = bench.status();
     let errors = status.frame_errors;
     assert_eq!(

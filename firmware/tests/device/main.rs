@@ -1,10 +1,10 @@
-//! The device behind a line: requests, retries, uploads, feeding, slow and noisy lines.
+//! The device at a line: requests, repeated requests, uploads, fed blocks, slow and noisy lines.
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 mod bench;
 mod feeding;
 mod frames;
-mod heard;
+mod outputs;
 mod requests;
 mod slow_line;
 #[path = "../support/mod.rs"]

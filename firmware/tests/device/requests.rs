@@ -1,7 +1,7 @@
-//! Requests and replies: hello, settings, requests that come twice.
+//! Requests and replies: hello, settings, repeated requests.
 
 use crate::bench::*;
-use crate::heard::*;
+use crate::outputs::*;
 use crate::support::{SETTINGS, blocks, table};
 use quietcut_core::acceleration::Sensor;
 use quietcut_core::monitor::{Settings, SettingsError, State};
@@ -14,7 +14,7 @@ fn a_session_begins_with_hello() {
     let mut state = State::default();
     let mut bench = Bench::new(&mut state, flash());
     assert_eq!(bench.ask(Request::Status), Reply::Refused(Refusal::HelloFirst));
-    // Under any number, and the next ones follow it.
+    // The first request may have any sequence number; the next requests continue it.
     bench.host.next = u16::MAX;
     let Reply::Info(info) = bench.ask(Request::Hello) else {
         panic!("an info")
@@ -31,8 +31,8 @@ fn a_session_begins_with_hello() {
         (status.uptime, status.frames, status.frame_errors.total()),
         (Nanoseconds(5_000_000_000), 3, 0)
     );
-    // The device's own count has no gaps.
-    assert_eq!(bench.host.heard, [0, 1, 2]);
+    // The sequence numbers of the device have no gap.
+    assert_eq!(bench.host.sequences, [0, 1, 2]);
 }
 
 #[test]
@@ -97,7 +97,7 @@ fn a_request_that_comes_twice_is_done_once() {
     let mut bench = Bench::open(&mut state, flash());
     for (block, edges) in &blocks(3) {
         let (sequence, frame) = bench.host.frame(&feed(block, edges));
-        // As if the replies to the first two were lost.
+        // The host repeats its request twice, as if the first two replies were lost.
         let replies: Vec<Response> = (0..3).flat_map(|_| bench.exchange(&frame)).collect();
         let done = Response::Reply {
             request: sequence,
@@ -123,7 +123,7 @@ fn a_request_that_comes_twice_is_done_once() {
             ..
         }]
     ));
-    // Hello is done again: its reply is that of now.
+    // Hello is performed again, so that its reply has the present content.
     let (_, hello) = bench.host.frame(&Request::Hello);
     for _ in 0..2 {
         let [

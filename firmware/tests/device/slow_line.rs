@@ -1,7 +1,7 @@
-//! Lines that are slow or stand still.
+//! Lines that are slow or accept no bytes.
 
 use crate::bench::*;
-use crate::heard::*;
+use crate::outputs::*;
 use crate::support::blocks;
 use proptest::prelude::*;
 use quietcut_core::checksum::crc32;
@@ -14,14 +14,14 @@ fn on_a_slow_line_reports_are_dropped_and_counted_but_replies_come() {
     let mut bench = Bench::open(&mut state, flash());
     bench.ask(Request::Subscribe(ALL));
     let blocks = blocks(300);
-    let mut heard = Heard::default();
+    let mut outputs = Outputs::default();
     for (index, (block, edges)) in blocks.iter().enumerate() {
         bench.wire.takes = Some(5);
         bench.device.take(block, edges);
         if index == 150 {
             let (sequence, frame) = bench.host.frame(&Request::Status);
             let mut responses = bench.exchange(&frame);
-            // Behind what was on its way already, but before all that the sensor goes on to say.
+            // The reply follows the messages that are already on the way, and precedes all later messages of the sensor.
             for _ in 0..3000 {
                 bench.wire.takes = Some(5);
                 responses.extend(bench.exchange(&[]));
@@ -29,21 +29,21 @@ fn on_a_slow_line_reports_are_dropped_and_counted_but_replies_come() {
             let is_reply = |response: &Response| matches!(response, Response::Reply { request, .. } if *request == sequence);
             assert_eq!(responses.iter().filter(|response| is_reply(response)).count(), 1);
             responses.retain(|response| !is_reply(response));
-            heard.take(responses);
+            outputs.take(responses);
         }
-        heard.take(bench.exchange(&[]));
+        outputs.take(bench.exchange(&[]));
     }
     bench.wire.takes = None;
-    // A spectrum that is on its way goes on in pieces.
+    // The rest of a spectrum is sent in chunks.
     for _ in 0..8 {
-        heard.take(bench.exchange(&[]));
+        outputs.take(bench.exchange(&[]));
     }
     let status = bench.status();
     assert!(status.dropped > 100, "{}", status.dropped);
-    assert!(!heard.reports.is_empty() && heard.reports.len() < 300);
-    // What came is what the pipeline said.
-    let expected = straight(&blocks, None).reports;
-    for report in heard.reports {
+    assert!(!outputs.reports.is_empty() && outputs.reports.len() < 300);
+    // The reports that arrive are those of the signal chain.
+    let expected = outputs_without_device(&blocks, None).reports;
+    for report in outputs.reports {
         let due = expected[report.sequence as usize];
         assert_eq!(
             (report.time, report.speed, report.judgement),
@@ -57,7 +57,7 @@ fn a_line_that_stands_still_loses_no_request() {
     let mut state = State::default();
     let mut bench = Bench::open(&mut state, flash());
     bench.wire.takes = Some(0);
-    // A host that does not wait for replies, on a line that does not take any.
+    // The host does not wait for replies, and the line does not accept them.
     let sent: Vec<u16> = (0..50)
         .map(|_| {
             let (sequence, frame) = bench.host.frame(&Request::Info);
@@ -81,7 +81,7 @@ fn a_line_that_stands_still_loses_no_request() {
 
 proptest! {
     #[test]
-    fn no_bytes_bring_it_down(
+    fn no_bytes_stop_the_device(
         noise in prop::collection::vec(any::<u8>(), 0..2000),
         bodies in prop::collection::vec(prop::collection::vec(any::<u8>(), 1..60), 0..20),
     ) {
@@ -89,7 +89,7 @@ proptest! {
         let mut bench = Bench::open(&mut state, flash());
         bench.exchange(&noise);
         bench.exchange(&[0]);
-        // Frames that are right but for their content, in order.
+        // Valid frames with random content, with the right sequence numbers.
         for body in bodies {
             let sequence = bench.host.next.to_le_bytes();
             let content = [[VERSION, sequence[0], sequence[1]].as_slice(), &body].concat();

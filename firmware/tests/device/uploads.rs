@@ -1,4 +1,4 @@
-//! Tables to the device: whole, interrupted, wrong.
+//! Uploads of tables: complete, interrupted, invalid.
 
 use crate::bench::*;
 use crate::support::table;
@@ -7,7 +7,7 @@ use quietcut_core::monitor::State;
 use quietcut_core::protocol::{Refusal, Reply, Request, Slot, Upload};
 
 #[test]
-fn a_table_is_uploaded_and_outlives_a_restart() {
+fn a_table_is_uploaded_and_kept_over_a_restart() {
     let file = table("acetal", 1.7, 181);
     let mut state = State::default();
     let mut bench = Bench::open(&mut state, flash());
@@ -36,7 +36,7 @@ fn a_table_is_uploaded_and_outlives_a_restart() {
 }
 
 #[test]
-fn an_upload_goes_on_after_a_restart() {
+fn an_upload_continues_after_a_restart() {
     let file = table("acetal", 1.7, 600);
     let mut state = State::default();
     let mut bench = Bench::open(&mut state, flash());
@@ -46,7 +46,7 @@ fn an_upload_goes_on_after_a_restart() {
     let mut state = State::default();
     let mut bench = Bench::open(&mut state, flash);
     let header = Header::read(&file).unwrap();
-    // Two pages of 2 048 bytes were full.
+    // Two pages of 2 048 bytes were complete.
     assert_eq!(
         bench.ask(Request::UploadQuery),
         Reply::Upload(Upload {
@@ -65,7 +65,7 @@ fn an_upload_goes_on_after_a_restart() {
 }
 
 #[test]
-fn what_is_no_table_leaves_the_last_good_one() {
+fn an_invalid_table_leaves_the_last_valid_one_in_use() {
     let file = table("good", 1.7, 181);
     let mut state = State::default();
     let mut bench = Bench::open(&mut state, flash());

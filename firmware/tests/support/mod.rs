@@ -1,4 +1,4 @@
-//! Tables to store, blocks to feed, and a line of bytes between a host and a device.
+//! Tables to upload, blocks to feed, and a line between a host and a device.
 #![allow(dead_code)] // Each test file uses its part of it.
 
 #[path = "../../../tests/support/small_table.rs"]
@@ -18,12 +18,12 @@ use quietcut_core::working_point::Tool;
 
 pub(crate) use small_table::table;
 
-/// The bytes of a table but for its generation and CRC.
+/// The bytes of a table after its header.
 pub(crate) fn content_of(table: &LobeTable) -> Vec<u8> {
     table.bytes()[32..].to_vec()
 }
 
-/// Two teeth, one mark per turn.
+/// Settings of a tool with two teeth and one mark per revolution.
 pub(crate) const SETTINGS: Settings = Settings {
     sensor: Sensor::IIS3DWB_16G,
     tool: Tool { teeth: 2 },
@@ -35,7 +35,7 @@ pub(crate) const SETTINGS: Settings = Settings {
     limits: None,
 };
 
-/// Blocks of a signal with some tones in it, and the edges of a spindle at 1 200 rev/min that come within each.
+/// Blocks of a signal with some tones, and the tachometer edges within each block, at 1 200 rev/min.
 pub(crate) fn blocks(count: u32) -> Vec<(Block, Vec<Edge>)> {
     const SAMPLE_NS: u64 = 37_500;
     const TURN_NS: u64 = 50_000_000;
@@ -69,12 +69,12 @@ pub(crate) fn blocks(count: u32) -> Vec<(Block, Vec<Edge>)> {
         .collect()
 }
 
-/// The line as the device sees it. It takes a given number of bytes, then no more until it is given more.
+/// The line at the device's end. It accepts a given number of bytes, then none until the number is raised.
 #[derive(Default)]
 pub(crate) struct Wire {
     pub(crate) to_device: VecDeque<u8>,
     pub(crate) from_device: Vec<u8>,
-    /// Bytes that the line still takes; `None` for any number.
+    /// Number of bytes that the line still accepts; `None` for any number.
     pub(crate) takes: Option<usize>,
 }
 
@@ -119,13 +119,13 @@ impl WriteReady for Wire {
     }
 }
 
-/// The host's end: frames of requests, frames back.
+/// The host's end of the line: encodes requests, decodes responses.
 #[derive(Default)]
 pub(crate) struct Host {
     pub(crate) next: u16,
     decoder: Decoder,
-    /// Sequence numbers of the device's frames.
-    pub(crate) heard: Vec<u16>,
+    /// Sequence numbers of the frames from the device.
+    pub(crate) sequences: Vec<u16>,
 }
 
 impl Host {
@@ -136,13 +136,13 @@ impl Host {
         (sequence, frame(request, sequence))
     }
 
-    /// The messages in what came from the device.
-    pub(crate) fn hear(&mut self, wire: &mut Wire) -> Vec<Response> {
+    /// Decodes the bytes that the device has sent.
+    pub(crate) fn receive(&mut self, wire: &mut Wire) -> Vec<Response> {
         let mut responses = Vec::new();
         for byte in wire.from_device.drain(..) {
             if let Some(result) = self.decoder.push(byte) {
                 let frame = result.unwrap();
-                self.heard.push(frame.sequence);
+                self.sequences.push(frame.sequence);
                 responses.push(frame.message().unwrap());
             }
         }
@@ -150,13 +150,13 @@ impl Host {
     }
 }
 
-/// The frame of a request under any sequence number.
+/// The frame of a request with this sequence number.
 pub(crate) fn frame(request: &Request, sequence: u16) -> Vec<u8> {
     let mut buffer = [0; MAX_FRAME];
     protocol::encode(request, sequence, &mut buffer).unwrap().to_vec()
 }
 
-/// A frame error that the device told of.
+/// The first frame error that the device has reported.
 pub(crate) fn refused_frame(responses: &[Response]) -> Option<FrameError> {
     responses.iter().find_map(|response| match response {
         Response::FrameRefused(error) => Some(*error),

@@ -1,4 +1,4 @@
-//! Damaged frames and streams with noise in them.
+//! Damaged frames, and streams with noise.
 
 use heapless::Vec as Heapless;
 use proptest::prelude::*;
@@ -15,7 +15,7 @@ use rand_chacha::ChaCha8Rng;
 use crate::samples::*;
 
 #[test]
-fn what_does_not_fit_is_refused() {
+fn a_body_too_large_for_a_frame_is_refused() {
     #[derive(Debug, PartialEq, serde::Serialize, serde::Deserialize)]
     struct Large(Heapless<u8, 600>);
     impl Message for Large {
@@ -23,7 +23,7 @@ fn what_does_not_fit_is_refused() {
     }
     let large = |byte, length| Large(core::iter::repeat_n(byte, length).collect());
     let mut buffer = [0; MAX_FRAME];
-    // Two bytes of length before the content.
+    // Two bytes of length precede the content.
     assert_eq!(encode(&large(7, MAX_BODY - 1), 0, &mut buffer), Err(TooLarge));
     let largest = large(7, MAX_BODY - 2);
     let frame = encode(&largest, 0, &mut buffer).unwrap().to_vec();
@@ -47,7 +47,7 @@ fn each_damage_has_its_own_error() {
     };
     let raw = |body: &[u8]| [&[VERSION, 0, 0], body].concat();
 
-    // Cut off in the middle: the zero comes too soon.
+    // A frame that is cut off in the middle: the zero comes too early.
     assert_eq!(error(&[&frame[..20], &[0]].concat()), FrameError::Cobs);
     assert_eq!(error(&[1, 2, 0]), FrameError::Cobs);
     assert_eq!(error(&[4, 1, 2, 3, 0]), FrameError::TooShort { found: 3 });
@@ -86,14 +86,14 @@ fn each_damage_has_its_own_error() {
         error(&forged(&raw(&[0, 1, 2]))),
         FrameError::TrailingBytes { count: 2 }
     );
-    // A chunk that claims more bytes than one can have.
+    // A chunk whose stated length exceeds the largest possible one.
     let chunk = [8, 0, (MAX_CHUNK + 1) as u8 | 0x80, 2];
     assert_eq!(
         error(&forged(&raw(&[chunk.as_slice(), &[0; 300]].concat()))),
         FrameError::Body { variant: 8 }
     );
 
-    // Whatever happened, the next frame is read.
+    // After any noise, the next frame is decoded.
     for noise in [
         &frame[..20],
         &[1, 2],
@@ -154,7 +154,7 @@ fn no_flipped_bit_becomes_a_message() {
 }
 
 #[test]
-fn sequence_numbers_go_round() {
+fn sequence_numbers_wrap() {
     let mut sent = Sequence::default();
     assert_eq!((sent.take(), sent.take()), (0, 1));
     let mut sent = Sequence::from(u16::MAX);
@@ -197,7 +197,7 @@ fn a_stream_with_every_kind_of_damage() {
                 .push(byte)
                 .map(|result| result.and_then(|frame| frame.message::<Request>()))
             {
-                // Nothing but what was sent may come out.
+                // The decoder may return only messages that were sent.
                 Some(Ok(message)) => {
                     assert!(requests().contains(&message));
                     good += 1;
@@ -212,10 +212,10 @@ fn a_stream_with_every_kind_of_damage() {
 
 proptest! {
     #[test]
-    fn no_bytes_make_it_panic_and_the_frame_behind_them_is_read(
+    fn no_bytes_make_the_decoder_panic_and_the_next_frame_is_read(
         noise in prop::collection::vec(any::<u8>(), 0..1500), which in 0_usize..15, zeros in any::<bool>(),
     ) {
-        // Half of the noise with few zeros, so that long frames and long bodies are tried too.
+        // Half of the noise has few zeros, so that it contains long frames and long bodies.
         let noise: Vec<u8> = noise.into_iter().map(|byte| if zeros { byte } else { byte.max(1) }).collect();
         let request = requests().remove(which);
         let bytes = [noise, vec![0], frame_of(&request)].concat();
@@ -224,14 +224,14 @@ proptest! {
     }
 
     #[test]
-    fn no_body_makes_it_panic(body in prop::collection::vec(any::<u8>(), 1..500)) {
+    fn no_body_makes_the_decoder_panic(body in prop::collection::vec(any::<u8>(), 1..500)) {
         let frame = forged(&[[VERSION, 0, 0].as_slice(), &body].concat());
         let _ = decode_all::<Request>(&frame);
         let _ = decode_all::<Response>(&frame);
     }
 
     #[test]
-    fn blocks_come_back(
+    fn blocks_are_decoded_as_encoded(
         counts in prop::collection::vec(any::<[i16; 3]>(), 0..=64), sequence: u32, time: u64, lost: u32, clipped: u16,
     ) {
         let block = Block { sequence, time: Nanoseconds(time), lost, clipped, counts: counts.into_iter().collect() };

@@ -1,4 +1,4 @@
-//! One message of every kind, with every field set, and frames of them.
+//! One message of every variant, with every field set, and their frames.
 
 use heapless::Vec as Heapless;
 use quietcut_core::acceleration::{Block, Sensor};
@@ -75,7 +75,7 @@ pub(crate) fn edges<const N: usize>(count: u64) -> Heapless<Edge, N> {
         .collect()
 }
 
-/// As large as a block can be: full, loud, late.
+/// The largest possible block: full, with extreme counts and the latest time.
 pub(crate) fn block() -> Block {
     Block {
         sequence: u32::MAX,
@@ -268,7 +268,7 @@ pub(crate) fn responses() -> Vec<Response> {
     responses
 }
 
-// The matches below have no `_`: a new variant does not compile until it has a name, and then a frozen frame.
+// The matches below have no `_`. A new variant does not compile until it has a name, and then needs a frozen frame.
 
 pub(crate) fn request_name(request: &Request) -> String {
     match request {
@@ -346,7 +346,7 @@ pub(crate) fn frame_of<M: Message>(message: &M) -> Vec<u8> {
     encode(message, SEQUENCE, &mut buffer).unwrap().to_vec()
 }
 
-/// A frame with this content before the CRC, whatever it is.
+/// A frame with this content before the CRC, valid or not.
 pub(crate) fn forged(content: &[u8]) -> Vec<u8> {
     let raw = [content, &crc32([content]).to_le_bytes()].concat();
     let mut buffer = vec![0; cobs::max_encoding_length(raw.len()) + 1];

@@ -1,4 +1,4 @@
-//! Tables to test with: from literals and from random numbers.
+//! Lobe tables for tests, with given and with random content.
 
 use proptest::prelude::*;
 use quietcut_core::lobes::{
@@ -8,7 +8,7 @@ use quietcut_core::lobes::{
 use quietcut_core::units::{Degrees, Hertz, Millimeters, Rpm};
 use quietcut_core::working_point::{Limits, WorkingPoint};
 
-/// A table with its own memory.
+/// The content of a table with its own memory.
 #[derive(Clone, Debug)]
 pub(crate) struct Owned {
     pub(crate) limits: Option<Limits>,
@@ -53,7 +53,7 @@ impl Owned {
         Ok(buffer)
     }
 
-    /// What a reader of the bytes would write again.
+    /// The content of a table as a reader of its bytes would encode it again.
     pub(crate) fn decode(table: &LobeTable) -> Self {
         let (from, to) = table.depths();
         let entries = |layer| {
@@ -75,7 +75,7 @@ impl Owned {
     }
 }
 
-/// What the robot's spindle can do.
+/// Speed limits of the robot's spindle.
 pub(crate) const LIMITS: Option<Limits> = Some(Limits {
     rpm_min: Rpm(600.0),
     rpm_max: Rpm(2400.0),
@@ -110,7 +110,7 @@ pub(crate) fn interval(from_mm: f32, to_mm: f32, kind: IntervalKind, chatter_hz:
     }
 }
 
-/// Half-immersion down-milling of acetal near its flip notch: values of the case `kuka-kr90-acetal`, rounded.
+/// Half-immersion down-milling of acetal near its flip notch, with rounded limits of the case `kuka-kr90-acetal`.
 pub(crate) fn acetal() -> Owned {
     let hopf = |from_mm, chatter_hz| interval(from_mm, 6.0, IntervalKind::Hopf, chatter_hz);
     let columns = vec![
@@ -144,7 +144,8 @@ pub(crate) fn kind() -> impl Strategy<Value = IntervalKind> {
     ]
 }
 
-/// Columns with ends on a grid of 1/40 of the range: often touching, often at the ends of the range.
+/// Columns whose interval ends are multiples of 1/40 of the depth range, so that they often touch each other or the ends of the
+/// range.
 pub(crate) fn column(depth_from_mm: f32, depth_to_mm: f32) -> impl Strategy<Value = Vec<Interval>> {
     (
         prop::collection::btree_set(0_u8..=40, 0..8),

@@ -1,4 +1,4 @@
-//! A virtual cut through the whole pipeline, and when it says what.
+//! A virtual cut through the whole signal chain, with the verdict of each tooth period.
 
 use quietcut_core::acceleration::Sensor;
 use quietcut_core::detector::Judgement;
@@ -8,14 +8,14 @@ use quietcut_core::working_point::Tool;
 use super::milling::{Cut, Milling, Process};
 use super::virtual_sensor::{Capture, VirtualSensor, capture};
 
-/// A judgement, with the tooth period in which it came.
+/// A judgement, with the tooth period to which it belongs.
 #[derive(Clone, Copy, Debug)]
 pub struct Heard {
     pub tooth: f64,
     pub judgement: Judgement,
 }
 
-/// Settings for a tool with so many teeth.
+/// Settings of the signal chain for a tool with this number of teeth.
 pub fn settings(sensor: Sensor, with: &VirtualSensor, teeth: usize) -> Settings {
     Settings {
         sensor,
@@ -26,7 +26,7 @@ pub fn settings(sensor: Sensor, with: &VirtualSensor, teeth: usize) -> Settings 
     }
 }
 
-/// Runs the pipeline over a capture.
+/// Runs the signal chain over a capture.
 pub fn listen(settings: Settings, capture: &Capture) -> Vec<Heard> {
     let monitor = Monitor::new(settings).unwrap();
     let mut state = Box::new(State::new());
@@ -44,7 +44,7 @@ pub fn listen(settings: Settings, capture: &Capture) -> Vec<Heard> {
     heard
 }
 
-/// Mean position and largest distance from it on the forced orbit.
+/// Mean position of the forced orbit, and the largest distance from it, in m.
 pub fn forced_orbit(process: &Process, depth_m: f64, steps: usize) -> ([f64; 3], f64) {
     let cut = Cut {
         depth_m,
@@ -72,7 +72,7 @@ pub fn forced_orbit(process: &Process, depth_m: f64, steps: usize) -> ([f64; 3],
     (mean, points.iter().map(distance).fold(0.0, f64::max))
 }
 
-/// A cut of so many tooth periods in air, in the material (entered within `ramp` of them), and in air again.
+/// Numbers of tooth periods of a cut: in air, in the material (with entry within `ramp` of them), and in air again.
 #[derive(Clone, Copy, Debug)]
 pub struct Course {
     pub before: f64,
@@ -81,7 +81,7 @@ pub struct Course {
     pub after: f64,
 }
 
-/// Runs a course through the sensors.
+/// Simulates a course and measures it with the sensors.
 pub fn run(process: &Process, depth_m: f64, course: Course, steps: usize, with: &VirtualSensor) -> Capture {
     let period = 60.0 / process.rpm / process.teeth as f64;
     let cut = Cut {

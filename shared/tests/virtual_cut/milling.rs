@@ -1,16 +1,16 @@
-//! A small integrator of the delay equations of milling, independent of the host's.
+//! A small integrator of the delay equations of milling, independent of that of the host.
 //!
-//! Structure in first-order modal form: q̇_r = λ_r q_r + L_rᵀF, X = 2 Re Σ R_r q_r. Tooth j at immersion angle φ_j reaches
-//! u_j = x sin φ_j + y cos φ_j + runout_j beyond its nominal circle; the chip thickness is h = u_j − w + f sin φ_j where the surface
-//! w is what the teeth before left, and 0 where the tooth does not touch (edge angle 90°, eqs 3.1–3.4). The surface follows
-//! w ← max(u_j, w − f sin φ_j) at each angle.
+//! Structure in first-order modal form: q̇_r = λ_r q_r + L_rᵀF, X = 2 Re Σ R_r q_r. Tooth j at immersion angle φ_j reaches u_j =
+//! x sin φ_j + y cos φ_j + runout_j beyond its nominal circle. The chip thickness is h = u_j − w + f sin φ_j, where w is the
+//! surface that the preceding teeth have left, and 0 if the tooth does not touch (edge angle 90°, eqs 3.1–3.4). The surface
+//! becomes w ← max(u_j, w − f sin φ_j) at each angle.
 //!
-//! Runge–Kutta of order 4 with steps that divide the tooth period and meet entry and exit; values at half steps by
-//! Hermite interpolation, so that the order is kept.
+//! The method is Runge–Kutta of order 4 with steps that divide the tooth period and meet entry and exit. Hermite interpolation
+//! gives values at half steps, which keeps the order.
 
 use std::f64::consts::TAU;
 
-/// A complex number; the integrator needs no more than this.
+/// A complex number with the operations that the integrator needs.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Complex {
     pub re: f64,
@@ -50,7 +50,7 @@ impl Mode {
         Self { pole, left, right }
     }
 
-    /// A mode of one direction with a real modal mass.
+    /// A mode in one direction with a real modal mass.
     pub fn single(direction: usize, frequency_hz: f64, damping_ratio: f64, mass_kg: f64) -> Self {
         let omega_d = TAU * frequency_hz * (1.0 - damping_ratio.powi(2)).sqrt();
         let mut left = [Complex::default(); 3];
@@ -61,7 +61,7 @@ impl Mode {
     }
 }
 
-/// Everything that does not change during a cut.
+/// Everything that is constant during a cut: structure, tool and material.
 #[derive(Clone, Debug)]
 pub struct Process {
     pub modes: Vec<Mode>,
@@ -72,11 +72,11 @@ pub struct Process {
     pub exit_deg: f64,
     pub feed_per_tooth_m: f64,
     pub rpm: f64,
-    /// False lets the chip thickness be negative: the linear equations.
+    /// False allows a negative chip thickness, as in the linear equations.
     pub loses_contact: bool,
-    /// False leaves the regenerative part of the chip out: what comes out is the forced orbit, on which X = X_τ.
+    /// False omits the regenerative part of the chip. The motion then is the forced orbit, on which X = X_τ.
     pub regenerative: bool,
-    /// Tooth j stands e·cos(ψ + 2πj/N) out.
+    /// Runout e in m: tooth j is e·cos(ψ + 2πj/N) beyond the nominal circle.
     pub runout_m: f64,
     pub runout_angle: f64,
 }
@@ -147,24 +147,24 @@ pub fn machine_tool(rpm: f64) -> Process {
     }
 }
 
-/// When and how the tool is in the material.
+/// Times of entry and exit of the tool.
 #[derive(Clone, Copy, Debug)]
 pub struct Cut {
     pub depth_m: f64,
-    /// The tool meets the material at this time,
+    /// Time at which the tool meets the material.
     pub enter_s: f64,
-    /// the engagement grows to its full angle within this time (0: at once),
+    /// Duration in which the engagement grows to its full angle; 0 for at once.
     pub ramp_s: f64,
-    /// and leaves it at this time.
+    /// Time at which the tool leaves the material.
     pub leave_s: f64,
 }
 
-/// One integration step: position and velocity at its ends, so that motion in between is a cubic.
+/// One integration step: position and velocity at both ends, which define a cubic between them.
 #[derive(Clone, Copy, Debug)]
 pub struct Step {
     pub position: [[f64; 3]; 2],
     pub velocity: [[f64; 3]; 2],
-    /// Largest chip thickness over nominal, 0 where nothing is cut.
+    /// True if any tooth cuts.
     pub cutting: bool,
 }
 
@@ -173,16 +173,16 @@ pub struct Milling {
     process: Process,
     cut: Cut,
     steps_per_tooth: usize,
-    /// Surface left at each half step of the tooth period, for each tooth place in it.
+    /// Surface at each half step of the tooth period, for each position of a tooth.
     surface: Vec<Vec<f64>>,
     state: Vec<Complex>,
     step: usize,
-    /// Force on the tool besides the cut, constant over a step (N): noise that drives the structure.
+    /// Additional force on the tool in N, constant over a step: noise that excites the structure.
     pub disturbance_n: [f64; 3],
 }
 
 impl Milling {
-    /// `steps_per_tooth` must let entry and exit fall on steps.
+    /// A cut at its start. `steps_per_tooth` must place entry and exit at the ends of steps.
     pub fn new(process: Process, cut: Cut, steps_per_tooth: usize) -> Self {
         let places = process.teeth;
         let state = vec![Complex::default(); process.modes.len()];
@@ -235,21 +235,21 @@ impl Milling {
         self.position(&self.derivative(state, force))
     }
 
-    /// Immersion angle in degrees, 0 to 360, of the tooth at `place` at half step `half` of a tooth period. The teeth come one
-    /// pitch apart; place p is the tooth that is p pitches ahead.
+    /// Immersion angle in degrees, 0 to 360, of the tooth at position `place` at half step `half` of a tooth period. The tooth
+    /// at position p is p pitches ahead.
     fn angle_deg(&self, place: usize, half: f64) -> f64 {
         let pitch = 360.0 / self.process.teeth as f64;
         (half / (2 * self.steps_per_tooth) as f64 + place as f64) * pitch
     }
 
-    /// Which tooth (0 …) is at `place` in tooth period `tooth`, and how far it stands out.
+    /// Runout of the tooth at position `place` in tooth period `tooth`.
     fn runout(&self, place: usize, tooth: usize) -> f64 {
         let n = self.process.teeth;
         let j = (place + n - tooth % n) % n;
         self.process.runout_m * (self.process.runout_angle + TAU * j as f64 / n as f64).cos()
     }
 
-    /// Share of the engagement and depth at a time: the last angle cut, and the depth.
+    /// Engagement at a time: the last immersion angle that is cut, and the depth.
     fn engagement(&self, time: f64) -> (f64, f64) {
         let Process {
             start_deg, exit_deg, ..
@@ -271,7 +271,7 @@ impl Milling {
         (start_deg + share * (exit_deg - start_deg), depth_m)
     }
 
-    /// Cutting force on the tool at half step `half` of the current tooth period, for teeth engaged in this step.
+    /// Cutting force on the tool at half step `half` of the present tooth period, of the teeth engaged in this step.
     fn force(&self, state: &[Complex], half: usize, exit_deg: f64, depth_m: f64) -> [f64; 3] {
         let mut force = [0.0; 3];
         if depth_m == 0.0 {
@@ -289,7 +289,7 @@ impl Milling {
             }
             let (sin, cos) = self.angle_deg(place, half as f64).to_radians().sin_cos();
             let reach = x * sin + y * cos + self.runout(place, tooth);
-            // At the end of a tooth period the same angle belongs to the next place.
+            // At the end of a tooth period, the same angle belongs to the next position.
             let before = self.surface.get(place + wrapped).map_or(0.0, |s| s[slot]);
             let regeneration = if self.process.regenerative {
                 reach - before
@@ -309,8 +309,8 @@ impl Milling {
         force
     }
 
-    /// Leaves the surface of the engaged teeth at a half step. The end of a step is the start of the next one, and left there,
-    /// but for the teeth that leave the cut with this step: `last` is for them.
+    /// Stores the surface of the engaged teeth at a half step. The end of a step is the start of the next one, which stores it;
+    /// with `last`, the end is stored for the teeth that leave the cut with this step.
     fn leave_surface(&mut self, state: &[Complex], half: usize, exit_deg: f64, depth_m: f64, last: bool) {
         let [x, y, _] = self.position(state);
         let tooth = self.step / self.steps_per_tooth;
@@ -337,7 +337,7 @@ impl Milling {
         }
     }
 
-    /// One step on.
+    /// Integrates one step.
     pub fn advance(&mut self) -> Step {
         let dt = self.dt();
         let time = self.step as f64 * dt;
@@ -384,7 +384,7 @@ impl Milling {
         step
     }
 
-    /// Gives the first mode a push.
+    /// Changes the modal state of the first mode.
     pub fn push(&mut self, by: Complex) {
         self.state[0] = self.state[0].add(by);
     }
@@ -394,7 +394,7 @@ impl Milling {
         &self.state
     }
 
-    /// Time of one revolution.
+    /// Duration of one revolution in s.
     pub fn turn_s(&self) -> f64 {
         60.0 / self.process.rpm
     }

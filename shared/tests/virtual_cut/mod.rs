@@ -1,4 +1,4 @@
-//! What the tests of the signal chain share: a virtual cut and the sensors on it.
+//! A virtual cut with sensors, shared by tests of the signal chain.
 //!
 //! Not every test uses all of it.
 #![allow(dead_code, unreachable_pub, clippy::unwrap_used)]

@@ -1,4 +1,4 @@
-//! A virtual accelerometer and tachometer on a virtual cut: blocks of counts, stamps, edges.
+//! A virtual accelerometer and tachometer on a virtual cut: blocks of counts with time stamps, and edges.
 
 use quietcut_core::acceleration::{Block, MAX_BLOCK_SAMPLES, Sensor, is_clipped};
 use quietcut_core::tachometer::{Edge, Wheel};
@@ -8,20 +8,20 @@ use rand_chacha::ChaCha8Rng;
 
 use super::milling::{Milling, Step};
 
-/// What is imperfect about the sensors.
+/// Errors of the virtual sensors.
 #[derive(Clone, Copy, Debug)]
 pub struct VirtualSensor {
     pub sensor: Sensor,
-    /// Motion of the sensor over motion of the tool tip.
+    /// Ratio of the motion of the sensor to the motion of the tool tip.
     pub transmission: f64,
-    /// True rate over nominal rate.
+    /// Ratio of the true sample rate to the nominal one.
     pub clock: f64,
-    /// Stamps of blocks are late by 0 to this.
+    /// Largest delay of the time stamp of a block, in s.
     pub stamp_jitter_s: f64,
-    /// Standard deviation of a tachometer edge.
+    /// Standard deviation of the time of a tachometer edge, in s.
     pub edge_jitter_s: f64,
     pub wheel: Wheel,
-    /// Standard deviation of a white force on the structure in each direction, per root hertz, in N/√Hz.
+    /// Root spectral density of a white force on the structure in each direction, in N/√Hz.
     pub force_noise: f64,
     pub seed: u64,
 }
@@ -45,9 +45,9 @@ impl VirtualSensor {
     }
 }
 
-/// What the device would get, and the truth beside it.
+/// The signals that the device gets, and the true motion.
 pub struct Capture {
-    /// Each block with the edges that came up to its end.
+    /// Each block with the tachometer edges up to its end.
     pub blocks: Vec<(Block, Vec<Edge>)>,
     /// For each tooth period, the largest distance of the tool from `centre`, in m.
     pub excursion_m: Vec<f64>,
@@ -56,7 +56,7 @@ pub struct Capture {
     pub rate: f64,
 }
 
-/// Start of the device's clock against that of the cut.
+/// Time in ns of the device's clock at the start of the cut.
 const START_NS: f64 = 3e9;
 
 /// A standard normal variate (Box–Muller).
@@ -66,7 +66,7 @@ fn normal(random: &mut ChaCha8Rng) -> f64 {
     (-2.0 * u.ln()).sqrt() * (std::f64::consts::TAU * v).cos()
 }
 
-/// Position within a step, by its cubic.
+/// Position at a fraction of a step, from its cubic.
 fn position(step: &Step, part: f64, dt: f64) -> [f64; 3] {
     let (a, b) = (part, 1.0 - part);
     [0, 1, 2].map(|d| {
@@ -77,7 +77,7 @@ fn position(step: &Step, part: f64, dt: f64) -> [f64; 3] {
     })
 }
 
-/// Runs a cut through the sensors. `centre` is what excursions are measured from.
+/// Simulates a cut and measures it with the sensors. Excursions are distances from `centre`.
 pub fn capture(mut milling: Milling, seconds: f64, with: &VirtualSensor, centre: [f64; 3]) -> Capture {
     let mut random = ChaCha8Rng::seed_from_u64(with.seed);
     let rate = f64::from(with.sensor.nominal_rate.0) * with.clock;

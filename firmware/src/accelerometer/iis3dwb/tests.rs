@@ -1,4 +1,4 @@
-//! The driver against a model of the sensor, register by register.
+//! The driver of the sensor, tested with a model of its registers.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -44,7 +44,7 @@ fn start_leaves_the_registers_that_the_data_sheet_asks_for() {
         assert_eq!(model.register(0x0a), 0b110);
         assert_eq!(model.register(0x0d), 0b1000);
         let scale = sensor.sensor().meters_per_second2_per_count / 9.806_65 * 1e6;
-        // Single precision.
+        // The tolerance is single precision.
         assert!((scale - micro_g).abs() < 1e-3, "{range:?}: {scale}");
     }
 }
@@ -82,12 +82,12 @@ fn every_sample_comes_once_in_order_and_settled() {
     sensor.start().unwrap();
     let mut samples = Samples::new();
     let mut next = 0;
-    // Reads of no samples, of some, of as many as fit, and of more than fit.
+    // Intervals after which no samples, some, as many as fit, and more than fit are in the queue.
     for turn in 0..2000_u64 {
         wait(&model, turn * 2_654_435_761 % 3_200_000);
         let level = model.borrow().level();
         let queue = sensor.read(&mut samples).unwrap();
-        // Status is read within two samples.
+        // The status is read within two samples.
         assert!((level..level + 2).contains(&usize::from(queue.level)));
         assert!(!queue.overrun);
         assert!(queue.gap.is_none_or(|gap| gap.remainder == 0), "turn {turn}");
@@ -101,7 +101,7 @@ fn every_sample_comes_once_in_order_and_settled() {
 }
 
 #[test]
-fn an_overrun_is_told_once_with_its_gap() {
+fn an_overrun_is_reported_once_with_its_gap() {
     let model = Model::new(NOMINAL_PERIOD_NS);
     let mut sensor = driver(&model, Configuration::default());
     sensor.start().unwrap();

@@ -1,4 +1,4 @@
-//! What a pipeline says and shows, told by a device or taken straight from it.
+//! Outputs of the signal chain: from the messages of a device, and from the chain without a device.
 
 use crate::bench::*;
 use crate::support::SETTINGS;
@@ -8,15 +8,15 @@ use quietcut_core::protocol::message::MAX_FEED_EDGES;
 use quietcut_core::protocol::{Feed, Request, Response, SpectrumChunk};
 use quietcut_core::tachometer::Edge;
 
-/// What a pipeline says and shows.
+/// Reports, stroboscopic points and spectra of the signal chain.
 #[derive(Debug, Default, PartialEq)]
-pub(crate) struct Heard {
+pub(crate) struct Outputs {
     pub(crate) reports: Vec<Report>,
     pub(crate) strobes: Vec<(u32, Strobe)>,
     pub(crate) spectra: Vec<(Band, u32, u32, Vec<u32>)>,
 }
 
-impl Heard {
+impl Outputs {
     pub(crate) fn take(&mut self, responses: Vec<Response>) {
         for response in responses {
             match response {
@@ -50,19 +50,19 @@ impl Heard {
     }
 }
 
-/// What the same blocks make of a pipeline without a device around it.
-pub(crate) fn straight(
+/// The outputs of the signal chain for these blocks, without a device.
+pub(crate) fn outputs_without_device(
     blocks: &[(quietcut_core::acceleration::Block, Vec<Edge>)],
     table: Option<&LobeTable>,
-) -> Heard {
+) -> Outputs {
     let monitor = Monitor::new(SETTINGS).unwrap();
     let mut state = State::default();
-    let mut heard = Heard::default();
+    let mut outputs = Outputs::default();
     for (block, edges) in blocks {
-        heard
+        outputs
             .reports
             .push(monitor.step(&mut state, block, edges, table, Some(&POINT)));
-        heard
+        outputs
             .strobes
             .extend(state.strobes().iter().map(|strobe| (block.sequence, *strobe)));
         for band in [Band::Structure, Band::Tool] {
@@ -71,12 +71,12 @@ pub(crate) fn straight(
             }
             let spectrum = state.spectrum(band).unwrap();
             let power = spectrum.power.iter().map(|power| power.to_bits()).collect();
-            heard
+            outputs
                 .spectra
                 .push((band, block.sequence, spectrum.bin.0.to_bits(), power));
         }
     }
-    heard
+    outputs
 }
 
 pub(crate) fn feed(block: &quietcut_core::acceleration::Block, edges: &[Edge]) -> Request {
