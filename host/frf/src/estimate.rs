@@ -21,10 +21,6 @@ pub enum Estimator {
     PseudoInverse,
 }
 
-/// Smallest singular value of the forces, each divided by its root mean square, for independent forces. Below it, noise of 1 % of a force
-/// causes errors as large as the FRF.
-pub(super) const DEPENDENT: f64 = 1e-2;
-
 /// FRF estimate at one frequency line.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FrfLine {

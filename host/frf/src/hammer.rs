@@ -1,22 +1,10 @@
 //! Impacts of a hammer test: detection, double impacts, and the windows of force and response.
 
 use super::FrfError;
+use super::criteria::{
+    BOUNCE_S, LEAST_IMPACT, PULSE_ABOVE_NOISE, PULSE_END, PULSE_END_ABOVE_NOISE, SECOND_PULSE,
+};
 use super::test_channels::TestChannels;
-
-/// Longest time from an impact to a bounce of the hammer, s; a pulse within it belongs to the same impact. A choice, below the interval of
-/// deliberate strikes.
-const BOUNCE_S: f64 = 0.4;
-
-/// Smallest peak of an impact, as a fraction of the largest force of the record. A choice.
-const IMPACT: f64 = 0.1;
-
-/// Smallest second pulse that makes an impact double, as a fraction of the peak of the impact. A choice, above the ringing of
-/// anti-aliasing filters.
-const SECOND: f64 = 0.03;
-
-/// Smallest peak of any pulse, in standard deviations of the force noise. A choice: Gaussian noise exceeds eight deviations with a
-/// probability of 1e-15 per sample.
-const NOISE: f64 = 8.0;
 
 /// Length of the segment before the impact, as a fraction of the segment. A choice; its mean gives the offset of the sensor.
 const BEFORE: f64 = 0.01;
@@ -212,7 +200,7 @@ fn impacts(force: &[f64], rate: f64) -> Vec<MeasuredImpact> {
     let largest = force
         .iter()
         .fold(0.0_f64, |largest, f| largest.max((f - middle).abs()));
-    let threshold = (IMPACT * largest).max(NOISE * noise);
+    let threshold = (LEAST_IMPACT * largest).max(PULSE_ABOVE_NOISE * noise);
     let mut impacts: Vec<MeasuredImpact> = Vec::new();
     let mut k = 0;
     while k < force.len() {
@@ -220,7 +208,7 @@ fn impacts(force: &[f64], rate: f64) -> Vec<MeasuredImpact> {
             k += 1;
             continue;
         }
-        let foot = (0.05 * threshold).max(2.0 * noise);
+        let foot = (PULSE_END * threshold).max(PULSE_END_ABOVE_NOISE * noise);
         let above = |k: usize| (force[k] - middle).abs() > foot;
         let mut first = k;
         while first > 0 && above(first - 1) {
@@ -260,7 +248,7 @@ fn second_pulse(force: &[f64], impact: &MeasuredImpact, end: usize, rate: f64) -
     let (at, size) = (from..end.min(force.len()))
         .map(|k| (k, (force[k] - middle).abs()))
         .max_by(|a, b| a.1.total_cmp(&b.1))?;
-    let threshold = (SECOND * impact.peak_n.abs()).max(NOISE * noise(force, middle));
+    let threshold = (SECOND_PULSE * impact.peak_n.abs()).max(PULSE_ABOVE_NOISE * noise(force, middle));
     let delay_s = at as f64 / rate - impact.time_s;
     (size > threshold).then(|| (delay_s, size / impact.peak_n.abs()))
 }

@@ -33,6 +33,7 @@
 //!
 //! Of a structure, this crate uses only the names of its directions: no modal model, no cutting force, no stability.
 
+mod criteria;
 mod cross_spectra;
 mod error;
 mod estimate;

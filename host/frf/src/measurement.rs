@@ -14,6 +14,7 @@ use num_complex::Complex64;
 
 pub use recording_group::RecordingGroup;
 
+use super::criteria::SPARE_AVERAGES;
 use super::error::FrfError;
 use super::estimate::{self, ChannelCounts, Estimator};
 use super::excitation::Excitation;
@@ -213,7 +214,7 @@ fn measure_group(
             .collect::<Result<Vec<_>, _>>()?,
     };
     group.averages = spectra.iter().map(|test| test.averages).sum();
-    if group.averages < counts.forces as f64 + 0.5 && excitation != Excitation::Hammer {
+    if group.averages < counts.forces as f64 + SPARE_AVERAGES && excitation != Excitation::Hammer {
         return Err(refused(format!(
             "{:.1} independent averages for {} forces; a longer record or a coarser resolution is needed",
             group.averages, counts.forces

@@ -7,6 +7,7 @@ use num_complex::Complex64;
 use realfft::RealFftPlanner;
 
 use super::FrfError;
+use super::criteria::{BANDS, LINES_PER_BAND_MIN, PLATEAU_BANDS, PLATEAU_RANGE};
 use super::excitation::Excitation;
 use super::measurement_settings::MeasurementSettings;
 use super::test_channels::TestChannels;
@@ -119,15 +120,6 @@ fn of_record(channels: &TestChannels<'_>, band_hz: Option<(f64, f64)>) -> Record
     }
 }
 
-/// Number of adjacent bands of the spectrum whose mean powers are compared to find the noise plateau. A choice.
-const BANDS: usize = 64;
-
-/// Smallest number of bands with equal power that form a noise plateau. A choice.
-const PLATEAU_BANDS: usize = 3;
-
-/// Smallest number of lines per band. A choice: the mean power of a band then has a standard deviation of 14 %.
-const LINES_PER_BAND_MIN: usize = 50;
-
 /// Noise plateau of a spectrum: the median over the bands whose mean power exceeds that of the lowest band by at most six standard deviations
 /// (1/√n of the power for n lines). White noise has equal power in all bands, and bands without signal contain nothing else.
 fn plateau(lines: &[Complex64], scale: f64) -> Option<f64> {
@@ -140,7 +132,7 @@ fn plateau(lines: &[Complex64], scale: f64) -> Option<f64> {
         .map(|band| scale * band.iter().map(|line| line.norm_sqr()).sum::<f64>() / count as f64)
         .collect();
     powers.sort_by(f64::total_cmp);
-    let most = powers.first()? * (1.0 + 6.0 / (count as f64).sqrt());
+    let most = powers.first()? * (1.0 + PLATEAU_RANGE / (count as f64).sqrt());
     let equal = powers.iter().take_while(|power| **power < most).count();
     (equal >= PLATEAU_BANDS).then(|| powers[equal / 2])
 }

@@ -6,13 +6,11 @@ use nalgebra::{Matrix4, Vector4};
 use num_complex::Complex64;
 
 use super::FrfError;
+use super::criteria::{
+    FREQUENCY_STEP, PAUSE, PERIOD_SCATTER, PERIODS_MIN, REPEATED_STEP, SAME_LEVEL, SETTLED, SETTLED_NOISE,
+    STEADY_SCATTER, SUBSEGMENT_SAMPLES_MIN, SUBSEGMENTS_MIN,
+};
 use super::test_channels::TestChannels;
-
-/// Smallest number of periods of a frequency step. A choice: the scatter of the period needs several.
-const PERIODS_MIN: usize = 8;
-
-/// Smallest relative change of the period that begins a new step. A choice, below usual frequency increments.
-const STEP: f64 = 1.5e-3;
 
 /// Decay time of the tracked force amplitude, in periods of the excitation. A choice: more than one period, and less than a frequency step.
 const FORGET: f64 = 3.0;
@@ -22,13 +20,6 @@ const FORGET_S: f64 = 1.0;
 
 /// Number of subsegments of a step that are demodulated separately, to estimate noise and settling. A choice.
 const SUBSEGMENTS: usize = 8;
-
-/// Largest relative deviation of the phasor ratio (response/force) of a settled response from its mean over the second half. A choice: 0.2 %.
-const SETTLED: f64 = 2e-3;
-
-/// Largest deviation of a settled phasor ratio that noise explains, in standard deviations. For a complex Gaussian error, 1 of 8000
-/// subsegments exceeds it.
-const NOISE: f64 = 3.0;
 
 /// Result of one frequency step.
 #[derive(Clone, Debug)]
@@ -56,9 +47,6 @@ pub(super) struct ForceLevel {
     /// Steps by ascending frequency. Of several steps at one frequency the longest is kept; of steps of about equal length, the last.
     pub(super) steps: Vec<FrequencyStep>,
 }
-
-/// Largest ratio of forces that count as one force level. A choice.
-const SAME_LEVEL: f64 = 1.05;
 
 /// Force levels of a record in the order of time. Frequencies that are repeated at another force form another level.
 ///
@@ -116,7 +104,7 @@ fn passes(steps: Vec<FrequencyStep>) -> Vec<Vec<FrequencyStep>> {
 }
 
 fn is_same_frequency(a: &FrequencyStep, b: &FrequencyStep) -> bool {
-    (a.frequency_hz - b.frequency_hz).abs() < STEP * a.frequency_hz
+    (a.frequency_hz - b.frequency_hz).abs() < FREQUENCY_STEP * a.frequency_hz
 }
 
 fn median_force(steps: &[FrequencyStep]) -> f64 {
@@ -131,7 +119,7 @@ fn by_frequency(mut steps: Vec<FrequencyStep>) -> Vec<FrequencyStep> {
     for step in steps {
         match kept.last_mut() {
             Some(last) if is_same_frequency(last, &step) => {
-                if step.samples as f64 > 0.9 * last.samples as f64 {
+                if step.samples as f64 > REPEATED_STEP * last.samples as f64 {
                     *last = step;
                 }
             }
@@ -157,11 +145,11 @@ fn tone_segments(force: &[f64], rate: f64) -> Vec<ToneSegment> {
     while from + PERIODS_MIN <= periods.len() {
         let mut to = from + PERIODS_MIN;
         let spread = scatter(&periods[from..to]);
-        let tolerance = |mean: f64| (STEP * mean).max(5.0 * spread);
+        let tolerance = |mean: f64| (FREQUENCY_STEP * mean).max(PERIOD_SCATTER * spread);
         let mean = |to: usize| (crossings[to] - crossings[from]) / (to - from) as f64;
         // The candidate segment must not begin within a frequency change, where periods scatter, nor at a pause, which is one long period.
-        let is_pause = |period: &f64| (period - mean(to)).abs() > 0.5 * mean(to);
-        if spread > 10.0 * STEP * mean(to) || periods[from..to].iter().any(is_pause) {
+        let is_pause = |period: &f64| (period - mean(to)).abs() > PAUSE * mean(to);
+        if spread > STEADY_SCATTER * FREQUENCY_STEP * mean(to) || periods[from..to].iter().any(is_pause) {
             from += 1;
             continue;
         }
@@ -172,8 +160,8 @@ fn tone_segments(force: &[f64], rate: f64) -> Vec<ToneSegment> {
             let is_off = |k: usize| off(k) > tolerance(now);
             let drift = || (crossings[to] - crossings[to - PERIODS_MIN]) / PERIODS_MIN as f64 - now;
             let drifts = to >= from + 2 * PERIODS_MIN
-                && drift().abs() > (STEP * now).max(5.0 * spread / PERIODS_MIN as f64);
-            if off(to) > 0.5 * now || is_off(to) && is_off(to + 1) || drifts {
+                && drift().abs() > (FREQUENCY_STEP * now).max(PERIOD_SCATTER * spread / PERIODS_MIN as f64);
+            if off(to) > PAUSE * now || is_off(to) && is_off(to + 1) || drifts {
                 break;
             }
             to += 1;
@@ -242,7 +230,7 @@ fn demodulated(
     let periods_per_subsegment = (periods / SUBSEGMENTS).max(1);
     let subsegments = periods / periods_per_subsegment;
     let length = (periods_per_subsegment as f64 * period).round() as usize;
-    if subsegments < 4 || length < 5 {
+    if subsegments < SUBSEGMENTS_MIN || length < SUBSEGMENT_SAMPLES_MIN {
         return None;
     }
     let phasors = |signal: &[f64]| -> Option<Vec<Phasor>> {
@@ -316,14 +304,15 @@ fn averaged(forces: &[Phasor], responses: &[Phasor]) -> (Complex64, f64, f64) {
 
 /// First subsegment from which all responses are settled; `None` if the second half is not settled.
 ///
-/// Settled: the phasor ratio differs from its mean over the second half by less than [`SETTLED`] (relative) or [`NOISE`] standard deviations.
+/// Settled: the phasor ratio differs from its mean over the second half by less than [`SETTLED`] (relative) or [`SETTLED_NOISE`] standard deviations.
 fn settled_from(ratios: &[Vec<Phasor>]) -> Option<usize> {
     let subsegments = ratios.first()?.len();
     let first = |ratio: &Vec<Phasor>| {
         let half = &ratio[subsegments / 2..];
         let mean = half.iter().map(|subsegment| subsegment.value).sum::<Complex64>() / half.len() as f64;
         let is_off = |subsegment: &Phasor| {
-            (subsegment.value - mean).norm() > (SETTLED * mean.norm()).max(NOISE * subsegment.variance.sqrt())
+            (subsegment.value - mean).norm()
+                > (SETTLED * mean.norm()).max(SETTLED_NOISE * subsegment.variance.sqrt())
         };
         ratio.iter().rposition(is_off).map_or(0, |last| last + 1)
     };

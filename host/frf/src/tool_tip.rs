@@ -6,24 +6,13 @@
 
 use num_complex::Complex64;
 
+use super::criteria::{LARGEST_DAMPING_RATIO, LEAST_PEAK, RESIDUAL_DECREASE, SAME_MODE, SMALL_RESIDUAL};
 use super::rational_fit::{RationalFit, RationalFitError, fit};
 use super::{Frf, FrfError, FrfTable};
 use quietcut_model::structure::Direction;
 
 /// Largest number of modes in a fit. A choice; vector fitting of more modes needs a narrower band.
 const MODES_MAX: usize = 8;
-
-/// Smallest relative decrease of the residual by which a further mode is accepted. A choice.
-const LEAST_DECREASE: f64 = 0.3;
-
-/// Relative residual below which no further mode is added. A choice, near the noise of a clean measurement.
-const SMALL_RESIDUAL: f64 = 2e-3;
-
-/// Largest shift of a natural frequency between calibration and cut, |ln(f₁/f₂)|. A choice.
-const SAME_MODE: f64 = 0.15;
-
-/// Smallest peak of a mode, as a fraction of the largest peak; a pole with a lower peak is noise. A choice.
-const LEAST_PEAK: f64 = 2e-3;
 
 /// Ratio of the mode shape at tool tip and sensor, for one mode and response direction.
 #[derive(Clone, Debug, PartialEq)]
@@ -179,7 +168,7 @@ fn modes(frequency_hz: &[f64], functions: &[&[Complex64]]) -> Result<RationalFit
             }
         };
         match &best {
-            Some(before) if next.residual > (1.0 - LEAST_DECREASE) * before.residual => {
+            Some(before) if next.residual > (1.0 - RESIDUAL_DECREASE) * before.residual => {
                 without_improvement += 1
             }
             _ => {
@@ -211,7 +200,7 @@ fn mode_numbers(modes: &RationalFit) -> Vec<usize> {
     (0..modes.poles.len())
         .filter(|&mode| {
             let pole = modes.poles[mode];
-            pole.re.abs() < 0.3 * pole.norm()
+            pole.re.abs() < LARGEST_DAMPING_RATIO * pole.norm()
                 && functions
                     .clone()
                     .any(|function| height(function, mode) > LEAST_PEAK * highest[function])

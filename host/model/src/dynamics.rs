@@ -2,6 +2,7 @@
 
 use nalgebra::{DMatrix, Matrix3xX, MatrixXx3};
 
+use crate::criteria::VELOCITY_JUMP;
 use crate::structure::{FirstOrder, Form, Matrices, Structure, StructureError};
 use quietcut_numerics::dormand_prince::Quartic;
 
@@ -50,7 +51,7 @@ impl Dynamics {
         let ca = &c * &a;
         let jump = &c * &b;
         // Modes of a structure with a mass matrix have C B = 0, except for rounding and the digits of the case file.
-        let velocity_jumps = jump.amax() > 1e-6 * c.amax() * b.amax() * order as f64;
+        let velocity_jumps = jump.amax() > VELOCITY_JUMP * c.amax() * b.amax() * order as f64;
         let cubic = match structure.equation() {
             Some(matrices) if structure.is_nonlinear() => Some(cubic(&matrices, &a)?),
             _ => None,

@@ -40,6 +40,7 @@
 //! no file.
 
 pub mod case;
+mod criteria;
 pub mod cutter;
 mod dynamics;
 pub mod effects;

@@ -3,6 +3,7 @@
 use std::collections::VecDeque;
 use std::f64::consts::TAU;
 
+use super::criteria::{CONTACT_DECIDED, CONTACT_TOLERANCE, CONTACT_TOLERANCE_MIN_M};
 use super::cutting::{Cutting, Regeneration};
 use super::surface::{SURFACE_NODES, Surface};
 use super::workpiece_traverse::MaterialWindows;
@@ -17,12 +18,6 @@ const SMOOTH_FROM: u8 = 5;
 /// Two instants closer than this fraction of the shortest tooth-passing period count as equal. Rounding of the time, 2.2e-16 of it, stays
 /// below this for 4 million periods; entries and exits of milling are much further apart.
 const SAME_TIME: f64 = 1e-9;
-
-/// Hysteresis of loss of contact, as a fraction of the feed per tooth: a chip whose thickness tends to zero, as in a slot, must not lose
-/// contact by integration errors. The value is a choice above the integration error.
-const CONTACT_TOLERANCE: f64 = 1e-7;
-/// Smallest hysteresis of loss of contact, m, for a cut without feed: above rounding of displacements.
-const CONTACT_TOLERANCE_MIN_M: f64 = 1e-15;
 
 /// State of contact of all teeth with the workpiece, and the machined surfaces that the teeth leave.
 #[derive(Clone, Debug)]
@@ -322,7 +317,7 @@ impl<'a> Contact<'a> {
             return;
         }
         // Long enough to resolve the growth of the chip from zero, short enough for linear extrapolation of the motion.
-        let soon_s = 1e-4 * self.shortest_delay_s();
+        let soon_s = CONTACT_DECIDED * self.shortest_delay_s();
         let then = std::array::from_fn(|axis| x[axis] + soon_s * v[axis]);
         self.set_step(t, t + soon_s);
         for (index, tooth) in self.cutting.cutter.teeth.iter().enumerate() {

@@ -1,6 +1,7 @@
 //! Error-controlled integration with event location: steps end where the right-hand side is not smooth.
 
 use super::contact::{Change, Contact};
+use super::criteria::{AT_REST, REGIME_CHANGES_MAX, REPEATED_CONTACT_CHANGES_MAX};
 use super::dense_step::{DenseStep, Workspace};
 use super::error::SimulateError;
 use super::model::{Model, StepContext};
@@ -60,13 +61,6 @@ impl Event {
         }
     }
 }
-
-/// Error of a step over its tolerance below which the tool counts as at rest. A choice: the error estimate of any vibration above rounding is
-/// larger.
-const AT_REST: f64 = 1e-6;
-
-/// Number of successive changes of contact without a step between them at which the run ends with an error. A choice: a tooth needs one.
-const STUCK: u32 = 3;
 
 impl<'a> Integrator<'a> {
     pub(super) fn new(model: &'a Model, settings: Settings, y: Vec<f64>) -> Self {
@@ -140,7 +134,7 @@ impl<'a> Integrator<'a> {
                 {
                     *stuck += 1;
                 }
-                if *stuck > STUCK {
+                if *stuck > REPEATED_CONTACT_CHANGES_MAX {
                     return Err(SimulateError::ContactUndecided {
                         time_s: self.t,
                         tooth: change.tooth + 1,
@@ -153,7 +147,7 @@ impl<'a> Integrator<'a> {
                 // A restoring force that has just changed counts as within its regime (see `first_below_zero`): many
                 // changes without a step between them mean that no regime is consistent with the motion.
                 *stuck += 1;
-                if *stuck > 10 * STUCK {
+                if *stuck > REGIME_CHANGES_MAX {
                     return Err(SimulateError::RegimeUndecided { time_s: self.t });
                 }
             }

@@ -54,6 +54,7 @@
 
 mod anti_aliasing;
 mod contact;
+mod criteria;
 mod cutting;
 mod dense_step;
 mod drive;

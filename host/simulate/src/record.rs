@@ -6,6 +6,7 @@ use std::path::Path;
 use quietcut_core::tachometer::Wheel;
 
 use super::anti_aliasing::decimated;
+use super::criteria::SAMPLES_PER_PITCH_MIN;
 use super::effect::{Effects, Pickup};
 use super::sensor::{Accelerometer, Sampler, TachometerModel};
 use super::{DenseStep, Model, Reading, Settings, Spindle, Statistics, VirtualCut, VirtualCutError};
@@ -188,13 +189,13 @@ impl VirtualCut {
     ) -> Result<Vec<f64>, VirtualCutError> {
         let [pitch_s, _] = spindle.bounds_s(TAU / f64::from(tachometer.wheel.positions));
         // Shortest pitch of the wheel, s: two samples for the rise, two for the fall, and one for each level between them.
-        let least = 6.0 / rate_hz;
+        let least = SAMPLES_PER_PITCH_MIN / rate_hz;
         if pitch_s < least {
             return Err(VirtualCutError::WheelTooFine {
                 positions: tachometer.wheel.positions,
                 spindle_rpm: self.spindle_rpm,
                 rate_hz,
-                needed_hz: 6.0 / pitch_s,
+                needed_hz: SAMPLES_PER_PITCH_MIN / pitch_s,
             });
         }
         let end_s = samples as f64 / rate_hz;

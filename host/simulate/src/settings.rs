@@ -1,5 +1,7 @@
 //! Tolerances and bounds of the time integration.
 
+use super::criteria::LARGEST_DISPLACEMENT_M;
+
 /// Tolerances and bounds of the time integration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
@@ -14,13 +16,13 @@ pub struct Settings {
 }
 
 impl Default for Settings {
-    /// Tolerances of 1e-12 m and of 1e-8 of the amplitude, far below the error of any measurement; a displacement above 0.1 m is no vibration
-    /// of a tool.
+    /// Tolerances of 1e-12 m and of 1e-8 of the amplitude, far below the error of any measurement; a displacement of at most
+    /// 0.1 m; any number of steps.
     fn default() -> Self {
         Self {
             absolute_m: 1e-12,
             relative: 1e-8,
-            largest_m: 0.1,
+            largest_m: LARGEST_DISPLACEMENT_M,
             steps_max: u64::MAX,
         }
     }

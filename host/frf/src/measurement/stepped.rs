@@ -1,6 +1,7 @@
 //! Receptances of a step-sine test: one phasor ratio per frequency step.
 
 use super::recording_group::{MeasuredGroup, RecordingGroup, receptances};
+use crate::criteria::SAME_FORCE;
 use crate::error::FrfError;
 use crate::estimate::FrfLine;
 use crate::measurement_settings::MeasurementSettings;
@@ -95,6 +96,3 @@ fn level(channels: &TestChannels<'_>, force_n: Option<f64>) -> Result<ForceLevel
         }),
     }
 }
-
-/// Largest ratio of forces that count as one level, when selecting a level and when warning of a varying force. A choice.
-const SAME_FORCE: f64 = 1.2;

@@ -1,6 +1,7 @@
 //! Spectra of hammer tests.
 
 use super::recording_group::RecordingGroup;
+use crate::criteria::{END_AMPLITUDE, IMPACTS_MIN};
 use crate::cross_spectra::{CrossSpectra, Segments, averaged};
 use crate::error::FrfError;
 use crate::hammer::{self, MeasuredImpact};
@@ -58,9 +59,9 @@ pub(super) fn struck(
             .collect();
         warnings.push(format!("double impacts are left out: at {} s", times.join(", ")));
     }
-    if used.len() < 3 {
+    if used.len() < IMPACTS_MIN {
         warnings.push(format!(
-            "{} impacts: coherence and errors are uncertain with fewer than 3",
+            "{} impacts: coherence and errors are uncertain with fewer than {IMPACTS_MIN}",
             used.len()
         ));
     }
@@ -79,7 +80,3 @@ pub(super) fn struck(
     group.impacts = Some((used, double));
     Ok(spectra)
 }
-
-/// Largest amplitude at the end of a segment without a warning, as a fraction of the peak. Truncation biases a resonance by about twice this
-/// fraction. A choice.
-const END_AMPLITUDE: f64 = 0.02;

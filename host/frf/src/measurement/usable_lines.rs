@@ -1,8 +1,9 @@
 //! Selection of the frequency lines with sufficient and independent forces.
 
 use super::recording_group::RecordingGroup;
+use crate::criteria::{DEPENDENT, EXCITED};
 use crate::cross_spectra::CrossSpectra;
-use crate::estimate::{ChannelCounts, DEPENDENT, FrfLine};
+use crate::estimate::{ChannelCounts, FrfLine};
 
 /// Removes the frequency lines outside the range of a sweep, where the force is too small.
 pub(super) fn keep_excited(lines: &mut Vec<FrfLine>, spectra: &[CrossSpectra], counts: ChannelCounts) {
@@ -23,10 +24,6 @@ pub(super) fn keep_excited(lines: &mut Vec<FrfLine>, spectra: &[CrossSpectra], c
     };
     lines.retain(is_excited);
 }
-
-/// Smallest force power of a line within the range of a sweep, as a fraction of the largest. At resonances the force of a shaker drops to
-/// about 1e-2 of the largest power.
-const EXCITED: f64 = 1e-3;
 
 /// Removes the frequency lines at which the forces are linearly dependent; an error if these are more than half of all lines.
 pub(super) fn independent(

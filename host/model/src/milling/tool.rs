@@ -1,5 +1,7 @@
 //! The milling tool.
 
+use crate::criteria::VARIABLE_PITCH_DEG;
+
 /// A milling tool without helix: each cutting edge is straight, in a plane with the tool axis, at the edge angle to the normal plane of
 /// that axis.
 #[derive(Clone, Debug, PartialEq)]
@@ -35,8 +37,9 @@ impl Tool {
     /// True for a tool with variable pitch, whose delay equation has several delays.
     pub fn has_variable_pitch(&self) -> bool {
         let equal = self.equal_pitch_deg();
-        // Case files give pitch angles with a few digits. A thousandth of a degree changes a delay by about 1e-5 of itself.
-        self.pitch_deg.iter().any(|pitch| (pitch - equal).abs() > 1e-3)
+        self.pitch_deg
+            .iter()
+            .any(|pitch| (pitch - equal).abs() > VARIABLE_PITCH_DEG)
     }
 
     /// Tooth-passing period at equal pitch, s.

@@ -5,11 +5,9 @@ use std::fmt;
 use nalgebra::DMatrix;
 use quietcut_numerics::eigenvalues::of_symmetric;
 
-use super::{Direction, Matrices};
+use crate::criteria::ZERO_EIGENVALUE;
 
-/// Magnitude of a negative eigenvalue, relative to the largest one, up to which it counts as zero. A free body has a zero eigenvalue, which
-/// rounding and matrices printed with few digits shift by about this much.
-const ZERO: f64 = 1e-9;
+use super::{Direction, Matrices};
 
 /// An indefinite matrix, which no passive structure can have.
 #[derive(Clone, Debug, PartialEq)]
@@ -138,7 +136,7 @@ fn is_definite(symmetric: &DMatrix<f64>, strict: bool) -> bool {
     let Ok(eigenvalues) = of_symmetric(scaled).map(|eigen| eigen.eigenvalues) else {
         return false;
     };
-    let threshold = ZERO * eigenvalues.amax();
+    let threshold = ZERO_EIGENVALUE * eigenvalues.amax();
     if strict {
         eigenvalues.min() > threshold
     } else {

@@ -3,11 +3,9 @@
 use nalgebra::{DMatrix, Matrix3};
 use num_complex::Complex64;
 
-use super::FirstOrder;
+use crate::criteria::{DEFECTIVE, SAME_POLE};
 
-/// Relative distance below which two poles form one mode, because the mode shapes of (nearly) repeated poles are not defined individually.
-/// It lies above the rounding of a double eigenvalue, √2e-16 ≈ 1.5e-8, and below the spacing of distinct modes.
-const SAME: f64 = 1e-6;
+use super::FirstOrder;
 
 /// Modal part of A for one pole pair λ = −ζω + iω√(1 − ζ²).
 ///
@@ -65,7 +63,7 @@ impl FirstOrder {
         for pole in self.poles().into_iter().filter(|pole| pole.im > 0.0) {
             match groups
                 .iter_mut()
-                .find(|group| (group[0] - pole).norm() < SAME * pole.norm())
+                .find(|group| (group[0] - pole).norm() < SAME_POLE * pole.norm())
             {
                 Some(group) => group.push(pole),
                 None => groups.push(vec![pole]),
@@ -83,7 +81,7 @@ impl FirstOrder {
         let projector = &right * (left.transpose() * &right).try_inverse()? * left.transpose();
         // P² = P by construction. A P = λ P holds only for a pole that has as many mode shapes as its multiplicity.
         let miss = self.a.map(Complex64::from) * &projector - &projector * pole;
-        (miss.norm() < 10.0 * SAME * pole.norm() * projector.norm()).then_some(ModalPart { pole, projector })
+        (miss.norm() < DEFECTIVE * pole.norm() * projector.norm()).then_some(ModalPart { pole, projector })
     }
 }
 

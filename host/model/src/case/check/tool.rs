@@ -5,11 +5,8 @@ use toml::Spanned;
 use super::Check;
 use crate::case::file::ToolFile;
 use crate::case::{CaseError, Parameter};
+use crate::criteria::{PITCH_SUM_DEG, TEETH_MAX};
 use crate::milling::{Runout, Tool};
-
-/// Largest number of teeth of a tool that a case may have; a larger one is taken for a typing error. Unfounded: large face mills have about
-/// 40 teeth.
-const TEETH_MAX: i64 = 64;
 
 impl Check<'_> {
     pub(super) fn tool(&mut self, file: &ToolFile) -> Result<Tool, CaseError> {
@@ -58,8 +55,7 @@ impl Check<'_> {
             return Err(self.wrong(pitch, key, angle, "angles greater than 0"));
         }
         let sum: f64 = angles.iter().sum();
-        // Pitch angles in a case file have about three digits after the point; the sum of 20 rounded angles errs by up to 0.01°.
-        if (sum - 360.0).abs() > 0.01 {
+        if (sum - 360.0).abs() > PITCH_SUM_DEG {
             return Err(self.wrong(pitch, key, format!("the sum {sum}"), "angles that sum to 360"));
         }
         Ok(angles.iter().map(|angle| angle * 360.0 / sum).collect())

@@ -1,0 +1,33 @@
+//! Every threshold by which this crate decides, each with the source of its number.
+//!
+//! A number without a derivation or a campaign behind it is marked "Unfounded". Bounds of the values of a case are physical and stand with
+//! their keys.
+
+/// Sum of the residues of a structure given by modes, relative to n·max|C|·max|B| with n states, above which its velocity jumps with the force.
+/// The sum is zero if the structure has a mass matrix. Mode shapes with seven digits in the case file leave up to this much: two factors
+/// with an error of 5e-7 in each of n products.
+pub(crate) const VELOCITY_JUMP: f64 = 1e-6;
+
+/// Magnitude of a negative eigenvalue of a mass, damping or stiffness matrix, relative to the largest one, up to which it counts as zero, as
+/// that of a free body. Entries with ten digits shift it by 5e-10 for each degree of freedom: two of them.
+pub(crate) const ZERO_EIGENVALUE: f64 = 1e-9;
+
+/// Relative distance below which two poles form one mode, because the mode shapes of (nearly) repeated poles are not defined individually. It
+/// lies above the rounding of a double eigenvalue, √(2e-16) ≈ 1.5e-8, and below the spacing of distinct modes. The value between is
+/// unfounded.
+pub(crate) const SAME_POLE: f64 = 1e-6;
+
+/// Largest relative residual of A P = λ P for a pole with as many mode shapes as its multiplicity. Poles that form one mode differ by
+/// [`SAME_POLE`]; ten is room. Unfounded.
+pub(crate) const DEFECTIVE: f64 = 10.0 * SAME_POLE;
+
+/// Difference of a pitch angle from that of equal pitch, degrees, above which a tool has variable pitch. Case files give angles with a few
+/// digits; a thousandth of a degree changes a delay, and with it the speed of a limit, by about 1e-5 of itself.
+pub(crate) const VARIABLE_PITCH_DEG: f64 = 1e-3;
+
+/// Largest distance of the sum of the pitch angles of a case from 360°, degrees. Angles with three digits after the point err by 5e-4° each: 20
+/// teeth in sum by 0.01°.
+pub(crate) const PITCH_SUM_DEG: f64 = 0.01;
+
+/// Largest number of teeth of a tool in a case; a larger one is taken for a typing error. Large face mills have some 40 teeth. Unfounded.
+pub(crate) const TEETH_MAX: i64 = 64;
