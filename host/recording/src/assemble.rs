@@ -2,12 +2,9 @@
 
 use std::path::Path;
 
+use super::criteria::UNEVEN;
 use super::raw::{Raw, RawColumn};
 use super::{Channel, Quantity, Recording, RecordingError, Sensitivity, Sidecar, Unit};
-
-/// Largest deviation of a time stamp from even sampling, in sample intervals. It allows for stamps printed with few digits, and detects a
-/// missing sample (deviation 1). The value is a choice between the two.
-const UNEVEN: f64 = 0.25;
 
 /// Builds the recording: applies names, units and sensitivities of the sidecar, and determines the sample rate.
 pub(super) fn recording(path: &Path, raw: Raw, sidecar: Sidecar) -> Result<Recording, RecordingError> {

@@ -6,6 +6,7 @@ use quietcut_core::tachometer::{Edge, LevelDetector, LevelDetectorState, Wheel};
 use quietcut_core::units::{Degrees, Hertz, Millimeters, Nanoseconds, Rpm};
 use quietcut_core::working_point::{Tool, WorkingPoint};
 
+use super::criteria::LEAST_SWING;
 use super::{Channel, Quantity, Recording, RecordingError};
 
 /// Acceleration per count, m/s², of the IIS3DWB accelerometer in its ranges ±2, ±4, ±8 and ±16 g (sensitivities of its data sheet, mg/LSB).
@@ -18,10 +19,6 @@ const COUNT: [f64; 4] = [
 
 /// Largest count that a converted sample takes: one below 32 767, so that the largest sample is not counted as clipped.
 const FULL_SCALE: f64 = 32_766.0;
-
-/// Smallest change of the tachometer level that counts as an edge, as a fraction of its range over the recording. A choice, above the noise
-/// of usual sensors.
-const LEAST_SWING: f64 = 0.02;
 
 /// Input of the monitor as the device would have acquired it during the recording.
 #[derive(Clone, Debug)]

@@ -36,6 +36,7 @@
 
 mod assemble;
 mod blocks;
+mod criteria;
 mod csv;
 pub mod cut_table;
 mod error;

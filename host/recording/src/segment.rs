@@ -1,5 +1,6 @@
 //! A segment of a recording, selected by start and end time (options `--from-s`, `--until-s`).
 
+use super::criteria::SAME_SAMPLE;
 use super::{Recording, RecordingError};
 
 /// A segment of a recording: all samples with `from_s` ≤ t < `until_s`.
@@ -10,10 +11,6 @@ pub struct Segment {
     /// End time, s, exclusive; `None` for the end of the recording.
     pub until_s: Option<f64>,
 }
-
-/// Tolerance when a start or end time selects a sample, in sample intervals. It absorbs the rounding of printed times. The value is a
-/// choice, far below one interval.
-const SAME_SAMPLE: f64 = 1e-3;
 
 impl Segment {
     /// True if the segment is the whole recording.
