@@ -117,7 +117,7 @@ fn lobes(cell: &VirtualCell, output: Output) -> Result<Vec<u8>, Error> {
         depth_mm: Some(TABLE_DEPTH_MM),
         ..TableRequest::default()
     };
-    let bytes = build_table(std::slice::from_ref(cell.case()), &request)?;
+    let bytes = build_table(std::slice::from_ref(cell.case()), &request)?.bytes;
     let table = LobeTable::parse(&bytes).map_err(Error::other)?;
     let (limit, speeds) = (lowest_limit(&table), table.speeds().len());
     let seconds = began.elapsed().as_secs_f64();

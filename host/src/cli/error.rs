@@ -97,7 +97,7 @@ impl From<CaseError> for Error {
 impl From<StabilityError> for Error {
     fn from(error: StabilityError) -> Self {
         match error {
-            StabilityError::BrokeDown { .. } => Self::other(error),
+            StabilityError::BrokeDown { .. } | StabilityError::Eigenvalues { .. } => Self::other(error),
             _ => Self::input(error),
         }
     }

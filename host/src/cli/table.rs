@@ -72,6 +72,8 @@ struct TableOutput {
     #[serde(skip_serializing_if = "Option::is_none")]
     interpolation_error: Option<ErrorOutput>,
     layers: Vec<LayerOutput>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    warnings: Vec<String>,
 }
 
 /// Bound of the interpolation error between the entries of a lobe table: in depth, mm, and in relative spindle speed.
@@ -128,7 +130,7 @@ struct UnstableOutput {
 pub fn run(args: Args) -> Result<(), Error> {
     if let Some(path) = &args.show {
         let bytes = file::read(path)?;
-        return show(path, &bytes, args.output);
+        return show(path, &bytes, Vec::new(), args.output);
     }
     let Some(out) = &args.out else {
         return Err(Error::input("--out FILE.qct is needed: the lobe table to write"));
@@ -162,12 +164,15 @@ pub fn run(args: Args) -> Result<(), Error> {
             "--rpm {first}: a table needs a range of speeds, first:last:count"
         )));
     }
-    let bytes = build_table(&cases, &request)?;
-    file::write(out, &bytes)?;
-    show(out, &bytes, args.output)
+    let built = build_table(&cases, &request)?;
+    file::write(out, &built.bytes)?;
+    for warning in &built.warnings {
+        tracing::warn!("{warning}");
+    }
+    show(out, &built.bytes, built.warnings, args.output)
 }
 
-fn show(path: &Path, bytes: &[u8], output: Output) -> Result<(), Error> {
+fn show(path: &Path, bytes: &[u8], warnings: Vec<String>, output: Output) -> Result<(), Error> {
     let wrong = |error| Error::input(format!("{}: this is no lobe table: {error}", path.display()));
     let table = LobeTable::parse(bytes).map_err(wrong)?;
     let header = table.header().map_err(wrong)?;
@@ -204,6 +209,7 @@ fn show(path: &Path, bytes: &[u8], output: Output) -> Result<(), Error> {
             speed: error.speed,
         }),
         layers,
+        warnings,
     };
     let text = as_text(path, &shown);
     output.answer(&shown, text)

@@ -6,6 +6,7 @@ use quietcut_frf::FrfError;
 use quietcut_model::ModelError;
 use quietcut_model::case::CaseError;
 use quietcut_model::structure::StructureError;
+use quietcut_numerics::eigenvalues::EigenvalueError;
 
 /// Reason why stability cannot be computed.
 #[derive(Debug, thiserror::Error)]
@@ -122,4 +123,79 @@ pub enum StabilityError {
         /// Reason of the failure.
         what: &'static str,
     },
+    /// The eigenvalues of a period map or of a loop of receptances cannot be computed.
+    #[error("at {rpm} rev/min and {depth_mm} mm the computation broke down: {cause}")]
+    Eigenvalues {
+        /// Spindle speed, rev/min.
+        rpm: f64,
+        /// Axial depth, mm.
+        depth_mm: f64,
+        /// Reason from the eigenvalue iteration.
+        cause: EigenvalueError,
+    },
+}
+
+/// Text for equations over a period that cannot be solved.
+pub(crate) const NO_SOLUTION: &str = "the equations of the period have no finite solution";
+
+/// Text for receptances that are infinite or not a number.
+pub(crate) const NOT_FINITE: &str = "receptances are not finite";
+
+/// Text for a dominant multiplier that no method finds.
+pub(crate) const NO_DOMINANT: &str =
+    "motions grow beyond the range of numbers, or multipliers of nearly one size are too many to tell apart";
+
+/// Reason why Floquet multipliers, or roots of a loop, cannot be computed at one speed and depth.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Breakdown {
+    /// A linear system is singular, or a result is not finite.
+    NoSolution,
+    /// Block Arnoldi does not converge on a map too large for all eigenvalues.
+    TooManyMultipliers,
+    /// The eigenvalue iteration of a matrix failed.
+    Eigenvalues(EigenvalueError),
+}
+
+impl From<EigenvalueError> for Breakdown {
+    fn from(cause: EigenvalueError) -> Self {
+        // A matrix that is not finite has no better reason than the equations behind it.
+        match cause {
+            EigenvalueError::NotFinite { .. } => Self::NoSolution,
+            _ => Self::Eigenvalues(cause),
+        }
+    }
+}
+
+impl Breakdown {
+    /// Error at a spindle speed (rev/min) and an axial depth (mm); `no_solution` says which equations have no finite
+    /// solution.
+    pub(crate) fn at(self, rpm: f64, depth_mm: f64, no_solution: &'static str) -> StabilityError {
+        let what = match self {
+            Self::NoSolution => no_solution,
+            Self::TooManyMultipliers => "multipliers of nearly one size are too many to tell apart",
+            Self::Eigenvalues(cause) => return StabilityError::Eigenvalues { rpm, depth_mm, cause },
+        };
+        StabilityError::BrokeDown { rpm, depth_mm, what }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn errors_of_multipliers_name_the_iteration_or_the_equations() {
+        let iteration = EigenvalueError::NotConverged {
+            size: 120,
+            iterations: 3600,
+        };
+        let error = Breakdown::from(iteration).at(900.0, 2.0, NO_SOLUTION).to_string();
+        assert!(
+            error.contains("900 rev/min") && error.contains("3600 iterations"),
+            "{error}"
+        );
+        let overflow = EigenvalueError::NotFinite { size: 120 };
+        let error = Breakdown::from(overflow).at(900.0, 2.0, NO_SOLUTION).to_string();
+        assert!(error.contains(NO_SOLUTION), "{error}");
+    }
 }

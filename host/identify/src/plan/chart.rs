@@ -28,7 +28,8 @@ impl KnownLimit {
     /// The gradient has `size` entries; those of unknowns that affect only tests are zero.
     pub(super) fn new(line: &SpeedLine, linearized: &Linearized, size: usize) -> Option<Self> {
         let first_mm = line.first_limit?.depth_mm;
-        let mut planes = linearized.planes(line);
+        let planes = linearized.planes(line).into_iter();
+        let mut planes: Vec<Plane> = planes.filter_map(Result::ok).collect();
         planes.retain(|plane| plane.depth_mm >= first_mm);
         planes.truncate(LOBES);
         for plane in &mut planes {

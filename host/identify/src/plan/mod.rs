@@ -197,9 +197,7 @@ impl Basis {
         };
         let unknowns = Unknowns::new(case, &request.prior, &request.means)
             .ok_or_else(|| no_derivatives("nothing is unknown; larger deviations are needed"))?;
-        let linearized = Linearized::new(case, &unknowns.variables).ok_or_else(|| {
-            no_derivatives("a twentieth of a deviation makes a structure or a cut that cannot be")
-        })?;
+        let linearized = Linearized::new(case, &unknowns.variables)?;
         let lines: Vec<Result<SpeedLine, StabilityError>> = request
             .speeds_rpm
             .par_iter()

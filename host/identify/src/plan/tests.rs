@@ -104,7 +104,7 @@ impl Campaign<'_> {
         let machine = self.machine(u);
         let line = first_limit(&machine, rpm, 2.0 * self.request.depth_mm);
         let linearized = Linearized::new(&machine, &self.unknowns.variables).unwrap();
-        linearized.planes(&line).remove(0)
+        linearized.planes(&line).remove(0).unwrap()
     }
 
     /// Transform of the acceleration at the frequencies of a record of 12 s, in units of the transform of its noise.

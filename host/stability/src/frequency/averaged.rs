@@ -5,7 +5,7 @@ use num_complex::Complex64;
 
 use super::open_loop::{OpenLoop, RealEnd, around, ascending};
 use super::problem::FrequencyProblem;
-use crate::error::StabilityError;
+use crate::error::{Breakdown, NOT_FINITE, StabilityError};
 use crate::spectrum::stability_loss::StabilityLoss;
 use quietcut_numerics::eigenvalues;
 
@@ -55,15 +55,20 @@ impl<'a> AveragedLoop<'a> {
     /// is already below 1 at the last line. A mode above the table remains undetected, however small the gain.
     ///
     /// # Errors
-    /// The gain at the last line, with the displacement and its past in opposite phase, is 1 or more at that depth.
-    pub(crate) fn check_reach(problem: &FrequencyProblem, depth_mm: f64) -> Result<(), StabilityError> {
+    /// The gain at the last line, with the displacement and its past in opposite phase, is 1 or more at that depth, or cannot be
+    /// computed.
+    pub(crate) fn check_reach(
+        problem: &FrequencyProblem,
+        rpm: f64,
+        depth_mm: f64,
+    ) -> Result<(), StabilityError> {
         let Some((_, last_hz)) = problem.band_hz() else {
             return Ok(());
         };
         let last = Complex64::new(0.0, std::f64::consts::TAU * last_hz);
         let loci = AveragedLoop::new(problem, None)
             .eigenvalues(last, 0.0)
-            .unwrap_or_default();
+            .map_err(|cause| cause.at(rpm, depth_mm, NOT_FINITE))?;
         let largest = loci.iter().map(|locus| locus.norm()).fold(0.0, f64::max);
         let deepest_mm = 1e3 / (2.0 * largest);
         if depth_mm < deepest_mm {
@@ -104,12 +109,12 @@ impl OpenLoop for AveragedLoop<'_> {
         s
     }
 
-    fn eigenvalues(&self, s: Complex64, _floor: f64) -> Option<Vec<Complex64>> {
-        let matrix = self.matrix(s)?;
+    fn eigenvalues(&self, s: Complex64, _floor: f64) -> Result<Vec<Complex64>, Breakdown> {
+        let matrix = self.matrix(s).ok_or(Breakdown::NoSolution)?;
         let seen = DMatrix::from_fn(self.axes.len(), self.axes.len(), |i, j| {
             matrix[(self.axes[i], self.axes[j])]
         });
-        eigenvalues::of_complex(seen).ok()
+        Ok(eigenvalues::of_complex(seen)?)
     }
 
     fn determinant(&self, s: Complex64, kappa: Complex64) -> Option<Complex64> {
@@ -121,22 +126,22 @@ impl OpenLoop for AveragedLoop<'_> {
         determinant.is_finite().then_some(determinant)
     }
 
-    fn real_end(&self) -> Option<RealEnd> {
+    fn real_end(&self) -> Result<Option<RealEnd>, Breakdown> {
         // At ω = 0 loci with regeneration are 0. Without regeneration they are real there: eigenvalues of the static
         // compliance times α₀.
         if self.delay_s.is_some() {
-            return None;
+            return Ok(None);
         }
         let loci = self.eigenvalues(Complex64::ZERO, 0.0)?;
         let real = loci.iter().filter(|locus| locus.im.abs() <= 1e-9 * locus.norm());
-        Some(RealEnd {
+        Ok(Some(RealEnd {
             omega: 0.0,
             loci: real.map(|locus| locus.re).collect(),
             kind: StabilityLoss::Fold,
-        })
+        }))
     }
 
-    fn grid(&self, floor: f64) -> Option<Vec<f64>> {
+    fn grid(&self, floor: f64) -> Result<Vec<f64>, Breakdown> {
         let resonances = self.problem.resonances();
         let fastest = resonances
             .iter()
@@ -144,7 +149,10 @@ impl OpenLoop for AveragedLoop<'_> {
             .fold(0.0, f64::max);
         let lines = self.problem.lines();
         let mut end = lines.last().copied().unwrap_or(0.0).max(1.5 * fastest);
-        let size = |omega: f64| Some(2.0 * self.matrix(Complex64::new(0.0, omega))?.norm());
+        let size = |omega: f64| -> Result<f64, Breakdown> {
+            let matrix = self.matrix(Complex64::new(0.0, omega));
+            Ok(2.0 * matrix.ok_or(Breakdown::NoSolution)?.norm())
+        };
         // Above all resonances the loci decrease with the frequency: the grid ends where they fall below the floor.
         while end > 0.0 && size(end)? >= floor {
             end *= 1.4;
@@ -156,6 +164,6 @@ impl OpenLoop for AveragedLoop<'_> {
             let steps = (end * delay_s * 3.0 / std::f64::consts::TAU).ceil();
             grid.extend((1..steps as usize).map(|i| end * i as f64 / steps));
         }
-        Some(ascending(grid))
+        Ok(ascending(grid))
     }
 }

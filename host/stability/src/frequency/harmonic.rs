@@ -6,6 +6,7 @@ use num_complex::Complex64;
 use super::limits::{AxisCrossing, limits};
 use super::open_loop::{OpenLoop, RealEnd, around, ascending};
 use super::problem::{FrequencyProblem, Resonance};
+use crate::error::Breakdown;
 use crate::spectrum::stability_loss::StabilityLoss;
 use quietcut_model::milling::Harmonic;
 use quietcut_numerics::eigenvalues;
@@ -73,7 +74,8 @@ impl<'a> HarmonicLoop<'a> {
         self.harmonics
     }
 
-    /// Limits from every second line of a table, empty if they cannot be computed; `None` without a table.
+    /// Limits from every second line of a table, for the error of limits from all lines; `None` without a table. If they
+    /// cannot be computed the list is empty, and limits have no stated error.
     pub(crate) fn thinned_limits(&self, depth_m: f64) -> Option<Vec<AxisCrossing>> {
         let problem = self.problem.thinned()?;
         let thinned = HarmonicLoop {
@@ -152,16 +154,13 @@ impl<'a> HarmonicLoop<'a> {
     }
 
     /// Real eigenvalues at s = iΩ/2, 1/m, where multipliers are −1.
-    fn flips(&self) -> Option<Vec<f64>> {
-        let matrix = self.matrix(Complex64::new(0.0, 0.5 * self.passing))?;
+    fn flips(&self) -> Result<Vec<f64>, Breakdown> {
+        let matrix = self.matrix(Complex64::new(0.0, 0.5 * self.passing));
+        let matrix = matrix.ok_or(Breakdown::NoSolution)?;
         let real = real_form(&matrix, self.count(), self.axes.len());
-        let all = eigenvalues::of_real(real).ok()?;
-        Some(
-            all.iter()
-                .filter(|value| value.im == 0.0)
-                .map(|value| value.re)
-                .collect(),
-        )
+        let all = eigenvalues::of_real(real)?;
+        let real = all.iter().filter(|value| value.im == 0.0);
+        Ok(real.map(|value| value.re).collect())
     }
 
     /// Frequency, Hz, of the harmonic with the largest displacement in the motion of a root s at a depth, m.
@@ -262,8 +261,9 @@ impl OpenLoop for HarmonicLoop<'_> {
         Complex64::new(s.re, rest.abs())
     }
 
-    fn eigenvalues(&self, s: Complex64, floor: f64) -> Option<Vec<Complex64>> {
-        eigenvalues::dominant(&self.matrix(s)?, floor).ok()
+    fn eigenvalues(&self, s: Complex64, floor: f64) -> Result<Vec<Complex64>, Breakdown> {
+        let matrix = self.matrix(s).ok_or(Breakdown::NoSolution)?;
+        Ok(eigenvalues::dominant(&matrix, floor)?)
     }
 
     fn determinant(&self, s: Complex64, kappa: Complex64) -> Option<Complex64> {
@@ -277,16 +277,16 @@ impl OpenLoop for HarmonicLoop<'_> {
         determinant.is_finite().then_some(determinant)
     }
 
-    fn real_end(&self) -> Option<RealEnd> {
-        Some(RealEnd {
+    fn real_end(&self) -> Result<Option<RealEnd>, Breakdown> {
+        Ok(Some(RealEnd {
             omega: 0.5 * self.passing,
             // The factor κ/w is 2 at s = iΩ/2.
             loci: self.flips()?.into_iter().map(|value| 2.0 * value).collect(),
             kind: StabilityLoss::Flip,
-        })
+        }))
     }
 
-    fn grid(&self, _floor: f64) -> Option<Vec<f64>> {
+    fn grid(&self, _floor: f64) -> Result<Vec<f64>, Breakdown> {
         let end = 0.5 * self.passing;
         let folded: Vec<Resonance> = self
             .problem
@@ -302,6 +302,6 @@ impl OpenLoop for HarmonicLoop<'_> {
             .collect();
         let mut grid = around(&folded, end);
         grid.extend((1..12).map(|i| end * f64::from(i) / 12.0));
-        Some(ascending(grid))
+        Ok(ascending(grid))
     }
 }

@@ -7,7 +7,7 @@ use num_complex::Complex64;
 use super::loci::{argument_increase, crossings, trace};
 use super::open_loop::OpenLoop;
 use crate::criteria::{LEAST_ERROR, SAME_LIMIT};
-use crate::error::StabilityError;
+use crate::error::{Breakdown, StabilityError};
 use crate::limits::speed_line::{SpeedLine, Switch};
 use crate::spectrum::stability_loss::StabilityLoss;
 
@@ -31,11 +31,12 @@ pub(crate) struct AxisCrossing {
 
 /// All crossings of the imaginary axis up to an axial depth (m), by depth.
 ///
-/// `None` if receptances are infinite or a result is not finite.
-pub(crate) fn limits(open_loop: &impl OpenLoop, depth_m: f64) -> Option<Vec<AxisCrossing>> {
+/// # Errors
+/// Receptances are infinite, a result is not finite, or an eigenvalue iteration fails.
+pub(crate) fn limits(open_loop: &impl OpenLoop, depth_m: f64) -> Result<Vec<AxisCrossing>, Breakdown> {
     let floor = depth_m.recip();
     let mut grid = open_loop.grid(floor)?;
-    let real_end = open_loop.real_end();
+    let real_end = open_loop.real_end()?;
     let mut limits = Vec::new();
     if let Some(end) = &real_end {
         // The real loci at this end are crossings themselves. Samples closer to the end are left out, where rounding of
@@ -46,7 +47,7 @@ pub(crate) fn limits(open_loop: &impl OpenLoop, depth_m: f64) -> Option<Vec<Axis
             grid.push(next_to_end);
             next_to_end
         } else {
-            let next_to_end = grid.get(1)? * REAL_END_OFFSET;
+            let next_to_end = grid.get(1).ok_or(Breakdown::NoSolution)? * REAL_END_OFFSET;
             grid.retain(|&omega| omega > next_to_end);
             grid.insert(0, next_to_end);
             next_to_end
@@ -55,7 +56,8 @@ pub(crate) fn limits(open_loop: &impl OpenLoop, depth_m: f64) -> Option<Vec<Axis
         for &value in end.loci.iter().filter(|&&value| value >= floor) {
             let near = loci
                 .iter()
-                .min_by(|p, q| (*p - value).norm().total_cmp(&(*q - value).norm()))?;
+                .min_by(|p, q| (*p - value).norm().total_cmp(&(*q - value).norm()))
+                .ok_or(Breakdown::NoSolution)?;
             limits.push(AxisCrossing {
                 depth_m: value.recip(),
                 omega: end.omega,
@@ -81,7 +83,7 @@ pub(crate) fn limits(open_loop: &impl OpenLoop, depth_m: f64) -> Option<Vec<Axis
             }),
     );
     limits.sort_by(|a, b| a.depth_m.total_cmp(&b.depth_m));
-    Some(limits)
+    Ok(limits)
 }
 
 /// Number of roots with Re s > `sigma` (1/s) at an axial depth (m), by the Nyquist criterion on the determinant D(s).
@@ -90,13 +92,13 @@ pub(crate) fn limits(open_loop: &impl OpenLoop, depth_m: f64) -> Option<Vec<Axis
 /// to infinity the argument of D grows by π (P − N) for P poles and N roots right of the line, conjugates included.
 /// `None` if the line meets a root, or if the table cannot be continued to it.
 pub(crate) fn unstable_roots(open_loop: &impl OpenLoop, depth_m: f64, sigma: f64) -> Option<i32> {
-    let grid = open_loop.grid(depth_m.max(1e-9).recip())?;
+    let grid = open_loop.grid(depth_m.max(1e-9).recip()).ok()?;
     let determinant = |omega: f64| {
         let s = Complex64::new(sigma, omega);
         open_loop.determinant(s, open_loop.regeneration(s) * depth_m)
     };
     let mut increase = argument_increase(&determinant, &grid)?;
-    if open_loop.real_end().is_none_or(|end| end.omega == 0.0) {
+    if open_loop.real_end().ok()?.is_none_or(|end| end.omega == 0.0) {
         // Beyond the grid the loop gain is below one, and the determinant goes straight to 1.
         increase -= determinant(*grid.last()?)?.arg();
     }

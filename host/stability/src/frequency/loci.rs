@@ -5,6 +5,8 @@ use std::f64::consts::PI;
 
 use num_complex::Complex64;
 
+use crate::error::Breakdown;
+
 /// Largest number of halvings of a frequency interval in which loci cannot be told apart. Unfounded.
 const LEVELS: u32 = 16;
 
@@ -31,23 +33,24 @@ pub(crate) struct Crossing {
 }
 
 /// Function of the frequency (rad/s) that returns all eigenvalues of absolute value `floor` and above.
-pub(crate) trait Loci: Fn(f64) -> Option<Vec<Complex64>> {}
-impl<F: Fn(f64) -> Option<Vec<Complex64>>> Loci for F {}
+pub(crate) trait Loci: Fn(f64) -> Result<Vec<Complex64>, Breakdown> {}
+impl<F: Fn(f64) -> Result<Vec<Complex64>, Breakdown>> Loci for F {}
 
 /// Samples the loci on a grid, so densely that every locus of at least `floor` can be told from the others between
 /// samples and is nearly straight: its middle deviates by at most `bend` times a tenth of its size.
 ///
-/// `None` if the function returns `None`.
-pub(crate) fn trace(loci: &impl Loci, grid: &[f64], floor: f64, bend: f64) -> Option<Vec<Sample>> {
+/// # Errors
+/// As the function.
+pub(crate) fn trace(loci: &impl Loci, grid: &[f64], floor: f64, bend: f64) -> Result<Vec<Sample>, Breakdown> {
     let sample = |omega: f64| {
-        Some(Sample {
+        Ok(Sample {
             omega,
             values: loci(omega)?,
         })
     };
     let mut samples = Vec::with_capacity(2 * grid.len());
     let Some((&first, rest)) = grid.split_first() else {
-        return Some(samples);
+        return Ok(samples);
     };
     let mut low = sample(first)?;
     for &omega in rest {
@@ -57,25 +60,25 @@ pub(crate) fn trace(loci: &impl Loci, grid: &[f64], floor: f64, bend: f64) -> Op
         low = high;
     }
     samples.push(low);
-    Some(samples)
+    Ok(samples)
 }
 
 /// Adds samples between two samples until every locus is straight and told apart from the others.
 fn divide(
-    sample: &impl Fn(f64) -> Option<Sample>,
+    sample: &impl Fn(f64) -> Result<Sample, Breakdown>,
     low: &Sample,
     high: &Sample,
     limits: (f64, f64),
     level: u32,
     samples: &mut Vec<Sample>,
-) -> Option<()> {
+) -> Result<(), Breakdown> {
     if level == LEVELS || is_nothing(low, limits.0) && is_nothing(high, limits.0) && level > 0 {
-        return Some(());
+        return Ok(());
     }
     let middle = sample(0.5 * (low.omega + high.omega))?;
     if is_straight(low, &middle, high, limits) {
         samples.push(middle);
-        return Some(());
+        return Ok(());
     }
     divide(sample, low, &middle, limits, level + 1, samples)?;
     samples.push(middle.clone());
@@ -171,18 +174,20 @@ pub(crate) fn steps(samples: &[Sample]) -> impl Iterator<Item = Step> {
 
 /// Collects the solutions that `solve` finds on the steps between samples.
 ///
-/// If `solve` fails on a step because two close loci were exchanged, the interval is halved and solved again. `None` if
-/// it fails however short the interval.
+/// If `solve` fails on a step because two close loci were exchanged, the interval is halved and solved again.
+///
+/// # Errors
+/// As the function `loci`, or `solve` fails however short the interval.
 pub(crate) fn solve_steps<T>(
     loci: &impl Loci,
     samples: &[Sample],
     solve: &impl Fn(Step) -> Option<Vec<T>>,
-) -> Option<Vec<T>> {
+) -> Result<Vec<T>, Breakdown> {
     let mut found = Vec::new();
     for pair in samples.windows(2) {
         found.extend(solve_between(loci, &pair[0], &pair[1], solve, 0)?);
     }
-    Some(found)
+    Ok(found)
 }
 
 fn solve_between<T>(
@@ -191,13 +196,13 @@ fn solve_between<T>(
     high: &Sample,
     solve: &impl Fn(Step) -> Option<Vec<T>>,
     level: u32,
-) -> Option<Vec<T>> {
+) -> Result<Vec<T>, Breakdown> {
     let whole: Option<Vec<Vec<T>>> = steps_between(low, high).into_iter().map(solve).collect();
     if let Some(found) = whole {
-        return Some(found.into_iter().flatten().collect());
+        return Ok(found.into_iter().flatten().collect());
     }
     if level == 2 * LEVELS {
-        return None;
+        return Err(Breakdown::NoSolution);
     }
     let omega = 0.5 * (low.omega + high.omega);
     let middle = Sample {
@@ -206,11 +211,18 @@ fn solve_between<T>(
     };
     let mut found = solve_between(loci, low, &middle, solve, level + 1)?;
     found.extend(solve_between(loci, &middle, high, solve, level + 1)?);
-    Some(found)
+    Ok(found)
 }
 
 /// Crossings of the positive real axis by loci of at least `floor`, largest first, to 1e-12 of the value.
-pub(crate) fn crossings(loci: &impl Loci, samples: &[Sample], floor: f64) -> Option<Vec<Crossing>> {
+///
+/// # Errors
+/// As [`solve_steps`].
+pub(crate) fn crossings(
+    loci: &impl Loci,
+    samples: &[Sample],
+    floor: f64,
+) -> Result<Vec<Crossing>, Breakdown> {
     let mut found = solve_steps(loci, samples, &|[low, high]: Step| {
         if (low.1.im > 0.0) == (high.1.im > 0.0) || low.1.re.max(high.1.re) < 0.5 * floor {
             return Some(Vec::new());
@@ -222,7 +234,8 @@ pub(crate) fn crossings(loci: &impl Loci, samples: &[Sample], floor: f64) -> Opt
         };
         let tolerance = 1e-12 * low.1.norm().max(high.1.norm());
         let (omega, value) = zero(mark(low), mark(high), tolerance, |omega| {
-            Some(loci(omega)?.into_iter().map(|value| (value, value.im)).collect())
+            let loci = loci(omega).ok()?;
+            Some(loci.into_iter().map(|value| (value, value.im)).collect())
         })?;
         let crossing = Crossing {
             omega,
@@ -237,7 +250,7 @@ pub(crate) fn crossings(loci: &impl Loci, samples: &[Sample], floor: f64) -> Opt
         )
     })?;
     found.sort_by(|a, b| b.value.total_cmp(&a.value));
-    Some(found)
+    Ok(found)
 }
 
 /// Point of a locus with its residual, which vanishes at the solution.
@@ -335,12 +348,12 @@ mod tests {
     use super::*;
 
     /// Two loci of one pole each, rotated by a delay.
-    fn two(omega: f64) -> Option<Vec<Complex64>> {
+    fn two(omega: f64) -> Result<Vec<Complex64>, Breakdown> {
         let mode = |natural: f64, size: f64| {
             size / Complex64::new(natural * natural - omega * omega, 0.04 * natural * omega)
                 * (Complex64::ONE - Complex64::cis(-omega))
         };
-        Some(vec![mode(10.0, 1.0), mode(23.0, 5.0)])
+        Ok(vec![mode(10.0, 1.0), mode(23.0, 5.0)])
     }
 
     #[test]

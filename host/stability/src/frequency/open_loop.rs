@@ -3,6 +3,7 @@
 use num_complex::Complex64;
 
 use super::problem::{FrequencyProblem, Resonance};
+use crate::error::Breakdown;
 use crate::spectrum::stability_loss::StabilityLoss;
 
 /// End of the frequency range at which all loci are real or conjugate pairs: real multipliers cross the unit circle
@@ -32,34 +33,44 @@ pub(crate) trait OpenLoop: Sync {
 
     /// Eigenvalues λ(s), 1/m, of absolute value `floor` and above, and possibly smaller ones.
     ///
-    /// `None` if H is infinite or a result is not finite.
-    fn eigenvalues(&self, s: Complex64, floor: f64) -> Option<Vec<Complex64>>;
+    /// # Errors
+    /// H is infinite, a result is not finite, or the eigenvalue iteration fails.
+    fn eigenvalues(&self, s: Complex64, floor: f64) -> Result<Vec<Complex64>, Breakdown>;
 
     /// Determinant det(I − (κα − β)H): its zeros are the roots, its poles the poles of the structure.
     fn determinant(&self, s: Complex64, kappa: Complex64) -> Option<Complex64>;
 
     /// End of the frequency range with real loci; `None` if there is none.
-    fn real_end(&self) -> Option<RealEnd>;
+    ///
+    /// # Errors
+    /// As [`eigenvalues`](Self::eigenvalues).
+    fn real_end(&self) -> Result<Option<RealEnd>, Breakdown>;
 
     /// Frequency grid from 0, rad/s, that resolves every resonance and ends where no locus reaches `floor`, 1/m.
-    fn grid(&self, floor: f64) -> Option<Vec<f64>>;
+    ///
+    /// # Errors
+    /// H is infinite.
+    fn grid(&self, floor: f64) -> Result<Vec<f64>, Breakdown>;
 
     /// Characteristic loci κλ/w at iω, 1/m: those of absolute value `floor` and above, and possibly smaller ones.
     ///
     /// The determinant vanishes at the depth w at which a locus has the value 1/w.
-    fn loci(&self, omega: f64, floor: f64) -> Option<Vec<Complex64>> {
+    ///
+    /// # Errors
+    /// As [`eigenvalues`](Self::eigenvalues).
+    fn loci(&self, omega: f64, floor: f64) -> Result<Vec<Complex64>, Breakdown> {
         let s = Complex64::new(0.0, omega);
         let regeneration = self.regeneration(s);
         let size = regeneration.norm();
         // At integer multiples of the tooth-passing frequency the regeneration factor vanishes.
         if size < 1e-14 {
-            return Some(Vec::new());
+            return Ok(Vec::new());
         }
         let mut loci = self.eigenvalues(s, floor / size)?;
         for locus in &mut loci {
             *locus *= regeneration;
         }
-        Some(loci)
+        Ok(loci)
     }
 }
 

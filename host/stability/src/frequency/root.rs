@@ -9,7 +9,7 @@ use super::loci::{steps, trace};
 use super::open_loop::OpenLoop;
 use super::problem::FrequencyProblem;
 use crate::criteria::LEAST_ERROR;
-use crate::error::StabilityError;
+use crate::error::{Breakdown, StabilityError};
 use crate::limits::point::CutStability;
 use crate::spectrum::stability_loss::StabilityLoss;
 
@@ -19,6 +19,9 @@ const LINES: [f64; 14] = [
     0.0, -0.3, -0.6, -0.8, -0.9, -0.97, -1.2, -2.0, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0,
 ];
 
+/// Text for a dominant multiplier that is not found from receptances.
+pub(crate) const NO_ROOT: &str = "the rightmost root cannot be found by receptances; limits can";
+
 /// Smallest locus, as a share of 1/w, that is traced along a line Re s = σ to predict roots away from the line.
 /// Unfounded.
 const REACH: f64 = 0.05;
@@ -27,8 +30,11 @@ const REACH: f64 = 0.05;
 ///
 /// First, roots are continued from depth 0, where they are poles of the structure. Then loci are traced along lines Re
 /// s = σ: if one passes near 1/w, its linear continuation away from the line predicts a root, which is then solved for.
-/// The rightmost root found is verified by counting the roots to its right. `None` if none is verified.
-pub(crate) fn rightmost(open_loop: &impl OpenLoop, depth_m: f64) -> Option<Complex64> {
+/// The rightmost root found is verified by counting the roots to its right.
+///
+/// # Errors
+/// No root is verified; the reason is that of the last line Re s = σ along which loci could not be traced.
+pub(crate) fn rightmost(open_loop: &impl OpenLoop, depth_m: f64) -> Result<Complex64, Breakdown> {
     let decay = open_loop
         .problem()
         .resonances()
@@ -41,10 +47,17 @@ pub(crate) fn rightmost(open_loop: &impl OpenLoop, depth_m: f64) -> Option<Compl
     if let Some(root) = best
         && is_rightmost(open_loop, depth_m, root, decay)
     {
-        return Some(root);
+        return Ok(root);
     }
+    let mut reason = Breakdown::NoSolution;
     for multiple in LINES {
-        let found = from_line(open_loop, depth_m, multiple * decay, decay);
+        let found = match from_line(open_loop, depth_m, multiple * decay, decay) {
+            Ok(found) => found,
+            Err(cause) => {
+                reason = cause;
+                None
+            }
+        };
         best = [best, found]
             .into_iter()
             .flatten()
@@ -52,10 +65,10 @@ pub(crate) fn rightmost(open_loop: &impl OpenLoop, depth_m: f64) -> Option<Compl
         if let Some(root) = found.and(best)
             && is_rightmost(open_loop, depth_m, root, decay)
         {
-            return Some(root);
+            return Ok(root);
         }
     }
-    None
+    Err(reason)
 }
 
 /// Rightmost of the roots continued from the poles of the structure.
@@ -70,11 +83,16 @@ fn from_poles(open_loop: &impl OpenLoop, depth_m: f64) -> Option<Complex64> {
         .map(|root| Complex64::new(root.re, root.im.abs()))
 }
 
-/// Rightmost of the roots predicted from loci along a line Re s = `sigma`.
-fn from_line(open_loop: &impl OpenLoop, depth_m: f64, sigma: f64, decay: f64) -> Option<Complex64> {
+/// Rightmost of the roots predicted from loci along a line Re s = `sigma`; `None` if there is none.
+fn from_line(
+    open_loop: &impl OpenLoop,
+    depth_m: f64,
+    sigma: f64,
+    decay: f64,
+) -> Result<Option<Complex64>, Breakdown> {
     let target = depth_m.recip();
     if !target.is_finite() {
-        return None;
+        return Ok(None);
     }
     let floor = REACH * target;
     let grid = open_loop.grid(target)?;
@@ -97,7 +115,7 @@ fn from_line(open_loop: &impl OpenLoop, depth_m: f64, sigma: f64, decay: f64) ->
             best = Some(Complex64::new(root.re, root.im.abs()));
         }
     }
-    best
+    Ok(best)
 }
 
 /// True if no root lies further right.
@@ -113,17 +131,17 @@ fn is_rightmost(open_loop: &impl OpenLoop, depth_m: f64, root: Complex64, decay:
 }
 
 /// Characteristic loci κλ/w at any s, 1/m.
-fn loci_at(open_loop: &impl OpenLoop, s: Complex64, floor: f64) -> Option<Vec<Complex64>> {
+fn loci_at(open_loop: &impl OpenLoop, s: Complex64, floor: f64) -> Result<Vec<Complex64>, Breakdown> {
     let regeneration = open_loop.regeneration(s);
     let size = regeneration.norm();
     if size < 1e-14 {
-        return Some(Vec::new());
+        return Ok(Vec::new());
     }
     let mut loci = open_loop.eigenvalues(s, floor / size)?;
     for locus in &mut loci {
         *locus *= regeneration;
     }
-    Some(loci)
+    Ok(loci)
 }
 
 /// Root near a guess, by secant steps on w − 1/locus, with the locus for which it is smallest.
@@ -132,7 +150,7 @@ pub(crate) fn polish(open_loop: &impl OpenLoop, depth_m: f64, guess: Complex64) 
     const SHALLOW_M: f64 = 1e-3;
     let floor = 0.3 / depth_m.max(SHALLOW_M);
     let miss = |s: Complex64| {
-        let loci = loci_at(open_loop, s, floor)?;
+        let loci = loci_at(open_loop, s, floor).ok()?;
         loci.into_iter()
             .map(|locus| depth_m - locus.inv())
             .min_by(|p, q| p.norm().total_cmp(&q.norm()))
@@ -182,11 +200,7 @@ pub(crate) fn averaged_point(
     open_loop: impl Fn(&FrequencyProblem) -> AveragedLoop<'_>,
 ) -> Result<CutStability, StabilityError> {
     let at = |problem: &FrequencyProblem| rightmost(&open_loop(problem), depth_mm * 1e-3);
-    let root = at(problem).ok_or(StabilityError::BrokeDown {
-        rpm,
-        depth_mm,
-        what: "the rightmost root cannot be found by receptances; limits can",
-    })?;
+    let root = at(problem).map_err(|cause| cause.at(rpm, depth_mm, NO_ROOT))?;
     let multiplier = |root: Complex64| (root * problem.tooth_period_s(rpm)).exp();
     let error = match problem.thinned() {
         Some(thinned) => at(&thinned).map_or(f64::INFINITY, |other| {

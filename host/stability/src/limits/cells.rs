@@ -12,7 +12,7 @@ use super::cell::Cell;
 use crate::criteria::{
     CELL_FAR, CELL_FOLLOWED, CELL_TOLERANCE, CELL_TOLERANCE_FAR, LEAST_ERROR, UNCONFIRMED,
 };
-use crate::error::StabilityError;
+use crate::error::{NO_SOLUTION, StabilityError};
 use crate::spectrum::along_depth::Spectrum;
 use crate::spectrum::root::Root;
 use crate::spectrum::verdict::Verdict;
@@ -133,12 +133,10 @@ impl<S: Spectrum> Column<S> {
     /// Computes all multipliers at the depth of a cell, and fills the cell.
     fn sample(&mut self, index: usize) -> Result<Sample, StabilityError> {
         let depth_m = self.depths_m[index];
-        let broke_down = StabilityError::BrokeDown {
-            rpm: self.rpm,
-            depth_mm: depth_m * 1e3,
-            what: "the equations of the period have no finite solution",
-        };
-        let all = self.spectrum.multipliers(depth_m).ok_or(broke_down)?;
+        let all = self
+            .spectrum
+            .multipliers(depth_m)
+            .map_err(|cause| cause.at(self.rpm, depth_m * 1e3, NO_SOLUTION))?;
         let largest = all.first().map_or(0.0, |multiplier| multiplier.norm());
         let mut sizes = (0.0_f64, 0.0_f64);
         let mut roots = Some(Vec::with_capacity(4));

@@ -6,7 +6,7 @@ use num_complex::Complex64;
 use super::bounds::{check_depth, check_speed};
 use super::speed_line::{SpeedLine, Switch};
 use crate::criteria::{LINE_FAR, LINE_FOLLOWED, LINE_LEVELS, LINE_POLISHED};
-use crate::error::StabilityError;
+use crate::error::{NO_SOLUTION, StabilityError};
 use crate::problem::linear::Problem;
 use crate::problem::period::check_length;
 use crate::spectrum::along_depth::Spectrum;
@@ -121,7 +121,7 @@ impl<S: Spectrum> Scan<S> {
         let all = self
             .spectrum
             .multipliers(depth_m)
-            .ok_or_else(|| self.broke_down(depth_m, "the equations of the period have no finite solution"))?;
+            .map_err(|cause| cause.at(self.rpm, depth_m * 1e3, NO_SOLUTION))?;
         let roots = all
             .into_iter()
             .take_while(|multiplier| multiplier.norm() > LINE_FOLLOWED)

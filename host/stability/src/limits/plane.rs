@@ -6,14 +6,19 @@ use std::f64::consts::TAU;
 use nalgebra::DVector;
 
 use super::sampling::Variable;
-use super::sensitivity::{Sensitivity, Slope, Tangent};
+use super::sensitivity::{Sensitivity, Slope, Tangent, no_derivative};
 use super::speed_line::{SpeedLine, Switch};
+use crate::error::StabilityError;
 use crate::problem::linear::{CubicTerms, Problem};
 use quietcut_model::case::Case;
 
 /// Half width of the central difference of the problem along a variable, in standard deviations. If one side is no
 /// valid machine, the difference is one-sided.
 const STEP: f64 = 0.05;
+
+/// Reason why a variable has no derivative.
+const OUT_OF_BOUNDS: &str = "a parameter leaves its bounds if it changes by a twentieth of its standard deviation to either side; \
+    a smaller deviation is needed";
 
 /// Linear problem of a case with its derivative along each variable, per standard deviation.
 #[derive(Clone, Debug)]
@@ -35,41 +40,49 @@ pub struct Plane {
 }
 
 impl Linearized {
-    /// Linearizes the problem of a case along its variables; `None` if the linear part of the case, or of a varied
-    /// case, is not valid.
-    pub fn new(case: &Case, variables: &[Variable]) -> Option<Self> {
-        let problem = Problem::new(case, CubicTerms::LeaveOut).ok()?;
+    /// Linearizes the problem of a case along its variables.
+    ///
+    /// # Errors
+    /// The linear part of the case is not covered, or that of a case varied to either side is not valid.
+    pub fn new(case: &Case, variables: &[Variable]) -> Result<Self, StabilityError> {
+        let problem = Problem::new(case, CubicTerms::LeaveOut)?;
         let tangents = variables.iter().map(|variable| {
             let at = |deviations: f64| {
                 let mut moved = case.clone();
-                let is_possible = variable.shift(&mut moved, deviations);
-                is_possible.then(|| Problem::new(&moved, CubicTerms::LeaveOut).ok())?
+                if variable.shift(&mut moved, deviations) {
+                    Problem::new(&moved, CubicTerms::LeaveOut)
+                } else {
+                    Err(StabilityError::NotCovered {
+                        path: case.path.clone(),
+                        what: OUT_OF_BOUNDS,
+                    })
+                }
             };
             match (at(-STEP), at(STEP)) {
-                (Some(low), Some(high)) => Some(Tangent::between(&low, &high, 2.0 * STEP)),
-                (None, Some(high)) => Some(Tangent::between(&problem, &high, STEP)),
-                (Some(low), None) => Some(Tangent::between(&low, &problem, STEP)),
-                (None, None) => None,
+                (Ok(low), Ok(high)) => Ok(Tangent::between(&low, &high, 2.0 * STEP)),
+                (Err(_), Ok(high)) => Ok(Tangent::between(&problem, &high, STEP)),
+                (Ok(low), Err(_)) => Ok(Tangent::between(&low, &problem, STEP)),
+                (Err(_), Err(reason)) => Err(reason),
             }
         });
-        let tangents = tangents.collect::<Option<Vec<_>>>()?;
-        Some(Self { problem, tangents })
+        let tangents = tangents.collect::<Result<Vec<_>, _>>()?;
+        Ok(Self { problem, tangents })
     }
 
-    /// Linearized losses of stability along a line, the first limit first; those without a derivative are omitted.
-    pub fn planes(&self, line: &SpeedLine) -> Vec<Plane> {
+    /// Linearized losses of stability along a line, the first limit first, each with the reason if it has no derivative.
+    pub fn planes(&self, line: &SpeedLine) -> Vec<Result<Plane, StabilityError>> {
         let losses = line.switches.iter().filter(|switch| !switch.gain);
-        losses.filter_map(|switch| self.plane(line.rpm, switch)).collect()
+        losses.map(|switch| self.plane(line.rpm, switch)).collect()
     }
 
-    fn plane(&self, rpm: f64, switch: &Switch) -> Option<Plane> {
-        let sensitivity = Sensitivity::new(&self.problem, rpm, switch).ok()?;
+    fn plane(&self, rpm: f64, switch: &Switch) -> Result<Plane, StabilityError> {
+        let sensitivity = Sensitivity::new(&self.problem, rpm, switch)?;
         let slopes: Option<Vec<Slope>> = self
             .tangents
             .iter()
             .map(|tangent| sensitivity.slope(tangent))
             .collect();
-        let slopes = slopes?;
+        let slopes = slopes.ok_or_else(|| no_derivative(rpm, switch))?;
         let count = slopes.len();
         let chatter_hz = switch
             .chatter_hz
@@ -85,10 +98,37 @@ impl Linearized {
                 DVector::from_fn(count, |index, _| slopes[index].angle * per_angle),
             )
         });
-        Some(Plane {
+        Ok(Plane {
             depth_mm: switch.depth_mm,
             gradient: DVector::from_fn(count, |index, _| slopes[index].depth_mm),
             chatter_hz,
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use quietcut_model::case::{Deviation, Parameter};
+    use quietcut_testkit::case;
+
+    #[test]
+    fn a_case_or_variable_without_derivatives_is_refused_with_the_reason() {
+        let damping = |std| {
+            vec![Variable::together(vec![Deviation {
+                parameter: Parameter::DampingRatio(0),
+                std,
+            }])]
+        };
+        let case = case("kuka-kr90-acetal");
+        assert!(Linearized::new(&case, &damping(1e-3)).is_ok());
+        let error = Linearized::new(&case, &damping(f64::INFINITY))
+            .unwrap_err()
+            .to_string();
+        assert!(error.contains("leaves its bounds"), "{error}");
+        let mut uneven = case.clone();
+        uneven.tool.as_mut().unwrap().pitch_deg = vec![170.0, 190.0];
+        let error = Linearized::new(&uneven, &damping(1e-3)).unwrap_err().to_string();
+        assert!(error.contains("equal pitch"), "{error}");
     }
 }

@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use super::bounds::{check_depth, check_speed};
 use crate::criteria::{KAPPA_MAX, LEAST_ERROR, MESH_ROOM, RIVAL, UNCONFIRMED, WOUND};
-use crate::error::StabilityError;
+use crate::error::{Breakdown, NO_DOMINANT, StabilityError};
 use crate::problem::linear::Problem;
 use crate::problem::period::{Period, Resolution, check_length};
 use crate::spectrum::characteristic::Characteristic;
@@ -76,10 +76,11 @@ pub fn point(problem: &Problem, rpm: f64, depth_mm: f64) -> Result<CutStability,
     check_speed(rpm)?;
     check_depth(depth_mm)?;
     check_length(problem, rpm, depth_mm)?;
-    let broke_down = |what| StabilityError::BrokeDown { rpm, depth_mm, what };
     let depth_m = depth_mm * 1e-3;
     let scan = Period::new(problem, rpm, 2.0 * depth_m, Resolution::SCAN);
-    let candidates = period_map::largest(&scan, depth_m, RIVAL).unwrap_or_default();
+    let scanned = period_map::largest(&scan, depth_m, RIVAL);
+    let failed = scanned.as_ref().err().copied();
+    let candidates = scanned.unwrap_or_default();
     let certain = candidates
         .is_certain
         .then(|| Rough::new(&candidates.multipliers, depth_m));
@@ -94,9 +95,9 @@ pub fn point(problem: &Problem, rpm: f64, depth_mm: f64) -> Result<CutStability,
         .or_else(|| searched(problem, rpm, depth_m, &candidates.multipliers))
         .or_else(of_maps)
         .ok_or_else(|| {
-            broke_down(
-                "motions grow beyond the range of numbers, or multipliers of nearly one size are too many to tell apart",
-            )
+            failed
+                .unwrap_or(Breakdown::NoSolution)
+                .at(rpm, depth_mm, NO_DOMINANT)
         })?;
     let multiplier = Complex64::new(found.multiplier.re, found.multiplier.im.abs());
     let chatter_hz = chatter_hz(problem, rpm, &found.period, multiplier, depth_m);
@@ -168,7 +169,9 @@ fn of_maps(problem: &Problem, rpm: f64, depth_m: f64, rough: &Rough) -> Option<S
     let kappa_m = rough.kappa_m.min(KAPPA_MAX * depth_m);
     let largest = |resolution, share| {
         let period = Period::new(problem, rpm, kappa_m, resolution);
-        let found = period_map::largest(&period, depth_m, share).filter(|found| found.is_certain);
+        let found = period_map::largest(&period, depth_m, share)
+            .ok()
+            .filter(|found| found.is_certain);
         found.map(|found| (found.multipliers, period))
     };
     let (coarse, period) = largest(Resolution::WORKING, 1.0)?;

@@ -314,6 +314,15 @@ impl<'a> Sensitivity<'a> {
     }
 }
 
+/// Reason why a limit has no derivative although its Floquet mode is known.
+pub(crate) fn no_derivative(rpm: f64, switch: &Switch) -> StabilityError {
+    StabilityError::BrokeDown {
+        rpm,
+        depth_mm: switch.depth_mm,
+        what: "the limit lies at the tip of an island and has no derivative",
+    }
+}
+
 fn bilinear(left: &Vector3<Complex64>, matrix: &Matrix3<f64>, right: &Vector3<Complex64>) -> Complex64 {
     (left.transpose() * matrix.map(Complex64::from) * right)[(0, 0)]
 }

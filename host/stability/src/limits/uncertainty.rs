@@ -56,7 +56,8 @@ impl<'a> Uncertainty<'a> {
     pub fn new(case: &'a Case, method_of: &'a MethodOfCase<'a>, seed: u64) -> Option<Self> {
         let variables = Variable::of_case(case);
         (!variables.is_empty()).then(|| Self {
-            linear: Linearized::new(case, &variables),
+            // Without derivatives draws are not stratified: more of them are needed, and the result holds as well.
+            linear: Linearized::new(case, &variables).ok(),
             case,
             method_of,
             variables,
@@ -134,6 +135,8 @@ impl<'a> Uncertainty<'a> {
             .linear
             .as_ref()
             .map_or_else(Vec::new, |linear| linear.planes(nominal));
+        // A limit without a derivative, at the tip of an island, has no direction to stratify along.
+        let planes: Vec<Plane> = planes.into_iter().filter_map(Result::ok).collect();
         let gradients: Vec<DVector<f64>> = planes.iter().map(|plane| plane.gradient.clone()).collect();
         let mut basis = Basis::new(self.variables.len(), &gradients);
         let mut batches = Batches(Vec::new());

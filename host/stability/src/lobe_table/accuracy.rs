@@ -285,6 +285,8 @@ impl<'a> Checks<'a> {
     }
 }
 
+/// Column of the table at the speed of a checked line. `None` if the table has none there, which counts as unstable at
+/// every depth, as on the device.
 fn column_of(table: &LobeTable<'_>, family: &Family, rpm: f64) -> Option<Column> {
     let point = WorkingPoint {
         axial_depth: Millimeters(0.0),

@@ -57,7 +57,7 @@ fn trial(
         ..TableRequest::default()
     };
     let began = std::time::Instant::now();
-    let bytes = build_table(std::slice::from_ref(&case), &request).unwrap();
+    let bytes = build_table(std::slice::from_ref(&case), &request).unwrap().bytes;
     let seconds = began.elapsed().as_secs_f64();
     let table = LobeTable::parse(&bytes).unwrap();
     let error = table.interpolation_error().unwrap();

@@ -26,7 +26,16 @@ const SPEEDS: usize = 121;
 /// of a gap; corrections after the third change little.
 const GUARDED: usize = 3;
 
-/// Bytes of a lobe table, header and CRC included: one layer per case, feed and feed direction.
+/// Lobe table as it is written to a file, with what its user should know.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct BuiltTable {
+    /// Bytes of the table, header and CRC included.
+    pub bytes: Vec<u8>,
+    /// Limits without derivatives, one warning per layer; empty if derivatives were not requested or all exist.
+    pub warnings: Vec<String>,
+}
+
+/// Builds a lobe table with one layer per case, feed and feed direction.
 ///
 /// Speeds are added until every limit differs from the straight line between its neighbours by less than 0.3 % of the
 /// largest depth, or until the table has its target size; feeds and directions likewise. Then every gap between speeds
@@ -37,7 +46,7 @@ const GUARDED: usize = 3;
 ///
 /// # Errors
 /// No case, cases of different tools, two layers for the same cut, or a case whose stability cannot be computed.
-pub fn build_table(cases: &[Case], request: &TableRequest) -> Result<Vec<u8>, BuildError> {
+pub fn build_table(cases: &[Case], request: &TableRequest) -> Result<BuiltTable, BuildError> {
     let first = cases.first().ok_or(BuildError::NoCase)?;
     let asked = layers::families(cases, request)?;
     let (from_rpm, to_rpm) = match (request.rpm, asked.first()) {
@@ -109,5 +118,11 @@ pub fn build_table(cases: &[Case], request: &TableRequest) -> Result<Vec<u8>, Bu
         checks.check_again(&guarded)?;
     }
     let table = LobeTable::parse(&written).map_err(BuildError::Format)?;
-    bytes(&entries, Some(checks.stated(&table, tolerance_mm)))
+    Ok(BuiltTable {
+        bytes: bytes(&entries, Some(checks.stated(&table, tolerance_mm)))?,
+        warnings: derivatives
+            .iter()
+            .filter_map(|layer| layer.warning.clone())
+            .collect(),
+    })
 }

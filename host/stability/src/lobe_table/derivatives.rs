@@ -9,7 +9,8 @@ use rayon::prelude::*;
 use super::entries::Entry;
 use super::error::BuildError;
 use super::layers::Family;
-use crate::limits::sensitivity::{Sensitivity, Tangent};
+use crate::error::StabilityError;
+use crate::limits::sensitivity::{Sensitivity, Tangent, no_derivative};
 use crate::limits::speed_line::{SpeedLine, Switch};
 use quietcut_model::structure::ModalPart;
 
@@ -18,6 +19,8 @@ pub(super) struct Derivatives {
     /// Modes, by ascending frequency.
     pub(super) modes: Vec<LayerMode>,
     pub(super) by_speed: Vec<SlopesOfLine>,
+    /// Warning about limits without derivatives, whose entries have derivatives of 0; `None` if every limit has them.
+    pub(super) warning: Option<String>,
 }
 
 /// Derivatives of the limits at one speed, each with the depth of its limit, mm.
@@ -63,14 +66,19 @@ impl Derivatives {
     /// Derivatives of all switches, for the `count` modes with the largest influence on limits.
     pub(super) fn new(family: &Family, lines: &[SpeedLine], count: usize) -> Result<Self, BuildError> {
         let parts = family.linear.structure.modal_parts();
-        let all: Vec<Vec<SwitchDerivatives>> = lines
+        let found: Vec<Vec<Result<SwitchDerivatives, StabilityError>>> = lines
             .par_iter()
             .map(|line| {
                 let switches = line.switches.iter();
                 switches
-                    .filter_map(|switch| of_switch(family, &parts, line.rpm, switch))
+                    .map(|switch| of_switch(family, &parts, line.rpm, switch))
                     .collect()
             })
+            .collect();
+        let warning = warning(family, &found);
+        let all: Vec<Vec<SwitchDerivatives>> = found
+            .into_iter()
+            .map(|line| line.into_iter().filter_map(Result::ok).collect())
             .collect();
         let influence = |mode: usize| {
             let switches = all.iter().flatten();
@@ -90,6 +98,7 @@ impl Derivatives {
         });
         Ok(Self {
             by_speed: by_speed.collect(),
+            warning,
             modes: chosen
                 .iter()
                 .map(|&index| LayerMode {
@@ -116,22 +125,50 @@ impl SwitchDerivatives {
     }
 }
 
-/// Derivatives of one switch; `None` if the limit is not differentiable, at the tip of an island. The table then has
-/// zeros.
-fn of_switch(family: &Family, parts: &[ModalPart], rpm: f64, switch: &Switch) -> Option<SwitchDerivatives> {
+/// Warning that counts the limits without derivatives and gives the reason of the first; `None` if every limit has them.
+fn warning(family: &Family, found: &[Vec<Result<SwitchDerivatives, StabilityError>>]) -> Option<String> {
+    let reasons: Vec<&StabilityError> = found
+        .iter()
+        .flatten()
+        .filter_map(|switch| switch.as_ref().err())
+        .collect();
+    let first = reasons.first()?;
+    Some(format!(
+        "{}: {} of {} limits have no derivatives, for which the table states 0; the first one: {first}",
+        family.path().display(),
+        reasons.len(),
+        found.iter().flatten().count()
+    ))
+}
+
+/// Derivatives of one switch.
+///
+/// # Errors
+/// The limit has no Floquet mode, or is not differentiable (the tip of an island).
+fn of_switch(
+    family: &Family,
+    parts: &[ModalPart],
+    rpm: f64,
+    switch: &Switch,
+) -> Result<SwitchDerivatives, StabilityError> {
     let problem = &family.linear;
-    let sensitivity = Sensitivity::new(problem, rpm, switch).ok()?;
+    let sensitivity = Sensitivity::new(problem, rpm, switch)?;
+    let slope = |tangent: &Tangent| {
+        sensitivity
+            .slope(tangent)
+            .ok_or_else(|| no_derivative(rpm, switch))
+    };
     let by_mode = parts.iter().map(|part| {
-        let by_omega = sensitivity.slope(&Tangent::omega(problem, part))?;
-        let by_damping = sensitivity.slope(&Tangent::damping_ratio(problem, part))?;
-        Some([
+        let by_omega = slope(&Tangent::omega(problem, part))?;
+        let by_damping = slope(&Tangent::damping_ratio(problem, part))?;
+        Ok([
             by_omega.depth_mm * part.omega(),
             by_damping.depth_mm * part.damping_ratio(),
         ])
     });
-    Some(SwitchDerivatives {
+    Ok(SwitchDerivatives {
         depth_mm: switch.depth_mm,
-        by_mode: by_mode.collect::<Option<_>>()?,
-        by_force: sensitivity.slope(&Tangent::cutting_force(problem))?.depth_mm,
+        by_mode: by_mode.collect::<Result<_, StabilityError>>()?,
+        by_force: slope(&Tangent::cutting_force(problem))?.depth_mm,
     })
 }

@@ -10,7 +10,7 @@ mod grid;
 mod layers;
 mod request;
 
-pub use build::build_table;
+pub use build::{BuiltTable, build_table};
 pub use error::BuildError;
 pub use request::TableRequest;
 

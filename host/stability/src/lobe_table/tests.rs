@@ -18,6 +18,11 @@ use crate::problem::pitched::Pitched;
 use quietcut_model::case::{Case, Deviation, Parameter};
 use quietcut_testkit::case;
 
+/// Bytes of the lobe table of these cases.
+fn build_table(cases: &[Case], request: &TableRequest) -> Result<Vec<u8>, BuildError> {
+    Ok(super::build_table(cases, request)?.bytes)
+}
+
 fn problem(case: &Case) -> Problem {
     Problem::new(case, CubicTerms::Refuse).unwrap()
 }
@@ -618,4 +623,31 @@ fn two_stable_orbits_are_not_surely_stable() {
     assert_eq!(entries.len(), 1);
     assert_eq!((entries[0].from_mm, entries[0].to_mm), (2.0, 3.0));
     assert_eq!(entries[0].interval.kind, quietcut_core::lobes::IntervalKind::Fold);
+}
+
+#[test]
+fn limits_without_derivatives_are_reported_with_the_first_reason() {
+    let case = case("kuka-kr90-acetal");
+    let request = TableRequest {
+        derivatives: true,
+        ..request((1200.0, 1210.0), 4.0)
+    };
+    let families = layers::families(std::slice::from_ref(&case), &request).unwrap();
+    let mut lines = families[0].lines(&[1200.0], 4.0).unwrap();
+    let complete = derivatives::Derivatives::new(&families[0], &lines, 2).unwrap();
+    assert_eq!(complete.warning, None);
+    // A linear structure has no fold, hence no Floquet mode and no derivative of one.
+    let count = lines[0].switches.len();
+    let mut fold = lines[0].switches[0];
+    fold.kind = crate::StabilityLoss::Fold;
+    lines[0].switches.push(fold);
+    let warning = derivatives::Derivatives::new(&families[0], &lines, 2)
+        .unwrap()
+        .warning
+        .unwrap();
+    assert!(
+        warning.contains(&format!("1 of {} limits", count + 1)),
+        "{warning}"
+    );
+    assert!(warning.contains("no motion belongs to this limit"), "{warning}");
 }

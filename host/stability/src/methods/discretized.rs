@@ -4,7 +4,7 @@ use num_complex::Complex64;
 
 use super::step_error::step_error;
 use super::stepped::{Mesh, Stepped};
-use crate::error::StabilityError;
+use crate::error::{Breakdown, StabilityError};
 use crate::limits::bounds::{check_depth, check_speed};
 use crate::limits::line::line_of;
 use crate::limits::method::Method;
@@ -40,26 +40,24 @@ pub struct Discretized<D> {
     pub steps: usize,
 }
 
-/// Applies `answer` to the dominant Floquet multipliers of the period map with `steps` steps per tooth period.
+/// Applies `evaluate` to the dominant Floquet multipliers of the period map with `steps` steps per tooth period.
 pub(crate) fn with_dominant<D: Discretization, T>(
     method: &Discretized<D>,
     rpm: f64,
     depth_mm: f64,
     steps: usize,
-    answer: impl FnOnce(&Dominant, &Stepped) -> Option<T>,
+    evaluate: impl FnOnce(&Dominant, &Stepped) -> Option<T>,
 ) -> Result<T, StabilityError> {
     let mesh = Mesh::new(&method.pitched, rpm, steps);
-    let broke_down = || StabilityError::BrokeDown {
-        rpm,
-        depth_mm,
-        what: "the steps of the period have no finite solution",
-    };
+    let broke_down =
+        |cause: Breakdown| cause.at(rpm, depth_mm, "the steps of the period have no finite solution");
+    let no_solution = || broke_down(Breakdown::NoSolution);
     let map = method
         .discretization
         .map(&method.pitched, &mesh, depth_mm * 1e-3)
-        .ok_or_else(broke_down)?;
-    let dominant = Dominant::any(&map).ok_or_else(broke_down)?;
-    answer(&dominant, &map).ok_or_else(broke_down)
+        .ok_or_else(no_solution)?;
+    let dominant = Dominant::any(&map).map_err(broke_down)?;
+    evaluate(&dominant, &map).ok_or_else(no_solution)
 }
 
 #[expect(private_bounds, reason = "sealed: discretizations are those of this module")]

@@ -1,6 +1,6 @@
 //! The mode-coupling criterion (Gasparetto 1998, 2001), for comparison.
 
-use crate::error::StabilityError;
+use crate::error::{NOT_FINITE, StabilityError};
 use crate::frequency::averaged::AveragedLoop;
 use crate::frequency::limits::{hertz, limits, speed_line};
 use crate::frequency::problem::FrequencyProblem;
@@ -58,7 +58,7 @@ impl Method for ModeCoupling {
     fn point(&self, rpm: f64, depth_mm: f64) -> Result<CutStability, StabilityError> {
         check_speed(rpm)?;
         check_depth(depth_mm)?;
-        AveragedLoop::check_reach(&self.problem, depth_mm)?;
+        AveragedLoop::check_reach(&self.problem, rpm, depth_mm)?;
         root::averaged_point(&self.problem, rpm, depth_mm, |problem| {
             AveragedLoop::new(problem, None)
         })
@@ -67,13 +67,10 @@ impl Method for ModeCoupling {
     fn line(&self, rpm: f64, depth_mm: f64, _samples: usize) -> Result<SpeedLine, StabilityError> {
         check_speed(rpm)?;
         check_depth(depth_mm)?;
-        AveragedLoop::check_reach(&self.problem, depth_mm)?;
+        AveragedLoop::check_reach(&self.problem, rpm, depth_mm)?;
         let open_loop = AveragedLoop::new(&self.problem, None);
-        let found = limits(&open_loop, depth_mm * 1e-3).ok_or(StabilityError::BrokeDown {
-            rpm,
-            depth_mm,
-            what: "receptances are not finite",
-        })?;
+        let found = limits(&open_loop, depth_mm * 1e-3);
+        let found = found.map_err(|cause| cause.at(rpm, depth_mm, NOT_FINITE))?;
         speed_line(&open_loop, rpm, depth_mm, &found, &[], hertz)
     }
 }

@@ -4,12 +4,12 @@
 use num_complex::Complex64;
 
 use crate::criteria::{HARMONICS_SETTLED_LIMIT, HARMONICS_SETTLED_MULTIPLIER, SAME_WITH_TWICE_HARMONICS};
-use crate::error::StabilityError;
+use crate::error::{NOT_FINITE, StabilityError};
 use crate::frequency::averaged::AveragedLoop;
 use crate::frequency::harmonic::HarmonicLoop;
 use crate::frequency::limits::{AxisCrossing, limits, speed_line};
 use crate::frequency::problem::FrequencyProblem;
-use crate::frequency::root::{point_of, polish, rightmost};
+use crate::frequency::root::{NO_ROOT, point_of, polish, rightmost};
 use crate::limits::bounds::{check_depth, check_speed};
 use crate::limits::method::Method;
 use crate::limits::point::CutStability;
@@ -44,7 +44,7 @@ impl MultiFrequency {
             let open_loop = self.open_loop(rpm, harmonics);
             limits(&open_loop, depth_mm * 1e-3)
                 .map(|limits| (open_loop, limits))
-                .ok_or(broke_down("receptances are not finite"))
+                .map_err(|cause| cause.at(rpm, depth_mm, NOT_FINITE))
         };
         if let Some(harmonics) = self.harmonics {
             let (open_loop, limits) = find(harmonics)?;
@@ -111,15 +111,15 @@ impl Method for MultiFrequency {
     fn point(&self, rpm: f64, depth_mm: f64) -> Result<CutStability, StabilityError> {
         check_speed(rpm)?;
         check_depth(depth_mm)?;
-        AveragedLoop::check_reach(&self.problem, depth_mm)?;
+        AveragedLoop::check_reach(&self.problem, rpm, depth_mm)?;
         let broke_down = |what| StabilityError::BrokeDown { rpm, depth_mm, what };
-        let not_found = broke_down("the rightmost root cannot be found by receptances; limits can");
         let depth_m = depth_mm * 1e-3;
         let delay_s = self.problem.tooth_period_s(rpm);
         let mut harmonics = self
             .harmonics
             .unwrap_or_else(|| HarmonicLoop::least_harmonics(&self.problem, rpm));
-        let mut root = rightmost(&self.open_loop(rpm, harmonics), depth_m).ok_or(not_found)?;
+        let mut root = rightmost(&self.open_loop(rpm, harmonics), depth_m)
+            .map_err(|cause| cause.at(rpm, depth_mm, NO_ROOT))?;
         loop {
             let finer = self.open_loop(rpm, 2 * harmonics + 1);
             let before = (root * delay_s).exp();
@@ -138,7 +138,7 @@ impl Method for MultiFrequency {
     fn line(&self, rpm: f64, depth_mm: f64, _samples: usize) -> Result<SpeedLine, StabilityError> {
         check_speed(rpm)?;
         check_depth(depth_mm)?;
-        AveragedLoop::check_reach(&self.problem, depth_mm)?;
+        AveragedLoop::check_reach(&self.problem, rpm, depth_mm)?;
         let (open_loop, limits, other) = self.settled(rpm, depth_mm)?;
         let mut others = vec![other];
         others.extend(open_loop.thinned_limits(depth_mm * 1e-3));

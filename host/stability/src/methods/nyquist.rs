@@ -1,7 +1,7 @@
 //! The Nyquist criterion: unstable roots from the winding of a determinant, limits from the characteristic loci.
 
 use super::multi_frequency::MultiFrequency;
-use crate::error::StabilityError;
+use crate::error::{NOT_FINITE, StabilityError};
 use crate::frequency::averaged::AveragedLoop;
 use crate::frequency::harmonic::HarmonicLoop;
 use crate::frequency::limits::{
@@ -37,7 +37,7 @@ impl Nyquist {
     pub fn unstable_roots(&self, rpm: f64, depth_mm: f64) -> Result<i32, StabilityError> {
         check_speed(rpm)?;
         check_depth(depth_mm)?;
-        AveragedLoop::check_reach(&self.problem, depth_mm)?;
+        AveragedLoop::check_reach(&self.problem, rpm, depth_mm)?;
         let depth_m = depth_mm * 1e-3;
         let count = if self.harmonics == 0 {
             unstable_roots(&self.averaged(rpm), depth_m, 0.0)
@@ -72,7 +72,7 @@ fn confirmed(
         what,
     };
     let depth_m = depth_mm * 1e-3;
-    let found = limits(open_loop, depth_m).ok_or(broke_down(depth_m, "receptances are not finite"))?;
+    let found = limits(open_loop, depth_m).map_err(|cause| cause.at(rpm, depth_mm, NOT_FINITE))?;
     let mut outside =
         outside_at_no_depth(open_loop).ok_or(broke_down(0.0, "the roots at depth 0 cannot be counted"))?;
     for (index, limit) in found.iter().enumerate() {
@@ -106,7 +106,7 @@ impl Method for Nyquist {
     fn point(&self, rpm: f64, depth_mm: f64) -> Result<CutStability, StabilityError> {
         check_speed(rpm)?;
         check_depth(depth_mm)?;
-        AveragedLoop::check_reach(&self.problem, depth_mm)?;
+        AveragedLoop::check_reach(&self.problem, rpm, depth_mm)?;
         if self.harmonics == 0 {
             return root::averaged_point(&self.problem, rpm, depth_mm, |problem| {
                 AveragedLoop::new(problem, Some(rpm))
@@ -122,7 +122,7 @@ impl Method for Nyquist {
     fn line(&self, rpm: f64, depth_mm: f64, _samples: usize) -> Result<SpeedLine, StabilityError> {
         check_speed(rpm)?;
         check_depth(depth_mm)?;
-        AveragedLoop::check_reach(&self.problem, depth_mm)?;
+        AveragedLoop::check_reach(&self.problem, rpm, depth_mm)?;
         if self.harmonics == 0 {
             let open_loop = self.averaged(rpm);
             let found = confirmed(&open_loop, rpm, depth_mm)?;
@@ -130,7 +130,7 @@ impl Method for Nyquist {
             let thinned = thinned
                 .iter()
                 .map(|problem| limits(&AveragedLoop::new(problem, Some(rpm)), depth_mm * 1e-3));
-            let others: Vec<Vec<AxisCrossing>> = thinned.map(Option::unwrap_or_default).collect();
+            let others: Vec<Vec<AxisCrossing>> = thinned.map(Result::unwrap_or_default).collect();
             return speed_line(&open_loop, rpm, depth_mm, &found, &others, hertz);
         }
         let open_loop = self.periodic(rpm);

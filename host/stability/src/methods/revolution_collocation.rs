@@ -5,7 +5,7 @@ use std::rc::Rc;
 use num_complex::Complex64;
 
 use crate::criteria::{LEAST_ERROR, MESH_ROOM};
-use crate::error::StabilityError;
+use crate::error::{Breakdown, NO_DOMINANT, StabilityError};
 use crate::limits::bounds::{check_depth, check_speed};
 use crate::limits::line::line_of;
 use crate::limits::method::Method;
@@ -37,25 +37,22 @@ impl Method for RevolutionCollocation {
         check_speed(rpm)?;
         check_depth(depth_mm)?;
         let depth_m = depth_mm * 1e-3;
-        let broke_down = || StabilityError::BrokeDown {
-            rpm,
-            depth_mm,
-            what: "motions grow beyond the range of numbers, or multipliers of nearly one size are too many to tell apart",
-        };
+        let broke_down = |cause: Breakdown| cause.at(rpm, depth_mm, NO_DOMINANT);
+        let no_solution = || broke_down(Breakdown::NoSolution);
         let map = |fineness| {
             let revolution = Revolution::new(&self.pitched, rpm, depth_m, fineness)?;
             RevolutionMap::new(Rc::new(revolution), depth_m)
         };
-        let coarse = map(Fineness::WORKING)
-            .and_then(|map| Dominant::any(&map)?.eigenvalues.first().copied())
-            .ok_or_else(broke_down)?;
-        let fine = map(Fineness::FINE).ok_or_else(broke_down)?;
-        let dominant = Dominant::any(&fine).ok_or_else(broke_down)?;
+        let coarse = map(Fineness::WORKING).ok_or_else(no_solution)?;
+        let coarse = Dominant::any(&coarse).map_err(broke_down)?;
+        let coarse = *coarse.eigenvalues.first().ok_or_else(no_solution)?;
+        let fine = map(Fineness::FINE).ok_or_else(no_solution)?;
+        let dominant = Dominant::any(&fine).map_err(broke_down)?;
         let distance = |value: &Complex64| (value - coarse).norm();
         let values = dominant.eigenvalues.iter().copied();
         let multiplier = values
             .min_by(|p, q| distance(p).total_cmp(&distance(q)))
-            .ok_or_else(broke_down)?;
+            .ok_or_else(no_solution)?;
         let chatter_hz = dominant
             .vector(multiplier)
             .and_then(|vector| fine.chatter_hz(multiplier, &vector));
@@ -71,7 +68,7 @@ impl Method for RevolutionCollocation {
                 move |depth_m| RevolutionMap::new(revolution.clone()?, depth_m),
                 |multiplier, depth_m| {
                     let finer = Revolution::new(&self.pitched, rpm, depth_m, Fineness::FINE)?;
-                    let finer = Dominant::any(&RevolutionMap::new(Rc::new(finer), depth_m)?)?;
+                    let finer = Dominant::any(&RevolutionMap::new(Rc::new(finer), depth_m)?).ok()?;
                     let nearest = map_spectrum::nearest(&finer.eigenvalues, multiplier)?;
                     Some(error(multiplier, nearest))
                 },

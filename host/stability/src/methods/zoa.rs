@@ -5,7 +5,7 @@ use std::f64::consts::{PI, TAU};
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-use crate::error::StabilityError;
+use crate::error::{Breakdown, NOT_FINITE, StabilityError};
 use crate::frequency::averaged::AveragedLoop;
 use crate::frequency::limits::{AxisCrossing, hertz, speed_line};
 use crate::frequency::loci::{Mark, Sample, Step, solve_steps, trace, zero};
@@ -43,7 +43,7 @@ pub struct Zoa {
 
 impl Zoa {
     /// Eigenvalues at all frequencies at which a limit may lie, up to an axial depth in m.
-    fn samples(&self, depth_m: f64) -> Option<Vec<Sample>> {
+    fn samples(&self, depth_m: f64) -> Result<Vec<Sample>, Breakdown> {
         let open_loop = AveragedLoop::new(&self.problem, None);
         // |1 − e^{−iωτ}| is at most 2, so that a limit requires |λ| ≥ 1/(2 w).
         let floor = 0.5 / depth_m;
@@ -74,11 +74,7 @@ impl Zoa {
         let delay_s = self.problem.tooth_period_s(rpm);
         let find = |zoa: &Self, samples: &[Sample]| {
             zoa.limits(samples, delay_s, depth_mm * 1e-3)
-                .ok_or(StabilityError::BrokeDown {
-                    rpm,
-                    depth_mm,
-                    what: "receptances are not finite",
-                })
+                .map_err(|cause| cause.at(rpm, depth_mm, NOT_FINITE))
         };
         let others: Vec<Vec<AxisCrossing>> = others
             .iter()
@@ -89,7 +85,7 @@ impl Zoa {
     }
 
     /// All limits with a tooth period `delay_s` (s), up to an axial depth in m.
-    fn limits(&self, samples: &[Sample], delay_s: f64, depth_m: f64) -> Option<Vec<AxisCrossing>> {
+    fn limits(&self, samples: &[Sample], delay_s: f64, depth_m: f64) -> Result<Vec<AxisCrossing>, Breakdown> {
         let open_loop = AveragedLoop::new(&self.problem, None);
         let loci = |omega: f64| open_loop.eigenvalues(Complex64::new(0.0, omega), 0.0);
         let mut limits = solve_steps(&loci, samples, &|[(low, from), (high, to)]: Step| {
@@ -111,7 +107,7 @@ impl Zoa {
                     miss: phase - lobe,
                 };
                 let (omega, value) = zero(mark(low, from, start), mark(high, to, end), CLOSED, |omega| {
-                    let with_miss = loci(omega)?.into_iter().map(|value| {
+                    let with_miss = loci(omega).ok()?.into_iter().map(|value| {
                         let miss = phase(omega, value, delay_s) - lobe;
                         (value, miss - (miss / TAU).round() * TAU)
                     });
@@ -132,7 +128,7 @@ impl Zoa {
             Some(limits)
         })?;
         limits.sort_by(|a, b| a.depth_m.total_cmp(&b.depth_m));
-        Some(limits)
+        Ok(limits)
     }
 }
 
@@ -153,7 +149,7 @@ impl Method for Zoa {
     fn point(&self, rpm: f64, depth_mm: f64) -> Result<CutStability, StabilityError> {
         check_speed(rpm)?;
         check_depth(depth_mm)?;
-        AveragedLoop::check_reach(&self.problem, depth_mm)?;
+        AveragedLoop::check_reach(&self.problem, rpm, depth_mm)?;
         root::averaged_point(&self.problem, rpm, depth_mm, |problem| {
             AveragedLoop::new(problem, Some(rpm))
         })
@@ -175,14 +171,11 @@ impl Method for Zoa {
         _samples: usize,
     ) -> Result<Vec<SpeedLine>, StabilityError> {
         check_depth(depth_mm)?;
-        AveragedLoop::check_reach(&self.problem, depth_mm)?;
         let rpm = speeds_rpm.first().copied().unwrap_or_default();
+        AveragedLoop::check_reach(&self.problem, rpm, depth_mm)?;
         let find = |zoa: &Self| {
-            zoa.samples(depth_mm * 1e-3).ok_or(StabilityError::BrokeDown {
-                rpm,
-                depth_mm,
-                what: "receptances are not finite",
-            })
+            let samples = zoa.samples(depth_mm * 1e-3);
+            samples.map_err(|cause| cause.at(rpm, depth_mm, NOT_FINITE))
         };
         let samples = find(self)?;
         let others = self.thinned().map(|zoa| {

@@ -265,10 +265,9 @@ impl<'a> Follower<'a> {
     /// Floquet multipliers about an orbit with given springs.
     fn roots(&self, springs: &[Spring; 3], orbit: &Orbit) -> Result<Vec<Complex64>, StabilityError> {
         let problem = self.problem.with(springs);
+        let singular = "the equations of the forced orbit are singular";
         let all = self.map.of(&problem).multipliers(orbit);
-        let all = all.ok_or_else(|| {
-            self.broke_down(orbit.depth_m, "the equations of the forced orbit are singular")
-        })?;
+        let all = all.map_err(|cause| cause.at(self.rpm, 1e3 * orbit.depth_m, singular))?;
         Ok(all
             .into_iter()
             .take_while(|multiplier| multiplier.norm() > EQUIVALENT_FOLLOWED)

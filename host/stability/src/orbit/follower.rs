@@ -86,11 +86,9 @@ fn dominant_of<M: PeriodMap>(map: M, rpm: f64, depth_mm: f64) -> Result<[Dominan
     let at = |map: M| {
         let follower = Follower::new(map, rpm, depth_mm * 1e-3);
         let orbit = follower.up_to(depth_mm * 1e-3)?.orbit;
-        let multiplier = follower
-            .map
-            .multipliers(&orbit)
-            .and_then(|all| all.first().copied())
-            .ok_or(singular)?;
+        let all = follower.map.multipliers(&orbit);
+        let all = all.map_err(|cause| OrbitError::of_multipliers(cause, depth_mm))?;
+        let multiplier = *all.first().ok_or(singular)?;
         let multiplier = Complex64::new(multiplier.re, multiplier.im.abs());
         Ok(Dominant {
             multiplier,
@@ -200,16 +198,17 @@ impl<M: PeriodMap> Follower<M> {
         let mut step = BRANCH_STEP_MAX;
         for _ in 0..STEPS_MAX {
             let depth_mm = here.orbit.depth_m * 1e3;
-            let next = self.step(&here, step).ok().and_then(|next| {
-                let pairs = pair(&here.roots, &next.roots, step <= 2.0 * BRANCH_STEP_MIN)?;
-                Some((next, pairs))
+            let next = self.step(&here, step).and_then(|next| {
+                let pairs = pair(&here.roots, &next.roots, step <= 2.0 * BRANCH_STEP_MIN);
+                Ok((next, pairs.ok_or(OrbitError::NoConvergence { depth_mm })?))
             });
-            let Some((next, pairs)) = next else {
-                if step <= BRANCH_STEP_MIN {
-                    return Err(OrbitError::NoConvergence { depth_mm });
+            let (next, pairs) = match next {
+                Ok(found) => found,
+                Err(error) if step <= BRANCH_STEP_MIN => return Err(error),
+                Err(_) => {
+                    step = (0.5 * step).max(BRANCH_STEP_MIN);
+                    continue;
                 }
-                step = (0.5 * step).max(BRANCH_STEP_MIN);
-                continue;
             };
             let mut events: Vec<(f64, Event)> = pairs
                 .iter()
@@ -250,7 +249,7 @@ impl<M: PeriodMap> Follower<M> {
         let all = self
             .map
             .multipliers(&orbit)
-            .ok_or(OrbitError::Singular { depth_mm })?;
+            .map_err(|cause| OrbitError::of_multipliers(cause, depth_mm))?;
         let largest = all.first().map_or(0.0, |multiplier| multiplier.norm());
         let roots = all
             .into_iter()

@@ -56,6 +56,9 @@ fn broke_down(rpm: f64, depth_mm: f64, cause: OrbitError) -> StabilityError {
         OrbitError::NoConvergence { .. } => "the forced orbit cannot be followed to this depth",
         OrbitError::Singular { .. } => "the equations of the forced orbit are singular",
         OrbitError::Lost { .. } => "the forced orbit is lost in a fold before this depth",
+        OrbitError::Eigenvalues { cause, .. } => {
+            return StabilityError::Eigenvalues { rpm, depth_mm, cause };
+        }
     };
     StabilityError::BrokeDown { rpm, depth_mm, what }
 }

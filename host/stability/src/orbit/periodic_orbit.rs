@@ -5,6 +5,8 @@ use num_complex::Complex64;
 
 use super::collocated::Advanced;
 use super::forced::ForcedProblem;
+use crate::error::Breakdown;
+use quietcut_numerics::eigenvalues::EigenvalueError;
 use quietcut_numerics::quadrature::Gauss;
 
 /// Reason why no orbit was found.
@@ -28,6 +30,24 @@ pub enum OrbitError {
         /// Axial depth, mm.
         depth_mm: f64,
     },
+    /// The Floquet multipliers about the orbit cannot be computed.
+    #[error("the Floquet multipliers about the orbit at {depth_mm} mm cannot be computed: {cause}")]
+    Eigenvalues {
+        /// Axial depth, mm.
+        depth_mm: f64,
+        /// Reason from the eigenvalue iteration.
+        cause: EigenvalueError,
+    },
+}
+
+impl OrbitError {
+    /// Reason why the multipliers about an orbit at a depth (mm) are missing.
+    pub(super) fn of_multipliers(cause: Breakdown, depth_mm: f64) -> Self {
+        match cause {
+            Breakdown::Eigenvalues(cause) => Self::Eigenvalues { depth_mm, cause },
+            Breakdown::NoSolution | Breakdown::TooManyMultipliers => Self::Singular { depth_mm },
+        }
+    }
 }
 
 /// Periodic orbit, by its state at the start of the period, where a tooth enters.
@@ -134,7 +154,10 @@ pub(super) trait PeriodMap: Sized {
     fn start_of(&self, state: DVector<f64>, states: &[DMatrix<f64>]) -> DVector<f64>;
 
     /// All Floquet multipliers about an orbit, largest first.
-    fn multipliers(&self, orbit: &Orbit) -> Option<Vec<Complex64>>;
+    ///
+    /// # Errors
+    /// The linearized equations are singular, or the eigenvalues cannot be computed.
+    fn multipliers(&self, orbit: &Orbit) -> Result<Vec<Complex64>, Breakdown>;
 
     /// Vibration frequency of a Floquet multiplier about an orbit, Hz.
     fn chatter_hz(&self, orbit: &Orbit, multiplier: Complex64) -> Option<f64>;

@@ -16,6 +16,7 @@ use num_complex::Complex64;
 use super::collocated::Linearized;
 use super::forced::{ForcedProblem, Uneven};
 use super::periodic_orbit::{Orbit, PeriodIntegration, PeriodMap, SubintervalNodes};
+use crate::error::Breakdown;
 use crate::problem::revolution_mesh::{Fineness, Flight, RevolutionMesh, Source, Subinterval};
 use crate::spectrum::chatter_frequency::dominant_frequency_hz;
 use crate::spectrum::eigenvector::eigenvector;
@@ -331,8 +332,9 @@ impl PeriodMap for RevolutionPeriod<'_> {
         start
     }
 
-    fn multipliers(&self, orbit: &Orbit) -> Option<Vec<Complex64>> {
-        let integration = self.integrate(&orbit.start, orbit.depth_m, &orbit.states)?;
+    fn multipliers(&self, orbit: &Orbit) -> Result<Vec<Complex64>, Breakdown> {
+        let integration = self.integrate(&orbit.start, orbit.depth_m, &orbit.states);
+        let integration = integration.ok_or(Breakdown::NoSolution)?;
         period_map::of_matrix(integration.by.columns(0, self.mesh.size).into_owned())
     }
 

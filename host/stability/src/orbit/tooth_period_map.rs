@@ -7,6 +7,7 @@ use super::forced::ForcedProblem;
 use super::periodic_orbit::{Orbit, PeriodIntegration, PeriodMap, SubintervalNodes};
 use super::tooth_period::{ToothPeriod, per_depth, rates};
 use super::variation;
+use crate::error::Breakdown;
 use crate::spectrum::chatter_frequency::chatter_hz;
 use crate::spectrum::period_map;
 
@@ -67,8 +68,9 @@ impl PeriodMap for ToothPeriod<'_> {
         state
     }
 
-    fn multipliers(&self, orbit: &Orbit) -> Option<Vec<Complex64>> {
-        period_map::multipliers(&variation::about(self, orbit)?, orbit.depth_m)
+    fn multipliers(&self, orbit: &Orbit) -> Result<Vec<Complex64>, Breakdown> {
+        let period = variation::about(self, orbit).ok_or(Breakdown::NoSolution)?;
+        period_map::multipliers(&period, orbit.depth_m)
     }
 
     fn chatter_hz(&self, orbit: &Orbit, multiplier: Complex64) -> Option<f64> {

@@ -4,14 +4,16 @@ use num_complex::Complex64;
 
 use super::crossing::Crossing;
 use super::root::Root;
+use crate::error::Breakdown;
 
 /// Floquet multipliers of one method at one spindle speed, as functions of the axial depth.
 pub(crate) trait Spectrum {
     /// All multipliers at an axial depth (m) that may come close to the unit circle, largest first; complex ones in
     /// exact conjugate pairs.
     ///
-    /// `None` if the equations have no finite solution.
-    fn multipliers(&mut self, depth_m: f64) -> Option<Vec<Complex64>>;
+    /// # Errors
+    /// The equations have no finite solution, or the eigenvalues cannot be computed.
+    fn multipliers(&mut self, depth_m: f64) -> Result<Vec<Complex64>, Breakdown>;
 
     /// The multiplier near a guess, to rounding; a real guess gives a real multiplier.
     ///

@@ -9,6 +9,7 @@ use super::crossing::Crossing;
 use super::period_map;
 use super::root::Root;
 use crate::criteria::{LEAST_ERROR, MESH_ROOM, SCANNED, SCANNED_SHARE};
+use crate::error::Breakdown;
 use crate::problem::linear::Problem;
 use crate::problem::period::{Period, Resolution};
 
@@ -47,7 +48,7 @@ impl<'a> Collocated<'a> {
 }
 
 impl Spectrum for Collocated<'_> {
-    fn multipliers(&mut self, depth_m: f64) -> Option<Vec<Complex64>> {
+    fn multipliers(&mut self, depth_m: f64) -> Result<Vec<Complex64>, Breakdown> {
         period_map::larger_than(&self.coarse, depth_m, SCANNED, SCANNED_SHARE)
     }
 

@@ -10,7 +10,8 @@ use num_complex::Complex64;
 use super::eigenvector::eigenvector;
 use super::hessenberg::Shifted;
 use crate::criteria::{CROWD, KRYLOV_ANY};
-use quietcut_numerics::eigenvalues;
+use crate::error::Breakdown;
+use quietcut_numerics::eigenvalues::{self, EigenvalueError};
 
 /// Number of vectors in a block: repeated eigenvalues are found up to this multiplicity, one for each direction in
 /// space.
@@ -67,15 +68,20 @@ pub(crate) struct Dominant {
 }
 
 impl Dominant {
-    /// All eigenvalues larger than `least`. `None` if a result is not finite, or if the map is large and block Arnoldi
-    /// does not converge.
-    pub(crate) fn of(map: &impl LinearMap, least: f64) -> Option<Self> {
+    /// All eigenvalues larger than `least`.
+    ///
+    /// # Errors
+    /// A result is not finite, or the map is large and block Arnoldi does not converge.
+    pub(crate) fn of(map: &impl LinearMap, least: f64) -> Result<Self, Breakdown> {
         Self::kept(map, &|values| values.retain(|value| value.norm() > least))
     }
 
     /// All eigenvalues larger than 0.25. If there is none, those of at least half the size of the largest, at most
     /// [`CROWD`] of them.
-    pub(crate) fn any(map: &impl LinearMap) -> Option<Self> {
+    ///
+    /// # Errors
+    /// As [`of`](Self::of).
+    pub(crate) fn any(map: &impl LinearMap) -> Result<Self, Breakdown> {
         Self::kept(map, &|values| {
             let largest = values.first().map_or(0.0, |value| value.norm());
             if largest > KRYLOV_ANY {
@@ -87,22 +93,24 @@ impl Dominant {
         })
     }
 
-    fn kept(map: &impl LinearMap, keep: &dyn Fn(&mut Vec<Complex64>)) -> Option<Self> {
+    fn kept(map: &impl LinearMap, keep: &dyn Fn(&mut Vec<Complex64>)) -> Result<Self, Breakdown> {
         // Beyond half the dimension the eigenvalues of the whole matrix are cheaper.
         let most = (map.size() / 2).min(SPACE_MAX);
         if map.size() > WHOLE
-            && let Some(found) = arnoldi(map, most, RESIDUAL, keep)
+            && let Ok(found) = arnoldi(map, most, RESIDUAL, keep)
             && found.is_settled
         {
-            return Some(found.dominant);
+            return Ok(found.dominant);
         }
         if map.size() > WHOLE_MAX {
-            return None;
+            return Err(Breakdown::TooManyMultipliers);
         }
-        let projected = map.apply(&DMatrix::identity(map.size(), map.size()))?;
+        let projected = map
+            .apply(&DMatrix::identity(map.size(), map.size()))
+            .ok_or(Breakdown::NoSolution)?;
         let mut eigenvalues = larger(&projected, 0.0)?;
         keep(&mut eigenvalues);
-        Some(Self {
+        Ok(Self {
             eigenvalues,
             basis: None,
             projected,
@@ -132,15 +140,16 @@ pub(crate) struct Largest {
 
 /// Eigenvalues larger than `share` of the largest, at most [`CROWD`].
 ///
-/// `None` if a result is not finite.
-pub(crate) fn largest(map: &impl LinearMap, share: f64) -> Option<Largest> {
+/// # Errors
+/// A result is not finite.
+pub(crate) fn largest(map: &impl LinearMap, share: f64) -> Result<Largest, Breakdown> {
     let most = (map.size() / 2).min(ROUGH_SPACE_MAX);
     let found = arnoldi(map, most, ROUGH, &|values| {
         let largest = values.first().map_or(0.0, |value| value.norm());
         values.retain(|value| value.norm() >= share * largest);
         values.truncate(CROWD);
     })?;
-    Some(Largest {
+    Ok(Largest {
         norm: found.dominant.projected.amax(),
         eigenvalues: found.dominant.eigenvalues,
         is_settled: found.is_settled,
@@ -156,7 +165,8 @@ pub(crate) fn larger_than(map: &impl LinearMap, least: f64, share: f64) -> Optio
     let found = arnoldi(map, most, ROUGH, &|values| {
         let largest = values.first().map_or(0.0, |value| value.norm());
         values.retain(|value| value.norm() > least.min(share * largest));
-    })?;
+    })
+    .ok()?;
     found.is_settled.then_some(found.dominant.eigenvalues)
 }
 
@@ -167,13 +177,16 @@ struct ArnoldiResult {
 }
 
 /// Block Arnoldi with full orthogonalization. It stops once the eigenvalues selected by `keep` (from all, largest
-/// first) have converged, or once the space would exceed `most` vectors. `None` if a result is not finite.
+/// first) have converged, or once the space would exceed `most` vectors.
+///
+/// # Errors
+/// A result is not finite.
 fn arnoldi(
     map: &impl LinearMap,
     most: usize,
     residual: f64,
     keep: &dyn Fn(&mut Vec<Complex64>),
-) -> Option<ArnoldiResult> {
+) -> Result<ArnoldiResult, Breakdown> {
     let size = map.size();
     // Arnoldi relation M V = V H + W K: V the blocks so far, W the next block, K in the lower rows of H.
     let mut room = most.min(4 * BLOCKS_BEFORE_EIGENVALUES * BLOCK);
@@ -193,7 +206,9 @@ fn arnoldi(
             basis = basis.resize_horizontally(room + BLOCK, 0.0);
             projected = projected.resize(room + BLOCK, room, 0.0);
         }
-        let mut image = map.apply(&basis.columns(done, width).into_owned())?;
+        let mut image = map
+            .apply(&basis.columns(done, width).into_owned())
+            .ok_or(Breakdown::NoSolution)?;
         let scale = image.norm();
         let known = basis.columns(0, done + width);
         // Two passes suffice: the first leaves in the space only the rounding of the image.
@@ -222,12 +237,12 @@ fn arnoldi(
                     basis: Some(basis.columns(0, end).into_owned()),
                     projected: within,
                 };
-                return Some(ArnoldiResult { dominant, is_settled });
+                return Ok(ArnoldiResult { dominant, is_settled });
             }
         }
         (done, width) = (end, next.ncols());
     }
-    None
+    Err(Breakdown::NoSolution)
 }
 
 /// True if every eigenvalue μ has a small residual ‖M v − μ v‖ = ‖K y‖, with K the coupling to the next block and y the
@@ -257,11 +272,11 @@ fn are_settled(
 }
 
 /// Eigenvalues of a matrix larger than `least`, largest first; of a conjugate pair the upper one first.
-fn larger(matrix: &DMatrix<f64>, least: f64) -> Option<Vec<Complex64>> {
-    let mut values = eigenvalues::of_real(matrix.clone()).ok()?;
+fn larger(matrix: &DMatrix<f64>, least: f64) -> Result<Vec<Complex64>, EigenvalueError> {
+    let mut values = eigenvalues::of_real(matrix.clone())?;
     values.retain(|value| value.norm() > least);
     values.sort_by(|p, q| q.norm().total_cmp(&p.norm()).then(q.im.total_cmp(&p.im)));
-    Some(values)
+    Ok(values)
 }
 
 /// Starting block: the same at every call, with components along all directions.

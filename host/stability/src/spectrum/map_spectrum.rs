@@ -7,6 +7,7 @@ use super::crossing::Crossing;
 use super::krylov::{Dominant, LinearMap};
 use super::stability_loss::StabilityLoss;
 use crate::criteria::MAPPED;
+use crate::error::Breakdown;
 
 /// Depth step of the difference quotient dμ/dw, as a share of the largest depth. Its truncation error, and the rounding
 /// of multipliers divided by the step, are then both near 1e-6. Derivatives serve as predictions only.
@@ -47,20 +48,20 @@ impl<M: PeriodMap, F: Fn(f64) -> Option<M>, E: Fn(Complex64, f64) -> Option<f64>
         }
     }
 
-    fn at(&mut self, depth_m: f64) -> Option<&mut Known> {
+    fn at(&mut self, depth_m: f64) -> Result<&mut Known, Breakdown> {
         if self.known.as_ref().is_none_or(|known| known.depth_m != depth_m) {
             self.known = Some(Known {
                 depth_m,
-                dominant: Dominant::of(&(self.map)(depth_m)?, MAPPED)?,
+                dominant: Dominant::of(&(self.map)(depth_m).ok_or(Breakdown::NoSolution)?, MAPPED)?,
                 deeper: None,
             });
         }
-        self.known.as_mut()
+        self.known.as_mut().ok_or(Breakdown::NoSolution)
     }
 
     /// The multiplier nearest to a guess; a real guess gives a real one.
     fn nearest(&mut self, guess: Complex64, depth_m: f64) -> Option<Complex64> {
-        nearest(&self.at(depth_m)?.dominant.eigenvalues, guess)
+        nearest(&self.at(depth_m).ok()?.dominant.eigenvalues, guess)
     }
 }
 
@@ -76,8 +77,8 @@ pub(crate) fn nearest(multipliers: &[Complex64], guess: Complex64) -> Option<Com
 impl<M: PeriodMap, F: Fn(f64) -> Option<M>, E: Fn(Complex64, f64) -> Option<f64>> Spectrum
     for MapSpectrum<F, E>
 {
-    fn multipliers(&mut self, depth_m: f64) -> Option<Vec<Complex64>> {
-        Some(self.at(depth_m)?.dominant.eigenvalues.clone())
+    fn multipliers(&mut self, depth_m: f64) -> Result<Vec<Complex64>, Breakdown> {
+        Ok(self.at(depth_m)?.dominant.eigenvalues.clone())
     }
 
     fn multiplier_near(&mut self, guess: Complex64, depth_m: f64, reach: f64) -> Option<Complex64> {
@@ -88,11 +89,13 @@ impl<M: PeriodMap, F: Fn(f64) -> Option<M>, E: Fn(Complex64, f64) -> Option<f64>
     fn sensitivity(&mut self, multiplier: Complex64, depth_m: f64) -> Option<Complex64> {
         let step_m = self.step_m;
         let own = self.nearest(multiplier, depth_m)?;
-        if self.at(depth_m)?.deeper.is_none() {
-            let deeper = Dominant::of(&(self.map)(depth_m + step_m)?, MAPPED)?.eigenvalues;
-            self.at(depth_m)?.deeper = Some(deeper);
+        if self.at(depth_m).ok()?.deeper.is_none() {
+            let deeper = Dominant::of(&(self.map)(depth_m + step_m)?, MAPPED)
+                .ok()?
+                .eigenvalues;
+            self.at(depth_m).ok()?.deeper = Some(deeper);
         }
-        let deeper = self.at(depth_m)?.deeper.as_deref()?;
+        let deeper = self.at(depth_m).ok()?.deeper.as_deref()?;
         // If two real multipliers meet between the depths w and w + step, the derivative does not exist.
         Some((nearest(deeper, own)? - own) / step_m)
     }
@@ -131,7 +134,7 @@ impl<M: PeriodMap, F: Fn(f64) -> Option<M>, E: Fn(Complex64, f64) -> Option<f64>
 
     fn chatter_hz(&self, crossing: &Crossing) -> Option<f64> {
         let map = (self.map)(crossing.depth_m)?;
-        let dominant = Dominant::of(&map, MAPPED)?;
+        let dominant = Dominant::of(&map, MAPPED).ok()?;
         let multiplier = nearest(&dominant.eigenvalues, crossing.multiplier)?;
         map.chatter_hz(multiplier, &dominant.vector(multiplier)?)
     }

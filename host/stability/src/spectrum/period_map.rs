@@ -7,6 +7,7 @@ use num_complex::Complex64;
 
 use super::krylov::{self, LinearMap};
 use crate::criteria::{GROWN, NORMAL};
+use crate::error::Breakdown;
 use crate::problem::period::Period;
 use quietcut_numerics::eigenvalues;
 
@@ -56,15 +57,21 @@ pub(crate) fn monodromy(period: &Period, depth_m: f64) -> Option<DMatrix<f64>> {
 
 /// All multipliers of the collocated map, largest first. Those that only represent the discretized history are near
 /// zero.
-pub(crate) fn multipliers(period: &Period, depth_m: f64) -> Option<Vec<Complex64>> {
-    of_matrix(monodromy(period, depth_m)?)
+///
+/// # Errors
+/// The collocation equations are singular, or the eigenvalues cannot be computed.
+pub(crate) fn multipliers(period: &Period, depth_m: f64) -> Result<Vec<Complex64>, Breakdown> {
+    of_matrix(monodromy(period, depth_m).ok_or(Breakdown::NoSolution)?)
 }
 
 /// All eigenvalues of the matrix of a period map, largest first; of a conjugate pair the upper one first.
-pub(crate) fn of_matrix(map: DMatrix<f64>) -> Option<Vec<Complex64>> {
-    let mut multipliers = eigenvalues::of_real(map).ok()?;
+///
+/// # Errors
+/// The matrix is not finite, or the iteration does not converge.
+pub(crate) fn of_matrix(map: DMatrix<f64>) -> Result<Vec<Complex64>, Breakdown> {
+    let mut multipliers = eigenvalues::of_real(map)?;
     multipliers.sort_by(|p, q| q.norm().total_cmp(&p.norm()).then(q.im.total_cmp(&p.im)));
-    Some(multipliers)
+    Ok(multipliers)
 }
 
 /// Approximate largest multipliers, as starting values of Newton's method.
@@ -79,8 +86,11 @@ pub(crate) struct Candidates {
 
 /// Multipliers larger than `share` of the largest.
 ///
-/// Large maps are treated by block Arnoldi. `None` if a result is not finite.
-pub(crate) fn largest(period: &Period, depth_m: f64, share: f64) -> Option<Candidates> {
+/// Large maps are treated by block Arnoldi.
+///
+/// # Errors
+/// The collocation equations are singular, or the eigenvalues cannot be computed.
+pub(crate) fn largest(period: &Period, depth_m: f64, share: f64) -> Result<Candidates, Breakdown> {
     let (order, size) = (period.order(), period.order() + period.ports());
     let of = |mut multipliers: Vec<Complex64>, norm: f64, is_settled: bool| {
         let largest = multipliers.first().map_or(0.0, |multiplier| multiplier.norm());
@@ -94,44 +104,53 @@ pub(crate) fn largest(period: &Period, depth_m: f64, share: f64) -> Option<Candi
     // `None` unless one is so large that this surface does not act.
     let grown = |transition: DMatrix<f64>| {
         let norm = transition.amax();
-        let multipliers = of_matrix(transition)?;
+        let multipliers = of_matrix(transition).ok()?;
         let is_large = multipliers.first().is_some_and(|first| first.norm() > GROWN);
         Some(of(multipliers, norm, is_large)).filter(|found| found.is_certain)
     };
     if size > WHOLE {
-        let map = Map::new(period, depth_m)?;
-        let identity = DMatrix::identity(size, order);
-        let transition = map.apply(&identity)?.rows(0, order).into_owned();
+        let map = Map::new(period, depth_m).ok_or(Breakdown::NoSolution)?;
+        let image = map.apply(&DMatrix::identity(size, order));
+        let transition = image.ok_or(Breakdown::NoSolution)?.rows(0, order).into_owned();
         if let Some(found) = grown(transition) {
-            return Some(found);
+            return Ok(found);
         }
         let found = krylov::largest(&map, share)?;
         if found.is_settled || size > UNSETTLED_WHOLE_MAX {
-            return Some(of(found.eigenvalues, found.norm, found.is_settled));
+            return Ok(of(found.eigenvalues, found.norm, found.is_settled));
         }
     }
-    let map = monodromy(period, depth_m)?;
+    let map = monodromy(period, depth_m).ok_or(Breakdown::NoSolution)?;
     if let Some(found) = grown(map.view((0, 0), (order, order)).into_owned()) {
-        return Some(found);
+        return Ok(found);
     }
     let norm = map.amax();
-    Some(of(of_matrix(map)?, norm, true))
+    Ok(of(of_matrix(map)?, norm, true))
 }
 
 /// Multipliers larger than `least`, or larger than `share` of the largest if that is less, largest first. Small maps
 /// return smaller multipliers too.
 ///
-/// Large maps are treated by block Arnoldi, accurate enough to start Newton's method. `None` if a result is not finite,
-/// or if block Arnoldi does not converge and the map is too large for all eigenvalues.
-pub(crate) fn larger_than(period: &Period, depth_m: f64, least: f64, share: f64) -> Option<Vec<Complex64>> {
+/// Large maps are treated by block Arnoldi, accurate enough to start Newton's method.
+///
+/// # Errors
+/// The collocation equations are singular, the eigenvalues cannot be computed, or block Arnoldi does not converge and
+/// the map is too large for all eigenvalues.
+pub(crate) fn larger_than(
+    period: &Period,
+    depth_m: f64,
+    least: f64,
+    share: f64,
+) -> Result<Vec<Complex64>, Breakdown> {
     let size = period.order() + period.ports();
-    if size > WHOLE
-        && let Some(found) = krylov::larger_than(&Map::new(period, depth_m)?, least, share)
-    {
-        return Some(found);
+    if size > WHOLE {
+        let map = Map::new(period, depth_m).ok_or(Breakdown::NoSolution)?;
+        if let Some(found) = krylov::larger_than(&map, least, share) {
+            return Ok(found);
+        }
     }
     if size > krylov::WHOLE_MAX {
-        return None;
+        return Err(Breakdown::TooManyMultipliers);
     }
     multipliers(period, depth_m)
 }

@@ -368,7 +368,7 @@ fn the_lobe_table_agrees_with_the_direct_solution() {
         depth_mm: Some(5.0),
         ..TableRequest::default()
     };
-    let bytes = build_table(std::slice::from_ref(&case), &request).unwrap();
+    let bytes = build_table(std::slice::from_ref(&case), &request).unwrap().bytes;
     let table = LobeTable::parse(&bytes).unwrap();
     let problem = Problem::new(&case, CubicTerms::Refuse).unwrap();
     let working_point = |depth_mm: f64| WorkingPoint {
