@@ -8,7 +8,7 @@ use quietcut::device::Client;
 use quietcut_core::protocol::{Reports, Subscription};
 use quietcut_tests::acceptance::{ABOVE, AcceptanceCut, BELOW, LIMITS};
 use quietcut_tests::emulator::{Emulator, Memory, PATIENCE};
-use quietcut_tests::said::{Said, steps, stimuli};
+use quietcut_tests::outputs::{ChainOutputs, steps, stimuli};
 
 /// Subscription to all reports. Spectra and stroboscopic points take longer to send than to compute; `emulated_device` compares
 /// them.
@@ -19,13 +19,13 @@ const REPORTS: Subscription = Subscription {
 };
 
 /// Runs the signal chain over the cut on host and emulator. Returns the outputs of the emulator.
-fn emulated(cut: &AcceptanceCut) -> Said {
+fn emulated(cut: &AcceptanceCut) -> ChainOutputs {
     let sensed = cut
         .cut
         .sense(&cut.case, cut.accelerometer, cut.tachometer, cut.seed)
         .expect("a cut that can be simulated");
     let steps = steps(sensed);
-    let host = Said::on_host(cut.settings(), None, None, &steps);
+    let host = ChainOutputs::on_host(cut.settings(), None, None, &steps);
     let memory = Memory::erased();
     let mut emulator = Emulator::start(&memory);
     let (mut client, _) = Client::connect(Box::new(emulator.port())).expect("the device answers");
@@ -34,7 +34,7 @@ fn emulated(cut: &AcceptanceCut) -> Said {
     let began = Instant::now();
     let device = std::thread::scope(|scope| {
         scope.spawn(|| emulator.feed_stored(&stimuli(&steps)));
-        Said::from_device(&mut client, steps.len(), PATIENCE)
+        ChainOutputs::from_device(&mut client, steps.len(), PATIENCE)
     });
     let status = client.status().expect("an answer");
     assert_eq!((status.dropped, client.lost_frames()), (0, 0));

@@ -11,7 +11,7 @@ use quietcut_core::protocol::{Info, Slot, VERSION};
 use quietcut_tests::cut::Cut;
 use quietcut_tests::emulator::{self, Cost, Emulator, Memory, PATIENCE};
 use quietcut_tests::firmware_image;
-use quietcut_tests::said::{ALL, Said, Step, stimuli};
+use quietcut_tests::outputs::{ALL, ChainOutputs, Step, stimuli};
 use quietcut_tests::scenario::{self, name_in_use, upload};
 use quietcut_tests::small_table::table;
 use rand::{RngExt, SeedableRng};
@@ -187,10 +187,10 @@ fn assert_same_to_the_bit(cut: &Cut, feed: impl FnOnce(&mut Emulator<'_>, &[Step
         .set_working_point(Some(cut.working_point))
         .expect("a cut that can be");
     client.subscribe(ALL).expect("a subscription");
-    let host = Said::on_host(cut.settings, Some(&table), Some(&cut.working_point), &cut.steps);
+    let host = ChainOutputs::on_host(cut.settings, Some(&table), Some(&cut.working_point), &cut.steps);
     let device = std::thread::scope(|scope| {
         scope.spawn(|| feed(&mut emulator, &cut.steps));
-        Said::from_device(&mut client, cut.steps.len(), PATIENCE)
+        ChainOutputs::from_device(&mut client, cut.steps.len(), PATIENCE)
     });
     host.assert_same(&device);
     let status = client.status().expect("an answer");
@@ -260,8 +260,8 @@ fn blocks_arrive_over_the_link() {
         "link: {:.0} blocks/s",
         cut.steps.len() as f64 / began.elapsed().as_secs_f64()
     );
-    let device = Said::from_device(&mut client, cut.steps.len(), Duration::from_secs(1));
-    Said::on_host(cut.settings, None, None, &cut.steps).assert_same(&device);
+    let device = ChainOutputs::from_device(&mut client, cut.steps.len(), Duration::from_secs(1));
+    ChainOutputs::on_host(cut.settings, None, None, &cut.steps).assert_same(&device);
     assert!(client.status().expect("an answer").is_fed);
 }
 

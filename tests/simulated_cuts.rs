@@ -13,7 +13,7 @@ const SAME_HZ: f64 = 0.5;
 /// Simulates a cut at this depth relative to the stability limit. The sensors differ between the speeds.
 fn cut(index: usize, share: f64) -> Outcome {
     let acceptance = AcceptanceCut::new(index, share);
-    let outcome = SimulatedCut::of(&acceptance).judged(acceptance.seed);
+    let outcome = SimulatedCut::of(&acceptance).outcome(acceptance.seed);
     println!("seed {}: {outcome}", acceptance.seed);
     outcome
 }

@@ -135,17 +135,18 @@ impl Line {
         let simulated: Vec<SimulatedCut> = (0..cuts)
             .map(|number| {
                 let (mut accelerometer, tachometer) = Self::sensors(number);
-                let told = accelerometer;
+                let assumed = accelerometer;
                 accelerometer.noise_g_per_root_hertz *= self.noise;
                 let shaking = (self.shaking > 0.0).then_some(Shaking {
                     newton_per_root_hertz: self.shaking,
                     seed: number,
                 });
-                SimulatedCut::new(&case, &self.cut, accelerometer, tachometer, shaking).told(&case, told)
+                SimulatedCut::new(&case, &self.cut, accelerometer, tachometer, shaking)
+                    .with_assumed_accelerometer(&case, assumed)
             })
             .collect();
         let outcomes = (0..seeds).zip(simulated.iter().cycle());
-        let outcomes = outcomes.map(|(seed, cut)| cut.judged(seed)).collect();
+        let outcomes = outcomes.map(|(seed, cut)| cut.outcome(seed)).collect();
         Rates { line: self, outcomes }
     }
 }

@@ -8,7 +8,7 @@ use quietcut_core::working_point::{Limits, WorkingPoint};
 
 use crate::acceptance::settings;
 use crate::command;
-use crate::said::{Step, steps};
+use crate::outputs::{Step, steps};
 
 /// Simulated cut of `kuka-kr90-acetal`; the clock of its sensor has an error of 2 %.
 pub struct Cut {

@@ -25,12 +25,12 @@ impl RawHost {
     }
 
     /// Sends bytes.
-    pub fn say(&mut self, bytes: &[u8]) {
+    pub fn send(&mut self, bytes: &[u8]) {
         self.port.send(bytes, SECOND).expect("the line takes bytes");
     }
 
     /// Receives the next response.
-    pub fn hear(&mut self) -> Response {
+    pub fn receive(&mut self) -> Response {
         let began = Instant::now();
         while began.elapsed() < PATIENCE {
             // Reads one byte at a time, so that bytes after the frame remain for the next call.
@@ -46,8 +46,8 @@ impl RawHost {
 
     /// Sends a request with this sequence number and returns its reply.
     pub fn ask(&mut self, number: u16, request: &Request) -> Reply {
-        self.say(&frame(number, request));
-        match self.hear() {
+        self.send(&frame(number, request));
+        match self.receive() {
             Response::Reply { request, reply } if request == number => reply,
             other => panic!("{other:?}"),
         }

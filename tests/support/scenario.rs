@@ -115,8 +115,8 @@ pub fn invalid_frames_have_their_own_errors_and_change_nothing(open: Open<'_>) {
     assert_eq!(name_in_use(&before), "kept");
 
     let mut refusal = |bytes: &[u8]| {
-        host.say(bytes);
-        match host.hear() {
+        host.send(bytes);
+        match host.receive() {
             Response::FrameRefused(error) => error,
             other => panic!("{other:?}"),
         }
@@ -147,9 +147,9 @@ pub fn invalid_frames_have_their_own_errors_and_change_nothing(open: Open<'_>) {
     let error = refusal(&[0x55; 2000]);
     assert!(matches!(error, FrameError::TooLong { .. }), "{error}");
     // A zero byte ends the unfinished frame.
-    host.say(&[0]);
-    host.say(&frame_of_version(99, 101));
-    let Response::FrameRefused(FrameError::Version { theirs: 99, .. }) = host.hear() else {
+    host.send(&[0]);
+    host.send(&frame_of_version(99, 101));
+    let Response::FrameRefused(FrameError::Version { theirs: 99, .. }) = host.receive() else {
         panic!("a frame of version 99 is refused")
     };
 

@@ -11,7 +11,7 @@ use quietcut_core::detector::Verdict;
 use quietcut_core::monitor::{self, Monitor, State};
 
 use crate::acceptance::{AcceptanceCut, settings};
-use crate::said::steps;
+use crate::outputs::steps;
 use crate::shaking::Shaking;
 
 /// Result of a virtual cut.
@@ -138,13 +138,13 @@ impl SimulatedCut {
     }
 
     /// Configures the signal chain for another accelerometer than the simulated one.
-    pub fn told(mut self, case: &Case, accelerometer: Accelerometer) -> Self {
+    pub fn with_assumed_accelerometer(mut self, case: &Case, accelerometer: Accelerometer) -> Self {
         self.settings = settings(case, accelerometer, self.tachometer);
         self
     }
 
     /// Runs the signal chain over the cut. `seed` is the seed of the sensor noise.
-    pub fn judged(&self, seed: u64) -> Outcome {
+    pub fn outcome(&self, seed: u64) -> Outcome {
         let Self { cut, tachometer, .. } = self;
         let sensed = SensedCut {
             blocks: self.sampler.blocks(seed),

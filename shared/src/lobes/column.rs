@@ -196,7 +196,7 @@ impl Column {
         }
     }
 
-    /// Appends the union of two groups. Kind and frequency of `near` apply if both are unstable.
+    /// Appends the union of two groups. Where both groups are unstable, the union has the kind and frequency of `near`.
     fn push_union(&mut self, near: &[Interval], far: &[Interval]) {
         let mut depth_mm = f32::NEG_INFINITY;
         loop {

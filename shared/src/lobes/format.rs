@@ -19,7 +19,7 @@
 //! | 38 | 2 | flags: bit 0, the machine's limits are given; schema 2: bit 1, the interpolation error is given; bits 8–15 M, number of modes |
 //! | 40 | 4+4 | slowest and fastest speed of the machine, f32, rev/min |
 //! | 48 | 4+4 | smallest and largest depth of the table, f32, mm |
-//! | 56 | 4 | largest chatter frequency, f32, Hz: the scale of all of them |
+//! | 56 | 4 | largest chatter frequency, f32, Hz: the scale of all chatter frequencies |
 //! | 60 | 4 | I, number of intervals |
 //! | 64 | 32 | name of the case, UTF-8, padded with zeros |
 //! | 96 | 24·L | layers: feed from, feed to (f32, mm), start, exit (f32, degrees), posture (1 byte), 3 zeros, index of its first interval (u32); schema 2 instead of the zeros: 1 where a feed direction is given, and it (u16, 1/100 degree) |

@@ -31,7 +31,7 @@ pub const MAX_TEETH: u8 = 12;
 pub enum SettingsError {
     /// The tool has no teeth, or more than [`MAX_TEETH`].
     Teeth(u8),
-    /// The wheel has no positions, or fewer than four teeth beside its gap.
+    /// The wheel has no positions, or fewer than four teeth outside of its gap.
     Wheel(Wheel),
     /// The sample rate is outside the range of the decimation filters.
     SampleRate(Hertz),

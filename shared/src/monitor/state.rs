@@ -125,7 +125,7 @@ impl State {
         }
     }
 
-    /// The newest finding from the tooth periods of a band.
+    /// The newest finding of the growth estimators, from the tooth periods of a band.
     pub fn finding(&self, band: Band) -> &Finding {
         match band {
             Band::Structure => self.structure.growth.finding(),

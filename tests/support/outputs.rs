@@ -49,7 +49,7 @@ pub fn stimuli(steps: &[Step]) -> Vec<Stimulus> {
 
 /// Recorded outputs of the signal chain. Numbers are compared by their bits: a NaN equals itself, and 0 differs from −0.
 #[derive(Debug, Default, PartialEq, Eq)]
-pub struct Said {
+pub struct ChainOutputs {
     /// Serialized reports (postcard), in order.
     pub reports: Vec<Vec<u8>>,
     /// Stroboscopic samples, keyed by the number of their block.
@@ -65,7 +65,7 @@ fn bytes<T: serde::Serialize>(value: &T) -> Vec<u8> {
         .to_vec()
 }
 
-impl Said {
+impl ChainOutputs {
     /// Runs the signal chain on the host over a cut.
     pub fn on_host(
         settings: Settings,
