@@ -39,20 +39,36 @@ pub enum CaseFileError {
         "no direction is both driven and measured, so the modes are not those of a tool; drive where the motion is measured"
     )]
     NoDirection,
+    /// The case is not valid TOML.
+    #[error("the case cannot be written as TOML: {0}")]
+    Toml(String),
+}
+
+/// The text of a case.
+///
+/// # Errors
+/// A value has no form in TOML.
+fn written(case: &Table) -> Result<String, CaseFileError> {
+    toml::to_string(case).map_err(|error| CaseFileError::Toml(error.to_string()))
 }
 
 /// Sections of a case that do not describe the dynamics of the machine.
 const OTHERS: [&str; 4] = ["tool", "material", "cut", "limits"];
 
 /// The case `text` with the sections tool, material, cut and limits of the case `other`.
-pub fn with_sections(text: &str, other: &Table) -> String {
-    let mut case: Table = text.parse().unwrap_or_default();
+///
+/// # Errors
+/// The text is not valid TOML.
+pub fn with_sections(text: &str, other: &Table) -> Result<String, CaseFileError> {
+    let mut case: Table = text
+        .parse()
+        .map_err(|error: toml::de::Error| CaseFileError::Toml(error.to_string()))?;
     for section in OTHERS {
         if let Some(value) = other.get(section) {
             case.insert(section.into(), value.clone());
         }
     }
-    toml::to_string(&case).unwrap_or_default()
+    written(&case)
 }
 
 /// Text of a case with complex modes, in the directions that are both excited and measured.
@@ -83,7 +99,7 @@ pub fn text_of_modes(name: &str, model: &ModalModel) -> Result<String, CaseFileE
             }
         })
         .collect();
-    Ok(toml::to_string(&modal(name, &directions, &modes)).unwrap_or_default())
+    written(&modal(name, &directions, &modes))
 }
 
 /// A case with complex modes whose shapes have an entry for each of `directions`.
@@ -259,8 +275,7 @@ pub fn text(name: &str, directions: &[Direction], estimates: &[Estimate]) -> Res
     if !extensions.is_empty() {
         case.insert("extension".into(), Value::Table(extensions));
     }
-    // A table of numbers and words always converts to TOML.
-    Ok(toml::to_string(&case).unwrap_or_default())
+    written(&case)
 }
 
 fn extensions(

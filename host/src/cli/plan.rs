@@ -103,6 +103,14 @@ pub fn run(args: Args) -> Result<(), Error> {
     );
     let found = plan(&case, &request, || bar.inc(1))?;
     bar.finish_and_clear();
+    if !found.without_derivative_rpm.is_empty() {
+        tracing::warn!(
+            "{}: the limits at {} speeds have no derivatives with respect to the unknowns and are not considered: {} rev/min",
+            args.case.display(),
+            found.without_derivative_rpm.len(),
+            listed(&found.without_derivative_rpm)
+        );
+    }
     if let Some(path) = &args.out {
         write(&case, &found, request.depth_mm, path)?;
     }
@@ -111,6 +119,12 @@ pub fn run(args: Args) -> Result<(), Error> {
         let _ = write!(output_text, "\n{}", path.display());
     }
     args.output.answer(&found, output_text)
+}
+
+/// Spindle speeds as a list for a message, rounded to 0.1 rev/min.
+fn listed(speeds_rpm: &[f64]) -> String {
+    let words: Vec<String> = speeds_rpm.iter().map(|rpm| format!("{rpm:.1}")).collect();
+    words.join(", ")
 }
 
 fn request(args: &Args) -> Request {
@@ -209,11 +223,11 @@ fn text(plan: &Plan) -> String {
             );
         }
     }
-    if !plan.without_limit_rpm.is_empty() {
+    let stable = plan.without_limit_rpm.len() - plan.without_derivative_rpm.len();
+    if stable > 0 {
         let _ = write!(
             text,
-            "\n{} speeds are stable up to the last depth and are not considered",
-            plan.without_limit_rpm.len()
+            "\n{stable} speeds are stable up to the last depth and are not considered"
         );
     }
     text

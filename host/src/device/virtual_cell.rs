@@ -90,8 +90,12 @@ impl VirtualCell {
         let (send, receive) = sync_channel(1);
         std::thread::spawn(move || {
             for (seed, (spindle_rpm, depth_mm)) in (1..).zip(CUTS.into_iter().cycle()) {
-                let Ok(sensed) = self.cut(spindle_rpm, depth_mm, SECONDS, seed) else {
-                    return;
+                let sensed = match self.cut(spindle_rpm, depth_mm, SECONDS, seed) {
+                    Ok(sensed) => sensed,
+                    Err(error) => {
+                        tracing::error!("the virtual cell makes no more cuts: {error}");
+                        return;
+                    }
                 };
                 // Sending fails after the device has been dropped.
                 if send.send(sensed).is_err() {

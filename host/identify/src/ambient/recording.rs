@@ -20,6 +20,18 @@ pub struct Ambient {
     pub turn_hz: Option<f64>,
     /// Reason why a recorded tachometer does not give the spindle angle; the stated speed is used instead, if there is one.
     pub tachometer_fault: Option<String>,
+    /// True if the spindle harmonics are still in the record, because it is too short to separate them from each other.
+    pub harmonics_remain: bool,
+}
+
+/// Result of the removal of the spindle harmonics.
+struct Removal {
+    /// Spindle frequency, Hz; `None` if no speed is known.
+    turn_hz: Option<f64>,
+    /// Reason why a recorded tachometer does not give the spindle angle.
+    tachometer_fault: Option<String>,
+    /// True if the harmonics could not be separated and remain.
+    harmonics_remain: bool,
 }
 
 /// Smallest number of samples per period of the highest frequency after decimation.
@@ -40,7 +52,11 @@ impl Ambient {
             .map(of)
             .find(|channels| !channels.is_empty())?;
         let mut samples: Vec<Vec<f64>> = chosen.iter().map(|channel| channel.samples.clone()).collect();
-        let (turn_hz, tachometer_fault) = without_harmonics(recording, &mut samples, high_hz);
+        let Removal {
+            turn_hz,
+            tachometer_fault,
+            harmonics_remain,
+        } = without_harmonics(recording, &mut samples, high_hz);
         let every = (recording.sample_rate_hz / (PER_PERIOD * high_hz))
             .floor()
             .max(1.0) as usize;
@@ -50,6 +66,7 @@ impl Ambient {
             rate_hz: recording.sample_rate_hz / every as f64,
             turn_hz,
             tachometer_fault,
+            harmonics_remain,
         })
     }
 
@@ -60,12 +77,8 @@ impl Ambient {
 }
 
 /// Removes the mean and all spindle harmonics up to 1.2 `high_hz` by least squares over the record, and trims it to the range in
-/// which the spindle angle is known. Returns the spindle frequency, Hz, and why a recorded tachometer does not give it.
-fn without_harmonics(
-    recording: &Recording,
-    samples: &mut [Vec<f64>],
-    high_hz: f64,
-) -> (Option<f64>, Option<String>) {
+/// which the spindle angle is known.
+fn without_harmonics(recording: &Recording, samples: &mut [Vec<f64>], high_hz: f64) -> Removal {
     let cut = recording.sidecar.cut.unwrap_or_default();
     let rate_hz = recording.sample_rate_hz;
     let mut fault = None;
@@ -109,15 +122,22 @@ fn without_harmonics(
             right.column_mut(channel).axpy(samples[sample], &row, 1.0);
         }
     }
+    let mut harmonics_remain = false;
     for (channel, samples) in samples.iter_mut().enumerate() {
-        if let Some(found) = scaled_solve(&normal, &right.column(channel).into_owned()) {
-            for (sample, angle) in samples.iter_mut().zip(&angle) {
-                fill(&mut row, *angle);
-                *sample -= found.dot(&row);
-            }
+        let Some(found) = scaled_solve(&normal, &right.column(channel).into_owned()) else {
+            harmonics_remain = harmonics > 0;
+            continue;
+        };
+        for (sample, angle) in samples.iter_mut().zip(&angle) {
+            fill(&mut row, *angle);
+            *sample -= found.dot(&row);
         }
     }
-    ((turn_hz > 0.0).then_some(turn_hz), fault)
+    Removal {
+        turn_hz: (turn_hz > 0.0).then_some(turn_hz),
+        tachometer_fault: fault,
+        harmonics_remain,
+    }
 }
 
 /// Decimates by the factor `every`, after a low-pass filter (windowed sinc, Hann) that passes up to a third of the new sample rate

@@ -1,6 +1,7 @@
 //! Candidate tests of a plan, each with its Fisher information about the unknown parameters.
 
 use std::f64::consts::{FRAC_2_PI, PI};
+use std::fmt::Display;
 
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
@@ -11,7 +12,7 @@ use super::chart::{KnownChart, KnownLimit};
 use super::means::Means;
 use super::unknowns::Unknowns;
 use quietcut_model::case::Case;
-use quietcut_model::structure::{Direction, FirstOrder, Structure};
+use quietcut_model::structure::{Direction, FirstOrder, Structure, StructureError};
 use quietcut_simulate::STANDARD_GRAVITY;
 use quietcut_stability::{CubicTerms, Problem, Variable};
 
@@ -66,16 +67,35 @@ pub(super) struct Candidate {
     pub(super) limit: Option<usize>,
 }
 
+/// Reason why the information of a test cannot be computed.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum CandidateError {
+    /// The nominal structure has no equation of motion.
+    #[error("{0}")]
+    Structure(#[from] StructureError),
+    /// The case is invalid when an unknown changes by one step.
+    #[error("a change of an unknown ({unknown}) by a twentieth of its standard deviation gives {what}")]
+    Invalid {
+        /// Name of the unknown.
+        unknown: String,
+        /// What is invalid.
+        what: String,
+    },
+}
+
 /// All candidate tests of a plan: hammer tests, force tests and brackets of limits.
+///
+/// # Errors
+/// A structure or a cut cannot be computed, for the nominal parameters or after one step of an unknown.
 pub(super) fn candidates(
     case: &Case,
     problem: &Problem,
     unknowns: &Unknowns,
     chart: &KnownChart,
     means: &Means,
-) -> Vec<Candidate> {
-    let mut candidates = hammers(case, unknowns, means);
-    candidates.extend(force(case, problem, unknowns, chart, means));
+) -> Result<Vec<Candidate>, CandidateError> {
+    let mut candidates = hammers(case, unknowns, means)?;
+    candidates.extend(force(case, problem, unknowns, chart, means)?);
     let count = chart.limits.len();
     let step = count.div_ceil(BRACKETS).max(1);
     candidates.extend(
@@ -86,7 +106,7 @@ pub(super) fn candidates(
             .step_by(step)
             .map(|(index, limit)| cuts(index, limit, means)),
     );
-    candidates
+    Ok(candidates)
 }
 
 /// Candidate that brackets a stability limit by cuts. It measures the limit depth, uniform within the bracket width w (variance
@@ -111,46 +131,61 @@ fn cuts(index: usize, limit: &KnownLimit, means: &Means) -> Candidate {
     }
 }
 
-/// The case with a variable one step below and above its value; `None` if one of the two cases is invalid.
-fn shifted(case: &Case, variable: &Variable) -> Option<[Case; 2]> {
-    let at = |deviations: f64| {
-        let mut moved = case.clone();
-        variable.shift(&mut moved, deviations).then_some(moved)
-    };
-    Some([at(-STEP)?, at(STEP)?])
+/// A quantity of the case with each of `variables` one step below and above its value; `names` are those of the unknowns.
+///
+/// # Errors
+/// One of the cases is invalid, or has no such quantity.
+fn shifted<'a, T, E: Display>(
+    case: &Case,
+    variables: impl Iterator<Item = &'a Variable>,
+    names: &[String],
+    of: impl Fn(&Case) -> Result<T, E>,
+) -> Result<Vec<[T; 2]>, CandidateError> {
+    variables
+        .zip(names)
+        .map(|(variable, name)| {
+            let invalid = |what: String| CandidateError::Invalid {
+                unknown: name.clone(),
+                what,
+            };
+            let at = |deviations: f64| {
+                let mut moved = case.clone();
+                if variable.shift(&mut moved, deviations) {
+                    of(&moved).map_err(|error| invalid(format!("an invalid case: {error}")))
+                } else {
+                    Err(invalid("a value outside its physical range".into()))
+                }
+            };
+            Ok([at(-STEP)?, at(STEP)?])
+        })
+        .collect()
 }
 
 /// Candidate hammer tests, one for each direction of the machine.
 ///
 /// A response a = −ω²H(ω)F(ω) in white noise of one-sided density S holds the information
 /// J_ij = 4/S ∫₀^∞ Re(∂_i a* ∂_j a) dω/2π per impact, with F the transform of a half sine.
-fn hammers(case: &Case, unknowns: &Unknowns, means: &Means) -> Vec<Candidate> {
+fn hammers(case: &Case, unknowns: &Unknowns, means: &Means) -> Result<Vec<Candidate>, CandidateError> {
     let Some(structure) = &case.structure else {
-        return Vec::new();
+        return Ok(Vec::new());
     };
-    let Ok(nominal) = structure.first_order() else {
-        return Vec::new();
-    };
+    let nominal = structure.first_order()?;
     let grid = frequency_grid(&nominal);
     let Some(&(highest_hz, _)) = grid.last() else {
-        return Vec::new();
+        return Ok(Vec::new());
     };
     // The spectrum of a half sine has its first zero at 1.5/pulse length, so this pulse excites all modes.
     let pulse_s = 0.75 / highest_hz;
-    let structures: Vec<Option<[FirstOrder; 2]>> = unknowns
-        .variables
-        .iter()
-        .chain(&unknowns.standstill)
-        .map(|variable| {
-            let [low, high] = shifted(case, variable)?;
-            let of = |case: &Case| {
-                case.structure
-                    .as_ref()
-                    .and_then(|s: &Structure| s.first_order().ok())
-            };
-            Some([of(&low)?, of(&high)?])
-        })
-        .collect();
+    let structures = shifted(
+        case,
+        unknowns.variables.iter().chain(&unknowns.standstill),
+        &unknowns.names,
+        |case: &Case| {
+            case.structure
+                .as_ref()
+                .map_or(Ok(nominal.clone()), Structure::first_order)
+        },
+    )?;
     let density = (means.accelerometer_g_per_root_hertz * STANDARD_GRAVITY).powi(2);
     let axes = Direction::ALL.into_iter().filter_map(|direction| {
         let axis = direction.axis()?;
@@ -160,7 +195,8 @@ fn hammers(case: &Case, unknowns: &Unknowns, means: &Means) -> Vec<Candidate> {
             .then_some((direction, axis))
     });
     let axes: Vec<(Direction, usize)> = axes.collect();
-    axes.par_iter()
+    Ok(axes
+        .par_iter()
         .map(|&(direction, axis)| {
             let mut information = DMatrix::zeros(unknowns.len(), unknowns.len());
             for &(hz, weight_hz) in &grid {
@@ -172,7 +208,7 @@ fn hammers(case: &Case, unknowns: &Unknowns, means: &Means) -> Vec<Candidate> {
                 let scale = omega * omega * force * (4.0 * means.blows as f64 * weight_hz / density).sqrt();
                 for output in axes.iter().map(|&(_, axis)| axis) {
                     let slope = |index: usize| match structures.get(index) {
-                        Some(Some([low, high])) => {
+                        Some([low, high]) => {
                             let of = |structure: &FirstOrder| {
                                 structure.receptance(omega).map(|h| h[(output, axis)])
                             };
@@ -203,7 +239,7 @@ fn hammers(case: &Case, unknowns: &Unknowns, means: &Means) -> Vec<Candidate> {
                 limit: None,
             }
         })
-        .collect()
+        .collect())
 }
 
 /// Quadrature nodes and weights in frequency, Hz: from half the lowest to twice the highest natural frequency, dense at resonances.
@@ -259,21 +295,18 @@ fn force(
     unknowns: &Unknowns,
     chart: &KnownChart,
     means: &Means,
-) -> Option<Candidate> {
-    let lowest = chart
+) -> Result<Option<Candidate>, CandidateError> {
+    let Some(lowest) = chart
         .limits
         .iter()
-        .min_by(|a, b| a.depth_mm().total_cmp(&b.depth_mm()))?;
+        .min_by(|a, b| a.depth_mm().total_cmp(&b.depth_mm()))
+    else {
+        return Ok(None);
+    };
     let depth_m = 0.5e-3 * lowest.depth_mm();
-    let problems: Vec<Option<[Problem; 2]>> = unknowns
-        .variables
-        .iter()
-        .map(|variable| {
-            let [low, high] = shifted(case, variable)?;
-            let of = |case: &Case| Problem::new(case, CubicTerms::LeaveOut).ok();
-            Some([of(&low)?, of(&high)?])
-        })
-        .collect();
+    let problems = shifted(case, unknowns.variables.iter(), &unknowns.names, |case: &Case| {
+        Problem::new(case, CubicTerms::LeaveOut)
+    })?;
     let engagement = problem.process.engagement;
     let density = means.dynamometer_n_per_root_hertz.powi(2);
     let mut information = DMatrix::zeros(unknowns.len(), unknowns.len());
@@ -292,7 +325,7 @@ fn force(
         let nominal = of(problem);
         for axis in 0..3 {
             let slope = |index: usize| match problems.get(index) {
-                Some(Some([low, high])) => (of(high)[axis] - of(low)[axis]) / (2.0 * STEP),
+                Some([low, high]) => (of(high)[axis] - of(low)[axis]) / (2.0 * STEP),
                 _ if index == unknowns.dynamometer_gain() => nominal[axis] * means.calibration,
                 _ => 0.0,
             };
@@ -300,7 +333,7 @@ fn force(
             information.ger(1.0, &row, &row, 1.0);
         }
     }
-    Some(Candidate {
+    Ok(Some(Candidate {
         test: Test::Force {
             rpm: lowest.rpm,
             depth_mm: 1e3 * depth_m,
@@ -308,5 +341,5 @@ fn force(
         },
         information,
         limit: None,
-    })
+    }))
 }

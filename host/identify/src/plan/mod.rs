@@ -72,7 +72,7 @@ pub enum PlanError {
         /// Path of the case file.
         case: String,
         /// Reason why there are no derivatives.
-        what: &'static str,
+        what: String,
     },
 }
 
@@ -152,8 +152,11 @@ pub struct Plan {
     /// Reason why the width is not reached; `None` if it is.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub obstacle: Option<Obstacle>,
-    /// Speeds without a stability limit up to the largest depth, rev/min; they do not count.
+    /// Speeds that do not count, rev/min: without a stability limit up to the largest depth, or with a limit without derivatives.
     pub without_limit_rpm: Vec<f64>,
+    /// Speeds whose limit has no derivatives by the unknowns, rev/min; they are among [`Plan::without_limit_rpm`].
+    #[serde(skip)]
+    pub without_derivative_rpm: Vec<f64>,
     /// All speeds with a stability limit.
     pub chart: Vec<Speed>,
 }
@@ -181,6 +184,7 @@ struct Basis {
     chart: KnownChart,
     candidates: Vec<Candidate>,
     without_limit_rpm: Vec<f64>,
+    without_derivative_rpm: Vec<f64>,
 }
 
 impl Basis {
@@ -195,8 +199,7 @@ impl Basis {
             case: case.path.display().to_string(),
             what,
         };
-        let unknowns = Unknowns::new(case, &request.prior, &request.means)
-            .ok_or_else(|| no_derivatives("nothing is unknown; larger deviations are needed"))?;
+        let unknowns = Unknowns::new(case, &request.prior, &request.means).map_err(no_derivatives)?;
         let linearized = Linearized::new(case, &unknowns.variables)?;
         let lines: Vec<Result<SpeedLine, StabilityError>> = request
             .speeds_rpm
@@ -212,10 +215,10 @@ impl Basis {
             .par_iter()
             .map(|line| KnownLimit::new(line, &linearized, unknowns.len()))
             .collect();
-        let without_limit_rpm = lines
-            .iter()
-            .zip(&limits)
-            .filter(|(_, limit)| limit.is_none())
+        let not_counted = || lines.iter().zip(&limits).filter(|(_, limit)| limit.is_none());
+        let without_limit_rpm = not_counted().map(|(line, _)| line.rpm).collect();
+        let without_derivative_rpm = not_counted()
+            .filter(|(line, _)| line.first_limit.is_some())
             .map(|(line, _)| line.rpm)
             .collect();
         let chart = KnownChart::new(limits.into_iter().flatten().collect());
@@ -226,12 +229,14 @@ impl Basis {
                 depth_mm: request.depth_mm,
             });
         }
-        let candidates = candidates(case, &problem, &unknowns, &chart, &request.means);
+        let candidates = candidates(case, &problem, &unknowns, &chart, &request.means)
+            .map_err(|error| no_derivatives(error.to_string()))?;
         Ok(Self {
             unknowns,
             chart,
             candidates,
             without_limit_rpm,
+            without_derivative_rpm,
         })
     }
 
@@ -263,6 +268,7 @@ impl Basis {
             after,
             obstacle,
             without_limit_rpm: self.without_limit_rpm.clone(),
+            without_derivative_rpm: self.without_derivative_rpm.clone(),
             chart: speeds
                 .map(|((limit, before_mm), after_mm)| Speed {
                     rpm: limit.rpm,

@@ -455,3 +455,16 @@ fn the_lowest_of_several_lobes_is_distributed_as_draws_are() {
     let near = 0.05 * (ninety_five - five);
     assert!((from - five).abs() < near && (to - ninety_five).abs() < near);
 }
+
+#[test]
+fn an_unknown_whose_change_gives_no_valid_machine_is_named() {
+    let case = case("kuka-kr90-acetal");
+    let mut request = request(&[1200.0], 8.0, 0.1);
+    // A twentieth of this deviation is more than the damping ratio itself.
+    request.means.standstill_damping = 25.0;
+    let error = plan(&case, &request, || {}).unwrap_err().to_string();
+    assert!(
+        error.contains("damping ratio of") && error.contains("at standstill"),
+        "{error}"
+    );
+}

@@ -60,28 +60,31 @@ struct Named {
 }
 
 impl Unknowns {
-    /// The unknowns that the case states (keys that end in `_std`), or else those of `prior`; `None` if there are none.
-    pub(super) fn new(case: &Case, prior: &Prior, means: &Means) -> Option<Self> {
+    /// The unknowns that the case states (keys that end in `_std`), or else those of `prior`.
+    ///
+    /// # Errors
+    /// There are none, or the modes of the matrices cannot be computed; the text gives the reason.
+    pub(super) fn new(case: &Case, prior: &Prior, means: &Means) -> Result<Self, String> {
         let stated = !case.deviations.is_empty();
         let named = if stated {
             of_case(case)
         } else {
-            let mut named = of_modes(case, [prior.frequency, prior.damping, prior.stiffness], "");
+            let mut named = of_modes(case, [prior.frequency, prior.damping, prior.stiffness], "")?;
             named.extend(of_forces(case, prior.force));
             named
         };
         if named.is_empty() {
-            return None;
+            return Err("nothing is unknown; larger deviations are needed".into());
         }
         let standstill = of_modes(
             case,
             [means.standstill_frequency, means.standstill_damping, 0.0],
             " at standstill against cutting",
-        );
+        )?;
         let gain = |of: &str| format!("gain of {of}, {} %", percent(means.calibration));
         let names = named.iter().chain(&standstill).map(|one| one.name.clone());
         let gains = [gain("hammer and accelerometer"), gain("the dynamometer")];
-        Some(Self {
+        Ok(Self {
             names: names.chain(gains).collect(),
             variables: named.into_iter().map(|one| one.variable).collect(),
             standstill: standstill.into_iter().map(|one| one.variable).collect(),
@@ -135,13 +138,16 @@ fn of_forces(case: &Case, relative: f64) -> Vec<Named> {
 
 /// Variables for frequency, damping ratio and stiffness of each mode with these relative deviations; a deviation of 0 gives no
 /// variable.
-fn of_modes(case: &Case, relative: [f64; 3], suffix: &str) -> Vec<Named> {
+///
+/// # Errors
+/// The modes of the matrices cannot be computed.
+fn of_modes(case: &Case, relative: [f64; 3], suffix: &str) -> Result<Vec<Named>, String> {
     let Some(structure) = &case.structure else {
-        return Vec::new();
+        return Ok(Vec::new());
     };
     let modes: Vec<(String, [Vec<Deviation>; 3])> = match &structure.form {
         Form::Modes(modes) => modes.iter().enumerate().map(of_mode).collect(),
-        Form::Matrices(matrices) => of_matrices(matrices),
+        Form::Matrices(matrices) => of_matrices(matrices)?,
         Form::Joints(robot) => robot.joints.iter().enumerate().map(of_joint).collect(),
     };
     let words = ["frequency", "damping ratio", "modal stiffness"];
@@ -164,7 +170,7 @@ fn of_modes(case: &Case, relative: [f64; 3], suffix: &str) -> Vec<Named> {
             }
         }
     }
-    named
+    Ok(named)
 }
 
 /// Name of a mode, and the changes of its parameters for a relative change of one in frequency, damping ratio and compliance.
@@ -221,22 +227,21 @@ fn of_joint((index, joint): (usize, &Joint)) -> (String, [Vec<Deviation>; 3]) {
 /// damping ratio and stiffness of each mode. With φᵀMφ = 1 and φᵀCφ = 2ζω, a change of one mode alone is a multiple of Mφφᵀ M.
 ///
 /// Modes are those of the symmetric parts of the matrices. Damping that couples modes does not change.
-fn of_matrices(matrices: &Matrices) -> Vec<(String, [Vec<Deviation>; 3])> {
+///
+/// # Errors
+/// The mass matrix is not positive definite, or the eigenvalues cannot be computed.
+fn of_matrices(matrices: &Matrices) -> Result<Vec<(String, [Vec<Deviation>; 3])>, String> {
     let symmetric = |matrix: &DMatrix<f64>| (matrix + matrix.transpose()) * 0.5;
     let (mass, damping, stiffness) = (
         symmetric(&matrices.mass),
         symmetric(&matrices.damping),
         symmetric(&matrices.stiffness),
     );
-    let Some(root) = Cholesky::new(mass.clone()).map(|cholesky| cholesky.l()) else {
-        return Vec::new();
-    };
-    let Some(inverse) = root.clone().try_inverse() else {
-        return Vec::new();
-    };
-    let Ok(eigen) = of_symmetric(&inverse * &stiffness * inverse.transpose()) else {
-        return Vec::new();
-    };
+    let inverse = Cholesky::new(mass.clone())
+        .and_then(|cholesky| cholesky.l().try_inverse())
+        .ok_or("the mass matrix is not positive definite, so that the structure has no modes")?;
+    let eigen = of_symmetric(&inverse * &stiffness * inverse.transpose())
+        .map_err(|error| format!("the modes of the structure cannot be computed: {error}"))?;
     let mut order: Vec<usize> = (0..eigen.eigenvalues.len()).collect();
     order.sort_by(|&a, &b| eigen.eigenvalues[a].total_cmp(&eigen.eigenvalues[b]));
     let mode = |index: usize| {
@@ -277,5 +282,5 @@ fn of_matrices(matrices: &Matrices) -> Vec<(String, [Vec<Deviation>; 3])> {
             ],
         ))
     };
-    order.into_iter().filter_map(mode).collect()
+    Ok(order.into_iter().filter_map(mode).collect())
 }

@@ -272,10 +272,11 @@ impl IdentifyOutput {
     /// TOML text of the case file with the identified model; `other` contains the sections besides the structure.
     pub(super) fn case(&self, path: &Path, other: Option<&toml::Table>) -> Result<String, Error> {
         let text = self.structure(path)?;
-        Ok(match other {
-            Some(other) => case_file::with_sections(&text, other),
-            None => text,
-        })
+        match other {
+            Some(other) => case_file::with_sections(&text, other)
+                .map_err(|error| Error::input(format!("--out {}: {error}", path.display()))),
+            None => Ok(text),
+        }
     }
 
     fn structure(&self, path: &Path) -> Result<String, Error> {
@@ -284,8 +285,8 @@ impl IdentifyOutput {
             .map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
         let refused = |error| Error::input(format!("--out {}: {error}", path.display()));
         if let Some(table) = &self.table {
-            // A table of numbers and strings always serializes to TOML.
-            return Ok(toml::to_string(table).unwrap_or_default());
+            return toml::to_string(table)
+                .map_err(|error| Error::other(format!("--out {}: {error}", path.display())));
         }
         if let Some(model) = &self.modal {
             return case_file::text_of_modes(&name, model).map_err(refused);

@@ -34,11 +34,11 @@ pub(super) fn linearity(args: &Args, recordings: &[Recording]) -> Result<Identif
         .flat_map(|tone| windows(tone, harmonics, PERIODS))
         .collect();
     let sweeps: Vec<&Recording> = of_kind(TestKind::Sweep).collect();
+    let (pairs, mut refused) = compare_sweeps(&sweeps)?;
     let mut found = Linearity {
-        sweeps: compare_sweeps(&sweeps)?,
+        sweeps: pairs,
         ..Linearity::default()
     };
-    let mut refused = None;
     for direction in Direction::ALL {
         let driven = |dwell: &&Dwell| dwell.force().is_some_and(|force| force.direction == direction);
         let tones: Vec<Dwell> = taken
@@ -66,7 +66,7 @@ pub(super) fn linearity(args: &Args, recordings: &[Recording]) -> Result<Identif
                     jumps_n,
                 });
             }
-            Err(error) => refused = Some(error),
+            Err(error) => refused.push(format!("force along {direction}: {error}")),
         }
     }
     for (index, i) in Direction::ALL.into_iter().enumerate() {
@@ -77,18 +77,18 @@ pub(super) fn linearity(args: &Args, recordings: &[Recording]) -> Result<Identif
         }
     }
     if found.tones.is_empty() && found.sweeps.is_empty() && found.reciprocity.is_empty() {
-        let why = refused.map_or_else(
-            || "no steady tones, and no two sweeps with a common band, were found".into(),
-            |error| error.to_string(),
-        );
-        return Err(Error::input(why));
+        return Err(Error::input(if refused.is_empty() {
+            "no steady tones, and no two sweeps with a common band, were found".into()
+        } else {
+            refused.join("; ")
+        }));
     }
     found.linear = found.tones.iter().all(|tones| tones.verdict.linear)
         && found.sweeps.iter().all(|sweeps| sweeps.comparison.same)
         && found.reciprocity.iter().all(|pair| pair.reciprocal);
     Ok(IdentifyOutput {
         dwells: Some(taken.dwells.len() + rising.len()),
-        warnings: taken.warnings,
+        warnings: taken.warnings.into_iter().chain(refused).collect(),
         messages: said(&found),
         linearity: Some(found),
         ..IdentifyOutput::of("linearity", Vec::new(), Vec::new())
@@ -107,27 +107,30 @@ fn response(dwell: &Dwell) -> Option<(f64, f64)> {
     Some((force.amplitude(1), motion.amplitude(1)))
 }
 
-/// Compares every sweep with the first sweep of its direction and quantity.
-fn compare_sweeps(sweeps: &[&Recording]) -> Result<Vec<SweepPair>, Error> {
+/// Compares every sweep with the first sweep of its direction and quantity; the texts name the pairs that cannot be compared.
+fn compare_sweeps(sweeps: &[&Recording]) -> Result<(Vec<SweepPair>, Vec<String>), Error> {
     let mut known: Vec<((Direction, Quantity), PathBuf, Spectra)> = Vec::new();
-    let mut found = Vec::new();
+    let (mut found, mut refused) = (Vec::new(), Vec::new());
     for sweep in sweeps {
         let record = along(sweep)?;
         let spectra = Spectra::new(&record.force, record.motion, sweep.sample_rate_hz);
         let place = (record.direction, record.quantity);
         match known.iter().find(|(other, ..)| *other == place) {
-            Some((_, path, first)) => {
-                if let Some(comparison) = compare(first, &spectra) {
-                    found.push(SweepPair {
-                        recordings: [path.clone(), sweep.path.clone()],
-                        comparison,
-                    });
-                }
-            }
+            Some((_, path, first)) => match compare(first, &spectra) {
+                Some(comparison) => found.push(SweepPair {
+                    recordings: [path.clone(), sweep.path.clone()],
+                    comparison,
+                }),
+                None => refused.push(format!(
+                    "sweeps {} and {}: their common band is too narrow to compare them",
+                    path.display(),
+                    sweep.path.display()
+                )),
+            },
             None => known.push((place, sweep.path.clone(), spectra)),
         }
     }
-    Ok(found)
+    Ok((found, refused))
 }
 
 fn said(found: &Linearity) -> Vec<String> {

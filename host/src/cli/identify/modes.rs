@@ -8,7 +8,9 @@ use maud::html;
 use super::Error;
 use super::answer::{ComplexFigure, ComplexMode, Figure, IdentifyOutput};
 use super::args::{Args, band};
-use crate::frf::{Estimator, FrfTable, MeasurementSettings, RecordSpectra, measure, record_spectra};
+use crate::frf::{
+    Estimator, FrfError, FrfTable, MeasurementSettings, RecordSpectra, measure, record_spectra,
+};
 use crate::identify::modes::{self, ChannelNoise, IdentifiedMode, ModalModel, Receptances};
 use crate::report::page::{figure, page};
 use crate::report::stabilization_chart::stabilization_chart;
@@ -65,17 +67,27 @@ struct Source {
 }
 
 fn source(args: &Args) -> Result<Source, Error> {
-    if let [path] = args.recordings.as_slice()
-        && is_table(path)?
-    {
-        return Ok(Source {
-            table: FrfTable::read(path)?,
-            deviation: None,
-            warnings: Vec::new(),
-            records: None,
-        });
+    let mut no_table = None;
+    if let [path] = args.recordings.as_slice() {
+        match table(path)? {
+            Ok(table) => {
+                return Ok(Source {
+                    table,
+                    deviation: None,
+                    warnings: Vec::new(),
+                    records: None,
+                });
+            }
+            Err(reason) => no_table = reason,
+        }
     }
-    let recordings = args.segment.read(&args.recordings)?;
+    let recordings = args
+        .segment
+        .read(&args.recordings)
+        .map_err(|error| match no_table {
+            Some(reason) => Error::input(format!("{error}; as a table of receptances: {reason}")),
+            None => error,
+        })?;
     let settings = MeasurementSettings {
         resolution_hz: args.modes.resolution_hz,
         estimator: if args.modes.pseudo_inverse {
@@ -95,19 +107,27 @@ fn source(args: &Args) -> Result<Source, Error> {
     })
 }
 
-/// Whether a file contains receptances instead of a recording.
-fn is_table(path: &Path) -> Result<bool, Error> {
+/// The table of receptances in a file. If the file is a recording, or may be one, the reason why it is no table; `None` without doubt.
+///
+/// # Errors
+/// The file cannot be read, or its head is that of a table but its content is wrong.
+fn table(path: &Path) -> Result<Result<FrfTable, Option<FrfError>>, Error> {
     match crate::file::ending(path).as_str() {
-        "uff" | "unv" | "bunv" => Ok(FrfTable::read(path).is_ok()),
+        "uff" | "unv" | "bunv" => Ok(FrfTable::read(path).map_err(Some)),
         "csv" => {
             let text = crate::file::read_text(path)?;
             let header = text
                 .lines()
                 .find(|line| !line.starts_with('#'))
                 .unwrap_or_default();
-            Ok(header.split(',').any(|title| title.trim() == "frequency_hz"))
+            let is_table = header.split(',').any(|title| title.trim() == "frequency_hz");
+            Ok(if is_table {
+                Ok(FrfTable::read(path)?)
+            } else {
+                Err(None)
+            })
         }
-        _ => Ok(false),
+        _ => Ok(Err(None)),
     }
 }
 

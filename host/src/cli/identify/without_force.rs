@@ -50,6 +50,12 @@ pub(super) fn output_only(args: &Args, recordings: &[Recording]) -> Result<Ident
             }
         ));
     }
+    if ambient.harmonics_remain {
+        warnings.push(
+            "the record is too short to separate the spindle harmonics, which remain in the motion: a mode near one may be the harmonic"
+                .into(),
+        );
+    }
     if recording.sidecar.kind == Some(TestKind::Cutting) {
         warnings.push(
             "this recording was made in a cut: the modes include the stiffness and damping of the cutting process"
