@@ -19,6 +19,10 @@ pub(crate) const DIFFERENT_LEVELS: f64 = 1.2;
 /// commanded, so that only their rounding differs.
 pub(crate) const SAME_POSTURE_DEG: f64 = 1e-3;
 
+/// χ² per degree of freedom of the receptances of a robot above which the user is warned that the model of its joints does not explain
+/// them: the residual is twice the stated error. Unfounded.
+pub(crate) const LARGEST_JOINT_MISFIT: f64 = 4.0;
+
 /// Prediction error of higher-order FRF above which the user is warned of their bias: relative to that of harmonic balance, and in
 /// addition to it. Noise alone makes both errors equal. Unfounded.
 pub(crate) const BIASED_PREDICTION: (f64, f64) = (2.0, 1e-3);

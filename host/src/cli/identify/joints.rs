@@ -9,7 +9,7 @@ use super::answer::{EstimatedJoint, Figure, IdentifyOutput};
 use super::args::{Args, band};
 use super::methods::settling;
 use crate::case::Case;
-use crate::criteria::{DIFFERENT_LEVELS, SAME_POSTURE_DEG};
+use crate::criteria::{DIFFERENT_LEVELS, LARGEST_JOINT_MISFIT, SAME_POSTURE_DEG};
 use crate::frf::{MeasurementSettings, measure};
 use crate::identify::case_file;
 use crate::identify::cubic_joints::{self, PostureDwells};
@@ -203,7 +203,7 @@ fn from_receptances(args: &Args, start: &Robot, postures: &[AtPosture]) -> Resul
         });
     }
     let fit = joints::fit(start, &measured, args.payload).map_err(|error| Error::input(error.to_string()))?;
-    if fit.misfit > 4.0 {
+    if fit.misfit > LARGEST_JOINT_MISFIT {
         warnings.push(format!(
             "the residual exceeds the error of the receptances by a factor of {:.1}: geometry or inertia of the links may be wrong, or links may bend; the intervals are estimated from the scatter between receptances",
             fit.misfit.sqrt()
