@@ -9,7 +9,7 @@ use std::path::Path;
 
 use super::raw::{Raw, RawColumn};
 use super::{Quantity, Recording, RecordingError};
-use crate::file::FileError;
+use crate::file::{FileError, Prepared};
 
 /// Significant digits of written samples: nine digits represent every 32-bit float exactly.
 const DIGITS: usize = 9;
@@ -318,9 +318,9 @@ fn number(text: &[u8]) -> Option<(f64, usize, End)> {
     }
 }
 
-/// Writes a recording as CSV: time in seconds, then one column per channel.
-pub(super) fn write(path: &Path, recording: &Recording) -> Result<(), RecordingError> {
-    crate::file::write_with(path, |writer| {
+/// A recording as a CSV file that is written but not yet published: time in seconds, then one column per channel.
+pub(super) fn prepared(path: &Path, recording: &Recording) -> Result<Prepared, RecordingError> {
+    Ok(crate::file::prepare(path, |writer| {
         let mut writer = csv::Writer::from_writer(writer);
         let titles = recording.channels.iter().map(|channel| match channel.quantity {
             Quantity::Unknown => channel.name.clone(),
@@ -341,8 +341,7 @@ pub(super) fn write(path: &Path, recording: &Recording) -> Result<(), RecordingE
             writer.write_record(&row)?;
         }
         writer.flush()
-    })?;
-    Ok(())
+    })?)
 }
 
 /// Shortest text of a number with [`DIGITS`] significant digits.

@@ -78,6 +78,35 @@ pub fn abandon_writing() {
 
 /// Writes `path` atomically with the content that `fill` writes: on an error the previous file stays unchanged.
 pub fn write_with(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<(), FileError> {
+    publish([prepare(path, fill)?])
+}
+
+/// A file that is complete on the disk under a temporary name; dropped without [`publish`] it is removed.
+#[derive(Debug)]
+pub struct Prepared {
+    path: PathBuf,
+    /// The temporary file; `None` after it got its name.
+    aside: Option<NamedTempFile>,
+}
+
+impl Drop for Prepared {
+    fn drop(&mut self) {
+        if let Some(aside) = self.aside.take() {
+            let mut known = being_written();
+            known.retain(|other| other != aside.path());
+            drop(aside);
+        }
+    }
+}
+
+/// Writes a file that is to become `path` under a temporary name in the same folder, with the content that `fill` writes.
+///
+/// # Errors
+/// The file cannot be written.
+pub fn prepare(
+    path: &Path,
+    fill: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+) -> Result<Prepared, FileError> {
     let failed = |cause| FileError::Write {
         path: path.into(),
         cause,
@@ -89,13 +118,39 @@ pub fn write_with(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<(
         aside
     };
     let name = aside.path().to_owned();
-    let filled = filled(aside, fill);
+    match filled(aside, fill) {
+        Ok(aside) => Ok(Prepared {
+            path: path.into(),
+            aside: Some(aside),
+        }),
+        Err(cause) => {
+            being_written().retain(|other| *other != name);
+            Err(failed(cause))
+        }
+    }
+}
+
+/// Gives files their names, one after the other; an interrupt by Ctrl-C waits until all have them.
+///
+/// # Errors
+/// A file cannot get its name: it and those after it are removed, and the previous files stay.
+pub fn publish<const N: usize>(files: [Prepared; N]) -> Result<(), FileError> {
     let mut known = being_written();
-    known.retain(|other| *other != name);
-    filled
-        .and_then(|aside| Ok(aside.persist(path)?))
-        .map(|_| ())
-        .map_err(failed)
+    let mut outcome = Ok(());
+    for mut file in files {
+        let Some(aside) = file.aside.take() else { continue };
+        known.retain(|other| other != aside.path());
+        if outcome.is_ok() {
+            outcome = aside
+                .persist(&file.path)
+                .map(|_| ())
+                .map_err(|error| FileError::Write {
+                    path: file.path.clone(),
+                    cause: error.error,
+                });
+        }
+    }
+    outcome
 }
 
 /// Writes the content of `fill` to the temporary file and syncs it to the disk; on an error the temporary file is removed.

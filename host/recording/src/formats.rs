@@ -8,6 +8,7 @@ use super::segment::Segment;
 use super::sidecar::Sidecar;
 use super::uff::UffForm;
 use super::{assemble, csv, mat, uff, wav};
+use crate::file::Prepared;
 
 /// File extensions of the formats that can be written: CSV, UFF 58 as text (uff, unv), UFF 58 binary (bunv).
 pub const WRITTEN: [&str; 4] = ["csv", "uff", "unv", "bunv"];
@@ -46,16 +47,16 @@ impl Recording {
         segment.of(assemble::recording(path, raw, Sidecar::beside(path)?)?)
     }
 
-    /// Writes the recording and its sidecar to `path` in the format of the file extension. Each file is replaced as a whole or left unchanged.
+    /// Writes the recording and its sidecar to `path` in the format of the file extension.
+    ///
+    /// Both files are complete on the disk before the first of them gets its name, the sidecar first. On an error the previous recording
+    /// stays. Only a machine that fails between the two renames leaves a sidecar whose recording is missing or older.
     ///
     /// # Errors
     /// The extension is not one of [`WRITTEN`], or a file cannot be written.
     pub fn write(&self, path: &Path) -> Result<(), RecordingError> {
         match crate::file::ending(path).as_str() {
-            "csv" => {
-                csv::write(path, self)?;
-                self.sidecar.write_beside(path)
-            }
+            "csv" => self.publish(path, csv::prepared(path, self)?),
             "uff" | "unv" => self.write_uff(path, UffForm::Text),
             "bunv" => self.write_uff(path, UffForm::Binary),
             ending => Err(RecordingError::Written {
@@ -65,12 +66,17 @@ impl Recording {
         }
     }
 
-    /// Writes the recording to `path` as UFF 58, with its sidecar. Each file is replaced as a whole or left unchanged.
+    /// Writes the recording to `path` as UFF 58, with its sidecar; both files as in [`Recording::write`].
     ///
     /// # Errors
     /// A file cannot be written.
     pub fn write_uff(&self, path: &Path, form: UffForm) -> Result<(), RecordingError> {
-        uff::write(path, self, form)?;
-        self.sidecar.write_beside(path)
+        self.publish(path, uff::prepared(path, self, form)?)
+    }
+
+    /// Gives the sidecar of `path` and then the recording their names.
+    fn publish(&self, path: &Path, recording: Prepared) -> Result<(), RecordingError> {
+        let sidecar = self.sidecar.prepared_beside(path)?;
+        Ok(crate::file::publish([sidecar, recording])?)
     }
 }

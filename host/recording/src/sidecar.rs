@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use super::RecordingError;
+use crate::file::Prepared;
 
 /// TestKind of test that was recorded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -169,15 +170,29 @@ impl Sidecar {
                 return Err(wrong(key, value, "a number of 0 or more"));
             }
         }
-        for (key, value) in [("cut.start_deg", cut.start_deg), ("cut.exit_deg", cut.exit_deg)] {
-            if let Some(value) = value
-                && !value.is_finite()
-            {
-                return Err(wrong(key, value, "a finite angle"));
+        let angles: [(&str, Option<f64>, fn(f64) -> bool, &str); 2] = [
+            (
+                "cut.start_deg",
+                cut.start_deg,
+                |deg| (0.0..360.0).contains(&deg),
+                "an angle from 0 to below 360",
+            ),
+            (
+                "cut.exit_deg",
+                cut.exit_deg,
+                |deg| deg > 0.0 && deg <= 360.0,
+                "an angle above 0, up to 360",
+            ),
+        ];
+        for (key, value, is_possible, expected) in angles {
+            match value {
+                Some(value) if !value.is_finite() => return Err(wrong(key, value, "a finite angle")),
+                Some(value) if !is_possible(value) => return Err(wrong(key, value, expected)),
+                _ => {}
             }
         }
         if let (Some(start), Some(exit)) = (cut.start_deg, cut.exit_deg)
-            && !(0.0 <= start && start < exit && exit <= 360.0)
+            && start >= exit
         {
             return Err(wrong("cut.exit_deg", exit, "an angle above start_deg, up to 360"));
         }
@@ -206,16 +221,18 @@ impl Sidecar {
         Ok(())
     }
 
-    /// Writes the sidecar of `recording`, beside it.
+    /// The sidecar of `recording` as a file that is written but not yet published.
     ///
     /// # Errors
     /// The file cannot be written.
-    pub fn write_beside(&self, recording: &Path) -> Result<(), RecordingError> {
+    pub(super) fn prepared_beside(&self, recording: &Path) -> Result<Prepared, RecordingError> {
         let path = Self::path_of(recording);
         let text = toml::to_string(self).map_err(|error| RecordingError::Content {
             path: path.clone(),
             what: error.to_string(),
         })?;
-        Ok(crate::file::write(&path, text.as_bytes())?)
+        Ok(crate::file::prepare(&path, |writer| {
+            writer.write_all(text.as_bytes())
+        })?)
     }
 }

@@ -111,6 +111,14 @@ fn the_sidecar_names_and_scales_channels() {
             vec!["cut.exit_deg = inf", "finite"],
         ),
         (
+            "sample_rate_hz = 10.0\n[cut]\nstart_deg = -20\n",
+            vec!["cut.start_deg = -20", "from 0 to below 360"],
+        ),
+        (
+            "sample_rate_hz = 10.0\n[cut]\nexit_deg = 400\n",
+            vec!["cut.exit_deg = 400", "up to 360"],
+        ),
+        (
             "sample_rate_hz = 10.0\n[channels.nose]\nat = \"x\"\n",
             vec!["channels.nose", "data"],
         ),
@@ -279,4 +287,32 @@ proptest! {
             prop_assert!((a - b).abs() <= 1e-8 * b.abs());
         }
     }
+}
+
+#[test]
+fn a_sidecar_that_cannot_be_replaced_leaves_the_old_recording() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.csv");
+    let mut recording = Recording {
+        path: path.clone(),
+        sample_rate_hz: 10.0,
+        start_s: 0.0,
+        since_s: 0.0,
+        channels: vec![Channel {
+            name: "ax".into(),
+            quantity: Quantity::Acceleration,
+            samples: vec![1.0, 2.0, 3.0],
+        }],
+        sidecar: Sidecar::default(),
+    };
+    recording.write(&path).unwrap();
+    let before = std::fs::read(&path).unwrap();
+    // A folder in the place of the sidecar cannot be replaced by a file.
+    let sidecar = Sidecar::path_of(&path);
+    std::fs::remove_file(&sidecar).unwrap();
+    std::fs::create_dir(&sidecar).unwrap();
+    recording.channels[0].samples[0] = 5.0;
+    assert!(recording.write(&path).is_err());
+    assert_eq!(std::fs::read(&path).unwrap(), before);
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 2);
 }

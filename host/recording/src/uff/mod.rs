@@ -30,7 +30,7 @@ use write::{exponential, header_of};
 
 use super::raw::{Raw, RawColumn};
 use super::{Quantity, Recording, RecordingError};
-use crate::file::FileError;
+use crate::file::{FileError, Prepared};
 
 /// One data set 58: a function with its header and values.
 #[derive(Clone, Debug, PartialEq)]
@@ -364,9 +364,13 @@ fn names(sets: &[DataSet]) -> Vec<String> {
         .collect()
 }
 
-/// Writes a recording as UFF: data set 164 with SI units, then one data set 58 per channel.
-pub(super) fn write(path: &Path, recording: &Recording, form: UffForm) -> Result<(), RecordingError> {
-    Ok(crate::file::write_with(path, |out| {
+/// A recording as a UFF file that is written but not yet published: data set 164 with SI units, then one data set 58 per channel.
+pub(super) fn prepared(
+    path: &Path,
+    recording: &Recording,
+    form: UffForm,
+) -> Result<Prepared, RecordingError> {
+    Ok(crate::file::prepare(path, |out| {
         write_units(out)?;
         for channel in &recording.channels {
             let header = header_of(recording, channel);
