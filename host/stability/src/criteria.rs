@@ -23,6 +23,9 @@ pub(crate) const MESH_ROOM: f64 = 10.0;
 /// the stated errors hold.
 pub(crate) const STEP_ROOM: f64 = 3.0;
 
+/// Relative rounding error of a multiplier from the map of a period of some hundred steps. Unfounded: an estimate.
+pub(crate) const STEP_ROUNDING: f64 = 1e-9;
+
 // Multipliers of a period map.
 
 /// Least |μ| of the Floquet multipliers that collocation computes at each depth of a scan. It lies below
@@ -60,6 +63,10 @@ pub(crate) const NORMAL: f64 = 1e7;
 /// Largest number of elements in a tooth period on the working mesh. The fastest motion turns by five radians in an
 /// element, so that 4000 elements cover three thousand vibrations; cuts that need more are refused. Unfounded.
 pub(crate) const ELEMENTS_MAX: f64 = 4000.0;
+
+/// Number of subinterval ends in a revolution beyond which no further generation of kinks is added. Subintervals are
+/// then short, and kinks of later generations are smooth. Unfounded.
+pub(crate) const KINKS_MAX: usize = 300;
 
 // Dominant multiplier of one cut.
 
@@ -178,6 +185,32 @@ pub(crate) const HARMONICS_SETTLED_MULTIPLIER: f64 = 1e-6;
 /// number. Unfounded.
 pub(crate) const SAME_WITH_TWICE_HARMONICS: f64 = 0.1;
 
+/// Distance from an end of the frequency range with real loci at which their imaginary parts give the direction of
+/// crossings, as a share of the end frequency, or at ω = 0 of the first grid frequency. It lies far above rounding and
+/// far below the width of a resonance; the value is unfounded.
+pub(crate) const REAL_END_OFFSET: f64 = 1e-5;
+
+/// Largest number of halvings of a frequency interval in which characteristic loci cannot be told apart. Unfounded.
+pub(crate) const LOCUS_LEVELS: u32 = 16;
+
+/// Largest deviation of a characteristic locus, at the middle of a frequency interval, from the straight line between
+/// its values at both ends, as a share of the larger of the two; beyond it the interval is halved. Unfounded.
+pub(crate) const LOCUS_BEND: f64 = 0.1;
+
+/// Values σ of the lines Re s = σ along which roots are searched, as multiples of the slowest decay rate of a
+/// resonance. Unfounded.
+pub(crate) const ROOT_LINES: [f64; 14] = [
+    0.0, -0.3, -0.6, -0.8, -0.9, -0.97, -1.2, -2.0, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0,
+];
+
+/// Smallest locus, as a share of 1/w, that is traced along a line Re s = σ to predict roots away from the line.
+/// Unfounded.
+pub(crate) const LOCUS_REACH: f64 = 0.05;
+
+/// Factor on [`LOCUS_BEND`] for the zeroth-order approximation. A tenth keeps the phase between two frequencies
+/// monotone, except where lobes touch. Unfounded.
+pub(crate) const ZOA_BEND: f64 = 0.1;
+
 // Forced orbits.
 
 /// Longest step along a branch of forced orbits, in units of the last depth and of the norm of the orbit at that depth.
@@ -201,6 +234,9 @@ pub(crate) const MULTIPLIER_MOVE_MAX: f64 = 0.12;
 /// Unfounded.
 pub(crate) const EQUIVALENT_FOLLOWED: f64 = 0.5;
 
+/// Least number of steps in depth at which the number of multipliers outside the unit circle is compared. Unfounded.
+pub(crate) const EQUIVALENT_SAMPLES_MIN: usize = 32;
+
 /// Damping constant that stands for sticking friction, in units of k/ω with the static stiffness k of the axis and the
 /// frequency ω of the slowest mode. A force at ω then moves the axis by a twentieth of the static deflection.
 /// Unfounded.
@@ -220,6 +256,10 @@ pub(crate) const DISTURBANCE_PERIODS: usize = 40;
 /// Number of layers (feeds times feed directions) of one case beyond which refinement adds none, unless neighbouring
 /// directions are too far apart for interpolation. It limits the size of a table. Unfounded.
 pub(crate) const LAYERS_MAX: usize = 12;
+
+/// Number of speeds at which limits half way between two feeds, or two feed directions, are compared with the mean of
+/// both. Unfounded.
+pub(crate) const LAYER_PROBES: usize = 16;
 
 /// Difference between a limit and the straight line between the neighbouring entries of a lobe table, as a share of the
 /// largest depth, beyond which a speed is added. Unfounded.

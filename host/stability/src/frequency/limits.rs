@@ -6,15 +6,10 @@ use num_complex::Complex64;
 
 use super::loci::{argument_increase, crossings, trace};
 use super::open_loop::OpenLoop;
-use crate::criteria::{LEAST_ERROR, SAME_LIMIT};
+use crate::criteria::{LEAST_ERROR, REAL_END_OFFSET, SAME_LIMIT};
 use crate::error::{Breakdown, StabilityError};
 use crate::limits::speed_line::{SpeedLine, Switch};
 use crate::spectrum::stability_loss::StabilityLoss;
-
-/// Distance from an end of the frequency range with real loci at which their imaginary parts give the direction of
-/// crossings, as a share of the end frequency, or at ω = 0 of the first grid frequency. Unfounded: far above rounding,
-/// far below the width of a resonance.
-const REAL_END_OFFSET: f64 = 1e-5;
 
 /// Root on the imaginary axis at a limit.
 #[derive(Clone, Copy, Debug, PartialEq)]

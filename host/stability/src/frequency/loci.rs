@@ -5,14 +5,8 @@ use std::f64::consts::PI;
 
 use num_complex::Complex64;
 
+use crate::criteria::{LOCUS_BEND, LOCUS_LEVELS};
 use crate::error::Breakdown;
-
-/// Largest number of halvings of a frequency interval in which loci cannot be told apart. Unfounded.
-const LEVELS: u32 = 16;
-
-/// Largest deviation of a locus, at the middle of a frequency interval, from the straight line between its values at
-/// both ends, as a share of the larger of the two. Unfounded.
-const BEND: f64 = 0.1;
 
 /// Eigenvalues at one frequency.
 #[derive(Clone, Debug)]
@@ -56,7 +50,7 @@ pub(crate) fn trace(loci: &impl Loci, grid: &[f64], floor: f64, bend: f64) -> Re
     for &omega in rest {
         let high = sample(omega)?;
         samples.push(low.clone());
-        divide(&sample, &low, &high, (floor, bend * BEND), 0, &mut samples)?;
+        divide(&sample, &low, &high, (floor, bend * LOCUS_BEND), 0, &mut samples)?;
         low = high;
     }
     samples.push(low);
@@ -72,7 +66,7 @@ fn divide(
     level: u32,
     samples: &mut Vec<Sample>,
 ) -> Result<(), Breakdown> {
-    if level == LEVELS || is_nothing(low, limits.0) && is_nothing(high, limits.0) && level > 0 {
+    if level == LOCUS_LEVELS || is_nothing(low, limits.0) && is_nothing(high, limits.0) && level > 0 {
         return Ok(());
     }
     let middle = sample(0.5 * (low.omega + high.omega))?;
@@ -201,7 +195,7 @@ fn solve_between<T>(
     if let Some(found) = whole {
         return Ok(found.into_iter().flatten().collect());
     }
-    if level == 2 * LEVELS {
+    if level == 2 * LOCUS_LEVELS {
         return Err(Breakdown::NoSolution);
     }
     let omega = 0.5 * (low.omega + high.omega);
@@ -227,7 +221,7 @@ pub(crate) fn crossings(
         if (low.1.im > 0.0) == (high.1.im > 0.0) || low.1.re.max(high.1.re) < 0.5 * floor {
             return Some(Vec::new());
         }
-        let mark = |(omega, value): (f64, Complex64)| Mark {
+        let mark = |(omega, value): (f64, Complex64)| LocusPoint {
             omega,
             value,
             miss: value.im,
@@ -255,7 +249,7 @@ pub(crate) fn crossings(
 
 /// Point of a locus with its residual, which vanishes at the solution.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Mark {
+pub(crate) struct LocusPoint {
     pub(crate) omega: f64,
     pub(crate) value: Complex64,
     pub(crate) miss: f64,
@@ -266,8 +260,8 @@ pub(crate) struct Mark {
 /// Regula falsi (Illinois), until the residual is below the tolerance. `None` if the residual jumps over zero, since
 /// two loci were then exchanged.
 pub(crate) fn zero(
-    mut low: Mark,
-    mut high: Mark,
+    mut low: LocusPoint,
+    mut high: LocusPoint,
     tolerance: f64,
     at: impl Fn(f64) -> Option<Vec<(Complex64, f64)>>,
 ) -> Option<(f64, Complex64)> {
@@ -288,7 +282,7 @@ pub(crate) fn zero(
         if is_narrow {
             return None;
         }
-        let mark = Mark { omega, value, miss };
+        let mark = LocusPoint { omega, value, miss };
         if (miss > 0.0) == (low.miss > 0.0) {
             low = mark;
             high.miss *= if last_side == 1 { 0.5 } else { 1.0 };

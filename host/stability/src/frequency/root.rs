@@ -8,23 +8,13 @@ use super::limits::unstable_roots;
 use super::loci::{steps, trace};
 use super::open_loop::OpenLoop;
 use super::problem::FrequencyProblem;
-use crate::criteria::LEAST_ERROR;
+use crate::criteria::{LEAST_ERROR, LOCUS_REACH, ROOT_LINES};
 use crate::error::{Breakdown, StabilityError};
 use crate::limits::point::CutStability;
 use crate::spectrum::stability_loss::StabilityLoss;
 
-/// Values σ of the lines Re s = σ along which roots are searched, as multiples of the slowest decay rate of a
-/// resonance. Unfounded.
-const LINES: [f64; 14] = [
-    0.0, -0.3, -0.6, -0.8, -0.9, -0.97, -1.2, -2.0, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0,
-];
-
 /// Text for a dominant multiplier that is not found from receptances.
 pub(crate) const NO_ROOT: &str = "the rightmost root cannot be found by receptances; limits can";
-
-/// Smallest locus, as a share of 1/w, that is traced along a line Re s = σ to predict roots away from the line.
-/// Unfounded.
-const REACH: f64 = 0.05;
 
 /// Rightmost root s, 1/s, with Im s ≥ 0, at an axial depth, m.
 ///
@@ -50,7 +40,7 @@ pub(crate) fn rightmost(open_loop: &impl OpenLoop, depth_m: f64) -> Result<Compl
         return Ok(root);
     }
     let mut reason = Breakdown::NoSolution;
-    for multiple in LINES {
+    for multiple in ROOT_LINES {
         let found = match from_line(open_loop, depth_m, multiple * decay, decay) {
             Ok(found) => found,
             Err(cause) => {
@@ -94,7 +84,7 @@ fn from_line(
     if !target.is_finite() {
         return Ok(None);
     }
-    let floor = REACH * target;
+    let floor = LOCUS_REACH * target;
     let grid = open_loop.grid(target)?;
     let loci = |omega: f64| loci_at(open_loop, Complex64::new(sigma, omega), 0.2 * floor);
     let samples = trace(&loci, &grid, floor, 1.0)?;

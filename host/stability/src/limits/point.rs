@@ -83,7 +83,7 @@ pub fn point(problem: &Problem, rpm: f64, depth_mm: f64) -> Result<CutStability,
     let candidates = scanned.unwrap_or_default();
     let certain = candidates
         .is_certain
-        .then(|| Rough::new(&candidates.multipliers, depth_m));
+        .then(|| ScannedMultipliers::new(&candidates.multipliers, depth_m));
     let of_maps = || of_maps(problem, rpm, depth_m, certain.as_ref()?);
     let found = match &certain {
         Some(rough) if rough.kappa_m > KAPPA_MAX * depth_m => of_maps(),
@@ -124,7 +124,7 @@ fn error(coarse: Complex64, fine: Complex64, least: f64) -> f64 {
 }
 
 /// Multipliers of a coarse period map.
-struct Rough {
+struct ScannedMultipliers {
     /// Multipliers; of a conjugate pair the upper one.
     multipliers: Vec<Complex64>,
     /// Largest complex depth |w (1 − 1/μ)| of these multipliers, m, and at least 2 w, which is its bound on the unit
@@ -132,7 +132,7 @@ struct Rough {
     kappa_m: f64,
 }
 
-impl Rough {
+impl ScannedMultipliers {
     fn new(multipliers: &[Complex64], depth_m: f64) -> Self {
         let upper = multipliers
             .iter()
@@ -148,7 +148,7 @@ impl Rough {
 }
 
 /// Dominant multiplier on the working and a finer mesh by Newton's method; `None` if it does not converge.
-fn confirmed(problem: &Problem, rpm: f64, depth_m: f64, rough: &Rough) -> Option<Solution> {
+fn confirmed(problem: &Problem, rpm: f64, depth_m: f64, rough: &ScannedMultipliers) -> Option<Solution> {
     let dominant = |resolution, guesses: &[Complex64]| {
         let period = Period::new(problem, rpm, rough.kappa_m, resolution);
         let found = dominant_of(&period, rough.kappa_m, depth_m, guesses);
@@ -165,7 +165,7 @@ fn confirmed(problem: &Problem, rpm: f64, depth_m: f64, rough: &Rough) -> Option
 }
 
 /// Dominant multiplier from the maps of the working and a finer mesh, for multipliers too small for Newton's method.
-fn of_maps(problem: &Problem, rpm: f64, depth_m: f64, rough: &Rough) -> Option<Solution> {
+fn of_maps(problem: &Problem, rpm: f64, depth_m: f64, rough: &ScannedMultipliers) -> Option<Solution> {
     let kappa_m = rough.kappa_m.min(KAPPA_MAX * depth_m);
     let largest = |resolution, share| {
         let period = Period::new(problem, rpm, kappa_m, resolution);

@@ -6,7 +6,7 @@ use quietcut_core::working_point::WorkingPoint;
 
 use super::encoding::towards;
 use super::entries::{Entry, surely_stable, unstable, with_all_of};
-use super::layers::{CheckedLayers, Family};
+use super::layers::{CheckedLayers, TableLayer};
 use crate::criteria::{CHECK_GROWTH, CHECK_STEP, LEAST_CHECKS, SUSPECT, TABLE_ROOM};
 use crate::error::StabilityError;
 use crate::limits::speed_line::SpeedLine;
@@ -122,7 +122,9 @@ impl<'a> Checks<'a> {
     /// Adds lines of checked layers at further speeds, given by gap.
     fn add(&mut self, layers: usize, places: &[Vec<f64>]) -> Result<(), StabilityError> {
         let all: Vec<f64> = places.iter().flatten().copied().collect();
-        let lines = self.checked_layers[layers].family.lines(&all, self.depth_mm)?;
+        let lines = self.checked_layers[layers]
+            .table_layer
+            .lines(&all, self.depth_mm)?;
         let mut lines = lines.into_iter();
         for (own, places) in self.lines[layers].iter_mut().zip(places) {
             own.extend(lines.by_ref().take(places.len()));
@@ -175,14 +177,15 @@ impl<'a> Checks<'a> {
 
     /// Largest disagreement in every gap, for one of the checked layers.
     fn misses(&self, table: &LobeTable<'_>, layers: usize) -> Vec<Disagreement> {
-        let family = &self.checked_layers[layers].family;
+        let table_layer = &self.checked_layers[layers].table_layer;
         let miss = |line: &SpeedLine| {
-            let tabulated: Vec<[f64; 2]> = column_of(table, family, line.rpm).map_or(Vec::new(), |column| {
-                let stable = column.stable();
-                stable
-                    .map(|(from, to)| [f64::from(from.0), f64::from(to.0)])
-                    .collect()
-            });
+            let tabulated: Vec<[f64; 2]> =
+                column_of(table, table_layer, line.rpm).map_or(Vec::new(), |column| {
+                    let stable = column.stable();
+                    stable
+                        .map(|(from, to)| [f64::from(from.0), f64::from(to.0)])
+                        .collect()
+                });
             Disagreement::between(&surely_stable(line, self.depth_mm), &tabulated, self.depth_mm)
         };
         let worst = |lines: &Vec<SpeedLine>| {
@@ -287,15 +290,15 @@ impl<'a> Checks<'a> {
 
 /// Column of the table at the speed of a checked line. `None` if the table has none there, which counts as unstable at
 /// every depth, as on the device.
-fn column_of(table: &LobeTable<'_>, family: &Family, rpm: f64) -> Option<Column> {
+fn column_of(table: &LobeTable<'_>, table_layer: &TableLayer, rpm: f64) -> Option<Column> {
     let point = WorkingPoint {
         axial_depth: Millimeters(0.0),
-        start: family.validity.start,
-        exit: family.validity.exit,
-        feed_per_tooth: family.validity.feed_from,
-        posture: family.validity.posture,
+        start: table_layer.validity.start,
+        exit: table_layer.validity.exit,
+        feed_per_tooth: table_layer.validity.feed_from,
+        posture: table_layer.validity.posture,
     };
-    towards(table, family.direction_deg)
+    towards(table, table_layer.direction_deg)
         .column(Rpm(rpm as f32), &point)
         .ok()
 }

@@ -9,7 +9,7 @@ use super::entries::{self, Entry};
 use super::error::BuildError;
 use super::request::TableRequest;
 use super::{grid, layers};
-use crate::criteria::TABLE_TOLERANCE;
+use crate::criteria::{LAYER_PROBES, TABLE_TOLERANCE};
 use crate::limits::chart::Refinement;
 use crate::limits::speeds::{default_speeds, spaced};
 use quietcut_model::case::Case;
@@ -48,36 +48,36 @@ pub struct BuiltTable {
 /// No case, cases of different tools, two layers for the same cut, or a case whose stability cannot be computed.
 pub fn build_table(cases: &[Case], request: &TableRequest) -> Result<BuiltTable, BuildError> {
     let first = cases.first().ok_or(BuildError::NoCase)?;
-    let asked = layers::families(cases, request)?;
+    let asked = layers::table_layers(cases, request)?;
     let (from_rpm, to_rpm) = match (request.rpm, asked.first()) {
         (Some(rpm), _) => rpm,
-        (None, Some(family)) => default_speeds(first, &family.linear.structure, family.teeth),
+        (None, Some(table_layer)) => default_speeds(first, &table_layer.linear.structure, table_layer.teeth),
         (None, None) => return Err(BuildError::NoCase),
     };
     let depth_mm = match request.depth_mm {
         Some(depth_mm) => depth_mm,
         None => grid::default_depth(&asked, from_rpm, to_rpm)?,
     };
-    let probes = spaced(from_rpm, to_rpm, layers::PROBES);
-    let families = layers::refined(cases, request, &probes, depth_mm, TABLE_TOLERANCE * depth_mm)?;
+    let probes = spaced(from_rpm, to_rpm, LAYER_PROBES);
+    let table_layers = layers::refined(cases, request, &probes, depth_mm, TABLE_TOLERANCE * depth_mm)?;
     let modes = if request.derivatives {
-        derivatives::mode_count(&families)?
+        derivatives::mode_count(&table_layers)?
     } else {
         0
     };
     let slopes_bytes = if modes == 0 { 0 } else { 4 * (2 * modes + 1) };
-    let bytes_of_speed = 4 + families.len() * (2 + 3 * (8 + slopes_bytes) / 2);
+    let bytes_of_speed = 4 + table_layers.len() * (2 + 3 * (8 + slopes_bytes) / 2);
     let refinement = Refinement {
         tolerance: TABLE_TOLERANCE,
         least_step: 2e-4,
         most_speeds: (BYTES / bytes_of_speed).max(SPEEDS),
     };
     let coarse = spaced(from_rpm, to_rpm, request.speeds.unwrap_or(SPEEDS).max(2));
-    let (speeds, lines) = grid::lines_of_all(&families, &coarse, depth_mm, refinement)?;
+    let (speeds, lines) = grid::lines_of_all(&table_layers, &coarse, depth_mm, refinement)?;
     let derivatives = if modes > 0 {
-        let of_layers = families.iter().zip(&lines);
+        let of_layers = table_layers.iter().zip(&lines);
         of_layers
-            .map(|(family, lines)| Derivatives::new(family, lines, modes))
+            .map(|(table_layer, lines)| Derivatives::new(table_layer, lines, modes))
             .collect::<Result<_, _>>()?
     } else {
         Vec::new()
@@ -94,7 +94,7 @@ pub fn build_table(cases: &[Case], request: &TableRequest) -> Result<BuiltTable,
     let bytes = |entries: &[Vec<Vec<Entry>>], error: Option<InterpolationError>| {
         let table = Table {
             first,
-            families: &families,
+            table_layers: &table_layers,
             speeds: &speeds,
             entries,
             derivatives: &derivatives,
@@ -103,7 +103,7 @@ pub fn build_table(cases: &[Case], request: &TableRequest) -> Result<BuiltTable,
         table.bytes(error)
     };
     let tolerance_mm = TABLE_TOLERANCE * depth_mm;
-    let checked_layers = layers::checked_layers(&families)?;
+    let checked_layers = layers::checked_layers(&table_layers)?;
     let mut checks = Checks::new(&checked_layers, &speeds, depth_mm)?;
     let mut written = bytes(&entries, None)?;
     let plain = LobeTable::parse(&written).map_err(BuildError::Format)?;

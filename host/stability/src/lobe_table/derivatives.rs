@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use super::entries::Entry;
 use super::error::BuildError;
-use super::layers::Family;
+use super::layers::TableLayer;
 use crate::error::StabilityError;
 use crate::limits::sensitivity::{Sensitivity, Tangent, no_derivative};
 use crate::limits::speed_line::{SpeedLine, Switch};
@@ -41,14 +41,14 @@ impl SlopesOfLine {
 }
 
 /// Number of modes for which every layer has derivatives.
-pub(super) fn mode_count(families: &[Family]) -> Result<usize, BuildError> {
-    let counts = families
+pub(super) fn mode_count(table_layers: &[TableLayer]) -> Result<usize, BuildError> {
+    let counts = table_layers
         .iter()
-        .map(|family| family.linear.structure.modal_parts().len());
+        .map(|table_layer| table_layer.linear.structure.modal_parts().len());
     let count = counts.min().unwrap_or(0).min(MODES_MAX);
-    match families.first() {
-        Some(family) if count == 0 => Err(BuildError::NotPossible {
-            path: family.path().into(),
+    match table_layers.first() {
+        Some(table_layer) if count == 0 => Err(BuildError::NotPossible {
+            path: table_layer.path().into(),
             what: "--derivatives are those by modes, and the structure has no mode that vibrates",
         }),
         _ => Ok(count),
@@ -64,18 +64,22 @@ struct SwitchDerivatives {
 
 impl Derivatives {
     /// Derivatives of all switches, for the `count` modes with the largest influence on limits.
-    pub(super) fn new(family: &Family, lines: &[SpeedLine], count: usize) -> Result<Self, BuildError> {
-        let parts = family.linear.structure.modal_parts();
+    pub(super) fn new(
+        table_layer: &TableLayer,
+        lines: &[SpeedLine],
+        count: usize,
+    ) -> Result<Self, BuildError> {
+        let parts = table_layer.linear.structure.modal_parts();
         let found: Vec<Vec<Result<SwitchDerivatives, StabilityError>>> = lines
             .par_iter()
             .map(|line| {
                 let switches = line.switches.iter();
                 switches
-                    .map(|switch| of_switch(family, &parts, line.rpm, switch))
+                    .map(|switch| of_switch(table_layer, &parts, line.rpm, switch))
                     .collect()
             })
             .collect();
-        let warning = warning(family, &found);
+        let warning = warning(table_layer, &found);
         let all: Vec<Vec<SwitchDerivatives>> = found
             .into_iter()
             .map(|line| line.into_iter().filter_map(Result::ok).collect())
@@ -126,7 +130,10 @@ impl SwitchDerivatives {
 }
 
 /// Warning that counts the limits without derivatives and gives the reason of the first; `None` if every limit has them.
-fn warning(family: &Family, found: &[Vec<Result<SwitchDerivatives, StabilityError>>]) -> Option<String> {
+fn warning(
+    table_layer: &TableLayer,
+    found: &[Vec<Result<SwitchDerivatives, StabilityError>>],
+) -> Option<String> {
     let reasons: Vec<&StabilityError> = found
         .iter()
         .flatten()
@@ -135,7 +142,7 @@ fn warning(family: &Family, found: &[Vec<Result<SwitchDerivatives, StabilityErro
     let first = reasons.first()?;
     Some(format!(
         "{}: {} of {} limits have no derivatives, for which the table states 0; the first one: {first}",
-        family.path().display(),
+        table_layer.path().display(),
         reasons.len(),
         found.iter().flatten().count()
     ))
@@ -146,12 +153,12 @@ fn warning(family: &Family, found: &[Vec<Result<SwitchDerivatives, StabilityErro
 /// # Errors
 /// The limit has no Floquet mode, or is not differentiable (the tip of an island).
 fn of_switch(
-    family: &Family,
+    table_layer: &TableLayer,
     parts: &[ModalPart],
     rpm: f64,
     switch: &Switch,
 ) -> Result<SwitchDerivatives, StabilityError> {
-    let problem = &family.linear;
+    let problem = &table_layer.linear;
     let sensitivity = Sensitivity::new(problem, rpm, switch)?;
     let slope = |tangent: &Tangent| {
         sensitivity

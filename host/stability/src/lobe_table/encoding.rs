@@ -10,7 +10,7 @@ use quietcut_core::working_point::Limits;
 use super::derivatives::Derivatives;
 use super::entries::Entry;
 use super::error::BuildError;
-use super::layers::Family;
+use super::layers::TableLayer;
 use quietcut_model::case::Case;
 
 /// The table for cuts in a given feed direction; unchanged if the direction is not known.
@@ -24,7 +24,7 @@ pub(super) fn towards<'a>(table: &LobeTable<'a>, direction_deg: Option<f64>) -> 
 /// Content of a table.
 pub(super) struct Table<'a> {
     pub(super) first: &'a Case,
-    pub(super) families: &'a [Family],
+    pub(super) table_layers: &'a [TableLayer],
     pub(super) speeds: &'a [f64],
     /// Entries by layer and speed.
     pub(super) entries: &'a [Vec<Vec<Entry>>],
@@ -50,11 +50,11 @@ impl Table<'_> {
             .map(|layer| layer.iter().map(Vec::as_slice).collect())
             .collect();
         let layers: Vec<Layer<'_>> = self
-            .families
+            .table_layers
             .iter()
             .zip(&columns)
-            .map(|(family, columns)| Layer {
-                validity: family.validity,
+            .map(|(table_layer, columns)| Layer {
+                validity: table_layer.validity,
                 columns,
             })
             .collect();
@@ -66,7 +66,10 @@ impl Table<'_> {
         let content = Content {
             name: &self.first.name[..end],
             // A tool has at most 64 teeth, so that the number fits.
-            teeth: self.families.first().map_or(0, |family| family.teeth as u8),
+            teeth: self
+                .table_layers
+                .first()
+                .map_or(0, |table_layer| table_layer.teeth as u8),
             limits: self.first.limits.map(|limits| Limits {
                 rpm_min: Rpm(limits.rpm_min as f32),
                 rpm_max: Rpm(limits.rpm_max as f32),
@@ -77,9 +80,9 @@ impl Table<'_> {
             layers: &layers,
         };
         let directions: Vec<Option<Degrees>> = self
-            .families
+            .table_layers
             .iter()
-            .map(|family| family.direction_deg.map(|degrees| Degrees(degrees as f32)))
+            .map(|table_layer| table_layer.direction_deg.map(|degrees| Degrees(degrees as f32)))
             .collect();
         let modes: Vec<&[LayerMode]> = self
             .derivatives

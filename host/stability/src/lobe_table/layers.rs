@@ -24,15 +24,11 @@ use quietcut_model::case::Case;
 /// Feed per tooth, mm, stated for a layer whose limits do not depend on the feed; larger than any feed.
 const ANY_FEED_MM: f32 = 100.0;
 
-/// Number of speeds at which limits half way between two feeds, or two feed directions, are compared with the mean of
-/// both. Unfounded.
-pub(super) const PROBES: usize = 16;
-
 /// Seed of the draws for percentiles; fixed, so that a table can be reproduced.
 const SEED: u64 = 1;
 
 /// Case and method of one layer.
-pub(super) struct Family {
+pub(super) struct TableLayer {
     pub(super) method: Box<dyn Method>,
     /// Linear problem with the mean pitch; equal to the problem of the method if structure and pitch allow.
     pub(super) linear: Problem,
@@ -44,7 +40,7 @@ pub(super) struct Family {
     percentile: Option<f64>,
 }
 
-impl Family {
+impl TableLayer {
     fn new(case: Case, percentile: Option<f64>, direction_deg: Option<f64>) -> Result<Self, BuildError> {
         let cut = *case.cut().map_err(StabilityError::from)?;
         let (feed_from, feed_to) = if depends_on_feed(&case) {
@@ -208,31 +204,31 @@ fn depends_on_feed(case: &Case) -> bool {
 
 /// Layers between which a table is checked: a single one, or the middle of two between which lookups interpolate.
 pub(super) struct CheckedLayers {
-    pub(super) family: Family,
+    pub(super) table_layer: TableLayer,
     /// Index of the single layer, or indices of the two layers.
     pub(super) layers: Vec<usize>,
 }
 
 /// All layers, and the middles of all neighbours in feed or in feed direction.
-pub(super) fn checked_layers(families: &[Family]) -> Result<Vec<CheckedLayers>, BuildError> {
+pub(super) fn checked_layers(table_layers: &[TableLayer]) -> Result<Vec<CheckedLayers>, BuildError> {
     let mut checked_layers = Vec::new();
-    for (index, family) in families.iter().enumerate() {
+    for (index, table_layer) in table_layers.iter().enumerate() {
         checked_layers.push(CheckedLayers {
-            family: family.at(family.feed_mm(), family.direction_deg)?,
+            table_layer: table_layer.at(table_layer.feed_mm(), table_layer.direction_deg)?,
             layers: vec![index],
         });
-        if let Some(next) = nearest(families, index, |other| other.feeds_beyond(family)) {
-            let feed_mm = 0.5 * (family.feed_mm() + families[next].feed_mm());
+        if let Some(next) = nearest(table_layers, index, |other| other.feeds_beyond(table_layer)) {
+            let feed_mm = 0.5 * (table_layer.feed_mm() + table_layers[next].feed_mm());
             checked_layers.push(CheckedLayers {
-                family: family.at(feed_mm, family.direction_deg)?,
+                table_layer: table_layer.at(feed_mm, table_layer.direction_deg)?,
                 layers: vec![index, next],
             });
         }
-        if let Some(next) = nearest(families, index, |other| other.turned_from(family)) {
-            let turn = families[next].turned_from(family).unwrap_or(0.0);
-            let degrees = family.direction_deg.map(|degrees| degrees + 0.5 * turn);
+        if let Some(next) = nearest(table_layers, index, |other| other.turned_from(table_layer)) {
+            let turn = table_layers[next].turned_from(table_layer).unwrap_or(0.0);
+            let degrees = table_layer.direction_deg.map(|degrees| degrees + 0.5 * turn);
             checked_layers.push(CheckedLayers {
-                family: family.at(family.feed_mm(), degrees)?,
+                table_layer: table_layer.at(table_layer.feed_mm(), degrees)?,
                 layers: vec![index, next],
             });
         }
@@ -240,11 +236,18 @@ pub(super) fn checked_layers(families: &[Family]) -> Result<Vec<CheckedLayers>, 
     Ok(checked_layers)
 }
 
-/// The family at the least distance from another; `None` if no distance is defined.
-fn nearest(families: &[Family], index: usize, distance: impl Fn(&Family) -> Option<f64>) -> Option<usize> {
-    let others = families.iter().enumerate().filter(|(other, _)| *other != index);
+/// The layer at the least distance from another; `None` if no distance is defined.
+fn nearest(
+    table_layers: &[TableLayer],
+    index: usize,
+    distance: impl Fn(&TableLayer) -> Option<f64>,
+) -> Option<usize> {
+    let others = table_layers
+        .iter()
+        .enumerate()
+        .filter(|(other, _)| *other != index);
     others
-        .filter_map(|(other, family)| Some((other, distance(family)?)))
+        .filter_map(|(other, table_layer)| Some((other, distance(table_layer)?)))
         .min_by(|a, b| a.1.total_cmp(&b.1))
         .map(|(other, _)| other)
 }
@@ -294,21 +297,21 @@ fn divided(
     cases: &[Case],
     divisions: &[Division],
     request: &TableRequest,
-) -> Result<Vec<Family>, BuildError> {
-    let mut families = Vec::new();
+) -> Result<Vec<TableLayer>, BuildError> {
+    let mut table_layers = Vec::new();
     for (case, division) in cases.iter().zip(divisions) {
         for &direction_deg in &division.directions_deg {
             for &feed_mm in &division.feeds_mm {
                 let case = at(case, feed_mm, direction_deg);
-                families.push(Family::new(case, request.percentile, direction_deg)?);
+                table_layers.push(TableLayer::new(case, request.percentile, direction_deg)?);
             }
         }
     }
-    Ok(families)
+    Ok(table_layers)
 }
 
 /// Layers as requested, before refinement.
-pub(super) fn families(cases: &[Case], request: &TableRequest) -> Result<Vec<Family>, BuildError> {
+pub(super) fn table_layers(cases: &[Case], request: &TableRequest) -> Result<Vec<TableLayer>, BuildError> {
     let mut teeth = None;
     for case in cases {
         let found = case.tool().map_err(StabilityError::from)?.teeth;
@@ -344,12 +347,12 @@ pub(super) fn refined(
     probes_rpm: &[f64],
     depth_mm: f64,
     tolerance_mm: f64,
-) -> Result<Vec<Family>, BuildError> {
+) -> Result<Vec<TableLayer>, BuildError> {
     let mut divisions = divisions(cases, request)?;
     for (case, division) in cases.iter().zip(&mut divisions) {
         let limits = |feed_mm: f64, direction_deg: Option<f64>| -> Result<Vec<f64>, BuildError> {
-            let family = Family::new(at(case, feed_mm, direction_deg), None, direction_deg)?;
-            let lines = family.lines(probes_rpm, depth_mm)?;
+            let table_layer = TableLayer::new(at(case, feed_mm, direction_deg), None, direction_deg)?;
+            let lines = table_layer.lines(probes_rpm, depth_mm)?;
             let limit = |line: &SpeedLine| line.first_limit.map_or(depth_mm, |limit| limit.depth_mm);
             Ok(lines.iter().map(limit).collect())
         };

@@ -276,13 +276,13 @@ fn the_stated_error_of_a_5_percent_table_holds() {
     };
     let bytes = build_table(std::slice::from_ref(&case), &request).unwrap();
     let table = LobeTable::parse(&bytes).unwrap();
-    let families = layers::families(std::slice::from_ref(&case), &request).unwrap();
+    let table_layers = layers::table_layers(std::slice::from_ref(&case), &request).unwrap();
     let seed = 20_261_121;
     println!("seed {seed}");
     let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
     let speeds: Vec<f64> = (0..40).map(|_| rng.random_range(1020.0..1120.0)).collect();
     let mut trial = Trial::new(&table);
-    for direct in families[0].lines(&speeds, 6.0).unwrap() {
+    for direct in table_layers[0].lines(&speeds, 6.0).unwrap() {
         trial.check(&point(&case, 1.0, 0.15), None, &direct);
     }
     trial.report();
@@ -551,8 +551,8 @@ fn postures_are_layers_and_a_percentile_is_that_of_the_machines() {
         percentile: Some(5.0),
         ..request((1290.0, 1310.0), 5.0)
     };
-    let families = layers::families(std::slice::from_ref(&case), &request).unwrap();
-    let tabulated = families[0].lines(&[1300.0], 5.0).unwrap();
+    let table_layers = layers::table_layers(std::slice::from_ref(&case), &request).unwrap();
+    let tabulated = table_layers[0].lines(&[1300.0], 5.0).unwrap();
     // With one parameter on which the limit falls monotonically, the 5 % limit is that of the machine at the 95 %
     // quantile.
     let mut hard = case.clone();
@@ -576,7 +576,7 @@ fn postures_are_layers_and_a_percentile_is_that_of_the_machines() {
 fn a_structure_with_cubic_terms_has_layers_over_feed() {
     let case = case("kuka-kr90-half-cubic");
     let (rpm, depth_mm) = (526.0, 8.0);
-    let families = layers::families(
+    let table_layers = layers::table_layers(
         std::slice::from_ref(&case),
         &TableRequest {
             feeds_per_tooth_mm: vec![0.05, 0.15],
@@ -584,15 +584,15 @@ fn a_structure_with_cubic_terms_has_layers_over_feed() {
         },
     )
     .unwrap();
-    assert_eq!(families.len(), 2);
+    assert_eq!(table_layers.len(), 2);
     assert!(
-        families
+        table_layers
             .iter()
-            .all(|family| family.validity.feed_from == family.validity.feed_to)
+            .all(|table_layer| table_layer.validity.feed_from == table_layer.validity.feed_to)
     );
     let forced = orbit::ForcedProblem::new(&case).unwrap();
     let direct = forced.line(rpm, depth_mm, 40).unwrap();
-    assert_eq!(families[1].lines(&[rpm], depth_mm).unwrap()[0], direct);
+    assert_eq!(table_layers[1].lines(&[rpm], depth_mm).unwrap()[0], direct);
     // Unstable depths of the entries and stable depths together cover the whole depth range.
     let entries = entries::unstable(&direct, depth_mm);
     let stable = entries::surely_stable(&direct, depth_mm);
@@ -632,16 +632,16 @@ fn limits_without_derivatives_are_reported_with_the_first_reason() {
         derivatives: true,
         ..request((1200.0, 1210.0), 4.0)
     };
-    let families = layers::families(std::slice::from_ref(&case), &request).unwrap();
-    let mut lines = families[0].lines(&[1200.0], 4.0).unwrap();
-    let complete = derivatives::Derivatives::new(&families[0], &lines, 2).unwrap();
+    let table_layers = layers::table_layers(std::slice::from_ref(&case), &request).unwrap();
+    let mut lines = table_layers[0].lines(&[1200.0], 4.0).unwrap();
+    let complete = derivatives::Derivatives::new(&table_layers[0], &lines, 2).unwrap();
     assert_eq!(complete.warning, None);
     // A linear structure has no fold, hence no Floquet mode and no derivative of one.
     let count = lines[0].switches.len();
     let mut fold = lines[0].switches[0];
     fold.kind = crate::StabilityLoss::Fold;
     lines[0].switches.push(fold);
-    let warning = derivatives::Derivatives::new(&families[0], &lines, 2)
+    let warning = derivatives::Derivatives::new(&table_layers[0], &lines, 2)
         .unwrap()
         .warning
         .unwrap();

@@ -4,6 +4,7 @@ use num_complex::Complex64;
 
 use super::step_error::step_error;
 use super::stepped::{Mesh, Stepped};
+use crate::criteria::STEP_ROUNDING;
 use crate::error::{Breakdown, StabilityError};
 use crate::limits::bounds::{check_depth, check_speed};
 use crate::limits::line::line_of;
@@ -13,9 +14,6 @@ use crate::limits::speed_line::SpeedLine;
 use crate::problem::pitched::Pitched;
 use crate::spectrum::krylov::Dominant;
 use crate::spectrum::map_spectrum::{MapSpectrum, PeriodMap};
-
-/// Relative rounding error of a multiplier from the map of a period of some hundred steps. Unfounded: an estimate.
-const ROUNDING: f64 = 1e-9;
 
 /// Scheme of one time step, such as semi-discretization.
 pub(crate) trait Discretization: Sync {
@@ -85,7 +83,7 @@ impl<D: Discretization> Discretized<D> {
             })
         };
         let order = self.discretization.order();
-        Ok(step_error(multiplier, finer(2)?, finer(4)?, order, ROUNDING))
+        Ok(step_error(multiplier, finer(2)?, finer(4)?, order, STEP_ROUNDING))
     }
 }
 

@@ -5,10 +5,11 @@ use std::f64::consts::{PI, TAU};
 use num_complex::Complex64;
 use rayon::prelude::*;
 
+use crate::criteria::ZOA_BEND;
 use crate::error::{Breakdown, NOT_FINITE, StabilityError};
 use crate::frequency::averaged::AveragedLoop;
 use crate::frequency::limits::{AxisCrossing, hertz, speed_line};
-use crate::frequency::loci::{Mark, Sample, Step, solve_steps, trace, zero};
+use crate::frequency::loci::{LocusPoint, Sample, Step, solve_steps, trace, zero};
 use crate::frequency::open_loop::OpenLoop;
 use crate::frequency::problem::FrequencyProblem;
 use crate::frequency::root;
@@ -17,11 +18,6 @@ use crate::limits::method::Method;
 use crate::limits::point::CutStability;
 use crate::limits::speed_line::SpeedLine;
 use crate::spectrum::stability_loss::StabilityLoss;
-
-/// Largest deviation of a locus from a straight line between two sampled frequencies, as a factor on the tenth of its
-/// size that the tracing of loci allows for other methods. With it the phase between two samples is monotone, except
-/// where lobes touch. Unfounded.
-const STRAIGHT: f64 = 0.1;
 
 /// Tolerance, rad, to which the phase condition ωτ = π − 2 arg(1/λ) + 2πk is solved; depths have the same relative
 /// error.
@@ -52,7 +48,7 @@ impl Zoa {
             &|omega| open_loop.eigenvalues(Complex64::new(0.0, omega), floor),
             &grid,
             floor,
-            STRAIGHT,
+            ZOA_BEND,
         )
     }
 
@@ -101,7 +97,7 @@ impl Zoa {
             let (least, most) = (start.min(end), start.max(end));
             let mut lobe = (least / TAU).ceil() * TAU;
             while lobe < most {
-                let mark = |omega, value, phase: f64| Mark {
+                let mark = |omega, value, phase: f64| LocusPoint {
                     omega,
                     value,
                     miss: phase - lobe,

@@ -22,7 +22,7 @@ use super::forced::ForcedProblem;
 use super::periodic_orbit::{Orbit, PeriodMap, Scale};
 use super::restoring::{Samples, Spring, equivalent, incremental};
 use super::tooth_period::ToothPeriod;
-use crate::criteria::{EQUIVALENT_FOLLOWED, LEAST_ERROR, STICKING_DAMPER};
+use crate::criteria::{EQUIVALENT_FOLLOWED, EQUIVALENT_SAMPLES_MIN, LEAST_ERROR, STICKING_DAMPER};
 use crate::error::StabilityError;
 use crate::limits::bounds::{check_depth, check_speed};
 use crate::limits::method::Method;
@@ -33,9 +33,6 @@ use crate::spectrum::stability_loss::StabilityLoss;
 use quietcut_model::RestoringForce;
 use quietcut_model::case::Case;
 use quietcut_model::effects::{ALL, Treatment};
-
-/// Least number of steps in depth at which the number of multipliers outside the unit circle is compared. Unfounded.
-const SAMPLES: usize = 32;
 
 /// Largest change of the equivalent springs in an iteration, in units of the static stiffness, at which springs and
 /// orbit count as agreeing.
@@ -447,7 +444,7 @@ impl Method for EquivalentProblem {
         check_depth(depth_mm)?;
         let follower = Follower::new(self, rpm);
         let last_m = 1e-3 * depth_mm;
-        let samples = samples.max(SAMPLES);
+        let samples = samples.max(EQUIVALENT_SAMPLES_MIN);
         let none_m = (1e-3 * NONE_MM).min(last_m / samples as f64);
         let mut low = follower.sample(none_m, &follower.rest())?;
         let start = low.outside();

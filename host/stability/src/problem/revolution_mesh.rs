@@ -10,6 +10,7 @@
 use super::period::{DECAY_MAX, Rates};
 use super::pitched::Pitched;
 use super::tooth_passages::{ToothPassage, ToothPassages, distinct};
+use crate::criteria::KINKS_MAX;
 use quietcut_numerics::quadrature::Gauss;
 
 /// Subinterval length, tolerance and number of kink generations of the mesh over a revolution.
@@ -47,10 +48,6 @@ pub(crate) enum Flight {
     Cut,
 }
 
-/// Number of subinterval ends in a revolution beyond which no further generation of kinks is added. Subintervals are
-/// then short, and kinks of later generations are smooth. Unfounded.
-const KINKS_MAX: usize = 300;
-
 /// Displacements p of one tooth at all nodes of one subinterval.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Series {
@@ -72,7 +69,7 @@ pub(crate) enum Source {
 /// Delayed displacement at one port: weighted sum over the nodes of the subinterval in which the preceding tooth cut
 /// the surface.
 #[derive(Clone, Debug)]
-pub(crate) struct Past {
+pub(crate) struct DelayedDisplacement {
     pub(crate) source: Source,
     /// Values of the Lagrange polynomials of those nodes at the delayed time.
     pub(crate) weights: Vec<f64>,
@@ -89,7 +86,7 @@ pub(crate) struct Subinterval {
     /// Cutting teeth, in the order of the ports of a node.
     pub(crate) cutting: Vec<ToothPassage>,
     /// Delayed displacement at each port, node by node.
-    pub(crate) pasts: Vec<Past>,
+    pub(crate) pasts: Vec<DelayedDisplacement>,
 }
 
 /// Mesh of one revolution at one spindle speed.
@@ -181,7 +178,7 @@ impl RevolutionMesh {
                     } else {
                         Source::Own(series)
                     };
-                    pasts.push(Past { source, weights });
+                    pasts.push(DelayedDisplacement { source, weights });
                 }
             }
             self.subintervals[index].pasts = pasts;

@@ -20,7 +20,7 @@ pub(crate) trait PeriodMap: LinearMap {
 }
 
 /// All multipliers of the map at one axial depth.
-struct Known {
+struct MultipliersAtDepth {
     depth_m: f64,
     dominant: Dominant,
     /// Multipliers at a slightly larger depth, for the difference quotient.
@@ -34,7 +34,7 @@ pub(crate) struct MapSpectrum<F, E> {
     error: E,
     /// Step of the difference quotient, m.
     step_m: f64,
-    known: Option<Known>,
+    known: Option<MultipliersAtDepth>,
 }
 
 impl<M: PeriodMap, F: Fn(f64) -> Option<M>, E: Fn(Complex64, f64) -> Option<f64>> MapSpectrum<F, E> {
@@ -48,9 +48,9 @@ impl<M: PeriodMap, F: Fn(f64) -> Option<M>, E: Fn(Complex64, f64) -> Option<f64>
         }
     }
 
-    fn at(&mut self, depth_m: f64) -> Result<&mut Known, Breakdown> {
+    fn at(&mut self, depth_m: f64) -> Result<&mut MultipliersAtDepth, Breakdown> {
         if self.known.as_ref().is_none_or(|known| known.depth_m != depth_m) {
-            self.known = Some(Known {
+            self.known = Some(MultipliersAtDepth {
                 depth_m,
                 dominant: Dominant::of(&(self.map)(depth_m).ok_or(Breakdown::NoSolution)?, MAPPED)?,
                 deeper: None,

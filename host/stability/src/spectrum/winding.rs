@@ -29,7 +29,7 @@ const ROOTS_MAX: usize = 12;
 
 /// Largest multiplier found, and the radius beyond which the winding number counts none.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Beyond {
+pub(crate) struct LargestMultiplier {
     /// Largest multiplier found, if larger than [`WOUND`]; of a conjugate pair the upper one.
     pub(crate) multiplier: Option<Complex64>,
     /// Radius beyond which the winding number counts no multiplier; infinite if no count converged.
@@ -144,7 +144,7 @@ impl<'a> Search<'a> {
 
     /// Largest multiplier found, and the radius beyond which the winding number counts none; `candidates` are starting
     /// values of Newton's method.
-    pub(crate) fn largest(&mut self, candidates: &[Complex64]) -> Beyond {
+    pub(crate) fn largest(&mut self, candidates: &[Complex64]) -> LargestMultiplier {
         let mut known: Vec<Complex64> = Vec::new();
         let mut best: Option<Complex64> = None;
         let is_large = |candidate: &&Complex64| candidate.norm() > WOUND && candidate.im >= 0.0;
@@ -178,7 +178,7 @@ impl<'a> Search<'a> {
                 break;
             }
         }
-        Beyond {
+        LargestMultiplier {
             multiplier: best,
             radius,
         }
