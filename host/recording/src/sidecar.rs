@@ -170,26 +170,22 @@ impl Sidecar {
                 return Err(wrong(key, value, "a number of 0 or more"));
             }
         }
-        let angles: [(&str, Option<f64>, fn(f64) -> bool, &str); 2] = [
-            (
-                "cut.start_deg",
-                cut.start_deg,
-                |deg| (0.0..360.0).contains(&deg),
-                "an angle from 0 to below 360",
-            ),
-            (
-                "cut.exit_deg",
-                cut.exit_deg,
-                |deg| deg > 0.0 && deg <= 360.0,
-                "an angle above 0, up to 360",
-            ),
-        ];
-        for (key, value, is_possible, expected) in angles {
-            match value {
-                Some(value) if !value.is_finite() => return Err(wrong(key, value, "a finite angle")),
-                Some(value) if !is_possible(value) => return Err(wrong(key, value, expected)),
-                _ => {}
+        for (key, value) in [("cut.start_deg", cut.start_deg), ("cut.exit_deg", cut.exit_deg)] {
+            if let Some(value) = value
+                && !value.is_finite()
+            {
+                return Err(wrong(key, value, "a finite angle"));
             }
+        }
+        if let Some(start) = cut.start_deg
+            && !(0.0..360.0).contains(&start)
+        {
+            return Err(wrong("cut.start_deg", start, "an angle from 0 to below 360"));
+        }
+        if let Some(exit) = cut.exit_deg
+            && !(exit > 0.0 && exit <= 360.0)
+        {
+            return Err(wrong("cut.exit_deg", exit, "an angle above 0, up to 360"));
         }
         if let (Some(start), Some(exit)) = (cut.start_deg, cut.exit_deg)
             && start >= exit

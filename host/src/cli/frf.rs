@@ -49,7 +49,7 @@ pub struct Args {
     /// Window of the segments of random excitation.
     #[arg(long, value_enum, default_value_t)]
     window: WindowName,
-    /// Overlap of these segments, as a fraction of their length.
+    /// Overlap of the segments of random excitation, as a fraction of their length.
     #[arg(long, value_name = "FRACTION", value_parser = overlap, default_value = "0.5", allow_negative_numbers = true)]
     overlap: f64,
     /// Channel to use where a recording has several forces, or several sensors of one direction; may be repeated.

@@ -53,6 +53,9 @@ pub(super) struct Unknowns {
 /// The case parameter of an entry (row, column) of a mass, damping or stiffness matrix.
 type Entry = fn(usize, usize) -> Parameter;
 
+/// Name of a mode, and the changes of the case for a relative change of one in its frequency, damping ratio and stiffness.
+type ModeChanges = (String, [Vec<Deviation>; 3]);
+
 /// A variable with its name for the user.
 struct Named {
     variable: Variable,
@@ -145,7 +148,7 @@ fn of_modes(case: &Case, relative: [f64; 3], suffix: &str) -> Result<Vec<Named>,
     let Some(structure) = &case.structure else {
         return Ok(Vec::new());
     };
-    let modes: Vec<(String, [Vec<Deviation>; 3])> = match &structure.form {
+    let modes: Vec<ModeChanges> = match &structure.form {
         Form::Modes(modes) => modes.iter().enumerate().map(of_mode).collect(),
         Form::Matrices(matrices) => of_matrices(matrices)?,
         Form::Joints(robot) => robot.joints.iter().enumerate().map(of_joint).collect(),
@@ -174,7 +177,7 @@ fn of_modes(case: &Case, relative: [f64; 3], suffix: &str) -> Result<Vec<Named>,
 }
 
 /// Name of a mode, and the changes of its parameters for a relative change of one in frequency, damping ratio and compliance.
-fn of_mode((index, mode): (usize, &Mode)) -> (String, [Vec<Deviation>; 3]) {
+fn of_mode((index, mode): (usize, &Mode)) -> ModeChanges {
     let one = |parameter, std| vec![Deviation { parameter, std }];
     let shape = mode.left.iter().enumerate().flat_map(|(entry, value)| {
         [(value.re, false), (value.im, true)].map(|(std, imaginary)| Deviation {
@@ -198,7 +201,7 @@ fn the_mode(frequency_hz: f64) -> String {
 
 /// Name of a joint, and the changes of its parameters for a relative change of one in frequency, damping ratio and stiffness of the
 /// joint with its link alone.
-fn of_joint((index, joint): (usize, &Joint)) -> (String, [Vec<Deviation>; 3]) {
+fn of_joint((index, joint): (usize, &Joint)) -> ModeChanges {
     let part = |parameter, std| Deviation { parameter, std };
     let stiffness = |factor: f64| {
         part(
@@ -230,7 +233,7 @@ fn of_joint((index, joint): (usize, &Joint)) -> (String, [Vec<Deviation>; 3]) {
 ///
 /// # Errors
 /// The mass matrix is not positive definite, or the eigenvalues cannot be computed.
-fn of_matrices(matrices: &Matrices) -> Result<Vec<(String, [Vec<Deviation>; 3])>, String> {
+fn of_matrices(matrices: &Matrices) -> Result<Vec<ModeChanges>, String> {
     let symmetric = |matrix: &DMatrix<f64>| (matrix + matrix.transpose()) * 0.5;
     let (mass, damping, stiffness) = (
         symmetric(&matrices.mass),
