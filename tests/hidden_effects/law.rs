@@ -24,7 +24,7 @@ pub(crate) enum Law {
         breakaway_n: f64,
         stribeck_m_per_s: f64,
     },
-    /// Backlash of a spring that has no force within ±half_gap: minus the force that the linear spring has too much.
+    /// Backlash: a spring without force within ±half_gap. f_r is minus the part of the linear spring's force that is missing.
     Gap {
         axis: usize,
         half_gap_m: f64,

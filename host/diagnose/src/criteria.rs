@@ -19,8 +19,8 @@ pub(crate) const LEAST_RELATIVE_NOISE: f64 = 3e-5;
 // Recorded cuts
 
 /// Largest relative difference between the spindle speed from the tachometer and that in the sidecar. A spindle without speed control may
-/// slip by up to 5 % at rated load (NEMA MG 1, induction motors of design A and B); a wrong number of pulses per revolution changes the
-/// speed by more, up to 19 pulses.
+/// slip by up to 5 % at rated load (NEMA MG 1, induction motors of design A and B). Counting one pulse too many or too few per revolution
+/// changes the speed by more than that, if there are fewer than 20.
 pub(crate) const SPEED_MISMATCH: f64 = 0.05;
 
 /// Fewest tachometer edges that determine the spindle angle within a fraction of a sample: two for a straight line, and two residuals.

@@ -28,7 +28,7 @@ pub enum DiagnoseError {
     Record {
         /// File of the recording.
         path: PathBuf,
-        /// The defect, and what is required.
+        /// The defect of the recording, and what is required instead.
         what: String,
     },
     /// No recording is given.

@@ -64,8 +64,7 @@ pub fn diagnose(
 
 /// [`diagnose`] with a callback at the beginning of each stage.
 ///
-/// # Errors
-/// As [`diagnose`].
+/// The case cannot be simulated, or a recording cannot be compared: too short, clipped, or without a required channel.
 pub fn diagnose_watched(
     case: &Case,
     recordings: &[Recording],
@@ -74,7 +73,8 @@ pub fn diagnose_watched(
 ) -> Result<Diagnosis, DiagnoseError> {
     watch(Stage::Records);
     let (recordings, shortened) = full_engagement::in_full_engagement(case, recordings)?;
-    let mut diagnosis = match long_records::concluded(case, &recordings, options, watch) {
+    let (concluded, remark) = long_records::concluded(case, &recordings, options, watch);
+    let mut diagnosis = match concluded {
         Some(diagnosis) => diagnosis,
         None => {
             watch(Stage::Records);
@@ -82,7 +82,13 @@ pub fn diagnose_watched(
             conclude::conclude(&study, &recordings, options, watch)
         }
     };
-    diagnosis.next_test = next_test::next_test(case, &recordings, &diagnosis);
+    diagnosis.warnings.extend(remark);
+    match next_test::next_test(case, &recordings, &diagnosis) {
+        Ok(test) => diagnosis.next_test = test,
+        Err(reason) => diagnosis.warnings.push(format!(
+            "no test is proposed that separates the candidate models: {reason}"
+        )),
+    }
     diagnosis.warnings.splice(0..0, shortened);
     Ok(diagnosis)
 }

@@ -3,7 +3,7 @@
 /// Options of a diagnosis.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Options {
-    /// Seed of all random numbers of a diagnosis: the same seed gives the same answer.
+    /// Seed of random numbers. No stage of a diagnosis depends on it: draws of force noise have fixed seeds.
     pub seed: u64,
 }
 

@@ -72,13 +72,16 @@ pub fn run(args: Args) -> Result<(), Error> {
 /// Adds the stability limits to the diagnosis: before and after the extension, or only those of the case if there is no
 /// extension but there are trial cuts. A failure becomes a warning.
 fn add_limits(case: &Case, recordings: &[Recording], cuts: &[TrialCut], diagnosis: &mut Diagnosis) {
-    let has_cuts = || !cuts.is_empty() || !recorded_cuts(case, recordings).is_empty();
+    let has_cuts = || !cuts.is_empty() || !recorded_cuts(case, recordings).0.is_empty();
     let found = match diagnosis.extended(case) {
-        Some(extended) => lobes(case, &extended, &diagnosis.moved(case), recordings, cuts)
-            .map(|found| diagnosis.lobes = Some(found)),
-        None if has_cuts() => {
-            baseline_lobes(case, recordings, cuts).map(|found| diagnosis.baseline_lobes = Some(found))
-        }
+        Some(extended) => lobes(case, &extended, &diagnosis.moved(case), recordings, cuts).map(|found| {
+            diagnosis.warnings.extend(found.warnings.iter().cloned());
+            diagnosis.lobes = Some(found);
+        }),
+        None if has_cuts() => baseline_lobes(case, recordings, cuts).map(|found| {
+            diagnosis.warnings.extend(found.warnings.iter().cloned());
+            diagnosis.baseline_lobes = Some(found);
+        }),
         None => Ok(()),
     };
     if let Err(error) = found {

@@ -4,7 +4,7 @@
 //! coefficient of the regressor, which is 1 if the effect exists; no reported parameter. Source: thesis, eq. 3.5.
 
 use super::process::{changed, everywhere, has_axial};
-use crate::candidates::cause::{Cause, Location, Parameter, Regressor};
+use crate::candidates::cause::{Cause, Location, Parameter, Regressors};
 use crate::records::record::Record;
 use crate::records::study::Study;
 use quietcut_model::effects::EffectName;
@@ -27,8 +27,8 @@ impl Cause for AxialDepthModulationCause {
         }
     }
 
-    fn regressors(&self, _: &Study<'_>, record: &Record, _: &Location, _: &[f64]) -> Option<Vec<Regressor>> {
-        Some(vec![changed(
+    fn regressors(&self, _: &Study<'_>, record: &Record, _: &Location, _: &[f64]) -> Regressors {
+        Ok(vec![changed(
             record,
             |cutter| cutter.axial_depth_modulation = true,
             1.0,

@@ -177,6 +177,15 @@ impl Regressor {
     }
 }
 
+/// Regressors of a cause in a record, one for each coefficient, or the reason why they cannot be computed there.
+pub(crate) type Regressors = Result<Vec<Regressor>, String>;
+
+/// Reason of a cause that is asked for regressors at a location it does not have.
+pub(crate) const WRONG_LOCATION: &str = "the cause cannot act at this location";
+
+/// Reason of a cause that is asked for regressors with another number of nonlinear parameters than it has.
+pub(crate) const WRONG_PARAMETERS: &str = "the number of nonlinear parameters is wrong";
+
 /// A fitted parameter: its key in `parameters` of the answer and in the extension, and its value.
 pub(crate) type Parameter = (&'static str, f64);
 
@@ -234,14 +243,14 @@ pub(crate) trait Cause: Send + Sync {
         Vec::new()
     }
 
-    /// Regressors of the cause in a record, one for each coefficient; `None` if they cannot be computed there.
+    /// Regressors of the cause in a record.
     fn regressors(
         &self,
         study: &Study<'_>,
         record: &Record,
         location: &Location,
         nonlinear_parameters: &[f64],
-    ) -> Option<Vec<Regressor>>;
+    ) -> Regressors;
 
     /// Parameters by key from the fitted coefficients; `None` if they are not physical, as a negative friction force.
     fn parameters(

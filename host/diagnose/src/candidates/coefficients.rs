@@ -1,7 +1,7 @@
 //! Cutting or edge coefficients of the material that differ from those of the case. The force F is linear in each.
 
 use super::process::{changed, cutter, everywhere, has_axial};
-use crate::candidates::cause::{Cause, Location, Parameter, Regressor};
+use crate::candidates::cause::{Cause, Location, Parameter, Regressors};
 use crate::records::record::Record;
 use crate::records::study::Study;
 use quietcut_model::effects::EffectName;
@@ -29,14 +29,8 @@ impl Cause for Coefficients {
         everywhere(study, self.name())
     }
 
-    fn regressors(
-        &self,
-        study: &Study<'_>,
-        record: &Record,
-        _: &Location,
-        _: &[f64],
-    ) -> Option<Vec<Regressor>> {
-        let step = (self.step)(cutter(study)?);
+    fn regressors(&self, study: &Study<'_>, record: &Record, _: &Location, _: &[f64]) -> Regressors {
+        let step = (self.step)(cutter(study).ok_or("no record is of a cut")?);
         // The axial coefficient is fitted only if the structure has an axial direction.
         let count = if has_axial(study) { 3 } else { 2 };
         let with_more = |index: usize| {
@@ -50,7 +44,7 @@ impl Cause for Coefficients {
                 step,
             )
         };
-        Some((0..count).map(with_more).collect())
+        Ok((0..count).map(with_more).collect())
     }
 
     fn parameters(

@@ -7,7 +7,7 @@
 use num_complex::Complex64;
 
 use super::sensor::{channels, readings_at, with_chip_of_true_motion};
-use crate::candidates::cause::{Cause, Location, Parameter, Regressor};
+use crate::candidates::cause::{Cause, Location, Parameter, Regressors, WRONG_LOCATION};
 use crate::records::record::Record;
 use crate::records::study::Study;
 use quietcut_model::effects::EffectName;
@@ -39,22 +39,16 @@ impl Cause for CrossAxis {
         locations
     }
 
-    fn regressors(
-        &self,
-        _: &Study<'_>,
-        record: &Record,
-        location: &Location,
-        _: &[f64],
-    ) -> Option<Vec<Regressor>> {
+    fn regressors(&self, _: &Study<'_>, record: &Record, location: &Location, _: &[f64]) -> Regressors {
         let Location::ChannelFrom(_, axis) = location else {
-            return None;
+            return Err(WRONG_LOCATION.into());
         };
         let mut weights = [0.0; 3];
         weights[*axis] = 1.0;
         let read = readings_at(record, location, |_| weights, |_| Complex64::ONE);
         let other = record.motion.clone();
         // The true motion is x = y − p·(the other direction).
-        Some(with_chip_of_true_motion(
+        Ok(with_chip_of_true_motion(
             record,
             location,
             read,

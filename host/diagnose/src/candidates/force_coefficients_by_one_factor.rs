@@ -3,7 +3,7 @@
 //! In the steady state of a stable linear cut without measured force, one gain of all channels is exactly equivalent.
 
 use super::process::{changed, cutter, everywhere};
-use crate::candidates::cause::{Cause, LocatedEffect, Location, Parameter, Regressor};
+use crate::candidates::cause::{Cause, LocatedEffect, Location, Parameter, Regressors};
 use crate::records::record::Record;
 use crate::records::study::Study;
 use quietcut_model::effects::EffectName;
@@ -73,8 +73,8 @@ impl Cause for CommonFactor {
         }
     }
 
-    fn regressors(&self, _: &Study<'_>, record: &Record, _: &Location, _: &[f64]) -> Option<Vec<Regressor>> {
-        Some(vec![changed(
+    fn regressors(&self, _: &Study<'_>, record: &Record, _: &Location, _: &[f64]) -> Regressors {
+        Ok(vec![changed(
             record,
             |cutter| {
                 let force = &mut cutter.force;

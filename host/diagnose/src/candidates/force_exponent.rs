@@ -7,7 +7,7 @@
 //! regressors are finite differences, exact if p and q are the values at which they are computed.
 
 use super::process::{added, changed, cutter, everywhere, step};
-use crate::candidates::cause::{Cause, Location, Parameter, Regressor};
+use crate::candidates::cause::{Cause, Location, Parameter, Regressors, WRONG_PARAMETERS};
 use crate::records::record::Record;
 use crate::records::study::Study;
 use quietcut_model::effects::EffectName;
@@ -42,9 +42,9 @@ impl Cause for ForceExponent {
         record: &Record,
         _: &Location,
         nonlinear_parameters: &[f64],
-    ) -> Option<Vec<Regressor>> {
+    ) -> Regressors {
         let &[exponent, q] = nonlinear_parameters else {
-            return None;
+            return Err(WRONG_PARAMETERS.into());
         };
         let less = step(exponent - 1.0, LEAST);
         let h = reference_m(study);
@@ -53,7 +53,7 @@ impl Cause for ForceExponent {
             reference_m: h * (-q / less).exp(),
         };
         let q_step = step(q, LEAST);
-        Some(vec![
+        Ok(vec![
             changed(record, |cutter| cutter.force.chip = Some(law(0.0)), less),
             added(
                 record,

@@ -16,7 +16,7 @@ use rayon::prelude::*;
 
 use crate::baseline::dynamic_stiffness;
 use crate::baseline::receptance::Receptance;
-use crate::candidates::cause::{Cause, Location, Parameter, Regressor};
+use crate::candidates::cause::{Cause, Location, Parameter, Regressor, Regressors};
 use crate::records::domain::Domain;
 use crate::records::record::Record;
 use crate::records::study::Study;
@@ -66,10 +66,10 @@ impl LinearChange {
         Some(matrix[(index, index)])
     }
 
-    fn effect(&self, location: &Location, relative: f64) -> Option<Effects> {
+    fn effect(&self, location: &Location, relative: f64) -> Result<Effects, String> {
         let mut table = location.table();
         table.insert("relative_change".into(), relative.into());
-        Effects::of_extension(self.name(), &table).ok()
+        Effects::of_extension(self.name(), &table).map_err(|error| error.to_string())
     }
 }
 
@@ -105,17 +105,11 @@ impl Cause for LinearChange {
         locations
     }
 
-    fn regressors(
-        &self,
-        study: &Study<'_>,
-        record: &Record,
-        location: &Location,
-        _: &[f64],
-    ) -> Option<Vec<Regressor>> {
+    fn regressors(&self, study: &Study<'_>, record: &Record, location: &Location, _: &[f64]) -> Regressors {
         let [below, above] = [-STEP, STEP].map(|step| {
             let effect = self.effect(location, step)?;
-            let first_order = study.baseline.altered(&effect).ok()?;
-            Some((effect, first_order))
+            let first_order = study.baseline.altered(&effect);
+            Ok::<_, String>((effect, first_order.map_err(|error| error.to_string())?))
         });
         let ((below_effect, below), (above_effect, above)) = (below?, above?);
         let baseline = &study.baseline;
@@ -144,8 +138,8 @@ impl Cause for LinearChange {
                         .clone()
                         .and(effect)
                         .altered(baseline.structure)
-                        .ok()?;
-                    Some(dynamic_stiffness::table(
+                        .map_err(|error| error.to_string())?;
+                    Ok::<_, String>(dynamic_stiffness::table(
                         &structure,
                         first_order,
                         &baseline.axes,
@@ -200,7 +194,7 @@ impl Cause for LinearChange {
                 }
             })
             .collect();
-        Some(vec![Regressor::of_channels(observed)])
+        Ok(vec![Regressor::of_channels(observed)])
     }
 
     fn parameters(

@@ -13,7 +13,7 @@ use rayon::prelude::*;
 use std::f64::consts::TAU;
 
 use crate::baseline::derivatives;
-use crate::candidates::cause::{Cause, Location, Parameter, Regressor};
+use crate::candidates::cause::{Cause, Location, Parameter, Regressor, Regressors, WRONG_LOCATION};
 use crate::candidates::closed_loop::{holding_force_n, starts_anywhere};
 use crate::records::channel::Observed;
 use crate::records::domain::Domain;
@@ -130,12 +130,14 @@ impl Cause for MissingMode {
         record: &Record,
         location: &Location,
         nonlinear_parameters: &[f64],
-    ) -> Option<Vec<Regressor>> {
+    ) -> Regressors {
         let (Location::Axis(axis), [frequency, damping]) = (location, nonlinear_parameters) else {
-            return None;
+            return Err(WRONG_LOCATION.into());
         };
         if is_free_decay_along(record, *axis) {
-            let force_n = static_force_n(study, record)?[*axis];
+            let force_n = static_force_n(study, record).ok_or(
+                "the static force before the free decay cannot be computed: the static stiffness is singular",
+            )?[*axis];
             let count = record.grid.count();
             let of = |channel| free_decay_of_mode(record, channel, *axis, force_n, [*frequency, *damping]);
             let observed = record
@@ -143,7 +145,7 @@ impl Cause for MissingMode {
                 .iter()
                 .map(|channel| of(channel).take(count).collect())
                 .collect();
-            return Some(vec![Regressor::of_channels(observed)]);
+            return Ok(vec![Regressor::of_channels(observed)]);
         }
         let force = &record.force_n[*axis];
         let observed = record
@@ -162,7 +164,7 @@ impl Cause for MissingMode {
                 record.grid.samples(&spectrum)
             })
             .collect();
-        Some(vec![Regressor::of_channels(observed)])
+        Ok(vec![Regressor::of_channels(observed)])
     }
 
     /// `None` if the baseline has a mode at least as large whose half-power bandwidth overlaps with that of this one: the fit then

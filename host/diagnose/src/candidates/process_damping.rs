@@ -5,7 +5,7 @@
 //! the measured velocity. Source: Altintas, Eynian and Onozuka, CIRP Annals 57 (2008).
 
 use super::process::{changed, cutter, everywhere};
-use crate::candidates::cause::{Cause, Location, Parameter, Regressor};
+use crate::candidates::cause::{Cause, Location, Parameter, Regressors};
 use crate::records::record::Record;
 use crate::records::study::Study;
 use quietcut_model::effects::EffectName;
@@ -27,12 +27,12 @@ impl Cause for ProcessDampingCause {
         }
     }
 
-    fn regressors(&self, _: &Study<'_>, record: &Record, _: &Location, _: &[f64]) -> Option<Vec<Regressor>> {
+    fn regressors(&self, _: &Study<'_>, record: &Record, _: &Location, _: &[f64]) -> Regressors {
         let unit = ProcessDamping {
             n_per_m: 1.0,
             friction: 0.0,
         };
-        Some(vec![changed(
+        Ok(vec![changed(
             record,
             |cutter| cutter.force.process_damping = Some(unit),
             1.0,

@@ -1,7 +1,7 @@
 //! Restoring forces: the equations are those of the simulation, evaluated along the measured motion.
 
 use crate::baseline::terms_of;
-use crate::candidates::cause::{Cause, LocatedEffect, Location, Parameter, Regressor};
+use crate::candidates::cause::{Cause, LocatedEffect, Location, Parameter, Regressor, Regressors};
 use crate::records::record::Record;
 use crate::records::study::Study;
 use quietcut_model::effects::EffectName;
@@ -154,7 +154,7 @@ impl Restoring {
         parts
     }
 
-    /// The force of coefficient number `index` with the value 1, along the motion of a record; `None` if the structure has no such force.
+    /// The force of coefficient number `index` with the value 1, along the motion of a record, or the reason why the structure has no such force.
     fn along(
         &self,
         study: &Study<'_>,
@@ -162,14 +162,15 @@ impl Restoring {
         location: &Location,
         nonlinear_parameters: &[f64],
         index: usize,
-    ) -> Option<Regressor> {
+    ) -> Result<Regressor, String> {
         let unit: Vec<f64> = (0..self.linear.len())
             .map(|i| f64::from(u8::from(i == index)))
             .collect();
-        let effects =
-            Effects::of_extension(self.name(), &self.table(location, nonlinear_parameters, &unit)).ok()?;
+        let table = self.table(location, nonlinear_parameters, &unit);
+        let effects = Effects::of_extension(self.name(), &table).map_err(|error| error.to_string())?;
+        let terms = terms_of(&effects, study.baseline.structure).map_err(|error| error.to_string())?;
         let mut sum: [Vec<f64>; 3] = std::array::from_fn(|_| Vec::new());
-        for term in terms_of(&effects, study.baseline.structure).ok()? {
+        for term in terms {
             for (sum, force) in sum.iter_mut().zip(restoring_along(&*term, &record.motion)) {
                 if sum.is_empty() {
                     *sum = force;
@@ -178,7 +179,7 @@ impl Restoring {
                 }
             }
         }
-        Some(Regressor::of_force(sum))
+        Ok(Regressor::of_force(sum))
     }
 }
 
@@ -243,7 +244,7 @@ impl Cause for Restoring {
         record: &Record,
         location: &Location,
         nonlinear_parameters: &[f64],
-    ) -> Option<Vec<Regressor>> {
+    ) -> Regressors {
         single_locations(location)
             .iter()
             .flat_map(|location| (0..self.linear.len()).map(move |index| (location, index)))

@@ -7,7 +7,7 @@
 use std::f64::consts::TAU;
 
 use super::process::{added, changed, cutter, everywhere, step};
-use crate::candidates::cause::{Cause, Location, Parameter, Regressor};
+use crate::candidates::cause::{Cause, Location, Parameter, Regressors, WRONG_PARAMETERS};
 use crate::records::record::Record;
 use crate::records::study::Study;
 use quietcut_model::effects::EffectName;
@@ -73,9 +73,9 @@ impl Cause for RunoutCause {
         record: &Record,
         _: &Location,
         nonlinear_parameters: &[f64],
-    ) -> Option<Vec<Regressor>> {
+    ) -> Regressors {
         let &[along, across] = nonlinear_parameters else {
-            return None;
+            return Err(WRONG_PARAMETERS.into());
         };
         let (along_step, across_step) = (step(along, LEAST_UM), step(across, LEAST_UM));
         let mut regressors = vec![changed(record, offset(along_step, 0.0), along_step)];
@@ -88,7 +88,7 @@ impl Cause for RunoutCause {
                 across_step,
             ));
         }
-        Some(regressors)
+        Ok(regressors)
     }
 
     fn settled(&self, _: &[f64], coefficients: &[f64]) -> Option<Vec<f64>> {

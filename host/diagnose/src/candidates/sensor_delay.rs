@@ -7,7 +7,7 @@
 use num_complex::Complex64;
 
 use super::sensor::{is_at, one_or_all, reading_in_cut, readings_at, with_chip_of_true_motion};
-use crate::candidates::cause::{Cause, Location, Parameter, Regressor};
+use crate::candidates::cause::{Cause, Location, Parameter, Regressor, Regressors, WRONG_PARAMETERS};
 use crate::records::record::Record;
 use crate::records::study::Study;
 use quietcut_model::effects::EffectName;
@@ -51,8 +51,8 @@ impl Cause for SensorDelayCause {
         record: &Record,
         location: &Location,
         nonlinear_parameters: &[f64],
-    ) -> Option<Vec<Regressor>> {
-        let delay = *nonlinear_parameters.first()?;
+    ) -> Regressors {
+        let delay = *nonlinear_parameters.first().ok_or(WRONG_PARAMETERS)?;
         // Divided by the delay, so that the coefficient is the delay in seconds.
         let change = |omega: f64| (Complex64::ONE - Complex64::cis(omega * delay)) / delay;
         let read = if record.cut.is_some() {
@@ -64,13 +64,16 @@ impl Cause for SensorDelayCause {
                 }
             };
             vec![Regressor::of_channels(
-                (0..record.channels.len()).map(of).collect::<Option<_>>()?,
+                (0..record.channels.len())
+                    .map(of)
+                    .collect::<Option<_>>()
+                    .ok_or("no record is of a cut")?,
             )]
         } else {
             readings_at(record, location, |channel| channel.pickup.weights, change)
         };
         // The true motion is x(t) = y(t + τ).
-        Some(with_chip_of_true_motion(
+        Ok(with_chip_of_true_motion(
             record,
             location,
             read,

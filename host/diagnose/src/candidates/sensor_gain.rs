@@ -8,7 +8,7 @@
 use num_complex::Complex64;
 
 use super::sensor::{one_or_all, readings_at, with_chip_of_true_motion};
-use crate::candidates::cause::{Cause, Location, Parameter, Regressor};
+use crate::candidates::cause::{Cause, Location, Parameter, Regressors};
 use crate::records::record::Record;
 use crate::records::study::Study;
 use quietcut_model::effects::EffectName;
@@ -36,13 +36,7 @@ impl Cause for SensorGainCause {
         one_or_all(study, self.name())
     }
 
-    fn regressors(
-        &self,
-        _: &Study<'_>,
-        record: &Record,
-        location: &Location,
-        _: &[f64],
-    ) -> Option<Vec<Regressor>> {
+    fn regressors(&self, _: &Study<'_>, record: &Record, location: &Location, _: &[f64]) -> Regressors {
         let read = readings_at(
             record,
             location,
@@ -50,7 +44,7 @@ impl Cause for SensorGainCause {
             |_| Complex64::ONE,
         );
         // The true motion is x = (1 − share)·y.
-        Some(with_chip_of_true_motion(
+        Ok(with_chip_of_true_motion(
             record,
             location,
             read,

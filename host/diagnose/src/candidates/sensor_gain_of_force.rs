@@ -5,7 +5,7 @@
 //! drives the structure, the gain of its sensor is equivalent to one gain of all channels of motion. Fit: linear in g − 1. Source: the
 //! calibration factor of ISO 16063; Altintas, Manufacturing Automation (2012), ch. 2, for dynamometers in cuts.
 
-use crate::candidates::cause::{Cause, LocatedEffect, Location, Parameter, Regressor};
+use crate::candidates::cause::{Cause, LocatedEffect, Location, Parameter, Regressor, Regressors};
 use crate::records::record::Record;
 use crate::records::study::Study;
 use quietcut_model::effects::EffectName;
@@ -45,13 +45,7 @@ impl Cause for ForceSensorGainCause {
         names.into_iter().map(Location::Channel).chain(together).collect()
     }
 
-    fn regressors(
-        &self,
-        _: &Study<'_>,
-        record: &Record,
-        location: &Location,
-        _: &[f64],
-    ) -> Option<Vec<Regressor>> {
+    fn regressors(&self, _: &Study<'_>, record: &Record, location: &Location, _: &[f64]) -> Regressors {
         let of = |index: usize| {
             let channel = &record.channels[index];
             if !names(location).contains(&channel.pickup.name) {
@@ -65,7 +59,7 @@ impl Cause for ForceSensorGainCause {
             force
         };
         let observed = (0..record.channels.len()).map(of).collect();
-        Some(vec![Regressor::of_channels(observed)])
+        Ok(vec![Regressor::of_channels(observed)])
     }
 
     fn parameters(

@@ -10,7 +10,7 @@
 use super::sensor::one_or_all;
 use super::sensor_gain::{SensorGainCause, factor};
 use crate::baseline::receptance::{Receptance, response};
-use crate::candidates::cause::{Cause, Location, Parameter, Regressor};
+use crate::candidates::cause::{Cause, Location, Parameter, Regressor, Regressors};
 use crate::records::channel::Observed;
 use crate::records::channel::main_axis;
 use crate::records::domain::Domain;
@@ -98,7 +98,7 @@ impl Cause for SensorOffsetCause {
         record: &Record,
         location: &Location,
         nonlinear_parameters: &[f64],
-    ) -> Option<Vec<Regressor>> {
+    ) -> Regressors {
         let Some((modes, _)) = modes(study, location) else {
             return SensorGainCause.regressors(study, record, location, nonlinear_parameters);
         };
@@ -112,7 +112,7 @@ impl Cause for SensorOffsetCause {
             };
             Regressor::of_channels(record.channels.iter().enumerate().map(read).collect())
         };
-        Some(modes.iter().map(of_mode).collect())
+        Ok(modes.iter().map(of_mode).collect())
     }
 
     fn parameters(

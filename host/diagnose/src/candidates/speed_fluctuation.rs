@@ -8,7 +8,7 @@
 //! reported amplitude is that of the tachometer, which is more accurate.
 
 use super::process::everywhere;
-use crate::candidates::cause::{Cause, Location, Parameter, Regressor};
+use crate::candidates::cause::{Cause, Location, Parameter, Regressor, Regressors, WRONG_PARAMETERS};
 use crate::motion::spindle_motion::{SpeedModulation, SpindleMotion, speed_modulation};
 use crate::records::record::Record;
 use crate::records::study::Study;
@@ -60,9 +60,9 @@ impl Cause for SpeedFluctuationCause {
         record: &Record,
         _: &Location,
         nonlinear_parameters: &[f64],
-    ) -> Option<Vec<Regressor>> {
+    ) -> Regressors {
         let &[frequency_hz, delta, phase_rad] = nonlinear_parameters else {
-            return None;
+            return Err(WRONG_PARAMETERS.into());
         };
         let fluctuation = Fluctuation {
             delta,
@@ -70,11 +70,11 @@ impl Cause for SpeedFluctuationCause {
             phase_rad,
         };
         let Some(cut) = &record.cut else {
-            return Some(vec![Regressor::default()]);
+            return Ok(vec![Regressor::default()]);
         };
         let spindle_motion = cut.cut.spindle_motion.with(fluctuation);
         let force = cut.force_along(&spindle_motion, &record.motion);
-        Some(vec![Regressor::of_cut(force.difference(&cut.force, 1.0))])
+        Ok(vec![Regressor::of_cut(force.difference(&cut.force, 1.0))])
     }
 
     /// The nonlinear parameters come from the tachometer and are not fitted.

@@ -4,7 +4,7 @@
 //! is equivalent. Fit: linear in r. Source: Altintas, Manufacturing Automation (2012), ch. 2 (forces over flank wear).
 
 use super::process::{changed, everywhere};
-use crate::candidates::cause::{Cause, Location, Parameter, Regressor};
+use crate::candidates::cause::{Cause, Location, Parameter, Regressors};
 use crate::records::record::Record;
 use crate::records::study::Study;
 use quietcut_model::effects::EffectName;
@@ -20,8 +20,8 @@ impl Cause for WearCause {
         everywhere(study, self.name())
     }
 
-    fn regressors(&self, _: &Study<'_>, record: &Record, _: &Location, _: &[f64]) -> Option<Vec<Regressor>> {
-        Some(vec![changed(
+    fn regressors(&self, _: &Study<'_>, record: &Record, _: &Location, _: &[f64]) -> Regressors {
+        Ok(vec![changed(
             record,
             |cutter| cutter.force.wear_per_s += 1.0,
             1.0,

@@ -155,7 +155,7 @@ pub struct NextTest {
     /// Force amplitudes, one after the other, N; peak force of an impact.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub force_n: Vec<f64>,
-    /// First and last frequency of a sweep; twice the frequency of a step sine, Hz.
+    /// First and last frequency of a sweep, Hz; for a step sine both are its frequency.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub band_hz: Option<[f64; 2]>,
     /// Spindle speed of a cut, rev/min.

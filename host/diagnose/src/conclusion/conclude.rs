@@ -67,7 +67,7 @@ fn answer(
         lobes: None,
         baseline_lobes: None,
         next_test: None,
-        warnings: Vec::new(),
+        warnings: library.unexamined.clone(),
         explanations: Vec::new(),
         acting: 0,
         views: residual_views(study, library, selection.best.as_ref()),

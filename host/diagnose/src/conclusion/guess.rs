@@ -170,6 +170,7 @@ fn along(study: &Study<'_>, motion: &Motion, axis: usize, term: FormulaTerm) -> 
                 format!("hysteresis.yield_m={yield_m:e}"),
                 format!("hysteresis.direction={direction}"),
             ];
+            // An error means that the structure does not move along this axis: the formula has no such term.
             let effects = Effects::parse(texts.iter().map(String::as_str)).ok()?;
             let terms = effects
                 .0

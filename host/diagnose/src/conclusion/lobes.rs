@@ -77,6 +77,8 @@ pub struct Chart {
     pub lines: Vec<SpeedLine>,
     /// Trial cuts and recorded cuts, each with the comparison of its outcome with the prediction.
     pub cuts: Vec<(TrialCut, Call)>,
+    /// One sentence for each recorded cut whose outcome cannot be determined.
+    pub warnings: Vec<String>,
 }
 
 /// Stability limits of the case and of the extended case.
@@ -100,6 +102,9 @@ pub struct Lobes {
     /// Charts of the case and of the extended case.
     #[serde(skip)]
     pub charts: [Chart; 2],
+    /// Sentences about intervals that cannot be computed, and about recorded cuts whose outcome cannot be determined.
+    #[serde(skip)]
+    pub warnings: Vec<String>,
 }
 
 /// An extended case with parameters at both ends of the 90 % interval along one principal direction of their covariance.
@@ -122,7 +127,7 @@ pub fn baseline_lobes(
 /// Stability limits of a case and of its extended case over the same speeds. `moved` holds the extended case at the ends of its parameters'
 /// intervals.
 ///
-/// As [`baseline_lobes`], and the same for the extended case.
+/// The case or the extended case has no tool, material or cut, or its limits cannot be computed.
 pub fn lobes(
     case: &Case,
     extended: &Case,
@@ -154,7 +159,12 @@ pub fn lobes(
         expected: "a speed",
     })?;
     let known = if is_costly { at..at + 1 } else { 0..speeds.len() };
-    spread(&mut speeds[known], range.searched_mm, moved, after_s);
+    let mut warnings = charts[0].warnings.clone();
+    if let Err(error) = spread(&mut speeds[known], range.searched_mm, moved, after_s) {
+        warnings.push(format!(
+            "the 90 % intervals of the stability limits could not be computed: {error}"
+        ));
+    }
     Ok(Lobes {
         at: speeds[at],
         searched_mm: range.searched_mm,
@@ -166,31 +176,34 @@ pub fn lobes(
             after: charts[1].calls(),
         }),
         charts,
+        warnings,
     })
 }
 
 /// Adds the 90 % intervals of the limits to `speeds`. The principal directions of the parameters are independent: the squares of their
 /// changes of a limit add, separately for increases and decreases.
-fn spread(speeds: &mut [Change], searched_mm: f64, moved: &[IntervalEnds], after_s: Option<f64>) {
+fn spread(
+    speeds: &mut [Change],
+    searched_mm: f64,
+    moved: &[IntervalEnds],
+    after_s: Option<f64>,
+) -> Result<(), StabilityError> {
     if moved.is_empty() {
-        return;
+        return Ok(());
     }
     let speeds_rpm: Vec<f64> = speeds.iter().map(|change| change.at_rpm).collect();
     let or_last = |limit_mm: Option<f64>| limit_mm.unwrap_or(searched_mm);
-    let limits = |case: &Case| -> Option<Vec<f64>> {
-        let lines = chart(&*method(case, after_s).ok()?, &speeds_rpm, searched_mm, 0).ok()?;
+    let limits = |case: &Case| -> Result<Vec<f64>, StabilityError> {
+        let lines = chart(&*method(case, after_s)?, &speeds_rpm, searched_mm, 0)?;
         let limits = lines.speeds.iter().map(|line| line.first_limit);
-        Some(
-            limits
-                .map(|limit| or_last(limit.map(|limit| limit.depth_mm)))
-                .collect(),
-        )
+        Ok(limits
+            .map(|limit| or_last(limit.map(|limit| limit.depth_mm)))
+            .collect())
     };
-    let moved: Option<Vec<[Vec<f64>; 2]>> = moved
+    let moved: Vec<[Vec<f64>; 2]> = moved
         .par_iter()
-        .map(|[low, high]| Some([limits(low)?, limits(high)?]))
-        .collect();
-    let Some(moved) = moved else { return };
+        .map(|[low, high]| Ok([limits(low)?, limits(high)?]))
+        .collect::<Result<_, StabilityError>>()?;
     for (index, change) in speeds.iter_mut().enumerate() {
         let center_mm = or_last(change.limit_after_mm);
         let reach = |sign: f64| {
@@ -206,21 +219,26 @@ fn spread(speeds: &mut [Change], searched_mm: f64, moved: &[IntervalEnds], after
             (high_mm < searched_mm).then_some(high_mm),
         ]);
     }
+    Ok(())
 }
 
 /// The trial cuts and recorded cuts of a chart.
 struct Cuts<'a> {
     tried: &'a [TrialCut],
     recorded: Vec<TrialCut>,
+    /// One sentence for each recorded cut whose outcome cannot be determined.
+    warnings: Vec<String>,
     /// Speeds of all recorded cuts, rev/min, including cuts whose immersion or feed belongs to another chart.
     recorded_rpm: Vec<f64>,
 }
 
 impl<'a> Cuts<'a> {
     fn new(case: &Case, recordings: &[Recording], tried: &'a [TrialCut]) -> Self {
+        let (recorded, warnings) = recorded_cuts(case, recordings);
         Self {
             tried,
-            recorded: recorded_cuts(case, recordings),
+            recorded,
+            warnings,
             recorded_rpm: recordings
                 .iter()
                 .filter(|recording| recording.sidecar.kind == Some(TestKind::Cutting))
@@ -272,6 +290,7 @@ impl Chart {
             searched_mm: range.searched_mm,
             lines,
             cuts: cuts.all().copied().zip(said).collect(),
+            warnings: cuts.warnings.clone(),
         })
     }
 
@@ -291,6 +310,7 @@ fn after_s(cases: &[&Case], recordings: &[Recording]) -> Option<f64> {
 }
 
 fn is_costly(case: &Case) -> bool {
+    // A case without forced problem is refused when its limits are computed.
     needs_orbit(case) && ForcedProblem::new(case).is_ok_and(|problem| problem.is_over_revolution())
 }
 
@@ -428,6 +448,20 @@ mod tests {
         };
         assert!(reach(&found) > 0.0);
         assert!((reach(&twice) / reach(&found) - 2.0_f64.sqrt()).abs() < 1e-9);
+    }
+
+    #[test]
+    fn limits_without_an_interval_say_why() {
+        let case = quietcut_testkit::case("kuka-kr90-acetal");
+        let mut broken = stiffened(0.1);
+        broken.material = None;
+        let lobes = lobes(&case, &stiffened(0.1), &[[broken.clone(), broken]], &[], &[]).unwrap();
+        assert_eq!(lobes.at.limit_after_ci90_mm, None);
+        assert!(
+            lobes.warnings[0].starts_with("the 90 % intervals"),
+            "{:?}",
+            lobes.warnings
+        );
     }
 
     #[test]

@@ -9,6 +9,7 @@ use crate::baseline::Baseline;
 use crate::conclusion::answer::{Diagnosis, Gain, Outcome, Quality};
 use crate::conclusion::conclude;
 use crate::criteria::{NOISE_TOLERANCE, SHORTENED_SHARE, UNEXPLAINED_OF_RESPONSE};
+use crate::error::DiagnoseError;
 use crate::fit::regression::{Regression, Subset};
 use crate::progress::{Options, Stage};
 use crate::records::study::Study;
@@ -25,6 +26,7 @@ const REVOLUTIONS: f64 = 24.0;
 /// The first part and the rest of each record, if all records are of random forces, of impacts or of cuts at one speed; `None` if the
 /// records are too short to be divided.
 fn beginnings(case: &Case, recordings: &[Recording]) -> Option<[Vec<Recording>; 2]> {
+    // A case without baseline model is refused when the whole records are prepared.
     let lowest_hz = Baseline::new(case).ok()?.lowest_hz()?;
     let all: usize = recordings.iter().map(Recording::len).sum();
     let (shortened, rest): (Vec<Recording>, Vec<Recording>) = recordings
@@ -58,19 +60,42 @@ fn revolutions_s(recording: &Recording) -> Option<f64> {
 }
 
 /// The answer from the first parts of the records, if it holds for the rest too; `None` if not, or if the records are too short to be
-/// divided.
+/// divided. A warning says if a part of the records cannot be compared alone.
 pub(crate) fn concluded(
     case: &Case,
     recordings: &[Recording],
     options: &Options,
     watch: &dyn Fn(Stage),
-) -> Option<Diagnosis> {
-    let [beginnings, rest] = beginnings(case, recordings)?;
-    let study = Study::new(case, &beginnings).ok()?;
-    let mut diagnosis = conclude::conclude(&study, &beginnings, options, watch);
+) -> (Option<Diagnosis>, Option<String>) {
+    let Some(parts) = beginnings(case, recordings) else {
+        return (None, None);
+    };
+    match validated(case, &parts, options, watch) {
+        Ok(diagnosis) => (diagnosis, None),
+        Err(error) => {
+            let warning = format!(
+                "causes were searched in the whole records, because a part cannot be compared alone: {error}"
+            );
+            (None, Some(warning))
+        }
+    }
+}
+
+/// The answer from the first parts of the records, if it holds for the rest too.
+///
+/// # Errors
+/// A first part or a rest cannot be compared alone.
+fn validated(
+    case: &Case,
+    [beginnings, rest]: &[Vec<Recording>; 2],
+    options: &Options,
+    watch: &dyn Fn(Stage),
+) -> Result<Option<Diagnosis>, DiagnoseError> {
+    let study = Study::new(case, beginnings)?;
+    let mut diagnosis = conclude::conclude(&study, beginnings, options, watch);
     drop(study);
     watch(Stage::Records);
-    let baseline = Residual::of(case, &rest)?;
+    let baseline = Residual::of(case, rest)?;
     let searched_s = beginnings
         .iter()
         .map(|record| record.len() as f64 / record.sample_rate_hz);
@@ -80,16 +105,19 @@ pub(crate) fn concluded(
     ));
     let extended = match diagnosis.outcome {
         // More samples cannot make a known cause explain the residual.
-        Outcome::Unexplained => return Some(diagnosis),
+        Outcome::Unexplained => return Ok(Some(diagnosis)),
         Outcome::None => case.clone(),
-        _ => diagnosis.extended(case)?,
+        _ => match diagnosis.extended(case) {
+            Some(extended) => extended,
+            None => return Ok(None),
+        },
     };
-    let extended_residual = Residual::of(&extended, &rest)?;
+    let extended_residual = Residual::of(&extended, rest)?;
     let beyond = extended_residual.energy - extended_residual.count;
     if beyond > NOISE_TOLERANCE * extended_residual.count
         && beyond > UNEXPLAINED_OF_RESPONSE * (baseline.energy - baseline.count)
     {
-        return None;
+        return Ok(None);
     }
     // Nothing was fitted to the rest: all of it is held out.
     let quality = |nrmse: f64| Quality {
@@ -105,7 +133,7 @@ pub(crate) fn concluded(
             extended_residual.count,
         ));
     }
-    Some(diagnosis)
+    Ok(Some(diagnosis))
 }
 
 /// Residual of a case in records to which nothing is fitted.
@@ -119,10 +147,10 @@ struct Residual {
 }
 
 impl Residual {
-    fn of(case: &Case, recordings: &[Recording]) -> Option<Self> {
-        let study = Study::new(case, recordings).ok()?;
+    fn of(case: &Case, recordings: &[Recording]) -> Result<Self, DiagnoseError> {
+        let study = Study::new(case, recordings)?;
         let regression = Regression::new(&study);
-        Some(Self {
+        Ok(Self {
             energy: regression.residual(Subset::Whole),
             count: regression.count(Subset::Whole) as f64,
             nrmse: regression.nrmse(&study, Subset::Whole),

@@ -9,20 +9,29 @@ use quietcut_recording::{RecordedCut, Recording, Sensed, SpindleSettings, TestKi
 use quietcut_stability::trial_cuts::{Outcome, TrialCut};
 
 /// The recorded cuts that belong to the chart of a case: with the immersion and feed of the case, and one given speed and depth.
-pub fn recorded_cuts(case: &Case, recordings: &[Recording]) -> Vec<TrialCut> {
-    recordings
+/// Behind them one warning for each cut whose outcome cannot be determined, with the reason.
+pub fn recorded_cuts(case: &Case, recordings: &[Recording]) -> (Vec<TrialCut>, Vec<String>) {
+    let mut warnings = Vec::new();
+    let cuts = recordings
         .iter()
         .filter(|recording| recording.sidecar.kind == Some(TestKind::Cutting))
         .filter_map(|recording| {
             let given = recording.sidecar.cut?;
+            let rpm = given.spindle_rpm.filter(|_| is_on_chart(case, &given))?;
+            let depth_mm = given.axial_depth_mm?;
+            let outcome = outcome(recording, case.tool.as_ref().map(|tool| tool.teeth));
             Some(TrialCut {
-                rpm: given.spindle_rpm.filter(|_| is_on_chart(case, &given))?,
-                depth_mm: given.axial_depth_mm?,
-                outcome: outcome(recording, case.tool.as_ref().map(|tool| tool.teeth)),
+                rpm,
+                depth_mm,
+                outcome: outcome.unwrap_or_else(|reason| {
+                    warnings.push(format!("a recorded cut counts as marginal: {reason}"));
+                    Outcome::Marginal
+                }),
                 chatter_hz: None,
             })
         })
-        .collect()
+        .collect();
+    (cuts, warnings)
 }
 
 fn is_on_chart(case: &Case, given: &RecordedCut) -> bool {
@@ -40,9 +49,12 @@ fn is_on_chart(case: &Case, given: &RecordedCut) -> bool {
         )
 }
 
-/// Chatter if the device detects it at any time; stable if it reports a verdict without chatter; marginal if it reports none, or if the
-/// recording has no channel that it uses.
-fn outcome(recording: &Recording, teeth: Option<usize>) -> Outcome {
+/// Outcome of a recorded cut: chatter if the device detects it at any time; stable if it reports a verdict without chatter; marginal if it
+/// reports none.
+///
+/// # Errors
+/// The device cannot evaluate the recording; the error is a sentence.
+fn outcome(recording: &Recording, teeth: Option<usize>) -> Result<Outcome, String> {
     let recorded = recording.sidecar.cut.and_then(|cut| cut.teeth);
     let speed = SpindleSettings {
         rpm: None,
@@ -50,24 +62,21 @@ fn outcome(recording: &Recording, teeth: Option<usize>) -> Outcome {
             .filter(|_| recorded.is_none())
             .and_then(|teeth| teeth.try_into().ok()),
     };
-    let Ok(sensed) = Sensed::new(recording, speed) else {
-        return Outcome::Marginal;
-    };
-    let Ok(monitor) = Monitor::new(sensed.settings) else {
-        return Outcome::Marginal;
-    };
+    let sensed = Sensed::new(recording, speed).map_err(|error| error.to_string())?;
+    let monitor =
+        Monitor::new(sensed.settings).map_err(|error| format!("{}: {error}", recording.path.display()))?;
     let mut state = State::default();
     let mut detected = Outcome::Marginal;
     for (block, edges) in sensed.steps() {
         let report = monitor.step(&mut state, block, edges, None, None);
         match report.judgement.verdict {
-            verdict if verdict.is_chatter() => return Outcome::Chatter,
+            verdict if verdict.is_chatter() => return Ok(Outcome::Chatter),
             Verdict::Stable | Verdict::Forced | Verdict::Runout => detected = Outcome::Stable,
             // The monitor has no verdict before the entry and after the exit of the tool.
             _ => {}
         }
     }
-    detected
+    Ok(detected)
 }
 
 #[cfg(test)]
@@ -106,8 +115,13 @@ mod tests {
         silent.channels.retain(|channel| !channel.name.starts_with('a'));
         let mut elsewhere = shallow.clone();
         elsewhere.sidecar.cut.as_mut().unwrap().exit_deg = Some(150.0);
-        let cuts = recorded_cuts(&case, &[shallow, record(1.8 * limit_mm), silent, elsewhere]);
+        let (cuts, warnings) = recorded_cuts(&case, &[shallow, record(1.8 * limit_mm), silent, elsewhere]);
         let outcomes: Vec<Outcome> = cuts.iter().map(|cut| cut.outcome).collect();
+        // The device evaluates no recording without acceleration.
+        assert!(
+            warnings.len() == 1 && warnings[0].contains("a recorded cut counts as marginal: "),
+            "{warnings:?}"
+        );
         // A cut of another immersion belongs to another chart.
         assert_eq!(outcomes, [Outcome::Stable, Outcome::Chatter, Outcome::Marginal]);
         assert_eq!((cuts[1].rpm, cuts[1].depth_mm), (900.0, 1.8 * limit_mm));

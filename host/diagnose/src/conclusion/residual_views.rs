@@ -41,7 +41,7 @@ pub struct ResidualView {
     pub spindle_motion: Option<SpindleMotionView>,
 }
 
-/// A channel of a cut over the spindle angle.
+/// A channel of a cut sampled at the tooth passings.
 #[derive(Clone, Debug)]
 pub struct SpindleMotionView {
     /// Mean spindle speed, rev/min.

@@ -26,6 +26,8 @@ pub(crate) struct Library {
     pub causes: Vec<Box<dyn Cause>>,
     /// The causes at their locations in this study.
     pub candidates: Vec<Candidate>,
+    /// Sentences about causes at locations where no regressor can be computed, with the reason.
+    pub unexamined: Vec<String>,
 }
 
 /// The effects that change the linear structure. All three by one factor scale its dynamic stiffness by that factor.
@@ -55,19 +57,27 @@ impl Library {
             .partition(|(_, location, _)| matches!(location, Location::EachOf(_)));
         let computed: Vec<_> = placed
             .into_par_iter()
-            .filter_map(|(cause, location, nonlinear_parameters)| {
-                let columns = columns(study, &*causes[cause], &location, &nonlinear_parameters)?;
-                Some((cause, location, nonlinear_parameters, columns))
+            .map(|(cause, location, nonlinear_parameters)| {
+                let columns = columns(study, &*causes[cause], &location, &nonlinear_parameters);
+                (cause, location, nonlinear_parameters, columns)
             })
             .collect();
         let mut library = Self {
             causes,
             candidates: Vec::new(),
+            unexamined: Vec::new(),
         };
+        let mut failed: Vec<(usize, Location, String)> = Vec::new();
         for (cause, location, nonlinear_parameters, columns) in computed {
-            let numbers = columns.iter().map(|column| regression.add(column)).collect();
-            library.put(cause, location, nonlinear_parameters, numbers);
+            match columns {
+                Ok(columns) => {
+                    let numbers = columns.iter().map(|column| regression.add(column)).collect();
+                    library.put(cause, location, nonlinear_parameters, numbers);
+                }
+                Err(reason) => failed.push((cause, location, reason)),
+            }
         }
+        library.unexamined = library.unexamined(failed);
         for (cause, location, nonlinear_parameters) in each {
             if let Some(numbers) = library.columns_along_each(cause, &location, &nonlinear_parameters) {
                 library.put(cause, location, nonlinear_parameters, numbers);
@@ -75,6 +85,21 @@ impl Library {
         }
         regression.complete();
         library
+    }
+
+    /// One sentence for each cause at a location where the regressors of all its start values `failed`.
+    fn unexamined(&self, failed: Vec<(usize, Location, String)>) -> Vec<String> {
+        let mut sentences: Vec<String> = Vec::new();
+        let mut known: Vec<(usize, Location)> = Vec::new();
+        for (cause, location, reason) in failed {
+            let name = self.causes[cause].name();
+            let place = (cause, location);
+            if self.find(place.0, &place.1).is_none() && !known.contains(&place) {
+                sentences.push(format!("{name} ({}) is not examined: {reason}", place.1));
+                known.push(place);
+            }
+        }
+        sentences
     }
 
     fn find(&self, cause: usize, location: &Location) -> Option<usize> {
@@ -140,7 +165,7 @@ impl Library {
         &self.candidates[choice.candidate].variants[choice.variant].1
     }
 
-    /// Linear fit of some choices; `None` if they are not identifiable or not physical.
+    /// Linear fit of the candidate model that consists of `choices`; `None` if it is not identifiable or not physical.
     pub(crate) fn explain(
         &self,
         study: &Study<'_>,
@@ -317,7 +342,8 @@ impl Library {
                     let mut moved = nonlinear_parameters.clone();
                     moved[parameter] = value.clamp(low, high);
                     let width = moved[parameter];
-                    columns(study, cause, &known.location, &moved).map(|columns| (columns, width))
+                    let columns = columns(study, cause, &known.location, &moved).ok()?;
+                    Some((columns, width))
                 };
                 let (above, to) = at(nonlinear_parameters[parameter] + step)?;
                 let (below, from) = at(nonlinear_parameters[parameter] - step)?;
@@ -406,7 +432,8 @@ impl Library {
             &*self.causes[known.cause],
             &known.location,
             &nonlinear_parameters,
-        )?;
+        )
+        .ok()?;
         let numbers = columns.iter().map(|column| regression.add(column)).collect();
         let variants = &mut self.candidates[candidate].variants;
         variants.push((nonlinear_parameters, numbers));
@@ -417,13 +444,13 @@ impl Library {
     }
 }
 
-/// Regressors of a cause by coefficient, record, channel and sample; `None` if they cannot be computed or are not finite.
+/// Regressors of a cause by coefficient, record, channel and sample, or the reason why they cannot be computed.
 fn columns(
     study: &Study<'_>,
     cause: &dyn Cause,
     location: &Location,
     nonlinear_parameters: &[f64],
-) -> Option<Vec<Vec<Vec<Vec<f64>>>>> {
+) -> Result<Vec<Vec<Vec<Vec<f64>>>>, String> {
     let mut by_coefficient: Vec<Vec<Vec<Vec<f64>>>> = Vec::new();
     for record in &study.records {
         for (index, regressor) in cause
@@ -440,5 +467,31 @@ fn columns(
     let whole = by_coefficient
         .iter()
         .all(|column| column.iter().flatten().flatten().all(|sample| sample.is_finite()));
-    whole.then_some(by_coefficient)
+    if whole {
+        Ok(by_coefficient)
+    } else {
+        Err("its response to the measured motion is not finite".into())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cause_without_regressors_is_reported_once() {
+        let library = Library {
+            causes: candidates::all(),
+            candidates: Vec::new(),
+            unexamined: Vec::new(),
+        };
+        let failed = |location: Location| (0, location, "a reason".to_owned());
+        let sentences = library.unexamined(vec![
+            failed(Location::Axis(0)),
+            failed(Location::Axis(0)),
+            failed(Location::Axis(1)),
+        ]);
+        let expected = ["x", "y"].map(|axis| format!("mass ({axis}) is not examined: a reason"));
+        assert_eq!(sentences, expected);
+    }
 }

@@ -64,10 +64,20 @@ pub(super) struct Bench<'a> {
 }
 
 impl<'a> Bench<'a> {
-    /// `None` if the case cannot be simulated, has no oscillating mode, or the records contain no channel of motion.
-    pub(super) fn new(case: &'a Case, recordings: &[Recording], views: &[ResidualView]) -> Option<Self> {
-        let baseline = Baseline::new(case).ok()?;
-        let modes_hz = [baseline.lowest_hz()?, highest_hz(&baseline)?];
+    /// Prepares the simulation of tests.
+    ///
+    /// # Errors
+    /// The case cannot be simulated, has no oscillating mode, or the records contain no channel of motion; the error is a sentence.
+    pub(super) fn new(
+        case: &'a Case,
+        recordings: &[Recording],
+        views: &[ResidualView],
+    ) -> Result<Self, String> {
+        let baseline = Baseline::new(case).map_err(|error| error.to_string())?;
+        let (Some(first_hz), Some(last_hz)) = (baseline.lowest_hz(), highest_hz(&baseline)) else {
+            return Err("the structure has no oscillating mode".into());
+        };
+        let modes_hz = [first_hz, last_hz];
         let [lowest_hz, highest_hz] = modes_hz;
         let channels = measured(&baseline, recordings, views);
         let rate_hz = SAMPLES_PER_PERIOD * highest_hz;
@@ -92,8 +102,10 @@ impl<'a> Bench<'a> {
             measured_n => measured_n,
         };
         let cuts = || recordings.iter().filter(|recording| is_cut(recording));
-        let usable = force_n.is_finite() && force_n > 0.0 && !channels.is_empty();
-        usable.then(|| Self {
+        if channels.is_empty() || !force_n.is_finite() || force_n <= 0.0 {
+            return Err("the records contain no motion".into());
+        }
+        Ok(Self {
             has_force: channels_of(cuts()).any(|channel| of_force(&channel)),
             cut: cuts().find_map(|recording| cut_so_far(case, recording)),
             case,

@@ -141,8 +141,11 @@ impl Experiment {
         }
     }
 
-    /// Readings of all sensors if `case` is the true machine; `None` if it cannot be simulated, or if the cut moves too far.
-    pub(super) fn readings(&self, bench: &Bench<'_>, case: &Case) -> Option<Vec<Reading>> {
+    /// Readings of all sensors if `case` is the true machine.
+    ///
+    /// # Errors
+    /// The experiment cannot be simulated, or the cut moves too far; the error is a sentence.
+    pub(super) fn readings(&self, bench: &Bench<'_>, case: &Case) -> Result<Vec<Reading>, String> {
         let mounted = self.recording(bench, case)?;
         // A second sensor next to the mounted one has none of its faults: the extensions of sensors are removed.
         let mut faultless = case.clone();
@@ -158,7 +161,8 @@ impl Experiment {
                 let channel = recording
                     .channels
                     .iter()
-                    .find(|channel| channel.name == measured_channel.name)?;
+                    .find(|channel| channel.name == measured_channel.name)
+                    .ok_or_else(|| format!("the simulation has no channel {}", measured_channel.name))?;
                 all.push((measured_channel.name.clone(), of, channel.samples.clone()));
             }
         }
@@ -181,23 +185,27 @@ impl Experiment {
         let whole = all
             .iter()
             .all(|(.., samples)| samples.iter().all(|value| value.is_finite()));
-        whole.then(|| {
-            all.into_iter()
-                .map(|(name, of, mut samples)| {
-                    samples.drain(..from.min(samples.len()));
-                    Reading { name, of, samples }
-                })
-                .collect()
-        })
+        if !whole {
+            return Err("the simulation diverges".into());
+        }
+        Ok(all
+            .into_iter()
+            .map(|(name, of, mut samples)| {
+                samples.drain(..from.min(samples.len()));
+                Reading { name, of, samples }
+            })
+            .collect())
     }
 
-    fn recording(&self, bench: &Bench<'_>, case: &Case) -> Option<Recording> {
+    fn recording(&self, bench: &Bench<'_>, case: &Case) -> Result<Recording, String> {
         match &self.excitation {
             Excitation::Rig { direction, signal } => {
                 let mut rig = Rig::new(*direction, signal.clone(), self.rate_hz);
                 rig.measured = bench.quantities();
-                rig.effects = Effects::of_case(case).ok()?;
-                Some(rig.record(case.structure().ok()?, Path::new("next-test")).ok()?.0)
+                rig.effects = Effects::of_case(case).map_err(|error| error.to_string())?;
+                let structure = case.structure().map_err(|error| error.to_string())?;
+                let recorded = rig.record(structure, Path::new("next-test"));
+                Ok(recorded.map_err(|error| error.to_string())?.0)
             }
             Excitation::Cut {
                 rpm,
@@ -229,14 +237,20 @@ impl Experiment {
                 };
                 let (recording, _) = cut
                     .record(&case, recorder, tachometer, Path::new("next-test"))
-                    .ok()?;
+                    .map_err(|error| error.to_string())?;
                 let most = recording
                     .channels
                     .iter()
                     .filter(|channel| channel.quantity == Quantity::Displacement)
                     .flat_map(|channel| &channel.samples)
                     .fold(0.0, |most: f64, value| value.abs().max(most));
-                (most <= LARGEST_PROPOSED_MOTION * bench.largest_m).then_some(recording)
+                if most <= LARGEST_PROPOSED_MOTION * bench.largest_m {
+                    Ok(recording)
+                } else {
+                    Err(format!(
+                        "in the cut the tool would move {most:.1e} m, far more than in the records"
+                    ))
+                }
             }
         }
     }

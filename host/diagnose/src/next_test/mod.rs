@@ -32,19 +32,30 @@ struct Proposal<'a> {
     between: [usize; 2],
 }
 
-/// The experiment that separates the candidate models of `diagnosis`; `None` if there is only one, or if none can be simulated.
-pub(super) fn next_test(case: &Case, recordings: &[Recording], diagnosis: &Diagnosis) -> Option<NextTest> {
+/// The experiment that separates the candidate models of `diagnosis`; `None` if there is only one.
+///
+/// # Errors
+/// No experiment can be simulated with all candidate models; the error is a sentence.
+pub(super) fn next_test(
+    case: &Case,
+    recordings: &[Recording],
+    diagnosis: &Diagnosis,
+) -> Result<Option<NextTest>, String> {
     let explanations = &diagnosis.explanations;
     if explanations.len() < 2 {
-        return None;
+        return Ok(None);
     }
     let bench = Bench::new(case, recordings, &diagnosis.views)?;
     let experiments = experiments(&bench);
     let rivals: Vec<Rival<'_>> = explanations.iter().map(|causes| Rival { causes }).collect();
-    let proposals: Vec<Proposal<'_>> = experiments
+    let by_experiment: Vec<Result<Vec<Proposal<'_>>, String>> = experiments
         .par_iter()
-        .flat_map_iter(|experiment| proposals(&bench, experiment, &rivals))
+        .map(|experiment| proposals(&bench, experiment, &rivals))
         .collect();
+    let reason = by_experiment
+        .iter()
+        .find_map(|proposals| proposals.as_ref().err().cloned());
+    let proposals: Vec<Proposal<'_>> = by_experiment.into_iter().flatten().flatten().collect();
     let separates = |proposal: &&Proposal<'_>| proposal.least.squared >= SEPARATING_DISTANCE;
     let best = proposals
         .iter()
@@ -57,44 +68,50 @@ pub(super) fn next_test(case: &Case, recordings: &[Recording], diagnosis: &Diagn
             proposals
                 .iter()
                 .max_by(|a, b| a.least.squared.total_cmp(&b.least.squared))
-        })?;
+        });
+    let Some(best) = best else {
+        return Err(reason.unwrap_or_else(|| "there is no experiment for this machine".into()));
+    };
     let [one, other] = best.between.map(|index| label(&explanations[index]));
-    Some(
-        best.experiment
-            .described(best.sensors, best.least.squared.sqrt(), best.why(&one, &other)),
-    )
+    let why = best.why(&one, &other);
+    Ok(Some(best.experiment.described(
+        best.sensors,
+        best.least.squared.sqrt(),
+        why,
+    )))
 }
 
-/// Proposals of one experiment, one for each set of sensors; empty if a candidate model cannot be simulated in it.
-fn proposals<'a>(bench: &Bench<'_>, experiment: &'a Experiment, rivals: &[Rival<'_>]) -> Vec<Proposal<'a>> {
-    let readings: Option<Vec<_>> = rivals
+/// Proposals of one experiment, one for each set of sensors.
+///
+/// # Errors
+/// A candidate model cannot be simulated in the experiment; the error is a sentence.
+fn proposals<'a>(
+    bench: &Bench<'_>,
+    experiment: &'a Experiment,
+    rivals: &[Rival<'_>],
+) -> Result<Vec<Proposal<'a>>, String> {
+    let readings: Vec<_> = rivals
         .iter()
         .map(|rival| rival.simulated(bench, experiment))
-        .collect();
-    let Some(readings) = readings else {
-        return Vec::new();
-    };
+        .collect::<Result<_, _>>()?;
     let pairs = (0..rivals.len()).flat_map(|one| (one + 1..rivals.len()).map(move |other| [one, other]));
     let pairs: Vec<[usize; 2]> = pairs.collect();
-    experiment
-        .sensors()
-        .into_iter()
-        .filter_map(|sensors| {
-            let (between, least) = pairs
-                .iter()
-                .map(|pair| {
-                    let [one, other] = pair.map(|index| &readings[index]);
-                    (*pair, separation::between(bench, one, other, sensors))
-                })
-                .min_by(|a, b| a.1.squared.total_cmp(&b.1.squared))?;
-            Some(Proposal {
-                experiment,
-                sensors,
-                least,
-                between,
+    let of_sensors = experiment.sensors().into_iter().filter_map(|sensors| {
+        let (between, least) = pairs
+            .iter()
+            .map(|pair| {
+                let [one, other] = pair.map(|index| &readings[index]);
+                (*pair, separation::between(bench, one, other, sensors))
             })
+            .min_by(|a, b| a.1.squared.total_cmp(&b.1.squared))?;
+        Some(Proposal {
+            experiment,
+            sensors,
+            least,
+            between,
         })
-        .collect()
+    });
+    Ok(of_sensors.collect())
 }
 
 impl Proposal<'_> {

@@ -38,18 +38,20 @@ pub(super) struct Difference {
 }
 
 impl Rival<'_> {
-    /// The readings of an experiment with this candidate model; `None` if the simulation fails or diverges.
-    pub(super) fn simulated(&self, bench: &Bench<'_>, experiment: &Experiment) -> Option<Predicted> {
+    /// The readings of an experiment with this candidate model. A parameter whose step cannot be simulated counts as known.
+    ///
+    /// The experiment cannot be simulated with this candidate model; the error is a sentence.
+    pub(super) fn simulated(&self, bench: &Bench<'_>, experiment: &Experiment) -> Result<Predicted, String> {
         let readings = experiment.readings(bench, &self.case(bench.case, None))?;
         let moved = self
             .steps()
             .into_iter()
             .filter_map(|(cause, key, step, deviations)| {
                 let case = self.case(bench.case, Some((cause, key, step)));
-                Some((experiment.readings(bench, &case)?, deviations))
+                Some((experiment.readings(bench, &case).ok()?, deviations))
             })
             .collect();
-        Some(Predicted { readings, moved })
+        Ok(Predicted { readings, moved })
     }
 
     /// Uncertain parameters: index of the cause, key, step, and the step in standard deviations.

@@ -29,8 +29,7 @@ impl Cutting {
     /// The cut of a recording along `motion`, which has `finer` samples per sample of the record. `with_force` is true if forces are
     /// measured.
     ///
-    /// # Errors
-    /// As [`RecordedCut::new`].
+    /// The case or the recording lacks a value that describes the cut, or an extension does not apply to it.
     pub(super) fn new(
         baseline: &Baseline<'_>,
         recording: &Recording,

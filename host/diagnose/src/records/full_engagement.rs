@@ -45,7 +45,7 @@ pub(crate) fn in_full_engagement<'a>(
     }
     let baseline = Baseline::new(case)?;
     for (index, recording) in recordings.iter().enumerate() {
-        let Some(range) = range(&baseline, recording) else {
+        let Some(Engaged { range, has_diameter }) = engaged(&baseline, recording) else {
             continue;
         };
         let [from_s, to_s] = [range.start, range.end].map(|sample| recording.time_s(sample));
@@ -63,6 +63,12 @@ pub(crate) fn in_full_engagement<'a>(
             "{}: full engagement from {from_s:.3} to {to_s:.3} s is diagnosed; the rest is air, entry or exit of the tool",
             recording.path.display()
         ));
+        if !has_diameter {
+            remarks.push(format!(
+                "{}: entry and exit of the tool are estimated from the vibration, because the tool has no diameter: give diameter_mm in [tool]",
+                recording.path.display()
+            ));
+        }
         shortened.to_mut()[index] = recording.part(range);
     }
     Ok((shortened, remarks))
@@ -72,11 +78,20 @@ fn is_of_a_cut(recording: &Recording) -> bool {
     recording.sidecar.kind == Some(TestKind::Cutting)
 }
 
+/// Samples of a recorded cut with full engagement.
+#[derive(Debug, PartialEq)]
+struct Engaged {
+    range: Range<usize>,
+    /// False if the tool has no diameter, so that the times of entry and exit are estimated from the level of the vibration.
+    has_diameter: bool,
+}
+
 /// The samples of a recorded cut with full engagement; `None` if it contains no air, or if no channel shows air.
-fn range(baseline: &Baseline<'_>, recording: &Recording) -> Option<Range<usize>> {
+fn engaged(baseline: &Baseline<'_>, recording: &Recording) -> Option<Engaged> {
     if !is_of_a_cut(recording) {
         return None;
     }
+    // A recording without a usable tachometer is refused when its record is prepared.
     let revolution_s = SpindleMotion::new(recording, None).ok()?.revolution_s();
     let cutter = cutter(baseline, recording)?;
     let levels = Levels::of(
@@ -108,7 +123,10 @@ fn range(baseline: &Baseline<'_>, recording: &Recording) -> Option<Range<usize>>
         ((revolution * revolution_s * recording.sample_rate_hz).max(0.0) as usize).min(recording.len())
     };
     let (from, to) = (sample(from), sample(to));
-    Some(from..to.max(from))
+    Some(Engaged {
+        range: from..to.max(from),
+        has_diameter: by_diameter.is_some(),
+    })
 }
 
 /// The tool in its cut; `None` if a required value is missing or wrong, which the preparation of the record reports as an error.
@@ -348,7 +366,7 @@ mod tests {
         ] {
             let case = case(name, "");
             let recording = recorded(&case, entering(entry, depth_mm, SECONDS), measured, noise);
-            let range = range(&Baseline::new(&case).unwrap(), &recording).unwrap();
+            let Engaged { range, .. } = engaged(&Baseline::new(&case).unwrap(), &recording).unwrap();
             let [from_s, to_s] = [range.start, range.end].map(|sample| recording.time_s(sample));
             println!("{name} {depth_mm} mm {entry:?} {measured:?}: {from_s} to {to_s} s");
             // The tool first touches the workpiece at `AIR_S` from the start of the recording, and leaves it at `AIR_S` from the end. Slow
@@ -375,8 +393,8 @@ mod tests {
                 &[measured],
                 0.005,
             );
-            let range = range(&Baseline::new(&case).unwrap(), &recording);
-            assert_eq!(range, None, "{depth_mm} mm, {measured:?}");
+            let engaged = engaged(&Baseline::new(&case).unwrap(), &recording);
+            assert_eq!(engaged, None, "{depth_mm} mm, {measured:?}");
         }
     }
 
@@ -406,6 +424,24 @@ mod tests {
         for figure in cause.parameters.values() {
             assert!((figure.value / 0.1 - 1.0).abs() < 0.05, "{figure:?}");
         }
+    }
+
+    #[test]
+    fn a_tool_without_diameter_is_reported() {
+        let mut case = case(SLOT, "");
+        let cut = entering(Entry::Feed, 1.0, SECONDS);
+        let recording = recorded(&case, cut, &[Quantity::Displacement], 0.005);
+        let remarks = |case: &Case| {
+            let recordings = std::slice::from_ref(&recording);
+            in_full_engagement(case, recordings).unwrap().1
+        };
+        assert_eq!(remarks(&case).len(), 1);
+        case.tool.as_mut().unwrap().diameter_mm = None;
+        let remarks = remarks(&case);
+        assert!(
+            remarks.len() == 2 && remarks[1].contains("give diameter_mm"),
+            "{remarks:?}"
+        );
     }
 
     #[test]

@@ -31,8 +31,7 @@ impl<'a> Study<'a> {
     /// about (noise/signal)², relative, which exceeds their standard deviation if (noise/signal)·√(number of samples) > 1. Along the motion
     /// of a candidate model there is no such bias.
     ///
-    /// # Errors
-    /// As [`Self::new`].
+    /// The case cannot be simulated, or a recording cannot be compared.
     pub(crate) fn with(
         case: &'a Case,
         recordings: &[Recording],

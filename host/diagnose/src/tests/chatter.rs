@@ -47,6 +47,7 @@ fn a_correct_baseline_has_no_cause_near_the_limit_and_in_chatter() {
         assert!(study.records[0].amplifies, "{depth_mm} mm");
         let diagnosis = diagnosed(recording);
         assert_eq!(diagnosis.outcome, Outcome::None, "{depth_mm} mm, {measured:?}");
+        assert!(diagnosis.warnings.is_empty(), "{:?}", diagnosis.warnings);
     }
 }
 

@@ -133,7 +133,7 @@ fn a_gain_of_the_only_channel_is_equivalent_to_one_factor_on_the_modes() {
     assert_eq!(group, ["damping", "mass", "sensor-gain", "stiffness"]);
     let mass = answer.causes.iter().find(|cause| cause.name == "mass").unwrap();
     let change = mass.parameters["relative_change"];
-    // The true motion is x/1.1 = H·F: dynamic stiffness divided by the gain.
+    // The reading 1.1·H·F is that of a structure whose mass, damping and stiffness are divided by 1.1.
     assert!((change.value - (1.0 / 1.1 - 1.0)).abs() < 2e-3, "{change:?}");
 }
 

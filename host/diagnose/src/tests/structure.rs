@@ -109,6 +109,8 @@ fn value(diagnosis: &Diagnosis, name: &str, key: &str) -> f64 {
 #[test]
 fn records_without_hidden_effects_have_no_cause() {
     let answer = diagnosed(&[]);
+    // No cause is impossible to examine.
+    assert!(answer.warnings.is_empty(), "{:?}", answer.warnings);
     assert_eq!(answer.outcome, Outcome::None, "{:?}", answer.causes);
 }
 
@@ -250,6 +252,7 @@ fn a_missing_mode_is_found_in_free_decays() {
         assert!((found / truth - 1.0).abs() < bound, "{key}: {found}");
     }
     let plain = diagnose(&baseline(), &free_decays(&[]), &Options::default()).unwrap();
+    assert!(plain.warnings.is_empty(), "{:?}", plain.warnings);
     assert_eq!(plain.outcome, Outcome::None, "{:?}", plain.causes);
 }
 
@@ -271,6 +274,8 @@ fn a_gain_is_equivalent_to_one_factor_on_mass_stiffness_and_damping() {
     assert!(json["explanations"][1][2]["confidence"].as_f64().unwrap() < 0.3);
     assert!((value(&answer, "sensor-gain", "gain") - 1.1).abs() < 0.002);
     assert!((value(&answer, "mass", "mass_kg") * 1.1 / 188.0 - 1.0).abs() < 0.002);
+    let reason = crate::next_test::next_test(&baseline(), &[], &answer).unwrap_err();
+    assert_eq!(reason, "the records contain no motion");
     // Readings of the same sensor under the same force cannot separate a gain from a common factor.
     let test = answer.next_test.unwrap();
     assert!(
@@ -358,7 +363,7 @@ fn imposed(unknown_n: f64, seed: u64) -> Recording {
         }
         let noise: f64 = rand_distr::StandardNormal.sample(&mut random);
         moved.push(x);
-        // The unknown force varies irregularly, as real friction does, three times per two periods of the first tone.
+        // The unknown force varies irregularly, as real friction does, about three times per period of the first tone.
         let phase = 3.0 * std::f64::consts::TAU * t + 0.8 * (0.4 * t).sin();
         force.push(
             188.0 * a + 305.0 * v + 2.26e6 * x + 150.0 * v.signum() + unknown_n * phase.cos() + 5.0 * noise,
@@ -544,11 +549,24 @@ fn long_records_are_searched_in_part_and_validated_on_the_rest() {
     );
 }
 
+#[test]
+fn a_record_without_rest_is_reported_if_the_others_are_long() {
+    let mut recordings = long_records(&[]);
+    recordings.truncate(2);
+    for channel in &mut recordings[1].channels {
+        channel.samples.truncate(8000);
+    }
+    let (answer, warning) =
+        crate::conclusion::long_records::concluded(&baseline(), &recordings, &Options::default(), &|_| ());
+    assert!(answer.is_none());
+    assert!(warning.is_some_and(|warning| warning.contains("too short")));
+}
+
 /// A drift of 4 % per minute is only 0.25 % in the first seconds, in which causes are searched.
 #[test]
 fn a_drift_over_long_records_is_not_overlooked() {
     let recordings = long_records(&["drift.relative_rate_per_s=0.0007"]);
-    let beginning =
+    let (beginning, _) =
         crate::conclusion::long_records::concluded(&baseline(), &recordings, &Options::default(), &|_| ());
     assert!(
         beginning.is_none_or(|answer| answer.outcome != Outcome::None),
