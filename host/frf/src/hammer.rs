@@ -6,7 +6,7 @@ use super::criteria::{
 };
 use super::test_channels::TestChannels;
 
-/// Length of the segment before the impact, as a fraction of the segment. A choice; its mean gives the offset of the sensor.
+/// Part of a segment before the impact, as a fraction of the segment; its mean gives the offset of the sensor. A choice.
 const BEFORE: f64 = 0.01;
 
 /// One impact of the hammer.
@@ -58,6 +58,8 @@ pub(super) struct ImpactSegments {
     pub(super) used: Vec<MeasuredImpact>,
     /// Double impacts, whose segments are not evaluated.
     pub(super) double: Vec<MeasuredImpact>,
+    /// Impacts too close to the start or end of the record for a segment, which are not evaluated.
+    pub(super) cut_short: Vec<MeasuredImpact>,
     /// Largest amplitude of a response at the end of a segment, as a fraction of the peak of that response in the segment.
     pub(super) end_amplitude: f64,
 }
@@ -76,7 +78,7 @@ pub(super) fn segments(
         path: channels.recording.path.clone(),
         what,
     };
-    let mut impacts = impacts(&force.samples, rate);
+    let impacts = impacts(&force.samples, rate);
     if impacts.is_empty() {
         return Err(refused(format!(
             "{} has no impact of a hammer: no pulse stands out of the noise",
@@ -90,7 +92,9 @@ pub(super) fn segments(
         None => longest,
     } & !1;
     let before = (BEFORE * length as f64) as usize;
-    impacts.retain(|impact| impact.first >= before && impact.first - before + length <= samples);
+    let has_segment =
+        |impact: &MeasuredImpact| impact.first >= before && impact.first - before + length <= samples;
+    let (mut impacts, cut_short): (Vec<_>, Vec<_>) = impacts.into_iter().partition(has_segment);
     if length < 16 || impacts.is_empty() {
         return Err(refused(format!(
             "no impact has {:.3} s of record after it; the impacts are {:.3} s apart at least",
@@ -124,6 +128,7 @@ pub(super) fn segments(
         end_amplitude: 0.0,
         used: Vec::new(),
         double,
+        cut_short,
     };
     for impact in used {
         let start = impact.first - before;

@@ -15,8 +15,9 @@ use num_complex::Complex64;
 pub use recording_group::RecordingGroup;
 
 use super::criteria::SPARE_AVERAGES;
+use super::cross_spectra::CrossSpectra;
 use super::error::FrfError;
-use super::estimate::{self, ChannelCounts, Estimator};
+use super::estimate::{self, ChannelCounts, Estimator, FrfLine};
 use super::excitation::Excitation;
 use super::measurement_settings::MeasurementSettings;
 use super::table::{Frf, FrfTable};
@@ -221,9 +222,21 @@ fn measure_group(
         )));
     }
     let mut lines = estimate::lines(&spectra, counts, settings.estimator);
+    warnings.extend(singular_lines(&spectra, &lines));
     if excitation == Excitation::Sweep {
         keep_excited(&mut lines, &spectra, counts);
     }
     independent(&mut lines, &mut group, counts).map_err(refused)?;
     Ok(receptances(group, &lines, first, warnings))
+}
+
+/// Warning of the frequencies without an estimate, where the matrix of the force spectra is singular; `None` if there are none.
+fn singular_lines(spectra: &[CrossSpectra], lines: &[FrfLine]) -> Option<String> {
+    let all_hz = spectra.first().map_or(&[][..], |test| &test.frequency_hz);
+    let has_line = |hertz: &f64| lines.iter().any(|line| line.frequency_hz == *hertz);
+    let missing = all_hz.len().saturating_sub(lines.len());
+    let first = (missing > 0).then(|| all_hz.iter().find(|hertz| !has_line(hertz)))??;
+    Some(format!(
+        "the forces vanish or are dependent at {missing} frequencies, which are left out (the first is {first:.3} Hz)"
+    ))
 }

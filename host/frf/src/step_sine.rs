@@ -48,22 +48,48 @@ pub(super) struct ForceLevel {
     pub(super) steps: Vec<FrequencyStep>,
 }
 
-/// Force levels of a record in the order of time. Frequencies that are repeated at another force form another level.
+/// All frequency steps of a record.
+#[derive(Clone, Debug)]
+pub(super) struct StepSine {
+    /// Force levels in the order of time.
+    pub(super) levels: Vec<ForceLevel>,
+    /// Approximate frequencies of the steps that have too few samples per period to be evaluated, Hz.
+    pub(super) unresolved_hz: Vec<f64>,
+}
+
+/// Frequency steps of a record by force level. Frequencies that are repeated at another force form another level.
 ///
 /// # Errors
 /// The record has several forces, or no segment of constant frequency.
-pub(super) fn levels(channels: &TestChannels<'_>) -> Result<Vec<ForceLevel>, FrfError> {
+pub(super) fn step_sine(channels: &TestChannels<'_>) -> Result<StepSine, FrfError> {
     let force = channels.only_force("a step-sine test")?;
     let rate = channels.recording.sample_rate_hz;
-    let steps: Vec<FrequencyStep> = tone_segments(&force.samples, rate)
-        .into_iter()
-        .filter_map(|tone| demodulated(channels, &force.samples, tone, rate))
-        .collect();
+    let (mut steps, mut unresolved_hz): (Vec<FrequencyStep>, Vec<f64>) = (Vec::new(), Vec::new());
+    for tone in tone_segments(&force.samples, rate) {
+        match demodulated(channels, &force.samples, tone, rate) {
+            Some(step) => steps.push(step),
+            None => {
+                let hertz = rate / tone.period;
+                let is_known = |known: &f64| (known - hertz).abs() < FREQUENCY_STEP * hertz;
+                if !unresolved_hz.iter().any(is_known) {
+                    unresolved_hz.push(hertz);
+                }
+            }
+        }
+    }
+    if steps.is_empty() && !unresolved_hz.is_empty() {
+        return Err(FrfError::Content {
+            path: channels.recording.path.clone(),
+            what: format!(
+                "no frequency step has {SUBSEGMENT_SAMPLES_MIN} samples per period; a higher sampling rate than {rate} Hz is needed"
+            ),
+        });
+    }
     if steps.is_empty() {
         return Err(FrfError::Content {
             path: channels.recording.path.clone(),
             what: format!(
-                "{} has no stretch of {PERIODS_MIN} periods of one frequency; is it a step-sine test?",
+                "{} has no segment of {PERIODS_MIN} periods of one frequency; is it a step-sine test?",
                 force.name
             ),
         });
@@ -82,7 +108,10 @@ pub(super) fn levels(channels: &TestChannels<'_>) -> Result<Vec<ForceLevel>, Frf
     for level in &mut levels {
         level.steps = by_frequency(std::mem::take(&mut level.steps));
     }
-    Ok(levels)
+    Ok(StepSine {
+        levels,
+        unresolved_hz,
+    })
 }
 
 /// Divides the steps into passes through the frequency range: a new pass begins when the frequency of an earlier step returns.
@@ -217,7 +246,7 @@ fn crossings(force: &[f64], rate: f64) -> Vec<f64> {
     crossings
 }
 
-/// Phasor ratios over the settled part of a segment; `None` if the segment is too short.
+/// Phasor ratios over the settled part of a segment of constant frequency; `None` if it has too few samples per period.
 fn demodulated(
     channels: &TestChannels<'_>,
     force: &[f64],

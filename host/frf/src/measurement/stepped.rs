@@ -1,11 +1,11 @@
 //! Receptances of a step-sine test: one phasor ratio per frequency step.
 
 use super::recording_group::{MeasuredGroup, RecordingGroup, receptances};
-use crate::criteria::SAME_FORCE;
+use crate::criteria::{SAME_FORCE, SUBSEGMENT_SAMPLES_MIN};
 use crate::error::FrfError;
 use crate::estimate::FrfLine;
 use crate::measurement_settings::MeasurementSettings;
-use crate::step_sine::{self, ForceLevel};
+use crate::step_sine::{ForceLevel, step_sine};
 use crate::test_channels::TestChannels;
 
 /// Measures the receptances of a step-sine test, one frequency line per step.
@@ -24,16 +24,27 @@ pub(super) fn stepped(
                     .into(),
         });
     }
-    let steps = level(first, settings.force_n)?.steps;
-    let unsettled: Vec<String> = steps
+    let step_sine = step_sine(first)?;
+    let listed = |frequencies_hz: Vec<f64>, digits: usize| {
+        let listed = frequencies_hz.iter().map(|hertz| format!("{hertz:.digits$}"));
+        listed.collect::<Vec<_>>().join(", ")
+    };
+    if !step_sine.unresolved_hz.is_empty() {
+        warnings.push(format!(
+            "frequency steps with fewer than {SUBSEGMENT_SAMPLES_MIN} samples per period are left out: at about {} Hz; a higher sampling rate is needed",
+            listed(step_sine.unresolved_hz, 0)
+        ));
+    }
+    let steps = level(first, step_sine.levels, settings.force_n)?.steps;
+    let unsettled: Vec<f64> = steps
         .iter()
         .filter(|step| !step.is_settled)
-        .map(|step| format!("{:.3}", step.frequency_hz))
+        .map(|step| step.frequency_hz)
         .collect();
     if !unsettled.is_empty() {
         warnings.push(format!(
             "the response had not settled at {} Hz; stay longer at each frequency",
-            unsettled.join(", ")
+            listed(unsettled, 3)
         ));
     }
     let (least, most) = steps
@@ -71,8 +82,11 @@ pub(super) fn stepped(
 }
 
 /// Force level to evaluate: the only level of the test, or the level nearest to `force_n`, N.
-fn level(channels: &TestChannels<'_>, force_n: Option<f64>) -> Result<ForceLevel, FrfError> {
-    let mut levels = step_sine::levels(channels)?;
+fn level(
+    channels: &TestChannels<'_>,
+    mut levels: Vec<ForceLevel>,
+    force_n: Option<f64>,
+) -> Result<ForceLevel, FrfError> {
     let all: Vec<String> = levels
         .iter()
         .map(|level| format!("{:.4}", level.force_n))

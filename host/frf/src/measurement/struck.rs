@@ -33,7 +33,7 @@ pub(super) fn struck(
             .map(|channels| hammer::segments(channels, windows))
             .collect::<Result<Vec<_>, _>>()?;
     }
-    let (mut used, mut double) = (Vec::new(), Vec::new());
+    let (mut used, mut double, mut cut_short) = (Vec::new(), Vec::new(), Vec::new());
     let mut end_amplitude = 0.0_f64;
     let spectra = cuts
         .into_iter()
@@ -48,16 +48,27 @@ pub(super) fn struck(
             let spectra = averaged(&signals, rate, &segments, band(settings, rate, cut.length));
             used.extend(cut.used);
             double.extend(cut.double);
+            cut_short.extend(cut.cut_short);
             end_amplitude = end_amplitude.max(cut.end_amplitude);
             spectra
         })
         .collect();
-    if !double.is_empty() {
-        let times: Vec<String> = double
+    let times = |impacts: &[MeasuredImpact]| {
+        let times: Vec<String> = impacts
             .iter()
-            .map(|impact: &MeasuredImpact| format!("{:.3}", impact.time_s))
+            .map(|impact| format!("{:.3}", impact.time_s))
             .collect();
-        warnings.push(format!("double impacts are left out: at {} s", times.join(", ")));
+        times.join(", ")
+    };
+    if !double.is_empty() {
+        warnings.push(format!("double impacts are left out: at {} s", times(&double)));
+    }
+    if !cut_short.is_empty() {
+        warnings.push(format!(
+            "impacts without a whole segment of {:.3} s in the record are left out: at {} s",
+            length as f64 / rate,
+            times(&cut_short)
+        ));
     }
     if used.len() < IMPACTS_MIN {
         warnings.push(format!(

@@ -461,6 +461,87 @@ fn impacts_become_segments_and_double_impacts_are_left_out() {
 }
 
 #[test]
+fn an_impact_without_a_whole_segment_is_left_out_with_a_warning() {
+    let mut random = random(31);
+    let mut force = vec![0.0; (40.0 * RATE) as usize];
+    for at_s in [1.0, 13.1, 25.3, 37.2] {
+        impact(&mut force, at_s, 200.0);
+    }
+    let recording = record(TestKind::Hammer, along_y(force), 0.002, &mut random);
+    let settings = MeasurementSettings {
+        hammer: HammerWindows {
+            segment_s: Some(10.0),
+            ..HammerWindows::default()
+        },
+        ..in_band()
+    };
+    let measurement = measure(std::slice::from_ref(&recording), &settings).unwrap();
+    let (used, double) = measurement.groups[0].impacts.clone().unwrap();
+    assert_eq!((used.len(), double.len()), (3, 0));
+    let expected = "impacts without a whole segment of 10.000 s in the record are left out: at 37.2";
+    assert!(
+        measurement
+            .warnings
+            .iter()
+            .any(|warning| warning.starts_with(expected)),
+        "{:?}",
+        measurement.warnings
+    );
+}
+
+#[test]
+fn a_frequency_step_with_few_samples_per_period_is_left_out_with_a_warning() {
+    let mut random = random(52);
+    let mut force = Vec::new();
+    for hertz in [16.0, 18.0, 0.3 * RATE] {
+        force.extend((0..(12.0 * RATE) as usize).map(|k| 10.0 * (TAU * hertz * k as f64 / RATE).sin()));
+        force.extend(vec![0.0; (1.5 * RATE) as usize]);
+    }
+    let recording = record(TestKind::StepSine, along_y(force), 0.0, &mut random);
+    let measurement = measure(std::slice::from_ref(&recording), &MeasurementSettings::default()).unwrap();
+    assert_eq!(measurement.table.frequency_hz().len(), 2);
+    assert!(
+        measurement
+            .warnings
+            .iter()
+            .any(|warning| warning.contains("fewer than 5 samples per period are left out: at about 154 Hz;")),
+        "{:?}",
+        measurement.warnings
+    );
+}
+
+#[test]
+fn a_frequency_without_force_is_left_out_with_a_warning() {
+    let spectra = |force: f64| {
+        let samples: Vec<f64> = (0..64)
+            .map(|k| force * (TAU * 4.0 * f64::from(k) / 64.0).cos())
+            .collect();
+        let segments = crate::cross_spectra::Segments {
+            weights: vec![1.0; 64],
+            starts: vec![0],
+            without_mean: false,
+            averages: 1.0,
+        };
+        crate::cross_spectra::averaged(&[&samples, &samples], 64.0, &segments, 4..6)
+    };
+    let counts = ChannelCounts {
+        forces: 1,
+        responses: 1,
+    };
+    let warning = |force: f64| {
+        let spectra = [spectra(force)];
+        let lines = estimate::lines(&spectra, counts, Estimator::H1);
+        singular_lines(&spectra, &lines)
+    };
+    assert!(
+        warning(0.0)
+            .unwrap()
+            .contains("at 2 frequencies, which are left out (the first is 4.000 Hz)")
+    );
+    assert_eq!(warning(1.0), None);
+}
+
+#[test]
 fn an_exponential_window_moves_the_poles_by_its_decay_and_nothing_else() {
     let mut random = random(31);
     let mut force = vec![0.0; (26.0 * RATE) as usize];

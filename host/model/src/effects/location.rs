@@ -44,20 +44,21 @@ pub(super) fn static_stiffness(
     structure: &Structure,
     name: &'static str,
 ) -> Result<Matrix3<f64>, EffectError> {
-    let unknown = || EffectError::Structure {
+    let unknown = |reason: &str| EffectError::Structure {
         name,
-        what:
-            "the static stiffness of the structure is not known (it is free, or its matrices are indefinite)"
-                .into(),
+        what: format!("the static stiffness of the structure is not known: {reason}"),
     };
     let axes: Vec<usize> = structure.directions.iter().filter_map(|d| d.axis()).collect();
-    let receptance = structure
+    let first_order = structure
         .first_order()
-        .ok()
-        .and_then(|first_order| first_order.receptance(0.0))
-        .ok_or_else(unknown)?;
+        .map_err(|error| unknown(&error.to_string()))?;
+    let receptance = first_order
+        .receptance(0.0)
+        .ok_or_else(|| unknown("it is free to move as a rigid body"))?;
     let compliance = DMatrix::from_fn(axes.len(), axes.len(), |i, j| receptance[(axes[i], axes[j])].re);
-    let stiffness = compliance.try_inverse().ok_or_else(unknown)?;
+    let stiffness = compliance
+        .try_inverse()
+        .ok_or_else(|| unknown("its static receptance has no inverse"))?;
     let mut whole = Matrix3::zeros();
     for (i, &row) in axes.iter().enumerate() {
         for (j, &column) in axes.iter().enumerate() {
