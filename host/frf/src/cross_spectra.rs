@@ -233,7 +233,7 @@ impl Transform {
         for ((time, sample), weight) in self.time.iter_mut().zip(samples).zip(weights) {
             *time = (sample - mean) * weight;
         }
-        // The transform fails only for buffers of the wrong length.
+        // The Fourier transform fails only for buffers of the wrong length; these were made by the plan.
         let done = self
             .plan
             .process_with_scratch(&mut self.time, &mut self.lines, &mut self.scratch);

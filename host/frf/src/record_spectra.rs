@@ -89,7 +89,7 @@ fn of_record(channels: &TestChannels<'_>, band_hz: Option<(f64, f64)>) -> Record
     let scale = (samples.max(1) as f64).sqrt().recip();
     let mut channel = |channel: &quietcut_recording::Channel, direction, derivatives| {
         time.copy_from_slice(&channel.samples);
-        // The transform fails only for buffers of the wrong length.
+        // The Fourier transform fails only for buffers of the wrong length; these were made by the plan.
         let done = plan.process_with_scratch(&mut time, &mut lines, &mut scratch);
         debug_assert!(done.is_ok());
         let squares: f64 = channel.samples.iter().map(|x| x * x).sum();

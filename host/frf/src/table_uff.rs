@@ -40,7 +40,7 @@ pub(super) fn read(path: &Path) -> Result<FrfTable, FrfError> {
         };
         let frequencies = frequencies(set).map_err(wrong)?;
         let mut entry = receptance(set, &frequencies).map_err(wrong)?;
-        let keep = frequency_hz.get_or_insert_with(|| without_rest(&entry, &frequencies));
+        let keep = frequency_hz.get_or_insert_with(|| without_zero_hz(&entry, &frequencies));
         // Mobility and accelerance cannot be integrated at 0 Hz, so the table has no line there.
         let from = frequencies.len().saturating_sub(keep.len());
         if frequencies.get(from..) != Some(keep.as_slice()) {
@@ -71,9 +71,10 @@ pub(super) fn read(path: &Path) -> Result<FrfTable, FrfError> {
 }
 
 /// Frequencies of an FRF without 0 Hz, if its receptance is not finite there (mobility or accelerance).
-fn without_rest(entry: &Frf, frequencies: &[f64]) -> Vec<f64> {
-    let is_rest = frequencies.first() == Some(&0.0);
-    let from = usize::from(is_rest && entry.receptance.first().is_some_and(|value| !value.is_finite()));
+fn without_zero_hz(entry: &Frf, frequencies: &[f64]) -> Vec<f64> {
+    let begins_at_zero = frequencies.first() == Some(&0.0);
+    let from =
+        usize::from(begins_at_zero && entry.receptance.first().is_some_and(|value| !value.is_finite()));
     frequencies.get(from..).unwrap_or_default().to_vec()
 }
 

@@ -85,7 +85,7 @@ impl Cutter {
         Ok(cutter)
     }
 
-    /// The same tool with another mean feed per tooth, m.
+    /// This tool with another mean feed per tooth, m.
     pub fn with_feed_per_tooth_m(mut self, feed_per_tooth_m: f64) -> Self {
         let count = self.teeth.len() as f64;
         for tooth in &mut self.teeth {
@@ -125,7 +125,7 @@ impl Cutter {
         feed_m * at.sin * self.sin_edge
     }
 
-    /// Axial depth of cut, m, at the axial displacement `z_m`, m; never negative.
+    /// Axial depth of cut, m, for the nominal depth `nominal_m` and the axial displacement `z_m` of the tool; never negative.
     pub fn depth_at_m(&self, nominal_m: f64, z_m: f64) -> f64 {
         if self.axial_depth_modulation {
             (nominal_m - z_m).max(0.0)

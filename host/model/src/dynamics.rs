@@ -116,18 +116,18 @@ impl Dynamics {
         self.note_products();
     }
 
-    /// These equations with the motion of a sensor away from the tool as output, see [`FirstOrder::seen`]. Forces still act on the tool.
+    /// These equations with the motion of a sensor away from the tool as output, see [`FirstOrder::at_sensor`]. Forces still act on the tool.
     #[must_use]
-    pub fn seen(&self, modes: &[f64]) -> Self {
-        let FirstOrder { a, c, .. } = self.first_order().seen(modes);
+    pub fn at_sensor(&self, modes: &[f64]) -> Self {
+        let FirstOrder { a, c, .. } = self.first_order().at_sensor(modes);
         let ca = &c * &a;
-        let mut seen = self.clone();
+        let mut at_sensor = self.clone();
         for axis in 0..3 {
-            seen.c[axis] = c.row(axis).iter().copied().collect();
-            seen.ca[axis] = ca.row(axis).iter().copied().collect();
+            at_sensor.c[axis] = c.row(axis).iter().copied().collect();
+            at_sensor.ca[axis] = ca.row(axis).iter().copied().collect();
         }
-        seen.note_products();
-        seen
+        at_sensor.note_products();
+        at_sensor
     }
 
     /// The linear part of the equations, without cubic terms.

@@ -120,7 +120,7 @@ impl ForceLaw {
         self.material
     }
 
-    /// The same law with the coefficients of another material.
+    /// This force law with the coefficients of another material.
     #[must_use]
     pub fn with_material(self, material: Material) -> Self {
         Self {

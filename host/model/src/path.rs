@@ -29,14 +29,14 @@ impl Motion {
     }
 
     /// Largest peak-to-peak displacement of the three axes, m.
-    pub fn swing_m(&self) -> f64 {
-        let swing = |x: &Vec<f64>| {
+    pub fn peak_to_peak_m(&self) -> f64 {
+        let peak_to_peak = |x: &Vec<f64>| {
             let ends = x
                 .iter()
                 .fold((0.0_f64, 0.0_f64), |(low, high), x| (low.min(*x), high.max(*x)));
             ends.1 - ends.0
         };
-        self.x.iter().map(swing).fold(0.0, f64::max)
+        self.x.iter().map(peak_to_peak).fold(0.0, f64::max)
     }
 
     /// Time, displacement and velocity of the tool at a sample.
@@ -56,7 +56,7 @@ impl Motion {
         let place = seconds / self.step_s;
         for signal in [&mut self.x[axis], &mut self.v[axis]] {
             *signal = (0..signal.len())
-                .map(|sample| between(signal, sample as f64 + place))
+                .map(|sample| interpolated(signal, sample as f64 + place))
                 .collect();
         }
     }
@@ -74,7 +74,7 @@ impl Motion {
 }
 
 /// Catmull–Rom (cubic) interpolation of a signal at `place`, counted in samples; the end samples are repeated.
-pub fn between(samples: &[f64], place: f64) -> f64 {
+pub fn interpolated(samples: &[f64], place: f64) -> f64 {
     let Some(last) = samples.len().checked_sub(1) else {
         return 0.0;
     };
@@ -134,7 +134,7 @@ pub fn restoring_from(
         {
             step(restoring_force, regime, (&before, &at), motion.step_s, own);
         }
-        let now = settled(restoring_force, regime, &at, own);
+        let now = regime_at(restoring_force, regime, &at, own);
         for (signal, value) in force.iter_mut().zip(restoring_force.restoring_n(now, &at, own)) {
             signal[sample] = value;
         }
@@ -144,7 +144,7 @@ pub fn restoring_from(
 }
 
 /// The regime of a restoring force at the instant `at`, from its `regime` at the previous sample.
-fn settled(
+fn regime_at(
     restoring_force: &dyn RestoringForce,
     regime: Option<Regime>,
     at: &MotionState,
@@ -177,7 +177,7 @@ fn step(
     let (mut first, mut second) = (vec![0.0; own.len()], vec![0.0; own.len()]);
     let half = 0.5 * step_s;
     for share in [0.0, 0.5] {
-        let now = settled(restoring_force, Some(regime), &mix(share), own);
+        let now = regime_at(restoring_force, Some(regime), &mix(share), own);
         restoring_force.rate(now, &mix(share), own, &mut first);
         let ahead: Vec<f64> = own
             .iter()

@@ -97,7 +97,7 @@ pub trait RestoringForce: Debug + Send + Sync {
 #[derive(Clone, Copy, Debug)]
 pub struct Regimes<'a>(pub &'a [Regime]);
 
-/// Number of internal states of all restoring forces `terms`.
+/// Total number of internal states of all `restoring_forces`.
 pub fn states(restoring_forces: &[Box<dyn RestoringForce>]) -> usize {
     restoring_forces
         .iter()

@@ -89,7 +89,7 @@ impl Spindle {
 
     /// A spindle whose speed changes linearly from `first_rpm` to `last_rpm`, rev/min, in `seconds`; all positive. Its mean speed is the
     /// arithmetic mean of both.
-    pub fn gliding(first_rpm: f64, last_rpm: f64, seconds: f64) -> Self {
+    pub fn sweeping(first_rpm: f64, last_rpm: f64, seconds: f64) -> Self {
         let speeds = [first_rpm, last_rpm].map(|rpm| rpm * TAU / 60.0);
         Self {
             speed_rad_per_s: 0.5 * (speeds[0] + speeds[1]),
@@ -97,7 +97,7 @@ impl Spindle {
         }
     }
 
-    /// The same spindle with speed modulation about its mean speed.
+    /// This spindle with speed modulation about its mean speed.
     #[must_use]
     pub fn fluctuating(self, fluctuation: Fluctuation) -> Self {
         Self {
@@ -221,7 +221,7 @@ mod tests {
     #[test]
     fn a_linear_speed_change_reaches_its_last_speed_and_time_and_angle_are_inverse() {
         for (first, last) in [(450.0, 690.0), (690.0, 450.0)] {
-            let spindle = Spindle::gliding(first, last, 60.0);
+            let spindle = Spindle::sweeping(first, last, 60.0);
             let rpm = |t: f64| spindle.speed_at_rad_per_s(t) * 60.0 / TAU;
             assert!((rpm(-1.0) - first).abs() < 1e-9 && (rpm(61.0) - last).abs() < 1e-9);
             // 570 revolutions: the mean speed for one minute.

@@ -53,7 +53,7 @@ struct ToothState {
     kinks: VecDeque<(f64, u8)>,
 }
 
-/// Chip thickness of one tooth at its immersion.
+/// Chip thickness of one tooth at its present immersion angle.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Chip {
     /// Chip thickness, m: distance from the surface in front to the edge; negative out of contact.

@@ -33,7 +33,7 @@ pub struct Workspace {
     pub(super) state: Vec<f64>,
     pub(super) rate: Vec<f64>,
     /// Equations of motion with the motion at a sensor away from the tool tip as output; `None` for a sensor at the tool.
-    pub(super) seen: Option<Dynamics>,
+    pub(super) sensor_dynamics: Option<Dynamics>,
 }
 
 impl Workspace {
@@ -43,7 +43,7 @@ impl Workspace {
         Self {
             state: zeros.clone(),
             rate: zeros,
-            seen: None,
+            sensor_dynamics: None,
         }
     }
 
@@ -51,7 +51,7 @@ impl Workspace {
     /// list means a sensor at the tool.
     pub fn at_sensor(model: &Model, modes: &[f64]) -> Self {
         Self {
-            seen: (!modes.is_empty()).then(|| model.dynamics.seen(modes)),
+            sensor_dynamics: (!modes.is_empty()).then(|| model.dynamics.at_sensor(modes)),
             ..Self::new(model)
         }
     }
@@ -81,10 +81,10 @@ impl DenseStep<'_> {
             &workspace.state,
             &mut workspace.rate,
         );
-        let dynamics = workspace.seen.as_ref().unwrap_or(&self.model.dynamics);
+        let dynamics = workspace.sensor_dynamics.as_ref().unwrap_or(&self.model.dynamics);
         Motion {
-            displacement_m: match &workspace.seen {
-                Some(seen) => seen.displacement(&workspace.state),
+            displacement_m: match &workspace.sensor_dynamics {
+                Some(sensor_dynamics) => sensor_dynamics.displacement(&workspace.state),
                 None => displacement_m,
             },
             velocity_m_per_s: dynamics.velocity(&workspace.rate),

@@ -34,7 +34,7 @@ impl Pores {
         self.at(fed_m + radius_m * sin, radius_m * cos)
     }
 
-    /// Solid fraction at a point of the workpiece times the relative tangential, radial and axial pressure.
+    /// Solid fraction at a point of the workpiece times the relative cutting pressure: tangential, radial, axial.
     pub(super) fn at(&self, x_m: f64, y_m: f64) -> [f64; 3] {
         let cell = LatticeCell::at(x_m / self.size_m, y_m / self.size_m);
         let solid = cell.interpolate(|i, j| f64::from(self.node_chance(i, j, 0) >= self.share));
@@ -53,7 +53,8 @@ impl Pores {
         })
     }
 
-    /// A uniform random number from 0 to 1 that depends on the node, the purpose and the seed only.
+    /// A uniform random number from 0 to 1 that depends only on the lattice node (i, j), the seed and the purpose: 0 for the pore, 1 to 3 for the
+    /// three pressures.
     fn node_chance(&self, i: i64, j: i64, purpose: u64) -> f64 {
         let bits = hashed(self.seed ^ hashed((i as u64) ^ hashed((j as u64) ^ hashed(purpose))));
         // The upper 53 bits.

@@ -64,7 +64,7 @@ impl VirtualCut {
     /// at the same instants as the acceleration.
     ///
     /// # Errors
-    /// As [`VirtualCut::hear`]; also a tachometer wheel too fine for the sampling rate.
+    /// As [`VirtualCut::sense`]; also a tachometer wheel too fine for the sampling rate.
     pub fn record(
         &self,
         case: &Case,

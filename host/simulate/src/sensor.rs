@@ -38,7 +38,7 @@ pub struct Accelerometer {
 /// A tachometer wheel on the spindle. Its first edge after the gap, or its only edge, is at the spindle angle 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TachometerModel {
-    /// Positions of the wheel, and how many of them are missing.
+    /// Number of positions on the wheel, and number of missing ones, which form the gap.
     pub wheel: Wheel,
     /// Standard deviation of the time stamp of an edge, s.
     pub jitter_s: f64,
@@ -111,7 +111,7 @@ impl Sampler {
         }
     }
 
-    /// The same sampler at another location than the tool; `modes` are the ratios of the mode shapes, see [`Workspace::at_sensor`].
+    /// This sampler at a location away from the tool; `modes` are the ratios of the mode shapes, see [`Workspace::at_sensor`].
     #[must_use]
     pub fn at_sensor(self, model: &Model, modes: &[f64]) -> Self {
         Self {
@@ -120,7 +120,7 @@ impl Sampler {
         }
     }
 
-    /// The same sampler with a constant delay of the samples, s.
+    /// This sampler with a constant delay of all samples, s.
     #[must_use]
     pub fn late_by(self, delay_s: f64) -> Self {
         Self { delay_s, ..self }

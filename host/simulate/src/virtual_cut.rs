@@ -57,7 +57,7 @@ pub enum VirtualCutError {
     /// The case lacks a section.
     #[error(transparent)]
     Case(#[from] CaseError),
-    /// An effect with invalid parameters, or one that the model does not support here.
+    /// An effect with invalid parameters, or one that this case does not allow.
     #[error(transparent)]
     Effect(#[from] EffectError),
     /// The equation of motion cannot be assembled.
@@ -192,7 +192,7 @@ impl VirtualCut {
     /// The commanded spindle motion, without speed modulation.
     fn spindle_motion(&self) -> Spindle {
         match self.last_rpm {
-            Some(last_rpm) => Spindle::gliding(self.spindle_rpm, last_rpm, self.seconds),
+            Some(last_rpm) => Spindle::sweeping(self.spindle_rpm, last_rpm, self.seconds),
             None => Spindle::new(self.spindle_rpm),
         }
     }

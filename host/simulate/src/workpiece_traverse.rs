@@ -11,7 +11,7 @@ pub enum WorkpieceTraverse {
     Air,
     /// Full engagement at all times; the surface at t = 0 is that of a tool at rest.
     Steady,
-    /// The axial depth grows linearly from `start_s` on for `ramp_s`, and shrinks as long until `end_s`.
+    /// The axial depth grows linearly for the time `ramp_s` from `start_s` on, and decreases linearly for the same time until `end_s`.
     Ramp {
         /// First contact with the workpiece, s.
         start_s: f64,

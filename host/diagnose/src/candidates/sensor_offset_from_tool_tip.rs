@@ -63,7 +63,7 @@ fn read_of(study: &Study<'_>, record: &Record, index: usize, mode: usize) -> Vec
     let first_order = &study.baseline.first_order;
     let mut alone = vec![0.0; first_order.order() / 2];
     alone[mode] = 1.0;
-    let transfer = response(&Receptance::new(&first_order.seen(&alone)), &record.grid);
+    let transfer = response(&Receptance::new(&first_order.at_sensor(&alone)), &record.grid);
     let responses = record.responses_by(channel, &transfer, &study.baseline.axes);
     let mut force = std::array::from_fn(|axis| {
         let force = &record.force_n[axis];

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use crate::motion::cut_force::CutForce;
 use crate::motion::mean_slopes::MeanSlopes;
 use crate::motion::spindle_motion::SpindleMotion;
-use quietcut_simulate::path::{Motion, between};
+use quietcut_simulate::path::{Motion, interpolated};
 use quietcut_simulate::{Cutter, Immersion, Tooth};
 
 /// By which share of its thickness a chip grows for the slope of its force.
@@ -377,5 +377,5 @@ impl Along<'_> {
 
 /// A motion between its samples; `place` counts them.
 fn at(signal: &[Vec<f64>; 3], place: f64) -> [f64; 3] {
-    signal.each_ref().map(|samples| between(samples, place))
+    signal.each_ref().map(|samples| interpolated(samples, place))
 }

@@ -38,7 +38,7 @@ impl Decays {
                 if pickup.quantity == Quantity::Force {
                     return vec![vec![0.0; count]; order];
                 }
-                let seen = first_order.seen(&pickup.modes);
+                let seen = first_order.at_sensor(&pickup.modes);
                 for (axis, weight) in pickup.weights.iter().enumerate() {
                     row += seen.c.row(axis) * *weight;
                 }

@@ -52,7 +52,7 @@ pub(super) fn predicted(
     };
     for round in 0..rounds {
         if round == 1 && record.amplifies {
-            cutting.cut.let_miss(record.motion.swing_m());
+            cutting.cut.let_miss(record.motion.peak_to_peak_m());
             compare_without_ends(&mut record, &cutting.cut);
         }
         if round > 0 {

@@ -84,7 +84,7 @@ fn opened(baseline: &Baseline<'_>, recording: &Recording, known: Known) -> Resul
         .iter_mut()
         .filter(|channel| !channel.pickup.modes.is_empty())
     {
-        let seen = baseline.first_order.seen(&channel.pickup.modes);
+        let seen = baseline.first_order.at_sensor(&channel.pickup.modes);
         channel.seen = Some(response(&Receptance::new(&seen), &grid));
     }
     let count = channels.len();

@@ -52,34 +52,34 @@ pub struct Case {
 }
 
 impl Case {
-    /// The structure.
+    /// The section `[structure]` of the case.
     ///
     /// # Errors
-    /// The case has none.
+    /// The case has no section `[structure]`.
     pub fn structure(&self) -> Result<&Structure, CaseError> {
         self.section(&self.structure, "structure", "the machine must be known")
     }
 
-    /// The tool.
+    /// The section `[tool]` of the case.
     ///
     /// # Errors
-    /// The case has none.
+    /// The case has no section `[tool]`.
     pub fn tool(&self) -> Result<&Tool, CaseError> {
         self.section(&self.tool, "tool", "teeth and edge angle must be known")
     }
 
-    /// The material.
+    /// The section `[material]` of the case.
     ///
     /// # Errors
-    /// The case has none.
+    /// The case has no section `[material]`.
     pub fn material(&self) -> Result<&Material, CaseError> {
         self.section(&self.material, "material", "the force coefficients must be known")
     }
 
-    /// The cut.
+    /// The section `[cut]` of the case.
     ///
     /// # Errors
-    /// The case has none.
+    /// The case has no section `[cut]`.
     pub fn cut(&self) -> Result<&Cut, CaseError> {
         self.section(&self.cut, "cut", "start angle, exit angle and feed must be known")
     }

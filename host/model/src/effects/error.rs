@@ -19,7 +19,7 @@ pub enum EffectError {
         /// The key.
         key: String,
     },
-    /// A key that must be given.
+    /// A required key that is missing.
     #[error("effect `{name}` needs {key}")]
     Missing {
         /// The effect.
@@ -35,7 +35,7 @@ pub enum EffectError {
         /// The key to give instead.
         key: &'static str,
     },
-    /// A value that is not possible.
+    /// A value that is not possible for its parameter.
     #[error("effect `{name}{dot}{key}`: `{found}` is not possible; {needed} is needed", dot = if .key.is_empty() { "" } else { "." })]
     Value {
         /// The effect.

@@ -6,7 +6,7 @@ use super::parameter::{Prior, ValueKind};
 use super::{EffectError, EffectName};
 use crate::structure::Direction;
 
-/// A value as it was given.
+/// A value of a parameter as given in the case or on the command line.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Value {
     /// A number, or a switch: true is 1 and false is 0.

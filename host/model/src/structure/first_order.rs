@@ -48,7 +48,7 @@ impl FirstOrder {
         Some(Matrix3::from_fn(|i, j| h[(i, j)]))
     }
 
-    /// The same structure in the axes of a feed direction at `angle_deg` from x towards y, degrees.
+    /// This structure in the axes of a feed direction at `angle_deg` from x towards y, degrees.
     ///
     /// Force and displacement are then in feed, normal and axial direction.
     pub fn rotated(&self, angle_deg: f64) -> Self {
@@ -63,13 +63,13 @@ impl FirstOrder {
     /// This structure with the motion of a sensor away from the tool as output u: `modes[r]` is the shape of mode r at the sensor divided by
     /// its shape at the tool, 1 for modes beyond the list. Only for modal structures, whose two states per mode are adjacent.
     #[must_use]
-    pub fn seen(&self, modes: &[f64]) -> Self {
-        let mut seen = self.clone();
+    pub fn at_sensor(&self, modes: &[f64]) -> Self {
+        let mut at_sensor = self.clone();
         for (mode, factor) in modes.iter().enumerate().take(self.order() / 2) {
-            let mut shape = seen.c.columns_mut(2 * mode, 2);
+            let mut shape = at_sensor.c.columns_mut(2 * mode, 2);
             shape *= *factor;
         }
-        seen
+        at_sensor
     }
 
     /// Poles of the structure (eigenvalues of A), rad/s, sorted by imaginary part.
@@ -105,13 +105,13 @@ impl Structure {
 }
 
 fn from_matrices(matrices: &Matrices, directions: &[Direction]) -> Result<FirstOrder, StructureError> {
-    let mut seen = Matrix3xX::zeros(directions.len());
+    let mut at_sensor = Matrix3xX::zeros(directions.len());
     for (index, direction) in directions.iter().enumerate() {
         if let Some(axis) = direction.axis() {
-            seen[(axis, index)] = 1.0;
+            at_sensor[(axis, index)] = 1.0;
         }
     }
-    from_second_order(matrices, &seen)
+    from_second_order(matrices, &at_sensor)
 }
 
 /// First-order form of M q̈ + C q̇ + K q = Jᵀ F, u = J q.

@@ -58,7 +58,7 @@ struct PostureGeometry {
 }
 
 impl Robot {
-    /// The same robot at the joint angles `angles_rad`, rad.
+    /// This robot in the posture of the joint angles `angles_rad`, rad.
     pub fn at(&self, angles_rad: &[f64]) -> Self {
         Self {
             angles_rad: angles_rad.to_vec(),
@@ -76,7 +76,7 @@ impl Robot {
                 rotation * joint.point_m + shift,
             ));
             let rotation_of_joint = Rotation3::from_axis_angle(&joint.axis, *angle);
-            // This joint maps x to rotation_of_joint (x − point) + point, before the joints between it and the base act.
+            // This joint maps x to `rotation_of_joint` (x − point) + point, before the joints between it and the base act.
             shift += rotation * (joint.point_m - rotation_of_joint * joint.point_m);
             rotation *= rotation_of_joint;
             links.push((rotation, rotation * joint.center_m + shift));
