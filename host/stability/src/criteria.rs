@@ -197,14 +197,14 @@ pub(crate) const LOCUS_LEVELS: u32 = 16;
 /// its values at both ends, as a share of the larger of the two; beyond it the interval is halved. Unfounded.
 pub(crate) const LOCUS_BEND: f64 = 0.1;
 
-/// Values σ of the lines Re s = σ along which roots are searched, as multiples of the slowest decay rate of a
-/// resonance. Unfounded.
+/// Values σ of the lines Re s = σ along which the roots s of a loop of receptances are searched, as multiples of the
+/// slowest decay rate of a resonance. Unfounded.
 pub(crate) const ROOT_LINES: [f64; 14] = [
     0.0, -0.3, -0.6, -0.8, -0.9, -0.97, -1.2, -2.0, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0,
 ];
 
-/// Smallest locus, as a share of 1/w, that is traced along a line Re s = σ to predict roots away from the line.
-/// Unfounded.
+/// Smallest locus, as a share of the inverse axial depth 1/w, that is traced along a line Re s = σ to predict roots
+/// away from the line. Unfounded.
 pub(crate) const LOCUS_REACH: f64 = 0.05;
 
 /// Factor on [`LOCUS_BEND`] for the zeroth-order approximation. A tenth keeps the phase between two frequencies
@@ -234,7 +234,8 @@ pub(crate) const MULTIPLIER_MOVE_MAX: f64 = 0.12;
 /// Unfounded.
 pub(crate) const EQUIVALENT_FOLLOWED: f64 = 0.5;
 
-/// Least number of steps in depth at which the number of multipliers outside the unit circle is compared. Unfounded.
+/// Least number of steps in depth, in cases with friction, backlash or hysteresis, at which the number of multipliers
+/// outside the unit circle is compared. Unfounded.
 pub(crate) const EQUIVALENT_SAMPLES_MIN: usize = 32;
 
 /// Damping constant that stands for sticking friction, in units of k/ω with the static stiffness k of the axis and the

@@ -22,7 +22,7 @@ pub(crate) struct AveragedLoop<'a> {
     directional: Matrix3<f64>,
     /// Axial (z) column of β₀, N/m; zero without axial-depth modulation.
     forced: Vector3<f64>,
-    /// Indices of the directions that change the chip thickness.
+    /// Indices of the directions (0 feed, 1 normal, 2 axial) in which the tool moves and changes the chip thickness.
     axes: Vec<usize>,
 }
 
@@ -86,7 +86,7 @@ impl<'a> AveragedLoop<'a> {
         Complex64::ONE + (h.row(2) * self.forced.map(Complex64::from))[0]
     }
 
-    /// Matrix H̃ α₀, by the Sherman–Morrison formula.
+    /// Matrix H̃ α₀ at s, with H̃ = (I + H β₀)⁻¹ H from the Sherman–Morrison formula.
     fn matrix(&self, s: Complex64) -> Option<Matrix3<Complex64>> {
         let h = self.problem.transfer(s)?;
         let change = h * self.forced.map(Complex64::from) * h.row(2);

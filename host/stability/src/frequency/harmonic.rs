@@ -28,7 +28,8 @@ pub(crate) struct HarmonicLoop<'a> {
     harmonics: usize,
     /// Harmonics of the coefficients, from −(2K + 1) to 2K + 1.
     coefficients: Vec<Harmonic>,
-    /// Indices of the directions that change the chip thickness or the axial depth.
+    /// Indices of the directions (0 feed, 1 normal, 2 axial) in which the tool moves and changes the chip thickness or
+    /// the axial depth.
     axes: Vec<usize>,
 }
 
@@ -58,7 +59,8 @@ impl<'a> HarmonicLoop<'a> {
         }
     }
 
-    /// Fewest harmonics that cover every resonance.
+    /// Least number K of harmonics with which the frequencies of the loop reach 25 % beyond every resonance, plus four
+    /// further ones.
     pub(crate) fn least_harmonics(problem: &FrequencyProblem, rpm: f64) -> usize {
         let fastest = problem
             .resonances()
@@ -88,7 +90,7 @@ impl<'a> HarmonicLoop<'a> {
         Some(limits(&thinned, depth_m).unwrap_or_default())
     }
 
-    /// Number of frequencies, 2K + 2.
+    /// Number of frequencies s + ipΩ in the loop, 2K + 2.
     fn count(&self) -> usize {
         2 * self.harmonics + 2
     }
@@ -104,7 +106,7 @@ impl<'a> HarmonicLoop<'a> {
             .collect()
     }
 
-    /// Harmonic p − q of the coefficients.
+    /// Harmonic p − q of the coefficients, which couples frequency q to frequency p.
     fn coefficient(&self, p: usize, q: usize) -> &Harmonic {
         // Both indices are below the number of frequencies, so that the difference is within the stored harmonics.
         &self.coefficients[p + 2 * self.harmonics + 1 - q]
@@ -141,7 +143,7 @@ impl<'a> HarmonicLoop<'a> {
         Some((cut, forced))
     }
 
-    /// Matrix (I + Hβ)⁻¹ Hα, whose eigenvalues are λ.
+    /// Matrix (I + Hβ)⁻¹ Hα of the loop at s; its eigenvalues are the λ of [`OpenLoop`].
     fn matrix(&self, s: Complex64) -> Option<DMatrix<Complex64>> {
         let (cut, forced) = self.matrices(s)?;
         match forced {

@@ -11,7 +11,7 @@ use crate::error::{Breakdown, StabilityError};
 use crate::limits::speed_line::{SpeedLine, Switch};
 use crate::spectrum::stability_loss::StabilityLoss;
 
-/// Root on the imaginary axis at a limit.
+/// Limit: an axial depth at which a root of the loop crosses the imaginary axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct AxisCrossing {
     /// Depth, m.

@@ -106,7 +106,7 @@ fn is_straight(low: &Sample, middle: &Sample, high: &Sample, (floor, bend): (f64
                     && (to - from).norm() <= 6.0 * bend * size
                     && is_alone(middle, index, (to - from).norm())
             }
-            // Only a locus below the floor may begin or end between samples.
+            // A locus without a partner in a neighbouring sample must lie below the floor.
             _ => value.norm() < floor,
         }
     })
@@ -151,7 +151,7 @@ pub(crate) type Step = [(f64, Complex64); 2];
 
 /// Steps between two samples, one for each locus.
 fn steps_between(low: &Sample, high: &Sample) -> Vec<Step> {
-    // Values without a partner are below every floor in use.
+    // With an infinite floor no value must have a partner; values without one lie below every floor in use.
     let pairs = pairs(low, high, f64::INFINITY).unwrap_or_default();
     pairs
         .into_iter()
@@ -274,7 +274,8 @@ pub(crate) fn zero(
         let (value, miss) = at(omega)?
             .into_iter()
             .min_by(|p, q| (p.0 - expected).norm().total_cmp(&(q.0 - expected).norm()))?;
-        // Rounding of the eigenvalues may keep the residual above the tolerance.
+        // On an interval as narrow as rounding a residual of up to a thousand times the tolerance is accepted, since
+        // eigenvalues have rounding too.
         let is_narrow = (high.omega - low.omega).abs() <= 1e-15 * high.omega;
         if miss.abs() <= tolerance || is_narrow && miss.abs() <= 1e3 * tolerance {
             return Some((omega, value));
@@ -341,7 +342,7 @@ fn argument_increase_between(
 mod tests {
     use super::*;
 
-    /// Two loci of one pole each, rotated by a delay.
+    /// Two loci: receptances of one mode each, times the regeneration factor of a delay.
     fn two(omega: f64) -> Result<Vec<Complex64>, Breakdown> {
         let mode = |natural: f64, size: f64| {
             size / Complex64::new(natural * natural - omega * omega, 0.04 * natural * omega)

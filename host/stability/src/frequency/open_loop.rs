@@ -28,7 +28,8 @@ pub(crate) trait OpenLoop: Sync {
     /// Factor κ/w: 1 − e^{−sτ}, or 1 if the displacement one tooth period ago is neglected.
     fn regeneration(&self, s: Complex64) -> Complex64;
 
-    /// Equivalent exponent s in the frequency range of the loop.
+    /// Exponent in the frequency range of the loop that belongs to the same Floquet multiplier as s, or to its
+    /// conjugate.
     fn folded(&self, s: Complex64) -> Complex64;
 
     /// Eigenvalues λ(s), 1/m, of absolute value `floor` and above, and possibly smaller ones.

@@ -31,7 +31,7 @@ pub(crate) fn rightmost(open_loop: &impl OpenLoop, depth_m: f64) -> Result<Compl
         .iter()
         .map(|resonance| resonance.width)
         .fold(f64::INFINITY, f64::min);
-    // Without resonances no decay rate is defined.
+    // Without resonances there is no slowest decay rate: all lines Re s = σ coincide with the imaginary axis.
     let decay = if decay.is_finite() { decay } else { 0.0 };
     let mut best = from_poles(open_loop, depth_m);
     if let Some(root) = best

@@ -121,7 +121,7 @@ impl Curve {
     }
 }
 
-/// Cells at one speed during their computation, by ascending depth.
+/// Cells at one spindle speed while they are computed, by ascending depth.
 struct Column<S> {
     rpm: f64,
     spectrum: S,
@@ -151,7 +151,8 @@ impl<S: Spectrum> Column<S> {
                 roots = None;
                 continue;
             };
-            // The change by Newton's method is the error of the map; the remaining error is far smaller.
+            // Newton's step corrects the error of the period map. The error that remains is far smaller, so that the
+            // least error is stated.
             let size = root.multiplier.norm();
             sizes = (sizes.0.max(size), sizes.1.max(LEAST_ERROR * size.max(1.0)));
             if let Some(roots) = &mut roots {
@@ -268,11 +269,11 @@ enum Followed {
     Filled,
     /// The error of the curves is too large; the multipliers at the middle are known.
     Bent(Sample),
-    /// Multipliers could not be told apart.
+    /// Multipliers of the two samples could not be paired, or two curves led to one multiplier.
     Lost,
 }
 
-/// True if none of `others` is the same multiplier.
+/// True if the multiplier differs from all of `others`.
 fn is_new(root: &Root, others: &[Root]) -> bool {
     let distance = |other: &Root| (other.multiplier - root.multiplier).norm();
     others

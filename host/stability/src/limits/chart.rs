@@ -48,7 +48,7 @@ pub struct Refinement {
     /// Largest difference between a limit and the straight line between the limits at neighbouring speeds, as a share
     /// of the largest depth.
     pub tolerance: f64,
-    /// Least relative distance between neighbouring speeds; closer ones are not divided.
+    /// Least distance between neighbouring speeds, relative to the speed; closer ones get no speed between them.
     pub least_step: f64,
     /// Number of speeds from which no further round of refinement begins.
     pub most_speeds: usize,

@@ -153,7 +153,7 @@ impl<S: Spectrum> Scan<S> {
         }
     }
 
-    /// Crossings between two samples, by depth.
+    /// Crossings of the unit circle between two sampled depths, by ascending depth.
     fn between(
         &mut self,
         low: &Sample,
@@ -188,7 +188,7 @@ impl<S: Spectrum> Scan<S> {
                 return None;
             }
         }
-        // A multiplier without a partner must be far from the circle.
+        // A multiplier of the deeper sample without a partner in the other must be far from the unit circle.
         if free.iter().any(|root| is_near(root, step_m)) {
             return None;
         }
@@ -203,7 +203,8 @@ impl<S: Spectrum> Scan<S> {
             multiplier: from.multiplier + (to.multiplier - from.multiplier) * share,
         };
         let crossing = self.spectrum.crossing_near(guess, low.depth_m, high.depth_m)?;
-        // The crossing must lie on this branch, not on another that crosses nearby.
+        // The crossing must lie on the branch of this multiplier, not on that of another which crosses at a nearby
+        // depth.
         let distance = (crossing.multiplier - guess.multiplier).norm();
         (distance < 0.5 * (to.multiplier - from.multiplier).norm() + 1e-6).then_some(DirectedCrossing {
             crossing,
@@ -274,7 +275,7 @@ impl<S: Spectrum> Scan<S> {
         while reach_m < deepest_m {
             let sides = [(-reach_m, outward), (reach_m, !outward)];
             let mut is_beyond = |(shift_m, inside): (f64, bool)| {
-                // A distance that reaches beyond depth 0 suffices on that side.
+                // A distance that reaches below depth 0 suffices on the shallow side.
                 depth_m + shift_m <= 0.0 || {
                     let guess = multiplier + slope * shift_m;
                     let there = self.spectrum.multiplier_near(guess, depth_m + shift_m, 0.1);
@@ -296,7 +297,7 @@ impl<S: Spectrum> Scan<S> {
     }
 }
 
-/// Net change of the number of multipliers outside over the crossings found.
+/// Change of the number of multipliers outside the unit circle over the crossings found, from small to large depth.
 fn balance(found: &[DirectedCrossing]) -> i32 {
     found
         .iter()

@@ -24,7 +24,7 @@ impl Limits {
             .iter()
             .map(|batch| batch.share_below(percentile_mm))
             .collect();
-        // The share below cannot be resolved more finely than one machine.
+        // The share of machines below a depth is not resolved more finely than one machine.
         let reach = (student_90(below.len()) * standard_error(&below)).max(least);
         [share - reach, share + reach].map(|share| self.all.quantile(share.clamp(0.0, 1.0)))
     }
@@ -60,7 +60,7 @@ fn student_90(count: usize) -> f64 {
 
 /// First depth that is not surely stable, mm: where stability is lost, or where a second stable orbit begins.
 pub(crate) fn limit_of(line: &SpeedLine) -> Option<f64> {
-    // If depth 0 is unstable, no stability can be lost.
+    // A machine that is unstable at depth 0 has the limit 0.
     if line.stable_mm.first().is_none_or(|interval| interval[0] > 0.0) {
         return Some(0.0);
     }

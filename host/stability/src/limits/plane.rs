@@ -16,7 +16,7 @@ use quietcut_model::case::Case;
 /// valid machine, the difference is one-sided.
 const STEP: f64 = 0.05;
 
-/// Reason why a variable has no derivative.
+/// Message for a variable along which the problem has no derivative.
 const OUT_OF_BOUNDS: &str = "a parameter leaves its bounds if it changes by a twentieth of its standard deviation to either side; \
     a smaller deviation is needed";
 
@@ -30,9 +30,9 @@ pub struct Linearized {
 /// Loss of stability linearized over the variables.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plane {
-    /// Axial depth at the nominal machine, mm.
+    /// Axial depth of the limit of the nominal machine, mm.
     pub depth_mm: f64,
-    /// Gradient of the depth, mm per standard deviation.
+    /// Gradient of the depth over the variables, mm per standard deviation.
     pub gradient: DVector<f64>,
     /// Chatter frequency, Hz, with its gradient, Hz per standard deviation; `None` at a flip, whose frequency follows
     /// from the spindle speed alone.

@@ -108,7 +108,7 @@ pub fn point(problem: &Problem, rpm: f64, depth_mm: f64) -> Result<CutStability,
     })
 }
 
-/// Dominant multiplier with its error, during the computation.
+/// Dominant multiplier with its error, before the chatter frequency is known.
 struct Solution {
     multiplier: Complex64,
     error: f64,
@@ -212,7 +212,7 @@ fn searched(problem: &Problem, rpm: f64, depth_m: f64, candidates: &[Complex64])
     let own = error(coarse, fine, LEAST_ERROR);
     Some(Solution {
         multiplier: fine,
-        // Another multiplier may lie between this one and the radius.
+        // A larger multiplier may lie between this one and the radius beyond which none was counted.
         error: own.max(beyond.radius - fine.norm()),
         period: working,
         // If this multiplier lies outside the unit circle, a larger one would lie outside as well.

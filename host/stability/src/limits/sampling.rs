@@ -86,7 +86,7 @@ impl Basis {
         for candidate in leading.iter().cloned().chain((0..size).map(unit)) {
             let length = candidate.norm();
             let mut rest = candidate;
-            // Two passes of orthogonalization suffice to rounding.
+            // Two passes of orthogonalization leave only rounding along the vectors before.
             for _ in 0..2 {
                 for vector in &vectors {
                     let along = vector.dot(&rest);
@@ -103,7 +103,7 @@ impl Basis {
         Self { vectors }
     }
 
-    /// Point with the given coordinates in this basis.
+    /// Point, in the variables, with the given coordinates in this basis.
     fn point(&self, coordinates: &[f64]) -> DVector<f64> {
         let size = self.vectors.first().map_or(0, |vector| vector.len());
         let mut point = DVector::zeros(size);

@@ -24,7 +24,8 @@ use quietcut_model::structure::{FirstOrder, ModalPart};
 pub struct Tangent {
     /// Derivative of A, B and C in feed, normal and axial direction.
     structure: Option<FirstOrder>,
-    /// Derivative of the force on a tooth.
+    /// Derivative of the vectors `cutting`, `normal` and `edge` of a tooth; `None` if they do not depend on the
+    /// parameter.
     force: Option<ToothForce>,
     feed_per_tooth_m: f64,
     start: f64,
@@ -205,13 +206,13 @@ impl<'a> Sensitivity<'a> {
         (slope.depth_mm.is_finite() && slope.angle.is_finite()).then_some(slope)
     }
 
-    /// Integral ∫ yᵀ … x dt over the tooth period.
+    /// Integral of a function of Floquet mode and adjoint over the tooth period.
     fn along(&self, integrand: impl Fn(&Node) -> Complex64) -> Complex64 {
         let nodes = &self.motion.nodes;
         nodes.iter().map(|node| integrand(node) * node.weight_s).sum()
     }
 
-    /// Vectors C x and Bᵀ y at a node.
+    /// Displacement C x of the Floquet mode and vector Bᵀ y of its adjoint at a node.
     fn ends(&self, node: &Node) -> (Vector3<Complex64>, Vector3<Complex64>) {
         let structure = &self.problem.structure;
         let seen = structure.c.map(Complex64::from) * &node.right;
@@ -225,13 +226,13 @@ impl<'a> Sensitivity<'a> {
         (0..node.teeth).map(move |tooth| engagement.angle(tooth, phase))
     }
 
-    /// Sum Σ cutting·normalᵀ over the cutting teeth.
+    /// Sum of cutting·normalᵀ (force direction times chip normal) over the teeth that cut at a node.
     fn directional(&self, node: &Node) -> Matrix3<f64> {
         let force = &self.problem.process.force;
         self.angles(node).map(|angle| force.directional(angle)).sum()
     }
 
-    /// Matrix M of one tooth: κ cutting·normalᵀ − β.
+    /// Force per displacement of one tooth at an immersion angle: M = κ cutting·normalᵀ − β.
     fn of_tooth(&self, angle: f64) -> Matrix3<Complex64> {
         let process = &self.problem.process;
         let mut coupling = process.force.directional(angle).map(|entry| self.kappa * entry);
@@ -263,7 +264,7 @@ impl<'a> Sensitivity<'a> {
         sum
     }
 
-    /// Integrand yᵀ dG x with G = A + B M C.
+    /// Integrand yᵀ dG x at a node, with G = A + B M C of the linearized equation ẋ = G x.
     fn integrand(&self, tangent: &Tangent, node: &Node) -> Complex64 {
         let (seen, pushed) = self.ends(node);
         let mut sum = Complex64::ZERO;
@@ -286,7 +287,7 @@ impl<'a> Sensitivity<'a> {
         sum
     }
 
-    /// Derivative dM of the matrix of one tooth.
+    /// Derivative dM of the force per displacement of one tooth, per unit of the parameter.
     fn change_of_tooth(&self, tangent: &Tangent, angle: f64) -> Matrix3<Complex64> {
         let process = &self.problem.process;
         let (cutting, normal) = (process.force.cutting.at(angle), process.force.normal.at(angle));

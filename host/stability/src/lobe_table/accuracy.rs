@@ -65,7 +65,7 @@ impl Disagreement {
 }
 
 impl Disagreement {
-    /// The larger value on each side.
+    /// The larger of both disagreements, on the unsafe and on the cautious side each.
     fn max(self, other: Self) -> Self {
         Self {
             unsafe_mm: self.unsafe_mm.max(other.unsafe_mm),

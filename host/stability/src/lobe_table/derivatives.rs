@@ -14,7 +14,7 @@ use crate::limits::sensitivity::{Sensitivity, Tangent, no_derivative};
 use crate::limits::speed_line::{SpeedLine, Switch};
 use quietcut_model::structure::ModalPart;
 
-/// Derivatives of the entries of one layer.
+/// Derivatives of the limits in the entries of one layer, with respect to modes and cutting force.
 pub(super) struct Derivatives {
     /// Modes, by ascending frequency.
     pub(super) modes: Vec<LayerMode>,

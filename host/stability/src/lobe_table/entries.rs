@@ -16,7 +16,7 @@ pub(super) struct Entry {
 
 /// Stable depths up to `depth_mm` with a single stable orbit; with two, stability depends on how the cut began.
 pub(super) fn surely_stable(line: &SpeedLine, depth_mm: f64) -> Vec<[f64; 2]> {
-    // A branch of orbits may extend one step beyond the last depth.
+    // Stable depths are cut at `depth_mm`, since a branch of forced orbits may extend one step beyond.
     let mut stable: Vec<[f64; 2]> = line
         .stable_mm
         .iter()

@@ -27,7 +27,7 @@ const ANY_FEED_MM: f32 = 100.0;
 /// Seed of the draws for percentiles; fixed, so that a table can be reproduced.
 const SEED: u64 = 1;
 
-/// Case and method of one layer.
+/// One layer of a table: its case, the method that computes its limits, and the cuts for which it is valid.
 pub(super) struct TableLayer {
     pub(super) method: Box<dyn Method>,
     /// Linear problem with the mean pitch; equal to the problem of the method if structure and pitch allow.
@@ -378,11 +378,12 @@ pub(super) fn refined(
     divided(cases, &divisions, request)
 }
 
-/// Axis of the layers (feed or direction) during refinement.
+/// Refinement of the layers along one axis: feed per tooth (mm) or feed direction (degrees).
 struct Axis {
     tolerance: f64,
     most: usize,
-    /// Largest gap over which lookups interpolate; wider gaps are always divided.
+    /// Largest distance between layers over which lookups interpolate; layers further apart always get one between
+    /// them.
     widest: f64,
 }
 

@@ -65,7 +65,7 @@ impl Discretization for FullDiscretization {
         let mut steps = Vec::with_capacity(mesh.count());
         for index in 0..mesh.count() {
             let (start_s, duration_s) = mesh.step(index);
-            // Between two entries or exits all steps are equal except for rounding.
+            // Between two entries or exits all steps have equal durations except for rounding, and share their weights.
             let weights = known
                 .take()
                 .filter(|weights| (weights.duration_s - duration_s).abs() < 1e-9 * duration_s)

@@ -16,7 +16,7 @@ use crate::limits::point::CutStability;
 use crate::limits::speed_line::SpeedLine;
 use crate::spectrum::stability_loss::StabilityLoss;
 
-/// Largest number of harmonics; larger matrices take too long. A choice.
+/// Largest number K of harmonics: a limit on computing time. A choice.
 const HARMONICS_MAX: usize = 400;
 
 /// Multi-frequency solution on modelled or measured receptances.
@@ -72,7 +72,7 @@ type Settled<'a> = (HarmonicLoop<'a>, Vec<AxisCrossing>, Vec<AxisCrossing>);
 
 /// Largest relative change between two lists of limits; `None` if the lists do not contain the same limits.
 fn largest_change(coarse: &[AxisCrossing], fine: &[AxisCrossing], depth_m: f64) -> Option<f64> {
-    // A limit close to the last depth may appear in one list only.
+    // A limit close to the last depth may lie beyond it in one of the lists; such limits are not compared.
     let inside = |limits: &[AxisCrossing]| -> Vec<AxisCrossing> {
         let within = limits
             .iter()

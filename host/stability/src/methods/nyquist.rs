@@ -60,7 +60,7 @@ impl Nyquist {
     }
 }
 
-/// Limits, with the number of unstable roots between them verified.
+/// Limits up to a depth. Between every two of them a count of unstable roots must agree with the crossings.
 fn confirmed(
     open_loop: &impl OpenLoop,
     rpm: f64,

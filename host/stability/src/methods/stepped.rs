@@ -196,7 +196,7 @@ impl<'a> Stepped<'a> {
         for step in &self.steps {
             step.flow.mul_to(&state, &mut next);
             for (index, response) in &step.past {
-                // The earliest index is −K, so that the row is not negative.
+                // The earliest displacement has the index −K, so that the row in the trace is not negative.
                 let row = (index + self.history as isize) as usize * kept;
                 next.gemm(1.0, response, &trace.rows(row, kept), 1.0);
             }

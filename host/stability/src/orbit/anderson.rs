@@ -27,7 +27,7 @@ impl Anderson {
         }
     }
 
-    /// Next z, after the image G(`at`) = `to`.
+    /// Next iterate z from the last iterate `at` and its image G(`at`) = `to`.
     pub(super) fn next(&mut self, at: &DVector<f64>, to: &DVector<f64>) -> DVector<f64> {
         let residual = to - at;
         self.rounds.push_back((residual.clone(), to.clone()));

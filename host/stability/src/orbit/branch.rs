@@ -14,7 +14,7 @@ pub struct BranchPoint {
     pub depth_mm: f64,
     /// Half the peak-to-peak displacement of the orbit in feed, normal and axial direction, mm.
     pub amplitude_mm: [f64; 3],
-    /// Absolute value of the largest Floquet multiplier.
+    /// Absolute value of the largest Floquet multiplier of the orbit.
     pub multiplier_abs: f64,
     /// Number of multipliers outside the unit circle.
     pub outside: i32,
@@ -44,9 +44,9 @@ pub struct Event {
 pub struct Branch {
     /// Spindle speed, rev/min.
     pub rpm: f64,
-    /// The points, in the order of the branch.
+    /// Orbits along the branch, in the order in which it is followed.
     pub points: Vec<BranchPoint>,
-    /// The events, in the order of the branch.
+    /// Bifurcations along the branch, in the order in which it is followed.
     pub events: Vec<Event>,
 }
 

@@ -10,11 +10,12 @@ pub(super) struct Advanced {
     pub(super) states: DMatrix<f64>,
     /// State at the end.
     pub(super) end: DVector<f64>,
-    /// Derivatives of the states at the nodes, (n m) × number of variables.
+    /// Derivatives of the states at the nodes with respect to the start of the period and the depth, (n m) × number of
+    /// these variables.
     pub(super) values: DMatrix<f64>,
-    /// Derivatives of the state at the end.
+    /// Derivatives of the state at the end of the subinterval with respect to the same variables.
     pub(super) end_by: DMatrix<f64>,
-    /// Largest change of a state at a node by the Newton step, relative to the largest state there.
+    /// Largest change of a state at a node by the Newton step, relative to the largest state in the subinterval.
     pub(super) moved: f64,
 }
 
@@ -22,9 +23,9 @@ pub(super) struct Advanced {
 pub(super) struct Linearized<'a> {
     gauss: &'a Gauss,
     duration_s: f64,
-    /// Jacobian of the rates at each node.
+    /// Jacobian ∂ẋ/∂x of the equation of motion at each node.
     jacobians: Vec<DMatrix<f64>>,
-    /// Factored matrix I − h a⊗J of the collocation equations.
+    /// LU factors of the matrix I − h a⊗J of the collocation equations, with the duration h and the Gauss integrals a.
     factored: nalgebra::LU<f64, nalgebra::Dyn, nalgebra::Dyn>,
 }
 
@@ -82,7 +83,8 @@ impl<'a> Linearized<'a> {
         forces: &[DMatrix<f64>],
     ) -> Option<Advanced> {
         let (order, nodes, columns) = (self.order(), self.gauss.nodes.len(), by.ncols());
-        // The first column is the residual, the others are derivatives.
+        // Right-hand sides: the first column is the residual of the collocation equations, the others belong to the
+        // derivatives.
         let mut right = DMatrix::zeros(order * nodes, columns + 1);
         for i in 0..nodes {
             let mut block = right.view_mut((i * order, 0), (order, columns + 1));

@@ -38,13 +38,13 @@ use quietcut_model::effects::{ALL, Treatment};
 /// orbit count as agreeing.
 const SETTLED: f64 = 1e-7;
 
-/// Largest number of iterations of equivalent spring and orbit. A choice.
+/// Largest number of iterations in which equivalent springs and orbit are computed from each other. A choice.
 const ROUNDS: usize = 200;
 
-/// Number of iterations that Anderson acceleration stores. A choice.
+/// Number of iterations of springs and orbit that Anderson acceleration stores. A choice.
 const REMEMBERED: usize = 5;
 
-/// Tolerance of the depth of a crossing, relative to the last depth.
+/// Width to which the depth interval around a crossing of the unit circle is narrowed, relative to the last depth.
 const CROSSING: f64 = 1e-6;
 
 /// Axial depth, mm, that replaces a depth of 0: there the tool is at rest, and equivalent stiffness and damping are not
@@ -54,7 +54,7 @@ const NONE_MM: f64 = 1e-4;
 /// Stability problem of a case with friction, backlash or hysteresis.
 #[derive(Debug)]
 pub struct EquivalentProblem {
-    /// Forced problem without the terms that are not smooth.
+    /// Forced problem of the case without friction, backlash and hysteresis.
     smooth: ForcedProblem,
     terms: Vec<Box<dyn RestoringForce>>,
     feed_direction_deg: f64,
@@ -64,11 +64,11 @@ pub struct EquivalentProblem {
     velocity: DMatrix<f64>,
     /// Static stiffness along each axis, N/m; 0 for a rigid axis.
     stiffness: [f64; 3],
-    /// Damper along each axis that stands for sticking, N s/m.
+    /// Damping constant along each axis that stands for sticking friction, N s/m.
     most_damping: [f64; 3],
 }
 
-/// Orbit with the equivalent springs that agree with it.
+/// Forced orbit and the equivalent springs that follow from it.
 #[derive(Clone)]
 struct Settled {
     springs: [Spring; 3],

@@ -107,7 +107,7 @@ pub(super) fn size_at(map: &impl PeriodMap, depth_m: f64) -> f64 {
             let by_depth = integration.by.column(map.size()) * depth_m;
             integration.periodic().lu().solve(&by_depth)
         });
-    // Without forcing the orbit is rest, and any scale serves.
+    // Without feed and edge forces the orbit is rest, and any unit of its size serves.
     linear
         .map(|state| state.norm())
         .filter(|size| *size > 0.0)
@@ -142,7 +142,7 @@ impl Sample {
 
 impl<M: PeriodMap> Follower<M> {
     pub(super) fn new(map: M, rpm: f64, depth_m: f64) -> Self {
-        // At depth 0 any positive scale of the depth serves.
+        // The depth is the unit of steps in depth along the branch; at depth 0 any positive unit serves.
         let depth_m = if depth_m > 0.0 { depth_m } else { 1e-3 };
         let scale = Scale {
             state: size_at(&map, depth_m),
@@ -230,7 +230,7 @@ impl<M: PeriodMap> Follower<M> {
         })
     }
 
-    /// Sample one step further along the branch.
+    /// Orbit with multipliers one step further along the branch.
     fn step(&self, from: &Sample, step: f64) -> Result<Sample, OrbitError> {
         let guess = from.orbit.along(&from.tangent, step, self.scale);
         self.sample(&guess, &from.tangent.along)

@@ -38,7 +38,7 @@ pub struct ForcedProblem {
     pub(super) cubic: Option<Cubic>,
     /// Smooth restoring forces of extensions, with the structure in the machine's axes.
     smooth: Option<Smooth>,
-    /// Chip law; `None` for a force proportional to the chip.
+    /// Chip law; `None` if the cutting force is proportional to the chip thickness.
     chip: Option<ChipLaw>,
     /// Process damping; `None` if absent.
     flank: Option<Flank>,
@@ -82,8 +82,9 @@ struct Smooth {
     terms: Vec<Arc<dyn RestoringForce>>,
     /// Input matrix B in the machine's axes.
     b: DMatrix<f64>,
-    /// Displacement matrix C and velocity matrix C A in the machine's axes.
+    /// Matrix C, in the machine's axes, that gives the displacement from the states.
     displacement: DMatrix<f64>,
+    /// Matrix C A, in the machine's axes, that gives the velocity from the states.
     velocity: DMatrix<f64>,
 }
 
@@ -283,7 +284,7 @@ impl ForcedProblem {
         Some(sum * size)
     }
 
-    /// Matrix B D C A of process damping, per axial depth.
+    /// Matrix B D C A by which process damping enters the equation of motion, per axial depth; zero without it.
     pub(super) fn damped(&self, damping: &Matrix3<f64>) -> DMatrix<f64> {
         let Some(flank) = &self.flank else {
             return DMatrix::zeros(self.order(), self.order());

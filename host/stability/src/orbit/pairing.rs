@@ -96,7 +96,7 @@ mod tests {
         assert_eq!(pair(&pair_before, &real_after, false), Some(rest));
         let back = vec![(at(0.31, 0.74), at(0.3, 0.75))];
         assert_eq!(pair(&real_after, &pair_before, false), Some(back));
-        // One of the two has crossed the circle: the step contains a fold.
+        // One of the two real multipliers has crossed the unit circle: the step contains a fold.
         let crossed = [at(1.01, 0.0), at(0.86, 0.0), at(0.31, 0.74)];
         assert_eq!(pair(&[at(0.95, 0.05), at(0.3, 0.75)], &crossed, false), None);
     }

@@ -66,7 +66,7 @@ pub(super) struct PeriodIntegration {
     pub(super) end: DVector<f64>,
     /// Derivative ∂end/∂(start, depth); the last column is that of the depth, 1/m.
     pub(super) by: DMatrix<f64>,
-    /// States at the nodes of each subinterval.
+    /// States at the nodes of each subinterval after the Newton step.
     pub(super) states: Vec<DMatrix<f64>>,
     /// Derivatives of the states at the nodes of each subinterval, (n m) × number of variables.
     pub(super) values: Vec<DMatrix<f64>>,
@@ -106,7 +106,7 @@ impl PeriodIntegration {
     }
 }
 
-/// Tangent of a branch at an orbit.
+/// Tangent of a branch of orbits over the depth, at one orbit.
 #[derive(Clone, Debug)]
 pub(super) struct Tangent {
     /// Unit tangent of start and depth, each divided by its [`Scale`].
@@ -309,7 +309,7 @@ fn shaped(values: DVector<f64>, order: usize) -> DMatrix<f64> {
     DMatrix::from_column_slice(order, nodes, values.as_slice())
 }
 
-/// Scales of state and depth that define the length along a branch.
+/// Units of state and depth in which the length along a branch is measured.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Scale {
     pub(super) state: f64,
@@ -317,7 +317,7 @@ pub(super) struct Scale {
 }
 
 impl Scale {
-    /// Converts a change of (start/size, depth/depth size) to one of start and depth.
+    /// Converts a change of start and depth in units of this scale to one in m and the units of the state.
     fn unscaled(&self, step: &DVector<f64>) -> DVector<f64> {
         let mut change = step * self.state;
         change[step.len() - 1] = step[step.len() - 1] * self.depth_m;

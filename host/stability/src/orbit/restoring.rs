@@ -13,7 +13,7 @@ use quietcut_model::path::{Motion, restoring_along, restoring_from};
 /// subinterval is a few radians. A choice.
 const PER_SUBINTERVAL: usize = 128;
 
-/// Least number of samples in a period. A choice.
+/// Least number of samples of the orbit in a period. A choice.
 const LEAST: usize = 1024;
 
 /// Largest number of periods for terms with internal states to reach a closed hysteresis loop. A choice.
@@ -112,7 +112,7 @@ impl Samples {
         if term.states() == 0 {
             return restoring_along(term, &self.motion(1, 0, |_| [0.0; 2]));
         }
-        // One further sample: the first of the next period.
+        // Appends the first sample of the next period, so that the internal state at the end of the period is known.
         let mut period = self.motion(1, 0, |_| [0.0; 2]);
         for signal in period.x.iter_mut().chain(&mut period.v) {
             signal.push(signal[0]);

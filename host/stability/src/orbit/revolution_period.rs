@@ -150,7 +150,7 @@ impl Forces {
         Self { teeth, damping }
     }
 
-    /// Teeth at a node, each with the index of its port.
+    /// Cutting teeth at a node, each with the index of its port.
     fn teeth_at(&self, node: usize, nodes: usize) -> impl Iterator<Item = (usize, &Tooth)> {
         let count = self.teeth.len() / nodes;
         self.teeth.iter().enumerate().skip(node * count).take(count)
@@ -166,7 +166,7 @@ impl Forces {
             .sum()
     }
 
-    /// Rates f(t_j, Y_j) at the nodes.
+    /// Time derivatives of the states at the nodes, f(t_j, Y_j).
     fn rates(
         &self,
         problem: &ForcedProblem,
@@ -190,7 +190,7 @@ impl Forces {
         (0..nodes).map(at).collect()
     }
 
-    /// Jacobians ∂f/∂x at the nodes.
+    /// Jacobians ∂f/∂x of the equation of motion at the nodes.
     fn jacobians(
         &self,
         problem: &ForcedProblem,

@@ -84,7 +84,8 @@ impl<'a> ToothPeriod<'a> {
         let mut subintervals = Vec::new();
         for interval in engagement.subintervals() {
             let length = interval.to - interval.from;
-            // Directional coefficients oscillate at twice the rotation of the tool.
+            // Phase angle of the fastest pole, plus that of the directional coefficients, which oscillate at twice the
+            // rotation of the tool.
             let angle = fastest * length * seconds_per_radian + 2.0 * length;
             let count = (angle / subinterval_angle).ceil().max(1.0);
             let turn = length / count;
@@ -123,7 +124,7 @@ impl<'a> ToothPeriod<'a> {
     }
 }
 
-/// Rates f(t_j, Y_j) at the nodes of a subinterval.
+/// Time derivatives of the states at the nodes of a subinterval, f(t_j, Y_j).
 pub(super) fn rates(
     problem: &ForcedProblem,
     subinterval: &Subinterval,
@@ -167,7 +168,7 @@ pub(super) fn per_depth(
     }
 }
 
-/// Jacobians of the rates at the nodes of a subinterval.
+/// Jacobians ∂f/∂x of the equation of motion at the nodes of a subinterval.
 fn jacobians(
     problem: &ForcedProblem,
     subinterval: &Subinterval,

@@ -13,7 +13,7 @@ use quietcut_numerics::quadrature::Gauss;
 pub(crate) struct Element {
     /// State transition G without regenerative force, n × n.
     pub(crate) flow: DMatrix<f64>,
-    /// Observation E of the state at the start, ports × n.
+    /// Matrix E, ports × n: displacements p due to the state at the start of the element.
     pub(crate) observe: DMatrix<f64>,
     /// Response Q of the displacements p to the regenerative chips p − p_τ, ports × ports, per meter of axial depth.
     pub(crate) kernel: DMatrix<f64>,
@@ -28,7 +28,7 @@ pub(crate) struct Element {
 /// Axial displacement at the nodes, z = E_z x + Q_z f, and the edge and feed force that it causes.
 #[derive(Clone, Debug)]
 pub(crate) struct Axial {
-    /// Observation E_z of the state at the start, nodes × n.
+    /// Matrix E_z, nodes × n: axial displacement due to the state at the start of the element.
     pub(crate) observe: DMatrix<f64>,
     /// Response Q_z of the axial displacement to the regenerative chips p − p_τ, nodes × ports, per meter of axial
     /// depth.
@@ -62,7 +62,7 @@ pub(crate) struct CuttingTooth {
 pub(crate) struct Step<'a> {
     gauss: &'a Gauss,
     duration: f64,
-    /// Matrix exponential e^{A h}, n × n.
+    /// State transition e^{A h} of the free structure over the duration h, n × n.
     flow: DMatrix<f64>,
     /// Displacement response C e^{A t_i} at each node, 3 × n.
     observe: Vec<Matrix3xX<f64>>,
@@ -82,7 +82,7 @@ impl<'a> Step<'a> {
             .collect();
         // Gauss nodes are symmetric: h − t_j is the time of the node with the mirrored index.
         let drive: Vec<MatrixXx3<f64>> = forward.iter().rev().map(|flow| flow * &structure.b).collect();
-        // e^{−A t} = e^{−A h} e^{A (h − t)}
+        // Backward responses from the forward ones: e^{−A t} = e^{−A h} e^{A (h − t)}.
         let back = exponential.at(-duration);
         Self {
             gauss,

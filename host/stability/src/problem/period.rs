@@ -113,7 +113,7 @@ impl Period {
             let count = (angle / resolution.angle).max(decay / DECAY_MAX).ceil().max(1.0);
             let gauss = Gauss::shared(degree(angle / count, resolution.tolerance));
             let step = Step::new(problem, &exponential, gauss, duration / count);
-            // The count is small: a few elements for each vibration in the period.
+            // The conversion is exact: the count is a few elements for each vibration in the period.
             for index in 0..count as usize {
                 let phase = interval.from + length * index as f64 / count;
                 elements.push(step.element(problem, interval.teeth, phase, length / count));

@@ -25,7 +25,7 @@ pub(crate) struct Fineness {
 }
 
 impl Fineness {
-    /// Working mesh, on which results are computed.
+    /// Working mesh, on which multipliers and limits are computed.
     pub(crate) const WORKING: Self = Self {
         angle: 5.0,
         tolerance: 1e-9,
@@ -130,7 +130,7 @@ impl RevolutionMesh {
                 (count, nodes_for(angle / count, fineness.tolerance))
             };
             let duration_s = length_s / count;
-            // The count is small: a few subintervals for each vibration in the revolution.
+            // The conversion is exact: the count is a few subintervals for each vibration in the revolution.
             subintervals.extend((0..count as usize).map(|index| Subinterval {
                 start_s: ends[0] + duration_s * index as f64,
                 duration_s,

@@ -30,7 +30,7 @@ const TERMS_MAX: usize = 60;
 #[derive(Clone, Debug)]
 pub(crate) struct Characteristic {
     order: usize,
-    /// Axial depth, m, by which κ is divided before powers are taken.
+    /// Axial depth, m, by which the complex depth κ is divided before its powers are taken.
     scale: f64,
     /// For each element the coefficients of its polynomial in κ/scale, n × n row by row.
     elements: Vec<Vec<f64>>,
@@ -38,7 +38,7 @@ pub(crate) struct Characteristic {
     flight: Vec<f64>,
 }
 
-/// Buffers of an evaluation, reused between evaluations.
+/// Buffers for evaluating Φ and its derivative, reused between evaluations.
 #[derive(Clone, Debug)]
 pub(crate) struct Workspace {
     value: Vec<Complex64>,
@@ -112,7 +112,8 @@ impl Characteristic {
         polynomial_at(first, n, xi, &mut work.value, &mut work.slope);
         for element in rest {
             polynomial_at(element, n, xi, &mut work.factor, &mut work.factor_slope);
-            // (P T)' = P' T + P T'
+            // Product rule (P T)' = P' T + P T' for the transition P of this element after the transition T of the
+            // elements before.
             multiply(&work.factor, &work.slope, n, &mut work.product);
             multiply_add(&work.factor_slope, &work.value, n, &mut work.product);
             std::mem::swap(&mut work.slope, &mut work.product);
@@ -138,7 +139,7 @@ impl Characteristic {
         let n = self.order;
         let inverse = inverse(multiplier);
         self.evaluate((Complex64::ONE - inverse) * depth_m, work);
-        // Scaling: squares of large multipliers would overflow.
+        // Φ − μI is divided by a unit, since squares of large multipliers would overflow.
         let unit = multiplier.l1_norm().max(1.0);
         for i in 0..n {
             work.value[i * n + i] -= multiplier;
@@ -286,7 +287,7 @@ fn inverse(z: Complex64) -> Complex64 {
     (z / size).inv() / size
 }
 
-/// Polynomial G + κ T E + κ² T Q E + … of an element, as coefficients in κ/scale.
+/// Transition matrix of an element as the polynomial G + κ T E + κ² T Q E + …, given by its coefficients in κ/scale.
 fn polynomial(element: &Element, scale: f64) -> Vec<f64> {
     let mut coefficients = by_rows(&element.flow);
     let mut largest = element.flow.amax();

@@ -18,7 +18,7 @@ pub(crate) struct Collocated<'a> {
     problem: &'a Problem,
     rpm: f64,
     deepest_m: f64,
-    /// Coarse mesh, for all multipliers at once.
+    /// Coarse mesh of the tooth period, for all multipliers at once.
     coarse: Period,
     /// Working mesh, for limits.
     period: Period,
@@ -31,7 +31,7 @@ pub(crate) struct Collocated<'a> {
 impl<'a> Collocated<'a> {
     /// Meshes and matrices for axial depths up to `deepest_m`.
     pub(crate) fn new(problem: &'a Problem, rpm: f64, deepest_m: f64) -> Self {
-        // At the unit circle |w (1 − 1/μ)| ≤ 2 w.
+        // The mesh must resolve the complex depth, which is |w (1 − 1/μ)| ≤ 2 w on the unit circle.
         let period = Period::new(problem, rpm, 2.0 * deepest_m, Resolution::WORKING);
         let characteristic = Characteristic::new(&period, 2.0 * deepest_m);
         Self {

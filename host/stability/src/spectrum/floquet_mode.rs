@@ -50,11 +50,11 @@ pub(crate) struct Node {
 pub(crate) struct FloquetMode {
     /// Nodes of the quadrature, in order of time.
     pub(crate) nodes: Vec<Node>,
-    /// Values at the entry of a tooth, which is the start of the period.
+    /// Mode and adjoint at the entry of a tooth, which is the start of the period.
     pub(crate) entry: Node,
-    /// Values at the exit of a tooth.
+    /// Mode and adjoint at the exit of a tooth.
     pub(crate) exit: Node,
-    /// Inner product lᵀ r of left and right eigenvector.
+    /// Inner product lᵀ r of left and right eigenvector of the transition matrix.
     pub(crate) overlap: Complex64,
 }
 
@@ -66,7 +66,7 @@ struct Subinterval {
     turn: f64,
 }
 
-/// Exponentials shared by subintervals of one duration.
+/// Matrix exponentials shared by subintervals of one duration.
 struct Basis {
     gauss: Gauss,
     duration: f64,
@@ -156,7 +156,8 @@ impl FloquetMode {
                 });
             }
         }
-        // The first interval has one tooth more than the second. If there is only one interval, teeth leave at its end.
+        // In the first part of the period one tooth more cuts than in the second. If there is only one part, a tooth
+        // leaves at its end.
         let most = subintervals.first().map_or(0, |subinterval| subinterval.teeth);
         let leaving = subintervals
             .iter()
@@ -256,7 +257,7 @@ impl Basis {
 
 /// Transition of the state from the start of a subinterval to its nodes and to its end.
 struct MapFactor {
-    /// Transition matrix to the end, n × n.
+    /// Transition matrix to the end of the subinterval, n × n.
     transition: Matrix,
     /// Transition matrix to each node, n × n.
     states: Vec<Matrix>,

@@ -12,9 +12,9 @@ pub(crate) struct Shifted {
     band: usize,
     /// Upper factor U, row by row.
     upper: Vec<Complex64>,
-    /// For each column the elimination factors of the `band` rows below it.
+    /// For each column the elimination factors of the `band` rows below the diagonal.
     factors: Vec<Complex64>,
-    /// Index of the row exchanged with each row.
+    /// For each elimination step the index of the row exchanged with the pivot row.
     pivots: Vec<usize>,
 }
 

@@ -94,7 +94,7 @@ impl Dominant {
     }
 
     fn kept(map: &impl LinearMap, keep: &dyn Fn(&mut Vec<Complex64>)) -> Result<Self, Breakdown> {
-        // Beyond half the dimension the eigenvalues of the whole matrix are cheaper.
+        // A Krylov space of more than half the dimension costs more than the eigenvalues of the whole matrix.
         let most = (map.size() / 2).min(SPACE_MAX);
         if map.size() > WHOLE
             && let Ok(found) = arnoldi(map, most, RESIDUAL, keep)
@@ -134,7 +134,7 @@ pub(crate) struct Largest {
     pub(crate) eigenvalues: Vec<Complex64>,
     /// False if block Arnoldi did not converge.
     pub(crate) is_settled: bool,
-    /// Largest entry of the projected matrix of the map.
+    /// Largest entry of the map projected on the Krylov space.
     pub(crate) norm: f64,
 }
 
@@ -170,7 +170,7 @@ pub(crate) fn larger_than(map: &impl LinearMap, least: f64, share: f64) -> Optio
     found.is_settled.then_some(found.dominant.eigenvalues)
 }
 
-/// Result of block Arnoldi: Krylov space and projected map.
+/// Result of block Arnoldi; `is_settled` is false if the eigenvalues have not converged.
 struct ArnoldiResult {
     dominant: Dominant,
     is_settled: bool,
@@ -332,8 +332,8 @@ mod tests {
         }
     }
 
-    /// Test matrix with a pair, a double and a negative eigenvalue outside a cluster of small ones, rotated by
-    /// reflections.
+    /// Test matrix with a conjugate pair, a double and a negative eigenvalue outside a cluster of small ones, in
+    /// rotated axes.
     fn matrix(size: usize) -> Matrix {
         let mut matrix = DMatrix::from_fn(size, size, |i, j| {
             if i == j {
@@ -364,7 +364,7 @@ mod tests {
             let expected = [(-1.1, 0.0), (0.5, 0.8), (0.5, -0.8), (0.9, 0.0), (0.9, 0.0)];
             assert_eq!(found.eigenvalues.len(), expected.len());
             for (value, (re, im)) in found.eigenvalues.iter().zip(expected) {
-                // The matrix is normal, so that eigenvalues are as accurate as the residual.
+                // Tolerance: the matrix is normal, so that eigenvalues are as accurate as the residual 1e-11.
                 assert!((value - Complex64::new(re, im)).norm() < 1e-10, "{found:?}");
                 let vector = found.vector(*value).unwrap();
                 let miss = map.0.map(Complex64::from) * &vector - &vector * *value;

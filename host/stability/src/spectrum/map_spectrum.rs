@@ -102,7 +102,7 @@ impl<M: PeriodMap, F: Fn(f64) -> Option<M>, E: Fn(Complex64, f64) -> Option<f64>
 
     fn crossing_near(&mut self, guess: Crossing, low_m: f64, high_m: f64) -> Option<Crossing> {
         let (mut depth_m, mut expected) = (guess.depth_m, guess.multiplier);
-        // Newton's method for |μ| = 1 along the branch.
+        // Newton's method in the depth for |μ| = 1 along the branch of this multiplier.
         for _ in 0..20 {
             let multiplier = self.nearest(expected, depth_m)?;
             let slope = self.sensitivity(multiplier, depth_m)?;

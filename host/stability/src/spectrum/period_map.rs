@@ -159,7 +159,7 @@ pub(crate) fn larger_than(
 struct Map<'a> {
     period: &'a Period,
     depth_m: f64,
-    /// Matrix I − w Q of each element, factored.
+    /// LU factors of I − w Q of each element, with the axial depth w and the kernel Q.
     implicit: Vec<LU<f64, Dyn, Dyn>>,
 }
 

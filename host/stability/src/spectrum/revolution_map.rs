@@ -16,7 +16,7 @@ use crate::problem::revolution_mesh::{Series, Source};
 pub(crate) struct RevolutionMap<'a> {
     revolution: Rc<Revolution<'a>>,
     depth_m: f64,
-    /// Matrix I − w Q of each element, factored.
+    /// LU factors of I − w Q of each element, with the axial depth w and the kernel Q.
     factors: Vec<LU<f64, Dyn, Dyn>>,
 }
 

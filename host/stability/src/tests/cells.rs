@@ -67,7 +67,7 @@ fn verdicts_of_whole_charts_are_those_of_semi_discretization() {
         let (mut decided, mut large) = (0, 0);
         for _ in 0..60 {
             let (speed, depth) = (rng.random_range(0..200), rng.random_range(0..100));
-            // Cells are computed from all depths of a speed together.
+            // One cell of a whole column, since a column is computed from few of its depths.
             let cell = method.cells(speeds[speed], &depths).unwrap()[depth];
             let point = stepped.point(speeds[speed], depths[depth]).unwrap();
             let place = format!("{name} {} {}", speeds[speed], depths[depth]);

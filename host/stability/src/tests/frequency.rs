@@ -71,7 +71,7 @@ fn averaged_limits_of_chapter_3_with_and_without_edge_and_feed_terms() {
     let with = limits(&problem);
     problem.process.axial_depth_modulation = false;
     let without = limits(&problem);
-    // Half a unit of the last printed digit.
+    // Tolerance: half a unit of the last printed digit.
     assert!(
         (with.0 - 0.6534).abs() <= 6e-5 && (without.0 - 0.6527).abs() <= 6e-5,
         "{with:?} {without:?}"

@@ -99,7 +99,7 @@ impl Counter {
         let mut last = (0.0, at(0.0)?);
         for i in 1..=FIRST {
             let angle = half * i as f64 / FIRST as f64;
-            // Ends of the intervals still to be passed, the nearest last.
+            // Ends of the angle intervals along the circle that are not passed yet, the nearest last.
             let mut ends = vec![(angle, at(angle)?)];
             while let Some(&end) = ends.last() {
                 let middle = 0.5 * (last.0 + end.0);
