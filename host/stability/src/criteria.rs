@@ -115,6 +115,34 @@ pub(crate) const LINE_FAR: f64 = 0.5;
 /// outside the unit circle. It is 1e5 times the error of the scan, 1e-8 per element.
 pub(crate) const LINE_POLISHED: f64 = 1e-3;
 
+// Charts between the requested speeds.
+
+/// Largest error of a limit on the straight line between two speeds of a chart, relative to its depth: the 1 % that a chart
+/// promises.
+pub(crate) const CHART_DEPTH: f64 = 0.01;
+
+/// Least relative gap between two speeds of a chart, and the error in speed of a steep limit: 0.1 %, the accuracy to which a
+/// spindle holds its speed.
+pub(crate) const CHART_SPEED: f64 = 1e-3;
+
+/// Fewest lines of a chart per lobe, the distance in speed over which the number of vibrations in a tooth period changes
+/// by one. A quarter of a turn of the multiplier has then three lines, so that the parabola through them bends as the limit
+/// does. Two thousand random points of random machines hold with it (`tests/between_speeds.rs`).
+pub(crate) const LINES_OF_LOBE: f64 = 12.0;
+
+/// Widest relative gap between two speeds of a chart. A region of stability or of chatter that no neighbouring line shows is
+/// found if it is wider. Unfounded; a region of 2 % in speed and 5 % in depth is a thousandth of a chart over a
+/// range of one to 2.7, which is one of a thousand random points.
+pub(crate) const CHART_GAP: f64 = 0.02;
+
+/// Relative gap between two speeds down to which it is halved beside a line that shows a tongue of instability. Half of the
+/// width 2ζ of a resonance with the damping ratio 0.5 % of a machine tool.
+pub(crate) const TONGUE_GAP: f64 = 0.005;
+
+/// Largest number of lines that are added to a chart: an hour at a second per line, as cubic terms may need. Gaps that
+/// remain are listed in the chart. Unfounded.
+pub(crate) const CHART_LINES_MAX: usize = 4000;
+
 // Cell charts.
 
 /// Relative error of the cubic in depth, between two sampled depths, up to which it gives the multipliers of the cells

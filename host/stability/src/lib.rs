@@ -100,6 +100,7 @@ pub use limits::line::line;
 pub use limits::method::{Label, Method};
 pub use limits::plane::{Linearized, Plane};
 pub use limits::point::{CutStability, point};
+pub use limits::resolution::Resolution;
 pub use limits::sampling::{Basis, Variable};
 pub use limits::sensitivity::{Sensitivity, Slope, Tangent};
 pub use limits::speed_line::{Limit, SpeedLine, Switch};

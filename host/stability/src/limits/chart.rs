@@ -4,6 +4,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::method::{Label, Method};
+use super::resolution::Resolution;
 use super::speed_line::SpeedLine;
 use super::spread::LimitSpread;
 use super::uncertainty::Uncertainty;
@@ -18,6 +19,13 @@ pub struct Chart {
     pub label: Label,
     /// One line per spindle speed, in the requested order.
     pub speeds: Vec<SpeedLine>,
+    /// Lines at speeds between the requested ones, ascending, so that straight lines through both draw the limits; empty if
+    /// not requested or not needed.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub refined: Vec<SpeedLine>,
+    /// Accuracy between speeds; `None` if no lines were added between the requested ones.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub resolution: Option<Resolution>,
     /// Depths, mm, at which lines contain the share of stable machines; empty if not requested.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub cells_mm: Vec<f64>,
@@ -38,6 +46,8 @@ pub fn chart<M: Method + ?Sized>(
     Ok(Chart {
         label: Label::of(method),
         speeds: method.lines(speeds_rpm, depth_mm, samples.max(CHART_SAMPLES_MIN))?,
+        refined: Vec::new(),
+        resolution: None,
         cells_mm: Vec::new(),
     })
 }

@@ -57,8 +57,10 @@ pub(crate) fn line_of<S: Spectrum>(
         spectrum: spectrum(deepest_m),
         crossings: Vec::new(),
     };
+    let mut largest = Vec::with_capacity(samples + 1);
     let mut low = scan.sample(0.0)?;
     let start = low.outside();
+    largest.push(low.largest);
     for index in 1..=samples {
         let share = index as f64 / samples as f64;
         if share * depth_m > deepest_m {
@@ -69,9 +71,13 @@ pub(crate) fn line_of<S: Spectrum>(
         let high = scan.sample(depth_m * share)?;
         let found = scan.between(&low, &high, 0)?;
         scan.crossings.extend(found);
+        largest.push(high.largest);
         low = high;
     }
-    Ok(scan.finish(start, depth_mm))
+    Ok(SpeedLine {
+        largest,
+        ..scan.finish(start, depth_mm)
+    })
 }
 
 /// True if the multiplier may reach the unit circle within a step in depth.
@@ -82,6 +88,8 @@ fn is_near(root: &Root, step_m: f64) -> bool {
 #[derive(Clone, Debug)]
 struct Sample {
     depth_m: f64,
+    /// Absolute value of the largest multiplier, to the error of the scan.
+    largest: f64,
     roots: Vec<Root>,
 }
 
@@ -122,13 +130,18 @@ impl<S: Spectrum> Scan<S> {
             .spectrum
             .multipliers(depth_m)
             .map_err(|cause| cause.at(self.rpm, depth_m * 1e3, NO_SOLUTION))?;
+        let largest = all.first().map_or(0.0, |multiplier| multiplier.norm());
         let roots = all
             .into_iter()
             .take_while(|multiplier| multiplier.norm() > LINE_FOLLOWED)
             .filter(|multiplier| multiplier.im >= 0.0)
             .map(|multiplier| self.root(multiplier, depth_m))
             .collect();
-        Ok(Sample { depth_m, roots })
+        Ok(Sample {
+            depth_m,
+            largest,
+            roots,
+        })
     }
 
     /// A multiplier with its derivative. Near the unit circle it is first refined by Newton's method, so that its side

@@ -25,6 +25,11 @@ pub trait Method: Sync {
         None
     }
 
+    /// True if a line takes seconds, so that a chart has lines at the requested speeds only unless the user asks for more.
+    fn takes_seconds(&self) -> bool {
+        false
+    }
+
     /// Dominant Floquet multiplier at a spindle speed (rev/min) and an axial depth (mm), with its error.
     ///
     /// The error is the numerical error with respect to the full linear problem, if the method converges to it. For a

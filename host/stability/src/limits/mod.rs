@@ -1,6 +1,7 @@
 //! Stability limits: one cut, one speed, charts and cells; derivatives and spread of limits. `Method` is the interface
 //! of all methods.
 
+pub(crate) mod between_speeds;
 pub(crate) mod bounds;
 pub(crate) mod cell;
 pub(crate) mod cell_chart;
@@ -11,6 +12,7 @@ pub(crate) mod method;
 pub(crate) mod percentiles;
 pub(crate) mod plane;
 pub(crate) mod point;
+pub(crate) mod resolution;
 pub(crate) mod sampling;
 pub(crate) mod sensitivity;
 pub(crate) mod speed_line;

@@ -58,6 +58,10 @@ pub struct SpeedLine {
     /// Spread of the limit; `None` if the case has no deviations, or if it was not requested.
     #[serde(flatten)]
     pub spread: Option<LimitSpread>,
+    /// Absolute value of the largest Floquet multiplier at the equal steps in depth of the scan, from depth 0 to the last;
+    /// empty if the method finds limits without multipliers.
+    #[serde(skip)]
+    pub(crate) largest: Vec<f64>,
 }
 
 impl SpeedLine {
@@ -98,6 +102,7 @@ impl SpeedLine {
             first_limit,
             switches,
             spread: None,
+            largest: Vec::new(),
         }
     }
 }

@@ -617,6 +617,7 @@ fn two_stable_orbits_are_not_surely_stable() {
         first_limit: None,
         switches: Vec::new(),
         spread: None,
+        largest: Vec::new(),
     };
     assert_eq!(entries::surely_stable(&line, 4.0), [[0.0, 2.0], [3.0, 4.0]]);
     let entries = entries::unstable(&line, 4.0);

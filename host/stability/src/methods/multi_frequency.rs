@@ -107,6 +107,10 @@ impl Method for MultiFrequency {
         "multi-frequency"
     }
 
+    fn takes_seconds(&self) -> bool {
+        true
+    }
+
     /// Computes the multiplier with twice the harmonics; its error is the change from the single to the doubled number.
     fn point(&self, rpm: f64, depth_mm: f64) -> Result<CutStability, StabilityError> {
         check_speed(rpm)?;

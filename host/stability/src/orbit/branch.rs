@@ -142,6 +142,7 @@ impl Branch {
             first_limit,
             switches,
             spread: None,
+            largest: Vec::new(),
         }
     }
 }

@@ -1,6 +1,7 @@
 //! Tests across the rooms, with the oracle of Taylor series that shares no code with them.
 
 mod agreement;
+mod between_speeds;
 mod cells;
 mod extensions;
 mod frequency;

@@ -1,0 +1,379 @@
+//! Lines at further spindle speeds of a chart, so that straight lines between neighbouring speeds draw the limits.
+//!
+//! A gap between two speeds is accepted if the straight line between the ends of each stable interval is right to
+//! [`CHART_DEPTH`] of the depth, or to [`CHART_SPEED`] of the speed where a limit is steep. The error of the straight line
+//! over a gap follows from the two neighbouring gaps. Extrapolation of the left neighbour to the right end of the gap
+//! misses by e_r, of the right neighbour to the left end by e_l. A kink within the gap, where two lobes meet, then lies
+//!
+//!   e_r e_l/(e_r + e_l)
+//!
+//! off the straight line, wherever in the gap it is; a parabola over equal gaps lies off by a quarter of that. If the
+//! stable intervals of two neighbouring speeds differ in number, the gap is halved down to the least width.
+//!
+//! A region of stability or of chatter that lies within one gap changes no limit at either end. It is found from the
+//! largest Floquet multiplier (characteristic multiplier) |μ|: at each step in depth, the same extrapolations of ln|μ|
+//! bound its extremum within the gap. A gap in which |μ| may reach 1 is halved as well. All this requires speeds that are
+//! close compared with the lobes, which repeat when the number of vibrations in a tooth period changes by one: gaps are
+//! first divided so that each lobe has [`LINES_OF_LOBE`] lines, and so that none is wider than [`CHART_GAP`]. Two lightly
+//! damped modes whose frequencies add up to a multiple of the tooth-passing frequency become unstable in a narrow
+//! tongue, which may end within a gap. A line beside it shows a maximum of |μ| over the depth: a gap beside such a line is
+//! halved down to [`TONGUE_GAP`].
+
+use super::chart::{Chart, chart};
+use super::method::Method;
+use super::resolution::Resolution;
+use super::speed_line::SpeedLine;
+use crate::criteria::{
+    CHART_DEPTH, CHART_GAP, CHART_LINES_MAX, CHART_SAMPLES_MIN, CHART_SPEED, LINES_OF_LOBE, TONGUE_GAP,
+};
+use crate::error::StabilityError;
+use crate::spectrum::verdict::Verdict;
+
+impl Chart {
+    /// Adds lines at further speeds until straight lines between all of them draw the limits: see [`Resolution`].
+    ///
+    /// `samples` is the number of steps in depth that the requested lines have, `teeth` the number of teeth of the tool.
+    /// The result does not depend on the number of threads.
+    ///
+    /// # Errors
+    /// As [`Method::line`], for the first speed that fails.
+    pub fn with_lines_between<M: Method + ?Sized>(
+        mut self,
+        method: &M,
+        depth_mm: f64,
+        samples: usize,
+        teeth: usize,
+    ) -> Result<Self, StabilityError> {
+        let mut lines: Vec<SpeedLine> = self.speeds.clone();
+        lines.sort_by(|a, b| a.rpm.total_cmp(&b.rpm));
+        lines.dedup_by(|a, b| a.rpm == b.rpm);
+        let asked = lines.len();
+        // Added lines have fewer steps in depth, which are steps of the requested lines, so that both can be compared.
+        let stride = stride(samples);
+        for line in &mut lines {
+            line.largest = line.largest.iter().step_by(stride).copied().collect();
+        }
+        loop {
+            let further: Vec<f64> = (1..lines.len())
+                .flat_map(|right| speeds_within(&lines, right, teeth))
+                .collect();
+            if further.is_empty() || lines.len() - asked + further.len() > CHART_LINES_MAX {
+                break;
+            }
+            let between = chart(method, &further, depth_mm, samples / stride)?.speeds;
+            self.refined.extend(between.iter().cloned());
+            lines.extend(between);
+            lines.sort_by(|a, b| a.rpm.total_cmp(&b.rpm));
+        }
+        self.refined.sort_by(|a, b| a.rpm.total_cmp(&b.rpm));
+        self.resolution = Some(Resolution {
+            depth_share: CHART_DEPTH,
+            speed_share: CHART_SPEED,
+            narrowest_island_rpm: narrowest_island_rpm(&lines, depth_mm),
+            unresolved_rpm: (1..lines.len())
+                .filter(|&right| !is_drawn(&lines, right))
+                .map(|right| [lines[right - 1].rpm, lines[right].rpm])
+                .collect(),
+        });
+        Ok(self)
+    }
+
+    /// Verdict that the chart draws at a spindle speed and an axial depth: from the straight lines between the two
+    /// neighbouring speeds, or from these speeds alone over an unresolved gap. `None` outside the speeds of the chart.
+    pub fn verdict(&self, rpm: f64, depth_mm: f64) -> Option<Verdict> {
+        let lines = self.lines();
+        let right = lines.partition_point(|line| line.rpm < rpm);
+        let line = lines.get(right)?;
+        if line.rpm == rpm {
+            return Some(verdict_of(contains(&line.stable_mm, depth_mm)));
+        }
+        let left = lines.get(right.checked_sub(1)?)?;
+        let unresolved = self
+            .resolution
+            .iter()
+            .flat_map(|resolution| &resolution.unresolved_rpm);
+        let is_resolved = unresolved.clone().all(|gap| *gap != [left.rpm, line.rpm]);
+        if is_resolved && left.stable_mm.len() == line.stable_mm.len() {
+            let share = (rpm - left.rpm) / (line.rpm - left.rpm);
+            let between = left.stable_mm.iter().zip(&line.stable_mm);
+            let mut intervals = between.map(|(a, b)| [0, 1].map(|end| a[end] + (b[end] - a[end]) * share));
+            return Some(verdict_of(
+                intervals.any(|interval| contains(&[interval], depth_mm)),
+            ));
+        }
+        let ends = [left, line].map(|line| contains(&line.stable_mm, depth_mm));
+        Some(if ends[0] == ends[1] {
+            verdict_of(ends[0])
+        } else {
+            Verdict::Undecided
+        })
+    }
+
+    /// All lines, requested and added, by ascending speed.
+    pub fn lines(&self) -> Vec<&SpeedLine> {
+        let mut lines: Vec<&SpeedLine> = self.speeds.iter().chain(&self.refined).collect();
+        lines.sort_by(|a, b| a.rpm.total_cmp(&b.rpm));
+        lines
+    }
+}
+
+/// Largest divisor of the number of steps in depth that leaves [`CHART_SAMPLES_MIN`] steps; 1 if there are fewer steps.
+fn stride(samples: usize) -> usize {
+    (1..=samples / CHART_SAMPLES_MIN)
+        .rev()
+        .find(|divisor| samples.is_multiple_of(*divisor))
+        .unwrap_or(1)
+}
+
+fn verdict_of(is_stable: bool) -> Verdict {
+    if is_stable {
+        Verdict::Stable
+    } else {
+        Verdict::Unstable
+    }
+}
+
+fn contains(intervals: &[[f64; 2]], depth_mm: f64) -> bool {
+    intervals
+        .iter()
+        .any(|[from, to]| (*from..=*to).contains(&depth_mm))
+}
+
+/// Speeds at which a gap is to be divided, rev/min; none if straight lines draw it, or if it has the least width.
+fn speeds_within(lines: &[SpeedLine], right: usize, teeth: usize) -> Vec<f64> {
+    let (left, right_line) = (&lines[right - 1], &lines[right]);
+    let width = right_line.rpm / left.rpm - 1.0;
+    if width <= CHART_SPEED {
+        return Vec::new();
+    }
+    let parts = (width / coarsest(left, right_line, teeth)).ceil();
+    let parts = if parts > 1.0 {
+        parts
+    } else if is_drawn(lines, right) {
+        return Vec::new();
+    } else {
+        2.0
+    };
+    // The number of parts is bounded: no lobe has more lines than the range has least widths.
+    let parts = parts.min((width / CHART_SPEED).ceil()) as usize;
+    let step_rpm = (right_line.rpm - left.rpm) / parts as f64;
+    (1..parts).map(|part| left.rpm + step_rpm * part as f64).collect()
+}
+
+/// Widest relative gap in speed, at most [`CHART_GAP`], at which every lobe has [`LINES_OF_LOBE`] lines. Lobes repeat in speed by 1/k of the
+/// speed, with k vibrations in a tooth period; the fastest chatter at an end of a stable interval sets k.
+fn coarsest(left: &SpeedLine, right: &SpeedLine, teeth: usize) -> f64 {
+    let vibrations = |line: &SpeedLine| {
+        let ends = line.switches.iter().filter(|switch| {
+            let is_end = |[from, to]: &[f64; 2]| *from == switch.depth_mm || *to == switch.depth_mm;
+            line.stable_mm.iter().any(is_end)
+        });
+        let fastest_hz = ends.filter_map(|switch| switch.chatter_hz).fold(0.0, f64::max);
+        fastest_hz * 60.0 / (line.rpm * teeth.max(1) as f64)
+    };
+    (1.0 / (LINES_OF_LOBE * vibrations(left).max(vibrations(right)))).min(CHART_GAP)
+}
+
+/// True if straight lines over the gap draw every stable interval, and if no region of stability or of chatter can lie
+/// within the gap.
+fn is_drawn(lines: &[SpeedLine], right: usize) -> bool {
+    let gap = Gap {
+        before: right.checked_sub(2).map(|index| &lines[index]),
+        left: &lines[right - 1],
+        right: &lines[right],
+        after: lines.get(right + 1),
+    };
+    gap.is_straight() && !gap.may_hide_a_region() && !gap.may_hide_a_tongue()
+}
+
+/// Two neighbouring lines of a chart with the lines beside them.
+struct Gap<'a> {
+    before: Option<&'a SpeedLine>,
+    left: &'a SpeedLine,
+    right: &'a SpeedLine,
+    after: Option<&'a SpeedLine>,
+}
+
+impl Gap<'_> {
+    /// True if the straight line between the ends of each stable interval is right to the accuracy of the chart.
+    fn is_straight(&self) -> bool {
+        let count = self.left.stable_mm.len();
+        if self.right.stable_mm.len() != count {
+            return false;
+        }
+        let alike = |line: &&SpeedLine| line.stable_mm.len() == count;
+        let (before, after) = (self.before.filter(alike), self.after.filter(alike));
+        (0..count).all(|interval| {
+            (0..2).all(|end| {
+                let at = |line: &SpeedLine| line.stable_mm[interval][end];
+                let (a, b) = (at(self.left), at(self.right));
+                let misses = self.misses(before.map(at), a, b, after.map(at));
+                let Some(error_mm) = kink_between(misses).map(f64::abs) else {
+                    return a == b;
+                };
+                let steep_mm = CHART_SPEED * self.left.rpm * (b - a).abs() / (self.right.rpm - self.left.rpm);
+                error_mm <= (CHART_DEPTH * a.min(b)).max(steep_mm)
+            })
+        })
+    }
+
+    /// Differences of the values at both ends of the gap from the straight lines through the gap's other end and the
+    /// neighbour beyond it: (right end, left end).
+    fn misses(&self, before: Option<f64>, left: f64, right: f64, after: Option<f64>) -> [Option<f64>; 2] {
+        let width = self.right.rpm - self.left.rpm;
+        let at_right = self.before.zip(before).map(|(line, value)| {
+            let slope = (left - value) / (self.left.rpm - line.rpm);
+            right - (left + slope * width)
+        });
+        let at_left = self.after.zip(after).map(|(line, value)| {
+            let slope = (value - right) / (line.rpm - self.right.rpm);
+            left - (right - slope * width)
+        });
+        [at_right, at_left]
+    }
+
+    /// True if |μ| may cross the unit circle and return within the gap, at a step in depth where both ends lie on one
+    /// side.
+    fn may_hide_a_region(&self) -> bool {
+        let (left, right) = (&self.left.largest, &self.right.largest);
+        let steps = left.len().min(right.len());
+        (0..steps).any(|step| {
+            let log = |line: &SpeedLine| line.largest.get(step).map(|size| logarithm(*size));
+            let (Some(a), Some(b)) = (log(self.left), log(self.right)) else {
+                return false;
+            };
+            if (a > 0.0) != (b > 0.0) {
+                return false;
+            }
+            let side = if a > 0.0 { 1.0 } else { -1.0 };
+            let misses = self.misses(self.before.and_then(log), a, b, self.after.and_then(log));
+            // Bending towards the circle makes both extrapolations miss in the direction away from it.
+            let Some(bulge) = kink_between(misses.map(|miss| miss.map(|miss| (side * miss).max(0.0)))) else {
+                return false;
+            };
+            let along = [left, right].map(|sizes| bend(sizes, step, side));
+            let nearest = (side * a).min(side * b) - bulge - along[0].max(along[1]);
+            bulge > 0.0 && nearest < 0.0
+        })
+    }
+}
+
+impl Gap<'_> {
+    /// True if the gap is wider than [`TONGUE_GAP`] and one of its ends shows a tongue of instability beside it.
+    fn may_hide_a_tongue(&self) -> bool {
+        self.right.rpm > self.left.rpm * (1.0 + TONGUE_GAP)
+            && [self.left, self.right]
+                .into_iter()
+                .any(|line| shows_a_tongue(&line.largest))
+    }
+}
+
+/// True if |μ| < 1 has a maximum over the depth that rises above the minima on both sides by more than its distance from
+/// the circle.
+fn shows_a_tongue(largest: &[f64]) -> bool {
+    let least = |sizes: &[f64]| sizes.iter().copied().fold(f64::INFINITY, f64::min);
+    (1..largest.len().saturating_sub(1)).any(|step| {
+        let peak = largest[step];
+        let is_maximum = peak >= largest[step - 1] && peak >= largest[step + 1];
+        let base = least(&largest[..step]).max(least(&largest[step + 1..]));
+        peak < 1.0 && is_maximum && peak - base > 1.0 - peak
+    })
+}
+
+/// Distance by which a kink within a gap lies off the straight line between its ends, from the misses of both
+/// extrapolations; of one alone, its bound. `None` if neither neighbour exists.
+fn kink_between(misses: [Option<f64>; 2]) -> Option<f64> {
+    match misses {
+        [Some(right), Some(left)] => {
+            let sum = right.abs() + left.abs();
+            Some(if sum > 0.0 {
+                right.abs() * left.abs() / sum
+            } else {
+                0.0
+            })
+        }
+        [Some(one), None] | [None, Some(one)] => Some(one.abs()),
+        [None, None] => None,
+    }
+}
+
+/// Largest change of ln|μ| towards the unit circle within a step in depth beside a sample, beyond the values at both ends
+/// of the step: that of the parabola through three samples, (second difference)/8.
+fn bend(largest: &[f64], step: usize, side: f64) -> f64 {
+    let at = |index: usize| largest.get(index).map(|size| side * logarithm(*size));
+    let three = step
+        .checked_sub(1)
+        .and_then(|below| Some((at(below)?, at(step)?, at(step + 1)?)));
+    three.map_or(0.0, |(below, here, above)| {
+        ((below - 2.0 * here + above) / 8.0).max(0.0)
+    })
+}
+
+/// ln|μ|, bounded below at a thousandth: smaller multipliers are all far inside the circle.
+fn logarithm(size: f64) -> f64 {
+    size.max(1e-3).ln()
+}
+
+/// Width of the narrowest region of stability or of chatter that begins and ends between the first and the last speed,
+/// rev/min.
+fn narrowest_island_rpm(lines: &[SpeedLine], depth_mm: f64) -> Option<f64> {
+    let stable = |line: &SpeedLine| line.stable_mm.clone();
+    let unstable = |line: &SpeedLine| complement(&line.stable_mm, depth_mm);
+    let mut widths = Vec::new();
+    widths.extend(island_widths_rpm(lines, &stable));
+    widths.extend(island_widths_rpm(lines, &unstable));
+    widths.into_iter().min_by(f64::total_cmp)
+}
+
+/// Depths from 0 to the last that lie outside ascending intervals.
+fn complement(intervals: &[[f64; 2]], depth_mm: f64) -> Vec<[f64; 2]> {
+    let starts = std::iter::once(0.0).chain(intervals.iter().map(|interval| interval[1]));
+    let ends = intervals
+        .iter()
+        .map(|interval| interval[0])
+        .chain(std::iter::once(depth_mm));
+    starts
+        .zip(ends)
+        .filter(|(from, to)| to > from)
+        .map(|(from, to)| [from, to])
+        .collect()
+}
+
+/// Widths in speed of all connected regions that touch neither the first nor the last line, rev/min. Intervals of
+/// neighbouring lines belong to one region if they overlap in depth. A region extends half way to the next lines.
+fn island_widths_rpm(lines: &[SpeedLine], intervals: &dyn Fn(&SpeedLine) -> Vec<[f64; 2]>) -> Vec<f64> {
+    // Each region with its first and last line, and the intervals that it has at the newest line.
+    let mut open: Vec<(usize, Vec<[f64; 2]>)> = Vec::new();
+    let mut widths = Vec::new();
+    for (index, line) in lines.iter().enumerate() {
+        let mut next: Vec<(usize, Vec<[f64; 2]>)> = Vec::new();
+        let mut continued = vec![false; open.len()];
+        for interval in intervals(line) {
+            let mut first = index;
+            for ((begin, ends), continued) in open.iter().zip(&mut continued) {
+                if ends
+                    .iter()
+                    .any(|end| end[0] < interval[1] && interval[0] < end[1])
+                {
+                    first = first.min(*begin);
+                    *continued = true;
+                }
+            }
+            match next
+                .iter_mut()
+                .find(|(begin, _)| *begin == first && first != index)
+            {
+                Some((_, ends)) => ends.push(interval),
+                None => next.push((first, vec![interval])),
+            }
+        }
+        for ((begin, _), continued) in open.iter().zip(&continued) {
+            if !continued && *begin > 0 {
+                let from_rpm = 0.5 * (lines[begin - 1].rpm + lines[*begin].rpm);
+                widths.push(0.5 * (lines[index - 1].rpm + line.rpm) - from_rpm);
+            }
+        }
+        open = next;
+    }
+    widths
+}

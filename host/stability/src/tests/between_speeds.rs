@@ -1,0 +1,136 @@
+//! Charts between the speeds asked for: random points have the verdict that is drawn.
+
+use rand::{RngExt, SeedableRng};
+use rayon::prelude::*;
+
+use crate::tests::{problem, random_case};
+use crate::*;
+
+/// Points drawn in a chart, and how they came out.
+#[derive(Debug, Default)]
+struct Drawn {
+    points: usize,
+    /// Points within 1 % in depth or 0.1 % in speed of a true limit.
+    near: usize,
+    undecided: usize,
+    wrong: Vec<(f64, f64)>,
+}
+
+/// Compares the drawn verdict with the computed one at random points that are farther than 1 % in depth and 0.1 % in speed from
+/// every true limit.
+fn compare(chart: &Chart, method: &dyn Method, depth_mm: f64, points: usize, seed: u64) -> Drawn {
+    let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
+    let lines = chart.lines();
+    let (first, last) = (lines[0].rpm, lines[lines.len() - 1].rpm);
+    let at: Vec<(f64, f64)> = (0..points)
+        .map(|_| (rng.random_range(first..last), rng.random_range(0.0..depth_mm)))
+        .collect();
+    let found: Vec<(Option<Verdict>, Option<Verdict>)> = at
+        .par_iter()
+        .map(|&(rpm, depth_mm)| {
+            let truth = |rpm: f64, depth_mm: f64| method.point(rpm, depth_mm).unwrap().verdict;
+            let center = truth(rpm, depth_mm);
+            let is_far = [-1.0, -0.5, 0.5, 1.0].into_iter().all(|share| {
+                truth(rpm * (1.0 + 1e-3 * share), depth_mm) == center
+                    && truth(rpm, depth_mm * (1.0 + 1e-2 * share)) == center
+            });
+            (is_far.then_some(center), chart.verdict(rpm, depth_mm))
+        })
+        .collect();
+    let mut drawn = Drawn::default();
+    for (at, (truth, verdict)) in at.into_iter().zip(found) {
+        drawn.points += 1;
+        drawn.undecided += usize::from(verdict == Some(Verdict::Undecided));
+        match truth {
+            None => drawn.near += 1,
+            Some(truth) if verdict != Some(Verdict::Undecided) && verdict != Some(truth) => {
+                drawn.wrong.push(at)
+            }
+            Some(_) => {}
+        }
+    }
+    drawn
+}
+
+/// Number of random machines; `QUIETCUT_SEEDS` sets another one.
+fn machines() -> u64 {
+    std::env::var("QUIETCUT_SEEDS").map_or(4, |count| count.parse().unwrap())
+}
+
+#[test]
+fn charts_of_the_literature_draw_the_verdict_of_every_point() {
+    for (name, rpm, depth_mm, count) in [
+        ("insperger-2dof-ad0.05", (5000.0, 25_000.0), 10.0, 40),
+        ("insperger-2dof-ad0.5", (5000.0, 25_000.0), 10.0, 40),
+        ("insperger-1dof-ad0.1", (5000.0, 25_000.0), 10.0, 12),
+        ("kuka-kr90-acetal", (600.0, 2400.0), 5.0, 7),
+        ("staubli-tx200", (500.0, 3000.0), 4.0, 20),
+    ] {
+        let problem = problem(name);
+        let teeth = quietcut_testkit::case(name).tool.unwrap().teeth;
+        let method = Collocation { problem };
+        let speeds = spaced(rpm.0, rpm.1, count);
+        let begun = std::time::Instant::now();
+        let chart = chart(&method, &speeds, depth_mm, 40).unwrap();
+        let base = begun.elapsed();
+        let chart = chart.with_lines_between(&method, depth_mm, 40, teeth).unwrap();
+        let drawn = compare(&chart, &method, depth_mm, 400, 7);
+        println!(
+            "{name}: {count} + {} lines, {base:?} of {:?}, {:?}, {drawn:?}",
+            chart.refined.len(),
+            begun.elapsed(),
+            chart.resolution
+        );
+        assert!(drawn.wrong.is_empty(), "{name}: {drawn:?}");
+        assert!(drawn.undecided * 100 <= drawn.points, "{name}: {drawn:?}");
+    }
+}
+
+#[test]
+fn charts_of_random_machines_draw_the_verdict_of_every_point() {
+    let mut total = Drawn::default();
+    for seed in 0..machines() {
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
+        let case = random_case(&mut rng);
+        let problem = Problem::new(&case, CubicTerms::Refuse).unwrap();
+        let teeth = case.tool.as_ref().unwrap().teeth;
+        let (from, to) = default_speeds(&case, &problem.structure, teeth);
+        let method = Collocation { problem };
+        let coarse = spaced(from, to, 12);
+        let mut depth_mm = 0.01;
+        let lowest = loop {
+            let lines = chart(&method, &coarse, depth_mm, 40).unwrap().speeds;
+            let limits = lines.iter().filter_map(|line| line.first_limit);
+            let lowest = limits.map(|limit| limit.depth_mm).fold(f64::INFINITY, f64::min);
+            if lowest.is_finite() || depth_mm > 100.0 {
+                break lowest;
+            }
+            depth_mm *= 2.0;
+        };
+        if !lowest.is_finite() {
+            continue;
+        }
+        let depth_mm = 4.0 * lowest;
+        let count = rng.random_range(2..40);
+        let begun = std::time::Instant::now();
+        let chart = chart(&method, &spaced(from, to, count), depth_mm, 40).unwrap();
+        let chart = chart.with_lines_between(&method, depth_mm, 40, teeth).unwrap();
+        let took = begun.elapsed();
+        let drawn = compare(&chart, &method, depth_mm, 100, seed);
+        println!(
+            "seed {seed}: {count} + {} lines, {took:?}, {:?}, {drawn:?}",
+            chart.refined.len(),
+            chart
+                .resolution
+                .as_ref()
+                .map(|r| (r.narrowest_island_rpm, r.unresolved_rpm.len()))
+        );
+        total.points += drawn.points;
+        total.near += drawn.near;
+        total.undecided += drawn.undecided;
+        total.wrong.extend(drawn.wrong);
+    }
+    println!("{total:?}");
+    assert!(total.wrong.is_empty(), "{total:?}");
+    assert!(total.undecided * 100 <= total.points, "{total:?}");
+}
