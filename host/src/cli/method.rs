@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use quietcut_model::effects::EffectName;
+
 use super::{Error, non_negative};
 use crate::case::Case;
 use crate::criteria::COARSE_TABLE;
@@ -21,6 +23,21 @@ const STEPS_MAX: usize = 20_000;
 
 /// Upper bound of `--harmonics`, a choice: more harmonics make the truncated Hill matrix too large to be useful.
 const HARMONICS_MAX: usize = 400;
+
+/// The case after some time, s, with wear and drift as they are then.
+///
+/// # Errors
+/// The case has neither wear nor drift, so that the time would change nothing; or their values are not possible.
+pub(super) fn case_after(case: &Case, after_s: f64) -> Result<Case, Error> {
+    if !case.has(EffectName::Wear) && !case.has(EffectName::Drift) {
+        return Err(Error::input(format!(
+            "--after-s {after_s}: {} has neither [extension.wear] nor [extension.drift], so that nothing in it changes with time; \
+             leave the option out, or add such a section",
+            case.path.display()
+        )));
+    }
+    Ok(after(case, after_s)?)
+}
 
 /// Stability method with its options.
 #[derive(Debug, clap::Args)]
@@ -80,7 +97,7 @@ impl MethodChoice {
         let moved;
         let case = match self.after_s {
             Some(after_s) => {
-                moved = after(case, after_s)?;
+                moved = case_after(case, after_s)?;
                 &moved
             }
             None => case,

@@ -6,11 +6,11 @@ use std::path::{Path, PathBuf};
 use quietcut_core::lobes::{IntervalKind, IntervalSlopes, LobeTable};
 use serde::Serialize;
 
+use super::method::case_after;
 use super::{Error, Output, Range};
 use crate::case::Case;
 use crate::file;
 use crate::lobe_table::{TableRequest, build_table};
-use crate::stability::after;
 
 /// Builds a lobe table for the device from cases, or shows one.
 #[derive(Debug, clap::Args)]
@@ -143,7 +143,7 @@ pub fn run(args: Args) -> Result<(), Error> {
         .map_err(Error::input)?;
     if let Some(after_s) = args.after_s {
         for case in &mut cases {
-            *case = after(case, after_s)?;
+            *case = case_after(case, after_s)?;
         }
     }
     let request = TableRequest {
