@@ -17,4 +17,5 @@ pub mod cli;
 mod criteria;
 pub mod demo;
 pub mod device;
+pub mod machine;
 pub mod report;

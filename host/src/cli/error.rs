@@ -7,6 +7,7 @@ use crate::case::CaseError;
 use crate::device::DeviceError;
 use crate::file::FileError;
 use crate::lobe_table::BuildError;
+use crate::machine::FolderError;
 use crate::plan::PlanError;
 use crate::recording::cut_table::CutTableError;
 use crate::stability::StabilityError;
@@ -89,6 +90,15 @@ impl From<CaseError> for Error {
     fn from(error: CaseError) -> Self {
         match error {
             CaseError::File(cause) => cause.into(),
+            other => Self::input(other),
+        }
+    }
+}
+
+impl From<FolderError> for Error {
+    fn from(error: FolderError) -> Self {
+        match error {
+            FolderError::Case(cause) => cause.into(),
             other => Self::input(other),
         }
     }

@@ -16,6 +16,7 @@ mod lobes_cells;
 mod method;
 mod milling_rig;
 pub mod monitor;
+pub mod next;
 mod number;
 mod output;
 pub mod plan;
@@ -24,6 +25,7 @@ mod progress;
 mod range;
 pub mod replay;
 mod segment;
+pub mod setup;
 pub mod simulate;
 pub mod table;
 pub mod upload;
@@ -55,6 +57,8 @@ struct Cli {
 #[derive(Debug, Subcommand)]
 enum Verb {
     Demo(demo::Args),
+    Setup(Box<setup::Args>),
+    Next(next::Args),
     Simulate(Box<simulate::Args>),
     Frf(frf::Args),
     Identify(Box<identify::Args>),
@@ -129,6 +133,8 @@ impl Verb {
 fn run(verb: Verb) -> Result<(), Error> {
     match verb {
         Verb::Demo(args) => demo::run(args),
+        Verb::Setup(args) => setup::run(*args),
+        Verb::Next(args) => next::run(args),
         Verb::Simulate(args) => simulate::run(*args),
         Verb::Frf(args) => frf::run(args),
         Verb::Identify(args) => identify::run(*args),

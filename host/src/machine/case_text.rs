@@ -1,0 +1,176 @@
+//! A commented case file from the answers of a user.
+
+use std::fmt::Write;
+
+use super::material_table::MaterialRange;
+
+/// Immersion of the cut.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Immersion {
+    /// Angle at which a tooth enters, degrees, clockwise from the normal to the feed.
+    pub start_deg: f64,
+    /// Angle at which a tooth leaves, degrees.
+    pub exit_deg: f64,
+}
+
+impl Immersion {
+    /// Both teeth flanks in full: a slot.
+    pub const SLOT: Self = Self {
+        start_deg: 0.0,
+        exit_deg: 180.0,
+    };
+
+    /// Up-milling with a radial depth a_e and a diameter D: from 0 to arccos(1 − 2a_e/D).
+    pub fn up(radial_depth_mm: f64, diameter_mm: f64) -> Self {
+        Self {
+            start_deg: 0.0,
+            exit_deg: engaged_deg(radial_depth_mm, diameter_mm),
+        }
+    }
+
+    /// Down-milling with a radial depth a_e and a diameter D: from 180° − arccos(1 − 2a_e/D) to 180°.
+    pub fn down(radial_depth_mm: f64, diameter_mm: f64) -> Self {
+        Self {
+            start_deg: 180.0 - engaged_deg(radial_depth_mm, diameter_mm),
+            exit_deg: 180.0,
+        }
+    }
+}
+
+/// Engaged angle arccos(1 − 2a_e/D), degrees.
+fn engaged_deg(radial_depth_mm: f64, diameter_mm: f64) -> f64 {
+    (1.0 - 2.0 * radial_depth_mm / diameter_mm)
+        .clamp(-1.0, 1.0)
+        .acos()
+        .to_degrees()
+}
+
+/// The material, by one of two ways.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum MaterialAnswer {
+    /// A class of materials: the coefficients lie anywhere in a range.
+    Range(&'static MaterialRange),
+    /// Coefficients that the user gives: tangential, radial, axial, MPa, and the standard deviation of the first if known.
+    Given {
+        /// Cutting coefficients, MPa.
+        cutting_mpa: [f64; 3],
+        /// Standard deviation of the tangential coefficient, MPa.
+        ktc_std_mpa: Option<f64>,
+    },
+}
+
+/// What the user answered.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Answers {
+    /// Name of the machine and job.
+    pub name: String,
+    /// Comments that stand at the head of the file: machine, holder, sensor, each as the user wrote it.
+    pub notes: Vec<(&'static str, String)>,
+    /// Number of teeth.
+    pub teeth: u8,
+    /// Diameter of the tool, mm.
+    pub diameter_mm: f64,
+    /// Edge angle, degrees.
+    pub edge_angle_deg: f64,
+    /// The material.
+    pub material: MaterialAnswer,
+    /// Immersion.
+    pub immersion: Immersion,
+    /// Feed per tooth, mm.
+    pub feed_per_tooth_mm: f64,
+    /// Lowest and highest spindle speed, rev/min.
+    pub rpm: (f64, f64),
+    /// Power of the spindle, W.
+    pub power_w: Option<f64>,
+}
+
+/// The case file, with a comment for each section. The structure is left to the taps.
+pub fn case_text(answers: &Answers) -> String {
+    let mut text = String::new();
+    // Writing to a String cannot fail.
+    let _ = write_case(&mut text, answers);
+    text
+}
+
+fn write_case(text: &mut String, answers: &Answers) -> std::fmt::Result {
+    writeln!(
+        text,
+        "# One machine and one job. The structure is missing: quietcut identify writes it from taps."
+    )?;
+    for (what, said) in &answers.notes {
+        writeln!(text, "# {what}: {}", said.replace(['\n', '\r'], " "))?;
+    }
+    writeln!(text, "name = {}\n", toml::Value::String(answers.name.clone()))?;
+    writeln!(text, "[tool]\nteeth = {}", answers.teeth)?;
+    writeln!(
+        text,
+        "# 90 is a square end mill.\nedge_angle_deg = {}",
+        float(answers.edge_angle_deg)
+    )?;
+    writeln!(text, "diameter_mm = {}\n", float(answers.diameter_mm))?;
+    write_material(text, answers)?;
+    writeln!(
+        text,
+        "\n[cut]\n# Immersion angles count from the normal to the feed, in the sense in which the tool rotates."
+    )?;
+    writeln!(text, "start_deg = {}", float(answers.immersion.start_deg))?;
+    writeln!(text, "exit_deg = {}", float(answers.immersion.exit_deg))?;
+    writeln!(text, "feed_per_tooth_mm = {}\n", float(answers.feed_per_tooth_mm))?;
+    writeln!(text, "[limits]\n# Speeds outside are never proposed.")?;
+    writeln!(
+        text,
+        "rpm_min = {}\nrpm_max = {}",
+        float(answers.rpm.0),
+        float(answers.rpm.1)
+    )?;
+    if let Some(power_w) = answers.power_w {
+        writeln!(text, "power_w = {}", float(power_w))?;
+    }
+    Ok(())
+}
+
+fn write_material(text: &mut String, answers: &Answers) -> std::fmt::Result {
+    writeln!(text, "[material]")?;
+    let ([ktc, krc, kac], std) = match answers.material {
+        MaterialAnswer::Range(range) => {
+            let (ktc, ktc_std) = MaterialRange::mean_and_std(range.ktc_mpa);
+            let (ratio, ratio_std) = MaterialRange::mean_and_std(range.radial_ratio);
+            writeln!(text, "# {}: {}.", range.what, range.source)?;
+            writeln!(
+                text,
+                "# ktc lies between {} and {} MPa there. Where each value in a range is as likely as another, the mean is",
+                range.ktc_mpa[0], range.ktc_mpa[1]
+            )?;
+            writeln!(
+                text,
+                "# (a + b)/2 and the standard deviation (b - a)/sqrt(12). Limits get a band from it. Measure your own:"
+            )?;
+            writeln!(text, "# quietcut identify --method force-coefficients.")?;
+            // Independent ktc and krc/ktc: the variance of the product to first order.
+            let krc_std = ((ratio * ktc_std).powi(2) + (ktc * ratio_std).powi(2)).sqrt();
+            ([ktc, ratio * ktc, 0.0], Some([ktc_std, krc_std]))
+        }
+        MaterialAnswer::Given {
+            cutting_mpa,
+            ktc_std_mpa,
+        } => (cutting_mpa, ktc_std_mpa.map(|std| [std, 0.0])),
+    };
+    for (key, value) in [("ktc_mpa", ktc), ("krc_mpa", krc), ("kac_mpa", kac)] {
+        writeln!(text, "{key} = {}", float(value))?;
+    }
+    for (key, value) in ["ktc_mpa_std", "krc_mpa_std"]
+        .into_iter()
+        .zip(std.into_iter().flatten())
+    {
+        if value > 0.0 {
+            writeln!(text, "{key} = {}", float(value))?;
+        }
+    }
+    Ok(())
+}
+
+/// The number as TOML takes it, rounded to twelve digits so that no rounding error shows.
+fn float(value: f64) -> String {
+    let rounded: f64 = format!("{value:.12e}").parse().unwrap_or(value);
+    format!("{rounded:?}")
+}

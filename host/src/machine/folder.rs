@@ -1,0 +1,134 @@
+//! Files of one machine: `case.toml`, `taps/`, `frf/`, `cuts/`, `tried.csv`, `table.qct`, `diagnosis/`, each with its age.
+
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::time::SystemTime;
+
+use crate::case::{Case, CaseError};
+
+/// Endings of the files that hold recordings.
+const RECORDINGS: [&str; 10] = [
+    "csv", "mat", "uff", "unv", "wav", "txt", "dat", "lvm", "tdms", "uf",
+];
+
+/// Endings of the tables of receptances that `identify` reads.
+const RECEPTANCES: [&str; 4] = ["csv", "uff", "unv", "uf"];
+
+/// The folder of a machine cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum FolderError {
+    /// There is no such folder.
+    #[error("{}: no such folder; quietcut setup {} makes one", path.display(), path.display())]
+    Missing {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// The folder cannot be read.
+    #[error("{}: the folder cannot be read", path.display())]
+    Unreadable {
+        /// The folder.
+        path: PathBuf,
+        /// Reason of the system.
+        source: io::Error,
+    },
+    /// `case.toml` is wrong.
+    #[error(transparent)]
+    Case(#[from] CaseError),
+}
+
+/// A file with the time of its last change.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct DatedFile {
+    /// Path, with the folder of the machine as the user gave it.
+    pub path: PathBuf,
+    /// Time of the last change.
+    pub changed: SystemTime,
+}
+
+/// What the folder of one machine holds.
+#[derive(Clone, Debug)]
+pub struct MachineFolder {
+    /// The folder as the user gave it.
+    pub path: PathBuf,
+    /// `case.toml`; `None` if there is none.
+    pub case: Option<(DatedFile, Case)>,
+    /// Recordings of taps, by name.
+    pub taps: Vec<DatedFile>,
+    /// Tables of receptances, by name.
+    pub receptances: Vec<DatedFile>,
+    /// Recordings of cuts, by name.
+    pub cuts: Vec<DatedFile>,
+    /// `tried.csv`, the table of tried cuts.
+    pub tried: Option<DatedFile>,
+    /// `lobes.html`, the chart.
+    pub chart: Option<DatedFile>,
+    /// `table.qct`, the lobe table of the device.
+    pub table: Option<DatedFile>,
+    /// `diagnosis/extended.toml`, the case with the cause that `diagnose` found.
+    pub extended: Option<DatedFile>,
+    /// `diagnosis/report.html`, the report of `diagnose`.
+    pub diagnosis: Option<DatedFile>,
+}
+
+impl MachineFolder {
+    /// Reads what the folder holds.
+    ///
+    /// # Errors
+    /// The folder cannot be read, or `case.toml` is wrong.
+    pub fn read(path: &Path) -> Result<Self, FolderError> {
+        if !path.is_dir() {
+            return Err(FolderError::Missing { path: path.into() });
+        }
+        let list = |name: &str, endings: &[&str]| {
+            files_in(&path.join(name), endings).map_err(|source| FolderError::Unreadable {
+                path: path.join(name),
+                source,
+            })
+        };
+        let case = match dated(path.join("case.toml")) {
+            Some(file) => {
+                let case = Case::read(&file.path)?;
+                Some((file, case))
+            }
+            None => None,
+        };
+        Ok(Self {
+            path: path.to_path_buf(),
+            case,
+            taps: list("taps", &RECORDINGS)?,
+            receptances: list("frf", &RECEPTANCES)?,
+            cuts: list("cuts", &RECORDINGS)?,
+            tried: dated(path.join("tried.csv")),
+            chart: dated(path.join("lobes.html")),
+            table: dated(path.join("table.qct")),
+            extended: dated(path.join("diagnosis/extended.toml")),
+            diagnosis: dated(path.join("diagnosis/report.html")),
+        })
+    }
+}
+
+/// Files of a folder with one of the endings, by name; none if there is no such folder.
+fn files_in(folder: &Path, endings: &[&str]) -> io::Result<Vec<DatedFile>> {
+    let entries = match fs::read_dir(folder) {
+        Ok(entries) => entries,
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),
+        Err(error) => return Err(error),
+    };
+    let mut files = Vec::new();
+    for entry in entries {
+        let path = entry?.path();
+        if endings.contains(&crate::file::ending(&path).as_str()) {
+            files.extend(dated(path));
+        }
+    }
+    files.sort_by(|a, b| a.path.cmp(&b.path));
+    Ok(files)
+}
+
+/// The file with its age; `None` if it is no file.
+fn dated(path: PathBuf) -> Option<DatedFile> {
+    let about = fs::metadata(&path).ok()?;
+    let changed = about.is_file().then(|| about.modified().ok()).flatten()?;
+    Some(DatedFile { path, changed })
+}

@@ -1,0 +1,11 @@
+//! The folder of one machine: its case, taps, receptances, cuts and lobe table, and the next useful step.
+
+mod case_text;
+mod folder;
+mod material_table;
+mod next_step;
+
+pub use case_text::{Answers, Immersion, MaterialAnswer, case_text};
+pub use folder::{FolderError, MachineFolder};
+pub use material_table::{MaterialRange, RANGES};
+pub use next_step::{NextStep, next_step};

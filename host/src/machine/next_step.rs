@@ -1,0 +1,245 @@
+//! The one next useful command for a machine, from what its folder holds.
+
+use std::path::Path;
+use std::time::SystemTime;
+
+use serde::Serialize;
+
+use super::folder::{DatedFile, MachineFolder};
+
+/// The next step for a machine.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct NextStep {
+    /// What is there, one statement each.
+    pub state: Vec<String>,
+    /// The command to run next.
+    pub command: String,
+    /// What the command does, and why it is the next.
+    pub why: String,
+}
+
+/// Number of speeds of the proposed chart. Lines between them are added where limits bend.
+const CHART_SPEEDS: usize = 60;
+
+/// Deepest cut of the proposed chart in mm where the case gives no diameter; else one diameter, the usual limit of a slot.
+const DEEPEST_MM: f64 = 10.0;
+
+/// Finds the next step.
+pub fn next_step(folder: &MachineFolder) -> NextStep {
+    let at = |name: &str| quoted(&folder.path.join(name));
+    let case = at("case.toml");
+    let state = state(folder);
+    let step = |command: String, why: &str| NextStep {
+        state: state.clone(),
+        command,
+        why: why.into(),
+    };
+    let Some((case_file, content)) = &folder.case else {
+        return step(
+            format!("quietcut setup {}", quoted(&folder.path)),
+            "a case file says which machine, tool, material and cut this is; everything else needs it",
+        );
+    };
+    let newest = |files: &[DatedFile]| files.iter().map(|file| file.changed).max();
+    let (taps, receptances) = (newest(&folder.taps), newest(&folder.receptances));
+    if taps > receptances {
+        let command = format!(
+            "quietcut frf {} --out {} --out {}",
+            list(&folder.taps),
+            at("frf/tool-tip.csv"),
+            at("frf/tool-tip.svg")
+        );
+        return step(
+            command,
+            "the taps are newer than the frequency response functions in frf/; the command estimates these from the taps",
+        );
+    }
+    if content.structure.is_none() {
+        return match folder.receptances.last() {
+            Some(_) => step(
+                format!(
+                    "quietcut identify {} --method modes --case {case} --out {case}",
+                    list(&folder.receptances)
+                ),
+                "the case has no structure; the command fits modes to the frequency response functions and writes them into the case",
+            ),
+            None => step(
+                format!(
+                    "quietcut frf {} --out {}",
+                    at("taps/*.csv"),
+                    at("frf/tool-tip.csv")
+                ),
+                "there are no taps yet: tap the tool tip in x, then in y, five times each, and save the recordings in taps/; then run this command",
+            ),
+        };
+    }
+    if receptances > Some(case_file.changed) {
+        return step(
+            format!(
+                "quietcut identify {} --method modes --case {case} --out {case}",
+                list(&folder.receptances)
+            ),
+            "the frequency response functions are newer than the case; the command fits its modes again",
+        );
+    }
+    let missing = [
+        ("tool", content.tool.is_none()),
+        ("material", content.material.is_none()),
+        ("cut", content.cut.is_none()),
+    ];
+    if let Some((section, _)) = missing.iter().find(|(_, missing)| *missing) {
+        return step(
+            format!("quietcut setup {}", quoted(&folder.path)),
+            &format!("the case has no section [{section}], which limits need; the command asks for it"),
+        );
+    }
+    let newer_than_case = |file: &Option<DatedFile>| is_newer(file, case_file.changed);
+    let ranges = ranges(folder);
+    if !newer_than_case(&folder.chart) {
+        let tried = folder
+            .tried
+            .as_ref()
+            .map_or_else(String::new, |file| format!(" --cuts {}", quoted(&file.path)));
+        return step(
+            format!("quietcut lobes {case} {ranges}{tried} --out {}", at("lobes.html")),
+            "the case is newer than the chart; the command draws the stable depths over the spindle speed",
+        );
+    }
+    if !newer_than_case(&folder.table) {
+        return step(
+            format!("quietcut table {case} --out {}", at("table.qct")),
+            "the case is newer than the lobe table of the device; the command builds the table",
+        );
+    }
+    let cuts = newest(&folder.cuts);
+    if cuts.is_none() && folder.tried.is_none() {
+        return step(
+            format!("quietcut plan {case} {ranges} --width-percent 20"),
+            "no cut was made yet; the command proposes the cuts that tell most about the limits. Save their recordings in cuts/, and their outcome in tried.csv",
+        );
+    }
+    if cuts > folder.diagnosis.as_ref().map(|file| file.changed) {
+        return step(
+            format!(
+                "quietcut diagnose {case} {} --out {}",
+                list(&folder.cuts),
+                at("diagnosis")
+            ),
+            "recorded cuts are newer than the diagnosis; the command compares them with the simulation and names what it lacks",
+        );
+    }
+    if let (Some(tried), Some(chart)) = (&folder.tried, &folder.chart)
+        && tried.changed > chart.changed
+    {
+        return step(
+            format!(
+                "quietcut lobes {case} {ranges} --cuts {} --out {}",
+                quoted(&tried.path),
+                at("lobes.html")
+            ),
+            "tried cuts are newer than the chart; the command counts those that are predicted wrong",
+        );
+    }
+    if let (Some(extended), Some(table)) = (&folder.extended, &folder.table)
+        && extended.changed > table.changed
+    {
+        return step(
+            format!(
+                "quietcut table {} --out {}",
+                quoted(&extended.path),
+                at("table.qct")
+            ),
+            "the diagnosis found a cause and wrote the extended case; the command builds the table of that case",
+        );
+    }
+    step(
+        format!("quietcut upload PORT {}", at("table.qct")),
+        "everything is up to date; the command sends the table to the device, PORT is its serial port",
+    )
+}
+
+/// True if the file exists and was changed at this time or later.
+fn is_newer(file: &Option<DatedFile>, than: SystemTime) -> bool {
+    file.as_ref().is_some_and(|file| file.changed >= than)
+}
+
+/// Ranges of speed and depth of the chart: the speeds of the spindle, and one diameter deep.
+fn ranges(folder: &MachineFolder) -> String {
+    let case = folder.case.as_ref().map(|(_, case)| case);
+    let speeds = case.and_then(|case| {
+        if let Some(limits) = case.limits {
+            // At rest there is no cut: the lowest speed of a chart is a twentieth of the highest.
+            return Some((limits.rpm_min.max(0.05 * limits.rpm_max), limits.rpm_max));
+        }
+        let structure = case.structure.as_ref()?.first_order().ok()?;
+        Some(crate::stability::default_speeds(
+            case,
+            &structure,
+            case.tool.as_ref()?.teeth,
+        ))
+    });
+    let (first, last) = speeds.unwrap_or((1000.0, 10_000.0));
+    let deepest_mm = case
+        .and_then(|case| case.tool.as_ref()?.diameter_mm)
+        .unwrap_or(DEEPEST_MM);
+    format!("--rpm {first:.0}:{last:.0}:{CHART_SPEEDS} --depth-mm 0:{deepest_mm}:50")
+}
+
+fn state(folder: &MachineFolder) -> Vec<String> {
+    let count = |files: &[DatedFile], what: &str| format!("{} {what}", files.len());
+    let has =
+        |file: &Option<DatedFile>, what: &str| format!("{} {what}", if file.is_some() { "a" } else { "no" });
+    let case = match &folder.case {
+        None => "no case.toml".into(),
+        Some((_, case)) => {
+            let sections = [
+                ("structure", case.structure.is_some()),
+                ("tool", case.tool.is_some()),
+                ("material", case.material.is_some()),
+                ("cut", case.cut.is_some()),
+                ("limits", case.limits.is_some()),
+            ];
+            let with: Vec<&str> = sections
+                .iter()
+                .filter(|(_, there)| *there)
+                .map(|(name, _)| *name)
+                .collect();
+            format!(
+                "case.toml with {}",
+                if with.is_empty() {
+                    "no section".into()
+                } else {
+                    with.join(", ")
+                }
+            )
+        }
+    };
+    vec![
+        case,
+        count(&folder.taps, "recordings in taps/"),
+        count(&folder.receptances, "tables in frf/"),
+        has(&folder.chart, "chart (lobes.html)"),
+        has(&folder.table, "lobe table (table.qct)"),
+        count(&folder.cuts, "recordings in cuts/"),
+        has(&folder.tried, "table of tried cuts (tried.csv)"),
+        has(&folder.diagnosis, "diagnosis (diagnosis/report.html)"),
+    ]
+}
+
+fn list(files: &[DatedFile]) -> String {
+    files
+        .iter()
+        .map(|file| quoted(&file.path))
+        .collect::<Vec<_>>()
+        .join(" ")
+}
+
+/// The path as a shell takes it: in single quotes if it has other characters than letters, digits and `/._-*`.
+fn quoted(path: &Path) -> String {
+    let text = path.display().to_string();
+    if text.chars().all(|c| c.is_alphanumeric() || "/._-*".contains(c)) {
+        text
+    } else {
+        format!("'{}'", text.replace('\'', r"'\''"))
+    }
+}
