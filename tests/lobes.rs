@@ -117,6 +117,55 @@ fn charts_are_written_in_every_format_and_no_other() {
 }
 
 #[test]
+fn speeds_are_added_where_limits_bend_and_can_be_left_out() {
+    let kuka = case("kuka-kr90-acetal");
+    let arguments = [
+        "lobes",
+        &kuka,
+        "--rpm",
+        "900:1200:3",
+        "--depth-mm",
+        "0.1:4:40",
+        "--json",
+    ];
+    let answer = json(&arguments);
+    let plain = json(&[&arguments[..], &["--no-refine"]].concat());
+    // The requested speeds keep their place and their values.
+    assert_eq!(answer["speeds"], plain["speeds"]);
+    assert!(
+        plain["refined"].is_null() && plain["resolution"].is_null(),
+        "{plain}"
+    );
+    let mut lines: Vec<&Value> = ["speeds", "refined"]
+        .into_iter()
+        .flat_map(|key| answer[key].as_array().expect("lines"))
+        .collect();
+    let rpm = |line: &Value| line["rpm"].as_f64().expect("a speed");
+    let limit = |line: &Value| line["first_limit"]["depth_mm"].as_f64().expect("a limit");
+    lines.sort_by(|a, b| rpm(a).total_cmp(&rpm(b)));
+    // Half way between any two speeds the limit is on the straight line, unless they are as close as a steep limit needs.
+    let middles: Vec<String> = lines
+        .windows(2)
+        .filter(|pair| rpm(pair[1]) / rpm(pair[0]) > 1.001)
+        .map(|pair| format!("{}", 0.5 * (rpm(pair[0]) + rpm(pair[1]))))
+        .collect();
+    for middle in middles.iter().step_by(7) {
+        let truth = json(&["lobes", &kuka, "--rpm", middle, "--depth-mm", "4", "--json"]);
+        let at: f64 = middle.parse().expect("a number");
+        let right = lines.partition_point(|line| rpm(line) < at);
+        let (left, right) = (lines[right - 1], lines[right]);
+        let share = (at - rpm(left)) / (rpm(right) - rpm(left));
+        let drawn = limit(left) + (limit(right) - limit(left)) * share;
+        let steep = 1e-3 * at * (limit(right) - limit(left)).abs() / (rpm(right) - rpm(left));
+        let truth = limit(&truth["speeds"][0]);
+        assert!(
+            (drawn - truth).abs() <= (0.01 * truth).max(steep),
+            "{middle}: {drawn} for {truth}"
+        );
+    }
+}
+
+#[test]
 fn wrong_cases_are_refused_with_the_place_and_the_remedy() {
     let folder = folder();
     let good = std::fs::read_to_string(case("kuka-kr90-acetal")).expect("the case");
@@ -248,6 +297,29 @@ fn methods_refuse_what_they_are_not_defined_for_and_options_of_others() {
     refused(linear, &["--method", "fdm", "--order", "0"], &["--order", "sdm"]);
     refused(linear, &["--method", "sdm", "--steps", "0"], &["0", "from 1"]);
     refused(linear, &["--method", "sdm", "--order", "2"], &["2", "0 or 1"]);
+}
+
+#[test]
+fn a_time_is_refused_for_a_case_that_does_not_change_with_time() {
+    let folder = folder();
+    let kuka = case("kuka-kr90-acetal");
+    let words = [
+        "--after-s 60",
+        "kuka-kr90-acetal.toml",
+        "[extension.wear]",
+        "[extension.drift]",
+    ];
+    quietcut(
+        folder.path(),
+        &["lobes", &kuka, "--at", "900,1", "--after-s", "60"],
+    )
+    .refused(&words);
+    quietcut(
+        folder.path(),
+        &["table", &kuka, "--after-s", "60", "--out", "a.qct"],
+    )
+    .refused(&words);
+    assert!(!folder.path().join("a.qct").exists());
 }
 
 #[test]

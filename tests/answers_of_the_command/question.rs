@@ -152,7 +152,7 @@ fn limits(tests: &Path) -> Result<Vec<Question>, String> {
             .iter()
             .map(|method| {
                 format!(
-                    "lobes tests/cases/{case}.toml --rpm {speeds} --depth-mm {depths} --method {method} --json"
+                    "lobes tests/cases/{case}.toml --rpm {speeds} --depth-mm {depths} --method {method} --no-refine --json"
                 )
             })
             .collect();

@@ -13,7 +13,9 @@ use crate::file;
 use crate::report::lobe_chart::{Column, lobe_chart};
 use crate::report::marks::Mark;
 use crate::report::page::{figure, page};
-use crate::stability::{Chart, CutStability, Label, LimitSpread, Method, SpeedLine, Uncertainty, chart};
+use crate::stability::{
+    Chart, CutStability, Label, LimitSpread, Method, Resolution, SpeedLine, Uncertainty, chart,
+};
 use crate::trial_cuts::{self, Calls, TrialCut};
 
 /// Computes stability limits over the spindle speed, or the dominant Floquet multiplier at given points.
@@ -48,6 +50,11 @@ pub struct Args {
     /// that identify --method inverse-stability reads. The chart shows them, and wrong predictions are counted.
     #[arg(long, value_name = "FILE", requires = "rpm", conflicts_with = "cells")]
     cuts: Option<PathBuf>,
+    /// Compute the limits at the given speeds only. Without this option further speeds are added where limits bend, so that
+    /// straight lines between all speeds are right to 1 % in depth or 0.1 % in speed; methods that need seconds per speed add
+    /// none.
+    #[arg(long, requires = "rpm", conflicts_with = "cells")]
+    no_refine: bool,
     /// Seed of the random parameters that are drawn from the standard deviations.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
@@ -92,6 +99,7 @@ pub fn run(args: Args) -> Result<(), Error> {
                 rpm,
                 depth_mm,
                 probability: args.probability,
+                refine: !args.no_refine && !method.takes_seconds(),
                 cuts,
             };
             run_chart(
@@ -138,6 +146,8 @@ struct ChartRequest {
     rpm: Range,
     depth_mm: Range,
     probability: bool,
+    /// Lines at further speeds are added where limits bend.
+    refine: bool,
     cuts: Option<Vec<TrialCut>>,
 }
 
@@ -161,6 +171,7 @@ fn run_chart(
         rpm,
         depth_mm,
         probability,
+        refine,
         cuts,
     } = request;
     if probability && uncertainty.is_none() {
@@ -171,6 +182,10 @@ fn run_chart(
     }
     let deepest_mm = depth_mm.first().max(depth_mm.last());
     let mut chart = chart(method, &rpm.values(), deepest_mm, depth_mm.steps_from_zero())?;
+    if refine && rpm.count() > 1 {
+        let teeth = case.tool.as_ref().map_or(1, |tool| tool.teeth);
+        chart = chart.with_lines_between(method, deepest_mm, depth_mm.steps_from_zero(), teeth)?;
+    }
     if let Some(uncertainty) = uncertainty {
         let cells_mm = if probability {
             depth_mm.values()
@@ -185,6 +200,9 @@ fn run_chart(
         write_chart(case, &chart, deepest_mm, &marks, path)?;
     }
     let mut text = limits_as_text(&chart);
+    if let Some(resolution) = &chart.resolution {
+        text.push_str(&resolution_as_text(&chart, resolution));
+    }
     if let Some(calls) = &calls {
         let _ = write!(
             text,
@@ -240,6 +258,27 @@ fn limits_as_text(chart: &Chart) -> String {
     text
 }
 
+/// Number of lines between the requested speeds, accuracy between all, and what remains open.
+fn resolution_as_text(chart: &Chart, resolution: &Resolution) -> String {
+    let mut text = format!(
+        "\n{} further speeds; straight lines between all speeds are right to {} % in depth or {} % in speed",
+        chart.refined.len(),
+        100.0 * resolution.depth_share,
+        100.0 * resolution.speed_share
+    );
+    if let Some(rpm) = resolution.narrowest_island_rpm {
+        let _ = write!(text, "; the narrowest island is {rpm:.1} rev/min wide");
+    }
+    let open = resolution.unresolved_rpm.len();
+    if open > 0 {
+        let _ = write!(
+            text,
+            "; over {open} gaps stable depths begin or end, and the verdict is open where both ends differ"
+        );
+    }
+    text
+}
+
 /// 5, 50 and 95 % percentiles of the first limit as text, mm; `beyond` stands for a limit deeper than the last depth.
 fn percentiles(spread: &LimitSpread, beyond: &str) -> [String; 3] {
     let percentiles = spread.limit_percentiles_mm;
@@ -274,8 +313,7 @@ fn write_chart(case: &Case, chart: &Chart, depth_mm: f64, marks: &[Mark], path: 
 }
 
 fn picture(case: &Case, chart: &Chart, depth_mm: f64, marks: &[Mark]) -> Result<String, Error> {
-    let mut columns: Vec<Column> = chart.speeds.iter().map(Column::from).collect();
-    columns.sort_by(|a, b| a.rpm.total_cmp(&b.rpm));
+    let columns: Vec<Column> = chart.lines().into_iter().map(Column::from).collect();
     // Drawing fails if the user gives only one spindle speed: an input error.
     let title = format!("{}, method: {}", case.name, chart.label);
     lobe_chart(&title, &columns, depth_mm, marks).map_err(Error::input)
@@ -355,9 +393,10 @@ fn as_csv(chart: &Chart) -> Result<String, Error> {
         header.extend(["limit_95_from [mm]", "limit_95_to [mm]"]);
     }
     writer.write_record(&header).map_err(Error::other)?;
-    for line in &chart.speeds {
+    let spread_columns = header.len() - 9;
+    for line in chart.lines() {
         let rpm = line.rpm.to_string();
-        let spread: Vec<String> = line
+        let mut spread: Vec<String> = line
             .spread
             .iter()
             .flat_map(|spread| {
@@ -365,6 +404,8 @@ fn as_csv(chart: &Chart) -> Result<String, Error> {
                 percentiles(spread, "").into_iter().chain(ends)
             })
             .collect();
+        // Lines between the requested speeds have no percentiles.
+        spread.resize(spread_columns, String::new());
         let spread = spread.iter().map(String::as_str);
         if line.switches.is_empty() {
             let row = [rpm.as_str(), "", "", "", "", "", "", "", ""];
