@@ -147,7 +147,7 @@ impl<A: Accelerometer> Acquisition<A> {
             None => lost,
             Some(gap) => {
                 let modulus = i64::from(gap.modulus).max(1);
-                // The number nearest to the clock's estimate that has the sensor's remainder.
+                // The number of lost samples nearest to the clock's estimate that has the remainder counted by the sensor.
                 lost - (lost - remainder + modulus / 2).rem_euclid(modulus) + modulus / 2
             }
         };

@@ -348,7 +348,7 @@ impl<'a, M: TableMemory, C: Clock> Device<'a, M, C> {
     fn feed(&mut self, block: &Block) {
         let edges = core::mem::take(&mut self.edges);
         if !self.is_fed {
-            // Blocks of the sensor and of the host must not mix.
+            // The state of the signal chain must not contain blocks of both the sensor and the host.
             self.restart();
             self.is_fed = true;
         }

@@ -29,7 +29,7 @@ pub const STORE_OFFSET: usize = 1024 * 1024;
 /// Size of the board's non-volatile memory in bytes.
 pub const MEMORY_BYTES: usize = 16 * 1024 * 1024;
 
-/// A message of the simulated spindle.
+/// A message of simulated signals, which takes the place of sensor and tachometer.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 // A box would need an allocator. Most messages are blocks, and few are held at a time.
 #[allow(clippy::large_enum_variant)]

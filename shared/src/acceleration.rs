@@ -167,7 +167,7 @@ impl SampleClock {
 }
 
 impl SampleClockState {
-    /// The state before the first block.
+    /// The state of the sample clock before the first block.
     pub const fn new() -> Self {
         Self {
             line: None,

@@ -54,7 +54,7 @@ pub(crate) const STAMP_RESOLUTION_NS: f32 = 20.0;
 
 // Tones of a power spectrum.
 
-/// Number of bins on each side of a peak whose median is the noise floor. Unfounded.
+/// Number of bins on each side of a peak, the median of whose powers is the noise floor. Unfounded.
 pub(crate) const FLOOR_HALF_WIDTH: usize = 64;
 
 /// Number of bins on each side of a peak that do not count for the noise floor: the main lobe of the Hann window, ±2 bins, and

@@ -35,7 +35,7 @@ pub struct EventClockState {
     period_ns: f32,
     /// Covariance of the fitted time a and period b, in units of the stamps' variance: var a, cov(a, b), var b.
     covariance: [f32; 3],
-    /// Variance of the stamps about the line, in ns².
+    /// Variance of the stamps about the fitted line, in ns².
     variance_ns2: f32,
     /// Deviation of the preceding stamp from its prediction in ns, scaled so that its standard deviation is that of one stamp.
     previous_ns: f32,
@@ -183,7 +183,7 @@ impl EventClockState {
         self.observations
     }
 
-    /// Variance of one stamp about the line, in ns².
+    /// Variance of one stamp about the fitted line, in ns².
     pub fn variance_ns2(&self) -> f32 {
         self.variance_ns2
     }

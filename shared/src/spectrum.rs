@@ -78,7 +78,7 @@ impl<const N: usize> Overlap<N> {
             .map(move |sample| sample.get(axis).copied().unwrap_or(0))
     }
 
-    /// Mean of one axis, rounded down.
+    /// Mean of the stored samples of one axis, rounded down.
     fn mean(&self, axis: usize) -> i32 {
         (self.axis(axis).map(i64::from).sum::<i64>() / N as i64) as i32
     }
@@ -95,7 +95,7 @@ impl<const N: usize> Default for Overlap<N> {
 pub struct PowerSpectrum<'a> {
     /// Power per bin from 0 Hz to half the sample rate, in (m/s²)².
     pub power: &'a [f32],
-    /// Width of a bin: sample rate over points.
+    /// Width of a bin: the sample rate divided by the number of points.
     pub bin: Hertz,
 }
 

@@ -58,13 +58,13 @@ pub struct SamplerState {
     angle: Turns,
     /// Samples taken since the start, up to 4.
     filled: u8,
-    /// Number of the next slot to fill, counted from angle 0; `None` before the first.
+    /// Number of the next angle slot to fill, counted from angle 0; `None` before the first.
     next_slot: Option<u64>,
-    /// Number of consecutive slots filled without a gap.
+    /// Number of consecutive angle slots filled without a gap.
     unbroken: u8,
-    /// Integral of the signal over time since the angle of the last slot, in m/s² times sample periods.
+    /// Integral of the signal over time since the last angle slot, in m/s² times sample periods.
     integral: [f32; 3],
-    /// Time since the angle of the last slot, in sample periods.
+    /// Time since the last angle slot, in sample periods.
     span: f32,
     passing: Passing,
 }
@@ -97,19 +97,19 @@ impl SamplerState {
 pub struct Passed {
     /// Tooth periods since angle 0 of the tachometer.
     pub tooth: u64,
-    /// Acceleration at each slot.
+    /// Acceleration at each angle slot.
     pub passing: Passing,
 }
 
 impl Sampler {
-    /// Spindle angle at which a slot begins.
+    /// Spindle angle at which an angle slot begins.
     fn angle_of(&self, slot: u64) -> Turns {
         let per_turn = u64::from(self.teeth) * SLOTS as u64;
         let part = ((slot % per_turn) << 32) / per_turn;
         Turns(((slot / per_turn) << 32) | part)
     }
 
-    /// Number of the first slot that begins at or after `angle`.
+    /// Number of the first angle slot that begins at or after `angle`.
     fn slot_from(&self, angle: Turns) -> u64 {
         let per_turn = u64::from(self.teeth) * SLOTS as u64;
         let part = u64::from(angle.fraction()) * per_turn;
@@ -158,7 +158,7 @@ impl Sampler {
         passed
     }
 
-    /// Fills a slot whose angle lies between the two middle samples, at the fraction `part` of their distance. The integral
+    /// Fills an angle slot whose angle lies between the two middle samples, at the fraction `part` of their distance. The integral
     /// already covers the distance up to the fraction `done`.
     fn fill(&self, state: &mut SamplerState, slot: u64, done: f32, part: f32) -> Option<Passed> {
         let value = match self.method {
@@ -170,7 +170,7 @@ impl Sampler {
             Method::Value => cubic(&state.samples, part),
         };
         (state.integral, state.span) = ([0.0; 3], 0.0);
-        // The mean over a slot is known at the beginning of the next slot.
+        // The mean over an angle slot is known at the beginning of the next angle slot.
         let slot = match self.method {
             Method::Mean => slot.checked_sub(1)?,
             Method::Value => slot,
@@ -179,7 +179,7 @@ impl Sampler {
         if let Some(values) = state.passing.get_mut(3 * place..3 * place + 3) {
             values.copy_from_slice(&value);
         }
-        // The integral of the first mean began within its slot, so that this mean is not used.
+        // The integral of the first mean began within its angle slot, so that this mean is not used.
         let partial = self.method == Method::Mean && state.unbroken == 0;
         state.unbroken = state.unbroken.saturating_add(1).min(SLOTS as u8 + 1);
         let whole = usize::from(state.unbroken) >= SLOTS + usize::from(self.method == Method::Mean);
@@ -238,7 +238,7 @@ pub struct Average {
     residual_count: u16,
 }
 
-/// Levels of the parts of the vibration: root mean squares over slots and axes, in m/s².
+/// Levels of the parts of the vibration: root mean squares over angle slots and axes, in m/s².
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Levels {
     /// Forced vibration: the part common to all teeth, without its mean over the tooth period.

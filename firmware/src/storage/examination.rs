@@ -72,7 +72,7 @@ impl<M: TableMemory> Storage<M> {
         }
     }
 
-    /// The slot of the next upload: one that is not in use.
+    /// The table slot of the next upload: one whose table is not in use.
     pub(super) fn free_slot(&self) -> usize {
         (0..SLOTS)
             .find(|&slot| self.in_use != Some(slot))

@@ -15,7 +15,7 @@ pub(super) struct Progress {
     pub(super) header: Header,
     /// Number of received bytes of the table, header included.
     pub(super) received: u32,
-    /// The slot is erased or written up to this offset.
+    /// Offset up to which the table slot is erased or written.
     pub(super) erased_to: u32,
     /// Received bytes that do not yet fill a flash word.
     pub(super) tail: Vec<u8, MAX_WRITE_SIZE>,

@@ -1,4 +1,4 @@
-//! The additions of schema 2; [`format`](super::format) specifies their bytes.
+//! The optional parts of a lobe table that schema 2 adds; [`format`](super::format) specifies their bytes.
 
 use super::TableError;
 use super::bytes::saturate;
@@ -22,7 +22,7 @@ pub struct InterpolationError {
     pub speed: f32,
 }
 
-/// The additions of schema 2 to a table.
+/// The optional parts of a lobe table that schema 2 adds: interpolation error, feed directions, modes and derivatives.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Additions<'a> {
     /// Bound of the interpolation error, if known.

@@ -246,7 +246,7 @@ fn group(a: &[Interval], b: &[Interval]) -> (usize, usize) {
     }
 }
 
-/// True if two groups have the same sequence of kinds, with pairwise overlapping intervals.
+/// True if two groups of unstable intervals have the same sequence of kinds, with pairwise overlapping intervals.
 fn is_same_topology(a: &[Interval], b: &[Interval]) -> bool {
     a.len() == b.len()
         && a.iter()

@@ -16,7 +16,7 @@ pub(crate) const FEW: usize = 3;
 /// Position of a speed between two grid speeds.
 #[derive(Clone, Copy)]
 struct Between {
-    /// Index of the grid speed below.
+    /// Index of the grid speed at or below the speed.
     below: usize,
     /// Interpolation weight of the grid speed above, 0 to 1.
     weight: f32,
@@ -95,7 +95,7 @@ impl<'a> CutLobes<'a> {
         Ok(())
     }
 
-    /// The position of a speed in the speed grid.
+    /// The position of a speed between two grid speeds of the table.
     fn between(&self, speed: Rpm) -> Result<Between, NotKnown> {
         let count = self.table.shape.speeds;
         let outside = || NotKnown::Speed {

@@ -22,7 +22,7 @@ pub struct Header {
 }
 
 impl Header {
-    /// True if this code can read the schema.
+    /// True if this code can read lobe tables of this schema.
     pub const fn knows(schema: u16) -> bool {
         schema == SCHEMA_PLAIN || schema == SCHEMA
     }

@@ -23,11 +23,11 @@ pub struct LayerMode {
 /// Derivatives of one end of an interval, in mm per relative change of a parameter.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Slopes {
-    /// By the natural frequency of each mode; 0 for modes that the table does not contain.
+    /// Derivatives by the natural frequency of each mode; 0 for modes that the table does not contain.
     pub by_frequency: [f32; MODES_MAX],
-    /// By the damping ratio of each mode; 0 for modes that the table does not contain.
+    /// Derivatives by the damping ratio of each mode; 0 for modes that the table does not contain.
     pub by_damping_ratio: [f32; MODES_MAX],
-    /// By the cutting force coefficient.
+    /// Derivative by the cutting force coefficient K_tc.
     pub by_cutting_force: f32,
 }
 
@@ -92,7 +92,7 @@ impl Slopes {
             .chain(core::iter::once(self.by_cutting_force))
     }
 
-    /// The derivatives from their numbers in the order of [`numbers`](Self::numbers).
+    /// Reads the derivatives from numbers in the order of [`numbers`](Self::numbers).
     pub(super) fn of_numbers(mut numbers: impl Iterator<Item = f32>, modes: usize) -> Option<Self> {
         let mut slopes = Self::default();
         for slot in slopes.by_frequency.iter_mut().take(modes) {

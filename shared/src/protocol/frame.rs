@@ -253,7 +253,7 @@ impl Default for Decoder {
 }
 
 impl Decoder {
-    /// A decoder before its first byte.
+    /// A frame decoder before its first byte.
     pub const fn new() -> Self {
         Self {
             state: DecoderState::Idle,

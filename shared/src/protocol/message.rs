@@ -14,17 +14,17 @@ use crate::working_point::{Limits, WorkingPoint};
 
 /// Largest number of table bytes in one [`Request::UploadChunk`].
 pub const MAX_CHUNK: usize = 256;
-/// Largest number of edges in one [`Feed`]; further edges precede it in [`Request::FeedEdges`].
+/// Largest number of tachometer edges in one [`Feed`]; further edges precede it in [`Request::FeedEdges`].
 pub const MAX_FEED_EDGES: usize = 8;
-/// Largest number of edges in one [`Request::FeedEdges`].
+/// Largest number of tachometer edges in one [`Request::FeedEdges`].
 pub const MAX_EDGES: usize = 32;
-/// Largest number of edges that a device holds for one block.
+/// Largest number of tachometer edges that a device holds for one block.
 pub const MAX_BLOCK_EDGES: usize = 128;
 /// Largest number of bins in one [`SpectrumChunk`].
 pub const MAX_CHUNK_BINS: usize = 96;
 /// Largest number of points in one [`StrobeChunk`].
 pub const MAX_CHUNK_STROBES: usize = 16;
-/// Number of table slots of a device.
+/// Number of table slots of a device: places in its flash that hold one lobe table each.
 pub const SLOTS: usize = 2;
 
 /// A request of the host. Each gets one [`Reply`].
@@ -136,11 +136,11 @@ pub enum Refusal {
     WorkingPoint(WorkingPoint),
     /// The table or its header is invalid.
     Table(TableError),
-    /// The table does not fit into a slot.
+    /// The lobe table does not fit into a table slot of the device's flash.
     TableTooLong {
         /// Its length in bytes.
         length: u32,
-        /// Capacity of a slot in bytes.
+        /// Capacity of a table slot in bytes.
         capacity: u32,
     },
     /// There is no upload to continue.
@@ -233,13 +233,13 @@ pub struct Info {
     pub sensor: Option<Sensor>,
     /// Largest length of a table in bytes.
     pub slot_capacity: u32,
-    /// The slots for tables.
+    /// The slots of the flash for lobe tables.
     pub slots: [Slot; SLOTS],
     /// The table in use.
     pub table: Option<TableSummary>,
 }
 
-/// Content of a table slot.
+/// Content of a table slot of the device's flash.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Slot {
     /// The slot is empty.
