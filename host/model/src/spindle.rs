@@ -231,7 +231,7 @@ mod tests {
                 assert!((spindle.time_s(spindle.angle_rad(t)) - t).abs() < 1e-12);
                 let h = 1e-4;
                 let rate = (spindle.angle_rad(t + h) - spindle.angle_rad(t - h)) / (2.0 * h);
-                // Half a step of the change of speed where it begins and ends, and rounding of angles of 4000 rad.
+                // Central difference over a kink of the speed at start and end of the sweep, and rounding of angles of 4000 rad.
                 assert!((rate - spindle.speed_at_rad_per_s(t)).abs() < 1e-4, "{t}");
                 let ([shortest, longest], delay) = (spindle.bounds_s(3.0), spindle.delay_s(t, 3.0));
                 // Rounding of angles of 4000 rad.
@@ -255,11 +255,11 @@ mod tests {
             for i in -20..200 {
                 let t = f64::from(i) * 0.013;
                 let back = spindle.time_s(spindle.angle_rad(t));
-                // Rounding of the angle over the least speed, 5 % of the mean.
+                // Rounding of the angle divided by the smallest speed, 5 % of the mean.
                 assert!((back - t).abs() < 1e-13, "{delta} {t}: {back}");
                 let h = 1e-5;
                 let rate = (spindle.angle_rad(t + h) - spindle.angle_rad(t - h)) / (2.0 * h);
-                // Third derivative δ Ω (2π f_m)² h²/6, and rounding of angles of 300 rad over 2e-5 s.
+                // Error of the central difference, δ Ω (2π f_m)² h²/6, and rounding of angles of 300 rad divided by 2e-5 s.
                 assert!(
                     (rate / spindle.speed_at_rad_per_s(t) - 1.0).abs() < 1e-6,
                     "{rate}"

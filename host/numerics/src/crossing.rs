@@ -64,14 +64,14 @@ mod tests {
     }
 
     #[test]
-    fn a_dip_between_two_places_is_found() {
+    fn a_minimum_between_two_evaluated_points_is_found() {
         // The function is negative from 0.605 to 0.615 only.
         let found = first_below_zero(|u| (u - 0.61).powi(2) - 2.5e-5).unwrap();
         assert!((found - 0.605).abs() < 1e-9, "{found}");
     }
 
     #[test]
-    fn what_has_just_changed_is_not_changed_back_by_rounding() {
+    fn rounding_at_the_start_is_no_crossing() {
         assert_eq!(first_below_zero(|u| u - 1e-18), None);
         // A function that is negative at 0 and stays negative crosses at once.
         assert_eq!(first_below_zero(|u| -1e-18 - u), Some(0.0));

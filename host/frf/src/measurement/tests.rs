@@ -37,7 +37,8 @@ const MODES: [Mode; 2] = [
     },
 ];
 
-/// H_pq(f) of the structure, for samples of a force that is linear between them: that takes sinc² off its spectrum.
+/// Receptance H_pq(f) of the structure times sinc²(f/rate): the factor between the spectrum of the samples and that of a force that is linear
+/// between them.
 fn receptance(hertz: f64, p: usize, q: usize) -> Complex64 {
     let omega = TAU * hertz;
     let half = std::f64::consts::PI * hertz / RATE;
@@ -52,7 +53,7 @@ fn receptance(hertz: f64, p: usize, q: usize) -> Complex64 {
         .sum()
 }
 
-/// Displacement by forces that change linearly between samples (as a band-limited force nearly does), exact for such.
+/// Exact displacements, m, under forces that are linear between samples, as a band-limited force nearly is.
 fn displacements(forces: &[Vec<f64>; 3]) -> [Vec<f64>; 3] {
     let samples = forces[0].len();
     let mut moved: [Vec<f64>; 3] = std::array::from_fn(|_| vec![0.0; samples]);
@@ -63,7 +64,7 @@ fn displacements(forces: &[Vec<f64>; 3]) -> [Vec<f64>; 3] {
         let exact = (a * step).exp();
         let inverse = a.try_inverse().unwrap();
         let b = nalgebra::Vector2::new(0.0, 1.0 / mode.mass_kg);
-        // x' = A x + b (f0 + (f1 − f0) t/T): held part and ramp.
+        // Solution of x' = A x + b (f0 + (f1 − f0) t/T) over one sampling interval: constant part and ramp of the force.
         let held = inverse * (exact - Matrix2::identity()) * b;
         let ramp = inverse * inverse * (exact - Matrix2::identity()) * b / step - inverse * b;
         let modal: Vec<f64> = (0..samples)
@@ -86,7 +87,7 @@ fn random(seed: u64) -> ChaCha8Rng {
     ChaCha8Rng::seed_from_u64(seed)
 }
 
-/// Noise without what the sampling could not follow: two-pole low pass at an eighth of the rate.
+/// Random force with little power near half the sampling rate: white noise after a two-pole low pass.
 fn force_noise(random: &mut ChaCha8Rng, samples: usize, size: f64) -> Vec<f64> {
     let (mut a, mut b) = (0.0, 0.0);
     (0..samples)
@@ -110,7 +111,7 @@ fn with_noise(signal: &[f64], part: f64, random: &mut ChaCha8Rng) -> Vec<f64> {
         .collect()
 }
 
-/// A recording of forces, and displacements with noise; forces that rest have no column.
+/// A recording of forces, and of displacements with noise; a force that is zero throughout has no channel.
 fn record(kind: TestKind, forces: [Vec<f64>; 3], noise: f64, random: &mut ChaCha8Rng) -> Recording {
     let moved = displacements(&forces);
     let channel = |name: &str, quantity, samples| Channel {
@@ -156,7 +157,7 @@ fn in_band() -> MeasurementSettings {
     }
 }
 
-/// Largest error of an entry, as a fraction of its largest value.
+/// Largest error of a measured receptance, as a fraction of the peak of the true receptance.
 fn error(measurement: &Measurement, name: &str) -> f64 {
     let entry = measurement
         .table
@@ -191,12 +192,12 @@ fn welch_finds_the_receptances_of_one_force() {
     let measurement = measure(std::slice::from_ref(&recording), &settings).unwrap();
     assert_eq!(measurement.table.entries().len(), 3);
     for name in ["xy", "yy", "zy"] {
-        // The window widens a peak of 0.7 Hz by 0.075 Hz: 1 %; and 40 averages of 1 % noise at the antiresonances.
+        // The window widens a peak of 0.7 Hz by 0.075 Hz, which lowers it by 1 %; noise of 1 % with some 50 averages adds to that.
         let error = error(&measurement, name);
         assert!(error < 0.03, "{name}: {error}");
     }
     let group = &measurement.groups[0];
-    // 59 segments that overlap by half are worth 1/18 less.
+    // 59 segments that overlap by half have 1/18 fewer effective averages.
     assert!((group.averages - 56.8).abs() < 2.5, "{}", group.averages);
 }
 
@@ -235,8 +236,8 @@ fn estimators_differ_by_where_the_noise_is_and_coherence_is_their_ratio() {
     let (h1, first) = measured(&noisy_force, Estimator::H1);
     let (h2, second) = measured(&noisy_force, Estimator::H2);
     let (mean, _) = measured(&noisy_force, Estimator::Mean);
-    // White noise of 9 % of the force's power is 1.7 % of its density at 10 Hz and 2.7 % at 30 Hz, where the force has
-    // less; the window takes a few thousandths off both.
+    // White noise with 9 % of the power of the force has 1.7 % of its spectral density at 10 Hz and 2.7 % at 30 Hz. The window changes
+    // both by a few thousandths.
     assert!(
         (0.973..0.983).contains(&(h1 / h2)) && (h2 - 1.0).abs() < 0.006,
         "{h1} {h2}"
@@ -244,12 +245,12 @@ fn estimators_differ_by_where_the_noise_is_and_coherence_is_their_ratio() {
     assert!((mean - 0.5 * (h1 + h2)).abs() < 5e-3, "{mean}");
     for (k, coherence) in first.coherence.unwrap().iter().enumerate() {
         let ratio = (first.receptance[k] / second.receptance[k]).re;
-        // Both are the same by algebra.
+        // The coherence equals H1/H2 by definition, within rounding.
         assert!((ratio - coherence).abs() < 1e-9, "{ratio} {coherence}");
     }
 }
 
-/// The standard way of scipy 1.17.1: `csd(f, x, fs=512, window=w, nperseg=64, noverlap=32)` over `welch` and coherence,
+/// Reference values of scipy 1.17.1: `csd(f, x, fs=512, window=w, nperseg=64, noverlap=32)` over `welch` and coherence,
 /// for f_k = sin(0.3k) + sin(0.001k²), x_k = f_{k−1} − 0.5 f_{k−3} + cos(0.7k), k < 400 (0 before the start); lines 3, 10
 /// and 20.
 #[test]
@@ -284,7 +285,7 @@ fn one_force_agrees_with_scipy() {
         let measurement = measure(std::slice::from_ref(&recording), &settings).unwrap();
         let entry = &measurement.table.entries()[0];
         for (line, re, im, coherence) in expected {
-            // The table begins with line 1. Ten digits were printed.
+            // The table begins with line 1 of the transform. The reference has ten digits.
             let h = entry.receptance[line - 1];
             assert!(
                 (h - Complex64::new(re, im)).norm() < 2e-9 * h.norm(),
@@ -333,7 +334,7 @@ fn three_forces_at_once_give_nine_receptances_and_intervals_that_cover() {
         let mut random = random(seed);
         let samples = (400.0 * RATE) as usize;
         let common = force_noise(&mut random, samples, 6.0);
-        // Partly the same, as cutting forces are.
+        // The three forces are partly correlated, as cutting forces are.
         let forces: [Vec<f64>; 3] = std::array::from_fn(|q| {
             let own = force_noise(&mut random, samples, 10.0);
             own.iter()
@@ -351,7 +352,7 @@ fn three_forces_at_once_give_nine_receptances_and_intervals_that_cover() {
         assert!((0.5..1.0).contains(&measurement.groups[0].least_singular));
         for (entry, deviation) in measurement.table.entries().iter().zip(&measurement.deviation) {
             let (p, q) = (entry.response.axis().unwrap(), entry.force.axis().unwrap());
-            // The noise is there everywhere; away from resonances the window has no bias of its own.
+            // The intervals cover random errors only. Away from resonances the window causes no bias.
             for (k, &hertz) in measurement.table.frequency_hz().iter().enumerate() {
                 if (12.0..16.0).contains(&hertz) || (24.0..29.0).contains(&hertz) {
                     let off = (entry.receptance[k].re - receptance(hertz, p, q).re).abs();
@@ -361,7 +362,7 @@ fn three_forces_at_once_give_nine_receptances_and_intervals_that_cover() {
             }
         }
     }
-    // 90 % of some six thousand values, of which nine at neighbouring lines hang together.
+    // Expected are 90 % of some six thousand values; those at neighbouring lines are correlated.
     let part = f64::from(covered as u32) / f64::from(counted as u32);
     assert!((0.87..0.93).contains(&part), "{part} of {counted}");
 }
@@ -370,7 +371,7 @@ fn three_forces_at_once_give_nine_receptances_and_intervals_that_cover() {
 fn dependent_forces_are_refused_and_further_tests_make_them_independent() {
     let mut random = random(20);
     let samples = (240.0 * RATE) as usize;
-    // A cut: all three forces are one signal, in another proportion for each immersion.
+    // As in cuts, the three forces are multiples of one signal; each immersion has another proportion.
     let cuts: Vec<Recording> = [[1.0, 0.5, 0.1], [-0.3, 1.0, 0.2], [0.2, -0.6, 0.5]]
         .iter()
         .map(|proportion: &[f64; 3]| {
@@ -405,7 +406,7 @@ fn dependent_forces_are_refused_and_further_tests_make_them_independent() {
                 .collect();
             let peak = truth.iter().map(|h| h.norm()).fold(0.0, f64::max);
             for (k, truth) in truth.iter().enumerate() {
-                // Five deviations: one of a quarter of a million is farther off. The window takes a hundredth off peaks.
+                // Five standard deviations are exceeded by one value in a million. The window lowers peaks by 1 %.
                 let off = (entry.receptance[k] - truth).norm();
                 assert!(
                     off < 5.0 * deviation[k] + 0.01 * peak,
@@ -414,7 +415,7 @@ fn dependent_forces_are_refused_and_further_tests_make_them_independent() {
                     deviation[k]
                 );
             }
-            // The forces in x and y are large, so that their columns are good.
+            // The forces in x and y are large, so that the errors of their columns are small.
             assert!(
                 q == 2 || error(&measurement, &entry.name()) < 0.08,
                 "{}: {}",
@@ -428,7 +429,7 @@ fn dependent_forces_are_refused_and_further_tests_make_them_independent() {
     }
 }
 
-/// Adds an impact at `at_s` to the force: a half sine of 8 ms.
+/// Adds an impact to the force from `at_s` on: a squared half sine of 30 ms with the peak `newtons`.
 fn impact(force: &mut [f64], at_s: f64, newtons: f64) {
     let (first, width) = ((at_s * RATE) as usize, (0.03 * RATE) as usize);
     for k in 0..=width {
@@ -455,7 +456,7 @@ fn impacts_become_segments_and_double_impacts_are_left_out() {
         (delay_s - 0.11).abs() < 0.005 && (part - 40.0 / 260.0).abs() < 0.02,
         "{delay_s} {part}"
     );
-    // Noise of 0.2 %, of which eleven seconds have more than the decay.
+    // Noise of 0.2 % of the signal acts over eleven seconds of each segment, much longer than the decay.
     let error = error(&measurement, "yy");
     assert!(error < 0.02, "{error}");
 }
@@ -578,14 +579,14 @@ fn an_exponential_window_moves_the_poles_by_its_decay_and_nothing_else() {
         .map(|&f| shifted(f).norm())
         .fold(0.0, f64::max);
     for (&hertz, h) in measurement.table.frequency_hz().iter().zip(&entry.receptance) {
-        // The free decay after the previous impact, e^{−ζωt}, has fallen below 1 %.
+        // The free decay of the preceding impact, e^{−ζωt}, has fallen below 1 % when the next begins.
         assert!(
             (h - shifted(hertz)).norm() < 0.012 * peak,
             "{hertz}: {h} {}",
             shifted(hertz)
         );
     }
-    // And back: the pole of the window's FRF, and that of the structure.
+    // The correction inverts the shift: from the pole of the FRF with window to that of the structure.
     let own = TAU * 17.4;
     let moved = Complex64::new(-0.02 * own - 1.0 / tau, own * (1.0 - 0.02_f64.powi(2)).sqrt());
     let (hertz, damping) = true_damping(moved.norm() / TAU, -moved.re / moved.norm(), tau);
@@ -614,7 +615,7 @@ fn a_slow_sweep_gives_receptances_in_its_frequency_range() {
     let measurement = measure(std::slice::from_ref(&recording), &MeasurementSettings::default()).unwrap();
     let frequency_hz = measurement.table.frequency_hz();
     let (first, last) = (frequency_hz[0], frequency_hz[frequency_hz.len() - 1]);
-    // A sweep does not end sharply: its spectrum falls to a thousandth within a few tenths of a hertz.
+    // The spectrum of a sweep does not end sharply at its last frequency: it falls to a thousandth within a few tenths of a hertz.
     assert!(
         (first - 8.0).abs() < 0.6 && (last - 30.0).abs() < 0.6,
         "{first} {last}"
@@ -627,7 +628,7 @@ fn a_slow_sweep_gives_receptances_in_its_frequency_range() {
         },
     )
     .unwrap();
-    // 1 % noise of 256 Hz, of which the sweep has 22.
+    // Noise of 1 % is spread over 256 Hz, of which the sweep covers 22 Hz.
     let error = error(&measurement, "yy");
     assert!(error < 0.01, "{error}");
 }
@@ -640,7 +641,7 @@ fn step_sine_is_demodulated_with_drift_and_reports_unsettled_steps() {
     let mut force = Vec::new();
     let mut phase = 0.0;
     for (index, hertz) in frequencies.iter().enumerate() {
-        // Two levels, and nothing between steps.
+        // Two force levels in turn, without force between the steps.
         let newtons = if index % 2 == 0 { 14.0 } else { 2.5 };
         for _ in 0..(stay_s * RATE) as usize {
             force.push(newtons * f64::sin(phase));
@@ -662,7 +663,7 @@ fn step_sine_is_demodulated_with_drift_and_reports_unsettled_steps() {
         assert!((found - expected).abs() < 1e-4 * expected, "{found} {expected}");
     }
     for name in ["xy", "yy", "zy"] {
-        // 1 % of force noise over seconds, and pieces that are off by 0.2 % at most.
+        // 1 % noise of the force is averaged over seconds; settled subsegments deviate by up to 0.2 %.
         let error = error(&measurement, name);
         assert!(error < 5e-3, "{name}: {error}");
     }

@@ -28,7 +28,7 @@ feed_per_tooth_mm = 0.1
 on = true
 "#;
 
-/// The case of that name among those that the project brings.
+/// The case `tests/cases/NAME.toml` of the project.
 pub(crate) fn case(name: &str) -> Case {
     let path = format!("{}/../../tests/cases/{name}.toml", env!("CARGO_MANIFEST_DIR"));
     Case::read(path).unwrap()
@@ -74,7 +74,7 @@ fn a_case_without_a_tool_says_so_when_asked() {
     );
 }
 
-/// What is replaced, by what, the line it stands in, and words the message must have.
+/// Faults of a case file: text that is replaced, its replacement, line of the fault, and words that the message must contain.
 const WRONG: [(&str, &str, usize, &[&str]); 18] = [
     ("teeth = 2", "teeth = 0", 10, &["tool.teeth", "found 0", "from 1"]),
     ("teeth = 2", "teeth = \"two\"", 10, &["\"two\"", "teeth"]),
@@ -261,7 +261,7 @@ fn the_cases_of_the_project_are_read() {
     assert!(count >= 20, "{count}");
 }
 
-/// Faults of extensions: the table, the line of the fault, and words of the message.
+/// Faults of extensions: text of the table, line of the fault, and words that the message must contain.
 const WRONG_EXTENSIONS: &[(&str, usize, &[&str])] = &[
     (
         "[extension.cubic-stifness]\nk3_n_per_m3 = 1.0\n",
@@ -279,7 +279,7 @@ const WRONG_EXTENSIONS: &[(&str, usize, &[&str])] = &[
         25,
         &["yield_m (the closest)"],
     ),
-    // The key of the right name in another unit.
+    // A key with the right name but another unit.
     (
         "[extension.backlash]\ngap_um = 50.0\n",
         24,
@@ -354,7 +354,7 @@ const WRONG_EXTENSIONS: &[(&str, usize, &[&str])] = &[
         25,
         &["a standard deviation of 0 or more"],
     ),
-    // A key that is missing, and values that do not go together.
+    // A missing key, and values that are not possible together.
     ("[extension.backlash]\ndirection = \"x\"\n", 23, &["needs gap_mm"]),
     (
         "[extension.backlash]\ngap_mm = 0.1\nbefore = \"coulomb-friction\"\n",

@@ -24,7 +24,7 @@ fn described(case: &Case) -> String {
     format!("{:?}", Effects::of_case(case).unwrap())
 }
 
-/// The effect of a table, written and read again.
+/// Effect of a table `[extension.NAME]` after it is written to text and parsed.
 fn comes_back(spec: &EffectSpec, table: &toml::Table) {
     let once = case(&text(spec.name, table));
     assert_eq!(once.effects().map(|spec| spec.id).collect::<Vec<_>>(), [spec.id]);
@@ -47,7 +47,7 @@ fn every_example_comes_back() {
     }
 }
 
-/// The number at a share of the way between the bounds of a parameter, cut at ±1000.
+/// Value at the fraction `share` of the interval of a parameter; infinite bounds are replaced by ±1000.
 fn within(prior: Prior, share: f64) -> f64 {
     let (low, high) = (prior.low.max(-1e3), prior.high.min(1e3));
     low + (high - low) * (0.001 + 0.998 * share)

@@ -1,4 +1,4 @@
-//! Effects by name, and each term against the closed form of its motion.
+//! Effects by name, and describing functions against a numerical Fourier sum.
 
 use super::*;
 
@@ -34,7 +34,7 @@ fn a_list_of_directions_is_an_effect_along_each() {
 }
 
 #[test]
-fn what_cannot_be_is_told_apart() {
+fn each_fault_of_an_effect_has_its_own_error() {
     let error = |text| Effects::parse([text]).unwrap_err();
     assert!(matches!(error("runout"), EffectError::Form(_)));
     assert!(matches!(error("runout=lots"), EffectError::Value { .. }));
@@ -48,7 +48,7 @@ fn what_cannot_be_is_told_apart() {
         Effects::parse(["runout=1", "runout.teeth=2"]).unwrap_err(),
         EffectError::Key { .. }
     ));
-    // A change over the record needs its length.
+    // The VALUE of wear is a change over the recording, whose length must be known.
     assert!(matches!(error("wear=0.1"), EffectError::NoDuration { .. }));
     assert!(Effects::parse_over(["wear=0.1"], Some(4.0)).is_ok());
     assert!(matches!(error("weather=1"), EffectError::Unknown(_)));
@@ -67,14 +67,14 @@ fn the_list_is_whole_and_each_specification_names_its_own_entry() {
             "{}",
             spec.name
         );
-        // A term is shared both ways.
+        // If an effect shares a term with another, so does the other with it.
         for other in spec.shares_term_with {
             assert!(other.spec().shares_term_with.contains(&id), "{}", spec.name);
         }
     }
 }
 
-/// The describing function of a term by a sum over a period of x = X·sin ωt.
+/// Compares each describing function with the Fourier sum of the restoring force over one period of x = X·sin ωt.
 #[test]
 fn closed_forms_of_describing_functions_are_the_sums() {
     use crate::path::{Motion, restoring_along};

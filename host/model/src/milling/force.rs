@@ -157,7 +157,7 @@ mod tests {
         kae_n_per_mm: 10.0,
     };
 
-    /// R(φ) of eq. 3.4 as printed, times the three forces.
+    /// Tangential, radial and axial force multiplied by the rotation matrix R(φ) of thesis eq. 3.4 as printed.
     fn by_rotation(forces: Vector3<f64>, angle: f64, gamma: f64) -> Vector3<f64> {
         let ((sp, cp), (sg, cg)) = (angle.sin_cos(), gamma.sin_cos());
         Matrix3::new(-cp, -sp * sg, -sp * cg, sp, -cp * sg, -cp * cg, 0.0, cg, -sg) * forces
@@ -203,7 +203,7 @@ mod tests {
                     assert!((ours[(i, j)] - printed[i][j]).abs() < 1e-14);
                 }
             }
-            // z leaves the chip thickness at a right edge angle, but F_z still acts.
+            // With an edge angle of 90°, z does not change the chip thickness, but F_z still acts.
             assert!(ours[(0, 2)].abs() < 1e-15 && (ours[(2, 0)] + s * 280.0 / 1835.0).abs() < 1e-14);
         }
     }

@@ -243,7 +243,7 @@ mod tests {
         };
         assert_eq!(found[0].remedy, [sign(4.35e6)]);
         assert_eq!(found[1].remedy[0], sign(4616.0));
-        // With the sign turned, damping needs C44 > 489 instead of 12.
+        // With the reversed sign, a definite damping matrix needs C44 > 489 instead of 12.
         let Remedy::Diagonal {
             row: 4,
             value: 12.0,

@@ -203,7 +203,7 @@ mod tests {
                             residue / (s - mode.pole()) + residue.conj() / (s - mode.pole().conj())
                         })
                         .sum();
-                    // Rounding in the solve: the poles are within a factor ten of each other.
+                    // Error by rounding in the linear solve, whose condition is small: the poles differ by a factor of ten at most.
                     assert!((h[(i, j)] - direct).norm() < 1e-12 * direct.norm().max(1e-7));
                 }
             }
@@ -225,7 +225,7 @@ mod tests {
             let h = first_order.receptance(omega).unwrap();
             for i in 0..3 {
                 for j in 0..3 {
-                    // The condition of K is about 1e5.
+                    // Error by rounding: the condition number of K is about 1e5.
                     assert!((h[(i, j)] - direct[(i, j)]).norm() < 1e-9 * direct.norm());
                 }
             }
@@ -256,7 +256,7 @@ mod tests {
         matrices.stiffness *= 1e200;
         let error = structure.first_order().unwrap_err();
         assert!(matches!(error, StructureError::Poles(_)), "{error}");
-        // The dynamics of the simulation pass it on, with the remedy.
+        // The equation of motion passes this error on, with the remedy.
         let error = crate::dynamics::Dynamics::new(&structure).unwrap_err();
         assert!(error.to_string().contains("check their units"), "{error}");
     }

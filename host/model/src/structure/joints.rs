@@ -192,9 +192,9 @@ pub(crate) mod tests {
         for joint in 0..6 {
             let (low, high) = (moved(joint, -h), moved(joint, h));
             let slope = (high.tool_m - low.tool_m) / (2.0 * h);
-            // Central differences of lengths of meters: 1e-12 of truncation, 1e-10 of rounding.
+            // Errors of the central differences of lengths of some metres: 1e-12 by truncation, 1e-10 by rounding.
             assert!((slope - jacobian.column(joint)).norm() < 1e-8, "{joint}");
-            // Kinetic energy of one joint at 1 rad/s, link by link, by differences of places and of rotations.
+            // Kinetic energy at 1 rad/s of one joint, summed over the links, from central differences of positions and rotations.
             let mut twice = robot.joints[joint].rotor_kg_m2;
             for (link, body) in robot.joints.iter().enumerate() {
                 let speed = (high.links[link].1 - low.links[link].1) / (2.0 * h);

@@ -130,7 +130,7 @@ mod tests {
             let h = 1e-4;
             let by_omega = (moved(h, 0.0) - moved(-h, 0.0)) / (2.0 * h * std::f64::consts::TAU);
             let by_damping = (moved(0.0, h) - moved(0.0, -h)) / (2.0 * h);
-            // Central differences of smooth functions with steps of 1e-4 err by about 1e-8 and rounding.
+            // Error of central differences of smooth functions with steps of 1e-4: about 1e-8 and rounding.
             assert!((part.by_omega() - &by_omega).norm() < 1e-7 * by_omega.norm());
             assert!((part.by_damping_ratio() - &by_damping).norm() < 1e-6 * by_damping.norm());
         }
@@ -160,7 +160,7 @@ mod tests {
                         .map(|pole| (pole - to).norm())
                         .fold(f64::INFINITY, f64::min)
                 };
-                // A is linear in λ while shapes stay: the rest is rounding, times the condition of the shapes.
+                // A is linear in λ at constant mode shapes: the error is rounding times the condition number of the shapes.
                 assert!(near(&moved.poles(), expected) < 1e-8 * part.omega(), "{name}");
                 for other in structure.poles() {
                     if other.im > 0.0 && (other - part.pole).norm() > 1e-3 {

@@ -11,7 +11,7 @@ fn cut(rpm: f64, seconds: f64) -> VirtualCut {
 
 #[test]
 fn a_recording_replays_as_the_simulated_samples() {
-    // The same cut straight to blocks, and by way of a recording.
+    // One cut, simulated once as blocks of the sensor and once as a recording.
     let case = case("kuka-kr90-acetal");
     let accelerometer = Accelerometer {
         clock_error: 0.02,
@@ -43,7 +43,7 @@ fn a_recording_replays_as_the_simulated_samples() {
     let sensed = Sensed::new(&recording, SpindleSettings::default()).unwrap();
     assert_eq!(sensed.settings.tool.teeth, 2);
     assert_eq!(sensed.working_point.unwrap().axial_depth.0, 1.0);
-    // The recording is scaled anew: samples agree to a count of the coarser of the two.
+    // The recording has another resolution: samples agree within one of its counts.
     let fine = f64::from(sensed.settings.sensor.meters_per_second2_per_count);
     let coarse = f64::from(accelerometer.sensor().meters_per_second2_per_count);
     for (a, b) in simulated.blocks.iter().zip(&sensed.blocks) {
@@ -54,8 +54,8 @@ fn a_recording_replays_as_the_simulated_samples() {
             }
         }
     }
-    // Edges to a hundredth of a sample, once the detector knows the swing: the record begins in the middle of an
-    // edge, and it learns by a quarter per turn.
+    // Edges agree within a hundredth of a sampling interval once the edge detector knows the amplitude of the level, which it learns
+    // by a quarter per revolution: the recording begins in the middle of an edge.
     let edges: Vec<u64> = simulated.edges.iter().map(|edge| edge.time.0).collect();
     let found: Vec<u64> = sensed.edges.iter().map(|edge| edge.time.0).collect();
     assert!(
@@ -90,7 +90,7 @@ fn the_ideal_record_obeys_the_equation_of_motion() {
     let dt = 1.0 / 5000.0;
     let mut worst: f64 = 0.0;
     for k in 1..recording.len() - 1 {
-        // Velocity by the central difference, good to (ω dt)²/6: the damping forces are small.
+        // Velocity by the central difference, with a relative error of (ω dt)²/6, which suffices since damping forces are small.
         let v = (pair("", k + 1) - pair("", k - 1)) / (2.0 * dt);
         let x = pair("", k);
         let residual = &m.mass * pair("a", k)
@@ -101,7 +101,7 @@ fn the_ideal_record_obeys_the_equation_of_motion() {
             - pair("f", k);
         worst = worst.max(residual.amax());
     }
-    // Forces are up to 11 N; a kink of the motion within the difference leaves some millinewtons.
+    // Forces are up to 11 N; a kink of the motion within the central difference causes an error of some millinewtons.
     assert!(worst < 0.02, "{worst}");
     let largest = (0..recording.len())
         .map(|k| pair("f", k).amax())
@@ -130,7 +130,7 @@ fn mean_accelerations_add_up_to_the_velocity_where_it_jumps() {
         place += speed * dt;
     }
     let largest = y.iter().fold(0.0_f64, |a, b| a.max(b.abs()));
-    // Twice summed, the error of the rectangle rule is of the order of dt times the velocity.
+    // The acceleration is summed twice by the rectangle rule, with an error of the order of dt times the velocity.
     assert!(worst < 0.05 * largest, "{worst} of {largest}");
 }
 
@@ -165,7 +165,7 @@ fn channels_may_be_late_scaled_and_left_out() {
     assert!(faulty.channel("fx").is_none() && plain.channel("fx").is_some());
     let of = |recording: &Recording, name: &str, k: usize| recording.channel(name).unwrap().samples[k];
     for k in 6..plain.len() {
-        // Six samples late, to rounding of the time.
+        // A delay of 1.2 ms is six samples; equal within rounding of the time.
         assert!((of(&faulty, "x", k) - of(&plain, "x", k - 6)).abs() < 1e-15);
         assert_eq!(of(&faulty, "vy", k), 1.2 * of(&plain, "vy", k));
         assert_eq!(of(&faulty, "y", k), of(&plain, "y", k));

@@ -1,4 +1,4 @@
-//! Rigs and terms against closed forms.
+//! Rigs and restoring forces against closed forms.
 
 use std::f64::consts::{PI, TAU};
 
@@ -28,7 +28,7 @@ fn linear() -> Structure {
 
 #[test]
 fn a_steady_tone_gives_the_receptance() {
-    // 40 s are 16 time constants to settle: e⁻³² is left.
+    // 40 s are 32 time constants 2m/c of the free decay: the transient falls to e⁻³².
     let tone = Signal::tones(&[17.2], [2.0, 2.0], 42.0, 1);
     let (recording, _) = rig(tone, &[]).record(&linear(), Path::new("a.csv")).unwrap();
     let h = linear().first_order().unwrap().receptance(TAU * 17.2).unwrap()[(1, 1)];
@@ -40,7 +40,7 @@ fn a_steady_tone_gives_the_receptance() {
 }
 
 #[test]
-fn every_smooth_term_obeys_its_equation() {
+fn every_smooth_restoring_force_obeys_its_equation() {
     let tones = Signal::tones(&[16.0, 17.4, 18.1], [30.0, 30.0], 3.0, 2);
     let (m, c, k) = (188.0, 305.0, 2.26e6);
     type Law = fn(f64, f64, f64) -> f64;
@@ -76,7 +76,7 @@ fn every_smooth_term_obeys_its_equation() {
             worst = worst.max(residual.abs());
             largest = largest.max(added.abs());
         }
-        // The motion is good to 1e-8 of its amplitude, the spring force of which is 300 N.
+        // The error of the motion is 1e-8 of its amplitude, at which the spring force is 300 N.
         assert!(worst < 1e-4 && largest > 0.5, "{effects:?}: {worst} of {largest}");
     }
 }
@@ -98,7 +98,7 @@ fn the_inverse_amplitude_grows_by_the_same_in_every_cycle_of_quadratic_damping()
     .record(&linear(), Path::new("a.csv"))
     .unwrap();
     let y = &samples(&recording, "y")[(3.6 * 20_000.0) as usize..];
-    // A maximum once per cycle.
+    // Maxima of the displacement, one per cycle.
     let tops: Vec<f64> = y
         .windows(3)
         .filter(|top| top[1] > 0.0 && top[0] < top[1] && top[1] >= top[2])
@@ -114,8 +114,8 @@ fn the_inverse_amplitude_grows_by_the_same_in_every_cycle_of_quadratic_damping()
 }
 
 #[test]
-fn dry_friction_takes_the_same_from_every_half_swing_and_then_holds() {
-    // Undamped but for friction, peaks shrink by 2·fc/k per half swing until |x| k < fc.
+fn dry_friction_reduces_the_amplitude_by_the_same_in_every_half_cycle_and_then_sticks() {
+    // With friction as the only damping, the peaks decrease by 2·fc/k per half cycle until |x| k < fc.
     let effects = ["damping=-0.99999999", "coulomb-friction=20"];
     let release = Signal::Release {
         force_n: 500.0,
@@ -138,7 +138,7 @@ fn dry_friction_takes_the_same_from_every_half_swing_and_then_holds() {
         wanted = -(wanted - wanted.signum() * 2.0 * fc / k);
         swings += 1;
         let i = released + (f64::from(swings) * half_swing * 20_000.0).round() as usize;
-        // A peak is flat: half a sample of time is (ωdt)²/8 of its height.
+        // Error by sampling at a peak: an offset of half a sampling interval lowers it by (ωdt)²/8 of its height.
         assert!(
             (y[i] - wanted).abs() < 1e-4 * y[released],
             "{swings}: {} {wanted}",
@@ -151,8 +151,8 @@ fn dry_friction_takes_the_same_from_every_half_swing_and_then_holds() {
 }
 
 #[test]
-fn what_friction_holds_is_let_go_at_the_first_peak_that_is_high_enough() {
-    // Nothing but the drive shortens steps until then.
+fn stick_ends_at_the_first_peak_of_the_force_above_the_friction_force() {
+    // Until slip begins, only the excitation force limits the integration step.
     let tone = Signal::tones(&[17.2], [0.0, 30.0], 20.0, 1);
     let instant = |index: u32| f64::from(index) * 1e-5;
     let wanted = (0..2_000_000)
@@ -162,15 +162,15 @@ fn what_friction_holds_is_let_go_at_the_first_peak_that_is_high_enough() {
     let effects = ["coulomb-friction=20"];
     let (recording, _) = rig(tone, &effects).record(&linear(), Path::new("a.csv")).unwrap();
     let y = samples(&recording, "y");
-    // Held is held to rounding.
+    // First sample with a motion beyond rounding.
     let first = y.iter().position(|y| y.abs() > 1e-15).unwrap();
-    // One sample lies between.
+    // Slip is seen within one sampling interval, 2 ms, after the force exceeds friction.
     let late = first as f64 / 500.0 - wanted;
     assert!((0.0..=2e-3).contains(&late), "{late} after {wanted}");
 }
 
 #[test]
-fn friction_behind_a_clearance_closes_by_hertz() {
+fn friction_behind_a_clearance_follows_the_law_of_hertz() {
     let effects = [
         "coulomb-friction=30",
         "coulomb-friction.fc_minus_n=20",
@@ -199,15 +199,15 @@ fn friction_behind_a_clearance_closes_by_hertz() {
             1 + usize::from(pressed > 0.999)
         }] = true;
         let found = force[i] - m * a[i] - c * v[i] - k * y[i];
-        // Between samples the slider may go on by half a millionth of the motion.
+        // Between samples the tool may move the slider further by about 1e-6 of the motion.
         assert!((found - wanted).abs() < 0.02, "{i}: {found} {wanted}");
     }
     assert_eq!(seen, [true; 3]);
 }
 
 #[test]
-fn play_has_its_period() {
-    // Free of damping a mass with play a and amplitude X swings in 4·(√(m/k)·(π/2) + a/(ω·(X − a))).
+fn backlash_has_the_period_of_its_closed_form() {
+    // Without damping, a mass with a gap ±a and amplitude X has the period 4·(√(m/k)·(π/2) + a/(ω·(X − a))).
     let effects = ["damping=-0.99999999", "backlash=0.1"];
     let impact = Signal::Impacts {
         impacts: vec![Impact {
@@ -232,14 +232,14 @@ fn play_has_its_period() {
     let amplitude = y[200..].iter().fold(0.0_f64, |a, x| a.max(x.abs()));
     let (gap, omega) = (0.05e-3, (2.26e6_f64 / 188.0).sqrt());
     let wanted = 4.0 * (0.5 * PI + gap / (amplitude - gap)) / omega;
-    // The peak is taken from samples: (ωdt)²/8 = 1e-4 of it.
+    // Sampling lowers the peak by up to (ωdt)²/8 = 1e-4 of its height.
     assert!((period / wanted - 1.0).abs() < 2e-4, "{period} {wanted}");
 }
 
 #[test]
 fn hysteresis_saturates_and_its_loop_has_the_area_of_friction() {
-    // Deep in slip a Bouc–Wen element is friction of k_h·z_y beside a spring of −k_h: the loop takes 4·k_h·z_y·X less
-    // what the rounded corners save, of the order z_y/X.
+    // Far beyond yield, a Bouc–Wen element is a friction force k_h·z_y in parallel with a spring −k_h. Its loop has the area
+    // 4·k_h·z_y·X, reduced by its rounded corners by a fraction of about z_y/X.
     let effects = [
         "hysteresis=2e6",
         "hysteresis.yield_m=1e-6",
@@ -283,7 +283,7 @@ fn a_missing_mode_adds_to_the_receptance() {
     let amplitude = samples(&recording, "y")[19_000..]
         .iter()
         .fold(0.0_f64, |a, x| a.max(x.abs()));
-    // A thousand samples at 27 per period: one lies within (π/54·3)²/2… of a peak; phases wander, so 1e-3 is safe.
+    // A thousand samples at 27 per period, at phases that drift: some lie so near to a peak that the error is below 1e-3.
     assert!(
         (amplitude / h.norm() - 1.0).abs() < 1e-3,
         "{amplitude} {}",
@@ -292,7 +292,7 @@ fn a_missing_mode_adds_to_the_receptance() {
 }
 
 #[test]
-fn coupling_comes_from_one_potential() {
+fn mode_coupling_conserves_energy() {
     // Energy is kept: without damping the sum of kinetic and all potential energy is that which the impact gave.
     let structure = case("kuka-kr90-half").structure.unwrap();
     let effects = [
@@ -366,7 +366,7 @@ fn sensors_read_what_their_effects_say() {
 
 #[test]
 fn where_the_velocity_jumps_accelerations_are_means_over_a_sample() {
-    // Modes that add up to no mass.
+    // The modes of this structure have no mass matrix, so that the velocity jumps.
     let structure = case("kuka-kr90-acetal").structure.unwrap();
     let impact = Signal::Impacts {
         impacts: vec![Impact {
@@ -437,7 +437,7 @@ fn noise_repeats_by_seed_and_has_its_size() {
         (sum / a.len() as f64).sqrt()
     };
     let rms = (samples(&plain, "y").iter().map(|x| x * x).sum::<f64>() / plain.len() as f64).sqrt();
-    // 20 000 samples: the deviation scatters by 0.5 %, four times that is allowed.
+    // The standard deviation of 20 000 samples scatters by 0.5 %; four times that is allowed.
     assert!((deviation("y") / (0.01 * rms) - 1.0).abs() < 0.02);
     assert!((deviation("fy") / 0.5 - 1.0).abs() < 0.02);
 }
@@ -453,7 +453,7 @@ fn a_joint_with_cubic_terms_is_the_spring_that_it_makes_at_the_tool() {
          damping_nms_per_rad = {c:e}\ncubic_stiffness_nm_per_rad3 = {k3:e}\ncubic_damping_nms3_per_rad3 = {c3:e}\n\
          mass_kg = 150.0\ncenter_m = [2.0, 0.0, 0.0]\ninertia_kg_m2 = [1.0, 1.0, 200.0]\n[posture]\njoints_deg = [0.0]\n"
     );
-    // Displacement is the angle times the arm, force the moment over it.
+    // The displacement of the tool is the joint angle times the arm, the force on it the moment divided by the arm.
     let (square, fourth) = (arm_m * arm_m, arm_m.powi(4));
     let spring = format!(
         "[structure]\nkind = \"matrices\"\ndirections = [\"y\"]\nmass = [[{:e}]]\ndamping = [[{:e}]]\n\
@@ -474,7 +474,7 @@ fn a_joint_with_cubic_terms_is_the_spring_that_it_makes_at_the_tool() {
     };
     let (a, b) = (pulled(&robot), pulled(&spring));
     let largest = b.iter().fold(0.0_f64, |most, y| most.max(y.abs()));
-    // Cubic forces are nearly a hundredth of the linear ones here, and both integrations are good to about 1e-7.
+    // Cubic forces are about a hundredth of the linear ones; the error of both integrations is about 1e-7.
     let cubic = k3 / fourth * largest.powi(2) / (k / square);
     assert!(cubic.abs() > 5e-3, "{cubic}");
     for (a, b) in a.iter().zip(&b) {

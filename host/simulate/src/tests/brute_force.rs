@@ -1,5 +1,5 @@
-//! The same cuts by a plain integration with small fixed steps and a surface on a grid of angles: another program, that
-//! shares nothing with the simulation but the case.
+//! Cuts compared with a second, independent integration: small fixed steps of the classical Runge–Kutta method, and surfaces on a
+//! grid of spindle angles. It shares only the case with the simulation.
 
 use num_complex::Complex64;
 
@@ -7,18 +7,18 @@ use super::*;
 use quietcut_model::milling::Runout;
 use quietcut_model::structure::{Form, Structure};
 
-/// Grid points per turn: two per step, because the surface is needed in the middle of a step too.
+/// A cut on a grid of `points` spindle angles per revolution: two per step, because the surface is required in the middle of a step too.
 struct Brute<'a> {
     case: &'a Case,
     spindle_rpm: f64,
     depth_mm: f64,
     points: usize,
-    /// Place of each tooth, in points, and its radius beyond the mean in m.
+    /// Position of each tooth on the tool, in grid points, and its radius minus the mean radius, m.
     teeth: Vec<(usize, f64)>,
     process: Process,
 }
 
-/// What the process has beyond the linear-edge law at a steady speed, written out once more.
+/// Parameters of chip law, process damping, wear and speed modulation, whose equations are written here a second time.
 #[derive(Clone, Copy)]
 struct Process {
     exponent: f64,
@@ -110,7 +110,7 @@ impl Equations {
         x
     }
 
-    /// Of the tool: the rate of the displacement, which is linear in y.
+    /// Velocity of the tool, m/s: the displacement is linear in y, so that its rate is the displacement of ẏ.
     fn velocity(&self, y: &[Complex64], force: [f64; 3]) -> [f64; 3] {
         self.displacement(&self.rate(y, force))
     }
@@ -150,20 +150,20 @@ impl Equations {
     }
 }
 
-/// When the spindle stood at each point so far.
+/// Times, s, at which the spindle passed each grid point so far.
 struct Times(Vec<f64>);
 
 impl Brute<'_> {
-    /// Displacement at every second point, over `turns` turns.
+    /// Displacement of the tool, m, at every second grid point over `turns` revolutions.
     fn run(&self, turns: usize) -> Vec<[f64; 3]> {
         let equations = Equations::new(self.case.structure().unwrap());
         let step_s = 2.0 * 60.0 / self.spindle_rpm / self.points as f64;
         let mut y = vec![Complex64::ZERO; equations.order()];
-        // Surface that each tooth left, by point; what was before the start was left by a tool at rest.
+        // Height of the surface that each tooth left, by grid point. Before the start, a tool at rest left the surface.
         let mut surface: Vec<Vec<f64>> = vec![Vec::new(); self.teeth.len()];
         let mut found = Vec::new();
         let mut x = equations.displacement(&y);
-        // Steps are in angle, counted in the time that it takes at the mean speed; the time itself is the last of y.
+        // The independent variable is the spindle angle, expressed as the time at the mean speed. The true time is the last state of y.
         y.push(Complex64::ZERO);
         let slowness = |t: f64| {
             let Process {
@@ -186,7 +186,7 @@ impl Brute<'_> {
                 let x = equations.displacement(y);
                 let mut force = self.force(surface, &times, (point, side, t), (x, [0.0; 3]));
                 if self.process.damping_n_per_m != 0.0 {
-                    // The velocity may jump with the force: a few rounds settle both.
+                    // Force and velocity may depend on each other: a fixed-point iteration of six rounds.
                     for _ in 0..6 {
                         let v = equations.velocity(y, force);
                         force = self.force(surface, &times, (point, side, t), (x, v));
@@ -203,7 +203,7 @@ impl Brute<'_> {
             let end: Vec<Complex64> = (0..y.len())
                 .map(|i| y[i] + step_s / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i]))
                 .collect();
-            // The middle by Hermite's cubic: displacement is linear in y, so its rates are those of y.
+            // States in the middle of the step, from Hermite's cubic interpolation.
             let middle: Vec<Complex64> = (0..y.len())
                 .map(|i| 0.5 * (y[i] + end[i]) + step_s / 8.0 * (k1[i] - k4[i]))
                 .collect();
@@ -239,7 +239,7 @@ impl Brute<'_> {
         (along * phi.sin() + across * phi.cos() + self.teeth[tooth].1) * gamma.sin() - x[2] * gamma.cos()
     }
 
-    /// Height of the surface in front of a tooth.
+    /// Height of the surface in front of a tooth at a grid point, m.
     fn in_front(&self, surface: &[Vec<f64>], times: &Times, tooth: usize, point: usize, phi_deg: f64) -> f64 {
         let ahead = (tooth + 1) % self.teeth.len();
         let gap = (self.points + self.teeth[ahead].0 - self.teeth[tooth].0) % self.points;
@@ -260,7 +260,7 @@ impl Brute<'_> {
         left - turn_feed_m * turns * phi_deg.to_radians().sin() * gamma.sin()
     }
 
-    /// When the spindle stood at a point; before the start by bisection of its angle.
+    /// Time at which the spindle passed a grid point, s; for points before the start by bisection of the spindle angle.
     fn time(&self, times: &Times, point: f64) -> f64 {
         if point >= 0.0
             && let Some(time) = times.0.get(point as usize)
@@ -301,7 +301,7 @@ impl Brute<'_> {
         }
     }
 
-    /// `side` says from which side of the point: at an entry or exit it matters.
+    /// Force on the tool at a grid point, N. `side` decides on which side of the point entry and exit are evaluated.
     fn force(
         &self,
         surface: &[Vec<f64>],
@@ -349,7 +349,7 @@ impl Brute<'_> {
             );
             let (sin, cos) = phi_deg.to_radians().sin_cos();
             if damping_n_per_m != 0.0 {
-                // Outwards along the chip is where `reach` grows: linear, so its rate is that of the velocity.
+                // Velocity of the edge along the chip thickness: `reach` is linear in the displacement.
                 let towards = self.reach(tooth, phi_deg, v) - self.reach(tooth, phi_deg, [0.0; 3]);
                 let radius_mm = 0.5 * tool.diameter_mm.unwrap();
                 let speed = std::f64::consts::TAU / 60.0
@@ -372,7 +372,7 @@ impl Brute<'_> {
     }
 }
 
-/// The largest difference over the largest displacement, over `turns` turns.
+/// Largest difference between simulation and grid over `turns` revolutions, relative to the largest displacement.
 fn difference(
     case: &Case,
     spindle_rpm: f64,
@@ -385,7 +385,7 @@ fn difference(
     difference_with(case, cut, runout, &[], PLAIN)
 }
 
-/// The same with effects of the process, once by name and once written out.
+/// As [`difference`], with `effects` in the simulation and `process` in the independent integration.
 fn difference_with(
     case: &Case,
     (spindle_rpm, depth_mm, turns, points): (f64, f64, usize, usize),
@@ -451,8 +451,8 @@ const TRUE: Runout = Runout {
 
 #[test]
 fn chatter_with_loss_of_contact() {
-    // The grid is of second order where contact changes between two points; the chatter that grows carries the error
-    // along. With finer grids the difference goes down to 1e-6.
+    // Changes of contact between two points make the grid second-order; growing chatter amplifies the error. With finer grids the
+    // difference falls to 1e-6.
     let acetal = difference(&case("kuka-kr90-acetal"), 900.0, 3.0, TRUE, 30, 8000);
     assert!(acetal < 1e-5, "{acetal}");
     let cubic = difference(&case("kuka-kr90-full-cubic"), 1000.0, 3.0, TRUE, 30, 8000);
@@ -462,15 +462,15 @@ fn chatter_with_loss_of_contact() {
 #[test]
 fn edge_forces_and_a_depth_that_follows_the_vibration() {
     let mut staubli = case("staubli-tx200");
-    // On the grid of angles.
+    // A start angle that lies on the grid of spindle angles.
     staubli.cut.as_mut().unwrap().start_deg = 126.0;
-    // The force jumps at loss of contact: the grid is of first order there, 2e-5 with four times the points.
+    // The force jumps at loss of contact, where the grid is first-order: the difference is 2e-5 with four times the points.
     let found = difference(&staubli, 500.0, 1.4, TRUE, 5, 48_000);
     assert!(found < 5e-4, "{found}");
 }
 
 #[test]
-fn uneven_pitch_runout_and_a_turned_feed() {
+fn variable_pitch_runout_and_a_rotated_feed() {
     let mut benchmark = case("insperger-2dof-ad0.5");
     let tool = benchmark.tool.as_mut().unwrap();
     tool.teeth = 3;
@@ -499,7 +499,7 @@ fn a_chip_law_that_is_not_linear() {
         &effects,
         process,
     );
-    // The rate of the force is infinite where a chip begins: the grid is of order 1.7 there.
+    // The force has an infinite derivative where a chip begins: the grid is of order 1.7 there.
     assert!(found < 1e-4, "{found}");
 }
 
@@ -512,7 +512,7 @@ fn process_damping_with_its_friction() {
     };
     let effects = ["process-damping=2e5", "process-damping.friction=0.3"];
     for (name, rpm) in [("kuka-kr90-full-cubic", 1000.0), ("kuka-kr90-acetal", 900.0)] {
-        // The force jumps where contact changes: the grid is of first order there.
+        // The force jumps where contact changes: the grid is first-order there.
         let found = difference_with(&case(name), (rpm, 3.0, 10, 32_000), TRUE, &effects, process);
         assert!(found < 3e-4, "{name}: {found}");
     }
@@ -531,7 +531,7 @@ fn wear_and_other_coefficients() {
     let material = worn.material.as_mut().unwrap();
     (material.ktc_mpa, material.krc_mpa) = (1.2 * material.ktc_mpa, 1.2 * material.krc_mpa);
     (material.kte_n_per_mm, material.kre_n_per_mm) = (4.0, 3.0);
-    // The brute force takes its coefficients from the case, the simulation by the effects.
+    // The independent integration takes its coefficients from the case, the simulation from the effects.
     std::mem::swap(&mut worn, &mut model);
     let process = Process {
         wear_per_s: 0.3,
@@ -546,7 +546,7 @@ fn wear_and_other_coefficients() {
     assert!(found < 5e-4, "{found}");
 }
 
-/// Where the tool is after half a second at 3 mm, in m.
+/// Displacement of the tool, m, after half a second of a cut 3 mm deep.
 fn ends(case: &Case, effects: &[&str]) -> [f64; 3] {
     let effects = Effects::parse(effects.iter().copied()).unwrap();
     let mut model = steady(case, 1000.0, 3.0);

@@ -38,13 +38,13 @@ fn free_decay_error_m(relative: f64) -> f64 {
 #[test]
 fn a_free_decay_is_exponential_and_its_error_follows_the_tolerance() {
     let errors = [1e-6, 1e-8, 1e-10].map(free_decay_error_m);
-    // A hundred times less per step is less error in proportion to the power 4/5 at least, with the power 5/6 of a
-    // method whose local error is of order 6: 40; half of that leaves room for the choice of steps.
+    // The error follows the tolerance with the power 5/6 for a local error of order 6: a tolerance of a hundredth divides it by 46.
+    // A factor of 20 leaves room for the choice of steps.
     assert!(
         errors[0] / errors[1] > 20.0 && errors[1] / errors[2] > 20.0,
         "{errors:?}"
     );
-    // 92 oscillations: a few hundred times the error per step.
+    // Over 92 oscillations the local errors add up to a few hundred times the tolerance.
     assert!(errors[1] < 3e-6 * 1e-4, "{errors:?}");
 }
 
@@ -87,8 +87,8 @@ fn a_harmonic_force_gives_the_receptance() {
             ];
             for (power, (found, expected)) in found.iter().zip(expected).enumerate() {
                 let size = 2.0 * receptance.norm() * omega.powi(power as i32);
-                // Error per step 1e-10, gathered over the thousand steps that the damping remembers, at the natural
-                // frequency: in the acceleration of a slow drive it counts for more.
+                // Local errors of 1e-10 add up over the thousand steps of the decay time. They oscillate at the natural frequency, so
+                // that they are larger relative to the acceleration of a slow excitation.
                 assert!(
                     (found - expected).abs() < 1e-6 * size,
                     "{ratio}: {found} {expected}"
@@ -99,8 +99,8 @@ fn a_harmonic_force_gives_the_receptance() {
 }
 
 #[test]
-fn a_rigid_machine_feels_the_forces_of_chapter_3() {
-    // A structure so heavy that it does not move: the force is that of the feed alone.
+fn the_force_on_a_rigid_machine_is_that_of_chapter_3() {
+    // The structure is so heavy that it does not vibrate: the force is that of the feed alone.
     let mut case = case("staubli-tx200");
     if let quietcut_model::structure::Form::Matrices(matrices) = &mut case.structure.as_mut().unwrap().form {
         matrices.mass *= 1e9;
@@ -109,7 +109,7 @@ fn a_rigid_machine_feels_the_forces_of_chapter_3() {
     }
     let (rpm, depth_mm) = (500.0, 0.67);
     let model = steady(&case, rpm, depth_mm);
-    // One tooth of four at a time: 126.87 to 180 degrees, eq. 3.6 with φ in the middle of the cut.
+    // One of four teeth cuts at a time, from 126.87° to 180°; thesis eq. 3.6 with φ in the middle of the cut.
     let phi: f64 = 150.0_f64.to_radians();
     let t = phi / TAU * 60.0 / rpm;
     let motion = motions(&model, Settings::default(), t, 1.0, 1.5 * t)[0];
@@ -125,7 +125,7 @@ fn a_rigid_machine_feels_the_forces_of_chapter_3() {
         fr * gamma.cos() - fa * gamma.sin(),
     ];
     for (found, expected) in motion.force_n.iter().zip(expected) {
-        // The machine still moves by a picometer.
+        // The heavy structure still moves by about a picometre.
         assert!(
             (found - expected).abs() < 1e-5,
             "{:?} {expected:?}",
@@ -135,7 +135,7 @@ fn a_rigid_machine_feels_the_forces_of_chapter_3() {
 }
 
 #[test]
-fn runout_moves_chip_from_tooth_to_tooth() {
+fn runout_changes_the_chip_thickness_of_each_tooth() {
     use quietcut_model::milling::Runout;
     let mut case = case("kuka-kr90-full");
     if let quietcut_model::structure::Form::Matrices(matrices) = &mut case.structure.as_mut().unwrap().form {
@@ -151,7 +151,7 @@ fn runout_moves_chip_from_tooth_to_tooth() {
         .unwrap()
         .cutter
         .set_runout(Runout { offset_um, angle_deg });
-    // Tooth 1 at 90° after a quarter turn, tooth 2 half a turn later; the second turn has a cut surface in front.
+    // Tooth 1 is at 90° after a quarter revolution, tooth 2 half a revolution later. In the second revolution the surface in front is cut.
     let force = motions(&model, Settings::default(), 0.125, 0.05, 0.2);
     let radial_mm = |tooth: f64| 1e-3 * offset_um * (angle_deg.to_radians() + 0.5 * TAU * tooth).cos();
     for (motion, (tooth, other)) in force.iter().zip([(0.0, 1.0), (1.0, 0.0)]) {

@@ -1,12 +1,13 @@
-//! What happens beyond the limits of chapter 6.
+//! Motion beyond the stability limits of thesis chapter 6: period doubling and quasi-periodic motion.
 
 use super::*;
 
-/// Angular frequency that makes chapter 6 dimensionless, rad/s, and its depth per w, mm.
+/// Angular frequency, rad/s, by which thesis chapter 6 makes time dimensionless.
 const OMEGA: f64 = 109.641_6;
+/// Axial depth, mm, of the dimensionless depth w = 1 of thesis chapter 6.
 const DEPTH_MM_PER_W: f64 = 1.0 / 0.033_628;
 
-/// x once per tooth, after transients, of the full-immersion robot with cubic terms.
+/// Stroboscopic section: displacement x, m, once per tooth-passing period after transients, of the robot with cubic terms at full immersion.
 fn once_per_tooth(tau: f64, w: f64, skipped: u32, kept: u32) -> Vec<f64> {
     let case = case("kuka-kr90-full-cubic");
     let spindle_rpm = 30.0 * OMEGA / tau;
@@ -30,7 +31,7 @@ fn spread(values: impl Iterator<Item = f64> + Clone) -> f64 {
 
 #[test]
 fn below_the_limit_every_tooth_finds_the_same_motion() {
-    // Flip at w = 0.06241.
+    // The limit (period doubling) is at w = 0.06241.
     let x = once_per_tooth(2.7, 0.055, 3000, 60);
     assert!(spread(x.iter().copied()) < 1e-3 * 0.15e-3, "{x:?}");
 }
@@ -52,7 +53,7 @@ fn fig_6_3_is_a_flip_at_2_7_and_a_torus_at_2_9() {
     let torus = once_per_tooth(2.9, 0.08, 3000, 60);
     let whole = spread(torus.iter().copied());
     assert!(whole > 0.1 * 0.15e-3, "{torus:?}");
-    // On no short period: both branches are as wide as a curve.
+    // The section has no short period: every subsequence spans much of the closed curve.
     for period in 1..8 {
         assert!(
             spread(torus.iter().copied().step_by(period)) > 0.3 * whole,
@@ -70,13 +71,13 @@ fn after_the_torus_the_motion_is_quasi_periodic_with_the_rotation_of_fig_6_13() 
         (1.34, 0.19, 1.0 / 2.0),
     ] {
         let per_tooth = once_per_tooth(tau, w, 6000, 2048);
-        // Once per spindle turn of two teeth.
+        // Once per spindle revolution: the tool has two teeth.
         let x: Vec<f64> = per_tooth.iter().copied().step_by(2).collect();
         let found = dominant_frequency(&x);
-        // A rotation p/q and 1 − p/q look alike from once per turn.
+        // Sampled once per revolution, the rotation numbers p/q and 1 − p/q cannot be told apart.
         let off = (found - rotation).abs().min((found - (1.0 - rotation)).abs());
         assert!(off < 0.01, "τ = {tau}: rotation {found}, not {rotation}");
-        // Locked, it would repeat exactly after q turns, and q is at most 5.
+        // A phase-locked motion would repeat exactly after q revolutions, with q at most 5.
         let period = (rotation * 60.0).round() as usize;
         let q = 60 / gcd(period, 60);
         let repeat = x
@@ -109,7 +110,7 @@ fn the_error_of_a_cut_with_loss_of_contact_follows_the_tolerance() {
             .fold(0.0, f64::max)
             / size
     });
-    // 60 teeth of growing chatter, 100 times the tolerance gathered. A hundredth of it is a hundredth of the error.
+    // Over 60 tooth passings of growing chatter the error grows to 100 times the tolerance, and is proportional to it.
     assert!(
         errors[0] / errors[1] > 15.0 && errors[1] / errors[2] > 15.0,
         "{errors:?}"
@@ -121,7 +122,7 @@ fn gcd(a: usize, b: usize) -> usize {
     if b == 0 { a } else { gcd(b, a % b) }
 }
 
-/// The strongest frequency of a series in cycles per sample, 0 to ½: peak of a Hann-windowed transform, refined.
+/// Dominant frequency of a series, in cycles per sample from 0 to ½: the peak of its Hann-windowed Fourier transform on a fine grid.
 fn dominant_frequency(x: &[f64]) -> f64 {
     let mean = x.iter().sum::<f64>() / x.len() as f64;
     let power = |frequency: f64| {

@@ -8,8 +8,9 @@ use quietcut_recording::Recording;
 
 const RATE_HZ: f64 = 20_000.0;
 
-/// Speed, rev/min, from and to, and over how long.
+/// Spindle speed at the start of the linear sweep, rev/min.
 const FIRST_RPM: f64 = 450.0;
+/// Spindle speed at the end of the sweep, rev/min.
 const LAST_RPM: f64 = 690.0;
 const SECONDS: f64 = 4.0;
 
@@ -17,7 +18,7 @@ fn angle_rad(t: f64) -> f64 {
     TAU / 60.0 * (FIRST_RPM * t + 0.5 * (LAST_RPM - FIRST_RPM) / SECONDS * t * t)
 }
 
-/// When the spindle stood half a turn back, by bisection.
+/// Time, s, at which the spindle was half a revolution behind its angle at `t`, by bisection.
 fn half_a_turn_before(t: f64) -> f64 {
     let wanted = angle_rad(t) - PI;
     let (mut low, mut high) = (t - 0.1, t);
@@ -64,14 +65,14 @@ fn the_force_of_a_gliding_spindle_in_foam_is_that_of_the_solid_chip() {
     let (mut compared, mut largest) = (0, 0.0_f64);
     for k in ((0.3 * RATE_HZ) as usize..(3.9 * RATE_HZ) as usize).step_by(23) {
         let t = k as f64 / RATE_HZ;
-        // One of two teeth is in the half immersion from 90 to 180 degrees; near its end contact may be lost.
+        // One of two teeth is in the cut from 90° to 180°. Near the exit contact may be lost, so that angles up to 137° are compared.
         let phi = [0.0, PI].map(|tooth| (angle_rad(t) + tooth).rem_euclid(TAU));
         let Some(phi) = phi.into_iter().find(|phi| (1.59..2.4).contains(phi)) else {
             continue;
         };
         let before = half_a_turn_before(t);
         let moved = |name| at(&recording, name, t) - at(&recording, name, before);
-        // The feed axis moves steadily, by the feed per tooth at the speed in the middle.
+        // The feed axis moves at constant speed: by the feed per tooth in a tooth-passing period at the mean spindle speed.
         let mean_delay_s = 30.0 / (0.5 * (FIRST_RPM + LAST_RPM));
         let chip_m = feed_m * (t - before) / mean_delay_s * phi.sin()
             + moved("x") * phi.sin()
@@ -87,7 +88,7 @@ fn the_force_of_a_gliding_spindle_in_foam_is_that_of_the_solid_chip() {
         ];
         for (name, expected) in expected {
             let found = recording.channel(name).unwrap().samples[k];
-            // Forces are up to 18 N; motion between samples is interpolated by straight lines.
+            // Forces are up to 18 N. The motion is interpolated linearly between samples, which causes an error of 1e-4 of that.
             assert!(
                 (found - expected).abs() < 2e-3,
                 "{t} s, {name}: {found} {expected}"
@@ -125,7 +126,7 @@ fn without_pores_and_without_change_of_speed_it_is_the_plain_cut() {
     let (plain, same) = (record(&plain), record(&same));
     for (a, b) in plain.channels.iter().zip(&same.channels) {
         for (a, b) in a.samples.iter().zip(&b.samples) {
-            // Tolerances of the integration, and at entry a sample may fall on either side of a jump.
+            // Within the tolerance of the integration. At entry a sample may fall on either side of a jump of the force.
             assert!(
                 (a - b).abs() < 1e-5 * a.abs().max(1e-3) || a.abs().min(b.abs()) < 1e-6,
                 "{a} {b}"

@@ -10,12 +10,12 @@ use super::*;
 use quietcut_model::case::Case;
 pub(crate) use quietcut_testkit::case;
 
-/// The tool of chapter 6 in a slot, 1 mm deep.
+/// The tool of thesis chapter 6 in a slot, 1 mm deep.
 pub(super) fn slot_cutter() -> Cutter {
     cutter(&case("kuka-kr90-full"), 1.0)
 }
 
-/// The tool of chapter 7, half immersed in acetal, 1 mm deep.
+/// The tool of thesis chapter 7 at half immersion in acetal, 1 mm deep.
 pub(super) fn acetal_cutter() -> Cutter {
     cutter(&case("kuka-kr90-acetal"), 1.0)
 }
@@ -31,7 +31,7 @@ fn cutter(case: &Case, depth_mm: f64) -> Cutter {
     cutter
 }
 
-/// A case in full cut from the start.
+/// Model of a cut of `case` with full engagement from the start.
 fn steady(case: &Case, spindle_rpm: f64, depth_mm: f64) -> Model {
     Model {
         dynamics: Dynamics::new(case.structure().unwrap()).unwrap(),
@@ -47,7 +47,7 @@ fn steady(case: &Case, spindle_rpm: f64, depth_mm: f64) -> Model {
     }
 }
 
-/// The motion at `first_s + k·every_s` up to `end_s`, from rest.
+/// The motion at the times `first_s + k·every_s` up to `end_s`, s, from rest.
 fn motions(model: &Model, settings: Settings, first_s: f64, every_s: f64, end_s: f64) -> Vec<Motion> {
     let at_rest = vec![0.0; model.dynamics.order()];
     motions_from(model, at_rest, settings, first_s, every_s, end_s)

@@ -1,4 +1,4 @@
-//! The sensors that listen to a virtual cut.
+//! Accelerometer and tachometer of a virtual cut.
 
 use quietcut_core::tachometer::Wheel;
 
@@ -42,7 +42,7 @@ fn blocks_are_stamped_by_the_true_clock() {
         ..Accelerometer::IIS3DWB_16G
     };
     let sensed = sensed(sensor, 1);
-    // Whole blocks and a rest, over one second at 25 867 Hz.
+    // One second at 25 867 Hz: whole blocks and one partial block.
     let samples: usize = sensed.blocks.iter().map(|block| block.counts.len()).sum();
     assert!(samples.abs_diff(25_867) <= 2, "{samples}");
     for (number, block) in sensed.blocks.iter().enumerate() {
@@ -69,18 +69,18 @@ fn noise_has_its_density_and_quiet_is_quiet() {
         };
         cut.sense(&case, sensor, TachometerModel::ONE_MARK, 3).unwrap()
     };
-    // The first half second is air.
+    // During the first half second the tool has no contact.
     let quiet = counts(&listen(0.0), 1);
     assert!(quiet[..13_000].iter().all(|count| *count == 0.0));
     let noisy = &counts(&listen(75e-6), 1)[..13_000];
     let deviation = (noisy.iter().map(|count| count * count).sum::<f64>() / noisy.len() as f64).sqrt();
-    // 75 µg/√Hz over 13.3 kHz is 8.66 mg, 142 counts of 0.061 mg; 13 000 samples know it to 1 %.
+    // 75 µg/√Hz over 13.3 kHz is 8.66 mg, or 142 counts of 0.061 mg; the estimate from 13 000 samples scatters by 1 %.
     assert!((deviation - 142.0).abs() < 5.0, "{deviation}");
 }
 
 #[test]
 fn a_small_range_clips_and_says_so() {
-    // Chatter of the benchmark's tool: 14 µm at 900 Hz are 48 g.
+    // Chatter of the tool of the benchmark: an amplitude of 14 µm at 900 Hz is an acceleration of 48 g.
     let cut = VirtualCut {
         entry: Entry::None,
         ..VirtualCut::new(10_000.0, 1.0, 0.3)
@@ -107,7 +107,7 @@ fn a_small_range_clips_and_says_so() {
     assert!(clipped > 1000 && clipped == at_end, "{clipped} {at_end}");
 }
 
-/// A slow sine of the force on a mass without spring: the acceleration is known exactly.
+/// Sinusoidal forces of 100 Hz along x and 3 kHz along y on a mass without spring, so that the acceleration is known exactly.
 struct Slow;
 
 impl Drive for Slow {
@@ -166,6 +166,6 @@ fn edges_come_at_their_angles_but_for_the_gap() {
         let expected_s = position as f64 / 600.0;
         worst = worst.max((edge.time.0 as f64 * 1e-9 - expected_s).abs());
     }
-    // 581 draws of a normal distribution stay within 5 standard deviations but once in 3000 seeds.
+    // 581 normal variables stay within 5 standard deviations, except for one of 3000 seeds.
     assert!(worst > 2e-6 && worst < 10e-6, "{worst}");
 }
