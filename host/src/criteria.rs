@@ -32,7 +32,8 @@ pub(crate) const BIASED_PREDICTION: (f64, f64) = (2.0, 1e-3);
 /// Interpolation error between the lines of an FRF table, relative to its peak, above which the user is warned. Unfounded.
 pub(crate) const COARSE_TABLE: f64 = 0.01;
 
-/// Relative change of a stability limit below which the limit counts as unchanged. Unfounded.
+/// Relative change of a stability limit below which the limit counts as unchanged. Multipliers are accurate to 1e-7, and ln |μ| changes by
+/// about as much as the relative depth; ten times that is taken.
 pub(crate) const UNCHANGED_LIMIT: f64 = 1e-6;
 
 // Reports

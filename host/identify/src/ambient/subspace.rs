@@ -49,7 +49,7 @@ pub struct AmbientModes {
 pub enum AmbientError {
     /// The record is too short for the band.
     #[error(
-        "{seconds:.1} s are too short to tell modes from {low_hz} Hz on, and how well: {needed_s:.1} s are needed at least"
+        "{seconds:.1} s are too short to identify modes above {low_hz} Hz with intervals; at least {needed_s:.1} s are needed"
     )]
     TooShort {
         /// Duration of the record, s.
@@ -60,10 +60,8 @@ pub enum AmbientError {
         needed_s: f64,
     },
     /// No mode in the band exceeds the noise.
-    #[error(
-        "nothing between {0} and {1} Hz stands out of the noise: the data cannot tell; record longer, or shake it more"
-    )]
-    Nothing(f64, f64),
+    #[error("no mode between {0} and {1} Hz exceeds the noise; record longer, or excite the structure more")]
+    NoMode(f64, f64),
     /// The singular values of the covariances cannot be computed.
     #[error(transparent)]
     SingularValues(#[from] SingularValueError),
@@ -88,7 +86,7 @@ const STEP: f64 = 1e-3;
 /// Identifies the modes of a record in a frequency band, Hz.
 ///
 /// # Errors
-/// The record is too short, or nothing stands out.
+/// The record is too short, or no mode exceeds the noise.
 pub fn modes(ambient: &Ambient, [low_hz, high_hz]: [f64; 2]) -> Result<AmbientModes, AmbientError> {
     let rows = ((PERIODS * ambient.rate_hz / low_hz).ceil() as usize).clamp(6, 60);
     let samples = ambient.channels.first().map_or(0, Vec::len);
@@ -120,7 +118,7 @@ pub fn modes(ambient: &Ambient, [low_hz, high_hz]: [f64; 2]) -> Result<AmbientMo
     };
     let order = record.order()?;
     if order == 0 {
-        return Err(AmbientError::Nothing(low_hz, high_hz));
+        return Err(AmbientError::NoMode(low_hz, high_hz));
     }
     let found = record.modes(order)?;
     let larger = record.poles(&record.mean, order + 4)?.unwrap_or_default();
@@ -134,7 +132,7 @@ pub fn modes(ambient: &Ambient, [low_hz, high_hz]: [f64; 2]) -> Result<AmbientMo
         })
         .collect();
     if modes.is_empty() {
-        return Err(AmbientError::Nothing(low_hz, high_hz));
+        return Err(AmbientError::NoMode(low_hz, high_hz));
     }
     Ok(AmbientModes { modes, order, blocks })
 }

@@ -98,7 +98,7 @@ pub struct InverseMode {
 #[derive(Debug, thiserror::Error)]
 pub enum InverseError {
     /// The first guess has no oscillating mode.
-    #[error("the first guess has no modes: every pole is real, or without a shape of its own")]
+    #[error("the first guess has no oscillating mode with a mode shape")]
     NoModes,
     /// No structure within the prior explains the cuts.
     #[error(

@@ -37,7 +37,7 @@ pub fn steady(recordings: &[Recording], harmonics: usize, settling: Settling) ->
         let found = dwell_segments(recording);
         if found.is_empty() {
             steady.warnings.push(format!(
-                "{name}: no frequency is held; a step-sine test is needed"
+                "{name}: no segment of constant frequency was found; a step-sine test is needed"
             ));
         }
         let (mut settled_dwells, mut moving, mut short, mut unsettled) = (Vec::new(), Vec::new(), 0, 0);
@@ -57,7 +57,7 @@ pub fn steady(recordings: &[Recording], harmonics: usize, settling: Settling) ->
         let mut dwells = settled_dwells;
         if moving.len() > dwells.len() {
             steady.warnings.push(format!(
-                "{name}: the motion of {} dwells still changes at their ends; parameters are off by what their transients are: dwell longer",
+                "{name}: the motion of {} dwells still changes at their ends; the transients bias the parameters: dwell longer",
                 moving.len()
             ));
             dwells.extend(moving);

@@ -12,10 +12,12 @@ const FINER: usize = 8;
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum ResponseError {
     /// The law has no mass.
-    #[error("a law without mass has no motion of its own")]
+    #[error("the law has no mass, so that its motion cannot be predicted")]
     NoMass,
     /// The motion grows without bound.
-    #[error("the motion of the law grows without bound after {time_s:.3} s: it means nothing at this force")]
+    #[error(
+        "the motion of the law grows without bound after {time_s:.3} s: the law does not hold at this force"
+    )]
     Diverged {
         /// Time at which the displacement is no longer finite, s.
         time_s: f64,

@@ -258,7 +258,7 @@ mod tests {
             })
             .collect();
         let [low, high] = band_of(&x, rate, 1e3);
-        // Accuracy of one smoothed interval: 1/400 of the sample rate, twice.
+        // Both ends are accurate to two smoothed intervals, each 1/400 of the sample rate of 500 Hz.
         assert!(
             (low - 20.0).abs() < 2.6 && (high - 60.0).abs() < 2.6,
             "{low} {high}"

@@ -210,7 +210,7 @@ fn short_and_noisy_records_are_refused_with_a_reason() {
     }
     let ambient = Ambient::new(&noise, BAND_HZ[1]).unwrap();
     match modes(&ambient, BAND_HZ) {
-        Err(error) => assert!(matches!(error, AmbientError::Nothing(..)), "{error}"),
+        Err(error) => assert!(matches!(error, AmbientError::NoMode(..)), "{error}"),
         Ok(found) => assert!(found.modes.iter().all(|mode| mode.is_vague()), "{found:?}"),
     }
     // A recording with a gap: the reason names the data.

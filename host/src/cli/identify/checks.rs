@@ -6,7 +6,7 @@ use super::Error;
 use super::answer::{IdentifyOutput, Linearity, SweepPair, TonesLinearity};
 use super::args::Args;
 use super::methods::settling;
-use super::records::along;
+use super::records::force_and_motion;
 use crate::identify::dwell::Dwell;
 use crate::identify::homogeneity::regions;
 use crate::identify::linearity::verdict;
@@ -89,7 +89,7 @@ pub(super) fn linearity(args: &Args, recordings: &[Recording]) -> Result<Identif
     Ok(IdentifyOutput {
         dwells: Some(taken.dwells.len() + rising.len()),
         warnings: taken.warnings.into_iter().chain(refused).collect(),
-        messages: said(&found),
+        messages: sentences(&found),
         linearity: Some(found),
         ..IdentifyOutput::of("linearity", Vec::new(), Vec::new())
     })
@@ -112,7 +112,7 @@ fn compare_sweeps(sweeps: &[&Recording]) -> Result<(Vec<SweepPair>, Vec<String>)
     let mut known: Vec<((Direction, Quantity), PathBuf, Spectra)> = Vec::new();
     let (mut found, mut refused) = (Vec::new(), Vec::new());
     for sweep in sweeps {
-        let record = along(sweep)?;
+        let record = force_and_motion(sweep)?;
         let spectra = Spectra::new(&record.force, record.motion, sweep.sample_rate_hz);
         let place = (record.direction, record.quantity);
         match known.iter().find(|(other, ..)| *other == place) {
@@ -133,7 +133,7 @@ fn compare_sweeps(sweeps: &[&Recording]) -> Result<(Vec<SweepPair>, Vec<String>)
     Ok((found, refused))
 }
 
-fn said(found: &Linearity) -> Vec<String> {
+fn sentences(found: &Linearity) -> Vec<String> {
     let mut messages = Vec::new();
     for TonesLinearity {
         direction,

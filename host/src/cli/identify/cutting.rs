@@ -69,7 +69,7 @@ pub(super) fn force_coefficients(args: &Args, recordings: &[Recording]) -> Resul
     Ok(IdentifyOutput {
         fit_error: Some(fit.relative_error),
         warnings: warnings(&fit, &tests),
-        messages: said(&fit),
+        messages: sentences(&fit),
         cutting: Some(Cutting {
             averaged: fit.averaged.map(figures),
             runout_um: fit
@@ -116,7 +116,7 @@ fn warnings(fit: &Fit, tests: &[CuttingTest]) -> Vec<String> {
     warnings
 }
 
-fn said(fit: &Fit) -> Vec<String> {
+fn sentences(fit: &Fit) -> Vec<String> {
     let mut messages = vec![format!("{} revolutions at {} feeds", fit.revolutions, fit.feeds)];
     if let Some(averaged) = fit.averaged {
         messages.extend(figures(averaged).into_iter().map(|(key, figure)| {

@@ -55,7 +55,7 @@ pub(super) fn joints(args: &Args, recordings: &[Recording]) -> Result<IdentifyOu
         Vec::new()
     };
     let found = if tones.iter().any(|(posture, _)| has_levels(&posture.dwells)) {
-        by_tones(args, &start, &postures, tones)?
+        from_tones(args, &start, &postures, tones)?
     } else {
         from_receptances(args, &start, &postures)?
     };
@@ -115,7 +115,7 @@ fn has_levels(dwells: &[Dwell]) -> bool {
 }
 
 /// Identifies stiffness, damping and cubic terms from steady sine responses at several force levels.
-fn by_tones(
+fn from_tones(
     args: &Args,
     start: &Robot,
     postures: &[AtPosture],

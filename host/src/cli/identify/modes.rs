@@ -50,7 +50,7 @@ pub(super) fn modes(args: &Args) -> Result<IdentifyOutput, Error> {
         fit_error: Some(model.fit_error),
         misfit: model.misfit,
         warnings,
-        messages: said(&model, &noise),
+        messages: sentences(&model, &noise),
         noise,
         modal: Some(model),
         ..IdentifyOutput::default()
@@ -107,7 +107,8 @@ fn source(args: &Args) -> Result<Source, Error> {
     })
 }
 
-/// The table of receptances in a file. If the file is a recording, or may be one, the reason why it is no table; `None` without doubt.
+/// The table of receptances in a file. The inner error is the reason why a UFF file is not a table, or `None` for a file that is certainly
+/// a recording.
 ///
 /// # Errors
 /// The file cannot be read, or its head is that of a table but its content is wrong.
@@ -192,7 +193,7 @@ fn not_in_case(args: &Args, model: &ModalModel) -> Option<String> {
     })
 }
 
-fn said(model: &ModalModel, noise: &[ChannelNoise]) -> Vec<String> {
+fn sentences(model: &ModalModel, noise: &[ChannelNoise]) -> Vec<String> {
     let mut lines = Vec::new();
     for found in &model.modes {
         let frequency = Figure::new(found.mode.frequency_hz, found.frequency_std_hz);

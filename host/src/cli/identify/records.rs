@@ -18,12 +18,12 @@ pub(super) fn multisine(
 ) -> Result<IdentifyOutput, Error> {
     let mut taken = Vec::new();
     for recording in recordings {
-        let Along {
+        let ForceAndMotion {
             direction,
             force,
             motion,
             quantity,
-        } = along(recording)?;
+        } = force_and_motion(recording)?;
         if quantity != Quantity::Displacement {
             return Err(Error::input(
                 recording.lacks("a displacement along the force, which --period-samples needs"),
@@ -99,12 +99,12 @@ pub(super) fn restoring_force(args: &Args, recordings: &[Recording]) -> Result<I
             recordings.len()
         )));
     };
-    let Along {
+    let ForceAndMotion {
         direction,
         force,
         motion,
         quantity,
-    } = along(recording)?;
+    } = force_and_motion(recording)?;
     let band_hz = band(args)?;
     let options = Options {
         terms: args.surface.iter().map(|term| term.term()).collect(),
@@ -182,7 +182,7 @@ fn slices(surface: &Surface, share: f64) -> Option<Slices> {
 }
 
 /// Recorded force and motion along one direction.
-pub(super) struct Along<'a> {
+pub(super) struct ForceAndMotion<'a> {
     pub(super) direction: Direction,
     pub(super) force: Vec<f64>,
     pub(super) motion: &'a [f64],
@@ -190,7 +190,7 @@ pub(super) struct Along<'a> {
 }
 
 /// First direction with a recorded motion and force; without any recorded force, a motion with zero force (free decay).
-pub(super) fn along(recording: &Recording) -> Result<Along<'_>, Error> {
+pub(super) fn force_and_motion(recording: &Recording) -> Result<ForceAndMotion<'_>, Error> {
     // Displacement has priority: integrating velocity or acceleration loses the low frequencies.
     let order = [Quantity::Displacement, Quantity::Velocity, Quantity::Acceleration];
     for quantity in order {
@@ -208,7 +208,7 @@ pub(super) fn along(recording: &Recording) -> Result<Along<'_>, Error> {
             let any_force = recording.channels.iter().any(|c| c.quantity == Quantity::Force);
             if driven || !any_force {
                 let force = force.map_or_else(|| vec![0.0; motion.samples.len()], |c| c.samples.clone());
-                return Ok(Along {
+                return Ok(ForceAndMotion {
                     direction,
                     force,
                     motion: &motion.samples,

@@ -91,7 +91,7 @@ pub(super) fn output_only(args: &Args, recordings: &[Recording]) -> Result<Ident
         found.blocks,
         found.order
     )];
-    lines.extend(said(&of_modes));
+    lines.extend(sentences(&of_modes));
     Ok(IdentifyOutput {
         modes: Some(of_modes),
         warnings,
@@ -138,7 +138,7 @@ pub(super) fn inverse_stability(args: &Args) -> Result<IdentifyOutput, Error> {
         prior.frequency,
         prior.damping
     )];
-    lines.extend(said(&of_modes));
+    lines.extend(sentences(&of_modes));
     let machine = case
         .structure()?
         .first_order()
@@ -187,7 +187,7 @@ fn of_mode(mode: &InverseMode) -> EstimatedMode {
     }
 }
 
-fn said(modes: &[EstimatedMode]) -> Vec<String> {
+fn sentences(modes: &[EstimatedMode]) -> Vec<String> {
     let line = |index: usize, key: &str, figure: &Figure, vague: bool| {
         let [low, high] = figure.ci90;
         format!(
