@@ -4,8 +4,9 @@
 
 use quietcut_tests::command::{cases, folder, quietcut};
 
-const VERBS: [&str; 13] = [
+const VERBS: [&str; 14] = [
     "demo",
+    "look",
     "identify",
     "diagnose",
     "plan",

@@ -2,7 +2,7 @@
 //!
 //! Main types: [`measure`] turns recordings of shaker, hammer, sweep or step-sine tests into a [`Measurement`] (receptances with coherence
 //! and standard deviation; estimators H1, H2 and their mean, [`Estimator`]); [`FrfTable`] holds receptances in m/N and reads and writes
-//! CSV and UFF 58; [`Interpolation`] evaluates a table between its lines.
+//! CSV and UFF 58, and reads the text tables of other programs; [`Interpolation`] evaluates a table between its lines.
 //!
 //! ```
 //! use std::f64::consts::TAU;
@@ -47,7 +47,9 @@ mod record_spectra;
 mod small_matrix;
 mod step_sine;
 mod table;
+mod table_column;
 mod table_file;
+mod table_found;
 mod table_uff;
 mod test_channels;
 mod tool_tip;
@@ -62,5 +64,6 @@ pub use measurement::{Measurement, RecordingGroup, measure};
 pub use measurement_settings::MeasurementSettings;
 pub use record_spectra::{ChannelLines, RecordSpectra, record_spectra};
 pub use table::{Frf, FrfTable};
+pub use table_found::ImportedTable;
 pub use tool_tip::{ModeRatio, calibrate};
 pub use window::Window;

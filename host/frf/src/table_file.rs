@@ -5,9 +5,9 @@ use std::path::Path;
 
 use num_complex::Complex64;
 
-use super::{Frf, FrfError, FrfTable};
+use super::{Frf, FrfError, FrfTable, ImportedTable};
 use quietcut_model::structure::Direction;
-use quietcut_recording::{Quantity, Unit};
+use quietcut_recording::{Import, Quantity, TextTable, Unit};
 
 /// Content of a column of an FRF table, from its header.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,9 +32,9 @@ enum ComplexPart {
 
 /// Unit of an FRF: conversion factor to SI, and order of the time derivative of displacement (0 receptance, 1 mobility, 2 accelerance).
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct FrfUnit {
-    factor: f64,
-    derivatives: i32,
+pub(super) struct FrfUnit {
+    pub(super) factor: f64,
+    pub(super) derivatives: i32,
 }
 
 struct Column {
@@ -53,11 +53,48 @@ impl FrfTable {
     /// The file cannot be read; a column has an unknown name or unit, or lacks its real or imaginary part; a value is not a number; the
     /// frequencies do not ascend.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, FrfError> {
+        Self::import(path, &Import::default()).map(|imported| imported.table)
+    }
+
+    /// Reads an FRF table with what the user states about its columns; also says how it was understood.
+    ///
+    /// Text tables of other programs have the extension csv, txt, dat, tsv or asc: real and imaginary part, or magnitude (also in dB) and phase.
+    ///
+    /// # Errors
+    /// As [`FrfTable::read`]; also if directions or units are not stated. The message names the option that states them.
+    pub fn import(path: impl AsRef<Path>, import: &Import) -> Result<ImportedTable, FrfError> {
         let path = path.as_ref();
         let ending = quietcut_recording::file::ending(path);
+        let table = match ending.as_str() {
+            "uff" | "unv" | "bunv" => super::table_uff::read(path)?,
+            _ => {
+                let is_own = TextTable::titles(path)?
+                    .iter()
+                    .any(|title| title == "frequency_hz" || title == "frequency_hz [Hz]");
+                if !is_own {
+                    return super::table_found::read(path, import);
+                }
+                Self::parse(path, &quietcut_recording::file::read_text(path)?)?
+            }
+        };
+        Ok(ImportedTable {
+            table,
+            understood: None,
+        })
+    }
+
+    /// True if the head of a file is that of an FRF table and not of a recording over time.
+    ///
+    /// # Errors
+    /// The file cannot be read.
+    pub fn is_table(path: &Path) -> Result<bool, FrfError> {
+        let ending = quietcut_recording::file::ending(path);
         match ending.as_str() {
-            "uff" | "unv" | "bunv" => super::table_uff::read(path),
-            _ => Self::parse(path, &quietcut_recording::file::read_text(path)?),
+            "uff" | "unv" | "bunv" => Ok(super::table_uff::read(path).is_ok()),
+            "csv" | "txt" | "dat" | "tsv" | "asc" => {
+                Ok(super::table_column::is_head(&TextTable::titles(path)?))
+            }
+            _ => Ok(false),
         }
     }
 
@@ -180,7 +217,7 @@ fn column(path: &Path, title: &str) -> Result<Column, FrfError> {
 }
 
 /// Parses directions such as `xy`: displacement in x, force in y.
-fn pair_of(text: &str) -> Option<DirectionPair> {
+pub(super) fn pair_of(text: &str) -> Option<DirectionPair> {
     let axis = |text: &str| {
         let direction: Direction = text.parse().ok()?;
         direction.axis().map(|_| direction)
@@ -195,6 +232,15 @@ impl FrfUnit {
         derivatives: 0,
     };
 
+    /// Name of the function: receptance, mobility or accelerance.
+    pub(super) fn word(self) -> &'static str {
+        match self.derivatives {
+            0 => "receptance",
+            1 => "mobility",
+            _ => "accelerance",
+        }
+    }
+
     /// Converts an FRF value in this unit to receptance, m/N; `None` for mobility and accelerance at 0 Hz, where no receptance follows.
     fn receptance(self, value: Complex64, frequency_hz: f64) -> Option<Complex64> {
         let rate = Complex64::new(0.0, TAU * frequency_hz).powi(self.derivatives);
@@ -204,13 +250,15 @@ impl FrfUnit {
 }
 
 /// Parses the unit of an FRF, such as `um/N`, `m/s^2/N` or `g/N`.
-fn frf_unit(text: &str) -> Result<FrfUnit, String> {
+pub(super) fn frf_unit(text: &str) -> Result<FrfUnit, String> {
     let wrong = || {
         format!(
             "\"{text}\" is no unit of it; a displacement, velocity or acceleration per force such as m/N, um/N or \
              (m/s^2)/N is needed"
         )
     };
+    // kg⁻¹ is (m/s²)/N.
+    let text = if text.trim() == "1/kg" { "m/s^2/N" } else { text };
     let (response, force) = text.rsplit_once('/').ok_or_else(wrong)?;
     let response = response
         .strip_prefix('(')

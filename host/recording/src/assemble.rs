@@ -1,125 +1,177 @@
-//! Combines the columns of a file with its sidecar into a recording in SI units.
+//! Combines the columns of a file with its sidecar and the options of the user into a recording in SI units.
 
 use std::path::Path;
 
 use super::criteria::UNEVEN;
-use super::raw::{Raw, RawColumn};
-use super::{Channel, Quantity, Recording, RecordingError, Sensitivity, Sidecar, Unit};
+use super::import::Import;
+use super::plausibility;
+use super::raw::Raw;
+use super::understand::understand;
+use super::understood::{Understood, UnderstoodColumn};
+use super::{Channel, Recording, RecordingError, Sidecar};
 
-/// Builds the recording: applies names, units and sensitivities of the sidecar, and determines the sample rate.
-pub(super) fn recording(path: &Path, raw: Raw, sidecar: Sidecar) -> Result<Recording, RecordingError> {
+/// A recording, and how its file was understood.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Imported {
+    /// The recording.
+    pub recording: Recording,
+    /// Which column became which channel.
+    pub understood: Understood,
+}
+
+/// Builds the recording: applies names, units and sensitivities, and determines the sample rate. `known` are the names of the columns of all
+/// records of the file, which sidecar and map may state.
+pub(super) fn recording(
+    path: &Path,
+    raw: Raw,
+    sidecar: Sidecar,
+    import: &Import,
+    known: &[String],
+) -> Result<Imported, RecordingError> {
+    if raw.unnamed_line.is_some() || raw.asks_names {
+        require_names(path, &raw, &sidecar, import)?;
+    }
+    let meanings = understand(path, &raw.columns, &sidecar, import, known)?;
     let mut time = None;
     let mut channels: Vec<Channel> = Vec::with_capacity(raw.columns.len());
-    let columns: Vec<String> = raw.columns.iter().map(|column| column.name.clone()).collect();
-    if let Some(stranger) = sidecar.channels.keys().find(|name| !columns.contains(name)) {
-        return Err(RecordingError::Content {
-            path: Sidecar::path_of(path),
-            what: format!(
-                "channels.{stranger}: the recording has no such channel, but {}",
-                columns.join(", ")
-            ),
+    let mut columns = Vec::with_capacity(raw.columns.len());
+    for (column, meaning) in raw.columns.into_iter().zip(meanings) {
+        columns.push(UnderstoodColumn {
+            column: column.name,
+            channel: meaning.name.clone(),
+            is_negative: meaning.is_negative,
+            unit: meaning.unit,
+            sensitivity: meaning.sensitivity,
+            si_unit: meaning.quantity.unit(),
+            from: meaning.from,
         });
-    }
-    for column in raw.columns {
-        let channel = channel(path, column, &sidecar)?;
-        if channel.name == "t" {
-            time = Some(channel.samples);
-        } else if channels.iter().any(|other| other.name == channel.name) {
+        let mut samples = column.samples;
+        if meaning.factor != 1.0 {
+            for sample in &mut samples {
+                *sample *= meaning.factor;
+            }
+        }
+        if meaning.name == "t" {
+            time = Some(samples);
+        } else if channels.iter().any(|other| other.name == meaning.name) {
             return Err(RecordingError::Content {
                 path: path.into(),
-                what: format!("two channels are called \"{}\"", channel.name),
+                what: format!("two channels are called \"{}\"", meaning.name),
             });
         } else {
-            channels.push(channel);
-        }
-    }
-    let (sample_rate_hz, start_s) = match (&time, raw.sample_rate_hz.or(sidecar.sample_rate_hz)) {
-        (Some(time), _) => even_rate(path, time)?,
-        (None, Some(rate)) => (rate, raw.start_s),
-        (None, None) => {
-            return Err(RecordingError::NoSampleRate {
-                path: path.into(),
-                sidecar: Sidecar::path_of(path),
+            channels.push(Channel {
+                name: meaning.name,
+                quantity: meaning.quantity,
+                samples,
             });
         }
-    };
+    }
+    let mut notes = raw.notes;
+    let (sample_rate_hz, start_s, rate_from) =
+        match (import.rate_hz, &time, raw.sample_rate_hz, sidecar.sample_rate_hz) {
+            (Some(rate), time, ..) => {
+                if time.is_some() {
+                    notes.push("the time column is replaced by --rate".into());
+                }
+                (rate, raw.start_s, "option")
+            }
+            (None, Some(time), ..) => {
+                let (rate, start) = even_rate(path, time)?;
+                (rate, start, "time column")
+            }
+            (None, None, Some(rate), _) => (rate, raw.start_s, "file"),
+            (None, None, None, Some(rate)) => (rate, raw.start_s, "sidecar"),
+            (None, None, None, None) => match raw.worded_rate_hz {
+                Some(rate) => (rate, raw.start_s, "file"),
+                None => {
+                    return Err(RecordingError::NoSampleRate {
+                        path: path.into(),
+                        sidecar: Sidecar::path_of(path),
+                    });
+                }
+            },
+        };
     if channels.is_empty() {
         return Err(RecordingError::Content {
             path: path.into(),
             what: "there is no channel beside time".into(),
         });
     }
-    Ok(Recording {
+    let recording = Recording {
         path: path.into(),
         sample_rate_hz,
         start_s,
         since_s: 0.0,
         channels,
         sidecar,
-    })
-}
-
-/// Converts a column to a channel with its standard name, in SI units.
-fn channel(path: &Path, column: RawColumn, sidecar: &Sidecar) -> Result<Channel, RecordingError> {
-    let RawColumn {
-        name,
-        mut unit,
-        mut samples,
-    } = column;
-    let said = sidecar.channels.get(&name).cloned().unwrap_or_default();
-    let in_sidecar = |what: String| RecordingError::Content {
-        path: Sidecar::path_of(path),
-        what: format!("channels.{name}.{what}"),
     };
-    if let Some(text) = &said.unit {
-        let stated: Unit = text
-            .parse()
-            .map_err(|error| in_sidecar(format!("unit: {error}")))?;
-        unit = Some(stated);
-    }
-    let (mut quantity, mut factor) =
-        unit.map_or((Quantity::Unknown, 1.0), |unit| (unit.quantity, unit.factor));
-    if let Some(text) = &said.sensitivity {
-        let sensitivity: Sensitivity = text
-            .parse()
-            .map_err(|error| in_sidecar(format!("sensitivity: {error}")))?;
-        if quantity != Quantity::Voltage {
-            return Err(in_sidecar(format!(
-                "sensitivity: only a voltage has one, and the channel is {quantity} ({})",
-                quantity.unit()
-            )));
-        }
-        quantity = sensitivity.quantity;
-        factor /= sensitivity.volts_per_unit;
-    }
-    let name = said.name.unwrap_or_else(|| conventional(&name));
-    // A voltage without sensitivity may represent any quantity, so it contradicts no channel name.
-    if let Some(expected) = Quantity::of_name(&name)
-        && ![expected, Quantity::Voltage, Quantity::Unknown].contains(&quantity)
-    {
-        return Err(RecordingError::Quantity {
-            path: path.into(),
-            column: name,
-            found: quantity,
-            expected,
-        });
-    }
-    if factor != 1.0 {
-        for sample in &mut samples {
-            *sample *= factor;
-        }
-    }
-    Ok(Channel {
-        name,
-        quantity,
-        samples,
+    Ok(Imported {
+        understood: Understood {
+            file: path.into(),
+            record: raw.label,
+            sample_rate_hz,
+            rate_from,
+            columns,
+            notes,
+            warnings: plausibility::warnings(&recording),
+        },
+        recording,
     })
 }
 
-/// Standard form of a channel name: lower case, with `t` for time.
-fn conventional(name: &str) -> String {
-    let name = name.to_lowercase();
-    if name == "time" { "t".into() } else { name }
+/// Refuses a file without names of columns, unless the map or the sidecar names a column.
+fn require_names(path: &Path, raw: &Raw, sidecar: &Sidecar, import: &Import) -> Result<(), RecordingError> {
+    let names: Vec<String> = raw.columns.iter().map(|column| column.name.clone()).collect();
+    let is_named = |index: usize| {
+        import
+            .map
+            .iter()
+            .any(|map| map.is_about(&names[index], index + 1, &names))
+            || sidecar
+                .channels
+                .get(&names[index])
+                .is_some_and(|said| said.name.is_some())
+    };
+    if (0..names.len()).any(is_named) {
+        return Ok(());
+    }
+    let first = raw.columns.first().map_or(&[][..], |column| &column.samples);
+    let grows = names.len() > 1 && first.len() > 1 && even_rate(path, first).is_ok();
+    let words: &[&str] = if grows {
+        &["t:s", "fx:N", "ax:m/s^2", "ay:m/s^2", "az:m/s^2"]
+    } else {
+        &["fx:N", "ax:m/s^2", "ay:m/s^2", "az:m/s^2"]
+    };
+    let map: Vec<String> = names
+        .iter()
+        .zip(words)
+        .map(|(name, word)| format!("{name}={word}"))
+        .collect();
+    let rate = if grows || raw.sample_rate_hz.or(raw.worded_rate_hz).is_some() {
+        ""
+    } else {
+        " --rate 25600"
+    };
+    let map = format!("--map {}{rate} with the names and units that hold", map.join(","));
+    Err(match raw.unnamed_line {
+        Some(line) => RecordingError::Line {
+            path: path.into(),
+            line,
+            what: format!(
+                "numbers without a row of names before them, in {} columns; add {map}, or a row of names such as t [s],fx [N],ax [m/s^2]",
+                names.len()
+            ),
+        },
+        None => RecordingError::Content {
+            path: path.into(),
+            what: format!(
+                "one matrix with the channels {}, whose names say nothing; add {map}, or [channels.{}] with name and unit to {}",
+                names.join(", "),
+                names.first().map_or("", String::as_str),
+                Sidecar::path_of(path).display()
+            ),
+        },
+    })
 }
 
 /// Sample rate (samples per second) and first time (s) of evenly spaced time stamps; uneven stamps are an error.
@@ -145,14 +197,29 @@ fn even_rate(path: &Path, time: &[f64]) -> Result<(f64, f64), RecordingError> {
         )));
     }
     let step = (last - first) / (time.len() - 1) as f64;
-    for (index, stamp) in time.iter().enumerate() {
+    let is_off = |(index, stamp): (usize, &f64)| {
         let expected = first + step * index as f64;
-        if (stamp - expected).abs() > UNEVEN * step {
-            return Err(wrong(format!(
-                "time is not even: sample {} stands at {stamp} s, {expected} s was expected; resample it first",
-                index + 1
-            )));
-        }
+        (stamp - expected).abs() > UNEVEN * step
+    };
+    if time.iter().enumerate().any(is_off) {
+        return Err(wrong(uneven(time)));
     }
     Ok((1.0 / step, *first))
+}
+
+/// Description of unevenly spaced times: the largest step, and the usual one.
+fn uneven(time: &[f64]) -> String {
+    let mut steps: Vec<f64> = time.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let largest = (0..steps.len())
+        .max_by(|&a, &b| steps[a].abs().total_cmp(&steps[b].abs()))
+        .unwrap_or(0);
+    let gap = steps.get(largest).copied().unwrap_or(0.0);
+    steps.sort_by(f64::total_cmp);
+    let usual = steps.get(steps.len() / 2).copied().unwrap_or(0.0);
+    format!(
+        "time is not even: the largest step is {gap:.6e} s after sample {} at {} s, and the usual one {usual:.6e} s; resample it first, or state \
+         the rate with --rate if the stamps are only rounded",
+        largest + 1,
+        time.get(largest).copied().unwrap_or(0.0)
+    )
 }

@@ -1,5 +1,7 @@
 //! Thresholds of decisions about recordings. Each says what it decides and where the number comes from.
 
+use super::unit::Quantity;
+
 /// Largest deviation of a time stamp from even sampling, in sample intervals. It allows for stamps printed with few digits, and detects a
 /// missing sample (deviation 1). The value is a choice between the two.
 pub(crate) const UNEVEN: f64 = 0.25;
@@ -11,3 +13,37 @@ pub(crate) const SAME_SAMPLE: f64 = 1e-3;
 /// Smallest change of the tachometer level that counts as an edge, as a fraction of its range over the recording. A choice, above the noise
 /// of usual sensors.
 pub(crate) const LEAST_SWING: f64 = 0.02;
+
+/// Number of equal samples in a row at the largest or smallest value that counts as clipping. Two equal samples at a peak occur in unclipped
+/// signals with coarse counts; three need a peak flatter than one count over two intervals. Unfounded beyond that.
+pub(crate) const CLIPPED_RUN: usize = 3;
+
+/// Duration of equal samples, in samples, that counts as a dropout of a channel that otherwise changes. Unfounded.
+pub(crate) const DROPOUT_RUN: usize = 32;
+
+/// Fraction of unchanged steps above which a channel is at rest or coarsely quantized, so that equal samples are no dropout. Unfounded.
+pub(crate) const AT_REST: f64 = 0.2;
+
+/// Largest correlation error, 1 − r, at which acceleration from one channel and acceleration from another channel are the same motion. With
+/// r² the share of common energy, 0.98 leaves 4 % to noise and to the distance between the sensors. A choice.
+pub(crate) const SAME_MOTION: f64 = 0.02;
+
+/// Largest relative distance of an amplitude ratio from a factor of units (9.80665, 1000, 10⁶) at which the unit is called wrong. Calibration
+/// errors of accelerometers are below 5 %. Data sheets state 5 to 10 % for industrial sensors; 5 % is a choice.
+pub(crate) const UNIT_FACTOR: f64 = 0.05;
+
+/// Range of peak values, SI, that sensors on machine tools measure; `None` for quantities without a bound. A peak outside suggests a unit that
+/// is wrong by a factor such as 1000.
+///
+/// Force: 10 mN, the resolution of piezoelectric force sensors, to 1 MN, above the largest dynamometers. Acceleration: 0.1 mm/s² (10 µg), the
+/// noise of seismic accelerometers, to 10⁶ m/s², the range of shock accelerometers. Displacement: 10 pm, the resolution of vibrometers, to
+/// 1 m. Velocity: 10 nm/s to 100 m/s likewise.
+pub(crate) fn plausible_peak(quantity: Quantity) -> Option<(f64, f64)> {
+    match quantity {
+        Quantity::Force => Some((1e-2, 1e6)),
+        Quantity::Acceleration => Some((1e-4, 1e6)),
+        Quantity::Displacement => Some((1e-11, 1.0)),
+        Quantity::Velocity => Some((1e-8, 1e2)),
+        _ => None,
+    }
+}

@@ -1,13 +1,14 @@
-//! Reader and writer of CSV recordings: a header row with `name [unit]` per column, then rows of numbers.
+//! Reader and writer of text tables: a row of names, then rows of numbers. [`super::text_head`] finds separator, decimal mark and names.
 //!
-//! Files of hundreds of megabytes are read in chunks, without the whole text in memory. Lines that start with `#` are comments. Empty lines
-//! are skipped. Numbers may be quoted.
+//! Files of hundreds of megabytes are read in chunks, without the whole text in memory. Lines that start with `#`, `%` or `//` are comments.
+//! Empty lines are skipped. Numbers may be quoted. Columns without any value are left out.
 
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
-use super::raw::{Raw, RawColumn};
+use super::raw::{FoundUnit, Raw, RawColumn};
+use super::text_head::{Dialect, Head, HeadColumn, Separator, head, is_comment};
 use super::{Quantity, Recording, RecordingError};
 use crate::file::{FileError, Prepared};
 
@@ -17,7 +18,10 @@ const DIGITS: usize = 9;
 /// Chunk size of reading, bytes; a choice.
 const CHUNK: usize = 1 << 18;
 
-/// Reads a CSV file. With `finite`, a NaN or infinite value is an error that names its line.
+/// Largest head of a file, bytes: prose, names, units. A choice; the heads of logging programs have a few kilobytes.
+const HEAD_MAX: usize = 1 << 18;
+
+/// Reads a text table. With `finite`, a NaN or infinite value is an error that names its line.
 pub(super) fn read(path: &Path, finite: bool) -> Result<Raw, RecordingError> {
     let unreadable = |cause| FileError::Read {
         path: path.into(),
@@ -25,36 +29,79 @@ pub(super) fn read(path: &Path, finite: bool) -> Result<Raw, RecordingError> {
     };
     let file = File::open(path).map_err(unreadable)?;
     let length = file.metadata().map_err(unreadable)?.len();
-    let columns = columns(path, file, length, CHUNK, finite)?;
-    if columns.iter().all(|column| column.samples.is_empty()) {
+    if length == 0 {
+        return Err(RecordingError::Content {
+            path: path.into(),
+            what: "the file is empty; a row of names and then rows of numbers are needed".into(),
+        });
+    }
+    let raw = table(path, file, length, CHUNK, finite)?;
+    if raw.columns.iter().all(|column| column.samples.is_empty()) {
         return Err(RecordingError::Content {
             path: path.into(),
             what: "there are no samples; a header row and then numbers are needed".into(),
         });
     }
-    Ok(Raw {
-        columns,
-        sample_rate_hz: None,
-        start_s: 0.0,
-    })
+    Ok(raw)
 }
 
-/// Reads the columns of a text of `length` bytes, in chunks of `chunk` bytes.
-fn columns(
+/// Names of the columns, from the head of the file alone; empty if there is no row of names.
+pub(super) fn titles(path: &Path) -> Result<Vec<String>, RecordingError> {
+    let unreadable = |cause| FileError::Read {
+        path: path.into(),
+        cause,
+    };
+    let mut start = vec![0; HEAD_MAX];
+    let mut file = File::open(path).map_err(unreadable)?;
+    let filled = fill(&mut file, &mut start).map_err(unreadable)?;
+    let columns = head(&start[..filled]).ok().and_then(|head| head.columns);
+    Ok(columns
+        .into_iter()
+        .flatten()
+        .map(|column| match column.unit {
+            FoundUnit::Text(unit) => format!("{} [{unit}]", column.name),
+            _ => column.name,
+        })
+        .collect())
+}
+
+/// Reads until `buffer` is full or the text ends; returns the number of bytes.
+fn fill(text: &mut impl Read, buffer: &mut [u8]) -> std::io::Result<usize> {
+    let mut filled = 0;
+    while filled < buffer.len() {
+        match text.read(&mut buffer[filled..]) {
+            Ok(0) => break,
+            Ok(read) => filled += read,
+            Err(error) if error.kind() == std::io::ErrorKind::Interrupted => {}
+            Err(error) => return Err(error),
+        }
+    }
+    Ok(filled)
+}
+
+/// Reads a table of `length` bytes, in chunks of `chunk` bytes after the head.
+fn table(
     path: &Path,
     mut text: impl Read,
     length: u64,
     chunk: usize,
     finite: bool,
-) -> Result<Vec<RawColumn>, RecordingError> {
-    let mut table = Table {
-        path,
-        line: 0,
-        columns: Vec::new(),
-        bytes: length,
-        finite,
+) -> Result<Raw, RecordingError> {
+    let unreadable = |cause| FileError::Read {
+        path: path.into(),
+        cause,
     };
+    let mut start = vec![0; HEAD_MAX.min(usize::try_from(length).unwrap_or(HEAD_MAX)).max(1)];
+    let filled = fill(&mut text, &mut start).map_err(unreadable)?;
+    start.truncate(filled);
+    let head = head(&start).map_err(|(line, what)| RecordingError::Line {
+        path: path.into(),
+        line,
+        what,
+    })?;
+    let mut table = Table::new(path, &head, length, finite);
     // The first `kept` bytes of the buffer hold the incomplete last line of the previous chunk.
+    let mut text = start[head.offset.min(start.len())..].chain(text);
     let mut buffer = vec![0; chunk.max(1)];
     let mut kept = 0;
     loop {
@@ -64,13 +111,7 @@ fn columns(
         let read = match text.read(&mut buffer[kept..]) {
             Ok(read) => read,
             Err(error) if error.kind() == std::io::ErrorKind::Interrupted => continue,
-            Err(cause) => {
-                return Err(FileError::Read {
-                    path: path.into(),
-                    cause,
-                }
-                .into());
-            }
+            Err(cause) => return Err(unreadable(cause).into()),
         };
         let filled = &buffer[..kept + read];
         let whole = if read == 0 {
@@ -83,10 +124,7 @@ fn columns(
         };
         table.lines(&filled[..whole])?;
         if read == 0 {
-            for column in &mut table.columns {
-                column.samples.shrink_to_fit();
-            }
-            return Ok(table.columns);
+            return table.raw(head);
         }
         let end = kept + read;
         buffer.copy_within(whole..end, 0);
@@ -94,98 +132,91 @@ fn columns(
     }
 }
 
-/// Columns of a CSV file while its lines are read.
+/// Columns of a text table while its lines are read.
 struct Table<'a> {
     path: &'a Path,
     /// Number of lines read so far.
     line: u64,
-    /// Columns with their samples; empty until the header is read.
     columns: Vec<RawColumn>,
+    /// Empty fields of each column.
+    gaps: Vec<Gaps>,
+    dialect: Dialect,
     /// Length of the whole file, bytes.
     bytes: u64,
     /// True if NaN and infinite values are errors.
     finite: bool,
 }
 
+/// Empty fields of a column.
+#[derive(Clone, Copy, Default)]
+struct Gaps {
+    count: usize,
+    /// Line of the first empty field.
+    line: u64,
+}
+
 /// Message part: remedy for a row with NaN or infinity.
 const LEAVE_OUT: &str = "a number is needed; repair the row, or leave it out with --from-s or --until-s";
 
-impl Table<'_> {
+impl<'a> Table<'a> {
+    /// An empty table with the columns of the head; columns without a name are called by their number.
+    fn new(path: &'a Path, head: &Head, bytes: u64, finite: bool) -> Self {
+        let unnamed = || {
+            vec![
+                HeadColumn {
+                    name: String::new(),
+                    unit: FoundUnit::None
+                };
+                head.width
+            ]
+        };
+        let columns = head.columns.clone().unwrap_or_else(unnamed);
+        Self {
+            path,
+            line: head.lines,
+            gaps: vec![Gaps::default(); columns.len()],
+            columns: columns
+                .into_iter()
+                .enumerate()
+                .map(|(index, column)| RawColumn {
+                    name: if column.name.is_empty() {
+                        (index + 1).to_string()
+                    } else {
+                        column.name
+                    },
+                    unit: column.unit,
+                    samples: Vec::new(),
+                })
+                .collect(),
+            dialect: head.dialect,
+            bytes,
+            finite,
+        }
+    }
+
     /// Parses complete lines; only the last line of a file may lack its line end.
     fn lines(&mut self, text: &[u8]) -> Result<(), RecordingError> {
+        let is_plain = self.dialect == Dialect::PLAIN && !self.columns.is_empty();
         let mut rest = text;
         while !rest.is_empty() {
             self.line += 1;
-            if self.columns.is_empty() || matches!(rest[0], b'#' | b'\n' | b'\r' | b' ' | b'\t') {
+            if !is_plain || matches!(rest[0], b'#' | b'%' | b'/' | b'\n' | b'\r' | b' ' | b'\t') {
                 let end = rest.iter().position(|&byte| byte == b'\n');
                 let (line, after) = rest.split_at(end.map_or(rest.len(), |at| at + 1));
                 rest = after;
-                let line = line.trim_ascii();
-                match line.first() {
-                    None | Some(b'#') => {}
-                    Some(_) if self.columns.is_empty() => self.header(line)?,
-                    Some(_) => {
-                        self.row(line)?;
+                match line.trim_ascii().first() {
+                    None => {}
+                    Some(b'#' | b'%' | b'/') if is_comment(&String::from_utf8_lossy(line)) => {}
+                    Some(_) if is_plain => {
+                        self.row(line.trim_ascii())?;
                     }
+                    Some(_) => self.general_row(line)?,
                 }
             } else {
                 rest = self.row(rest)?;
             }
         }
         Ok(())
-    }
-
-    /// Parses the header row into columns.
-    fn header(&mut self, line: &[u8]) -> Result<(), RecordingError> {
-        // Byte order mark of UTF-8, written by some editors.
-        let line = line.strip_prefix(b"\xef\xbb\xbf").unwrap_or(line);
-        let text = std::str::from_utf8(line).map_err(|error| {
-            self.wrong(format!(
-                "byte {} of the header is not UTF-8; a text file is needed",
-                error.valid_up_to() + 1
-            ))
-        })?;
-        let mut reader = csv::ReaderBuilder::new()
-            .has_headers(false)
-            .trim(csv::Trim::All)
-            .from_reader(text.as_bytes());
-        let mut titles = csv::StringRecord::new();
-        reader
-            .read_record(&mut titles)
-            .map_err(|error| self.wrong(error.to_string()))?;
-        for title in &titles {
-            let column = self.column(title)?;
-            self.columns.push(column);
-        }
-        Ok(())
-    }
-
-    /// Parses one column header, `name [unit]` or `name`.
-    fn column(&self, title: &str) -> Result<RawColumn, RecordingError> {
-        let (name, unit) = match title.strip_suffix(']').and_then(|inner| inner.rsplit_once('[')) {
-            Some((name, unit)) => {
-                let unit = unit.parse().map_err(|cause| RecordingError::Unit {
-                    path: self.path.into(),
-                    column: title.into(),
-                    cause,
-                })?;
-                (name.trim(), Some(unit))
-            }
-            None => (title, None),
-        };
-        let is_number = name.parse::<f64>().is_ok();
-        if name.is_empty() || is_number {
-            return Err(self.wrong(if is_number {
-                format!("the header has the number {name}; a row of names is needed before the numbers")
-            } else {
-                "a column has no name; every column needs one, as in \"ax [m/s^2]\"".into()
-            }));
-        }
-        Ok(RawColumn {
-            name: name.into(),
-            unit,
-            samples: Vec::new(),
-        })
     }
 
     /// Parses the numbers of the first line of `text` and returns the text after this line.
@@ -197,23 +228,66 @@ impl Table<'_> {
                 (value.is_finite() || !self.finite) && end == if is_last { End::Line } else { End::Field }
             });
             let Some((value, length, _)) = parsed else {
-                return Err(self.row_error(text));
+                // The line may have empty fields; the values that are already stored are taken back.
+                for column in &mut self.columns[..index] {
+                    column.samples.pop();
+                }
+                let end = text
+                    .iter()
+                    .position(|&byte| byte == b'\n')
+                    .map_or(text.len(), |at| at + 1);
+                let (line, after) = text.split_at(end);
+                self.general_row(line)?;
+                return Ok(after);
             };
             self.columns[index].samples.push(value);
             rest = &rest[length..];
         }
-        if self
-            .columns
-            .first()
-            .is_some_and(|column| column.samples.len() == 1)
-        {
-            self.make_room(text.len() - rest.len());
-        }
+        self.make_room_after_first(text.len() - rest.len());
         Ok(rest)
     }
 
-    /// Reserves memory for all samples, from the file length and the length of the first row. Growth by doubling could take twice the memory.
-    fn make_room(&mut self, line: usize) {
+    /// Parses a line in any dialect; empty fields are marked as gaps.
+    fn general_row(&mut self, line: &[u8]) -> Result<(), RecordingError> {
+        let text = String::from_utf8_lossy(line);
+        let fields = self.dialect.fields(text.trim_matches(['\n', '\r']));
+        let extra = fields.get(self.columns.len()..).unwrap_or_default();
+        if fields.len() < self.columns.len() || extra.iter().any(|field| !field.is_empty()) {
+            return Err(self.row_error(&fields));
+        }
+        if fields.iter().all(|field| field.is_empty()) {
+            return Ok(());
+        }
+        for index in 0..self.columns.len() {
+            let field = fields[index];
+            let value = if field.is_empty() {
+                let gaps = &mut self.gaps[index];
+                if gaps.count == 0 {
+                    gaps.line = self.line;
+                }
+                gaps.count += 1;
+                f64::NAN
+            } else {
+                match self.dialect.number(field) {
+                    Some(value) if value.is_finite() || !self.finite => value,
+                    _ => return Err(self.row_error(&fields)),
+                }
+            };
+            self.columns[index].samples.push(value);
+        }
+        self.make_room_after_first(line.len());
+        Ok(())
+    }
+
+    /// Reserves memory for all samples after the first row of `line` bytes. Growth by doubling could take twice the memory.
+    fn make_room_after_first(&mut self, line: usize) {
+        if self
+            .columns
+            .first()
+            .is_none_or(|column| column.samples.len() != 1)
+        {
+            return;
+        }
         let lines = usize::try_from(self.bytes).unwrap_or(0) / line.max(1);
         // Later rows are often longer, since time gets more digits. The surplus is small, and unused memory is not committed.
         for column in &mut self.columns {
@@ -221,11 +295,49 @@ impl Table<'_> {
         }
     }
 
-    /// Error that describes the fault in the first line of `text`.
-    fn row_error(&self, text: &[u8]) -> RecordingError {
-        let end = text.iter().position(|&byte| byte == b'\n').unwrap_or(text.len());
-        let line = String::from_utf8_lossy(&text[..end]);
-        let fields: Vec<&str> = line.split(',').map(str::trim).collect();
+    /// The columns with values; a column with some empty fields is an error.
+    fn raw(self, head: Head) -> Result<Raw, RecordingError> {
+        let mut notes = head.notes;
+        let is_unnamed = |name: &str, index: usize| {
+            head.columns
+                .as_ref()
+                .is_some_and(|columns| columns[index].name.is_empty())
+                && name.parse() == Ok(index + 1)
+        };
+        let mut columns = Vec::with_capacity(self.columns.len());
+        let several = self.columns.len() > 1;
+        for (index, (mut column, gaps)) in self.columns.into_iter().zip(&self.gaps).enumerate() {
+            if gaps.count > 0 && gaps.count == column.samples.len() {
+                if !is_unnamed(&column.name, index) {
+                    notes.push(format!("column \"{}\" is empty", column.name));
+                }
+                continue;
+            }
+            if gaps.count > 0 && self.finite {
+                return Err(RecordingError::Line {
+                    path: self.path.into(),
+                    line: gaps.line,
+                    what: format!("\"\" in column \"{}\": a number is needed", column.name),
+                });
+            }
+            if several && is_unnamed(&column.name, index) && is_counting(&column.samples) {
+                notes.push(format!("column {} counts the rows", index + 1));
+                continue;
+            }
+            column.samples.shrink_to_fit();
+            columns.push(column);
+        }
+        Ok(Raw {
+            columns,
+            worded_rate_hz: head.rate_hz,
+            unnamed_line: head.columns.is_none().then_some(head.lines + 1),
+            notes,
+            ..Raw::default()
+        })
+    }
+
+    /// Error that describes the fault in a line with these fields.
+    fn row_error(&self, fields: &[&str]) -> RecordingError {
         if fields.len() != self.columns.len() {
             return self.wrong(format!(
                 "{} values, but the header has {} columns",
@@ -233,16 +345,12 @@ impl Table<'_> {
                 self.columns.len()
             ));
         }
-        let parsed = |field: &str| {
-            number(field.as_bytes())
-                .filter(|&(_, length, _)| length == field.len())
-                .map(|(value, ..)| value)
-        };
+        let parsed = |field: &str| self.dialect.number(field);
         let is_number = |field: &str| parsed(field).is_some_and(|value| value.is_finite() || !self.finite);
         let wrong = fields
             .iter()
             .zip(&self.columns)
-            .find(|(field, _)| !is_number(field));
+            .find(|(field, _)| !field.is_empty() && !is_number(field));
         self.wrong(match wrong {
             Some((field, column)) => {
                 // At most 40 characters: a damaged file may have a very long field.
@@ -254,7 +362,10 @@ impl Table<'_> {
                 };
                 format!("\"{shown}\" in column \"{}\": {needed}", column.name)
             }
-            None => "a number for each column is needed, with commas between".into(),
+            None => match self.dialect.separator {
+                Separator::Comma => "a number for each column is needed, with commas between".into(),
+                _ => "a number for each column is needed".into(),
+            },
         })
     }
 
@@ -265,6 +376,16 @@ impl Table<'_> {
             what,
         }
     }
+}
+
+/// True for samples that count the rows from 0 or 1, as the index column of a data frame does.
+fn is_counting(samples: &[f64]) -> bool {
+    let first = samples.first().copied().unwrap_or(f64::NAN);
+    (first == 0.0 || first == 1.0)
+        && samples
+            .iter()
+            .enumerate()
+            .all(|(index, sample)| *sample == first + index as f64)
 }
 
 /// Separator after a number.
@@ -363,8 +484,8 @@ mod tests {
     use super::*;
 
     fn parse(text: &[u8], chunk: usize) -> Result<Vec<Vec<f64>>, String> {
-        columns(Path::new("a.csv"), text, text.len() as u64, chunk, true)
-            .map(|columns| columns.into_iter().map(|column| column.samples).collect())
+        table(Path::new("a.csv"), text, text.len() as u64, chunk, true)
+            .map(|raw| raw.columns.into_iter().map(|column| column.samples).collect())
             .map_err(|error| error.to_string())
     }
 
@@ -396,8 +517,32 @@ mod tests {
             let said = parse(format!("a,b\n1,2\n{row}\n3,4\n").as_bytes(), 4).unwrap_err();
             assert!(said.contains("line 3") && said.contains(words), "{row}: {said}");
         }
-        let said = parse(b"a,\xe4\n1,2\n", 64).unwrap_err();
-        assert!(said.contains("line 1") && said.contains("byte 3"), "{said}");
+        let said = parse(b"\xff\xfea\0,\0", 64).unwrap_err();
+        assert!(said.contains("line 1") && said.contains("UTF-16"), "{said}");
+    }
+
+    #[test]
+    fn tables_of_spreadsheets_and_loggers_are_read() {
+        let two = |a: [f64; 2], b: [f64; 2]| Ok(vec![a.to_vec(), b.to_vec()]);
+        for (text, expected) in [
+            (&b"a,\xe4\n1,2\n3,4\n"[..], two([1.0, 3.0], [2.0, 4.0])),
+            (b"a;b\n1,5;2\n3;4,25\n", two([1.5, 3.0], [2.0, 4.25])),
+            (b"a\tb\n1\t2\n3\t4\n", two([1.0, 3.0], [2.0, 4.0])),
+            (b"a b\n  1   2\n  3 4e0\n", two([1.0, 3.0], [2.0, 4.0])),
+            (b"a,b,\n1,2,\n3,4,\n", two([1.0, 3.0], [2.0, 4.0])),
+            (b"a,b\n1,2,\n3,4,\n", two([1.0, 3.0], [2.0, 4.0])),
+            (b",a,b\n0,1,2\n1,3,4\n", two([1.0, 3.0], [2.0, 4.0])),
+            (b"a,Comment,b\n1,,2\n3,,4\n,,\n", two([1.0, 3.0], [2.0, 4.0])),
+            (b"% made\na,b\n1,2\n% later\n3,4\n", two([1.0, 3.0], [2.0, 4.0])),
+        ] {
+            let shown = String::from_utf8_lossy(text);
+            assert_eq!(parse(text, 5), expected, "{shown}");
+        }
+        let said = parse(b"a;b\n1,5;2\n3;x\n", 64).unwrap_err();
+        assert!(
+            said.contains("line 3") && said.contains("\"x\" in column \"b\""),
+            "{said}"
+        );
     }
 
     proptest! {

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use super::understood::{Doubt, doubts_text};
 use super::{Quantity, UnknownUnit};
 use crate::file::FileError;
 
@@ -12,7 +13,7 @@ pub enum RecordingError {
     #[error(transparent)]
     File(#[from] FileError),
     /// The file extension belongs to no format that can be read.
-    #[error("{}: \"{found}\" is no format that can be read; csv, uff, wav and mat are", path.display())]
+    #[error("{}: \"{found}\" is no format that can be read; csv, uff, wav and mat are, lvm, tdms, and txt, dat, tsv and asc as text tables", path.display())]
     Format {
         /// The file.
         path: PathBuf,
@@ -89,8 +90,22 @@ pub enum RecordingError {
         /// Time of the last such sample, s.
         last_s: f64,
     },
+    /// The meaning of columns is in doubt: direction, unit or sensitivity is not stated.
+    #[error("{}: {}", path.display(), doubts_text(doubts, sidecar))]
+    Doubt {
+        /// The file.
+        path: PathBuf,
+        /// Sidecar file that could state the meaning.
+        sidecar: PathBuf,
+        /// The columns, each with what could be stated about it.
+        doubts: Vec<Doubt>,
+    },
     /// Neither file nor sidecar states the sample rate.
-    #[error("{}: the sample rate is not given; a column \"t [s]\" or sample_rate_hz in {} is needed", path.display(), sidecar.display())]
+    #[error(
+        "{}: the sample rate is not given; --rate 25600 with the rate that holds, sample_rate_hz = 25600 in {}, or a column \"t [s]\" is needed",
+        path.display(),
+        sidecar.display()
+    )]
     NoSampleRate {
         /// The file.
         path: PathBuf,
@@ -98,7 +113,7 @@ pub enum RecordingError {
         sidecar: PathBuf,
     },
     /// The recording lacks a required channel or setting.
-    #[error("{}: it has no {needed}; its channels are {}", path.display(), found.join(", "))]
+    #[error("{}: it has no {needed}; its channels are {}{}", path.display(), found.join(", "), without_unit(found))]
     NoChannel {
         /// The file.
         path: PathBuf,
@@ -107,4 +122,21 @@ pub enum RecordingError {
         /// Names and units of the channels of the recording.
         found: Vec<String>,
     },
+}
+
+/// Message part for channels whose unit is unknown, such as `fx [unknown]`: the option that states it.
+fn without_unit(found: &[String]) -> String {
+    let names: Vec<String> = found
+        .iter()
+        .filter_map(|channel| channel.strip_suffix(" [unknown]"))
+        .filter_map(|name| Some(format!("{name}={name}:{}", Quantity::of_name(name)?.unit())))
+        .collect();
+    if names.is_empty() {
+        String::new()
+    } else {
+        format!(
+            "; the file states no unit for some of them: --map {} with the units that hold",
+            names.join(",")
+        )
+    }
 }

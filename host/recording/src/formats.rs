@@ -2,12 +2,14 @@
 
 use std::path::Path;
 
+use super::assemble::{self, Imported};
 use super::error::RecordingError;
+use super::import::Import;
 use super::recording::Recording;
 use super::segment::Segment;
 use super::sidecar::Sidecar;
 use super::uff::UffForm;
-use super::{assemble, csv, mat, uff, wav};
+use super::{csv, lvm, mat, tdms, uff, wav};
 use crate::file::Prepared;
 
 /// File extensions of the formats that can be written: CSV, UFF 58 as text (uff, unv), UFF 58 binary (bunv).
@@ -28,13 +30,46 @@ impl Recording {
     /// # Errors
     /// As [`Recording::read`]; also if the segment lies outside the recording.
     pub fn read_segment(path: impl AsRef<Path>, segment: Segment) -> Result<Self, RecordingError> {
+        let import = Import {
+            segment,
+            ..Import::default()
+        };
+        Self::import(path, &import).map(|imported| imported.recording)
+    }
+
+    /// Reads the only record of a file with its sidecar and what the user states about the file; also says how it was understood.
+    ///
+    /// # Errors
+    /// As [`Recording::read`]; also if the file has several records and `import` does not choose one.
+    pub fn import(path: impl AsRef<Path>, import: &Import) -> Result<Imported, RecordingError> {
+        let path = path.as_ref();
+        let mut records = Self::import_all(path, import)?;
+        match (records.len(), records.pop()) {
+            (1, Some(record)) => Ok(record),
+            (count, _) => Err(RecordingError::Content {
+                path: path.into(),
+                what: format!(
+                    "the file has {count} records, and one is needed; choose it with --record 1 to --record {count}"
+                ),
+            }),
+        }
+    }
+
+    /// Reads all records of a file, or the one that `import` chooses, each as a recording of its own.
+    ///
+    /// # Errors
+    /// As [`Recording::read`]; also if the chosen record or column does not exist.
+    pub fn import_all(path: impl AsRef<Path>, import: &Import) -> Result<Vec<Imported>, RecordingError> {
         let path = path.as_ref();
         let ending = crate::file::ending(path);
-        let raw = match ending.as_str() {
-            "csv" => csv::read(path, segment.is_whole())?,
-            "wav" => wav::read(path)?,
+        let finite = import.segment.is_whole();
+        let records = match ending.as_str() {
+            "csv" | "txt" | "dat" | "tsv" | "asc" => vec![csv::read(path, finite)?],
+            "wav" => vec![wav::read(path)?],
             "mat" => mat::read(path)?,
-            "uff" | "unv" | "bunv" => uff::read(path, segment.is_whole())?,
+            "lvm" => lvm::read(path)?,
+            "tdms" => tdms::read(path)?,
+            "uff" | "unv" | "bunv" => vec![uff::read(path, finite)?],
             _ => {
                 // A missing file is reported before an unknown extension.
                 crate::file::read(path)?;
@@ -44,7 +79,37 @@ impl Recording {
                 });
             }
         };
-        segment.of(assemble::recording(path, raw, Sidecar::beside(path)?)?)
+        let count = records.len();
+        let first = match import.record {
+            None => 0,
+            Some(number) if (1..=count).contains(&number) => number - 1,
+            Some(number) => {
+                return Err(RecordingError::Content {
+                    path: path.into(),
+                    what: format!("--record {number}: the file has {count} records"),
+                });
+            }
+        };
+        let mut known: Vec<String> = Vec::new();
+        for column in records.iter().flat_map(|raw| &raw.columns) {
+            if !known.contains(&column.name) {
+                known.push(column.name.clone());
+            }
+        }
+        let chosen = if import.record.is_some() { 1 } else { count };
+        let sidecar = Sidecar::beside(path)?;
+        records
+            .into_iter()
+            .skip(first)
+            .take(chosen)
+            .map(|raw| {
+                let imported = assemble::recording(path, raw, sidecar.clone(), import, &known)?;
+                Ok(Imported {
+                    recording: import.segment.of(imported.recording)?,
+                    ..imported
+                })
+            })
+            .collect()
     }
 
     /// Writes the recording and its sidecar to `path` in the format of the file extension.

@@ -4,7 +4,9 @@
 //! SI units.
 //!
 //! Main types: [`Recording`] with its [`Channel`]s, [`Sidecar`] (kind of test, cut, posture, names and units of channels), [`Unit`] and
-//! [`Quantity`], [`SpindleAngle`] (spindle angle from the tachometer). Formats: CSV, WAV, MAT and UFF 58 ([`uff`]).
+//! [`Quantity`], [`SpindleAngle`] (spindle angle from the tachometer). Formats: CSV and other text tables, WAV, MAT,
+//! LabVIEW measurement files, TDMS and UFF 58 ([`uff`]). [`Recording::import`] also reads files in the words of other programs, and says how it
+//! understood them ([`Understood`]).
 //!
 //! ```
 //! use quietcut_recording::{Channel, Quantity, Recording, Sidecar};
@@ -42,24 +44,39 @@ pub mod cut_table;
 mod error;
 pub mod file;
 mod formats;
+mod import;
+mod lvm;
 mod mat;
+mod plausibility;
 mod raw;
 mod recording;
 mod segment;
 mod sidecar;
 mod spindle_angle;
+mod summary;
+mod tdms;
+mod text_head;
+mod text_table;
 pub mod uff;
+mod understand;
+mod understood;
 mod unit;
 mod wav;
+mod words;
 
+pub use assemble::Imported;
 pub use blocks::{Sensed, SpindleSettings};
 pub use error::RecordingError;
 pub use formats::WRITTEN;
+pub use import::{ColumnMap, Import, Scale};
 pub use recording::{Channel, Recording};
 pub use segment::Segment;
 pub use sidecar::{RecordedChannel, RecordedCut, RecordedPosture, Sidecar, TestKind};
 pub use spindle_angle::SpindleAngle;
+pub use summary::{ChannelSummary, envelope};
+pub use text_table::{TextColumn, TextTable};
 pub use uff::UffForm;
+pub use understood::{Basis, Doubt, Understood, UnderstoodColumn};
 pub use unit::{Quantity, Sensitivity, Unit, UnknownUnit};
 
 #[cfg(test)]

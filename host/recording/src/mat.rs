@@ -1,13 +1,14 @@
-//! Reader of MAT-files of level 5, compressed or uncompressed. Every real numeric vector is a channel.
+//! Reader of MAT-files of level 5, compressed or uncompressed: numbers, text, structures and cells.
 //!
 //! The longer dimension of a matrix is time: the columns of an N × 3 matrix are channels, and the rows of a 3 × N matrix. The columns of a
-//! square matrix are channels.
+//! square matrix are channels. [`records`] finds the records in the variables.
 //!
-//! Format: MathWorks, "MAT-File Format", level 5. Text, structures, objects and sparse arrays are skipped. Level 7.3 (HDF5) is an error. A
-//! scalar is a parameter, not a channel.
+//! Format: MathWorks, "MAT-File Format", level 5. Objects, complex, logical and sparse arrays are skipped. Level 7.3 (HDF5) is an error.
 //!
 //! The file is read in chunks and its values are stored only once. The length of the file bounds the allocated memory, whatever sizes its
 //! headers state.
+
+mod records;
 
 use std::fs::File;
 use std::io::{BufRead, BufReader, ErrorKind, Read, copy, sink};
@@ -48,8 +49,14 @@ const COMPRESSED: u32 = 15;
 /// Data type of a matrix element (miMATRIX).
 const MATRIX: u32 = 14;
 
-/// Reads the channels of a MAT-file: the numeric vectors and matrices with the largest number of samples.
-pub(super) fn read(path: &Path) -> Result<Raw, RecordingError> {
+/// Largest depth of structures in structures that is read. A choice; recordings have one or two levels.
+const DEPTH_MAX: usize = 6;
+
+/// Largest number of elements of all structures and cells of a file. A choice; a record of a structure array takes a few.
+const ELEMENTS_MAX: usize = 100_000;
+
+/// Reads the records of a MAT-file: its vectors and matrices, or those of its structures.
+pub(super) fn read(path: &Path) -> Result<Vec<Raw>, RecordingError> {
     let unreadable = |cause| FileError::Read {
         path: path.into(),
         cause,
@@ -60,27 +67,28 @@ pub(super) fn read(path: &Path) -> Result<Raw, RecordingError> {
         path: path.into(),
         what,
     };
-    let variables = variables(&mut BufReader::with_capacity(CHUNK, file), length).map_err(content)?;
-    let longest = variables.iter().map(Variable::samples).max().unwrap_or(0);
-    let columns: Vec<RawColumn> = variables
-        .into_iter()
-        .filter(|variable| longest > 1 && variable.samples() == longest)
-        .flat_map(Variable::into_columns)
-        .collect();
-    if columns.is_empty() {
-        return Err(content(
-            "it has no numeric vector that could be a channel (text, structures and objects are skipped)"
-                .into(),
-        ));
-    }
-    Ok(Raw {
-        columns,
-        sample_rate_hz: None,
-        start_s: 0.0,
-    })
+    let items = items(&mut BufReader::with_capacity(CHUNK, file), length).map_err(content)?;
+    records::records(items).map_err(content)
+}
+
+/// A named value of the file, or of a structure.
+#[derive(Debug)]
+struct Item {
+    name: String,
+    value: Value,
+}
+
+/// A value of the file.
+#[derive(Debug)]
+enum Value {
+    Numbers(Variable),
+    Text(String),
+    /// Elements of a structure array, each with its fields; the elements of a cell array have one field without name.
+    Elements(Vec<Vec<Item>>),
 }
 
 /// A real numeric variable, split into channels; a row vector and a column vector are one channel.
+#[derive(Debug)]
 struct Variable {
     name: String,
     /// Samples of each channel; all channels have the same length.
@@ -103,17 +111,13 @@ impl Variable {
         self.values
             .into_iter()
             .enumerate()
-            .map(|(index, samples)| RawColumn {
-                name: name(index),
-                unit: None,
-                samples,
-            })
+            .map(|(index, samples)| RawColumn::without_unit(name(index), samples))
             .collect()
     }
 }
 
-/// Reads all real numeric variables of a file of `length` bytes.
-fn variables(reader: &mut dyn BufRead, length: u64) -> Result<Vec<Variable>, String> {
+/// Reads all variables of a file of `length` bytes.
+fn items(reader: &mut dyn BufRead, length: u64) -> Result<Vec<Item>, String> {
     let mut header = Vec::with_capacity(HEADER);
     reader
         .take(HEADER as u64)
@@ -146,17 +150,18 @@ fn variables(reader: &mut dyn BufRead, length: u64) -> Result<Vec<Variable>, Str
     let mut memory = ValueMemory {
         file: length,
         bytes: length.saturating_mul(VALUES_PER_BYTE).max(VALUES_MIN),
+        elements: ELEMENTS_MAX,
     };
-    let mut variables = Vec::new();
+    let mut items = Vec::new();
     while !source.is_at_end()? {
         let tag = source.tag()?;
         match tag.kind {
-            COMPRESSED => variables.extend(inflated(&mut source, tag.length, &mut memory)?),
-            MATRIX => variables.extend(source.within(&tag, |inner| matrix(inner, &mut memory))?),
+            COMPRESSED => items.extend(inflated(&mut source, tag.length, &mut memory)?),
+            MATRIX => items.extend(source.within(&tag, |inner| matrix(inner, &mut memory, 0))?),
             _ => source.skip(&tag)?,
         }
     }
-    Ok(variables)
+    Ok(items)
 }
 
 /// Remaining memory for the values of one file.
@@ -165,6 +170,8 @@ struct ValueMemory {
     file: u64,
     /// Memory still available for values, bytes.
     bytes: u64,
+    /// Elements of structures and cells that may still be read.
+    elements: usize,
 }
 
 impl ValueMemory {
@@ -181,18 +188,22 @@ impl ValueMemory {
         Ok(())
     }
 
+    /// Counts `count` elements of structure or cell `name`; an error if the file has too many.
+    fn take_elements(&mut self, name: &str, count: usize) -> Result<(), String> {
+        self.elements = self.elements.checked_sub(count).ok_or_else(|| {
+            format!("structure \"{name}\" has more than {ELEMENTS_MAX} elements; save the records as vectors")
+        })?;
+        Ok(())
+    }
+
     /// Number of values per channel for which memory is reserved before reading a variable with `channels` channels.
     fn trusted(&self, channels: usize) -> usize {
         usize::try_from(self.file.max(TRUSTED) / channels.max(1) as u64 + 1).unwrap_or(usize::MAX)
     }
 }
 
-/// Decompresses an element of `length` bytes and reads the matrix in it; `None` if it holds no real numeric matrix.
-fn inflated(
-    source: &mut Source<'_>,
-    length: u64,
-    memory: &mut ValueMemory,
-) -> Result<Option<Variable>, String> {
+/// Decompresses an element of `length` bytes and reads the matrix in it; `None` if it holds no value that is read.
+fn inflated(source: &mut Source<'_>, length: u64, memory: &mut ValueMemory) -> Result<Option<Item>, String> {
     if length > source.available {
         return Err(source.cut_off(length));
     }
@@ -207,7 +218,7 @@ fn inflated(
         big_endian: source.big_endian,
     };
     let found = inner.tag().and_then(|tag| match tag.kind {
-        MATRIX => inner.within(&tag, |inner| matrix(inner, memory)),
+        MATRIX => inner.within(&tag, |inner| matrix(inner, memory, 0)),
         _ => Ok(None),
     });
     let found =
@@ -218,16 +229,21 @@ fn inflated(
     Ok(found)
 }
 
-/// Reads the data of a matrix element; `None` if the matrix is not two-dimensional, real and numeric.
-fn matrix(source: &mut Source<'_>, memory: &mut ValueMemory) -> Result<Option<Variable>, String> {
+/// Reads the data of a matrix element `depth` levels inside others; `None` if it holds no real numbers in two dimensions, text, structure
+/// or cell.
+fn matrix(source: &mut Source<'_>, memory: &mut ValueMemory, depth: usize) -> Result<Option<Item>, String> {
+    // An empty field of a structure has no content at all.
+    if source.available == 0 {
+        return Ok(None);
+    }
     let flags = source.small()?;
     let Some(flags) = flags.get(..4) else {
         return Ok(None);
     };
     let flags = word(flags, source.big_endian);
     let (class, complex, logical) = (flags & 0xff, flags & 0x800 != 0, flags & 0x200 != 0);
-    // Array classes 6 to 15: double, single and the integer types.
-    if !(6..=15).contains(&class) || complex || logical {
+    // Array classes: 1 cell, 2 structure, 4 text, 6 to 15 double, single and the integer types.
+    if !matches!(class, 1 | 2 | 4 | 6..=15) || complex || logical {
         return Ok(None);
     }
     let dimensions: Vec<usize> = source
@@ -239,6 +255,31 @@ fn matrix(source: &mut Source<'_>, memory: &mut ValueMemory) -> Result<Option<Va
         return Ok(None);
     };
     let name = String::from_utf8_lossy(&source.small()?).into_owned();
+    let item = |value| {
+        Ok(Some(Item {
+            name: name.clone(),
+            value,
+        }))
+    };
+    match class {
+        1 | 2 => {
+            if depth >= DEPTH_MAX {
+                return Ok(None);
+            }
+            let count = rows.saturating_mul(columns);
+            let elements = elements(source, memory, &name, count, class == 2, depth)?;
+            return item(Value::Elements(elements));
+        }
+        4 => {
+            let tag = source.tag()?;
+            return if tag.length > SMALL_MAX {
+                Ok(None)
+            } else {
+                item(Value::Text(source.text(&tag)?))
+            };
+        }
+        _ => {}
+    }
     let tag = source.tag()?;
     let size = size_of_kind(tag.kind).ok_or_else(|| {
         format!(
@@ -274,7 +315,67 @@ fn matrix(source: &mut Source<'_>, memory: &mut ValueMemory) -> Result<Option<Va
             }
         }
     })?;
-    Ok(Some(Variable { name, values }))
+    Ok(Some(Item {
+        name: name.clone(),
+        value: Value::Numbers(Variable { name, values }),
+    }))
+}
+
+/// Reads the elements of a structure array or a cell array of `count` elements.
+fn elements(
+    source: &mut Source<'_>,
+    memory: &mut ValueMemory,
+    name: &str,
+    count: usize,
+    is_structure: bool,
+    depth: usize,
+) -> Result<Vec<Vec<Item>>, String> {
+    let fields = if is_structure {
+        let length = source.small()?;
+        let length = length
+            .get(..4)
+            .map_or(0, |bytes| word(bytes, source.big_endian) as usize);
+        let names = source.small()?;
+        if length == 0 || length > names.len().max(1) {
+            return Ok(Vec::new());
+        }
+        names
+            .chunks_exact(length)
+            .map(|name| {
+                let end = name.iter().position(|&byte| byte == 0).unwrap_or(length);
+                String::from_utf8_lossy(&name[..end]).into_owned()
+            })
+            .collect()
+    } else {
+        vec![String::new()]
+    };
+    memory.take_elements(name, count.saturating_mul(fields.len().max(1)))?;
+    let mut elements = Vec::new();
+    for _ in 0..count {
+        let mut items = Vec::new();
+        for field in &fields {
+            let tag = source.tag()?;
+            if tag.kind != MATRIX {
+                source.skip(&tag)?;
+                continue;
+            }
+            let found = source.within(&tag, |inner| matrix(inner, memory, depth + 1))?;
+            items.extend(found.map(|found| found.named(field)));
+        }
+        elements.push(items);
+    }
+    Ok(elements)
+}
+
+impl Item {
+    /// The value with the name of its field; the elements of structures have no names of their own.
+    fn named(mut self, name: &str) -> Self {
+        self.name = name.into();
+        if let Value::Numbers(variable) = &mut self.value {
+            variable.name = name.into();
+        }
+        self
+    }
 }
 
 /// Size of a stored number type, bytes; `None` if the data type is not numeric.
@@ -305,9 +406,10 @@ fn decode(kind: u32, data: &[u8], big_endian: bool, mut take: impl FnMut(f64)) {
     }
     match kind {
         1 => decode!(i8),
-        2 => decode!(u8),
+        // Text in UTF-8 (16) has single bytes.
+        2 | 16 => decode!(u8),
         3 => decode!(i16),
-        4 => decode!(u16),
+        4 | 17 => decode!(u16),
         5 => decode!(i32),
         6 => decode!(u32),
         7 => decode!(f32),
@@ -417,6 +519,18 @@ impl Source<'_> {
         let mut data = Vec::new();
         self.chunks(&tag, |chunk| data.extend_from_slice(chunk))?;
         Ok(data)
+    }
+
+    /// Reads the text of an element: UTF-8, UTF-16 or bytes.
+    fn text(&mut self, tag: &Tag) -> Result<String, String> {
+        let mut codes = Vec::new();
+        self.numbers(tag, |code| codes.push(code as u32))?;
+        // Data types 16 (UTF-8), 1 and 2 hold bytes of UTF-8; the others hold one code for each letter.
+        if matches!(tag.kind, 1 | 2 | 16) {
+            let bytes: Vec<u8> = codes.iter().map(|&code| code as u8).collect();
+            return Ok(String::from_utf8_lossy(&bytes).into_owned());
+        }
+        Ok(codes.into_iter().filter_map(char::from_u32).collect())
     }
 
     /// Reads the numbers of an element and passes each to `take`.

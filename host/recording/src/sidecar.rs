@@ -94,7 +94,7 @@ pub struct RecordedChannel {
     /// Mounting position of the sensor, such as `spindle-housing`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub at: Option<String>,
-    /// Standard name of the channel (`fx`, `ax`, `tacho` …) if the file uses another name.
+    /// Standard name of the channel (`fx`, `ax`, `tacho` …) if the file uses another name; `-ax` for a sensor against the axis.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
     /// Unit of the channel, such as `m/s^2`; it overrides the unit in the file.
@@ -217,16 +217,33 @@ impl Sidecar {
         Ok(())
     }
 
+    /// The text of the sidecar of `recording`.
+    ///
+    /// # Errors
+    /// A value cannot be written as TOML.
+    pub fn text(&self, recording: &Path) -> Result<String, RecordingError> {
+        toml::to_string(self).map_err(|error| RecordingError::Content {
+            path: Self::path_of(recording),
+            what: error.to_string(),
+        })
+    }
+
+    /// Writes the sidecar of `recording`, beside it.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn write_beside(&self, recording: &Path) -> Result<(), RecordingError> {
+        let text = self.text(recording)?;
+        Ok(crate::file::write(&Self::path_of(recording), text.as_bytes())?)
+    }
+
     /// The sidecar of `recording` as a file that is written but not yet published.
     ///
     /// # Errors
     /// The file cannot be written.
     pub(super) fn prepared_beside(&self, recording: &Path) -> Result<Prepared, RecordingError> {
         let path = Self::path_of(recording);
-        let text = toml::to_string(self).map_err(|error| RecordingError::Content {
-            path: path.clone(),
-            what: error.to_string(),
-        })?;
+        let text = self.text(recording)?;
         Ok(crate::file::prepare(&path, |writer| {
             writer.write_all(text.as_bytes())
         })?)

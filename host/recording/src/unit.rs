@@ -92,26 +92,33 @@ const UNITS: &[(&str, Quantity, f64)] = &[
     ("s", Quantity::Time, 1.0),
     ("ms", Quantity::Time, 1e-3),
     ("us", Quantity::Time, 1e-6),
+    ("ns", Quantity::Time, 1e-9),
     ("min", Quantity::Time, 60.0),
     ("N", Quantity::Force, 1.0),
     ("kN", Quantity::Force, 1e3),
     ("mN", Quantity::Force, 1e-3),
     ("lbf", Quantity::Force, 4.448_221_615_260_5),
+    ("kgf", Quantity::Force, G),
     ("m", Quantity::Displacement, 1.0),
     ("mm", Quantity::Displacement, 1e-3),
     ("um", Quantity::Displacement, 1e-6),
     ("nm", Quantity::Displacement, 1e-9),
     ("cm", Quantity::Displacement, 1e-2),
     ("in", Quantity::Displacement, 0.0254),
+    ("mil", Quantity::Displacement, 25.4e-6),
+    ("ft", Quantity::Displacement, 0.3048),
     ("m/s", Quantity::Velocity, 1.0),
     ("mm/s", Quantity::Velocity, 1e-3),
     ("um/s", Quantity::Velocity, 1e-6),
     ("in/s", Quantity::Velocity, 0.0254),
+    ("ft/s", Quantity::Velocity, 0.3048),
     ("m/s^2", Quantity::Acceleration, 1.0),
     ("m/s2", Quantity::Acceleration, 1.0),
     ("mm/s^2", Quantity::Acceleration, 1e-3),
     ("mm/s2", Quantity::Acceleration, 1e-3),
     ("in/s^2", Quantity::Acceleration, 0.0254),
+    ("ft/s^2", Quantity::Acceleration, 0.3048),
+    ("um/s^2", Quantity::Acceleration, 1e-6),
     ("g", Quantity::Acceleration, G),
     ("mg", Quantity::Acceleration, 1e-3 * G),
     ("rad", Quantity::Angle, 1.0),
@@ -120,6 +127,7 @@ const UNITS: &[(&str, Quantity, f64)] = &[
     ("kPa", Quantity::Pressure, 1e3),
     ("V", Quantity::Voltage, 1.0),
     ("mV", Quantity::Voltage, 1e-3),
+    ("uV", Quantity::Voltage, 1e-6),
     ("1", Quantity::Level, 1.0),
     ("", Quantity::Level, 1.0),
 ];
@@ -144,19 +152,86 @@ fn known() -> String {
 impl FromStr for Unit {
     type Err = UnknownUnit;
 
-    /// Parses a unit from a column header. `²`, `**` and both Unicode letters for micro (µ, μ) are accepted.
+    /// Parses a unit, such as `m/s^2`, or a factor with a unit, such as `98.1 m/s^2` (a sample of 1 is that much).
+    ///
+    /// `²`, `⁻²`, `**`, `m/s/s`, `m s^-2`, `m/sec²`, whole words (`Newton`, `volts`, `sec`) and both Unicode letters for micro (µ, μ) are accepted.
     fn from_str(text: &str) -> Result<Self, UnknownUnit> {
-        let plain = text
-            .trim()
-            .replace('²', "^2")
-            .replace(['µ', 'μ'], "u")
-            .replace("**", "^");
+        if let Some(unit) = plain(text) {
+            return Ok(unit);
+        }
+        // The factor 1 alone is the unit of a level and has been found above.
+        let (number, unit) = leading_number(text).ok_or_else(|| UnknownUnit { found: text.into() })?;
+        match plain(unit) {
+            Some(unit) if number.is_finite() && number != 0.0 && unit.quantity != Quantity::Level => {
+                Ok(Self {
+                    factor: number * unit.factor,
+                    ..unit
+                })
+            }
+            _ => Err(UnknownUnit { found: text.into() }),
+        }
+    }
+}
+
+/// A unit without a factor, by its usual spellings.
+fn plain(text: &str) -> Option<Unit> {
+    let plain = text
+        .trim()
+        .replace('²', "^2")
+        .replace(['µ', 'μ'], "u")
+        .replace("**", "^");
+    let of = |name: &str| {
         UNITS
             .iter()
-            .find(|(name, ..)| *name == plain)
-            .map(|&(_, quantity, factor)| Self { quantity, factor })
-            .ok_or_else(|| UnknownUnit { found: text.into() })
+            .find(|(known, ..)| *known == name)
+            .map(|&(_, quantity, factor)| Unit { quantity, factor })
+    };
+    of(&plain).or_else(|| of(&respelled(&plain)?))
+}
+
+/// Usual spelling of a unit in the table that is written in another way; `None` for an empty text.
+fn respelled(text: &str) -> Option<String> {
+    let mut plain = text.replace("⁻^2", "^-2").replace(['·', '⋅', '*'], " ");
+    // Brackets around the whole or around a part: (m/s^2), m/(s^2).
+    plain.retain(|letter| !matches!(letter, '(' | ')'));
+    let word = match plain.trim().to_lowercase().as_str() {
+        "newton" | "newtons" => "N",
+        "volt" | "volts" => "V",
+        "sec" | "secs" | "second" | "seconds" | "sek" | "sekunden" => "s",
+        "msec" | "millisecond" | "milliseconds" => "ms",
+        "usec" | "microseconds" => "us",
+        "micron" | "microns" | "micrometer" | "micrometre" => "um",
+        "meter" | "metre" | "meters" => "m",
+        "inch" | "inches" => "in",
+        "mils" => "mil",
+        "lbs" | "pound-force" => "lbf",
+        "gn" | "g_n" | "g's" | "gs" | "gravity" => "g",
+        "ips" => "in/s",
+        "-" | "none" | "unitless" => "1",
+        "degrees" | "°" => "deg",
+        _ => "",
+    };
+    if !word.is_empty() {
+        return Some(word.into());
     }
+    let plain = plain.replace("sec", "s").replace("/s/s", "/s^2");
+    // `m s^-2`, `m s-2`, `ms^-2` and `m/s-2` are `m/s^2`; `m s^-1` is `m/s`.
+    let (length, rest) = ["um", "mm", "cm", "m", "in", "ft"]
+        .iter()
+        .find_map(|length| Some((*length, plain.strip_prefix(length)?)))?;
+    let rest: String = rest.chars().filter(|letter| !letter.is_whitespace()).collect();
+    match rest.as_str() {
+        "/s^2" | "/s2" | "s^-2" | "s-2" | "/s-2" => Some(format!("{length}/s^2")),
+        "s^-1" | "s-1" | "/s" => Some(format!("{length}/s")),
+        _ => None,
+    }
+}
+
+/// The number at the start of a text and the text after it; `None` without a number or a text.
+fn leading_number(text: &str) -> Option<(f64, &str)> {
+    let (number, length) = fast_float2::parse_partial::<f64, _>(text.trim_start()).ok()?;
+    let rest = text.trim_start().get(length..)?.trim();
+    (length > 0 && !rest.is_empty()).then_some((number, rest))
 }
 
 /// Sensitivity of a sensor: voltage per measured unit, such as "10.2 mV/g".
@@ -173,9 +248,8 @@ impl FromStr for Sensitivity {
 
     fn from_str(text: &str) -> Result<Self, String> {
         let wrong = || format!("\"{text}\"; a sensitivity such as \"10.2 mV/g\" or \"2.2 mV/N\" is needed");
-        let (number, units) = text.trim().split_once(' ').ok_or_else(wrong)?;
-        let number: f64 = number.parse().map_err(|_| wrong())?;
-        let (volts, measured) = units.trim().split_once('/').ok_or_else(wrong)?;
+        let (number, units) = leading_number(text).ok_or_else(wrong)?;
+        let (volts, measured) = units.split_once('/').ok_or_else(wrong)?;
         let volts: Unit = volts.parse().map_err(|_| wrong())?;
         // Parentheses are allowed around a unit with a slash: "mV/(m/s^2)".
         let measured = measured
@@ -214,6 +288,22 @@ mod tests {
         ] {
             assert_eq!(text.parse(), Ok(Unit { quantity, factor }), "{text}");
         }
+        for (text, same) in [
+            ("m/s/s", "m/s^2"),
+            ("m/sec^2", "m/s^2"),
+            ("m s^-2", "m/s^2"),
+            ("m·s⁻²", "m/s^2"),
+            ("(m/s^2)", "m/s^2"),
+            ("mm/s²", "mm/s^2"),
+            ("Newton", "N"),
+            ("sec", "s"),
+            ("inch", "in"),
+        ] {
+            assert_eq!(text.parse::<Unit>(), same.parse(), "{text}");
+        }
+        let scaled: Unit = "98.1 m/s^2".parse().unwrap();
+        assert_eq!((scaled.quantity, scaled.factor), (Quantity::Acceleration, 98.1));
+        assert!("0 N".parse::<Unit>().is_err() && "3".parse::<Unit>().is_err());
         let error = "furlong".parse::<Unit>().unwrap_err().to_string();
         assert!(error.contains("furlong") && error.contains("um"), "{error}");
     }
@@ -223,6 +313,7 @@ mod tests {
         let sensitivity: Sensitivity = "10.2 mV/g".parse().unwrap();
         assert_eq!(sensitivity.quantity, Quantity::Acceleration);
         assert!((sensitivity.volts_per_unit - 10.2e-3 / 9.806_65).abs() < 1e-15);
+        assert_eq!("10.2mV/g".parse(), Ok(sensitivity));
         assert_eq!("2 V/(m/s^2)".parse::<Sensitivity>().unwrap().volts_per_unit, 2.0);
         for wrong in ["10.2", "10 mV", "x mV/g", "10 g/mV", "0 mV/g", "10 mV/s"] {
             assert!(wrong.parse::<Sensitivity>().is_err(), "{wrong}");

@@ -7,7 +7,7 @@ use std::io::{BufReader, Read};
 use std::path::Path;
 
 use super::RecordingError;
-use super::raw::{Raw, RawColumn};
+use super::raw::{FoundUnit, Raw, RawColumn};
 use crate::file::FileError;
 
 /// Reads all channels of a WAV file with its sample rate.
@@ -56,7 +56,7 @@ pub(super) fn read(path: &Path) -> Result<Raw, RecordingError> {
     Ok(Raw {
         columns,
         sample_rate_hz: Some(f64::from(spec.sample_rate)),
-        start_s: 0.0,
+        ..Raw::default()
     })
 }
 
@@ -72,7 +72,7 @@ fn columns<S: hound::Sample + Into<f64>>(
     let mut columns: Vec<RawColumn> = (0..count)
         .map(|channel| RawColumn {
             name: format!("ch{}", channel + 1),
-            unit: None,
+            unit: FoundUnit::None,
             samples: Vec::with_capacity(length),
         })
         .collect();

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::segment::RecordedSegment;
+use super::segment::{Recorded, RecordedSegment};
 use super::{Error, Output, progress};
 use crate::case::Case;
 use crate::diagnose::answer::Outcome;
@@ -48,7 +48,10 @@ pub fn run(args: Args) -> Result<(), Error> {
         Some(path) => trial_cuts::read(path)?,
         None => Vec::new(),
     };
-    let recordings = args.segment.read(&args.recordings)?;
+    let Recorded {
+        recordings,
+        understood,
+    } = args.segment.read(&args.recordings)?;
     let bar = progress::bar(Some(STAGES), "{spinner} {bar:24} {msg} {elapsed}");
     let options = Options { seed: args.seed };
     let mut diagnosis = diagnose_watched(&case, &recordings, &options, &|stage| {
@@ -66,7 +69,7 @@ pub fn run(args: Args) -> Result<(), Error> {
     if let Some(folder) = &args.out {
         write(folder, &case.name, &diagnosis, extended.as_deref())?;
     }
-    args.output.answer(&diagnosis, text(&diagnosis))
+    args.output.answer_with(&understood, &diagnosis, text(&diagnosis))
 }
 
 /// Adds the stability limits to the diagnosis: before and after the extension, or only those of the case if there is no

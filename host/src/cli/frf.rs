@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use maud::html;
 use serde::Serialize;
 
-use super::segment::RecordedSegment;
+use super::segment::{Recorded, RecordedSegment};
 use super::{Error, Output, finite, positive};
 use crate::file;
 use crate::frf::{
@@ -192,7 +192,10 @@ impl Args {
 
 /// Runs the verb.
 pub fn run(args: Args) -> Result<(), Error> {
-    let recordings = args.segment.read(&args.recordings)?;
+    let Recorded {
+        recordings,
+        understood,
+    } = args.segment.read(&args.recordings)?;
     let measurement = measure(&recordings, &args.settings())?;
     let (table, calibration) = match (&args.housing, &args.tip) {
         (Some(housing), Some(tip)) => calibrate(
@@ -210,7 +213,7 @@ pub fn run(args: Args) -> Result<(), Error> {
     }
     let answer = FrfOutput::new(&args, &measurement, &table, &calibration);
     let text = answer.text();
-    args.output.answer(&answer, text)
+    args.output.answer_with(&understood, &answer, text)
 }
 
 fn write(target: &OutputFile, table: &FrfTable, is_binary: bool) -> Result<(), Error> {

@@ -14,6 +14,7 @@ mod without_force;
 use std::path::Path;
 
 use super::Error;
+use super::segment::Recorded;
 use crate::case::Case;
 use answer::IdentifyOutput;
 pub use args::Args;
@@ -26,8 +27,11 @@ pub fn run(args: Args) -> Result<(), Error> {
         _ => args.case.as_deref(),
     };
     let other = others.map(sections).transpose()?;
-    let recordings = match args.method {
-        Method::InverseStability | Method::Modes => Vec::new(),
+    let Recorded {
+        recordings,
+        mut understood,
+    } = match args.method {
+        Method::InverseStability | Method::Modes => Recorded::default(),
         _ => args.segment.read(&args.recordings)?,
     };
     let mut answer = match args.method {
@@ -40,7 +44,7 @@ pub fn run(args: Args) -> Result<(), Error> {
         Method::InverseStability => without_force::inverse_stability(&args)?,
         Method::Joints => joints::joints(&args, &recordings)?,
         Method::ForceCoefficients => cutting::force_coefficients(&args, &recordings)?,
-        Method::Modes => modes::modes(&args)?,
+        Method::Modes => modes::modes(&args, &mut understood)?,
     };
     if let Some(path) = &args.out {
         let text = answer.case(path, other.as_ref())?;
@@ -50,7 +54,7 @@ pub fn run(args: Args) -> Result<(), Error> {
     for warning in &answer.warnings {
         tracing::warn!("{warning}");
     }
-    args.output.answer(&answer, text(&answer))
+    args.output.answer_with(&understood, &answer, text(&answer))
 }
 
 /// TOML tables of the case file at `path`, after a check that it is a valid case.

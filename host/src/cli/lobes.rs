@@ -78,6 +78,7 @@ struct PointsOutput {
 /// Runs the verb.
 pub fn run(args: Args) -> Result<(), Error> {
     let case = Case::read(&args.case).map_err(Error::input)?;
+    args.method.announce()?;
     if let (Some(variation), Some(rpm), Some(depth_mm)) = (args.varied.variation(), args.rpm, args.depth_mm) {
         return varied::run(&case, &args.method, &variation, rpm, depth_mm, args.output);
     }

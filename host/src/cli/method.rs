@@ -4,11 +4,12 @@ use std::path::{Path, PathBuf};
 
 use quietcut_model::effects::EffectName;
 
-use super::{Error, non_negative};
+use super::{Error, non_negative, progress};
 use crate::case::Case;
 use crate::criteria::COARSE_TABLE;
-use crate::frf::{FrfTable, Interpolation};
+use crate::frf::{FrfTable, ImportedTable, Interpolation};
 use crate::orbit::collocation_of;
+use crate::recording::{ColumnMap, Import};
 use crate::stability::{
     Collocation, CubicTerms, Fdm, FrequencyProblem, FullDiscretization, Method, ModeCoupling, MultiFrequency,
     Nyquist, Pitched, Problem, RevolutionCollocation, Sdm, SdmOrder, SemiDiscretization, Zoa, after,
@@ -45,9 +46,14 @@ pub(super) struct MethodChoice {
     /// Stability method. Default: collocation; with --frf multi-frequency.
     #[arg(long, value_enum)]
     method: Option<MethodName>,
-    /// Table of receptances that replaces the structure of the case: frequency_hz,hxx_re [m/N],hxx_im [m/N],…
+    /// Table of receptances that replaces the structure of the case: frequency_hz,hxx_re [m/N],hxx_im [m/N],… or a table of
+    /// mobility or accelerance, also as magnitude and phase.
     #[arg(long, value_name = "FILE")]
     frf: Option<PathBuf>,
+    /// Meaning and unit of a column of --frf, such as Real=hxx_re:m/N,Imag=hxx_im:m/N, or hxx_mag, hxx_db, hxx_phase:deg,
+    /// coherence_xx. Several with commas between; may be repeated.
+    #[arg(long, value_name = "COLUMN=NAME[:UNIT],…", value_delimiter = ',', value_parser = ColumnMap::parse, requires = "frf")]
+    map: Vec<ColumnMap>,
     /// Harmonics of the directional coefficients. Default: multi-frequency adds harmonics until the limits converge; nyquist
     /// uses 0, the averaged coefficients.
     #[arg(long, value_name = "N", value_parser = harmonics)]
@@ -103,7 +109,7 @@ impl MethodChoice {
             None => case,
         };
         if let Some(path) = &self.frf {
-            let table = FrfTable::read(path).map_err(Error::input)?;
+            let table = self.table(path)?.table;
             warn_of_table(&table)?;
             return self.on_receptances(FrequencyProblem::of_table(case, &table)?, path);
         }
@@ -137,6 +143,26 @@ impl MethodChoice {
             }),
             _ => return self.on_receptances(FrequencyProblem::new(case, cubic)?, &case.path),
         })
+    }
+
+    /// Reads the table of `--frf` with its `--map`.
+    fn table(&self, path: &Path) -> Result<ImportedTable, Error> {
+        let import = Import {
+            map: self.map.clone(),
+            ..Import::default()
+        };
+        FrfTable::import(path, &import).map_err(Error::input)
+    }
+
+    /// Prints on stderr how the table of `--frf` was understood, if it had to be interpreted.
+    pub(super) fn announce(&self) -> Result<(), Error> {
+        if let Some(path) = &self.frf
+            && let Some(understood) = self.table(path)?.understood
+        {
+            progress::clear();
+            eprintln!("understood: {understood}");
+        }
+        Ok(())
     }
 
     fn name(&self) -> MethodName {

@@ -13,6 +13,7 @@ pub mod identify;
 pub mod info;
 pub mod lobes;
 mod lobes_cells;
+pub mod look;
 mod method;
 mod milling_rig;
 pub mod monitor;
@@ -60,6 +61,7 @@ enum Verb {
     Setup(Box<setup::Args>),
     Next(next::Args),
     Simulate(Box<simulate::Args>),
+    Look(look::Args),
     Frf(frf::Args),
     Identify(Box<identify::Args>),
     Diagnose(diagnose::Args),
@@ -136,6 +138,7 @@ fn run(verb: Verb) -> Result<(), Error> {
         Verb::Setup(args) => setup::run(*args),
         Verb::Next(args) => next::run(args),
         Verb::Simulate(args) => simulate::run(*args),
+        Verb::Look(args) => look::run(args),
         Verb::Frf(args) => frf::run(args),
         Verb::Identify(args) => identify::run(*args),
         Verb::Diagnose(args) => diagnose::run(args),

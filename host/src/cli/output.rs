@@ -6,6 +6,7 @@ use std::io::{self, Write};
 use serde::Serialize;
 
 use super::Error;
+use crate::recording::Understood;
 
 /// Output format of a verb, text or JSON; part of the arguments of every verb.
 #[derive(Clone, Copy, Debug, Default, clap::Args)]
@@ -29,6 +30,28 @@ impl Output {
             print(&text)
         }
     }
+
+    /// As [`Output::answer`]; the JSON object also has `understood`, if a file had to be interpreted.
+    pub(super) fn answer_with(
+        self,
+        understood: &[Understood],
+        object: &impl Serialize,
+        text: impl Display,
+    ) -> Result<(), Error> {
+        if understood.is_empty() {
+            self.answer(object, text)
+        } else {
+            self.answer(&WithUnderstood { object, understood }, text)
+        }
+    }
+}
+
+/// The result of a verb, and how the files of its recordings were understood.
+#[derive(Serialize)]
+struct WithUnderstood<'a, T> {
+    #[serde(flatten)]
+    object: &'a T,
+    understood: &'a [Understood],
 }
 
 fn print(text: &dyn Display) -> Result<(), Error> {

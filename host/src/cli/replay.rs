@@ -54,9 +54,13 @@ impl Args {
 
 /// Runs the verb.
 pub fn run(args: Args) -> Result<(), Error> {
-    let recordings = args.segment.read(std::slice::from_ref(&args.recording))?;
-    let [recording] = recordings.as_slice() else {
-        return Err(Error::input("a recording is needed"));
+    let recorded = args.segment.read(std::slice::from_ref(&args.recording))?;
+    let [recording] = recorded.recordings.as_slice() else {
+        return Err(Error::input(format!(
+            "{}: {} records, and replay uses one; choose it with --record",
+            args.recording.display(),
+            recorded.recordings.len()
+        )));
     };
     let speed = SpindleSettings {
         rpm: args.rpm,
@@ -82,7 +86,8 @@ pub fn run(args: Args) -> Result<(), Error> {
         Some(port) => on_device(&args, port, &sensed, table.as_deref())?,
         None => on_host(&args, &sensed, table.as_deref())?,
     };
-    args.output.answer(&log, format_args!("{}", log.summary))
+    args.output
+        .answer_with(&recorded.understood, &log, format_args!("{}", log.summary))
 }
 
 /// Runs the signal chain on this computer.

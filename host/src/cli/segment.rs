@@ -1,12 +1,12 @@
-//! Options for the segment of the recordings that a verb uses.
+//! Options for the segment of the recordings that a verb uses, and for what their files do not state.
 
 use std::path::PathBuf;
 
-use super::{Error, finite};
-use crate::recording::{Recording, Segment};
+use super::{Error, finite, positive, progress};
+use crate::recording::{ColumnMap, Import, Recording, Segment, Understood};
 
-/// Start and end of the segment of the recordings to use.
-#[derive(Clone, Copy, Debug, clap::Args)]
+/// Start and end of the segment of the recordings to use; names, units and rate that their files do not state.
+#[derive(Clone, Debug, clap::Args)]
 #[command(next_help_heading = "Segment of the recordings")]
 pub(super) struct RecordedSegment {
     /// Start of the segment in s on the time axis of the file. Default: the first sample.
@@ -16,19 +16,71 @@ pub(super) struct RecordedSegment {
     /// sample.
     #[arg(long, value_name = "T", value_parser = finite, allow_negative_numbers = true)]
     until_s: Option<f64>,
+    #[command(flatten)]
+    stated: StatedColumns,
+}
+
+/// What the user states about the files of recordings.
+#[derive(Clone, Debug, Default, clap::Args)]
+#[command(next_help_heading = "Import of the recordings")]
+pub(super) struct StatedColumns {
+    /// Channel and unit of a column, such as acc=ax:g, 2=fx:N (by number), "ch1=ax:10.2 mV/g" (sensitivity) or acc=-az
+    /// (against the axis). Several with commas between; may be repeated.
+    #[arg(long, value_name = "COLUMN=NAME[:UNIT],…", value_delimiter = ',', value_parser = ColumnMap::parse)]
+    map: Vec<ColumnMap>,
+    /// Sample rate in samples per second; it replaces the time column of the file.
+    #[arg(long, value_name = "HZ", value_parser = positive, allow_negative_numbers = true)]
+    rate: Option<f64>,
+    /// Number of the record to use, from 1, in a file with several. Default: all of them.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    record: Option<u32>,
+}
+
+/// Recordings of a verb, and how their files were understood where they had to be interpreted.
+#[derive(Default)]
+pub(super) struct Recorded {
+    pub(super) recordings: Vec<Recording>,
+    pub(super) understood: Vec<Understood>,
+}
+
+impl StatedColumns {
+    /// The options as an import of `segment`.
+    pub(super) fn import(&self, segment: Segment) -> Import {
+        Import {
+            segment,
+            map: self.map.clone(),
+            rate_hz: self.rate,
+            record: self.record.map(|record| record as usize),
+        }
+    }
 }
 
 impl RecordedSegment {
-    /// Reads the segment of each recording, in the order of `paths`.
+    /// The options as an import.
+    pub(super) fn import(&self) -> Import {
+        self.stated.import(Segment {
+            from_s: self.from_s,
+            until_s: self.until_s,
+        })
+    }
+
+    /// Reads the segment of each recording, in the order of `paths`; prints one line on stderr for each file that had to be interpreted.
     ///
     /// # Errors
     /// A recording cannot be read, or has no samples in the segment.
-    pub(super) fn read(self, paths: &[PathBuf]) -> Result<Vec<Recording>, Error> {
-        let segment = Segment {
-            from_s: self.from_s,
-            until_s: self.until_s,
-        };
-        let read = paths.iter().map(|path| Recording::read_segment(path, segment));
-        Ok(read.collect::<Result<_, _>>()?)
+    pub(super) fn read(&self, paths: &[PathBuf]) -> Result<Recorded, Error> {
+        let import = self.import();
+        let mut read = Recorded::default();
+        for path in paths {
+            for imported in Recording::import_all(path, &import)? {
+                if imported.understood.is_interpreted() {
+                    progress::clear();
+                    eprintln!("understood: {}", imported.understood);
+                    read.understood.push(imported.understood);
+                }
+                read.recordings.push(imported.recording);
+            }
+        }
+        Ok(read)
     }
 }

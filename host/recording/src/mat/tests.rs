@@ -46,7 +46,14 @@ fn doubles(values: &[f64]) -> Vec<u8> {
 
 fn of(mut bytes: &[u8]) -> Result<Vec<Variable>, String> {
     let length = bytes.len() as u64;
-    variables(&mut bytes, length)
+    let items = items(&mut bytes, length)?;
+    Ok(items
+        .into_iter()
+        .filter_map(|item| match item.value {
+            Value::Numbers(variable) => Some(variable),
+            _ => None,
+        })
+        .collect())
 }
 
 #[test]
@@ -56,7 +63,7 @@ fn vectors_plain_and_compressed_and_stored_small_are_read() {
         // A small element: three one-byte values of a double matrix, stored inside the tag.
         compressed(&matrix_element("small", 6, 1, 3, 2, &[7, 8, 9])),
         matrix_element("both", 6, 3, 2, 9, &doubles(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0])),
-        // Text (class 4) is skipped.
+        // Text (class 4) is no channel.
         matrix_element("text", 4, 1, 3, 4, &[b'a', 0, b'b', 0, b'c', 0]),
     ]);
     let read: Vec<(String, Vec<f64>)> = of(&bytes)

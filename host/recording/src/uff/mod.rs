@@ -228,7 +228,7 @@ pub(super) fn read(path: &Path, finite: bool) -> Result<Raw, RecordingError> {
     if let Some(times) = &uneven {
         columns.push(RawColumn {
             name: "t".into(),
-            unit: "s".parse().ok(),
+            unit: "s".parse().ok().into(),
             samples: times.clone(),
         });
     }
@@ -268,12 +268,17 @@ pub(super) fn read(path: &Path, finite: bool) -> Result<Raw, RecordingError> {
         if (-3..0).contains(&set.header.response.direction) {
             samples.iter_mut().for_each(|sample| *sample = -*sample);
         }
-        columns.push(RawColumn { name, unit, samples });
+        columns.push(RawColumn {
+            name,
+            unit: unit.into(),
+            samples,
+        });
     }
     Ok(Raw {
         columns,
         sample_rate_hz: even.map(|(_, step)| rate_hz(step)),
         start_s: even.map_or(0.0, |(first, _)| first),
+        ..Raw::default()
     })
 }
 

@@ -9,20 +9,21 @@ use super::Error;
 use super::answer::{ComplexFigure, ComplexMode, Figure, IdentifyOutput};
 use super::args::{Args, band};
 use crate::frf::{
-    Estimator, FrfError, FrfTable, MeasurementSettings, RecordSpectra, measure, record_spectra,
+    Estimator, FrfError, FrfTable, ImportedTable, MeasurementSettings, RecordSpectra, measure, record_spectra,
 };
 use crate::identify::modes::{self, ChannelNoise, IdentifiedMode, ModalModel, Receptances};
+use crate::recording::{Import, Understood};
 use crate::report::page::{figure, page};
 use crate::report::stabilization_chart::stabilization_chart;
 use crate::structure::Direction;
 
 /// Identifies complex modes from the receptances or recordings of the command line.
-pub(super) fn modes(args: &Args) -> Result<IdentifyOutput, Error> {
+pub(super) fn modes(args: &Args, understood: &mut Vec<Understood>) -> Result<IdentifyOutput, Error> {
     let options = &args.modes;
     if let Some(path) = &options.stabilization {
         ending(path)?;
     }
-    let source = source(args)?;
+    let source = source(args, understood)?;
     let band_hz = band(args)?;
     let refused =
         |error: modes::ModesError| Error::input(format!("{}: {error}", source.table.path().display()));
@@ -66,13 +67,17 @@ struct Source {
     records: Option<Vec<RecordSpectra>>,
 }
 
-fn source(args: &Args) -> Result<Source, Error> {
+fn source(args: &Args, understood: &mut Vec<Understood>) -> Result<Source, Error> {
     let mut no_table = None;
     if let [path] = args.recordings.as_slice() {
-        match table(path)? {
-            Ok(table) => {
+        match table(path, &args.segment.import())? {
+            Ok(imported) => {
+                if let Some(understood) = imported.understood {
+                    crate::cli::progress::clear();
+                    eprintln!("understood: {understood}");
+                }
                 return Ok(Source {
-                    table,
+                    table: imported.table,
                     deviation: None,
                     warnings: Vec::new(),
                     records: None,
@@ -81,13 +86,15 @@ fn source(args: &Args) -> Result<Source, Error> {
             Err(reason) => no_table = reason,
         }
     }
-    let recordings = args
+    let recorded = args
         .segment
         .read(&args.recordings)
         .map_err(|error| match no_table {
             Some(reason) => Error::input(format!("{error}; as a table of receptances: {reason}")),
             None => error,
         })?;
+    let recordings = recorded.recordings;
+    *understood = recorded.understood;
     let settings = MeasurementSettings {
         resolution_hz: args.modes.resolution_hz,
         estimator: if args.modes.pseudo_inverse {
@@ -112,22 +119,10 @@ fn source(args: &Args) -> Result<Source, Error> {
 ///
 /// # Errors
 /// The file cannot be read, or its head is that of a table but its content is wrong.
-fn table(path: &Path) -> Result<Result<FrfTable, Option<FrfError>>, Error> {
+fn table(path: &Path, import: &Import) -> Result<Result<ImportedTable, Option<FrfError>>, Error> {
     match crate::file::ending(path).as_str() {
-        "uff" | "unv" | "bunv" => Ok(FrfTable::read(path).map_err(Some)),
-        "csv" => {
-            let text = crate::file::read_text(path)?;
-            let header = text
-                .lines()
-                .find(|line| !line.starts_with('#'))
-                .unwrap_or_default();
-            let is_table = header.split(',').any(|title| title.trim() == "frequency_hz");
-            Ok(if is_table {
-                Ok(FrfTable::read(path)?)
-            } else {
-                Err(None)
-            })
-        }
+        "uff" | "unv" | "bunv" => Ok(FrfTable::import(path, import).map_err(Some)),
+        _ if FrfTable::is_table(path)? => Ok(Ok(FrfTable::import(path, import)?)),
         _ => Ok(Err(None)),
     }
 }

@@ -1,0 +1,312 @@
+//! Meaning of a column of an FRF table in a text file: frequency, part of a response, or coherence, from words, unit, option or sidecar.
+
+use quietcut_model::structure::Direction;
+use quietcut_recording::{ColumnMap, RecordedChannel, Scale, TextColumn};
+
+use super::table_file::{FrfUnit, frf_unit, pair_of};
+
+/// Content of a column.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Content {
+    /// Frequency, with the factor to Hz.
+    Frequency(f64),
+    /// A part of a frequency response function.
+    Value(Part),
+    /// Coherence.
+    Coherence,
+    /// Anything else.
+    Other,
+}
+
+/// Part of a complex value.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Part {
+    Real,
+    Imaginary,
+    Magnitude,
+    /// Magnitude in decibels, 20·log₁₀ of the value in its unit.
+    Decibel,
+    Phase(PhaseUnit),
+}
+
+/// Unit of a phase.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum PhaseUnit {
+    Degrees,
+    Radians,
+    Unstated,
+}
+
+/// Meaning of a column.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Meaning {
+    pub(super) content: Content,
+    /// Directions of response and force.
+    pub(super) directions: Option<(Direction, Direction)>,
+    /// Unit of the value; `None` if it is not stated.
+    pub(super) unit: Option<FrfUnit>,
+    /// Words of the name that are no part, in lower case: the columns of one response have the same.
+    pub(super) label: String,
+    /// True if a word says mobility or accelerance, by its order of derivative.
+    word_derivatives: i32,
+}
+
+impl Meaning {
+    /// Unit that the words propose: that of a receptance, mobility or accelerance.
+    pub(super) fn proposed_unit(&self) -> &'static str {
+        match self.word_derivatives {
+            1 => "(m/s)/N",
+            2 => "(m/s^2)/N",
+            _ => "m/N",
+        }
+    }
+}
+
+/// Words of frequencies, in lower case.
+const FREQUENCY: &[&str] = &["frequency", "freq", "frequenz", "frequencies", "hz"];
+
+/// Words of the parts of a complex value, in lower case.
+const PARTS: &[(Part, &[&str])] = &[
+    (Part::Real, &["real", "re", "realteil", "realpart"]),
+    (
+        Part::Imaginary,
+        &["imag", "im", "imaginary", "imaginär", "imaginärteil", "imaginaer"],
+    ),
+    (Part::Decibel, &["db"]),
+    (
+        Part::Phase(PhaseUnit::Unstated),
+        &["phase", "phi", "arg", "angle", "phasenwinkel"],
+    ),
+    (
+        Part::Magnitude,
+        &["mag", "magnitude", "abs", "amplitude", "amp", "betrag", "modulus"],
+    ),
+];
+
+/// Words that say nothing about the response that a column belongs to.
+const EMPTY: &[&str] = &["frf", "h", "part", "of", "the", "in", "response", "function"];
+
+/// Meaning of a column.
+///
+/// # Errors
+/// The unit is unknown, or contradicts the name that option or sidecar give.
+pub(super) fn meaning(
+    column: &TextColumn,
+    map: Option<&ColumnMap>,
+    said: Option<&RecordedChannel>,
+) -> Result<Meaning, String> {
+    let stated = map
+        .map(|map| map.name.clone())
+        .or_else(|| said.and_then(|said| said.name.clone()));
+    let unit = map
+        .and_then(|map| match &map.scale {
+            Some(Scale::Ratio(unit)) => Some(unit.clone()),
+            Some(Scale::Unit(unit)) => Some(unit.quantity.unit().to_owned()),
+            _ => None,
+        })
+        .or_else(|| said.and_then(|said| said.unit.clone()))
+        .or_else(|| column.unit.clone());
+    let in_degrees = map.is_some_and(|map| {
+        matches!(&map.scale, Some(Scale::Unit(unit)) if (unit.factor - std::f64::consts::PI / 180.0).abs() < 1e-6)
+    });
+    match stated {
+        Some(name) => by_name(&name, unit.as_deref(), in_degrees),
+        None => by_words(&column.name, unit.as_deref()),
+    }
+}
+
+/// Meaning of a stated name, such as `hxx_re`, `hxy_phase`, `coherence_xx` or `frequency_hz`.
+fn by_name(name: &str, unit: Option<&str>, in_degrees: bool) -> Result<Meaning, String> {
+    let of = |content, directions, unit| Meaning {
+        content,
+        directions,
+        unit,
+        label: name.to_owned(),
+        word_derivatives: 0,
+    };
+    if name == "frequency_hz" {
+        return Ok(of(Content::Frequency(1.0), None, None));
+    }
+    if let Some(pair) = name.strip_prefix("coherence_").and_then(pair_of) {
+        return Ok(of(Content::Coherence, Some(pair), None));
+    }
+    let part = name.strip_prefix('h').and_then(|rest| rest.split_once('_'));
+    let found = part.and_then(|(pair, part)| {
+        let part = match part {
+            "re" => Part::Real,
+            "im" => Part::Imaginary,
+            "mag" => Part::Magnitude,
+            "db" => Part::Decibel,
+            "phase" if in_degrees => Part::Phase(PhaseUnit::Degrees),
+            "phase" => Part::Phase(phase(unit)),
+            _ => return None,
+        };
+        Some((pair_of(pair)?, part))
+    });
+    let Some((pair, part)) = found else {
+        // A name of its own makes the column one that is not used.
+        return Ok(of(Content::Other, None, None));
+    };
+    let unit = match part {
+        Part::Phase(_) => None,
+        _ => unit.map(|unit| frf_unit(unit_of_level(unit))).transpose()?,
+    };
+    let label = format!("{}{}", pair.0, pair.1);
+    Ok(Meaning {
+        label,
+        ..of(Content::Value(part), Some(pair), unit)
+    })
+}
+
+/// Unit behind `dB re 1 m/N`, `dB m/N` or `dB`.
+fn unit_of_level(unit: &str) -> &str {
+    let lower = unit.to_lowercase();
+    let rest = lower
+        .strip_prefix("db")
+        .map_or(unit, |rest| &unit[unit.len() - rest.len()..]);
+    let rest = rest.trim();
+    let rest = rest.strip_prefix("re").map_or(rest, str::trim);
+    let rest = rest.strip_prefix('1').map_or(rest, str::trim);
+    rest.trim_start_matches('(')
+}
+
+fn phase(unit: Option<&str>) -> PhaseUnit {
+    match unit.map(|unit| unit.trim().to_lowercase()).as_deref() {
+        Some("deg" | "°" | "degree" | "degrees" | "grad") => PhaseUnit::Degrees,
+        Some("rad" | "radian" | "radians") => PhaseUnit::Radians,
+        _ => PhaseUnit::Unstated,
+    }
+}
+
+/// Meaning of the words and the unit in the head of a column.
+fn by_words(name: &str, unit: Option<&str>) -> Result<Meaning, String> {
+    let (name, unit) = match unit {
+        Some(unit) => (name.to_owned(), Some(unit.to_owned())),
+        None => name_and_ratio(name),
+    };
+    let lower = name.to_lowercase();
+    let words: Vec<&str> = lower
+        .split(|letter: char| !letter.is_alphanumeric())
+        .filter(|word| !word.is_empty())
+        .collect();
+    let plain_unit = unit.as_deref().map(str::trim).unwrap_or_default();
+    let mut found = Meaning {
+        content: Content::Other,
+        directions: None,
+        unit: None,
+        label: String::new(),
+        word_derivatives: 0,
+    };
+    let hertz = match plain_unit.to_lowercase().as_str() {
+        "hz" | "hertz" | "1/s" => Some(1.0),
+        "khz" => Some(1e3),
+        "rad/s" => Some(1.0 / std::f64::consts::TAU),
+        _ => None,
+    };
+    let is_frequency = words.iter().any(|word| FREQUENCY.contains(word)) || words == ["f"];
+    if hertz.is_some() || is_frequency && plain_unit.is_empty() {
+        found.content = Content::Frequency(hertz.unwrap_or(1.0));
+        return Ok(found);
+    }
+    let is_level = plain_unit.to_lowercase().starts_with("db") || words.contains(&"db");
+    let mut part = None;
+    let mut label = Vec::new();
+    for word in words {
+        if word.starts_with("coh") || word.starts_with("kohärenz") {
+            found.content = Content::Coherence;
+        } else if let Some((named, _)) = PARTS.iter().find(|(_, known)| known.contains(&word)) {
+            part.get_or_insert(*named);
+        } else if let Some(derivatives) = derivatives(word) {
+            found.word_derivatives = derivatives;
+        } else if !EMPTY.contains(&word) {
+            label.push(word);
+        }
+    }
+    found.directions = directions(&label);
+    found.label = label.join(" ");
+    if found.content == Content::Coherence {
+        return Ok(found);
+    }
+    let part = match part {
+        Some(Part::Phase(_)) => Part::Phase(phase(unit.as_deref())),
+        Some(Part::Magnitude) | None if is_level => Part::Decibel,
+        Some(part) => part,
+        None => return Ok(found),
+    };
+    found.content = Content::Value(part);
+    if !matches!(part, Part::Phase(_)) {
+        let unit = unit_of_level(plain_unit);
+        if !unit.is_empty() && unit != "-" {
+            found.unit = Some(frf_unit(unit)?);
+        }
+    }
+    Ok(found)
+}
+
+/// Splits `Hxx Real (m/N)` and `Hxx (dB re 1 m/N)`, whose unit is no unit of a channel.
+fn name_and_ratio(title: &str) -> (String, Option<String>) {
+    let inner = title.trim().strip_suffix(')');
+    if let Some(inner) = inner {
+        for (at, _) in inner.match_indices('(') {
+            let unit = &inner[at + 1..];
+            let is_phase = phase(Some(unit)) != PhaseUnit::Unstated;
+            let lower = unit.trim().to_lowercase();
+            let is_frequency = ["hz", "khz", "hertz", "rad/s"].contains(&lower.as_str());
+            if is_phase || is_frequency || lower.starts_with("db") || frf_unit(unit).is_ok() {
+                return (title[..at].trim().into(), Some(unit.trim().into()));
+            }
+        }
+    }
+    (title.into(), None)
+}
+
+/// Order of the time derivative that a word names: 0 receptance, 1 mobility, 2 accelerance.
+fn derivatives(word: &str) -> Option<i32> {
+    match word {
+        "receptance" | "compliance" | "flexibility" | "nachgiebigkeit" => Some(0),
+        "mobility" | "admittance" => Some(1),
+        "accelerance" | "inertance" => Some(2),
+        _ => None,
+    }
+}
+
+/// Directions of response and force in the words of a label: `hxx`, `xy`, `x y`, `ax fx`.
+fn directions(label: &[&str]) -> Option<(Direction, Direction)> {
+    let whole = label
+        .iter()
+        .find_map(|word| pair_of(word).or_else(|| pair_of(word.strip_prefix('h')?)));
+    if whole.is_some() {
+        return whole;
+    }
+    let axis = |word: &str| -> Option<Direction> {
+        let last = word.strip_prefix(['a', 'f', 'v', 'd']).unwrap_or(word);
+        let direction: Direction = last.parse().ok()?;
+        direction.axis().map(|_| direction)
+    };
+    let axes: Vec<Direction> = label.iter().filter_map(|word| axis(word)).collect();
+    match axes.as_slice() {
+        &[response, force] => Some((response, force)),
+        _ => None,
+    }
+}
+
+/// True if titles are those of an FRF table: a column of frequencies and a part of a response.
+pub(super) fn is_head(titles: &[String]) -> bool {
+    let of = |title: &String| {
+        let (name, unit) = match title.strip_suffix(']').and_then(|inner| inner.rsplit_once('[')) {
+            Some((name, unit)) => (name.trim(), Some(unit)),
+            None => (title.as_str(), None),
+        };
+        by_words(name, unit).map(|meaning| meaning.content)
+    };
+    let contents: Vec<_> = titles.iter().map(of).collect();
+    let has_frequency = contents
+        .iter()
+        .any(|content| matches!(content, Ok(Content::Frequency(_))));
+    let is_own = titles.iter().any(|title| title.starts_with("frequency_hz"));
+    // A unit that is wrong does not make the table a recording.
+    let has_value = contents
+        .iter()
+        .any(|content| matches!(content, Ok(Content::Value(_)) | Err(_)));
+    is_own || has_frequency && has_value
+}

@@ -1,0 +1,472 @@
+//! FRF tables in text files of other programs: real and imaginary part, or magnitude and phase, of receptance, mobility or accelerance.
+//!
+//! Columns are understood from words and units: `Frequency (Hz)`, `Real`, `Imag`, `Mag (dB)`, `Phase (deg)`, `Hxx Real (m/N)`. What is not
+//! stated is asked for: the option `--map` or the sidecar names the column (`hxx_re`, `hxx_im`, `hxx_mag`, `hxx_phase`, `hxx_db`,
+//! `coherence_xx`, `frequency_hz`) and its unit.
+
+use std::f64::consts::TAU;
+use std::path::Path;
+
+use num_complex::Complex64;
+
+use super::table_column::{Content, Meaning, Part, PhaseUnit, meaning};
+use super::table_file::FrfUnit;
+use super::{Frf, FrfError, FrfTable};
+use quietcut_model::structure::Direction;
+use quietcut_recording::{Import, Sidecar, TextColumn, TextTable};
+
+/// An FRF table, and how its columns were understood.
+#[derive(Clone, Debug)]
+pub struct ImportedTable {
+    /// The table, receptances in m/N.
+    pub table: FrfTable,
+    /// One line: columns with their meaning; `None` for a table in the form of this program.
+    pub understood: Option<String>,
+}
+
+/// Reads a table from a text file of another program.
+pub(super) fn read(path: &Path, import: &Import) -> Result<ImportedTable, FrfError> {
+    let text = TextTable::read(path)?;
+    let sidecar = Sidecar::beside(path)?;
+    let names: Vec<String> = text.columns.iter().map(|column| column.name.clone()).collect();
+    let mut columns = Vec::with_capacity(text.columns.len());
+    for (index, column) in text.columns.iter().enumerate() {
+        let map = import
+            .map
+            .iter()
+            .find(|map| map.is_about(&column.name, index + 1, &names));
+        let said = sidecar.channels.get(&column.name);
+        let meaning = meaning(column, map, said).map_err(|what| FrfError::Column {
+            path: path.into(),
+            column: column.name.clone(),
+            what,
+        })?;
+        columns.push((column, meaning));
+    }
+    assemble(path, &columns, text.notes)
+}
+
+/// Real and imaginary part of one response, or its magnitude and phase.
+struct Pair<'a> {
+    label: &'a str,
+    first: (&'a TextColumn, &'a Meaning),
+    second: (&'a TextColumn, &'a Meaning),
+}
+
+fn assemble(
+    path: &Path,
+    columns: &[(&TextColumn, Meaning)],
+    mut notes: Vec<String>,
+) -> Result<ImportedTable, FrfError> {
+    let wrong = |what: String| FrfError::Content {
+        path: path.into(),
+        what,
+    };
+    let (frequency, factor) = columns
+        .iter()
+        .find_map(|(column, meaning)| match meaning.content {
+            Content::Frequency(factor) => Some((column, factor)),
+            _ => None,
+        })
+        .ok_or_else(|| {
+            wrong("there is no column of frequencies, such as frequency_hz or Frequency (Hz)".into())
+        })?;
+    let mut frequency_hz: Vec<f64> = frequency.values.iter().map(|value| value * factor).collect();
+    let pairs = pairs(path, columns)?;
+    require_statements(path, &pairs)?;
+    let mut entries = Vec::new();
+    let mut said = Vec::new();
+    for pair in &pairs {
+        // Both are stated: the table is refused above otherwise.
+        let (Some((response, force)), Some(unit)) = (pair.directions(), pair.unit()) else {
+            continue;
+        };
+        let receptance = pair
+            .values(path)?
+            .into_iter()
+            .zip(&frequency_hz)
+            .map(|(value, hertz)| {
+                value * unit.factor / Complex64::new(0.0, TAU * hertz).powi(unit.derivatives)
+            })
+            .collect();
+        let coherence = coherence(columns, pair.label, (response, force), pairs.len());
+        said.push(format!(
+            "{} and {} are h{response}{force}, {}",
+            pair.first.0.name,
+            pair.second.0.name,
+            unit.word()
+        ));
+        entries.push(Frf {
+            response,
+            force,
+            receptance,
+            coherence,
+        });
+    }
+    // Mobility and accelerance cannot be integrated at 0 Hz, so the table has no line there.
+    if frequency_hz.first() == Some(&0.0)
+        && entries
+            .iter()
+            .any(|entry| entry.receptance.first().is_some_and(|value| !value.is_finite()))
+    {
+        frequency_hz.remove(0);
+        for entry in &mut entries {
+            entry.receptance.remove(0);
+            if let Some(coherence) = &mut entry.coherence {
+                coherence.remove(0);
+            }
+        }
+        notes.push("the line at 0 Hz is left out".into());
+    }
+    said.extend(notes);
+    let table = FrfTable::new(path, frequency_hz, entries)?;
+    Ok(ImportedTable {
+        understood: Some(format!("{}: {}", path.display(), said.join("; "))),
+        table,
+    })
+}
+
+/// Pairs the columns of the same response.
+fn pairs<'a>(path: &Path, columns: &'a [(&'a TextColumn, Meaning)]) -> Result<Vec<Pair<'a>>, FrfError> {
+    let mut pairs: Vec<Pair<'a>> = Vec::new();
+    for (column, meaning) in columns {
+        let Content::Value(part) = meaning.content else {
+            continue;
+        };
+        // The pair is made once, at its real part or magnitude.
+        if matches!(part, Part::Imaginary | Part::Phase(_)) {
+            continue;
+        }
+        let is_other = |other: &&(&TextColumn, Meaning)| {
+            let belongs = other.1.label == meaning.label && other.1.directions == meaning.directions;
+            belongs
+                && match (part, other.1.content) {
+                    (Part::Real, Content::Value(Part::Imaginary)) => true,
+                    (Part::Magnitude | Part::Decibel, Content::Value(Part::Phase(_))) => true,
+                    _ => false,
+                }
+        };
+        let Some((other, of_other)) = columns
+            .iter()
+            .find(is_other)
+            .map(|(column, meaning)| (*column, meaning))
+        else {
+            return Err(FrfError::Content {
+                path: path.into(),
+                what: format!(
+                    "column \"{}\" stands alone; real and imaginary part, or magnitude and phase, are needed",
+                    column.name
+                ),
+            });
+        };
+        pairs.push(Pair {
+            label: &meaning.label,
+            first: (column, meaning),
+            second: (other, of_other),
+        });
+    }
+    if pairs.is_empty() {
+        return Err(FrfError::Content {
+            path: path.into(),
+            what: format!(
+                "no frequency response function in it; its columns are {}; real and imaginary part, or magnitude and phase, are needed",
+                columns
+                    .iter()
+                    .map(|(column, _)| column.name.clone())
+                    .collect::<Vec<_>>()
+                    .join(", ")
+            ),
+        });
+    }
+    Ok(pairs)
+}
+
+/// Refuses pairs without directions, unit of response per force, or unit of the phase, with the option that states them.
+fn require_statements(path: &Path, pairs: &[Pair<'_>]) -> Result<(), FrfError> {
+    const PROPOSED: [&str; 9] = ["xx", "yx", "zx", "xy", "yy", "zy", "xz", "yz", "zz"];
+    let mut taken: Vec<String> = pairs
+        .iter()
+        .filter_map(|pair| {
+            pair.directions()
+                .map(|(response, force)| format!("{response}{force}"))
+        })
+        .collect();
+    let (mut lacks, mut map) = (Vec::new(), Vec::new());
+    for pair in pairs {
+        let mut missing = Vec::new();
+        if pair.directions().is_none() {
+            missing.push("the directions of response and force");
+        }
+        if pair.unit().is_none() {
+            missing.push("the unit (response per force)");
+        }
+        if matches!(
+            pair.second.1.content,
+            Content::Value(Part::Phase(PhaseUnit::Unstated))
+        ) && phase_unit(&pair.second.0.values).is_none()
+        {
+            missing.push("the unit of the phase");
+        }
+        if missing.is_empty() {
+            continue;
+        }
+        let (first, second) = (pair.first.0, pair.second.0);
+        let name = pair.directions().map_or_else(
+            || {
+                PROPOSED
+                    .iter()
+                    .find(|name| !taken.iter().any(|other| other == *name))
+                    .map_or_else(|| "xx".to_owned(), |name| (*name).to_owned())
+            },
+            |(response, force)| format!("{response}{force}"),
+        );
+        taken.push(name.clone());
+        lacks.push(format!(
+            "\"{}\" and \"{}\": the file does not state {}",
+            first.name,
+            second.name,
+            missing.join(" and ")
+        ));
+        let unit = if pair.unit().is_none() {
+            format!(":{}", pair.first.1.proposed_unit())
+        } else {
+            String::new()
+        };
+        let (one, two) = match pair.first.1.content {
+            Content::Value(Part::Real) => (format!("h{name}_re{unit}"), format!("h{name}_im{unit}")),
+            Content::Value(Part::Decibel) => (format!("h{name}_db{unit}"), format!("h{name}_phase:deg")),
+            _ => (format!("h{name}_mag{unit}"), format!("h{name}_phase:deg")),
+        };
+        map.push(format!("{}={one},{}={two}", first.name, second.name));
+    }
+    if lacks.is_empty() {
+        return Ok(());
+    }
+    let (file, map) = (Sidecar::path_of(path), map.join(","));
+    let lines: Vec<String> = map
+        .split(',')
+        .filter_map(|entry| entry.split_once('='))
+        .map(|(column, name)| match name.split_once(':') {
+            Some((name, unit)) => format!("[channels.\"{column}\"] name = \"{name}\", unit = \"{unit}\""),
+            None => format!("[channels.\"{column}\"] name = \"{name}\""),
+        })
+        .collect();
+    Err(FrfError::Content {
+        path: path.into(),
+        what: format!(
+            "{}; add --map \"{map}\" with the directions and units that hold, or these keys to {}: {}",
+            lacks.join("; "),
+            file.display(),
+            lines.join("; ")
+        ),
+    })
+}
+
+impl Pair<'_> {
+    fn directions(&self) -> Option<(Direction, Direction)> {
+        self.first.1.directions
+    }
+
+    /// Unit of the response per force: that of the first column, else that of the second.
+    fn unit(&self) -> Option<FrfUnit> {
+        self.first.1.unit.or(match self.second.1.content {
+            Content::Value(Part::Imaginary) => self.second.1.unit,
+            _ => None,
+        })
+    }
+
+    /// Complex values in the unit of the file.
+    fn values(&self, path: &Path) -> Result<Vec<Complex64>, FrfError> {
+        let (first, second) = (&self.first.0.values, &self.second.0.values);
+        let to_radians = match self.second.1.content {
+            Content::Value(Part::Phase(unit)) => match unit {
+                PhaseUnit::Degrees => std::f64::consts::PI / 180.0,
+                PhaseUnit::Radians => 1.0,
+                PhaseUnit::Unstated => phase_unit(second).unwrap_or(1.0),
+            },
+            _ => 1.0,
+        };
+        let is_negative = |value: &f64| *value < 0.0;
+        if self.first.1.content == Content::Value(Part::Magnitude)
+            && let Some(line) = first.iter().position(is_negative)
+        {
+            return Err(FrfError::Content {
+                path: path.into(),
+                what: format!(
+                    "magnitude \"{}\" is {} at value {}; a magnitude is 0 or more, and decibels have the unit dB: --map \"{}=hxx_db:m/N\" \
+                     with the directions and the unit that hold",
+                    self.first.0.name,
+                    first[line],
+                    line + 1,
+                    self.first.0.name
+                ),
+            });
+        }
+        Ok(first
+            .iter()
+            .zip(second)
+            .map(|(&one, &two)| match self.first.1.content {
+                Content::Value(Part::Real) => Complex64::new(one, two),
+                Content::Value(Part::Decibel) => {
+                    Complex64::from_polar(10f64.powf(one / 20.0), two * to_radians)
+                }
+                _ => Complex64::from_polar(one, two * to_radians),
+            })
+            .collect())
+    }
+}
+
+/// Factor to radians of a phase whose unit is not stated; `None` if the values allow both.
+///
+/// More than two revolutions (4π) are degrees: the phase of few modes is within one revolution. Values within ±π that span 1.5 or more are
+/// radians: in degrees such a phase would not move at all, and no mode would be in the band.
+fn phase_unit(values: &[f64]) -> Option<f64> {
+    let (low, high) = values
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &value| {
+            (low.min(value), high.max(value))
+        });
+    let largest = low.abs().max(high.abs());
+    if largest > 2.0 * TAU {
+        Some(std::f64::consts::PI / 180.0)
+    } else if largest <= std::f64::consts::PI + 0.01 && high - low >= 1.5 {
+        Some(1.0)
+    } else {
+        None
+    }
+}
+
+/// Coherence of the same directions or label; of a table with one response, the only one.
+fn coherence(
+    columns: &[(&TextColumn, Meaning)],
+    label: &str,
+    directions: (Direction, Direction),
+    pairs: usize,
+) -> Option<Vec<f64>> {
+    columns
+        .iter()
+        .find(|(_, meaning)| {
+            meaning.content == Content::Coherence
+                && (meaning.directions == Some(directions) || meaning.label == label || pairs == 1)
+        })
+        .map(|(column, _)| column.values.clone())
+}
+
+#[cfg(test)]
+mod tests {
+    use quietcut_recording::ColumnMap;
+
+    use super::*;
+
+    fn import(text: &str, map: &[&str]) -> Result<ImportedTable, String> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.csv");
+        std::fs::write(&path, text).unwrap();
+        let import = Import {
+            map: map.iter().map(|map| ColumnMap::parse(map).unwrap()).collect(),
+            ..Import::default()
+        };
+        FrfTable::import(&path, &import).map_err(|error| error.to_string())
+    }
+
+    fn value(table: &ImportedTable) -> Complex64 {
+        table.table.entries()[0].receptance[0]
+    }
+
+    #[test]
+    fn parts_units_and_directions_are_understood() {
+        let omega = Complex64::new(0.0, TAU * 10.0);
+        let h = Complex64::new(3e-6, -4e-6);
+        let (mag, phase) = h.to_polar();
+        let a = h * omega * omega;
+        let v = h * omega;
+        for (text, name) in [
+            (
+                format!(
+                    "Frequency (Hz),Hxx Real (m/N),Hxx Imag (m/N)\n10,{},{}\n20,1,1\n",
+                    h.re, h.im
+                ),
+                "xx",
+            ),
+            (
+                format!(
+                    "Freq [Hz];Mag Hyy [um/N];Phase Hyy [deg]\n10;{};{}\n20;1;1\n",
+                    1e6 * mag,
+                    phase.to_degrees()
+                ),
+                "yy",
+            ),
+            (
+                format!(
+                    "frequency,H_xy Re [(m/s^2)/N],H_xy Im [(m/s^2)/N]\n0,1,0\n10,{},{}\n20,1,1\n",
+                    a.re, a.im
+                ),
+                "xy",
+            ),
+            (
+                format!(
+                    "f [Hz]\thzz real [m/s/N]\thzz imag [m/s/N]\n10\t{}\t{}\n20\t1\t1\n",
+                    v.re, v.im
+                ),
+                "zz",
+            ),
+            (
+                format!(
+                    "Frequency (Hz),Hxx (dB re 1 m/N),Hxx Phase (rad)\n10,{},{phase}\n20,1,1\n",
+                    20.0 * mag.log10()
+                ),
+                "xx",
+            ),
+        ] {
+            let found = import(&text, &[]).unwrap_or_else(|error| panic!("{text}: {error}"));
+            assert_eq!(found.table.entries()[0].name(), name, "{text}");
+            // Tolerance: rounding of dB and phase.
+            assert!(
+                (value(&found) - h).norm() < 1e-12 * h.norm(),
+                "{text}: {}",
+                value(&found)
+            );
+            assert!(found.understood.is_some());
+        }
+    }
+
+    #[test]
+    fn tables_without_unit_or_direction_are_refused_with_the_option_that_mends_it() {
+        let plain = "Frequency (Hz),Real,Imag\n10,3e-6,-4e-6\n20,1e-6,1e-6\n";
+        let said = import(plain, &[]).unwrap_err();
+        for words in [
+            "directions",
+            "unit",
+            "--map \"Real=hxx_re:m/N,Imag=hxx_im:m/N\"",
+            "a.toml",
+            "[channels.\"Real\"]",
+        ] {
+            assert!(said.contains(words), "{words}: {said}");
+        }
+        let found = import(plain, &["Real=hyy_re:m/N", "Imag=hyy_im:m/N"]).unwrap();
+        assert_eq!(
+            (value(&found), found.table.entries()[0].name().as_str()),
+            (Complex64::new(3e-6, -4e-6), "yy")
+        );
+        let several = "Freq;Mag 1;Phase 1;Mag 2;Phase 2\n10;1;-170;2;3\n20;1;5;2;100\n";
+        let said = import(several, &[]).unwrap_err();
+        assert!(said.contains("Mag 2=hyx_mag:m/N,Phase 2=hyx_phase:deg"), "{said}");
+        let said = import("Frequency (Hz),Real\n1,2\n2,3\n", &[]).unwrap_err();
+        assert!(said.contains("stands alone"), "{said}");
+        let said = import(
+            "Frequency (Hz),Mag Hxx (m/N),Phase Hxx (deg)\n1,-20,3\n2,-21,3\n",
+            &[],
+        )
+        .unwrap_err();
+        assert!(said.contains("0 or more") && said.contains("hxx_db"), "{said}");
+    }
+
+    #[test]
+    fn the_unit_of_a_phase_is_taken_only_where_values_leave_no_choice() {
+        let degrees = phase_unit(&[-170.0, 10.0]).unwrap();
+        assert!((degrees * 180.0 - std::f64::consts::PI).abs() < 1e-15);
+        assert_eq!(phase_unit(&[-3.1, 0.1]), Some(1.0));
+        assert_eq!(phase_unit(&[-0.3, 0.1]), None);
+        assert_eq!(phase_unit(&[-7.0, 0.1]), None);
+    }
+}

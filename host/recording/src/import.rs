@@ -1,0 +1,134 @@
+//! Options of an import: what the user states about a file on the command line.
+
+use super::segment::Segment;
+use super::unit::{Sensitivity, Unit};
+
+/// What the user states about the files of a command; it takes precedence over the files and their sidecars.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Import {
+    /// Segment of the recording that is used.
+    pub segment: Segment,
+    /// Columns that the user names (`--map`).
+    pub map: Vec<ColumnMap>,
+    /// Sample rate, samples per second (`--rate`); it replaces the time column of the file.
+    pub rate_hz: Option<f64>,
+    /// Number of the record in a file with several records, from 1 (`--record`); `None` for all.
+    pub record: Option<usize>,
+}
+
+/// Name and unit of one column, as in `acc=ax:g`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ColumnMap {
+    /// Name of the column in the file, or its number from 1.
+    pub column: String,
+    /// Name of the channel; a name of its own makes it an auxiliary channel.
+    pub name: String,
+    /// True if the channel points against its axis (`acc=-ax`): samples change their sign.
+    pub is_negative: bool,
+    /// Unit of the samples; `None` if the file states it.
+    pub scale: Option<Scale>,
+}
+
+/// Unit of the samples of a column, or sensitivity of its sensor.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Scale {
+    /// Unit, also with a factor: `g`, `98.1 m/s^2`.
+    Unit(Unit),
+    /// Sensitivity of a voltage: `10.2 mV/g`.
+    Sensitivity(Sensitivity),
+    /// Unit of a frequency response function, response per force: `um/N`, `(m/s^2)/N`, `deg`, `dB`.
+    Ratio(String),
+}
+
+impl ColumnMap {
+    /// Parses `COLUMN=NAME` or `COLUMN=NAME:UNIT`, such as `acc=ax:g`, `2=fx:N`, `acc=-az`, `ch1=ax:10.2 mV/g`.
+    ///
+    /// # Errors
+    /// The text has another form, or the unit is unknown; the message states the forms.
+    pub fn parse(text: &str) -> Result<Self, String> {
+        let forms =
+            "COLUMN=NAME or COLUMN=NAME:UNIT is needed, such as acc=ax:g, 2=fx:N or \"ch1=ax:10.2 mV/g\"";
+        // The name of a column may itself have an equals sign; the name of a channel has none.
+        let (column, channel) = text
+            .rsplit_once('=')
+            .ok_or_else(|| format!("`{text}`: {forms}"))?;
+        let (name, unit) = match channel.split_once(':') {
+            Some((name, unit)) => (name.trim(), Some(unit.trim())),
+            None => (channel.trim(), None),
+        };
+        let (is_negative, name) = match name.strip_prefix('-') {
+            Some(name) => (true, name),
+            None => (false, name),
+        };
+        if column.trim().is_empty() || name.is_empty() {
+            return Err(format!("`{text}`: {forms}"));
+        }
+        let scale = match unit {
+            None => None,
+            Some(unit) => Some(match (unit.parse::<Unit>(), unit.parse::<Sensitivity>()) {
+                (Ok(unit), _) => Scale::Unit(unit),
+                (Err(_), Ok(sensitivity)) => Scale::Sensitivity(sensitivity),
+                (Err(_), Err(_)) if is_ratio(unit) => Scale::Ratio(unit.into()),
+                (Err(error), Err(_)) => {
+                    return Err(format!(
+                        "`{text}`: {error}; a sensitivity such as 10.2 mV/g is possible too"
+                    ));
+                }
+            }),
+        };
+        Ok(Self {
+            column: column.trim().into(),
+            name: name.into(),
+            is_negative,
+            scale,
+        })
+    }
+
+    /// True if this entry is about the column with this name, or with this number (from 1) where no column has the number as its name.
+    pub fn is_about(&self, name: &str, number: usize, names: &[String]) -> bool {
+        if names.contains(&self.column) {
+            return self.column == name;
+        }
+        if self.column.parse() == Ok(number) {
+            return true;
+        }
+        self.column.to_lowercase() == name.to_lowercase()
+    }
+}
+
+/// True for a unit of response per force, and for decibels.
+fn is_ratio(text: &str) -> bool {
+    let of_force = text.rsplit_once('/').is_some_and(|(response, force)| {
+        let is_unit = |text: &str| text.parse::<Unit>().is_ok();
+        is_unit(response) && is_unit(force)
+    });
+    of_force || text == "1/kg" || text.eq_ignore_ascii_case("db")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn columns_are_mapped_by_name_or_number_with_unit_or_sensitivity() {
+        let map = ColumnMap::parse("Acc X=-ax:g").unwrap();
+        assert_eq!(
+            (map.column.as_str(), map.name.as_str(), map.is_negative),
+            ("Acc X", "ax", true)
+        );
+        assert!(matches!(map.scale, Some(Scale::Unit(_))));
+        assert!(matches!(
+            ColumnMap::parse("ch1=ax:10.2mV/g").unwrap().scale,
+            Some(Scale::Sensitivity(_))
+        ));
+        assert_eq!(ColumnMap::parse("2=fx").unwrap().scale, None);
+        for wrong in ["acc", "=ax", "acc=", "acc=ax:furlong"] {
+            assert!(ColumnMap::parse(wrong).is_err(), "{wrong}");
+        }
+        let names = ["acc".to_owned(), "2".to_owned()];
+        let two = ColumnMap::parse("2=fx").unwrap();
+        assert!(two.is_about("2", 2, &names) && !two.is_about("acc", 2, &names));
+        let one = ColumnMap::parse("1=fx").unwrap();
+        assert!(one.is_about("acc", 1, &names));
+    }
+}

@@ -1,0 +1,226 @@
+//! Records in the variables of a MAT-file: vectors beside each other, matrices with a rate, structures, and arrays of structures.
+//!
+//! The variables of the file are one record if vectors or matrices are among them. Otherwise each element of each structure with vectors is a
+//! record of its own: an array of impacts gives as many records. A field that is a structure with one vector and a unit is a channel.
+
+use super::{Item, Value, Variable};
+use crate::raw::{FoundUnit, Raw, RawColumn};
+
+/// Names of a sample rate, samples per second, in lower case.
+const RATES: &[&str] = &[
+    "fs",
+    "f_s",
+    "fsample",
+    "srate",
+    "samplerate",
+    "sample_rate",
+    "sample_rate_hz",
+    "samplingrate",
+    "sampling_rate",
+    "samplingfrequency",
+    "sampling_frequency",
+    "abtastrate",
+];
+
+/// Names of a sample interval, s, in lower case.
+const INTERVALS: &[&str] = &[
+    "dt",
+    "ts",
+    "deltat",
+    "delta_t",
+    "tsample",
+    "sampletime",
+    "sample_time",
+    "x_increment",
+    "wf_increment",
+];
+
+/// Names of a time vector in a structure that holds one channel, in lower case.
+const TIMES: &[&str] = &["t", "time", "zeit", "x"];
+
+/// The records of a file; there is at least one.
+pub(super) fn records(items: Vec<Item>) -> Result<Vec<Raw>, String> {
+    let rate = rate(&items);
+    let mut found = Vec::new();
+    collect(items, None, rate, &mut found);
+    if found.is_empty() {
+        return Err(
+            "it has no numeric vector that could be a channel (objects, complex and sparse arrays are skipped)".into(),
+        );
+    }
+    Ok(found)
+}
+
+/// Adds the records in `items`, the variables of the file or the fields of structure `label`; `outer_hz` is the rate stated around them.
+fn collect(items: Vec<Item>, label: Option<String>, outer_hz: Option<f64>, found: &mut Vec<Raw>) {
+    let rate_hz = rate(&items).or(outer_hz);
+    let units = units(&items);
+    let mut variables: Vec<(Variable, Option<String>)> = Vec::new();
+    let mut structures = Vec::new();
+    for item in items {
+        match item.value {
+            Value::Numbers(variable) => {
+                let unit = units
+                    .iter()
+                    .find(|(name, _)| *name == item.name.to_lowercase())
+                    .map(|(_, unit)| unit.clone());
+                variables.push((variable, unit));
+            }
+            Value::Text(_) => {}
+            Value::Elements(elements) => structures.push((item.name, elements)),
+        }
+    }
+    let channels_of_structures = channels(&mut structures);
+    variables.extend(channels_of_structures);
+    let longest = variables
+        .iter()
+        .map(|(variable, _)| variable.samples())
+        .max()
+        .unwrap_or(0);
+    if longest > 1 {
+        found.push(record(variables, longest, label, rate_hz));
+        return;
+    }
+    for (name, elements) in structures {
+        let several = elements.len() > 1;
+        for (index, fields) in elements.into_iter().enumerate() {
+            let own = if several {
+                format!("{name}({})", index + 1)
+            } else {
+                name.clone()
+            };
+            let label = match &label {
+                Some(outer) if own.is_empty() => outer.clone(),
+                Some(outer) => format!("{outer}.{own}"),
+                None => own,
+            };
+            collect(fields, Some(label), rate_hz, found);
+        }
+    }
+}
+
+/// One record from the variables with `longest` samples; the shorter ones are noted.
+fn record(
+    variables: Vec<(Variable, Option<String>)>,
+    longest: usize,
+    label: Option<String>,
+    worded_rate_hz: Option<f64>,
+) -> Raw {
+    let mut notes = Vec::new();
+    let mut columns: Vec<RawColumn> = Vec::new();
+    let mut sources = 0;
+    for (variable, unit) in variables {
+        let samples = variable.samples();
+        if samples < longest {
+            if samples > 1 {
+                notes.push(format!(
+                    "{} has {samples} of {longest} samples and is not used",
+                    variable.name
+                ));
+            }
+            continue;
+        }
+        sources += 1;
+        columns.extend(variable.into_columns().into_iter().map(|column| RawColumn {
+            unit: unit.clone().map_or(FoundUnit::None, FoundUnit::Text),
+            ..column
+        }));
+    }
+    Raw {
+        asks_names: sources == 1 && columns.len() > 1,
+        columns,
+        worded_rate_hz,
+        label,
+        notes,
+        ..Raw::default()
+    }
+}
+
+/// Sample rate that a scalar states by its name, samples per second.
+fn rate(items: &[Item]) -> Option<f64> {
+    let scalar = |names: &[&str]| {
+        items.iter().find_map(|item| match &item.value {
+            Value::Numbers(variable) if names.contains(&item.name.to_lowercase().as_str()) => {
+                match variable.values.as_slice() {
+                    [values] if values.len() == 1 && values[0].is_finite() && values[0] > 0.0 => {
+                        Some(values[0])
+                    }
+                    _ => None,
+                }
+            }
+            _ => None,
+        })
+    };
+    scalar(RATES).or_else(|| scalar(INTERVALS).map(|interval| 1.0 / interval))
+}
+
+/// Units of variables, by the name of the variable in lower case: `force_unit = 'N'`, or a structure `units` with a field for each.
+fn units(items: &[Item]) -> Vec<(String, String)> {
+    let mut units = Vec::new();
+    for item in items {
+        let name = item.name.to_lowercase();
+        match &item.value {
+            Value::Text(text) => {
+                for end in ["_unit", "_units"] {
+                    if let Some(of) = name.strip_suffix(end) {
+                        units.push((of.to_owned(), text.clone()));
+                    }
+                }
+            }
+            Value::Elements(elements) if matches!(name.as_str(), "unit" | "units") => {
+                for field in elements.iter().flatten() {
+                    if let Value::Text(text) = &field.value {
+                        units.push((field.name.to_lowercase(), text.clone()));
+                    }
+                }
+            }
+            _ => {}
+        }
+    }
+    units
+}
+
+/// Takes the structures that hold one channel each out of `structures`: one vector, and its unit as text.
+fn channels(structures: &mut Vec<(String, Vec<Vec<Item>>)>) -> Vec<(Variable, Option<String>)> {
+    // A single such structure is a record with one channel, and keeps its own names.
+    let is_channel = |(_, elements): &(String, Vec<Vec<Item>>)| match elements.as_slice() {
+        [fields] => fields.iter().filter(|field| is_signal(field)).count() == 1,
+        _ => false,
+    };
+    if structures
+        .iter()
+        .filter(|structure| is_channel(structure))
+        .count()
+        < 2
+    {
+        return Vec::new();
+    }
+    let mut taken = Vec::new();
+    for (name, elements) in std::mem::take(structures) {
+        let structure = (name, elements);
+        if !is_channel(&structure) {
+            structures.push(structure);
+            continue;
+        }
+        let (name, elements) = structure;
+        let mut unit = None;
+        let mut signal = None;
+        for field in elements.into_iter().flatten() {
+            let is_unit = matches!(field.name.to_lowercase().as_str(), "unit" | "units" | "einheit");
+            let is_the_signal = is_signal(&field);
+            match field.value {
+                Value::Text(text) if is_unit => unit = Some(text),
+                Value::Numbers(variable) if is_the_signal => signal = Some(variable),
+                _ => {}
+            }
+        }
+        taken.extend(signal.map(|variable| (Variable { name, ..variable }, unit)));
+    }
+    taken
+}
+
+/// True for a field with one vector of samples that is no time.
+fn is_signal(field: &Item) -> bool {
+    matches!(&field.value, Value::Numbers(variable) if variable.values.len() == 1 && variable.samples() > 1)
+        && !TIMES.contains(&field.name.to_lowercase().as_str())
+}

@@ -1,0 +1,154 @@
+//! Summary of one channel: peak, root mean square, mean, clipping, dropouts, and an envelope for a small picture.
+
+use serde::Serialize;
+
+use super::Channel;
+use super::criteria::{AT_REST, CLIPPED_RUN, DROPOUT_RUN};
+
+/// Figures of one channel, in the SI unit of its quantity.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ChannelSummary {
+    /// Name of the channel.
+    pub channel: String,
+    /// SI unit of the figures.
+    pub unit: &'static str,
+    /// First sample.
+    pub first: f64,
+    /// Smallest sample.
+    pub minimum: f64,
+    /// Largest sample.
+    pub maximum: f64,
+    /// Largest absolute sample.
+    pub peak: f64,
+    /// Root mean square about zero.
+    pub rms: f64,
+    /// Mean (DC component).
+    pub mean: f64,
+    /// Number of samples in runs at the largest or smallest value: clipping.
+    pub clipped: usize,
+    /// True if all samples are equal.
+    pub constant: bool,
+    /// Dropouts: stretches of equal samples in a channel that otherwise changes, with start and end in s.
+    pub dropouts_s: Vec<[f64; 2]>,
+}
+
+impl ChannelSummary {
+    /// Figures of a channel sampled at `rate_hz`, whose first sample is at `start_s`.
+    pub fn of(channel: &Channel, rate_hz: f64, start_s: f64) -> Self {
+        let samples = channel.samples.as_slice();
+        let count = samples.len().max(1) as f64;
+        let (minimum, maximum) = samples
+            .iter()
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &sample| {
+                (low.min(sample), high.max(sample))
+            });
+        let constant = minimum == maximum;
+        let runs = runs(samples);
+        let is_extreme = |value: f64| value == minimum || value == maximum;
+        let clipped = if constant {
+            0
+        } else {
+            runs.iter()
+                .filter(|run| is_extreme(samples[run.0]) && run.1 >= CLIPPED_RUN)
+                .map(|run| run.1)
+                .sum()
+        };
+        let changes = runs.len();
+        let is_lively = samples.len() as f64 - changes as f64 <= AT_REST * count;
+        let time = |sample: usize| start_s + sample as f64 / rate_hz;
+        let dropouts_s = runs
+            .iter()
+            .filter(|run| is_lively && run.1 >= DROPOUT_RUN && !is_extreme(samples[run.0]))
+            .map(|run| [time(run.0), time(run.0 + run.1)])
+            .collect();
+        Self {
+            channel: channel.name.clone(),
+            unit: channel.quantity.unit(),
+            first: samples.first().copied().unwrap_or(0.0),
+            minimum,
+            maximum,
+            peak: minimum.abs().max(maximum.abs()),
+            rms: (samples.iter().map(|sample| sample * sample).sum::<f64>() / count).sqrt(),
+            mean: samples.iter().sum::<f64>() / count,
+            clipped,
+            constant,
+            dropouts_s,
+        }
+    }
+}
+
+/// Runs of equal samples: index of the first sample and length.
+fn runs(samples: &[f64]) -> Vec<(usize, usize)> {
+    let mut runs: Vec<(usize, usize)> = Vec::new();
+    for (index, sample) in samples.iter().enumerate() {
+        match runs.last_mut() {
+            Some((first, length)) if samples[*first] == *sample => *length += 1,
+            _ => runs.push((index, 1)),
+        }
+    }
+    runs
+}
+
+/// Largest absolute deviation from the mean in each of `width` equal parts of the samples, as a share of the largest of all; fewer parts if there
+/// are fewer samples.
+pub fn envelope(samples: &[f64], width: usize) -> Vec<f64> {
+    let mean = samples.iter().sum::<f64>() / samples.len().max(1) as f64;
+    let width = width.min(samples.len());
+    let parts: Vec<f64> = (0..width)
+        .map(|part| {
+            let from = part * samples.len() / width;
+            let to = (part + 1) * samples.len() / width;
+            samples[from..to]
+                .iter()
+                .fold(0.0_f64, |largest, sample| largest.max((sample - mean).abs()))
+        })
+        .collect();
+    let largest = parts.iter().fold(0.0_f64, |largest, part| largest.max(*part));
+    if largest > 0.0 {
+        parts.iter().map(|part| part / largest).collect()
+    } else {
+        parts
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Quantity;
+    use super::*;
+
+    fn summary(samples: Vec<f64>) -> ChannelSummary {
+        let channel = Channel {
+            name: "ax".into(),
+            quantity: Quantity::Acceleration,
+            samples,
+        };
+        ChannelSummary::of(&channel, 1000.0, 0.0)
+    }
+
+    #[test]
+    fn clipping_dropouts_and_constant_channels_are_found() {
+        let sine = |k: u32| (f64::from(k) * 0.1).sin();
+        let clean = summary((0..1000).map(sine).collect());
+        assert_eq!(
+            (clean.clipped, clean.constant, clean.dropouts_s.len()),
+            (0, false, 0)
+        );
+        // The root mean square of a sine is 1/√2; tolerance: the last period is not whole.
+        assert!((clean.rms - 0.5_f64.sqrt()).abs() < 0.01 && clean.mean.abs() < 0.02);
+        let clipped = summary((0..1000).map(|k| sine(k).clamp(-0.8, 0.8)).collect());
+        assert!(clipped.clipped > 300, "{}", clipped.clipped);
+        let dropped = summary(
+            (0..1000)
+                .map(|k| if (200..250).contains(&k) { 0.1 } else { sine(k) })
+                .collect(),
+        );
+        assert_eq!(dropped.dropouts_s, [[0.2, 0.25]]);
+        assert!(summary(vec![3.0; 10]).constant);
+    }
+
+    #[test]
+    fn the_envelope_is_relative_to_its_largest_part() {
+        assert_eq!(envelope(&[1.0, -1.0, 2.0, -2.0], 2), [0.5, 1.0]);
+        assert_eq!(envelope(&[1.0], 64), [0.0]);
+    }
+}

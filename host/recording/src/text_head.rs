@@ -1,0 +1,610 @@
+//! Head of a text table: separator, decimal mark, encoding, names and units of the columns, sample rate, and where the numbers begin.
+//!
+//! The head is found from the numbers: the first line of numbers that is followed by another one, or preceded by a row of as many names.
+
+use super::raw::FoundUnit;
+use super::unit::Unit;
+use super::words::name_and_unit;
+
+/// Separator between the fields of a line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Separator {
+    Comma,
+    Semicolon,
+    Tab,
+    /// Any number of blanks and tabs.
+    Blank,
+}
+
+/// Form of the numbers of a text table.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Dialect {
+    pub(super) separator: Separator,
+    /// True if the decimal mark is a comma.
+    pub(super) decimal_comma: bool,
+}
+
+impl Dialect {
+    /// Comma between fields, decimal point.
+    pub(super) const PLAIN: Self = Self {
+        separator: Separator::Comma,
+        decimal_comma: false,
+    };
+
+    /// Fields of a line, without blanks and quotes around them.
+    pub(super) fn fields(self, line: &str) -> Vec<&str> {
+        let separator = match self.separator {
+            Separator::Blank => return blank_fields(line),
+            Separator::Comma => ',',
+            Separator::Semicolon => ';',
+            Separator::Tab => '\t',
+        };
+        let mut fields = Vec::new();
+        let mut start = 0;
+        let mut is_quoted = false;
+        // A quote that is not closed is a letter like others, so that it does not swallow the rest of the line.
+        let is_closed = line.matches('"').count().is_multiple_of(2);
+        for (at, letter) in line.char_indices() {
+            if letter == '"' && is_closed {
+                is_quoted = !is_quoted;
+            } else if letter == separator && !is_quoted {
+                fields.push(bare(&line[start..at]));
+                start = at + 1;
+            }
+        }
+        fields.push(bare(&line[start..]));
+        fields
+    }
+
+    /// The number of a field; `None` if it is none.
+    pub(super) fn number(self, field: &str) -> Option<f64> {
+        if self.decimal_comma && field.contains(',') {
+            if field.contains('.') {
+                return None;
+            }
+            return fast_float2::parse(field.replace(',', ".")).ok();
+        }
+        fast_float2::parse(field).ok()
+    }
+
+    /// Number of fields of a line of numbers; `None` if a field is text, or no field is a number.
+    fn count_of_numbers(self, line: &str) -> Option<usize> {
+        let fields = self.fields(line);
+        let numbers = fields.iter().filter(|field| self.number(field).is_some()).count();
+        let empty = fields.iter().filter(|field| field.is_empty()).count();
+        (numbers > 0 && numbers + empty == fields.len()).then_some(fields.len())
+    }
+
+    /// Description for the user; `None` for comma and point.
+    pub(super) fn note(self) -> Option<String> {
+        let separator = match self.separator {
+            Separator::Comma => "comma",
+            Separator::Semicolon => "semicolon",
+            Separator::Tab => "tab",
+            Separator::Blank => "blank",
+        };
+        match (self == Self::PLAIN, self.decimal_comma) {
+            (true, _) => None,
+            (_, true) => Some(format!("separator {separator}, decimal comma")),
+            (_, false) => Some(format!("separator {separator}")),
+        }
+    }
+}
+
+/// A field without blanks and quotes around it.
+fn bare(field: &str) -> &str {
+    let field = field.trim();
+    field
+        .strip_prefix('"')
+        .and_then(|inner| inner.strip_suffix('"'))
+        .map_or(field, str::trim)
+}
+
+/// Fields between blanks; a quoted field may hold blanks.
+fn blank_fields(line: &str) -> Vec<&str> {
+    let mut fields = Vec::new();
+    let mut rest = line.trim();
+    while !rest.is_empty() {
+        let end = match rest.strip_prefix('"').and_then(|inner| inner.find('"')) {
+            Some(inner) => inner + 2,
+            None => rest.find(char::is_whitespace).unwrap_or(rest.len()),
+        };
+        fields.push(bare(&rest[..end]));
+        rest = rest[end..].trim_start();
+    }
+    fields
+}
+
+/// A column of the head.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct HeadColumn {
+    /// Name; empty if the head has none.
+    pub(super) name: String,
+    pub(super) unit: FoundUnit,
+}
+
+/// Head of a text table.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Head {
+    pub(super) dialect: Dialect,
+    /// Columns with their names; `None` if the file has no row of names.
+    pub(super) columns: Option<Vec<HeadColumn>>,
+    /// Number of columns of the first line of numbers; 0 if there is none.
+    pub(super) width: usize,
+    /// Offset of the first line of numbers in the file, bytes.
+    pub(super) offset: usize,
+    /// Number of lines before it.
+    pub(super) lines: u64,
+    /// Sample rate stated in a line before the numbers, samples per second.
+    pub(super) rate_hz: Option<f64>,
+    /// What the user should know: separator, encoding.
+    pub(super) notes: Vec<String>,
+}
+
+/// A line of the head, with its place.
+struct Line<'a> {
+    text: &'a str,
+    /// Offset in the file, bytes.
+    offset: usize,
+    /// Number of the line, from 1.
+    number: u64,
+}
+
+impl Line<'_> {
+    fn is_comment(&self) -> bool {
+        is_comment(self.text)
+    }
+}
+
+/// True for a line of comment: `#`, `%` or `//` at its start.
+pub(super) fn is_comment(line: &str) -> bool {
+    let line = line.trim_start();
+    line.starts_with(['#', '%']) || line.starts_with("//")
+}
+
+/// Text without the marks of a comment.
+fn without_marks(line: &str) -> &str {
+    line.trim_start().trim_start_matches(['#', '%', '/']).trim()
+}
+
+/// Finds the head in the first bytes of a file.
+///
+/// # Errors
+/// Number of the line and description of the fault: text among numbers, or a text in UTF-16.
+pub(super) fn head(bytes: &[u8]) -> Result<Head, (u64, String)> {
+    if bytes.starts_with(b"\xff\xfe") || bytes.starts_with(b"\xfe\xff") {
+        return Err((1, "the text is UTF-16; save it as UTF-8".into()));
+    }
+    let (text, is_latin) = decoded(bytes);
+    let lines = lines(&text, bytes);
+    let filled: Vec<&Line> = lines.iter().filter(|line| !line.text.trim().is_empty()).collect();
+    let data: Vec<&Line> = filled.iter().copied().filter(|line| !line.is_comment()).collect();
+    let found = (0..data.len()).find_map(|index| {
+        let dialect = dialect(data[index].text, &data[index..])?;
+        let width = dialect.count_of_numbers(data[index].text)?;
+        let same = |line: &Line| dialect.count_of_numbers(line.text) == Some(width);
+        let next = data.get(index + 1).is_none_or(|line| same(line));
+        let names = index
+            .checked_sub(1)
+            .is_some_and(|before| width > 1 && names(dialect, data[before].text, width).is_some());
+        (next || names).then_some((index, dialect, width))
+    });
+    let mut notes = Vec::new();
+    if is_latin {
+        notes.push("encoding Latin-1".into());
+    }
+    let Some((index, dialect, width)) = found else {
+        // Without numbers the first line counts as the head, and the reader names the fault in the lines after it.
+        let first = data.first();
+        let columns = first.map(|line| head_columns(&Dialect::PLAIN.fields(line.text), None));
+        let after = data.get(1).or(data.first());
+        return Ok(Head {
+            dialect: Dialect::PLAIN,
+            width: columns.as_ref().map_or(0, Vec::len),
+            columns,
+            offset: after
+                .filter(|_| data.len() > 1)
+                .map_or(bytes.len(), |line| line.offset),
+            lines: after
+                .filter(|_| data.len() > 1)
+                .map_or(lines.len() as u64, |line| line.number - 1),
+            rate_hz: None,
+            notes,
+        });
+    };
+    notes.extend(dialect.note());
+    let first = data[index];
+    let mut used = Vec::new();
+    let columns = columns_before(dialect, width, &data[..index], &filled, first, &mut used)?;
+    let rate_hz = filled
+        .iter()
+        .take_while(|line| line.number < first.number)
+        .filter(|line| !used.contains(&line.number))
+        .find_map(|line| rate(without_marks(line.text), dialect.decimal_comma));
+    Ok(Head {
+        dialect,
+        columns,
+        width,
+        offset: first.offset,
+        lines: first.number - 1,
+        rate_hz,
+        notes,
+    })
+}
+
+/// Names and units in the lines before the numbers; the numbers of these lines go to `used`.
+fn columns_before(
+    dialect: Dialect,
+    width: usize,
+    before: &[&Line],
+    filled: &[&Line],
+    first: &Line,
+    used: &mut Vec<u64>,
+) -> Result<Option<Vec<HeadColumn>>, (u64, String)> {
+    let is_row = |line: &Line| {
+        let fields = dialect.fields(line.text);
+        width == 1 || fields.len() > 1 || names(dialect, line.text, width).is_some()
+    };
+    if let Some((last, earlier)) = before.split_last()
+        && is_row(last)
+    {
+        let fields = names(dialect, last.text, width).unwrap_or_else(|| dialect.fields(last.text));
+        let numbers = fields
+            .iter()
+            .filter(|field| dialect.number(field).is_some())
+            .count();
+        if numbers > 0 {
+            let text = fields
+                .iter()
+                .find(|field| dialect.number(field).is_none() && !field.is_empty())
+                .copied()
+                .unwrap_or_default();
+            return Err((
+                last.number,
+                format!(
+                    "\"{text}\" stands among numbers; a number is needed there, or the header has a number and a row of names is needed"
+                ),
+            ));
+        }
+        used.push(last.number);
+        if is_units(&fields)
+            && let Some(above) = earlier.last()
+            && let Some(titles) = names(dialect, above.text, width)
+        {
+            used.push(above.number);
+            return Ok(Some(head_columns(&titles, Some(&fields))));
+        }
+        return Ok(Some(head_columns(&fields, None)));
+    }
+    // A row of names may stand in the last comment, as numpy writes it.
+    let comment = filled
+        .iter()
+        .rev()
+        .find(|line| line.number < first.number)
+        .filter(|line| line.is_comment());
+    if let Some(comment) = comment
+        && let Some(titles) = names(dialect, without_marks(comment.text), width)
+        && titles.iter().all(|title| dialect.number(title).is_none())
+        && rate(without_marks(comment.text), dialect.decimal_comma).is_none()
+    {
+        used.push(comment.number);
+        return Ok(Some(head_columns(&titles, None)));
+    }
+    Ok(None)
+}
+
+/// Decodes UTF-8, or Latin-1 if the bytes are no UTF-8; a letter that the end of the bytes cuts is left out.
+fn decoded(bytes: &[u8]) -> (String, bool) {
+    match std::str::from_utf8(bytes) {
+        Ok(text) => (text.into(), false),
+        Err(error) if error.error_len().is_none() => {
+            let whole = &bytes[..error.valid_up_to()];
+            (String::from_utf8_lossy(whole).into_owned(), false)
+        }
+        Err(_) => (latin(bytes), true),
+    }
+}
+
+/// Text of Latin-1 bytes.
+pub(super) fn latin(bytes: &[u8]) -> String {
+    bytes.iter().map(|&byte| char::from(byte)).collect()
+}
+
+/// Lines of the decoded text with their offsets in the bytes of the file.
+fn lines<'t>(text: &'t str, bytes: &[u8]) -> Vec<Line<'t>> {
+    let mut offset = if bytes.starts_with(b"\xef\xbb\xbf") { 3 } else { 0 };
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    let mut lines = Vec::new();
+    for (index, line) in text.split_inclusive('\n').enumerate() {
+        let length = bytes
+            .get(offset..)
+            .and_then(|rest| rest.iter().position(|&byte| byte == b'\n'))
+            .map_or(bytes.len() - offset.min(bytes.len()), |at| at + 1);
+        lines.push(Line {
+            text: line.trim_end_matches(['\n', '\r']),
+            offset,
+            number: index as u64 + 1,
+        });
+        offset += length;
+    }
+    lines
+}
+
+/// Number of lines from which the decimal mark is taken; a choice: the first samples may be whole numbers.
+const LINES_FOR_DECIMAL: usize = 200;
+
+/// Separator and decimal mark of a line of numbers, and of the lines after it; `None` if the line has no number.
+fn dialect(line: &str, lines: &[&Line]) -> Option<Dialect> {
+    let with = |separator| Dialect {
+        separator,
+        decimal_comma: lines
+            .iter()
+            .take(LINES_FOR_DECIMAL)
+            .any(|line| line.text.contains(',')),
+    };
+    let found = if line.contains(';') {
+        with(Separator::Semicolon)
+    } else if line.trim().contains('\t') {
+        with(Separator::Tab)
+    } else if line.contains(',') {
+        let blank = with(Separator::Blank);
+        let fields = blank.fields(line);
+        // `0,001 1,25` has commas inside its fields, `0.001, 1.25` at their ends.
+        let has_inner =
+            |field: &&str| field.contains(',') && blank.number(field).is_some() && !field.ends_with(',');
+        if fields.len() > 1 && fields.iter().any(has_inner) && blank.count_of_numbers(line).is_some() {
+            blank
+        } else {
+            Dialect::PLAIN
+        }
+    } else if blank_fields(line).len() > 1 {
+        with(Separator::Blank)
+    } else {
+        Dialect::PLAIN
+    };
+    found.count_of_numbers(line).map(|_| found)
+}
+
+/// The `width` titles of a line; `None` if it has another number of fields.
+fn names(dialect: Dialect, line: &str, width: usize) -> Option<Vec<&str>> {
+    let fields = dialect.fields(line);
+    if fields.len() == width {
+        return Some(fields);
+    }
+    if dialect.separator != Separator::Blank {
+        return None;
+    }
+    // `Time (s)  Acc X (g)`: columns apart by two blanks or tabs.
+    let wide: Vec<&str> = line
+        .split(|letter: char| letter == '\t')
+        .flat_map(|part| part.split("  "))
+        .map(bare)
+        .filter(|part| !part.is_empty())
+        .collect();
+    if wide.len() == width {
+        return Some(wide);
+    }
+    // `Time (s) Force (N)`: a bracket belongs to the word before it.
+    let mut joined: Vec<&str> = Vec::new();
+    for field in &fields {
+        match joined.last_mut() {
+            Some(before) if field.starts_with(['(', '[']) => {
+                let start = before.as_ptr() as usize - line.as_ptr() as usize;
+                let end = field.as_ptr() as usize - line.as_ptr() as usize + field.len();
+                *before = line.get(start..end)?;
+            }
+            _ => joined.push(field),
+        }
+    }
+    (joined.len() == width).then_some(joined)
+}
+
+/// True for a row of units: every field is empty, in brackets, or a known unit.
+fn is_units(fields: &[&str]) -> bool {
+    let is_bracketed = |field: &str| {
+        (field.starts_with('(') && field.ends_with(')')) || (field.starts_with('[') && field.ends_with(']'))
+    };
+    let is_unit = |field: &&str| field.is_empty() || is_bracketed(field) || field.parse::<Unit>().is_ok();
+    fields.iter().all(is_unit) && fields.iter().any(|field| !field.is_empty())
+}
+
+/// Columns from titles, with units from a row of units if there is one.
+fn head_columns(titles: &[&str], units: Option<&[&str]>) -> Vec<HeadColumn> {
+    titles
+        .iter()
+        .enumerate()
+        .map(|(index, title)| {
+            if let Some(unit) = units.and_then(|units| units.get(index)) {
+                let unit = unit
+                    .trim_start_matches(['(', '['])
+                    .trim_end_matches([')', ']'])
+                    .trim();
+                let balanced = unit.matches('(').count() == unit.matches(')').count();
+                let unit = if balanced {
+                    unit.to_owned()
+                } else {
+                    format!("{unit})")
+                };
+                return HeadColumn {
+                    name: (*title).into(),
+                    unit: if unit.is_empty() {
+                        FoundUnit::None
+                    } else {
+                        FoundUnit::Text(unit)
+                    },
+                };
+            }
+            let (name, unit) = name_and_unit(title);
+            HeadColumn {
+                name: name.into(),
+                unit: unit.map_or(FoundUnit::None, |unit| FoundUnit::Text(unit.into())),
+            }
+        })
+        .collect()
+}
+
+/// Words for a sample rate, in lower case.
+const RATE_WORDS: &[&str] = &[
+    "sample rate",
+    "sampling rate",
+    "samplerate",
+    "sample_rate",
+    "sampling_rate",
+    "sampling frequency",
+    "sample frequency",
+    "sampling freq",
+    "sampling_frequency",
+    "abtastrate",
+    "abtastfrequenz",
+    "samples per second",
+    "fs",
+];
+
+/// Words for a sample interval, in lower case.
+const INTERVAL_WORDS: &[&str] = &[
+    "sample interval",
+    "sampling interval",
+    "sample period",
+    "sample_interval",
+    "abtastintervall",
+    "delta t",
+    "delta_t",
+    "delta_x",
+    "time step",
+    "dt",
+];
+
+/// Sample rate, samples per second, that a line such as `Fs = 25600 Hz` or `dt: 0.1 ms` states.
+pub(super) fn rate(line: &str, decimal_comma: bool) -> Option<f64> {
+    let lower = line.to_lowercase();
+    let after = |words: &[&str]| {
+        words.iter().find_map(|word| {
+            let at = lower.find(word)?;
+            let before = lower[..at].chars().next_back();
+            let rest = &lower[at + word.len()..];
+            let is_word = !before.is_some_and(char::is_alphanumeric)
+                && !rest.chars().next().is_some_and(char::is_alphanumeric);
+            is_word.then(|| rest.to_owned())
+        })
+    };
+    let number = |rest: &str| {
+        let at = rest.find(|letter: char| letter.is_ascii_digit())?;
+        // Between word and number stand signs and a unit only, no other sentence.
+        if rest[..at].chars().filter(|letter| letter.is_alphabetic()).count() > 4 {
+            return None;
+        }
+        let mut digits = rest[at..].to_owned();
+        if decimal_comma {
+            digits = digits.replacen(',', ".", 1);
+        }
+        let (value, length) = fast_float2::parse_partial::<f64, _>(&digits).ok()?;
+        let units = format!("{} {}", &rest[..at], &digits[length..]);
+        (value.is_finite() && value > 0.0).then_some((value, units))
+    };
+    let has = |units: &str, word: &str| {
+        units
+            .split(|letter: char| !(letter.is_alphanumeric() || "µμ".contains(letter)))
+            .any(|part| part == word)
+    };
+    if let Some((value, units)) = after(RATE_WORDS).and_then(|rest| number(&rest)) {
+        let factor = if has(&units, "khz") || has(&units, "ks") {
+            1e3
+        } else if has(&units, "mhz") || has(&units, "ms") {
+            1e6
+        } else {
+            1.0
+        };
+        return Some(factor * value);
+    }
+    let (value, units) = after(INTERVAL_WORDS).and_then(|rest| number(&rest))?;
+    let factor = if has(&units, "ms") {
+        1e-3
+    } else if has(&units, "us") || has(&units, "µs") || has(&units, "μs") {
+        1e-6
+    } else {
+        1.0
+    };
+    Some(1.0 / (factor * value))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn found(text: &str) -> Head {
+        head(text.as_bytes()).unwrap()
+    }
+
+    fn titles(head: &Head) -> Vec<String> {
+        let columns = head.columns.iter().flatten();
+        columns
+            .map(|column| match &column.unit {
+                FoundUnit::Text(unit) => format!("{} [{unit}]", column.name),
+                _ => column.name.clone(),
+            })
+            .collect()
+    }
+
+    #[test]
+    fn heads_are_found_behind_prose_units_and_comments() {
+        for (text, expected, lines) in [
+            ("Time (s),Force (N)\n0,1\n1,2\n", vec!["Time [s]", "Force [N]"], 1),
+            (
+                "Time,Force,Accel X\n(s),(N),(m/s^2)\n0,1,2\n1,2,3\n",
+                vec!["Time [s]", "Force [N]", "Accel X [m/s^2]"],
+                2,
+            ),
+            (
+                "Messung vom 3.4.2024\nBearbeiter;Huber\n\nZeit [s];Kraft [N]\n0,0;1,5\n0,1;2,5\n",
+                vec!["Zeit [s]", "Kraft [N]"],
+                4,
+            ),
+            ("# t fx ax\n0 1 2\n1 2 3\n", vec!["t", "fx", "ax"], 1),
+            ("% made\nt\tfx\n0\t1\n1\t2\n", vec!["t", "fx"], 2),
+            ("Time (s) Force (N)\n0 1\n1 2\n", vec!["Time [s]", "Force [N]"], 1),
+            ("0 1\n1 2\n", vec![], 0),
+            ("t,fx\n0,1\n", vec!["t", "fx"], 1),
+        ] {
+            let head = found(text);
+            assert_eq!(
+                (titles(&head), head.lines),
+                (expected.iter().map(ToString::to_string).collect(), lines),
+                "{text}"
+            );
+        }
+        let german = found("Zeit [s];Kraft [N]\n0,0;1,5\n0,1;2,5\n");
+        assert_eq!(
+            german.dialect,
+            Dialect {
+                separator: Separator::Semicolon,
+                decimal_comma: true
+            }
+        );
+        let latin = head(b"Zeit [s];a [m/s\xb2]\n0;1\n1;2\n").unwrap();
+        assert_eq!(titles(&latin), ["Zeit [s]", "a [m/s²]"]);
+        assert_eq!(latin.offset, 18);
+    }
+
+    #[test]
+    fn sample_rates_are_read_from_lines_of_prose() {
+        for (line, rate_hz) in [
+            ("Fs = 25600", Some(25_600.0)),
+            ("Sample Rate: 51.2 kHz", Some(51_200.0)),
+            ("Sample rate (Hz),2048", Some(2048.0)),
+            ("dt = 0.5 ms", Some(2000.0)),
+            ("Delta_X;0.001", Some(1000.0)),
+            ("offset 3", None),
+            ("Fs is the rate of the second channel 3", None),
+        ] {
+            let found = rate(line, false);
+            assert_eq!(found.map(|found| found.round()), rate_hz, "{line}");
+        }
+        assert_eq!(rate("Abtastrate: 25,6 kHz", true), Some(25_600.0));
+    }
+
+    #[test]
+    fn text_among_the_first_numbers_is_no_name() {
+        let (line, what) = head(b"t,fx\n0,abc\n1,2\n2,3\n").unwrap_err();
+        assert!(line == 2 && what.contains("abc"), "{what}");
+    }
+}

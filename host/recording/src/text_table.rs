@@ -1,0 +1,56 @@
+//! Text tables as other programs write them: columns of numbers with name and unit, in any separator and decimal mark.
+
+use std::path::Path;
+
+use super::raw::FoundUnit;
+use super::{RecordingError, csv};
+
+/// Columns of a text table.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct TextTable {
+    /// Columns in the order of the file.
+    pub columns: Vec<TextColumn>,
+    /// Facts about the reading: separator, decimal mark, encoding, columns that were left out.
+    pub notes: Vec<String>,
+}
+
+/// One column of a text table.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TextColumn {
+    /// Name; the number of the column if the file has no names.
+    pub name: String,
+    /// Unit, as the file states it.
+    pub unit: Option<String>,
+    /// Values, without conversion.
+    pub values: Vec<f64>,
+}
+
+impl TextTable {
+    /// Reads a text table.
+    ///
+    /// # Errors
+    /// The file cannot be read; a line has text among its numbers, or another number of values than the head; a value is NaN or infinite.
+    pub fn read(path: &Path) -> Result<Self, RecordingError> {
+        let raw = csv::read(path, true)?;
+        let columns = raw.columns.into_iter().map(|column| TextColumn {
+            name: column.name,
+            unit: match column.unit {
+                FoundUnit::Text(unit) => Some(unit),
+                _ => None,
+            },
+            values: column.samples,
+        });
+        Ok(Self {
+            columns: columns.collect(),
+            notes: raw.notes,
+        })
+    }
+
+    /// Names of the columns of a text file, from its head alone; empty if it has none.
+    ///
+    /// # Errors
+    /// The file cannot be read.
+    pub fn titles(path: &Path) -> Result<Vec<String>, RecordingError> {
+        csv::titles(path)
+    }
+}

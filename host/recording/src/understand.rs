@@ -1,0 +1,526 @@
+//! Understanding of columns: which column is which channel, from the option `--map`, the sidecar, or the words and unit of its head.
+//!
+//! A column with the name of a channel (`t`, `fx`, `x`, `vx`, `ax`, `tacho`) is that channel. A column whose words or unit say that it is a
+//! force or a motion must also state its direction and its unit; otherwise it is a doubt, and the file is refused with the option that
+//! answers it. All other columns are auxiliary channels.
+
+use std::path::Path;
+
+use super::import::{ColumnMap, Import, Scale};
+use super::raw::{FoundUnit, RawColumn};
+use super::sidecar::RecordedChannel;
+use super::understood::{Basis, Doubt};
+use super::words::NameMeaning;
+use super::{Quantity, RecordingError, Sensitivity, Sidecar, Unit};
+
+/// Meaning of one column: the channel that it becomes.
+#[derive(Clone, Debug)]
+pub(super) struct Meaning {
+    /// Name of the channel.
+    pub(super) name: String,
+    pub(super) quantity: Quantity,
+    /// Factor from the samples in the file to SI.
+    pub(super) factor: f64,
+    /// True if the channel points against its axis.
+    pub(super) is_negative: bool,
+    pub(super) from: Basis,
+    /// Unit as it is stated, for the report.
+    pub(super) unit: Option<String>,
+    /// Sensitivity as it is stated, for the report.
+    pub(super) sensitivity: Option<String>,
+}
+
+/// What is stated about a column, whoever states it.
+#[derive(Default)]
+struct Stated {
+    name: Option<String>,
+    is_negative: bool,
+    unit: Option<Unit>,
+    unit_text: Option<String>,
+    sensitivity: Option<Sensitivity>,
+    from: Option<Basis>,
+}
+
+/// Meaning of every column, in the order of `columns`.
+///
+/// # Errors
+/// A unit is unknown or contradicts the name of its channel; the sidecar or the map names a column that does not exist; a meaning is in doubt.
+pub(super) fn understand(
+    path: &Path,
+    columns: &[RawColumn],
+    sidecar: &Sidecar,
+    import: &Import,
+    known: &[String],
+) -> Result<Vec<Meaning>, RecordingError> {
+    let names: Vec<String> = columns.iter().map(|column| column.name.clone()).collect();
+    if let Some(stranger) = sidecar.channels.keys().find(|name| !known.contains(name)) {
+        return Err(RecordingError::Content {
+            path: Sidecar::path_of(path),
+            what: format!(
+                "channels.{stranger}: the recording has no such channel, but {}",
+                known.join(", ")
+            ),
+        });
+    }
+    let is_about = |map: &ColumnMap, index: usize| map.is_about(&names[index], index + 1, &names);
+    if let Some(stranger) = import
+        .map
+        .iter()
+        .find(|map| !(0..known.len()).any(|index| map.is_about(&known[index], index + 1, known)))
+    {
+        return Err(RecordingError::Content {
+            path: path.into(),
+            what: format!(
+                "--map {}: the file has no such column, but {}",
+                stranger.column,
+                known.join(", ")
+            ),
+        });
+    }
+    let mut doubts = Doubts::default();
+    let mut meanings = Vec::with_capacity(columns.len());
+    for (index, column) in columns.iter().enumerate() {
+        let map = import.map.iter().find(|map| is_about(map, index));
+        let said = sidecar.channels.get(&column.name);
+        let stated = stated(path, column, said, map)?;
+        meanings.push(meaning(path, column, stated, &mut doubts)?);
+    }
+    prefer_exact_time(&mut meanings);
+    doubts.twice(columns, &meanings);
+    let found = doubts.suggested(&meanings);
+    if found.is_empty() {
+        Ok(meanings)
+    } else {
+        Err(RecordingError::Doubt {
+            path: path.into(),
+            sidecar: Sidecar::path_of(path),
+            doubts: found,
+        })
+    }
+}
+
+/// Combines what file, sidecar and map state about a column; the map takes precedence over the sidecar, the sidecar over the file.
+fn stated(
+    path: &Path,
+    column: &RawColumn,
+    said: Option<&RecordedChannel>,
+    map: Option<&ColumnMap>,
+) -> Result<Stated, RecordingError> {
+    let in_sidecar = |what: String| RecordingError::Content {
+        path: Sidecar::path_of(path),
+        what: format!("channels.{}.{what}", column.name),
+    };
+    let mut stated = Stated::default();
+    match &column.unit {
+        FoundUnit::None => {}
+        FoundUnit::Text(text) => {
+            stated.unit = text.parse().ok();
+            stated.unit_text = Some(text.clone());
+        }
+        FoundUnit::Known(unit) => {
+            stated.unit = Some(*unit);
+            stated.unit_text = Some(unit_text(*unit));
+        }
+    }
+    if let Some(said) = said {
+        if let Some(text) = &said.unit {
+            let unit: Unit = text
+                .parse()
+                .map_err(|error| in_sidecar(format!("unit: {error}")))?;
+            stated.unit = Some(unit);
+            stated.unit_text = Some(text.clone());
+        }
+        if let Some(text) = &said.sensitivity {
+            let sensitivity: Sensitivity = text
+                .parse()
+                .map_err(|error| in_sidecar(format!("sensitivity: {error}")))?;
+            let quantity = stated.unit.map_or(Quantity::Unknown, |unit| unit.quantity);
+            if quantity != Quantity::Voltage {
+                return Err(in_sidecar(format!(
+                    "sensitivity: only a voltage has one, and the channel is {quantity} ({})",
+                    quantity.unit()
+                )));
+            }
+            stated.sensitivity = Some(sensitivity);
+        }
+        if let Some(name) = &said.name {
+            stated.is_negative = name.starts_with('-');
+            stated.name = Some(name.trim_start_matches('-').into());
+            stated.from = Some(Basis::Sidecar);
+        }
+    }
+    if let Some(map) = map {
+        stated.name = Some(map.name.clone());
+        stated.is_negative = map.is_negative;
+        stated.from = Some(Basis::Option);
+        match map.scale.clone() {
+            Some(Scale::Ratio(unit)) => {
+                return Err(RecordingError::Content {
+                    path: path.into(),
+                    what: format!(
+                        "--map {}={}:{unit}: a unit of frequency response functions, and this is a recording over time",
+                        map.column, map.name
+                    ),
+                });
+            }
+            Some(Scale::Unit(unit)) => {
+                stated.sensitivity = None;
+                stated.unit = Some(unit);
+                stated.unit_text = Some(unit_text(unit));
+            }
+            Some(Scale::Sensitivity(sensitivity)) => {
+                // A column without unit is taken in volts, as the sensitivity says.
+                let volts = stated.unit.unwrap_or(Unit {
+                    quantity: Quantity::Voltage,
+                    factor: 1.0,
+                });
+                if volts.quantity != Quantity::Voltage {
+                    return Err(RecordingError::Content {
+                        path: path.into(),
+                        what: format!(
+                            "--map {}={}: only a voltage has a sensitivity, and the column is {} ({})",
+                            map.column,
+                            map.name,
+                            volts.quantity,
+                            volts.quantity.unit()
+                        ),
+                    });
+                }
+                stated.unit = Some(volts);
+                stated.unit_text.get_or_insert_with(|| "V".into());
+                stated.sensitivity = Some(sensitivity);
+            }
+            None => {}
+        }
+    }
+    Ok(stated)
+}
+
+/// Text of a unit for the report: the SI unit, with the factor if it is not 1.
+fn unit_text(unit: Unit) -> String {
+    if unit.factor == 1.0 {
+        unit.quantity.unit().into()
+    } else {
+        format!("{} {}", unit.factor, unit.quantity.unit())
+    }
+}
+
+/// Meaning of one column; what is not stated goes to `doubts`.
+fn meaning(
+    path: &Path,
+    column: &RawColumn,
+    stated: Stated,
+    doubts: &mut Doubts,
+) -> Result<Meaning, RecordingError> {
+    let (mut quantity, mut factor) = stated
+        .unit
+        .map_or((Quantity::Unknown, 1.0), |unit| (unit.quantity, unit.factor));
+    if let Some(sensitivity) = stated.sensitivity {
+        quantity = sensitivity.quantity;
+        factor /= sensitivity.volts_per_unit;
+    }
+    if stated.is_negative {
+        factor = -factor;
+    }
+    let of = |name: String, from: Basis| Meaning {
+        name,
+        quantity,
+        factor,
+        is_negative: stated.is_negative,
+        from,
+        unit: stated.unit_text.clone(),
+        sensitivity: stated.sensitivity.map(|sensitivity| {
+            format!(
+                "{} V/({})",
+                sensitivity.volts_per_unit,
+                sensitivity.quantity.unit()
+            )
+        }),
+    };
+    let lower = column.name.to_lowercase();
+    let found = match stated.name {
+        Some(name) => of(name, stated.from.unwrap_or(Basis::Sidecar)),
+        None if is_channel_name(&lower) => match motion_of_axis(&lower, quantity) {
+            Some(name) => of(name, Basis::Words),
+            None => of(lower, Basis::Head),
+        },
+        None if lower == "time" => of("t".into(), Basis::Head),
+        None => return by_words(path, column, of(lower, Basis::Auxiliary), doubts),
+    };
+    checked(path, column, found)
+}
+
+/// True for the names of channels: `t`, `fx`, `x`, `vx`, `ax` …, `tacho`, and these with a suffix (`ax_2`).
+fn is_channel_name(name: &str) -> bool {
+    let stem = name.split_once('_').map_or(name, |(stem, suffix)| {
+        // `a_x` and `x_value` are words; `ax_2` and `ax_7_2` are further sensors of this direction.
+        if suffix
+            .chars()
+            .all(|letter| letter.is_ascii_digit() || letter == '_')
+        {
+            stem
+        } else {
+            name
+        }
+    });
+    Quantity::of_name(stem).is_some() || stem == "tacho"
+}
+
+/// Channel of a column that is called by its axis alone, such as `X [g]`: the unit states the quantity.
+fn motion_of_axis(name: &str, quantity: Quantity) -> Option<String> {
+    let is_axis = matches!(name, "x" | "y" | "z");
+    let prefix = match quantity {
+        Quantity::Force => "f",
+        Quantity::Velocity => "v",
+        Quantity::Acceleration => "a",
+        _ => return None,
+    };
+    is_axis.then(|| format!("{prefix}{name}"))
+}
+
+/// Checks that unit and name of a channel agree.
+fn checked(path: &Path, column: &RawColumn, found: Meaning) -> Result<Meaning, RecordingError> {
+    let stem = found.name.split('_').next().unwrap_or_default();
+    let expected = Quantity::of_name(&found.name).or_else(|| Quantity::of_name(stem));
+    if let (FoundUnit::Text(text), Quantity::Unknown) = (&column.unit, found.quantity)
+        && (expected.is_some() || found.name == "tacho")
+    {
+        return Err(unknown_unit(path, column, text));
+    }
+    // A voltage without sensitivity may represent any quantity, so it contradicts no channel name.
+    if let Some(expected) = Quantity::of_name(&found.name)
+        && ![expected, Quantity::Voltage, Quantity::Unknown].contains(&found.quantity)
+    {
+        return Err(RecordingError::Quantity {
+            path: path.into(),
+            column: found.name,
+            found: found.quantity,
+            expected,
+        });
+    }
+    Ok(found)
+}
+
+fn unknown_unit(path: &Path, column: &RawColumn, text: &str) -> RecordingError {
+    RecordingError::Unit {
+        path: path.into(),
+        column: format!("{} [{text}]", column.name),
+        cause: super::UnknownUnit { found: text.into() },
+    }
+}
+
+/// Meaning of a column from its words and its unit; `plain` is its meaning as an auxiliary channel.
+fn by_words(
+    path: &Path,
+    column: &RawColumn,
+    plain: Meaning,
+    doubts: &mut Doubts,
+) -> Result<Meaning, RecordingError> {
+    let words = NameMeaning::of(&column.name);
+    if words.is_tacho {
+        return Ok(Meaning {
+            name: "tacho".into(),
+            from: Basis::Words,
+            ..plain
+        });
+    }
+    // A unit of force or acceleration is enough to call for a direction; a length or speed without a word may be a position or a feed.
+    let by_unit = match plain.quantity {
+        Quantity::Time | Quantity::Force | Quantity::Acceleration => Some(plain.quantity),
+        Quantity::Displacement | Quantity::Velocity if words.axis.is_some() => Some(plain.quantity),
+        _ => None,
+    };
+    let Some(quantity) = words.quantity.or(by_unit) else {
+        return Ok(plain);
+    };
+    let mut found = Meaning {
+        from: Basis::Words,
+        ..plain
+    };
+    if found.quantity == Quantity::Unknown {
+        if let FoundUnit::Text(text) = &column.unit {
+            return Err(unknown_unit(path, column, text));
+        }
+        if let Some(unit) = words.unit {
+            found.quantity = unit.quantity;
+            found.factor *= unit.factor;
+            found.unit = Some(unit_text(unit));
+        }
+    }
+    if quantity == Quantity::Time {
+        let is_time = matches!(found.quantity, Quantity::Time | Quantity::Unknown);
+        return Ok(if is_time {
+            Meaning {
+                name: "t".into(),
+                ..found
+            }
+        } else {
+            Meaning {
+                from: Basis::Auxiliary,
+                ..found
+            }
+        });
+    }
+    let has_unit = found.quantity == quantity;
+    if !has_unit && ![Quantity::Voltage, Quantity::Level, Quantity::Unknown].contains(&found.quantity) {
+        return Err(RecordingError::Quantity {
+            path: path.into(),
+            column: column.name.clone(),
+            found: found.quantity,
+            expected: quantity,
+        });
+    }
+    if has_unit
+        && !words.is_negative
+        && let Some(axis) = words.axis
+    {
+        found.name = format!("{}{axis}", prefix(quantity));
+        return Ok(found);
+    }
+    doubts.open.push(Open {
+        column: column.name.clone(),
+        quantity,
+        axis: words.axis,
+        is_negative: words.is_negative,
+        stated: found.quantity,
+        is_twice: false,
+    });
+    Ok(found)
+}
+
+/// Start of the channel names of a quantity: `f`, none, `v` or `a`.
+fn prefix(quantity: Quantity) -> &'static str {
+    match quantity {
+        Quantity::Force => "f",
+        Quantity::Velocity => "v",
+        Quantity::Acceleration => "a",
+        _ => "",
+    }
+}
+
+/// Of several time columns, the one whose head has the exact name is time; the others are auxiliary.
+fn prefer_exact_time(meanings: &mut [Meaning]) {
+    let is_exact = |meaning: &Meaning| meaning.name == "t" && meaning.from != Basis::Words;
+    let has_exact = meanings.iter().any(is_exact);
+    let mut has_time = has_exact;
+    for meaning in meanings.iter_mut() {
+        if meaning.name == "t" && meaning.from == Basis::Words {
+            if has_time {
+                meaning.name = "time".into();
+                meaning.from = Basis::Auxiliary;
+            }
+            has_time = true;
+        }
+    }
+}
+
+/// A column whose direction, unit or sensitivity is not stated.
+struct Open {
+    column: String,
+    quantity: Quantity,
+    axis: Option<char>,
+    is_negative: bool,
+    /// Quantity of the stated unit.
+    stated: Quantity,
+    /// True if another column has been understood as the same channel.
+    is_twice: bool,
+}
+
+/// Columns that are in doubt.
+#[derive(Default)]
+struct Doubts {
+    open: Vec<Open>,
+}
+
+impl Doubts {
+    /// Adds columns that were understood as a channel that another column already is.
+    fn twice(&mut self, columns: &[RawColumn], meanings: &[Meaning]) {
+        for (index, meaning) in meanings.iter().enumerate() {
+            let is_open = self.open.iter().any(|open| open.column == columns[index].name);
+            let is_twice = meanings[..index].iter().any(|other| other.name == meaning.name);
+            if meaning.from == Basis::Words && is_twice && !is_open && meaning.name != "t" {
+                self.open.push(Open {
+                    column: columns[index].name.clone(),
+                    quantity: meaning.quantity,
+                    axis: meaning.name.chars().last().filter(|last| "xyz".contains(*last)),
+                    is_negative: false,
+                    stated: meaning.quantity,
+                    is_twice: true,
+                });
+            }
+        }
+    }
+
+    /// The doubts with the names and units that are possible: each direction is proposed once.
+    fn suggested(&self, meanings: &[Meaning]) -> Vec<Doubt> {
+        let mut taken: Vec<String> = meanings.iter().map(|meaning| meaning.name.clone()).collect();
+        let mut doubts = Vec::new();
+        for open in &self.open {
+            let prefix = prefix(open.quantity);
+            let axes = open.axis.map_or_else(|| vec!['x', 'y', 'z'], |axis| vec![axis]);
+            let free = axes
+                .iter()
+                .map(|axis| format!("{prefix}{axis}"))
+                .find(|name| !taken.contains(name));
+            let name = free.unwrap_or_else(|| {
+                let first = format!("{prefix}{}", axes[0]);
+                (2..)
+                    .map(|number| format!("{first}_{number}"))
+                    .find(|name| !taken.contains(name))
+                    .unwrap_or(first)
+            });
+            taken.push(name.clone());
+            let has_unit = open.stated == open.quantity;
+            let sensitivity = (open.stated == Quantity::Voltage).then_some(match open.quantity {
+                Quantity::Force => "2.2 mV/N",
+                Quantity::Acceleration => "10 mV/g",
+                Quantity::Velocity => "1 V/(m/s)",
+                _ => "1 V/mm",
+            });
+            doubts.push(Doubt {
+                what: open.what(),
+                column: open.column.clone(),
+                name: if open.is_negative {
+                    format!("-{name}")
+                } else {
+                    name
+                },
+                unit: (!has_unit && sensitivity.is_none()).then(|| open.quantity.unit()),
+                sensitivity,
+            });
+        }
+        doubts
+    }
+}
+
+impl Open {
+    /// Sentence part: which column is what, and what is not stated.
+    fn what(&self) -> String {
+        let mut lacks = Vec::new();
+        if self.is_twice {
+            lacks.push("which of several sensors of this direction it is");
+        }
+        if self.axis.is_none() {
+            lacks.push("its direction");
+        }
+        if self.is_negative {
+            lacks.push("whether its sign is already turned");
+        }
+        match self.stated {
+            Quantity::Voltage if self.quantity != Quantity::Voltage => lacks.push("its sensitivity"),
+            stated if stated != self.quantity => lacks.push("its unit"),
+            _ => {}
+        }
+        let article = if self.quantity == Quantity::Acceleration {
+            "an"
+        } else {
+            "a"
+        };
+        format!(
+            "column \"{}\" is {article} {}, but the file does not state {}",
+            self.column,
+            self.quantity,
+            lacks.join(" and ")
+        )
+    }
+}

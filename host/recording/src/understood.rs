@@ -1,0 +1,203 @@
+//! Report of an import: which column became which channel, and what is in doubt.
+
+use std::fmt;
+use std::path::PathBuf;
+
+use serde::Serialize;
+
+use super::{RecordedChannel, Sidecar};
+
+/// Report of one record: which column became which channel, with unit and sample rate.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Understood {
+    /// The file.
+    pub file: PathBuf,
+    /// Group, structure element or block of the file that holds the record.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub record: Option<String>,
+    /// Sample rate, samples per second.
+    pub sample_rate_hz: f64,
+    /// Source of the sample rate: `time column`, `file`, `sidecar` or `option`.
+    pub rate_from: &'static str,
+    /// Columns in the order of the file, the time column included.
+    pub columns: Vec<UnderstoodColumn>,
+    /// Other facts about the reading: separator, encoding, columns that were left out.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub notes: Vec<String>,
+    /// Units that are probably wrong.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub warnings: Vec<String>,
+}
+
+/// Meaning of one column.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct UnderstoodColumn {
+    /// Name of the column in the file.
+    pub column: String,
+    /// Name of the channel; `t` is time.
+    pub channel: String,
+    /// True if the channel points against its axis, so that the samples changed their sign.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub is_negative: bool,
+    /// Unit in the file, as it stands there or in the sidecar or option; `None` if it is not stated.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub unit: Option<String>,
+    /// Sensitivity that converts a voltage, as the sidecar or the option states it; `None` if there is none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sensitivity: Option<String>,
+    /// Unit of the channel's samples (SI).
+    pub si_unit: &'static str,
+    /// Reason for the meaning.
+    pub from: Basis,
+}
+
+/// Reason for the meaning of a column.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Basis {
+    /// The head has the name of a channel, such as `ax`.
+    Head,
+    /// Words in the head, such as `Hammer` or `Acc X`.
+    Words,
+    /// The sidecar names the channel.
+    Sidecar,
+    /// The option `--map` names the channel.
+    Option,
+    /// No word of a quantity: an auxiliary channel.
+    Auxiliary,
+}
+
+impl Understood {
+    /// True if the file does not say everything in the form of a recording, so that the user should see how it was understood.
+    pub fn is_interpreted(&self) -> bool {
+        !self.notes.is_empty()
+            || !self.warnings.is_empty()
+            || self.rate_from == "option"
+            || self
+                .columns
+                .iter()
+                .any(|column| matches!(column.from, Basis::Words | Basis::Option))
+    }
+}
+
+impl Understood {
+    /// The sidecar that states what was understood: `before` with name, unit and sensitivity of every column that is a channel, and the sample
+    /// rate if the file does not hold it.
+    #[must_use]
+    pub fn sidecar(&self, before: &Sidecar) -> Sidecar {
+        let mut sidecar = before.clone();
+        if matches!(self.rate_from, "option" | "sidecar") {
+            sidecar.sample_rate_hz = Some(self.sample_rate_hz);
+        }
+        for column in &self.columns {
+            if matches!(column.from, Basis::Head | Basis::Auxiliary) {
+                continue;
+            }
+            let said = sidecar.channels.entry(column.column.clone()).or_default();
+            let sign = if column.is_negative { "-" } else { "" };
+            *said = RecordedChannel {
+                name: Some(format!("{sign}{}", column.channel)),
+                unit: column.unit.clone(),
+                sensitivity: column.sensitivity.clone(),
+                ..said.clone()
+            };
+        }
+        sidecar
+    }
+}
+
+impl fmt::Display for Understood {
+    /// One line: file, columns with channel and unit, sample rate, notes.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}", self.file.display())?;
+        if let Some(record) = &self.record {
+            write!(f, ", {record}")?;
+        }
+        write!(f, ": {} samples/s ({})", self.sample_rate_hz, self.rate_from)?;
+        for column in &self.columns {
+            let unit = column.unit.as_deref().unwrap_or("no unit");
+            let sign = if column.is_negative { "-" } else { "" };
+            match column.from {
+                Basis::Auxiliary => write!(f, "; {} [{unit}] is no force or motion", column.column)?,
+                _ => write!(f, "; {} [{unit}] is {sign}{}", column.column, column.channel)?,
+            }
+        }
+        for note in self.notes.iter().chain(&self.warnings) {
+            write!(f, "; {note}")?;
+        }
+        Ok(())
+    }
+}
+
+/// A column whose meaning is not certain, and what the user can state about it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Doubt {
+    /// Description: column and what is not stated.
+    pub what: String,
+    /// Name of the column in the file.
+    pub column: String,
+    /// Channel name that is possible.
+    pub name: String,
+    /// Unit that is possible; `None` if the file states it.
+    pub unit: Option<&'static str>,
+    /// Sensitivity that is possible, if the column is a voltage.
+    pub sensitivity: Option<&'static str>,
+}
+
+/// Joins doubts: what is not stated, the option and the lines of the sidecar that state it.
+pub(super) fn doubts_text(doubts: &[Doubt], sidecar: &std::path::Path) -> String {
+    let what: Vec<&str> = doubts.iter().map(|doubt| doubt.what.as_str()).collect();
+    let map: Vec<String> = doubts
+        .iter()
+        .map(
+            |Doubt {
+                 column,
+                 name,
+                 unit,
+                 sensitivity,
+                 ..
+             }| {
+                let unit = sensitivity
+                    .or(*unit)
+                    .map_or_else(String::new, |unit| format!(":{unit}"));
+                format!("{column}={name}{unit}")
+            },
+        )
+        .collect();
+    let map = map.join(",");
+    // A shell splits words at blanks and reads brackets.
+    let is_plain = map
+        .chars()
+        .all(|letter| letter.is_alphanumeric() || "=,:-_./^".contains(letter));
+    let map = if is_plain { map } else { format!("\"{map}\"") };
+    let lines: Vec<String> = doubts
+        .iter()
+        .map(|doubt| {
+            let is_bare = doubt
+                .column
+                .chars()
+                .all(|letter| letter.is_ascii_alphanumeric() || letter == '_' || letter == '-');
+            let key = if is_bare {
+                doubt.column.clone()
+            } else {
+                format!("\"{}\"", doubt.column)
+            };
+            let mut line = format!("[channels.{key}] name = \"{}\"", doubt.name);
+            if doubt.sensitivity.is_none()
+                && let Some(unit) = doubt.unit
+            {
+                line += &format!(", unit = \"{unit}\"");
+            }
+            if let Some(sensitivity) = doubt.sensitivity {
+                line += &format!(", unit = \"V\", sensitivity = \"{sensitivity}\"");
+            }
+            line
+        })
+        .collect();
+    format!(
+        "{}; add --map {map} with the names and units that hold, or these keys to {}: {}",
+        what.join("; "),
+        sidecar.display(),
+        lines.join("; ")
+    )
+}
