@@ -435,9 +435,8 @@ fn disturbances_of_extended_cases_grow_as_their_multipliers_say() {
             expected.multiplier_abs, plain.multiplier_abs
         );
         // The error comes from the multiplier of the other direction, which is almost as large. The extension changes the
-        // multiplier by far more. The force of quadratic damping has a kink at zero velocity: the error is 4e-3, the change
-        // 7e-2.
-        let tolerance = if extension == squared { 6e-3 } else { 1e-3 };
+        // multiplier by far more.
+        let tolerance = 1e-3;
         assert!(
             (found - expected.multiplier_abs).abs() < tolerance,
             "{extension}: {found} {expected:?}"

@@ -32,6 +32,7 @@ pub(super) const CUBIC_DAMPING: EffectSpec = EffectSpec {
             law: |[c3, _], _, v| c3 * v.powi(3),
             slopes: |[c3, _], _, v| [0.0, 3.0 * c3 * v.powi(2)],
             describing_function: |[c3, _], amplitude, omega| c3 * describing_function(amplitude, omega),
+            bends_at_rest: false,
             direction: values.direction()?,
         }))
     },

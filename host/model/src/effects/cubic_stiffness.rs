@@ -32,6 +32,7 @@ pub(super) const CUBIC_STIFFNESS: EffectSpec = EffectSpec {
             law: |[k3, _], x, _| k3 * x.powi(3),
             slopes: |[k3, _], x, _| [3.0 * k3 * x.powi(2), 0.0],
             describing_function: |[k3, _], amplitude, _| k3 * describing_function(amplitude),
+            bends_at_rest: false,
             direction: values.direction()?,
         }))
     },

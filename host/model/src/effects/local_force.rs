@@ -25,6 +25,8 @@ pub(super) struct LocalForce {
     pub(super) slopes: fn([f64; 2], f64, f64) -> [f64; 2],
     /// Describing function N(X, ω) of the force law: see [`RestoringForce::describing_function`].
     pub(super) describing_function: DescribingFunction,
+    /// True if a derivative of the force law jumps where the velocity is 0.
+    pub(super) bends_at_rest: bool,
     /// Direction of the force; `None` for the only direction of a structure.
     pub(super) direction: Option<Direction>,
 }
@@ -35,8 +37,13 @@ struct ForceAlongAxis {
     law: Law,
     slopes: fn([f64; 2], f64, f64) -> [f64; 2],
     describing_function: DescribingFunction,
+    bends_at_rest: bool,
     axis: usize,
 }
+
+/// The regime of motion towards positive displacement. A law without a bend has no other.
+const FORWARD: Regime = 0;
+const BACKWARD: Regime = 1;
 
 impl Effect for LocalForce {
     fn id(&self) -> EffectName {
@@ -49,6 +56,7 @@ impl Effect for LocalForce {
             law: self.law,
             slopes: self.slopes,
             describing_function: self.describing_function,
+            bends_at_rest: self.bends_at_rest,
             axis: axis_of(structure, self.direction, self.id.name())?,
         })])
     }
@@ -67,7 +75,25 @@ impl RestoringForce for ForceAlongAxis {
         slopes.damping[self.axis][self.axis] = by_v;
         Some(slopes)
     }
+
     fn describing_function(&self, amplitude_m: f64, omega: f64) -> Option<Complex64> {
         Some((self.describing_function)(self.coefficients, amplitude_m, omega))
+    }
+
+    /// An integration step over a bend of the law has an error that the error estimate of the step does not cover.
+    fn margin(&self, regime: Regime, at: &MotionState, _: &[f64], _: f64) -> f64 {
+        match regime {
+            _ if !self.bends_at_rest => f64::INFINITY,
+            BACKWARD => -at.v[self.axis],
+            _ => at.v[self.axis],
+        }
+    }
+
+    fn next(&self, before: Option<Regime>, at: &MotionState, _: &[f64], _: f64) -> Regime {
+        match before {
+            Some(FORWARD) => BACKWARD,
+            None if self.bends_at_rest && at.v[self.axis] < 0.0 => BACKWARD,
+            _ => FORWARD,
+        }
     }
 }

@@ -17,7 +17,7 @@ pub(super) const QUADRATIC_DAMPING: EffectSpec = EffectSpec {
     parameters: &[Parameter::number("c2_ns2_per_m2", "N s²/m²", "quadratic damping")
         .linear()
         .main()],
-    // The force is smooth enough for a Jacobian: the derivative 2·|v| of |v|·v is continuous.
+    // The force is smooth enough for a Jacobian: the derivative 2·|v| of |v|·v is continuous. Its slope jumps at v = 0.
     treatment: Treatment::Smooth,
     candidates: &["one law along one direction, or a law along each"],
     shares_term_with: &[],
@@ -34,6 +34,7 @@ pub(super) const QUADRATIC_DAMPING: EffectSpec = EffectSpec {
             law: |[c2, _], _, v| c2 * v.abs() * v,
             slopes: |[c2, _], _, v| [0.0, 2.0 * c2 * v.abs()],
             describing_function: |[c2, _], amplitude, omega| c2 * describing_function(amplitude, omega),
+            bends_at_rest: true,
             direction: values.direction()?,
         }))
     },

@@ -33,6 +33,7 @@ pub(super) const QUADRATIC_STIFFNESS: EffectSpec = EffectSpec {
             slopes: |[k2, _], x, _| [2.0 * k2 * x, 0.0],
             // An even function of x has no component at the fundamental frequency.
             describing_function: |_, _, _| Complex64::ZERO,
+            bends_at_rest: false,
             direction: values.direction()?,
         }))
     },

@@ -39,6 +39,7 @@ pub(super) const SOFTENING_HARDENING: EffectSpec = EffectSpec {
                 k3 * cubic_stiffness::describing_function(amplitude)
                     + k5 * quintic_describing_function(amplitude)
             },
+            bends_at_rest: false,
             direction: values.direction()?,
         }))
     },
