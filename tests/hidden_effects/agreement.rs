@@ -11,7 +11,7 @@ use quietcut::structure::Direction;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-use super::cause::{Cause, Kind, PROCESS, STRUCTURAL};
+use super::cause::{Cause, EffectKind, PROCESS, STRUCTURAL};
 use super::cut::CutBench;
 use super::machine::Machine;
 use super::oracle::Lab;
@@ -22,7 +22,7 @@ use super::sensor::Sensor;
 fn texts(cause: &Cause, machine: &Machine, rig: &Rig) -> Vec<String> {
     let name = cause.kind.name();
     let values = cause.values(machine, &rig.scale);
-    let mut texts: Vec<String> = if cause.kind == Kind::SensorOffsetByMode {
+    let mut texts: Vec<String> = if cause.kind == EffectKind::SensorOffsetByMode {
         vec![format!("{name}.ratio={:e},{:e}", values[0].1, values[1].1)]
     } else {
         values
@@ -32,10 +32,10 @@ fn texts(cause: &Cause, machine: &Machine, rig: &Rig) -> Vec<String> {
     };
     if cause.kind.of_sensor() {
         texts.push(format!("{name}.channel={}", rig.sensors[cause.sensor].name()));
-        if cause.kind == Kind::CrossAxis {
+        if cause.kind == EffectKind::CrossAxis {
             texts.push(format!("{name}.direction=y"));
         }
-    } else if !matches!(cause.kind, Kind::ModeCoupling | Kind::Drift) {
+    } else if !matches!(cause.kind, EffectKind::ModeCoupling | EffectKind::Drift) {
         texts.push(format!("{name}.direction={}", ["x", "y", "z"][cause.axis]));
     }
     texts
@@ -43,7 +43,7 @@ fn texts(cause: &Cause, machine: &Machine, rig: &Rig) -> Vec<String> {
 
 #[test]
 fn structural_effects_agree_with_the_library() {
-    for kind in STRUCTURAL.into_iter().chain([Kind::SensorOffsetByMode]) {
+    for kind in STRUCTURAL.into_iter().chain([EffectKind::SensorOffsetByMode]) {
         let mut compared = 0;
         for seed in 0..40 {
             let mut random = ChaCha8Rng::seed_from_u64(seed);
@@ -173,7 +173,7 @@ fn cutting_effects_agree_with_the_library() {
 /// The library's effect for a cause of the cutting process.
 fn process_effects(cause: &Cause, bench: &CutBench) -> Effects {
     let name = cause.kind.name();
-    if cause.kind == Kind::AxialDepthModulation {
+    if cause.kind == EffectKind::AxialDepthModulation {
         return Effects::parse(["axial-depth-modulation=1"]).unwrap();
     }
     let mut texts: Vec<String> = cause
@@ -181,7 +181,7 @@ fn process_effects(cause: &Cause, bench: &CutBench) -> Effects {
         .iter()
         .map(|(key, value)| format!("{name}.{key}={value:e}"))
         .collect();
-    if cause.kind == Kind::SpeedFluctuation {
+    if cause.kind == EffectKind::SpeedFluctuation {
         texts.push(format!("{name}.phase_deg={:e}", cause.shares[2].to_degrees()));
     }
     Effects::parse(texts.iter().map(String::as_str)).unwrap()

@@ -10,7 +10,7 @@ use super::process::CutScale;
 
 /// A kind of effect.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub(crate) enum Kind {
+pub(crate) enum EffectKind {
     Mass,
     Stiffness,
     Damping,
@@ -52,52 +52,52 @@ pub(crate) enum Kind {
 }
 
 /// Effects of the library that tests of structures can hide.
-pub(crate) const STRUCTURAL: [Kind; 17] = [
-    Kind::Mass,
-    Kind::Stiffness,
-    Kind::Damping,
-    Kind::MissingMode,
-    Kind::CubicStiffness,
-    Kind::QuadraticStiffness,
-    Kind::CubicDamping,
-    Kind::SofteningHardening,
-    Kind::CoulombFriction,
-    Kind::Backlash,
-    Kind::Hysteresis,
-    Kind::ModeCoupling,
-    Kind::Drift,
-    Kind::SensorGain,
-    Kind::SensorDelay,
-    Kind::CrossAxis,
-    Kind::SensorOffset,
+pub(crate) const STRUCTURAL: [EffectKind; 17] = [
+    EffectKind::Mass,
+    EffectKind::Stiffness,
+    EffectKind::Damping,
+    EffectKind::MissingMode,
+    EffectKind::CubicStiffness,
+    EffectKind::QuadraticStiffness,
+    EffectKind::CubicDamping,
+    EffectKind::SofteningHardening,
+    EffectKind::CoulombFriction,
+    EffectKind::Backlash,
+    EffectKind::Hysteresis,
+    EffectKind::ModeCoupling,
+    EffectKind::Drift,
+    EffectKind::SensorGain,
+    EffectKind::SensorDelay,
+    EffectKind::CrossAxis,
+    EffectKind::SensorOffset,
 ];
 
 /// Effects of the library that belong to the cutting process.
-pub(crate) const PROCESS: [Kind; 8] = [
-    Kind::ForceCoefficients,
-    Kind::EdgeForce,
-    Kind::ForceExponent,
-    Kind::Runout,
-    Kind::ProcessDamping,
-    Kind::AxialDepthModulation,
-    Kind::SpeedFluctuation,
-    Kind::Wear,
+pub(crate) const PROCESS: [EffectKind; 8] = [
+    EffectKind::ForceCoefficients,
+    EffectKind::EdgeForce,
+    EffectKind::ForceExponent,
+    EffectKind::Runout,
+    EffectKind::ProcessDamping,
+    EffectKind::AxialDepthModulation,
+    EffectKind::SpeedFluctuation,
+    EffectKind::Wear,
 ];
 
 /// Effects that the library does not have.
-pub(crate) const NOT_IN_LIBRARY: [Kind; 6] = [
-    Kind::PulsatingStiffness,
-    Kind::Stop,
-    Kind::Stribeck,
-    Kind::UnmeasuredForce,
-    Kind::SensorSaturation,
-    Kind::SensorSquare,
+pub(crate) const NOT_IN_LIBRARY: [EffectKind; 6] = [
+    EffectKind::PulsatingStiffness,
+    EffectKind::Stop,
+    EffectKind::Stribeck,
+    EffectKind::UnmeasuredForce,
+    EffectKind::SensorSaturation,
+    EffectKind::SensorSquare,
 ];
 
 /// One effect at one location with given parameters.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Cause {
-    pub(crate) kind: Kind,
+    pub(crate) kind: EffectKind,
     /// Direction of the effect: 0, 1, 2 for x, y, z.
     pub(crate) axis: usize,
     /// Index of the sensor that the effect concerns, in the order of the rig.
@@ -119,7 +119,7 @@ pub(crate) struct Scale {
     pub(crate) cut: Option<CutScale>,
 }
 
-impl Kind {
+impl EffectKind {
     /// Effect names in answers: one, or several for a common factor.
     pub(crate) fn names(self) -> &'static [&'static str] {
         match self {
@@ -262,11 +262,13 @@ impl Kind {
 
 impl Cause {
     /// True if the machine can have the effect at all.
-    pub(crate) fn possible(kind: Kind, machine: &Machine) -> bool {
+    pub(crate) fn possible(kind: EffectKind, machine: &Machine) -> bool {
         match kind {
-            Kind::Mass | Kind::Stiffness | Kind::Damping | Kind::Drift => !machine.modal,
-            Kind::ModeCoupling | Kind::CrossAxis => machine.axes.len() >= 2,
-            Kind::SensorOffsetByMode => machine.modal,
+            EffectKind::Mass | EffectKind::Stiffness | EffectKind::Damping | EffectKind::Drift => {
+                !machine.modal
+            }
+            EffectKind::ModeCoupling | EffectKind::CrossAxis => machine.axes.len() >= 2,
+            EffectKind::SensorOffsetByMode => machine.modal,
             _ => true,
         }
     }
@@ -284,11 +286,11 @@ impl Cause {
         let c = self.damping_along(machine);
         let (peak, speed) = (scale.peak_m, scale.peak_m * machine.omega[0]);
         match self.kind {
-            Kind::Mass => vec![("mass_kg", entry(&machine.mass, 0.1 * s[0]))],
-            Kind::Stiffness => vec![("stiffness_n_per_m", entry(&machine.stiffness, 0.1 * s[0]))],
-            Kind::Damping => vec![("damping_ns_per_m", entry(&machine.damping, 0.3 * s[0]))],
-            Kind::CommonFactor => vec![("factor", 1.0 + 0.1 * s[0])],
-            Kind::MissingMode => vec![
+            EffectKind::Mass => vec![("mass_kg", entry(&machine.mass, 0.1 * s[0]))],
+            EffectKind::Stiffness => vec![("stiffness_n_per_m", entry(&machine.stiffness, 0.1 * s[0]))],
+            EffectKind::Damping => vec![("damping_ns_per_m", entry(&machine.damping, 0.3 * s[0]))],
+            EffectKind::CommonFactor => vec![("factor", 1.0 + 0.1 * s[0])],
+            EffectKind::MissingMode => vec![
                 (
                     "frequency_hz",
                     s[0] * self.natural(machine) / std::f64::consts::TAU,
@@ -296,35 +298,37 @@ impl Cause {
                 ("damping_ratio", s[1]),
                 ("modal_mass_kg", s[2] * machine.mass[(0, 0)]),
             ],
-            Kind::CubicStiffness => vec![("k3_n_per_m3", 0.1 * s[0] * k / peak.powi(2))],
-            Kind::QuadraticStiffness => vec![("k2_n_per_m2", 0.1 * s[0] * k / peak)],
-            Kind::CubicDamping => vec![("c3_ns3_per_m3", 0.5 * s[0] * c / speed.powi(2))],
-            Kind::SofteningHardening => {
+            EffectKind::CubicStiffness => vec![("k3_n_per_m3", 0.1 * s[0] * k / peak.powi(2))],
+            EffectKind::QuadraticStiffness => vec![("k2_n_per_m2", 0.1 * s[0] * k / peak)],
+            EffectKind::CubicDamping => vec![("c3_ns3_per_m3", 0.5 * s[0] * c / speed.powi(2))],
+            EffectKind::SofteningHardening => {
                 let k3 = -0.1 * s[0] * k / peak.powi(2);
                 vec![
                     ("k3_n_per_m3", k3),
                     ("k5_n_per_m5", -k3 / (2.0 * (s[1] * peak).powi(2))),
                 ]
             }
-            Kind::CoulombFriction => vec![("fc_n", 0.3 * s[0].abs() * c * speed)],
-            Kind::Backlash => vec![("gap_mm", 2e3 * s[0].abs() * peak), ("stiffness_fraction", s[1])],
-            Kind::Hysteresis => vec![
+            EffectKind::CoulombFriction => vec![("fc_n", 0.3 * s[0].abs() * c * speed)],
+            EffectKind::Backlash => vec![("gap_mm", 2e3 * s[0].abs() * peak), ("stiffness_fraction", s[1])],
+            EffectKind::Hysteresis => vec![
                 ("hysteretic_stiffness_n_per_m", s[0] * k),
                 ("yield_m", s[1].abs() * peak),
             ],
-            Kind::ModeCoupling => vec![("kxyy_n_per_m3", 0.3 * s[0] * k / peak.powi(2))],
-            Kind::Drift => vec![("relative_rate_per_s", 0.1 * s[0] / scale.seconds)],
-            Kind::SensorGain => vec![("gain", 1.0 + 0.1 * s[0])],
-            Kind::SensorDelay => vec![("delay_s", 0.5 * s[0] * scale.sample_s)],
-            Kind::CrossAxis => vec![("fraction", 0.1 * s[0])],
-            Kind::SensorOffset => vec![("ratio", 1.0 - 0.1 * s[0])],
-            Kind::SensorOffsetByMode => vec![("ratio_1", 1.0 - 0.1 * s[0]), ("ratio_2", 1.0 - 0.1 * s[1])],
-            Kind::PulsatingStiffness => vec![("stiffness", 0.1 * s[0] * k)],
-            Kind::Stop => vec![("stiffness", 0.5 * s[0] * k)],
-            Kind::Stribeck => vec![("kinetic", 0.5 * s[0] * c * speed)],
-            Kind::UnmeasuredForce => vec![("amplitude", 0.3 * s[0] * c * speed)],
-            Kind::SensorSaturation => vec![("third", 0.1 * s[0])],
-            Kind::SensorSquare => vec![("second", 0.1 * s[0])],
+            EffectKind::ModeCoupling => vec![("kxyy_n_per_m3", 0.3 * s[0] * k / peak.powi(2))],
+            EffectKind::Drift => vec![("relative_rate_per_s", 0.1 * s[0] / scale.seconds)],
+            EffectKind::SensorGain => vec![("gain", 1.0 + 0.1 * s[0])],
+            EffectKind::SensorDelay => vec![("delay_s", 0.5 * s[0] * scale.sample_s)],
+            EffectKind::CrossAxis => vec![("fraction", 0.1 * s[0])],
+            EffectKind::SensorOffset => vec![("ratio", 1.0 - 0.1 * s[0])],
+            EffectKind::SensorOffsetByMode => {
+                vec![("ratio_1", 1.0 - 0.1 * s[0]), ("ratio_2", 1.0 - 0.1 * s[1])]
+            }
+            EffectKind::PulsatingStiffness => vec![("stiffness", 0.1 * s[0] * k)],
+            EffectKind::Stop => vec![("stiffness", 0.5 * s[0] * k)],
+            EffectKind::Stribeck => vec![("kinetic", 0.5 * s[0] * c * speed)],
+            EffectKind::UnmeasuredForce => vec![("amplitude", 0.3 * s[0] * c * speed)],
+            EffectKind::SensorSaturation => vec![("third", 0.1 * s[0])],
+            EffectKind::SensorSquare => vec![("second", 0.1 * s[0])],
             _ => Vec::new(),
         }
     }
@@ -345,21 +349,21 @@ impl Cause {
         let values = self.values(machine, scale);
         let (a, value) = (self.axis, values[0].1);
         match self.kind {
-            Kind::Mass => machine.mass[(a, a)] = value,
-            Kind::Stiffness => machine.stiffness[(a, a)] = value,
-            Kind::Damping => machine.damping[(a, a)] = value,
+            EffectKind::Mass => machine.mass[(a, a)] = value,
+            EffectKind::Stiffness => machine.stiffness[(a, a)] = value,
+            EffectKind::Damping => machine.damping[(a, a)] = value,
             // Modes belong to all directions, and so does their factor.
-            Kind::CommonFactor if machine.modal => {
+            EffectKind::CommonFactor if machine.modal => {
                 machine.mass *= value;
                 machine.damping *= value;
                 machine.stiffness *= value;
             }
-            Kind::CommonFactor => {
+            EffectKind::CommonFactor => {
                 machine.mass[(a, a)] *= value;
                 machine.damping[(a, a)] *= value;
                 machine.stiffness[(a, a)] *= value;
             }
-            Kind::MissingMode => {
+            EffectKind::MissingMode => {
                 let (omega, ratio, mass) = (std::f64::consts::TAU * value, values[1].1, values[2].1);
                 let n = machine.mass.nrows();
                 let grown = |matrix: &nalgebra::DMatrix<f64>, corner: f64| {
@@ -390,45 +394,45 @@ impl Cause {
         };
         let (k, omega) = (machine.stiffness_along(axis), self.natural(machine));
         match self.kind {
-            Kind::CubicStiffness => system.add(spring(3, value)),
-            Kind::QuadraticStiffness => system.add(spring(2, value)),
-            Kind::SofteningHardening => {
+            EffectKind::CubicStiffness => system.add(spring(3, value)),
+            EffectKind::QuadraticStiffness => system.add(spring(2, value)),
+            EffectKind::SofteningHardening => {
                 system.add(spring(3, value));
                 system.add(spring(5, second));
             }
-            Kind::CubicDamping => system.add(Law::Damper {
+            EffectKind::CubicDamping => system.add(Law::Damper {
                 axis,
                 power: 3,
                 coefficient: value,
             }),
-            Kind::CoulombFriction => system.add(Law::Friction {
+            EffectKind::CoulombFriction => system.add(Law::Friction {
                 axis,
                 kinetic_n: value,
                 breakaway_n: value,
                 stribeck_m_per_s: 1.0,
             }),
-            Kind::Stribeck => system.add(Law::Friction {
+            EffectKind::Stribeck => system.add(Law::Friction {
                 axis,
                 kinetic_n: value,
                 breakaway_n: 2.5 * value,
                 stribeck_m_per_s: 0.2 * omega * scale.peak_m,
             }),
-            Kind::Backlash => system.add(Law::Gap {
+            EffectKind::Backlash => system.add(Law::Gap {
                 axis,
                 half_gap_m: 0.5e-3 * value,
                 stiffness: second * k,
             }),
-            Kind::Hysteresis => system.add(Law::BoucWen {
+            EffectKind::Hysteresis => system.add(Law::BoucWen {
                 axis,
                 stiffness: value,
                 yield_m: second,
                 own: 0,
             }),
-            Kind::ModeCoupling => system.add(Law::Coupling {
+            EffectKind::ModeCoupling => system.add(Law::Coupling {
                 axes: [0, 1],
                 coefficient: value,
             }),
-            Kind::Drift => {
+            EffectKind::Drift => {
                 let stiffness = std::array::from_fn(|i| {
                     std::array::from_fn(|j| machine.stiffness.get((i, j)).copied().unwrap_or(0.0))
                 });
@@ -437,17 +441,17 @@ impl Cause {
                     rate_per_s: value,
                 });
             }
-            Kind::PulsatingStiffness => system.add(Law::Pulsating {
+            EffectKind::PulsatingStiffness => system.add(Law::Pulsating {
                 axis,
                 stiffness: value,
                 omega: 0.37 * omega,
             }),
-            Kind::Stop => system.add(Law::Stop {
+            EffectKind::Stop => system.add(Law::Stop {
                 axis,
                 gap_m: 0.3 * scale.peak_m,
                 stiffness: value,
             }),
-            Kind::UnmeasuredForce => system.add(Law::UnmeasuredForce {
+            EffectKind::UnmeasuredForce => system.add(Law::UnmeasuredForce {
                 axis,
                 amplitude_n: value,
                 omega: 0.83 * omega,

@@ -11,7 +11,7 @@ use quietcut::recording::{Channel, Quantity, RecordedChannel, RecordedCut, Recor
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-use super::cause::{Cause, Kind, PROCESS, Scale};
+use super::cause::{Cause, EffectKind, PROCESS, Scale};
 use super::chip::{Chips, Job, Run};
 use super::machine::{Machine, between};
 use super::motion::interpolated;
@@ -313,7 +313,7 @@ impl CutBench {
                     let gain: f64 = causes
                         .iter()
                         .filter(|cause| cause.sensor == index || cause.sensor == EVERY_FORCE)
-                        .filter(|cause| cause.kind == Kind::SensorGain)
+                        .filter(|cause| cause.kind == EffectKind::SensorGain)
                         .map(|cause| cause.values(&self.machine, &self.scale)[0].1)
                         .product();
                     motion.force.iter().map(|force| gain * force[*axis]).collect()
@@ -325,7 +325,7 @@ impl CutBench {
                         .filter(|cause| cause.kind.of_sensor())
                         .filter(about)
                         .collect();
-                    let late = |cause: &&Cause| cause.kind == Kind::SensorDelay && sensor.acceleration;
+                    let late = |cause: &&Cause| cause.kind == EffectKind::SensorDelay && sensor.acceleration;
                     let series = match causes.iter().position(late) {
                         Some(place) => {
                             let delay_s = causes.remove(place).values(&self.machine, &self.scale)[0].1;
@@ -538,44 +538,44 @@ impl Lab for CutBench {
         }
     }
 
-    fn places(&self, kind: Kind) -> Vec<(usize, usize)> {
+    fn places(&self, kind: EffectKind) -> Vec<(usize, usize)> {
         let first = self.sensors().len() - self.motion.len();
         let last = first + self.motion.len();
         match kind {
-            Kind::SensorGain => (first..last)
+            EffectKind::SensorGain => (first..last)
                 .map(|sensor| (self.motion[sensor - first].axis, sensor))
                 .chain([(0, EVERY_SENSOR)])
                 .chain((0..first).map(|force| (self.machine.axes[force], force)))
                 .chain((first > 1).then_some((0, EVERY_FORCE)))
                 .collect(),
-            Kind::SensorOffset => Vec::new(),
+            EffectKind::SensorOffset => Vec::new(),
             kind if kind.of_sensor() => (first..last)
                 .map(|sensor| (self.motion[sensor - first].axis, sensor))
                 .collect(),
-            Kind::AxialDepthModulation if self.machine.axes.len() < 3 => Vec::new(),
-            Kind::Mass | Kind::Stiffness | Kind::Damping | Kind::CommonFactor => {
+            EffectKind::AxialDepthModulation if self.machine.axes.len() < 3 => Vec::new(),
+            EffectKind::Mass | EffectKind::Stiffness | EffectKind::Damping | EffectKind::CommonFactor => {
                 self.machine.axes.iter().map(|axis| (*axis, 0)).collect()
             }
             _ => vec![(0, 0)],
         }
     }
 
-    fn kinds(&self) -> Vec<Kind> {
+    fn kinds(&self) -> Vec<EffectKind> {
         let mut kinds = PROCESS.to_vec();
         kinds.extend([
-            Kind::SensorGain,
-            Kind::SensorDelay,
-            Kind::CrossAxis,
-            Kind::Mass,
-            Kind::Stiffness,
-            Kind::Damping,
+            EffectKind::SensorGain,
+            EffectKind::SensorDelay,
+            EffectKind::CrossAxis,
+            EffectKind::Mass,
+            EffectKind::Stiffness,
+            EffectKind::Damping,
         ]);
         kinds
     }
 
-    fn names(&self, kind: Kind) -> &'static [&'static str] {
+    fn names(&self, kind: EffectKind) -> &'static [&'static str] {
         // A factor does not change edge coefficients that are zero.
-        let edgeless = kind == Kind::CommonForce && self.job.edge_n_per_mm == [0.0; 3];
+        let edgeless = kind == EffectKind::CommonForce && self.job.edge_n_per_mm == [0.0; 3];
         if edgeless {
             &kind.names()[..1]
         } else {

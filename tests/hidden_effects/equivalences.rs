@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-use super::cause::{Cause, Kind};
+use super::cause::{Cause, EffectKind};
 use super::cut::{CutBench, EVERY_FORCE, EVERY_SENSOR};
 use super::machine::Machine;
 use super::oracle::{Lab, Oracle, Verdict};
@@ -28,7 +28,7 @@ fn verdict(lab: &dyn Lab, sigma: &[f64], hidden: &Cause) -> Verdict {
 
 fn gain(sensor: usize) -> Cause {
     Cause {
-        kind: Kind::SensorGain,
+        kind: EffectKind::SensorGain,
         axis: 0,
         sensor,
         shares: vec![0.8],
@@ -105,7 +105,7 @@ fn a_common_gain_of_a_cut_without_force_is_equivalent_to_a_factor_on_the_force()
     for seed in [0, 2] {
         let bench = CutBench::draw(&mut ChaCha8Rng::seed_from_u64(seed), false);
         let sigma = percent(&bench, Some(bench.angle_sigma()));
-        let mut expected: BTreeSet<&str> = bench.names(Kind::CommonForce).iter().copied().collect();
+        let mut expected: BTreeSet<&str> = bench.names(EffectKind::CommonForce).iter().copied().collect();
         expected.insert("sensor-gain");
         assert_eq!(
             verdict(&bench, &sigma, &gain(EVERY_SENSOR)),

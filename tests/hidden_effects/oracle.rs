@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 use nalgebra::{DMatrix, DVector};
 use rand_chacha::ChaCha8Rng;
 
-use super::cause::{Cause, Kind};
+use super::cause::{Cause, EffectKind};
 use super::noise::Whitening;
 use super::rig::Output;
 
@@ -35,13 +35,13 @@ pub(crate) trait Lab {
     fn output(&self, causes: &[Cause]) -> Output;
 
     /// Locations that an effect can have: direction and sensor.
-    fn places(&self, kind: Kind) -> Vec<(usize, usize)>;
+    fn places(&self, kind: EffectKind) -> Vec<(usize, usize)>;
 
     /// Effects of the library that can act in this test.
-    fn kinds(&self) -> Vec<Kind>;
+    fn kinds(&self) -> Vec<EffectKind>;
 
     /// Names that an effect has in answers about this test.
-    fn names(&self, kind: Kind) -> &'static [&'static str] {
+    fn names(&self, kind: EffectKind) -> &'static [&'static str] {
         kind.names()
     }
 
@@ -214,7 +214,7 @@ impl<'a> Oracle<'a> {
     }
 
     /// Start values of an effect at all its locations.
-    pub(crate) fn candidates(&self, kind: Kind, random: &mut ChaCha8Rng) -> Vec<Cause> {
+    pub(crate) fn candidates(&self, kind: EffectKind, random: &mut ChaCha8Rng) -> Vec<Cause> {
         let mut all = Vec::new();
         for (axis, sensor) in self.lab.places(kind) {
             for shares in kind.starts(random) {
@@ -230,10 +230,10 @@ impl<'a> Oracle<'a> {
     }
 
     /// Effects that may resemble the hidden one: those of the library and, for gains, the common factors that are exactly equivalent.
-    fn rivals_of(&self, hidden: &Cause) -> Vec<Kind> {
+    fn rivals_of(&self, hidden: &Cause) -> Vec<EffectKind> {
         let mut kinds = self.lab.kinds();
-        if matches!(hidden.kind, Kind::SensorGain | Kind::SensorOffset) {
-            kinds.extend([Kind::CommonFactor, Kind::CommonForce]);
+        if matches!(hidden.kind, EffectKind::SensorGain | EffectKind::SensorOffset) {
+            kinds.extend([EffectKind::CommonFactor, EffectKind::CommonForce]);
         }
         kinds
     }
@@ -343,8 +343,8 @@ impl<'a> Oracle<'a> {
 }
 
 /// Start value of a simpler effect that resembles the hidden one at small amplitude: within its gap, backlash is a reduced stiffness.
-fn stand_in(kind: Kind, hidden: &Cause) -> Option<Cause> {
-    (kind == Kind::Stiffness && hidden.kind == Kind::Backlash).then(|| Cause {
+fn stand_in(kind: EffectKind, hidden: &Cause) -> Option<Cause> {
+    (kind == EffectKind::Stiffness && hidden.kind == EffectKind::Backlash).then(|| Cause {
         kind,
         shares: vec![-10.0 * hidden.shares[1]],
         ..hidden.clone()
@@ -353,17 +353,17 @@ fn stand_in(kind: Kind, hidden: &Cause) -> Option<Cause> {
 
 /// Two changes among mass, stiffness and damping in the direction of the hidden two, of which one is `kind`. They differ from the hidden
 /// two by a common factor on the equation of motion, so that free decays are equal.
-fn by_common_factor(kind: Kind, gone: &Cause, stays: &Cause) -> Option<[Cause; 2]> {
-    let size = |kind: Kind| match kind {
-        Kind::Mass | Kind::Stiffness => Some(0.1),
-        Kind::Damping => Some(0.3),
+fn by_common_factor(kind: EffectKind, gone: &Cause, stays: &Cause) -> Option<[Cause; 2]> {
+    let size = |kind: EffectKind| match kind {
+        EffectKind::Mass | EffectKind::Stiffness => Some(0.1),
+        EffectKind::Damping => Some(0.3),
         _ => None,
     };
     if gone.axis != stays.axis || kind == gone.kind || kind == stays.kind {
         return None;
     }
     let factor = 1.0 / (1.0 + size(gone.kind)? * gone.shares[0]);
-    let with = |kind: Kind, value: f64| {
+    let with = |kind: EffectKind, value: f64| {
         Some(Cause {
             kind,
             shares: vec![(value - 1.0) / size(kind)?],
@@ -405,14 +405,14 @@ impl Cause {
     fn sensible(&self) -> bool {
         let s = &self.shares;
         match self.kind {
-            Kind::MissingMode => s[0] > 0.1 && (0.0005..0.3).contains(&s[1]) && s[2] > 0.5,
-            Kind::SofteningHardening => s[0].abs() < 4.0 && s[1] > 0.2,
-            Kind::Stiffness => (-9.5..4.0).contains(&s[0]),
-            Kind::Backlash => s[0] > 0.0 && s[0] < 2.0 && (0.0..0.95).contains(&s[1]),
-            Kind::Hysteresis => s[1] > 0.01 && s[0].abs() < 0.9,
-            Kind::ForceExponent => (0.0..2.0).contains(&s[0]) && (0.05..20.0).contains(&s[1]),
-            Kind::SpeedFluctuation => s[1] > 0.01 && s[1] < 1.0,
-            Kind::SensorOffsetByMode => s.iter().all(|share| share.abs() < 4.0),
+            EffectKind::MissingMode => s[0] > 0.1 && (0.0005..0.3).contains(&s[1]) && s[2] > 0.5,
+            EffectKind::SofteningHardening => s[0].abs() < 4.0 && s[1] > 0.2,
+            EffectKind::Stiffness => (-9.5..4.0).contains(&s[0]),
+            EffectKind::Backlash => s[0] > 0.0 && s[0] < 2.0 && (0.0..0.95).contains(&s[1]),
+            EffectKind::Hysteresis => s[1] > 0.01 && s[0].abs() < 0.9,
+            EffectKind::ForceExponent => (0.0..2.0).contains(&s[0]) && (0.05..20.0).contains(&s[1]),
+            EffectKind::SpeedFluctuation => s[1] > 0.01 && s[1] < 1.0,
+            EffectKind::SensorOffsetByMode => s.iter().all(|share| share.abs() < 4.0),
             _ => s[0].abs() < 4.0,
         }
     }

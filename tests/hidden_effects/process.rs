@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use super::cause::{Cause, Kind, Scale};
+use super::cause::{Cause, EffectKind, Scale};
 use super::chip::Job;
 use super::machine::Machine;
 
@@ -36,25 +36,29 @@ impl Process {
         for cause in causes {
             let values: Vec<f64> = cause.values(machine, scale).iter().map(|value| value.1).collect();
             match cause.kind {
-                Kind::ForceCoefficients => {
+                EffectKind::ForceCoefficients => {
                     (0..values.len()).for_each(|i| process.cutting_pa[i] = 1e6 * values[i])
                 }
-                Kind::EdgeForce => (0..values.len()).for_each(|i| process.edge_n_per_m[i] = 1e3 * values[i]),
-                Kind::CommonForce => {
+                EffectKind::EdgeForce => {
+                    (0..values.len()).for_each(|i| process.edge_n_per_m[i] = 1e3 * values[i])
+                }
+                EffectKind::CommonForce => {
                     process.cutting_pa = process.cutting_pa.map(|value| value * values[0]);
                     process.edge_n_per_m = process.edge_n_per_m.map(|value| value * values[0]);
                 }
-                Kind::ForceExponent => process.exponent = Some((values[0], 1e-3 * values[1])),
-                Kind::Runout => {
+                EffectKind::ForceExponent => process.exponent = Some((values[0], 1e-3 * values[1])),
+                EffectKind::Runout => {
                     for (index, radial) in process.radial_m.iter_mut().enumerate() {
                         let angle = values[1].to_radians() + TAU * index as f64 / job.teeth as f64;
                         *radial = 1e-6 * values[0] * angle.cos();
                     }
                 }
-                Kind::ProcessDamping => process.damping_n_per_m = values[0],
-                Kind::AxialDepthModulation => process.depth_follows = values[0],
-                Kind::SpeedFluctuation => process.fluctuation = Some([values[0], values[1], cause.shares[2]]),
-                Kind::Wear => process.wear_per_s = values[0],
+                EffectKind::ProcessDamping => process.damping_n_per_m = values[0],
+                EffectKind::AxialDepthModulation => process.depth_follows = values[0],
+                EffectKind::SpeedFluctuation => {
+                    process.fluctuation = Some([values[0], values[1], cause.shares[2]])
+                }
+                EffectKind::Wear => process.wear_per_s = values[0],
                 _ => {}
             }
         }
@@ -89,30 +93,32 @@ impl Cause {
         let [kt, kr, _] = job.cutting_mpa;
         let edge = kt * job.feed_mm;
         Some(match self.kind {
-            Kind::ForceCoefficients => vec![
+            EffectKind::ForceCoefficients => vec![
                 ("ktc_mpa", kt * (1.0 + 0.2 * s[0])),
                 ("krc_mpa", kr * (1.0 + 0.2 * s[1])),
             ],
-            Kind::CommonForce => vec![("factor", 1.0 + 0.1 * s[0])],
-            Kind::EdgeForce => vec![
+            EffectKind::CommonForce => vec![("factor", 1.0 + 0.1 * s[0])],
+            EffectKind::EdgeForce => vec![
                 ("kte_n_per_mm", job.edge_n_per_mm[0] + 0.1 * s[0] * edge),
                 ("kre_n_per_mm", job.edge_n_per_mm[1] + 0.1 * s[1] * edge),
             ],
-            Kind::ForceExponent => vec![
+            EffectKind::ForceExponent => vec![
                 ("exponent", 1.0 - 0.4 * s[0]),
                 ("reference_chip_mm", s[1] * job.feed_mm),
             ],
-            Kind::Runout => runout(0.2e3 * s[0] * job.feed_mm, s[1], job.teeth),
+            EffectKind::Runout => runout(0.2e3 * s[0] * job.feed_mm, s[1], job.teeth),
             // Scale: with one tooth always engaged, process damping would be half the damping of the structure.
-            Kind::ProcessDamping => {
+            EffectKind::ProcessDamping => {
                 vec![(
                     "process_damping_n_per_m",
                     0.5 * s[0] * machine.damping[(0, 0)] * cut.cutting_speed() / (1e-3 * cut.depth_mm),
                 )]
             }
-            Kind::AxialDepthModulation => vec![("on", s[0])],
-            Kind::SpeedFluctuation => vec![("delta", 0.02 * s[0]), ("frequency_hz", s[1] * cut.rpm / 60.0)],
-            Kind::Wear => vec![("relative_rate_per_s", 0.2 * s[0] / scale.seconds)],
+            EffectKind::AxialDepthModulation => vec![("on", s[0])],
+            EffectKind::SpeedFluctuation => {
+                vec![("delta", 0.02 * s[0]), ("frequency_hz", s[1] * cut.rpm / 60.0)]
+            }
+            EffectKind::Wear => vec![("relative_rate_per_s", 0.2 * s[0] / scale.seconds)],
             _ => return None,
         })
     }

@@ -8,7 +8,7 @@ use quietcut::recording::{Channel, Quantity, RecordedChannel, Recording, Sidecar
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-use super::cause::{Cause, Kind, STRUCTURAL, Scale};
+use super::cause::{Cause, EffectKind, STRUCTURAL, Scale};
 use super::machine::{Machine, between};
 use super::motion::{Path, System, first_order, interpolated};
 use super::noise::Whitening;
@@ -16,7 +16,7 @@ use super::oracle::Lab;
 use super::sensor::{Sensor, letter, noisy, read_by, sensors};
 use super::signal::signal;
 
-/// Kind of a test of the structure.
+/// EffectKind of a test of the structure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Test {
     /// A shaker with many tones, or a hammer.
@@ -284,7 +284,9 @@ impl Rig {
             .iter()
             .filter(|cause| cause.kind.of_sensor() && cause.sensor == index)
             .collect();
-        let by_mode = about.iter().find(|cause| cause.kind == Kind::SensorOffsetByMode);
+        let by_mode = about
+            .iter()
+            .find(|cause| cause.kind == EffectKind::SensorOffsetByMode);
         let elsewhere = by_mode.map(|cause| {
             let [first, second] = [0, 1].map(|mode| cause.values(machine, &self.scale)[mode].1 - 1.0);
             let moved = |(tip, freedoms): (&[f64; 3], &[[f64; 2]; 2])| {
@@ -383,31 +385,31 @@ impl Lab for Bench {
         self.rig.output(&self.machine, causes)
     }
 
-    fn places(&self, kind: Kind) -> Vec<(usize, usize)> {
+    fn places(&self, kind: EffectKind) -> Vec<(usize, usize)> {
         let sensors = &self.rig.sensors;
         // In free decays the delay of the only sensor is equivalent to an earlier start of the record.
         let only_late =
-            kind == Kind::SensorDelay && self.rig.kind == TestKind::FreeDecay && sensors.len() == 1;
-        if kind == Kind::CommonForce || only_late || !Cause::possible(kind, &self.machine) {
+            kind == EffectKind::SensorDelay && self.rig.kind == TestKind::FreeDecay && sensors.len() == 1;
+        if kind == EffectKind::CommonForce || only_late || !Cause::possible(kind, &self.machine) {
             Vec::new()
         } else if kind.of_sensor() {
             (0..sensors.len())
                 .filter(|sensor| {
-                    let of_place = matches!(kind, Kind::SensorOffset | Kind::SensorOffsetByMode);
+                    let of_place = matches!(kind, EffectKind::SensorOffset | EffectKind::SensorOffsetByMode);
                     !of_place || sensors[*sensor].at_housing
                 })
                 .map(|sensor| (sensors[sensor].axis, sensor))
                 .collect()
-        } else if matches!(kind, Kind::ModeCoupling | Kind::Drift) {
+        } else if matches!(kind, EffectKind::ModeCoupling | EffectKind::Drift) {
             vec![(0, 0)]
         } else {
             self.machine.axes.iter().map(|axis| (*axis, 0)).collect()
         }
     }
 
-    fn kinds(&self) -> Vec<Kind> {
+    fn kinds(&self) -> Vec<EffectKind> {
         let of_machine = |kind| match kind {
-            Kind::SensorOffset if self.machine.modal => Kind::SensorOffsetByMode,
+            EffectKind::SensorOffset if self.machine.modal => EffectKind::SensorOffsetByMode,
             kind => kind,
         };
         STRUCTURAL.map(of_machine).to_vec()

@@ -4,7 +4,7 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use super::cause::{Cause, Kind, Scale};
+use super::cause::{Cause, EffectKind, Scale};
 use super::machine::Machine;
 use super::motion::interpolated;
 
@@ -57,12 +57,14 @@ pub(crate) fn read_by(
     for cause in causes {
         let value = cause.values(machine, scale)[0].1;
         match cause.kind {
-            Kind::SensorGain | Kind::SensorOffset => weights = weights.map(|weight| weight * value),
+            EffectKind::SensorGain | EffectKind::SensorOffset => {
+                weights = weights.map(|weight| weight * value)
+            }
             // The series already contains this error.
-            Kind::SensorOffsetByMode => {}
-            Kind::SensorDelay => delay = value,
-            Kind::CrossAxis => weights[usize::from(sensor.axis == 0)] += value,
-            Kind::SensorSquare => second = value,
+            EffectKind::SensorOffsetByMode => {}
+            EffectKind::SensorDelay => delay = value,
+            EffectKind::CrossAxis => weights[usize::from(sensor.axis == 0)] += value,
+            EffectKind::SensorSquare => second = value,
             _ => third = value,
         }
     }

@@ -1,8 +1,8 @@
 //! Concludes a diagnosis: selects a candidate model and turns it into an answer.
 
-use crate::conclusion::answer::{Diagnosis, Gain, Outcome, Quality, Unexplained};
+use crate::conclusion::answer::{Diagnosis, EstimatedCause, Gain, Outcome, Quality, Unexplained};
 use crate::conclusion::parameter_estimates::{by_common_factor, parameter_estimates};
-use crate::conclusion::residual_views::residual_views;
+use crate::conclusion::residual_views::{ResidualView, residual_views};
 use crate::criteria::{
     CHANCE_OF_DOUBT, CONFIDENCE_LOSS, CONFIDENCE_WIDTH, DOUBT, DOUBTFUL_RESIDUAL, EQUIVALENT,
     HIGHEST_CONFIDENCE, NOISE_TOLERANCE, UNEXPLAINED_OF_FORCE, UNEXPLAINED_OF_RESPONSE,
@@ -48,45 +48,11 @@ fn answer(
     let held_out = regression.residual(Subset::HeldOut);
     let count = regression.count(Subset::HeldOut) as f64;
     let whole = regression.residual(Subset::Whole);
-    let baseline_quality = Quality {
-        nrmse_heldout: regression.nrmse(study, Subset::HeldOut),
-        nrmse_whole: regression.nrmse(study, Subset::Whole),
-    };
-    let mut diagnosis = Diagnosis {
-        outcome: Outcome::None,
-        baseline: baseline_quality,
-        causes: Vec::new(),
-        equivalent: Vec::new(),
-        extended: None,
-        gain: None,
-        unexplained: Unexplained {
-            fraction: 0.0,
-            location: "none above noise".into(),
-            guess: None,
-        },
-        lobes: None,
-        baseline_lobes: None,
-        next_test: None,
-        warnings: library.unexamined.clone(),
-        explanations: Vec::new(),
-        acting: 0,
-        views: residual_views(study, library, selection.best.as_ref()),
-    };
-    if baseline_quality.nrmse_whole > UNLIKE_SEGMENTS * baseline_quality.nrmse_heldout {
-        diagnosis.warnings.push(format!(
-            "prediction error (NRMSE): {:.2} % on held-out segments, {:.2} % overall: most of the residual lies in the fitted segments, so that the held-out gain is of little value",
-            100.0 * baseline_quality.nrmse_heldout,
-            100.0 * baseline_quality.nrmse_whole
-        ));
-    }
+    let views = residual_views(study, library, selection.best.as_ref());
+    let mut diagnosis = of_baseline(study, library, regression, views);
+    let baseline_quality = diagnosis.baseline;
     let (of_noise, of_excess) = criteria.excess(regression, selection.best.as_ref());
-    let allowed = match &selection.best {
-        _ if study.all_in(Domain::Force) => UNEXPLAINED_OF_FORCE,
-        Some(best) if best.simulated.is_some() => {
-            UNEXPLAINED_OF_RESPONSE * UNEXPLAINED_PER_FURTHER_CAUSE.powi(best.choices.len() as i32 - 1)
-        }
-        _ => UNEXPLAINED_OF_RESPONSE,
-    };
+    let allowed = allowed_residual(study, selection.best.as_ref());
     if of_noise > NOISE_TOLERANCE {
         diagnosis.unexplained.fraction = of_excess;
     }
@@ -126,19 +92,7 @@ fn answer(
     let best = &spread(best).unwrap_or_else(|| best.clone());
     diagnosis.causes = parameter_estimates(study, library, regression, best, uncertain, confidence);
     diagnosis.acting = diagnosis.causes.len();
-    for cause in diagnosis
-        .causes
-        .iter()
-        .filter(|cause| cause.name == EffectName::SensorGain.name())
-    {
-        let gain = cause.parameters["gain"].value;
-        if let Some(unit) = checks::unit_of_gain(gain) {
-            let channel = cause.channel.as_deref().unwrap_or("every channel of motion");
-            diagnosis.warnings.push(format!(
-                "{channel} reads {gain:.4} times the true value, which is about {unit}: check its unit and that of the force"
-            ));
-        }
-    }
+    diagnosis.warnings.extend(unit_warnings(&diagnosis.causes));
     diagnosis.explanations = vec![diagnosis.causes.clone()];
     let who = names(library, best);
     for other in &selection.others {
@@ -149,16 +103,7 @@ fn answer(
     let by_factor = by_common_factor(study, library, regression, best, inflation);
     diagnosis.add_rival(by_factor, false);
     if diagnosis.causes.len() > diagnosis.acting {
-        let shared: Vec<&'static str> = who
-            .into_iter()
-            .filter(|name| {
-                !selection.others.is_empty()
-                    && selection
-                        .others
-                        .iter()
-                        .all(|other| names(library, other).contains(name))
-            })
-            .collect();
+        let shared = shared_names(library, selection, &who);
         confound(&mut diagnosis, &shared);
     }
     let share = |left: f64, there: f64| (left / there.max(f64::MIN_POSITIVE)).sqrt();
@@ -168,6 +113,84 @@ fn answer(
     });
     diagnosis.gain = Some(Gain::new(held_out, left_held_out, count));
     diagnosis
+}
+
+/// The answer if the baseline is right, with a warning if the held-out segments differ from the others.
+fn of_baseline(
+    study: &Study<'_>,
+    library: &Library,
+    regression: &Regression,
+    views: Vec<ResidualView>,
+) -> Diagnosis {
+    let baseline = Quality {
+        nrmse_heldout: regression.nrmse(study, Subset::HeldOut),
+        nrmse_whole: regression.nrmse(study, Subset::Whole),
+    };
+    let mut warnings = library.unexamined.clone();
+    if baseline.nrmse_whole > UNLIKE_SEGMENTS * baseline.nrmse_heldout {
+        warnings.push(format!(
+            "prediction error (NRMSE): {:.2} % on held-out segments, {:.2} % overall: most of the residual lies in the fitted segments, so that the held-out gain is of little value",
+            100.0 * baseline.nrmse_heldout,
+            100.0 * baseline.nrmse_whole
+        ));
+    }
+    Diagnosis {
+        outcome: Outcome::None,
+        baseline,
+        causes: Vec::new(),
+        equivalent: Vec::new(),
+        extended: None,
+        gain: None,
+        unexplained: Unexplained {
+            fraction: 0.0,
+            location: "none above noise".into(),
+            guess: None,
+        },
+        lobes: None,
+        baseline_lobes: None,
+        next_test: None,
+        warnings,
+        explanations: Vec::new(),
+        acting: 0,
+        views,
+    }
+}
+
+/// Largest share of the baseline's residual energy above the noise that the candidate model `best` may leave.
+fn allowed_residual(study: &Study<'_>, best: Option<&CandidateModel>) -> f64 {
+    match best {
+        _ if study.all_in(Domain::Force) => UNEXPLAINED_OF_FORCE,
+        Some(best) if best.simulated.is_some() => {
+            UNEXPLAINED_OF_RESPONSE * UNEXPLAINED_PER_FURTHER_CAUSE.powi(best.choices.len() as i32 - 1)
+        }
+        _ => UNEXPLAINED_OF_RESPONSE,
+    }
+}
+
+/// Warnings about sensor gains that are near the ratio of a wrong unit.
+fn unit_warnings(causes: &[EstimatedCause]) -> Vec<String> {
+    causes
+        .iter()
+        .filter(|cause| cause.name == EffectName::SensorGain.name())
+        .filter_map(|cause| {
+            let gain = cause.parameters["gain"].value;
+            let unit = checks::unit_of_gain(gain)?;
+            let channel = cause.channel.as_deref().unwrap_or("every channel of motion");
+            Some(format!(
+                "{channel} reads {gain:.4} times the true value, which is about {unit}: check its unit and that of the force"
+            ))
+        })
+        .collect()
+}
+
+/// The names of the best candidate model that all equivalent models contain; empty without an equivalent model.
+fn shared_names(library: &Library, selection: &Selection, best: &[&'static str]) -> Vec<&'static str> {
+    let others = &selection.others;
+    let in_all = |name: &&'static str| {
+        let contains = |other: &CandidateModel| names(library, other).contains(name);
+        !others.is_empty() && others.iter().all(contains)
+    };
+    best.iter().copied().filter(in_all).collect()
 }
 
 /// Sets the outcome to confounded. The group of equivalent names holds those that not all equivalent candidate models share, and their

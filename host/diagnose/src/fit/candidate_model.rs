@@ -38,12 +38,12 @@ pub(crate) struct Simulated {
     /// By record: fitted initial state; empty for a start from rest.
     pub starts: Vec<Vec<f64>>,
     /// Prediction of the records by the extended case, if a later stage needs it.
-    pub reading: Option<Arc<Reading>>,
+    pub reading: Option<Arc<ExtendedPrediction>>,
 }
 
 /// Prediction of the records by an extended case.
 #[derive(Debug)]
-pub(crate) struct Reading {
+pub(crate) struct ExtendedPrediction {
     /// By record and channel: measured minus predicted samples.
     pub residuals: Vec<Vec<Vec<f64>>>,
     /// Noise-free samples of the channels.

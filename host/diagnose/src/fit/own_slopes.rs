@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::fit::candidate_model::Reading;
+use crate::fit::candidate_model::ExtendedPrediction;
 use crate::fit::candidate_model::{CandidateModel, Simulated};
 use crate::fit::library::Library;
 use crate::fit::regression::{Regression, Subset};
@@ -74,7 +74,12 @@ impl Relinearization<'_> {
     }
 
     /// The recordings with the extended case along the motion that was predicted before.
-    fn again(&self, library: &Library, at: &CandidateModel, known: &Reading) -> Option<Arc<Reading>> {
+    fn again(
+        &self,
+        library: &Library,
+        at: &CandidateModel,
+        known: &ExtendedPrediction,
+    ) -> Option<Arc<ExtendedPrediction>> {
         let extensions = library.extensions(self.study, at)?;
         self.read(&extensions, Some(&known.predicted)).map(Arc::new)
     }
@@ -86,7 +91,7 @@ impl Relinearization<'_> {
         regression: &mut Regression,
         at: &CandidateModel,
         shapes: &[Vec<usize>],
-        (known, now): (&Reading, &Reading),
+        (known, now): (&ExtendedPrediction, &ExtendedPrediction),
     ) -> Option<Slopes> {
         let mut of_baseline = library.columns_of(at);
         of_baseline.extend(shapes.iter().flatten());
@@ -144,7 +149,7 @@ fn whitened(regression: &Regression, residuals: &[Vec<Vec<f64>>]) -> DVector<f64
     DVector::from_vec(parts.into_iter().flat_map(|(_, part)| part).collect())
 }
 
-fn left_of(regression: &Regression, reading: &Reading) -> f64 {
+fn left_of(regression: &Regression, reading: &ExtendedPrediction) -> f64 {
     whitened(regression, &reading.residuals).norm_squared()
 }
 

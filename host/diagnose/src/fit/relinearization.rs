@@ -9,7 +9,7 @@
 use std::sync::Arc;
 
 use crate::candidates::extension_tables::joined;
-use crate::fit::candidate_model::Reading;
+use crate::fit::candidate_model::ExtendedPrediction;
 use crate::fit::candidate_model::{CandidateModel, Choice, Simulated};
 use crate::fit::closed_fit::ClosedFit;
 use crate::fit::covariance::covariance;
@@ -49,7 +49,7 @@ impl<'a> Relinearization<'a> {
         &self,
         extensions: &[(&'static str, toml::Table)],
         predicted: Option<&[Clean]>,
-    ) -> Option<Reading> {
+    ) -> Option<ExtendedPrediction> {
         let mut case = self.study.baseline.case.clone();
         let tables = extensions.iter().map(|(name, table)| (*name, table));
         case.extensions.extend(joined(tables));
@@ -80,7 +80,7 @@ impl<'a> Relinearization<'a> {
             .flatten()
             .flatten()
             .all(|sample| sample.is_finite());
-        finite.then(|| Reading {
+        finite.then(|| ExtendedPrediction {
             predicted: read.records.iter().map(Record::predicted).collect(),
             residuals,
         })
@@ -137,8 +137,8 @@ impl ClosedFit for Relinearization<'_> {
         let mut columns = library.columns_of(explanation);
         columns.extend(slopes.iter().flatten());
         let mut at = explanation.clone();
-        let mut predicted: Option<Arc<Reading>> = None;
-        let mut best: Option<(CandidateModel, Arc<Reading>)> = None;
+        let mut predicted: Option<Arc<ExtendedPrediction>> = None;
+        let mut best: Option<(CandidateModel, Arc<ExtendedPrediction>)> = None;
         for round in 0..ROUNDS {
             let Some(reading) = self.read(
                 &library.extensions(self.study, &at)?,

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use nalgebra::Matrix3;
 use num_complex::Complex64;
 
-use super::reading::Reading;
+use super::reading::SimulatedReading;
 use crate::baseline::{Baseline, derivatives};
 use crate::conclusion::residual_views::ResidualView;
 use crate::criteria::ASSUMED_NOISE;
@@ -125,8 +125,8 @@ impl<'a> Bench<'a> {
     }
 
     /// Standard deviation of each reading's noise: that of the same channel in the records, otherwise an assumed share of the reading.
-    pub(super) fn deviations(&self, readings: &[Reading]) -> Vec<f64> {
-        let of = |reading: &Reading| {
+    pub(super) fn deviations(&self, readings: &[SimulatedReading]) -> Vec<f64> {
+        let of = |reading: &SimulatedReading| {
             let measured = self
                 .channels
                 .iter()

@@ -4,7 +4,7 @@ use std::f64::consts::{PI, TAU};
 use std::path::Path;
 
 use super::bench::Bench;
-use super::reading::{Reading, SensorOf, Sensors};
+use super::reading::{SensorOf, Sensors, SimulatedReading};
 use crate::conclusion::answer::NextTest;
 use crate::criteria::LARGEST_PROPOSED_MOTION;
 use quietcut_model::case::Case;
@@ -145,7 +145,7 @@ impl Experiment {
     ///
     /// # Errors
     /// The experiment cannot be simulated, or the cut moves too far; the error is a sentence.
-    pub(super) fn readings(&self, bench: &Bench<'_>, case: &Case) -> Result<Vec<Reading>, String> {
+    pub(super) fn readings(&self, bench: &Bench<'_>, case: &Case) -> Result<Vec<SimulatedReading>, String> {
         let mounted = self.recording(bench, case)?;
         // A second sensor next to the mounted one has none of its faults: the extensions of sensors are removed.
         let mut faultless = case.clone();
@@ -192,7 +192,7 @@ impl Experiment {
             .into_iter()
             .map(|(name, of, mut samples)| {
                 samples.drain(..from.min(samples.len()));
-                Reading { name, of, samples }
+                SimulatedReading { name, of, samples }
             })
             .collect())
     }

@@ -20,7 +20,7 @@ pub(super) enum SensorOf {
 }
 
 /// Simulated samples of one sensor.
-pub(super) struct Reading {
+pub(super) struct SimulatedReading {
     pub(super) name: String,
     pub(super) of: SensorOf,
     pub(super) samples: Vec<f64>,
@@ -44,7 +44,7 @@ impl Sensors {
     }
 }
 
-impl Reading {
+impl SimulatedReading {
     pub(super) fn is_read_by(&self, sensors: Sensors) -> bool {
         match self.of {
             SensorOf::Mounted => true,

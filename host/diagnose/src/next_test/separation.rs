@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::bench::Bench;
 use super::experiment::Experiment;
-use super::reading::{Reading, Sensors};
+use super::reading::{Sensors, SimulatedReading};
 use crate::candidates::extension_tables::joined;
 use crate::conclusion::answer::{EstimatedCause, Figure, NINETY_PERCENT};
 use quietcut_model::case::Case;
@@ -20,9 +20,9 @@ pub(super) struct Rival<'a> {
 
 /// Readings of an experiment under a candidate model.
 pub(super) struct Predicted {
-    readings: Vec<Reading>,
+    readings: Vec<SimulatedReading>,
     /// By parameter: readings with the parameter changed by a step, and that step in standard deviations of the parameter.
-    moved: Vec<(Vec<Reading>, f64)>,
+    moved: Vec<(Vec<SimulatedReading>, f64)>,
 }
 
 /// Distance between two candidate models in an experiment.
@@ -141,7 +141,7 @@ fn difference(bench: &Bench<'_>, truth: &Predicted, model: &Predicted, sensors: 
     let compared: Vec<usize> = (0..truth.readings.len())
         .filter(|index| truth.readings[*index].is_read_by(sensors))
         .collect();
-    let stacked = |a: &[Reading], b: &[Reading]| -> DVector<f64> {
+    let stacked = |a: &[SimulatedReading], b: &[SimulatedReading]| -> DVector<f64> {
         let values = compared.iter().flat_map(|&index| {
             let pairs = a[index].samples.iter().zip(&b[index].samples);
             let difference: Vec<f64> = pairs.map(|(a, b)| (a - b) / deviations[index]).collect();
@@ -172,7 +172,7 @@ fn difference(bench: &Bench<'_>, truth: &Predicted, model: &Predicted, sensors: 
         channel: truth
             .readings
             .get(index)
-            .map_or_else(String::new, Reading::described),
+            .map_or_else(String::new, SimulatedReading::described),
         times_noise,
     }
 }
