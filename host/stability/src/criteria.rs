@@ -92,6 +92,11 @@ pub(crate) const MARGINS: [f64; 5] = [2.8, 0.3, 0.05, 0.01, 2e-3];
 /// found inside, so that the verdict is open. Unfounded.
 pub(crate) const FINE_MARGINS: [f64; 2] = [4e-4, 1e-4];
 
+/// Largest distances of the means over three successive numbers of points from one integer, latest first, at which a
+/// winding number counts as converged. Each doubling of the points squares the error once they resolve the nearest
+/// zero, which takes 0.4 to 0.16 and to 0.03.
+pub(crate) const WINDING_ERRORS: [f64; 3] = [0.02, 0.1, 0.4];
+
 // Limits along the depth.
 
 /// Least number of steps in depth of a chart. With 40 steps the lines of random machines agree with single depths
@@ -114,6 +119,21 @@ pub(crate) const LINE_FAR: f64 = 0.5;
 /// Distance of |μ| from 1 within which Newton's method corrects a multiplier of the scan before it counts as inside or
 /// outside the unit circle. It is 1e5 times the error of the scan, 1e-8 per element.
 pub(crate) const LINE_POLISHED: f64 = 1e-3;
+
+/// Distance by which the tangents of a multiplier from two sampled depths may miss each other half way, as a share of
+/// the distance that it travels between them; a larger one is another multiplier. Unfounded.
+pub(crate) const TANGENT_MISS: f64 = 0.25;
+
+/// Factor on the move of a multiplier along its tangent, over a step in depth, within which it may reach the unit
+/// circle and is followed. Unfounded.
+pub(crate) const REACH_FACTOR: f64 = 3.0;
+
+/// Distance of |μ| from 1 within which a multiplier is followed, however small its derivative. Unfounded.
+pub(crate) const REACH_LEAST: f64 = 0.02;
+
+/// Least distance of |μ| from 1 within a depth interval, by the cubic between its ends, as a share of the smaller
+/// distance at the ends; below it the multiplier may touch the circle and the interval is halved. Unfounded.
+pub(crate) const TOUCHING: f64 = 0.3;
 
 // Charts between the requested speeds.
 
@@ -225,6 +245,18 @@ pub(crate) const LOCUS_LEVELS: u32 = 16;
 /// its values at both ends, as a share of the larger of the two; beyond it the interval is halved. Unfounded.
 pub(crate) const LOCUS_BEND: f64 = 0.1;
 
+/// Largest move of a characteristic locus over a frequency interval, as a factor on its largest allowed deviation from
+/// a straight line. Unfounded.
+pub(crate) const LOCUS_MOVE: f64 = 6.0;
+
+/// Largest change of the argument of a determinant over half a frequency interval, as a share of π; a larger one halves
+/// the interval. The number of revolutions is unambiguous below 1; the factor of five is unfounded.
+pub(crate) const ARGUMENT_CHANGE: f64 = 0.2;
+
+/// Largest distance of the number of half revolutions of a determinant from an integer at which unstable roots are
+/// counted from it. A distance of 1/2 would be ambiguous; the margin is unfounded.
+pub(crate) const HALF_REVOLUTION_ERROR: f64 = 0.2;
+
 /// Values σ of the lines Re s = σ along which the roots s of a loop of receptances are searched, as multiples of the
 /// slowest decay rate of a resonance. Unfounded.
 pub(crate) const ROOT_LINES: [f64; 14] = [
@@ -240,6 +272,11 @@ pub(crate) const LOCUS_REACH: f64 = 0.05;
 pub(crate) const ZOA_BEND: f64 = 0.1;
 
 // Forced orbits.
+
+/// Velocity jump per force at the tool, relative to the largest entries of the output and input matrices times the
+/// number of states, up to which the structure counts as having a mass at the tool. It lies far above rounding; the
+/// value is unfounded.
+pub(crate) const VELOCITY_JUMP: f64 = 1e-6;
 
 /// Longest step along a branch of forced orbits, in units of the last depth and of the norm of the orbit at that depth.
 /// Unfounded: a branch up and down takes about a hundred steps.

@@ -6,7 +6,7 @@ use num_complex::Complex64;
 
 use super::loci::{argument_increase, crossings, trace};
 use super::open_loop::OpenLoop;
-use crate::criteria::{LEAST_ERROR, REAL_END_OFFSET, SAME_LIMIT};
+use crate::criteria::{HALF_REVOLUTION_ERROR, LEAST_ERROR, REAL_END_OFFSET, SAME_LIMIT};
 use crate::error::{Breakdown, StabilityError};
 use crate::limits::speed_line::{SpeedLine, Switch};
 use crate::spectrum::stability_loss::StabilityLoss;
@@ -101,7 +101,8 @@ pub(crate) fn unstable_roots(open_loop: &impl OpenLoop, depth_m: f64, sigma: f64
     // At both ends of the path the determinant is real, apart from rounding and from the truncation of harmonics at ω =
     // 0: the number of half revolutions is an integer.
     let rounded = half_turns.round();
-    ((half_turns - rounded).abs() < 0.2).then_some(open_loop.problem().poles_right_of(sigma) - rounded as i32)
+    ((half_turns - rounded).abs() < HALF_REVOLUTION_ERROR)
+        .then_some(open_loop.problem().poles_right_of(sigma) - rounded as i32)
 }
 
 /// Error estimate of a limit, m: the change with other computations (every second line of a table, another number of

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 
 use num_complex::Complex64;
 
-use crate::criteria::{LOCUS_BEND, LOCUS_LEVELS};
+use crate::criteria::{ARGUMENT_CHANGE, LOCUS_BEND, LOCUS_LEVELS, LOCUS_MOVE};
 use crate::error::Breakdown;
 
 /// Eigenvalues at one frequency.
@@ -103,7 +103,7 @@ fn is_straight(low: &Sample, middle: &Sample, high: &Sample, (floor, bend): (f64
             (Some(from), Some(to)) => {
                 let size = from.norm().max(to.norm());
                 (value - (from + to) * 0.5).norm() <= bend * size
-                    && (to - from).norm() <= 6.0 * bend * size
+                    && (to - from).norm() <= LOCUS_MOVE * bend * size
                     && is_alone(middle, index, (to - from).norm())
             }
             // A locus without a partner in a neighbouring sample must lie below the floor.
@@ -329,7 +329,7 @@ fn argument_increase_between(
     }
     // Twenty halvings reach a millionth of the grid interval: if the argument still changes by π/5, the function has a
     // zero on the path.
-    if first.abs().max(second.abs()) < 0.2 * PI || level == 20 {
+    if first.abs().max(second.abs()) < ARGUMENT_CHANGE * PI || level == 20 {
         return Some(first + second);
     }
     Some(

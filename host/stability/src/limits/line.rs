@@ -5,7 +5,9 @@ use num_complex::Complex64;
 
 use super::bounds::{check_depth, check_speed};
 use super::speed_line::{SpeedLine, Switch};
-use crate::criteria::{LINE_FAR, LINE_FOLLOWED, LINE_LEVELS, LINE_POLISHED};
+use crate::criteria::{
+    LINE_FAR, LINE_FOLLOWED, LINE_LEVELS, LINE_POLISHED, REACH_FACTOR, REACH_LEAST, TOUCHING,
+};
 use crate::error::{NO_SOLUTION, StabilityError};
 use crate::problem::linear::Problem;
 use crate::problem::period::check_length;
@@ -82,7 +84,7 @@ pub(crate) fn line_of<S: Spectrum>(
 
 /// True if the multiplier may reach the unit circle within a step in depth.
 fn is_near(root: &Root, step_m: f64) -> bool {
-    root.excess().abs() < (3.0 * root.slope.norm() * step_m + 0.02).min(LINE_FAR)
+    root.excess().abs() < (REACH_FACTOR * root.slope.norm() * step_m + REACH_LEAST).min(LINE_FAR)
 }
 
 #[derive(Clone, Debug)]
@@ -338,5 +340,5 @@ fn may_touch(from: &Root, to: &Root, step_m: f64) -> bool {
             side * (u * u * ((1.0 + 2.0 * t) * a + t * da) + t2 * ((3.0 - 2.0 * t) * b - u * db))
         })
         .fold(f64::INFINITY, f64::min);
-    nearest < 0.3 * a.abs().min(b.abs())
+    nearest < TOUCHING * a.abs().min(b.abs())
 }

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
+use crate::criteria::VELOCITY_JUMP;
 use crate::error::StabilityError;
 use crate::problem::linear::{CubicTerms, Problem};
 use crate::problem::pitched::Pitched;
@@ -133,6 +134,35 @@ pub(super) struct Cubic {
     damping: DMatrix<f64>,
 }
 
+impl Cubic {
+    /// Cubic terms of a case, for the states of its linear problem; `None` for a linear structure.
+    fn of(case: &Case, linear: &Problem) -> Result<Option<Self>, StabilityError> {
+        let structure = case.structure()?;
+        let Some(matrices) = structure.equation().filter(|_| structure.is_nonlinear()) else {
+            return Ok(None);
+        };
+        let size = matrices.mass.nrows();
+        // q̇ = s·(lower half): the scale s stands in the upper right corner of A.
+        let scale = linear.structure.a[(0, size)];
+        let inverse_mass = matrices
+            .mass
+            .clone()
+            .try_inverse()
+            .ok_or_else(|| StabilityError::Structure {
+                path: case.path.clone(),
+                cause: quietcut_model::structure::StructureError::SingularMass,
+            })?;
+        let part = |matrix: &Option<DMatrix<f64>>, factor: f64| match matrix {
+            Some(matrix) => &inverse_mass * matrix * factor,
+            None => DMatrix::zeros(size, size),
+        };
+        Ok(Some(Self {
+            stiffness: part(&matrices.cubic_stiffness, scale.recip()),
+            damping: part(&matrices.cubic_damping, scale * scale),
+        }))
+    }
+}
+
 impl ForcedProblem {
     /// Builds the forced problem of a case.
     ///
@@ -150,36 +180,11 @@ impl ForcedProblem {
         let pitched = Pitched::new(case, CubicTerms::Kept)?;
         let linear = pitched.with_mean_pitch().clone();
         let uneven = Uneven::of(case, &pitched)?;
-        let structure = case.structure()?;
-        let cubic = match structure.equation() {
-            Some(matrices) if structure.is_nonlinear() => {
-                let size = matrices.mass.nrows();
-                // q̇ = s·(lower half): the scale s stands in the upper right corner of A.
-                let scale = linear.structure.a[(0, size)];
-                let inverse_mass =
-                    matrices
-                        .mass
-                        .clone()
-                        .try_inverse()
-                        .ok_or_else(|| StabilityError::Structure {
-                            path: case.path.clone(),
-                            cause: quietcut_model::structure::StructureError::SingularMass,
-                        })?;
-                let part = |matrix: &Option<DMatrix<f64>>, factor: f64| match matrix {
-                    Some(matrix) => &inverse_mass * matrix * factor,
-                    None => DMatrix::zeros(size, size),
-                };
-                Some(Cubic {
-                    stiffness: part(&matrices.cubic_stiffness, scale.recip()),
-                    damping: part(&matrices.cubic_damping, scale * scale),
-                })
-            }
-            _ => None,
-        };
+        let cubic = Cubic::of(case, &linear)?;
         let about = about_orbit(case)?;
         let machine = linear.structure.rotated(-case.cut()?.feed_direction_deg);
         let jump = (&machine.c * &machine.b).amax();
-        let inertial = jump <= 1e-6 * machine.c.amax() * machine.b.amax() * machine.order() as f64;
+        let inertial = jump <= VELOCITY_JUMP * machine.c.amax() * machine.b.amax() * machine.order() as f64;
         if !inertial && (about.law.process_damping.is_some() || !about.terms.is_empty()) {
             return Err(StabilityError::NotCovered {
                 path: case.path.clone(),

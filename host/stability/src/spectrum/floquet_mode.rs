@@ -101,44 +101,23 @@ impl FloquetMode {
                 nodes.iter().map(at).collect()
             })
             .collect();
-        let structure = &problem.structure;
-        let transposed = FirstOrder {
-            a: structure.a.transpose(),
-            b: structure.c.transpose(),
-            c: structure.b.transpose(),
-        };
-        let mut forward = Vec::with_capacity(subintervals.len());
-        let mut adjoint = Vec::with_capacity(subintervals.len());
-        let reversed: Vec<Basis> = bases.iter().map(Basis::transposed).collect();
-        for (subinterval, ports) in subintervals.iter().zip(&ports) {
-            forward.push(MapFactor::new(structure, &bases[subinterval.basis], ports)?);
-            let exchanged: Vec<Ports> = ports
-                .iter()
-                .rev()
-                .map(|ports| ports.iter().map(|&(seen, force)| (force, seen)).collect())
-                .collect();
-            adjoint.push(MapFactor::new(
-                &transposed,
-                &reversed[subinterval.basis],
-                &exchanged,
-            )?);
-        }
+        let (forward, adjoint) = factors(&problem.structure, &bases, &subintervals, &ports)?;
         let order = problem.structure.order();
         let mut transition = Matrix::identity(order, order);
-        for passage in &forward {
-            transition = &passage.transition * transition;
+        for factor in &forward {
+            transition = &factor.transition * transition;
         }
         let mut right = eigenvector(&transition, multiplier)?;
         let mut left = eigenvector(&transition.transpose(), multiplier)?;
         let overlap = left.dot(&right);
         let mut rights = vec![right.clone()];
-        for passage in &forward {
-            right = &passage.transition * right;
+        for factor in &forward {
+            right = &factor.transition * right;
             rights.push(right.clone());
         }
         let mut lefts = vec![left.clone()];
-        for passage in adjoint.iter().rev() {
-            left = &passage.transition * left;
+        for factor in adjoint.iter().rev() {
+            left = &factor.transition * left;
             lefts.push(left.clone());
         }
         lefts.reverse();
@@ -179,6 +158,38 @@ impl FloquetMode {
             overlap,
         })
     }
+}
+
+/// Transitions over all subintervals: of the structure, and of the transposed structure in reversed time with directions
+/// of observation and of force exchanged. `None` if a collocation is singular.
+fn factors(
+    structure: &FirstOrder,
+    bases: &[Basis],
+    subintervals: &[Subinterval],
+    ports: &[Vec<Ports>],
+) -> Option<(Vec<MapFactor>, Vec<MapFactor>)> {
+    let transposed = FirstOrder {
+        a: structure.a.transpose(),
+        b: structure.c.transpose(),
+        c: structure.b.transpose(),
+    };
+    let mut forward = Vec::with_capacity(subintervals.len());
+    let mut adjoint = Vec::with_capacity(subintervals.len());
+    let reversed: Vec<Basis> = bases.iter().map(Basis::transposed).collect();
+    for (subinterval, ports) in subintervals.iter().zip(ports) {
+        forward.push(MapFactor::new(structure, &bases[subinterval.basis], ports)?);
+        let exchanged: Vec<Ports> = ports
+            .iter()
+            .rev()
+            .map(|ports| ports.iter().map(|&(seen, force)| (force, seen)).collect())
+            .collect();
+        adjoint.push(MapFactor::new(
+            &transposed,
+            &reversed[subinterval.basis],
+            &exchanged,
+        )?);
+    }
+    Some((forward, adjoint))
 }
 
 /// Divides the period into subintervals over which no motion exceeds the phase angle [`ANGLE`].

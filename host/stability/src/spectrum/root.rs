@@ -3,6 +3,7 @@
 use num_complex::Complex64;
 
 use super::stability_loss::StabilityLoss;
+use crate::criteria::TANGENT_MISS;
 
 /// Floquet multiplier at one axial depth, in the upper half plane or on the real axis.
 #[derive(Clone, Copy, Debug)]
@@ -35,7 +36,7 @@ impl Root {
             .enumerate()
             .min_by(|(_, a), (_, b)| miss(a).total_cmp(&miss(b)))?;
         let travel = 0.5 * step_m * (self.slope.norm() + to.slope.norm());
-        if miss(&to) > 0.25 * travel + 1e-6
+        if miss(&to) > TANGENT_MISS * travel + 1e-6
             || StabilityLoss::of(self.multiplier) != StabilityLoss::of(to.multiplier)
         {
             return None;

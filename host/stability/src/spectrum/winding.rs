@@ -13,7 +13,7 @@
 use num_complex::Complex64;
 
 use super::characteristic::{Characteristic, Workspace};
-use crate::criteria::{FINE_MARGINS, MARGINS, WOUND};
+use crate::criteria::{FINE_MARGINS, MARGINS, WINDING_ERRORS, WOUND};
 
 /// Largest number of floating-point operations of all evaluations together: a few seconds. A choice.
 const OPERATIONS_MAX: f64 = 3e9;
@@ -85,7 +85,12 @@ impl<'a> Search<'a> {
             let whole = mean.round();
             // Once the points resolve the zero nearest to the circle, each doubling of their number squares the error
             // of the mean. Three successive means close to the same integer are therefore taken as converged.
-            if (mean - whole).abs() < 0.02 && (last - whole).abs() < 0.1 && (before - whole).abs() < 0.4 {
+            let errors = [mean, last, before].map(|mean| (mean - whole).abs());
+            if errors
+                .iter()
+                .zip(WINDING_ERRORS)
+                .all(|(error, most)| *error < most)
+            {
                 return (whole >= 0.0).then_some(whole as usize);
             }
             (before, last) = (last, mean);
