@@ -137,26 +137,27 @@ pub(crate) const TOUCHING: f64 = 0.3;
 
 // Charts between the requested speeds.
 
-/// Largest error of a limit on the straight line between two speeds of a chart, relative to its depth: the 1 % that a chart
-/// promises.
+/// Largest error of a limit on the straight line between two speeds of a chart, relative to the depth of the limit: the
+/// 1 % that a chart states.
 pub(crate) const CHART_DEPTH: f64 = 0.01;
 
 /// Least relative gap between two speeds of a chart, and the error in speed of a steep limit: 0.1 %, the accuracy to which a
 /// spindle holds its speed.
 pub(crate) const CHART_SPEED: f64 = 1e-3;
 
-/// Fewest lines of a chart per lobe, the distance in speed over which the number of vibrations in a tooth period changes
-/// by one. A quarter of a turn of the multiplier has then three lines, so that the parabola through them bends as the limit
-/// does. Two thousand random points of random machines hold with it (`tests/between_speeds.rs`).
+/// Least number of lines of a chart per lobe. A lobe is the distance in speed over which the number of vibrations in a
+/// tooth period changes by one, and the multiplier rotates once. Three lines then lie in each quarter of a revolution,
+/// so that the parabola through them bends as the limit does. `tests/between_speeds.rs` checks two thousand random
+/// points of random machines.
 pub(crate) const LINES_OF_LOBE: f64 = 12.0;
 
-/// Widest relative gap between two speeds of a chart. A region of stability or of chatter that no neighbouring line shows is
-/// found if it is wider. Unfounded; a region of 2 % in speed and 5 % in depth is a thousandth of a chart over a
-/// range of one to 2.7, which is one of a thousand random points.
+/// Largest gap between two speeds of a chart, relative to the speed. A region of stability or of chatter that is wider
+/// appears in some line; a narrower one may not. Unfounded: a region of 2 % in speed and 5 % in depth is a thousandth
+/// of a chart over a factor of 2.7 in speed, hence contains one of a thousand random points.
 pub(crate) const CHART_GAP: f64 = 0.02;
 
-/// Relative gap between two speeds down to which it is halved beside a line that shows a tongue of instability. Half of the
-/// width 2ζ of a resonance with the damping ratio 0.5 % of a machine tool.
+/// Relative gap between two speeds down to which it is halved next to a line that shows a tongue of instability: half
+/// of the half-power width 2ζ of a resonance with the damping ratio ζ = 0.5 % of a machine tool.
 pub(crate) const TONGUE_GAP: f64 = 0.005;
 
 /// Largest number of lines that are added to a chart: an hour at a second per line, as cubic terms may need. Gaps that

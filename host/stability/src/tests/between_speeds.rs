@@ -1,4 +1,4 @@
-//! Charts between the speeds asked for: random points have the verdict that is drawn.
+//! Charts between their requested speeds: at random points the drawn verdict is that of the method.
 
 use rand::{RngExt, SeedableRng};
 use rayon::prelude::*;
@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use crate::tests::{problem, random_case};
 use crate::*;
 
-/// Points drawn in a chart, and how they came out.
+/// Numbers of random points in a chart, by the comparison of drawn and computed verdict.
 #[derive(Debug, Default)]
 struct Drawn {
     points: usize,
@@ -52,7 +52,7 @@ fn compare(chart: &Chart, method: &dyn Method, depth_mm: f64, points: usize, see
     drawn
 }
 
-/// Number of random machines; `QUIETCUT_SEEDS` sets another one.
+/// Number of random machines: 4 by default, or that of `QUIETCUT_SEEDS`.
 fn machines() -> u64 {
     std::env::var("QUIETCUT_SEEDS").map_or(4, |count| count.parse().unwrap())
 }
