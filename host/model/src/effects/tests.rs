@@ -74,6 +74,23 @@ fn the_list_is_whole_and_each_specification_names_its_own_entry() {
     }
 }
 
+#[test]
+fn a_static_stiffness_that_is_not_known_has_its_reason() {
+    use crate::structure::Form;
+
+    let error = |change: fn(&mut crate::structure::Matrices)| {
+        let mut structure = crate::case::tests::case("kuka-kr90-y17-low").structure.unwrap();
+        let Form::Matrices(matrices) = &mut structure.form else {
+            panic!("a structure of matrices");
+        };
+        change(matrices);
+        let effects = Effects::parse(["backlash=0.1"]).unwrap();
+        effects.0[0].restoring_forces(&structure).unwrap_err().to_string()
+    };
+    assert!(error(|matrices| matrices.stiffness.fill(0.0)).contains("it is free to move as a rigid body"));
+    assert!(error(|matrices| matrices.mass.fill(-1.0)).contains("the mass matrix is indefinite"));
+}
+
 /// Compares each describing function with the Fourier sum of the restoring force over one period of x = X·sin ωt.
 #[test]
 fn closed_forms_of_describing_functions_are_the_sums() {
