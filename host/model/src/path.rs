@@ -4,7 +4,7 @@ use super::{MotionState, Regime, RestoringForce};
 
 /// Displacement and velocity of the tool in the machine's axes, sampled at constant intervals. An axis without motion has empty vectors.
 #[derive(Clone, Debug, Default)]
-pub struct Motion {
+pub struct SampledMotion {
     /// Sampling interval, s.
     pub step_s: f64,
     /// Time of the first sample from the start of the recording, s.
@@ -17,7 +17,7 @@ pub struct Motion {
     pub rest_m_per_s: [f64; 3],
 }
 
-impl Motion {
+impl SampledMotion {
     /// Number of samples.
     pub fn len(&self) -> usize {
         self.x.iter().map(Vec::len).max().unwrap_or(0)
@@ -93,8 +93,8 @@ pub fn interpolated(samples: &[f64], place: f64) -> f64 {
 /// Restoring force f_r, N, in the machine's axes at each sample of `motion`.
 ///
 /// Regimes follow the motion as in a simulation. For dry friction without internal states, f_r is interpolated linearly between the two slip
-/// directions while the velocity is below the noise level [`Motion::rest_m_per_s`].
-pub fn restoring_along(restoring_force: &dyn RestoringForce, motion: &Motion) -> [Vec<f64>; 3] {
+/// directions while the velocity is below the noise level [`SampledMotion::rest_m_per_s`].
+pub fn restoring_along(restoring_force: &dyn RestoringForce, motion: &SampledMotion) -> [Vec<f64>; 3] {
     if let Some(axis) = restoring_force.holds().filter(|_| restoring_force.states() == 0) {
         let mut force: [Vec<f64>; 3] = std::array::from_fn(|_| vec![0.0; motion.len()]);
         for sample in 0..motion.len() {
@@ -119,7 +119,7 @@ pub fn restoring_along(restoring_force: &dyn RestoringForce, motion: &Motion) ->
 /// last.
 pub fn restoring_from(
     restoring_force: &dyn RestoringForce,
-    motion: &Motion,
+    motion: &SampledMotion,
     own: &mut [f64],
 ) -> [Vec<f64>; 3] {
     let count = motion.len();

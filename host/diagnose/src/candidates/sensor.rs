@@ -10,7 +10,7 @@ use crate::records::domain::Domain;
 use crate::records::record::Record;
 use crate::records::study::Study;
 use quietcut_recording::Quantity;
-use quietcut_simulate::path::Motion;
+use quietcut_simulate::path::SampledMotion;
 
 /// Names of the channels of motion, if all records are compared in the response domain; otherwise empty.
 pub(super) fn channels(study: &Study<'_>) -> Vec<String> {
@@ -162,7 +162,7 @@ pub(super) fn with_chip_of_true_motion(
     location: &Location,
     mut regressors: Vec<Regressor>,
     over: f64,
-    truth: impl Fn(&mut Motion, usize),
+    truth: impl Fn(&mut SampledMotion, usize),
 ) -> Vec<Regressor> {
     let (Some(cut), Some(regressor)) = (&record.cut, regressors.first_mut()) else {
         return regressors;

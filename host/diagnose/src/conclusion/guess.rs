@@ -14,7 +14,7 @@ use crate::criteria::LEAST_EXPLAINED_BY_GUESS;
 use crate::fit::regression::{Regression, Subset};
 use crate::records::study::Study;
 use quietcut_simulate::Effects;
-use quietcut_simulate::path::{Motion, restoring_along};
+use quietcut_simulate::path::{SampledMotion, restoring_along};
 
 /// Largest number of terms of a formula.
 const MOST: usize = 4;
@@ -152,7 +152,7 @@ fn column(study: &Study<'_>, axis: usize, term: FormulaTerm) -> Option<Vec<Vec<V
     is_finite.then_some(columns)
 }
 
-fn along(study: &Study<'_>, motion: &Motion, axis: usize, term: FormulaTerm) -> Option<Vec<f64>> {
+fn along(study: &Study<'_>, motion: &SampledMotion, axis: usize, term: FormulaTerm) -> Option<Vec<f64>> {
     let of = |f: &dyn Fn(f64, f64) -> f64| {
         let samples = motion.x[axis].iter().zip(&motion.v[axis]);
         samples.map(|(x, v)| f(*x, *v)).collect()

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use crate::motion::cut_force::CutForce;
 use crate::motion::mean_slopes::MeanSlopes;
 use crate::motion::spindle_motion::SpindleMotion;
-use quietcut_simulate::path::{Motion, interpolated};
+use quietcut_simulate::path::{SampledMotion, interpolated};
 use quietcut_simulate::{Cutter, Immersion, Tooth};
 
 /// By which share of its thickness a chip grows for the slope of its force.
@@ -80,7 +80,7 @@ impl Chips {
     pub(crate) fn new(
         cutter: &Cutter,
         spindle_motion: &SpindleMotion,
-        motion: &Motion,
+        motion: &SampledMotion,
         sampling: Sampling,
         at_samples: impl Fn(usize) -> bool + Sync,
     ) -> Self {
@@ -111,7 +111,12 @@ impl Chips {
     }
 
     /// The force of a tool that turns so along the motion of these chips.
-    pub(crate) fn force(&self, cutter: &Cutter, spindle_motion: &SpindleMotion, motion: &Motion) -> CutForce {
+    pub(crate) fn force(
+        &self,
+        cutter: &Cutter,
+        spindle_motion: &SpindleMotion,
+        motion: &SampledMotion,
+    ) -> CutForce {
         let of = |series, width_s| self.of_series_n(series, width_s, cutter, spindle_motion, motion);
         CutForce {
             mean_n: of(&self.over_samples, motion.step_s),
@@ -126,7 +131,7 @@ impl Chips {
         width_s: f64,
         cutter: &Cutter,
         spindle_motion: &SpindleMotion,
-        motion: &Motion,
+        motion: &SampledMotion,
     ) -> [Vec<f64>; 3] {
         let (radial_m, passes) = self.standing_out(cutter);
         let chips = || series.chips.iter().zip(series.thickness_m.chunks(self.passes));
@@ -293,7 +298,7 @@ fn series(samples: usize, of: impl Fn(usize, &mut Series) + Sync) -> Series {
 struct Along<'a> {
     cutter: &'a Cutter,
     spindle_motion: &'a SpindleMotion,
-    motion: &'a Motion,
+    motion: &'a SampledMotion,
     passes: usize,
     step_s: f64,
     end_s: f64,

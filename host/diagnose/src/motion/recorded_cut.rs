@@ -12,7 +12,7 @@ use crate::motion::spindle_motion::SpindleMotion;
 use quietcut_model::case::Case;
 use quietcut_model::milling::Cut;
 use quietcut_recording::Recording;
-use quietcut_simulate::path::Motion;
+use quietcut_simulate::path::SampledMotion;
 use quietcut_simulate::{Cutter, Effects, Spindle};
 
 /// Least sin φ, the share of the feed in the chip thickness, down to which the surfaces of earlier passes are evaluated.
@@ -99,7 +99,7 @@ impl RecordedCut {
     pub(crate) fn chips(
         &self,
         spindle_motion: &SpindleMotion,
-        motion: &Motion,
+        motion: &SampledMotion,
         finer: usize,
         with_force: bool,
     ) -> Chips {

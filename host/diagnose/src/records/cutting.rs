@@ -10,7 +10,7 @@ use crate::motion::spindle_motion::SpindleMotion;
 use crate::records::channel::Observed;
 use quietcut_recording::{Quantity, Recording};
 use quietcut_simulate::Cutter;
-use quietcut_simulate::path::Motion;
+use quietcut_simulate::path::SampledMotion;
 
 /// A recorded cut with the cutting force of the baseline along a motion.
 pub(crate) struct Cutting {
@@ -33,7 +33,7 @@ impl Cutting {
     pub(super) fn new(
         baseline: &Baseline<'_>,
         recording: &Recording,
-        motion: &Motion,
+        motion: &SampledMotion,
         finer: usize,
         with_force: bool,
     ) -> Result<Self, DiagnoseError> {
@@ -64,7 +64,7 @@ impl Cutting {
     }
 
     /// Recomputes chips and force along another motion.
-    pub(super) fn follow(&mut self, motion: &Motion) {
+    pub(super) fn follow(&mut self, motion: &SampledMotion) {
         self.chips = self
             .cut
             .chips(&self.cut.spindle_motion, motion, self.finer, self.with_force);
@@ -72,12 +72,12 @@ impl Cutting {
     }
 
     /// The cutting force of another tool with the same chips. `motion` is that of the chips.
-    pub(crate) fn force_of(&self, cutter: &Cutter, motion: &Motion) -> CutForce {
+    pub(crate) fn force_of(&self, cutter: &Cutter, motion: &SampledMotion) -> CutForce {
         self.chips.force(cutter, &self.cut.spindle_motion, motion)
     }
 
     /// The cutting force of the baseline's tool along another spindle motion or another motion of the tool, with new chips.
-    pub(crate) fn force_along(&self, spindle_motion: &SpindleMotion, motion: &Motion) -> CutForce {
+    pub(crate) fn force_along(&self, spindle_motion: &SpindleMotion, motion: &SampledMotion) -> CutForce {
         self.cut
             .chips(spindle_motion, motion, self.finer, self.with_force)
             .force(&self.cut.cutter, spindle_motion, motion)

@@ -10,7 +10,7 @@ use crate::records::channel::{Observed, main_axis};
 use crate::records::record::Record;
 use crate::signal::noise::{rms, white_floor};
 use quietcut_recording::{Quantity, Recording, TestKind};
-use quietcut_simulate::path::{Motion, restoring_along};
+use quietcut_simulate::path::{SampledMotion, restoring_along};
 
 /// Bins over which power is averaged before it is compared with the noise, to either side.
 const AVERAGED: usize = 4;
@@ -35,9 +35,9 @@ pub(crate) fn learn(
     let grid = &record.grid;
     let bins = grid.bins();
     let rate = grid.finer() as f64 * grid.rate_hz();
-    let mut motion = Motion {
+    let mut motion = SampledMotion {
         step_s: 1.0 / rate,
-        ..Motion::default()
+        ..SampledMotion::default()
     };
     let mut displacement: [Vec<Complex64>; 3] = std::array::from_fn(|_| Vec::new());
     let decay = fine_decay(record, baseline, rate);
@@ -276,9 +276,9 @@ pub(crate) fn compare_forces(
     let grid = record.grid.clone();
     let bins = grid.bins();
     let rate = grid.finer() as f64 * grid.rate_hz();
-    let mut motion = Motion {
+    let mut motion = SampledMotion {
         step_s: 1.0 / rate,
-        ..Motion::default()
+        ..SampledMotion::default()
     };
     let mut band_hz: f64 = 0.0;
     let mut spectra: [Vec<Complex64>; 3] = std::array::from_fn(|_| Vec::new());

@@ -18,7 +18,7 @@ use crate::records::{checks, cut_prediction, motion_estimate, response_predictio
 use crate::signal::grid::Grid;
 use crate::signal::noise::{BANDS, floor_between_impacts, rms, white_floor};
 use quietcut_recording::{Quantity, Recording, TestKind};
-use quietcut_simulate::path::Motion;
+use quietcut_simulate::path::SampledMotion;
 
 /// Least oversampling of a cut's record: its force jumps when teeth enter and leave.
 const FINER_IN_CUTS: usize = 8;
@@ -99,7 +99,7 @@ fn opened(baseline: &Baseline<'_>, recording: &Recording, known: Known) -> Resul
             .each_ref()
             .map(|force| floor_n(force, recording.sidecar.kind)),
         force_n,
-        motion: Motion::default(),
+        motion: SampledMotion::default(),
         displacement: std::array::from_fn(|_| Vec::new()),
         readings: Vec::new(),
         closed: None,

@@ -17,7 +17,7 @@ use crate::records::domain::Domain;
 use crate::signal::grid::Grid;
 use crate::signal::noise::{BANDS, floor_between_lines, rms, white_floor_beside};
 use quietcut_recording::{Quantity, TestKind};
-use quietcut_simulate::path::{Motion, restoring_along};
+use quietcut_simulate::path::{SampledMotion, restoring_along};
 
 /// By axis of the force: response of a channel per newton at the bins of the upsampled spectrum; empty for an axis without response.
 pub(crate) type Responses = [Vec<Complex64>; 3];
@@ -50,7 +50,7 @@ pub(crate) struct Record {
     /// Noise floor of each force as a standard deviation of white noise, N: sensor noise and aliased force.
     pub force_deviation_n: [f64; 3],
     /// Estimated motion: at each frequency the measured one or the predicted one, whichever is more certain.
-    pub motion: Motion,
+    pub motion: SampledMotion,
     /// Spectra of the estimated displacement at the samples of the record, m, continued smoothly beyond both ends. The continuation adds
     /// only free decays.
     pub displacement: [Vec<Complex64>; 3],

@@ -94,7 +94,7 @@ fn a_static_stiffness_that_is_not_known_has_its_reason() {
 /// Compares each describing function with the Fourier sum of the restoring force over one period of x = X·sin ωt.
 #[test]
 fn closed_forms_of_describing_functions_are_the_sums() {
-    use crate::path::{Motion, restoring_along};
+    use crate::path::{SampledMotion, restoring_along};
     use std::f64::consts::TAU;
 
     let structure = crate::case::tests::case("kuka-kr90-y17-low").structure.unwrap();
@@ -105,11 +105,11 @@ fn closed_forms_of_describing_functions_are_the_sums() {
             .map(|n| size * of(angle(n)))
             .collect()
     };
-    let motion = Motion {
+    let motion = SampledMotion {
         step_s: TAU / omega / f64::from(count),
         x: [Vec::new(), signal(f64::sin, amplitude), Vec::new()],
         v: [Vec::new(), signal(f64::cos, amplitude * omega), Vec::new()],
-        ..Motion::default()
+        ..SampledMotion::default()
     };
     let mut tried = 0;
     for texts in [

@@ -7,7 +7,7 @@ use nalgebra::DMatrix;
 use super::periodic_orbit::{Orbit, SubintervalNodes};
 use crate::criteria::{DISTURBANCE, DISTURBANCE_PERIODS};
 use quietcut_model::RestoringForce;
-use quietcut_model::path::{Motion, restoring_along, restoring_from};
+use quietcut_model::path::{SampledMotion, restoring_along, restoring_from};
 
 /// Number of samples of the orbit in each subinterval of the mesh. The phase angle of the fastest motion over a
 /// subinterval is a few radians. A choice.
@@ -80,7 +80,7 @@ impl Samples {
     }
 
     /// Motion over `periods` periods, with a disturbance added to one axis.
-    fn motion(&self, periods: usize, axis: usize, added: impl Fn(f64) -> [f64; 2]) -> Motion {
+    fn motion(&self, periods: usize, axis: usize, added: impl Fn(f64) -> [f64; 2]) -> SampledMotion {
         let count = self.len();
         let mut x: [Vec<f64>; 3] = std::array::from_fn(|axis| self.x[axis].repeat(periods));
         let mut v: [Vec<f64>; 3] = std::array::from_fn(|axis| self.v[axis].repeat(periods));
@@ -96,7 +96,7 @@ impl Samples {
             let steps = (0..count).map(|n| (velocity[(n + 1) % count] - velocity[n]).abs());
             0.5 * steps.fold(0.0, f64::max)
         });
-        Motion {
+        SampledMotion {
             step_s: self.step_s,
             start_s: 0.0,
             x,
