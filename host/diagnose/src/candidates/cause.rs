@@ -18,19 +18,19 @@ use quietcut_recording::Quantity;
 /// Where a cause acts.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub(crate) enum Location {
-    /// On the whole machine.
+    /// The cause acts on the whole machine.
     Everywhere,
-    /// Along one of the machine's axes (0, 1, 2).
+    /// The cause acts along one of the machine's axes (0, 1, 2).
     Axis(usize),
-    /// Along each of these axes, with separate coefficients for each axis.
+    /// The cause acts along each of these axes, with separate coefficients for each axis.
     EachOf(Vec<usize>),
-    /// Between two of the machine's axes.
+    /// The cause couples two of the machine's axes.
     Axes(usize, usize),
-    /// In the channel of this name.
+    /// The cause acts in the channel of this name.
     Channel(String),
-    /// In each of these channels, with the same coefficients.
+    /// The cause acts in each of these channels, with the same coefficients.
     Channels(Vec<String>),
-    /// In the channel of this name, which also reads this axis of the machine.
+    /// The cause acts in the channel of this name, which also reads this axis of the machine.
     ChannelFrom(String, usize),
 }
 

@@ -12,7 +12,7 @@ use quietcut_simulate::Cutter;
 pub(super) struct Coefficients {
     pub(super) effect: EffectName,
     pub(super) keys: [&'static str; 3],
-    /// The three coefficients in the material.
+    /// The tangential, radial and axial coefficient in a material.
     pub(super) of: fn(&mut Material) -> [&mut f64; 3],
     /// Step of a coefficient, in its unit, of the size of the coefficients themselves.
     pub(super) step: fn(&Cutter) -> f64,

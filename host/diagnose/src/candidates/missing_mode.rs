@@ -23,7 +23,7 @@ use quietcut_model::effects::EffectName;
 
 pub(super) struct MissingMode;
 
-/// Damping ratios of the start values.
+/// Damping ratios of a missing mode at which its search starts.
 const DAMPING: [f64; 3] = [0.008, 0.025, 0.08];
 /// Number of start values: the highest peaks of the search over frequency and damping ratio.
 const KEPT: usize = 4;

@@ -179,7 +179,7 @@ pub struct NextTest {
 }
 
 impl NextTest {
-    /// The test as a sentence without full stop.
+    /// The proposed test in words, as a sentence without full stop.
     pub fn what(&self) -> String {
         let list = |values: &[f64]| {
             let values: Vec<String> = values.iter().map(|value| format!("{value:.3}")).collect();
@@ -220,7 +220,7 @@ pub struct Diagnosis {
     pub baseline: Quality,
     /// The causes, the most certain first; if they are confounded, those of all candidate models.
     pub causes: Vec<EstimatedCause>,
-    /// Names that are equivalent on these records.
+    /// Groups of cause names that the records cannot separate.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub equivalent: Vec<Vec<&'static str>>,
     /// Prediction error of the extended case.
@@ -315,7 +315,7 @@ mod tests {
             (gain.ci90[0] - 0.926).abs() < 1e-3 && gain.ci90[1] == 1.0,
             "{gain:?}"
         );
-        // With noise alone before, the explained share is unknown.
+        // If the residual before the extension is noise alone, the explained share is unknown.
         let gain = Gain::new(990.0, 980.0, 1000.0);
         assert_eq!(gain.ci90, [-1.0, 1.0]);
         assert_eq!(Gain::new(1001.0, 1500.0, 1000.0).residual_energy_removed, -1.0);

@@ -19,7 +19,7 @@ use quietcut_simulate::path::{SampledMotion, restoring_along};
 /// Largest number of terms of a formula.
 const MOST: usize = 4;
 
-/// Exponents of x and v in products of powers.
+/// Exponents (i, j) of the terms x^i·v^j of a formula.
 const POWERS: [(i32, i32); 16] = [
     (1, 0),
     (0, 1),

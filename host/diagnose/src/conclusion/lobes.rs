@@ -37,9 +37,9 @@ const BELOW_CUTS: f64 = 1.2;
 /// Stability limit at one spindle speed before and after the extension; `None` if it is above the largest depth of the search.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Change {
-    /// Limit of axial depth of the case, mm.
+    /// Stability limit of axial depth of the case without the extension, mm.
     pub limit_before_mm: Option<f64>,
-    /// Limit of axial depth of the extended case, mm.
+    /// Stability limit of axial depth of the extended case, mm.
     pub limit_after_mm: Option<f64>,
     /// 90 % interval of `limit_after_mm`, from the intervals of the parameters. An upper end of `None` is above the largest depth of the
     /// search.
@@ -47,13 +47,13 @@ pub struct Change {
     pub limit_after_ci90_mm: Option<[Option<f64>; 2]>,
     /// Spindle speed, rev/min.
     pub at_rpm: f64,
-    /// Type of the stability loss of the case.
+    /// Type of the stability loss at the limit of the case without the extension.
     pub kind_before: Option<StabilityLoss>,
-    /// Type of the stability loss of the extended case.
+    /// Type of the stability loss at the limit of the extended case.
     pub kind_after: Option<StabilityLoss>,
-    /// Chatter frequency of the case, Hz.
+    /// Chatter frequency at the limit of the case without the extension, Hz.
     pub chatter_before_hz: Option<f64>,
-    /// Chatter frequency of the extended case, Hz.
+    /// Chatter frequency at the limit of the extended case, Hz.
     pub chatter_after_hz: Option<f64>,
 }
 
@@ -94,7 +94,7 @@ pub struct Lobes {
     pub after_s: Option<f64>,
     /// Name of the stability method of the extended case.
     pub method_after: &'static str,
-    /// Limits at every speed of the chart.
+    /// Stability limits before and after the extension, at every speed of the chart.
     pub speeds: Vec<Change>,
     /// Predictions of trial cuts and recorded cuts, if there are any.
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -42,7 +42,7 @@ pub(crate) struct OutputError<'a> {
 /// One column of the Jacobian: record, free parameter, values.
 pub(crate) type Column = (usize, usize, Vec<f64>);
 
-/// Jᵀ r for `size` free parameters.
+/// Jᵀ r, the product of the Jacobian's columns with the residuals, for `size` free parameters.
 pub(crate) fn projected(columns: &[Column], size: usize, residuals: &[Vec<f64>]) -> DVector<f64> {
     let mut sum = DVector::zeros(size);
     for (record, slot, column) in columns {

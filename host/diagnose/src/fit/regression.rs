@@ -38,7 +38,7 @@ pub(crate) struct Refit {
     pub change: Vec<f64>,
     /// χ² before the change.
     pub before: f64,
-    /// Decrease of χ² by the change.
+    /// Decrease of χ² by the change of the coefficients.
     pub taken: f64,
 }
 

@@ -7,7 +7,7 @@ use crate::fit::output_error::OutputError;
 use crate::fit::segment::Segment;
 use crate::fit::unknowns::{FitProblem, ParameterPoint, SearchResult, at_bounds, energy, predicted, stepped};
 
-/// Largest number of iterations of a search.
+/// Largest number of Levenberg–Marquardt iterations of a search.
 pub(crate) const ROUNDS: usize = 15;
 
 impl OutputError<'_> {

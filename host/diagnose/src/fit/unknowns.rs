@@ -44,7 +44,7 @@ pub(crate) struct FitProblem<'a> {
 pub(crate) struct SearchResult {
     pub(crate) point: ParameterPoint,
     pub(crate) left: f64,
-    /// Jᵀ J of the free parameters.
+    /// Normal matrix Jᵀ J of the free parameters at the end of the search.
     pub(crate) normal: DMatrix<f64>,
 }
 

@@ -3,9 +3,9 @@
 /// The cutting force along the machine's axes, N.
 #[derive(Clone, Debug)]
 pub(crate) struct CutForce {
-    /// Mean over each interval of the upsampled grid.
+    /// Mean cutting force over each interval of the upsampled grid, N.
     pub mean_n: [Vec<f64>; 3],
-    /// Force at the samples of the record, if forces are measured; 0 at samples near the entry or exit of a tooth.
+    /// Cutting force at the samples of the record, N, if forces are measured; 0 at samples near the entry or exit of a tooth.
     pub sampled_n: [Vec<f64>; 3],
 }
 

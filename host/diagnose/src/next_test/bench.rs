@@ -203,7 +203,7 @@ fn cut_so_far(case: &Case, recording: &Recording) -> Option<CutSoFar> {
     Some(CutSoFar {
         rpm: given.spindle_rpm?,
         depth_mm: given.axial_depth_mm?,
-        // A case without a cut is refused before this.
+        // The preparation of the records has refused a case without a cut.
         cut: cut_of(case, recording).ok()?,
     })
 }

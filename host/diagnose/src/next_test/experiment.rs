@@ -255,7 +255,7 @@ impl Experiment {
         }
     }
 
-    /// The test in the form of the answer.
+    /// The test as the entry `next_test` of the answer.
     pub(super) fn described(&self, sensors: Sensors, distance: f64, why: String) -> NextTest {
         let plain = NextTest {
             kind: "",

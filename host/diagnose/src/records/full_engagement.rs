@@ -215,7 +215,7 @@ struct Levels {
     chatters: bool,
     /// Levels by channel and revolution.
     of: Vec<Vec<f64>>,
-    /// Noise of each channel over its reference.
+    /// Standard deviation of each channel's noise over the reference level of the channel.
     noise: Vec<f64>,
 }
 

@@ -65,7 +65,7 @@ pub(crate) struct Record {
     /// Receptance H(iω) of the baseline, m/N, at the bins of the upsampled spectrum. In the force domain: dynamic stiffness, N/m, at the
     /// bins of the samples.
     pub transfer: Vec<Matrix3<Complex64>>,
-    /// By channel: response per newton of force.
+    /// By channel: frequency response per newton of force, at the bins of the upsampled spectrum.
     pub(super) responses: Vec<Responses>,
     /// Range of the samples that are compared. Samples before it only determine later chips. Near the end of a cut the motion is less
     /// certain if its sensors measure velocity or acceleration.
