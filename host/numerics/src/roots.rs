@@ -36,9 +36,9 @@ const STEPS_MAX: usize = 100;
 
 /// Root of an increasing function in [low, high] by Newton's method, in which bisection replaces a step that leaves the bracket.
 ///
-/// `function` returns value and derivative. The error of the root is 2 ε · max(|x|, high − low), with the machine precision ε.
+/// `function` returns value and derivative. The error of the root is 2 ε · max(|x|, (high − low)/2), with the machine precision ε.
 pub fn monotone([mut low, mut high]: [f64; 2], start: f64, function: impl Fn(f64) -> [f64; 2]) -> f64 {
-    let reach = high - low;
+    let reach = 0.5 * (high - low);
     let mut x = start;
     for _ in 0..STEPS_MAX {
         let [value, slope] = function(x);

@@ -47,7 +47,7 @@ pub fn normal_quantile(share: f64) -> f64 {
 }
 
 /// The probability that |t| of Student's distribution with ν degrees of freedom stays below `t`: 1 − I_{ν/(ν + t²)}(ν/2, 1/2).
-pub fn student_two_sided_probability(t: f64, freedoms: f64) -> f64 {
+fn student_two_sided_probability(t: f64, freedoms: f64) -> f64 {
     // The complement I_{t²/(ν + t²)}(1/2, ν/2), which is free of cancellation for small t.
     incomplete_beta(0.5, 0.5 * freedoms, t * t / (freedoms + t * t))
 }
@@ -55,7 +55,7 @@ pub fn student_two_sided_probability(t: f64, freedoms: f64) -> f64 {
 /// Half the width of the two-sided interval that contains a variable of Student's distribution with the probability `share`; error 1e-10.
 ///
 /// Infinite without degrees of freedom.
-pub fn student_two_sided_quantile(share: f64, freedoms: f64) -> f64 {
+fn student_two_sided_quantile(share: f64, freedoms: f64) -> f64 {
     if freedoms <= 0.0 {
         return f64::INFINITY;
     }
@@ -78,25 +78,13 @@ pub fn chi_squared_quantile(share: f64, freedoms: f64) -> f64 {
 }
 
 /// The probability that F with (ν₁, ν₂) degrees of freedom stays below x: I_{ν₁x/(ν₁x + ν₂)}(ν₁/2, ν₂/2).
-pub fn f_probability(x: f64, [above, below]: [f64; 2]) -> f64 {
+fn f_probability(x: f64, [above, below]: [f64; 2]) -> f64 {
     incomplete_beta(0.5 * above, 0.5 * below, above * x / (above * x + below))
 }
 
 /// The number below which F with (ν₁, ν₂) degrees of freedom stays with the probability `share`; relative error 1e-10.
 pub fn f_quantile(share: f64, freedoms: [f64; 2]) -> f64 {
     quantile(share, |x| f_probability(x, freedoms))
-}
-
-/// The number below which Hotelling's T² of a mean of `samples` vectors of `dimension` entries stays with probability `share`:
-/// p(n − 1)/(n − p) F_{p, n − p}.
-///
-/// Infinite where there are not more samples than entries.
-pub fn hotelling_quantile(share: f64, dimension: usize, samples: usize) -> f64 {
-    if samples <= dimension {
-        return f64::INFINITY;
-    }
-    let (p, n) = (dimension as f64, samples as f64);
-    p * (n - 1.0) / (n - p) * f_quantile(share, [p, n - p])
 }
 
 /// Exact two-sided confidence interval, at the level `share`, of a probability after `hits` successes in `trials` trials (Clopper and
@@ -325,8 +313,6 @@ mod tests {
         // t² is F with one degree of freedom above.
         let t = student_two_sided_quantile(0.9, 7.0);
         assert!((f_quantile(0.9, [1.0, 7.0]) - t * t).abs() < 1e-9);
-        assert!((hotelling_quantile(0.9, 1, 8) - t * t).abs() < 1e-9);
-        assert_eq!(hotelling_quantile(0.9, 3, 3), f64::INFINITY);
     }
 
     #[test]

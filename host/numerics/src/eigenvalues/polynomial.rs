@@ -20,8 +20,8 @@ pub fn polynomial_roots(coefficients: &[Complex64]) -> Result<Vec<Complex64>, Ei
     };
     let leading = coefficients[degree];
     of_complex(DMatrix::from_fn(degree, degree, |i, j| {
-        if j + 1 == degree {
-            -coefficients[i] / leading
+        if i == 0 {
+            -coefficients[degree - 1 - j] / leading
         } else {
             Complex64::from(f64::from(u8::from(i == j + 1)))
         }

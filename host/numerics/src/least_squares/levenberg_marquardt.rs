@@ -128,6 +128,8 @@ pub struct LevenbergMarquardt {
     pub iterations_max: usize,
     /// Largest number of steps that are tried from one linearization.
     pub trials_max: usize,
+    /// Ridge that is added to every damping: it regularizes parameters that depend on each other below the accuracy of the derivatives.
+    pub ridge: f64,
     /// Treatment of parameters without effect on the prediction.
     pub idle: Idle,
 }
@@ -205,7 +207,7 @@ impl LevenbergMarquardt {
     }
 
     fn step(&self, sums: &NormalSums, damping: f64) -> Option<DVector<f64>> {
-        let step = NormalEquations::new(&sums.matrix, damping, self.idle)?.solve(&sums.gradient);
+        let step = NormalEquations::new(&sums.matrix, self.ridge + damping, self.idle)?.solve(&sums.gradient);
         step.iter().all(|entry| entry.is_finite()).then_some(step)
     }
 }

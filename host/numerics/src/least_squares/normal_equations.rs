@@ -57,7 +57,7 @@ impl<T: ComplexField<RealField = f64>> NormalEquations<T> {
         for j in 0..size {
             scaled[(j, j)] = T::from_real(1.0 + ridge);
             for i in j + 1..size {
-                scaled[(i, j)] = matrix[(i, j)].clone().scale(scale[i] * scale[j]);
+                scaled[(i, j)] = matrix[(i, j)].clone().scale(scale[i]).scale(scale[j]);
             }
         }
         Some(Self {
@@ -90,7 +90,7 @@ impl<T: ComplexField<RealField = f64>> NormalEquations<T> {
         for j in 0..self.scale.len() {
             for i in 0..self.scale.len() {
                 let entry = inverse[(i, j)].clone();
-                inverse[(i, j)] = entry.scale(self.scale[i] * self.scale[j]);
+                inverse[(i, j)] = entry.scale(self.scale[i]).scale(self.scale[j]);
             }
         }
         inverse

@@ -248,6 +248,7 @@ fn iteration(first: f64, iterations_max: usize) -> LevenbergMarquardt {
         damping: Damping::tenfold(first),
         iterations_max,
         trials_max: 13,
+        ridge: 0.0,
         idle: Idle::Refuse,
     }
 }
@@ -489,4 +490,31 @@ fn dependent_columns_share_the_solution_of_least_norm() {
     let found = MinimumNorm::new(matrix, Tolerance::Absolute(0.0)).unwrap();
     assert!((found.solve(&right) - fit.parameters).amax() < 1e-13);
     assert!(MinimumNorm::new(DMatrix::zeros(0, 3), Tolerance::Absolute(0.0)).is_err());
+}
+
+#[test]
+fn the_covariance_comes_from_the_triangle_and_keeps_the_digits_that_normal_equations_lose() {
+    // Unit upper triangular with −1 above the diagonal: A⁻¹ has 1 on the diagonal and 2^(j − i − 1) above it, so that
+    // (AᵀA)⁻¹ = A⁻¹A⁻ᵀ is a sum of powers of two. The condition number is 20 · 2¹⁹ = 1e7.
+    let size = 20;
+    let matrix = DMatrix::from_fn(size, size, |i, j| match i.cmp(&j) {
+        std::cmp::Ordering::Less => -1.0,
+        std::cmp::Ordering::Equal => 1.0,
+        std::cmp::Ordering::Greater => 0.0,
+    });
+    let inverse = DMatrix::from_fn(size, size, |i, j| match i.cmp(&j) {
+        std::cmp::Ordering::Less => 2.0_f64.powi((j - i) as i32 - 1),
+        std::cmp::Ordering::Equal => 1.0,
+        std::cmp::Ordering::Greater => 0.0,
+    });
+    let exact = &inverse * inverse.transpose();
+    let error = |covariance: &DMatrix<f64>| (covariance - &exact).amax() / exact.amax();
+    let fit = LinearProblem::new(&matrix, &DVector::repeat(size, 1.0))
+        .solve()
+        .unwrap();
+    // Rounding 1e-16 times the condition number.
+    assert!(error(&fit.covariance) < 1e-8, "{:e}", error(&fit.covariance));
+    // The square of the condition number leaves two or three digits, or none.
+    let by_squares = invert_normal_equations(&matrix.tr_mul(&matrix));
+    assert!(by_squares.is_none_or(|covariance| error(&covariance) > 1e-6));
 }

@@ -1,0 +1,69 @@
+//! Eigenvectors of a matrix by inverse iteration.
+
+use nalgebra::{DMatrix, DVector};
+use num_complex::Complex64;
+
+/// Number of steps of the inverse iteration. Each amplifies the eigenvector by 1e8 over the others.
+const STEPS: usize = 3;
+
+/// Relative distance of the shift from the eigenvalue, which keeps the matrix regular.
+const BESIDE: f64 = 1e-8;
+
+/// Right eigenvector of length 1 of a matrix for an approximate eigenvalue. `None` if the matrix is not finite.
+pub fn eigenvector(matrix: &DMatrix<Complex64>, eigenvalue: Complex64) -> Option<DVector<Complex64>> {
+    let order = matrix.nrows();
+    let shift = if eigenvalue.norm() > 0.0 {
+        eigenvalue * (1.0 + BESIDE)
+    } else {
+        Complex64::from(1e-10 * matrix.norm())
+    };
+    null_vector(matrix - DMatrix::identity(order, order) * shift)
+}
+
+/// Vector v of length 1 with the least ‖A v‖ of a matrix A that is nearly singular, but not exactly. `None` if A is singular or not
+/// finite.
+pub fn null_vector(matrix: DMatrix<Complex64>) -> Option<DVector<Complex64>> {
+    let order = matrix.nrows();
+    let lu = matrix.lu();
+    let mut vector = DVector::from_fn(order, |i, _| Complex64::new(1.0, 0.3 * i as f64));
+    for _ in 0..STEPS {
+        vector = lu.solve(&vector)?;
+        let norm = vector.norm();
+        if !(norm.is_finite() && norm > 0.0) {
+            return None;
+        }
+        vector.unscale_mut(norm);
+    }
+    Some(vector)
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::{RngExt, SeedableRng};
+
+    use super::*;
+    use crate::eigenvalues::of_complex;
+
+    #[test]
+    fn every_eigenvector_of_a_random_matrix_meets_its_equation() {
+        let seed = 23;
+        println!("seed {seed}");
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
+        for size in [1, 2, 5, 20] {
+            let matrix = DMatrix::from_fn(size, size, |_, _| {
+                Complex64::new(rng.random_range(-1.0..1.0), rng.random_range(-1.0..1.0))
+            });
+            for eigenvalue in of_complex(matrix.clone()).unwrap() {
+                let vector = eigenvector(&matrix, eigenvalue).unwrap();
+                assert!((vector.norm() - 1.0).abs() < 1e-14);
+                let miss = &matrix * &vector - &vector * eigenvalue;
+                assert!(miss.norm() < 1e-12 * matrix.norm(), "{size}: {}", miss.norm());
+            }
+        }
+        // An eigenvalue of zero, and no number.
+        let nilpotent = DMatrix::from_fn(2, 2, |i, j| Complex64::from(f64::from(u8::from(i < j))));
+        let vector = eigenvector(&nilpotent, Complex64::ZERO).unwrap();
+        assert!(vector[1].norm() < 1e-9);
+        assert!(null_vector(DMatrix::repeat(2, 2, Complex64::from(f64::NAN))).is_none());
+    }
+}
