@@ -9,10 +9,14 @@ use std::f64::consts::TAU;
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use quietcut_numerics::eigenvalues::{EigenvalueError, of_real};
-use quietcut_numerics::singular_values::{SingularValueError, Vectors, decompose};
+use quietcut_numerics::least_squares::{MinimumNorm, Tolerance, eliminated};
+use quietcut_numerics::singular_values::SingularValueError;
 
 /// Number of pole relocations. A choice: the poles usually converge within a few.
 const ROUNDS: usize = 20;
+
+/// Singular value of normalized columns below which they depend on each other: about the rounding of their sums.
+const DEPENDENT: Tolerance = Tolerance::Absolute(1e-13);
 
 /// Error of fitting a sum of modes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -30,9 +34,9 @@ pub enum RationalFitError {
     /// The least-squares equations have no computable singular values.
     #[error(transparent)]
     Equations(#[from] SingularValueError),
-    /// The least-squares equations have no solution.
-    #[error("{0}")]
-    Solution(&'static str),
+    /// The list of orders to try is empty.
+    #[error("no model order is tried")]
+    NoOrder,
     /// The poles cannot be computed.
     #[error(transparent)]
     Poles(#[from] EigenvalueError),
@@ -147,37 +151,23 @@ fn relocated(
             matrix[(2 * k, width + own)] = h.re;
             matrix[(2 * k + 1, width + own)] = h.im;
         }
-        // QR decomposition eliminates the residues of this function: the lower block of R has the common unknowns c_n only.
-        balance(&mut matrix, width);
-        let r = matrix.qr().r();
-        let count = (r.nrows() - width).min(own);
+        // Eliminates the residues of this function: the remaining equations have the common unknowns c_n only.
+        let common = eliminated(matrix, width);
+        let count = common.nrows().min(own);
         let at = left.nrows();
         left = left.resize_vertically(at + count, 0.0);
         right = right.resize_vertically(at + count, 0.0);
-        for i in 0..count {
-            for j in 0..own {
-                left[(at + i, j)] = r[(width + i, width + j)];
-            }
-            right[at + i] = r[(width + i, width + own)];
-        }
+        left.rows_mut(at, count)
+            .copy_from(&common.view((0, 0), (count, own)));
+        right
+            .rows_mut(at, count)
+            .copy_from(&common.view((0, own), (count, 1)));
     }
     if left.nrows() < own {
         return Err(undetermined(frequency_hz, functions, poles.len()));
     }
-    let c = decompose(left, Vectors::Both)?
-        .solve(&right, 1e-13)
-        .map_err(RationalFitError::Solution)?;
+    let c = MinimumNorm::new(left, DEPENDENT)?.solve(&right);
     Ok(zeros(poles, &c)?)
-}
-
-/// Scales the first `columns` columns to unit norm, since the basis functions span many powers of ten.
-fn balance(matrix: &mut DMatrix<f64>, columns: usize) {
-    for mut column in matrix.column_iter_mut().take(columns) {
-        let norm = column.norm();
-        if norm > 0.0 {
-            column /= norm;
-        }
-    }
 }
 
 /// Zeros of σ = 1 + Σ c_n φ_n: the eigenvalues of A − b cᵀ in real form. Zeros with positive real part are mirrored at the imaginary axis.
@@ -226,17 +216,20 @@ pub fn residues(
             matrix[(2 * k + 1, column)] = value.im;
         }
     }
+    // The basis spans many powers of ten.
     let norms: Vec<f64> = matrix.column_iter().map(|column| column.norm()).collect();
-    balance(&mut matrix, width);
-    let decomposed = decompose(matrix.clone(), Vectors::Both)?;
+    for (mut column, norm) in matrix.column_iter_mut().zip(&norms) {
+        if *norm > 0.0 {
+            column /= *norm;
+        }
+    }
+    let equations = MinimumNorm::new(matrix.clone(), DEPENDENT)?;
     let (mut all, mut residual) = (0.0, 0.0);
     let mut residues = Vec::with_capacity(functions.len());
     for function in functions {
         let values = function.iter().flat_map(|h| [h.re, h.im]);
         let right = DVector::from_iterator(2 * frequency_hz.len(), values);
-        let solution = decomposed
-            .solve(&right, 1e-13)
-            .map_err(RationalFitError::Solution)?;
+        let solution = equations.solve(&right);
         // Residual of each function relative to the function itself, so that all functions have equal weight.
         let norm = right.norm_squared();
         if norm > 0.0 {

@@ -2,8 +2,9 @@
 
 use std::f64::consts::TAU;
 
-use nalgebra::{Matrix4, Vector4};
+use nalgebra::{DMatrix, DVector, Matrix4, Vector4};
 use num_complex::Complex64;
+use quietcut_numerics::least_squares::solve_normal_equations;
 
 use super::FrfError;
 use super::criteria::{
@@ -400,7 +401,11 @@ fn phasor(signal: &[f64], first: usize, length: usize, period: f64) -> Option<Ph
         normal += row * row.transpose();
         right += row * *sample;
     }
-    let solution = normal.cholesky()?.solve(&right);
+    let solution = solve_normal_equations(
+        &DMatrix::from_column_slice(4, 4, normal.as_slice()),
+        &DVector::from_column_slice(right.as_slice()),
+    )?;
+    let solution = Vector4::from_column_slice(solution.as_slice());
     let residual: f64 = samples
         .iter()
         .enumerate()

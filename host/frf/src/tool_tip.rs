@@ -180,7 +180,7 @@ fn modes(frequency_hz: &[f64], functions: &[&[Complex64]]) -> Result<RationalFit
             break;
         }
     }
-    best.ok_or_else(|| refused.unwrap_or(RationalFitError::Solution("no model order is tried")))
+    best.ok_or_else(|| refused.unwrap_or(RationalFitError::NoOrder))
 }
 
 /// Indices of the poles that count as modes: lightly damped, and with a significant peak in at least one function.

@@ -2,6 +2,8 @@
 
 use std::f64::consts::TAU;
 
+use quietcut_numerics::roots::monotone;
+
 /// Spindle motion; at t = 0 the spindle angle is 0 and tooth 1 is at the immersion angle 0.
 ///
 /// The speed is constant, modulated as Ω(t) = Ω₀(1 + δ sin(2πf_m t + ψ)), or changes linearly from one speed to another.
@@ -189,29 +191,9 @@ impl Spindle {
 /// Solves t + lead(t) = `mean_s` for the time t, s, by Newton's method with bisection as safeguard; t + lead(t) increases monotonically.
 fn inverse(fluctuation: Fluctuation, mean_s: f64) -> f64 {
     let reach_s = 2.0 * fluctuation.delta.abs() / (TAU * fluctuation.frequency_hz);
-    let (mut low, mut high) = (mean_s - reach_s, mean_s + reach_s);
-    let mut t = mean_s;
-    // Bisection alone reaches rounding in 60 steps from a bracket of a second; Newton's method takes about five.
-    for _ in 0..60 {
-        let excess_s = t + fluctuation.ahead_s(t) - mean_s;
-        if excess_s > 0.0 {
-            high = t;
-        } else {
-            low = t;
-        }
-        let newton = t - excess_s / fluctuation.share(t);
-        let next = if newton > low && newton < high {
-            newton
-        } else {
-            0.5 * (low + high)
-        };
-        let step = next - t;
-        t = next;
-        if step.abs() <= 2.0 * f64::EPSILON * t.abs().max(reach_s) {
-            break;
-        }
-    }
-    t
+    monotone([mean_s - reach_s, mean_s + reach_s], mean_s, |t| {
+        [t + fluctuation.ahead_s(t) - mean_s, fluctuation.share(t)]
+    })
 }
 
 #[cfg(test)]

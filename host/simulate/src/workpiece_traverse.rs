@@ -3,6 +3,7 @@
 use super::SimulateError;
 use quietcut_model::cutter::Cutter;
 use quietcut_model::spindle::Spindle;
+use quietcut_numerics::roots::{bisection, minimum};
 
 /// Traverse of the workpiece: entry, full engagement and exit of the tool. Times in s.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -185,43 +186,21 @@ fn complement(excluded: Option<[f64; 2]>, window: [f64; 2]) -> [Option<[f64; 2]>
 
 /// The window within [`from`, `to`] in which the concave function `f` is positive; `None` if there is none.
 fn positive(f: impl Fn(f64) -> f64, [from, to]: [f64; 2]) -> Option<[f64; 2]> {
-    let top = maximum(&f, from, to);
+    let top = minimum([from, to], 0.0, |x| -f(x));
     if f(top) <= 0.0 {
         return None;
     }
-    let left = if f(from) >= 0.0 { from } else { root(&f, from, top) };
-    let right = if f(to) >= 0.0 { to } else { root(&f, to, top) };
+    // The positive end of the last bit.
+    let root = |negative: f64| {
+        let [_, positive] = bisection([negative, top], 0.0, |x| {
+            let is_positive = f(x) > 0.0;
+            !is_positive
+        });
+        positive
+    };
+    let left = if f(from) >= 0.0 { from } else { root(from) };
+    let right = if f(to) >= 0.0 { to } else { root(to) };
     Some([left, right])
-}
-
-/// The argument at which a concave function is largest, from ternary search.
-fn maximum(f: &impl Fn(f64) -> f64, mut from: f64, mut to: f64) -> f64 {
-    // The bracket shrinks to (2/3)^100 of the window, below rounding.
-    for _ in 0..100 {
-        let third = (to - from) / 3.0;
-        if f(from + third) < f(to - third) {
-            from += third;
-        } else {
-            to -= third;
-        }
-    }
-    // The midpoint of the bracket.
-    0.5 * (from + to)
-}
-
-/// The zero of `f` between an argument with a negative and one with a positive value, from bisection to the last bit.
-fn root(f: &impl Fn(f64) -> f64, mut negative: f64, mut positive: f64) -> f64 {
-    loop {
-        let middle = 0.5 * (negative + positive);
-        if middle == negative || middle == positive {
-            return positive;
-        }
-        if f(middle) > 0.0 {
-            positive = middle;
-        } else {
-            negative = middle;
-        }
-    }
 }
 
 #[cfg(test)]

@@ -6,6 +6,7 @@ use std::f64::consts::PI;
 use std::sync::Arc;
 
 use num_complex::Complex64;
+use quietcut_numerics::roots::bisection;
 
 use super::location::{along, axis_of};
 use super::{
@@ -76,13 +77,8 @@ pub fn describing_function(amplitude: f64, yield_m: f64) -> Complex64 {
     // Half a period from the upper to the lower peak of x: z unloads from +z₀ with slope 1 to 0, then loads over the rest s of the
     // stroke as z = −z_y(1 − e^{−s/z_y}), to −z₀. The peak z₀ is the fixed point of this map.
     let stroke = 2.0 * amplitude;
-    let mut low = 0.0;
-    let mut high = yield_m.min(stroke);
-    for _ in 0..60 {
-        let z = 0.5 * (low + high);
-        let reached = -yield_m * (-(stroke - z) / yield_m).exp_m1();
-        if reached > z { low = z } else { high = z }
-    }
+    let reached = |z: f64| -yield_m * (-(stroke - z) / yield_m).exp_m1();
+    let [low, high] = bisection([0.0, yield_m.min(stroke)], 0.0, |z| reached(z) > z);
     let top = 0.5 * (low + high);
     let count = 256;
     let mut sum = Complex64::ZERO;
