@@ -115,10 +115,6 @@ pub(crate) const STEADY_DEVIATIONS: f64 = 4.0;
 /// by as much, 1/√58 = 13 %: below, it gains nothing. Unfounded for other numbers of dwells.
 pub(crate) const LARGEST_MISFIT: f64 = 1.3;
 
-/// Smallest singular value of a regression with columns of length 1, relative to the largest, at which it has full rank: the rounding
-/// error 1.1e-16 of double precision times 10⁴ rows.
-pub(crate) const FULL_RANK: f64 = 1e-12;
-
 /// Fewest force levels at a frequency for higher-order FRF: H₁, H₃ and H₅ are three unknowns.
 pub(crate) const LEAST_LEVELS: usize = 3;
 
@@ -274,3 +270,30 @@ pub(crate) const LEAST_GAIN: f64 = 1e-3;
 /// Distance of a lobe above the lowest lobe, in standard deviations of the difference, beyond which it is never the lowest: the
 /// probability is 3e-5.
 pub(crate) const NEVER_LOWEST: f64 = 4.0;
+
+#[cfg(test)]
+mod tests {
+    use quietcut_numerics::statistics::{chi_squared_probability, chi_squared_quantile, normal_probability};
+
+    use super::*;
+
+    /// True where a computed probability has the stated order of magnitude and first digit.
+    fn is_stated(probability: f64, stated: f64) -> bool {
+        (probability / stated - 1.0).abs() < 0.5
+    }
+
+    #[test]
+    fn probabilities_of_chance_are_those_that_the_sentences_state() {
+        let exceeds = |deviations: f64| normal_probability(-deviations);
+        assert!(is_stated(
+            1.0 - chi_squared_probability(0.5 * REGION_EVIDENCE, 1.0),
+            6e-7
+        ));
+        assert!(is_stated(1.0 - chi_squared_probability(KIND_EVIDENCE, 1.0), 6e-7));
+        assert!((chi_squared_quantile(1.0 - 6e-7, 1.0) / KIND_EVIDENCE - 1.0).abs() < 0.01);
+        assert!(is_stated(2.0 * exceeds(JUMP_DEVIATIONS), 2e-9));
+        assert!(is_stated(exceeds(LINEAR_DEVIATIONS), 3e-5));
+        assert!(is_stated(exceeds(HARMONIC_DEVIATIONS), 3e-7));
+        assert!(is_stated(exceeds(FORCE_HARMONIC_DEVIATIONS), 1e-3));
+    }
+}

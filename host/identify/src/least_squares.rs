@@ -1,8 +1,11 @@
 //! Weighted least squares on steady motions; the weights depend on the parameters.
 
-use crate::criteria::{FULL_RANK, LARGEST_MISFIT};
-use nalgebra::{Cholesky, DMatrix, DVector};
-use quietcut_numerics::singular_values::{Vectors, decompose};
+use crate::criteria::LARGEST_MISFIT;
+use nalgebra::{DMatrix, DVector};
+use quietcut_numerics::Stop;
+use quietcut_numerics::least_squares::{
+    Damping, Idle, LevenbergMarquardt, Minimum, NormalSums, Objective, invert_normal_equations,
+};
 
 /// Reason why a law cannot be fitted to dwells.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -41,10 +44,8 @@ pub enum FitError {
 
 /// Normal equations summed over dwells, from the whitened residual r of each dwell and its derivative S by the parameters.
 pub(super) struct Normal {
-    /// Σ SᵀS.
-    matrix: DMatrix<f64>,
-    /// Σ Sᵀr.
-    gradient: DVector<f64>,
+    /// Σ SᵀS and Σ Sᵀr.
+    sums: NormalSums,
     /// Σ Sᵀr rᵀS.
     scatter: DMatrix<f64>,
     /// Σ rᵀr.
@@ -69,8 +70,10 @@ impl Normal {
     /// Empty normal equations for `size` parameters.
     pub(super) fn new(size: usize) -> Self {
         Self {
-            matrix: DMatrix::zeros(size, size),
-            gradient: DVector::zeros(size),
+            sums: NormalSums {
+                matrix: DMatrix::zeros(size, size),
+                gradient: DVector::zeros(size),
+            },
             scatter: DMatrix::zeros(size, size),
             sum: 0.0,
             rows: 0,
@@ -88,9 +91,9 @@ impl Normal {
             return;
         };
         let gradient = slope.tr_mul(&residual);
-        self.matrix += slope.tr_mul(&slope);
+        self.sums.matrix += slope.tr_mul(&slope);
         self.scatter += &gradient * gradient.transpose();
-        self.gradient += gradient;
+        self.sums.gradient += gradient;
         self.sum += residual.norm_squared();
         self.rows += residual.len();
     }
@@ -103,7 +106,7 @@ impl Normal {
     }
 
     fn misfit(&self) -> f64 {
-        self.sum / self.rows.saturating_sub(self.gradient.len()).max(1) as f64
+        self.sum / self.rows.saturating_sub(self.sums.gradient.len()).max(1) as f64
     }
 
     /// Covariance and misfit of the parameters.
@@ -114,7 +117,7 @@ impl Normal {
         if self.failed > 0 {
             return Err(self.failure());
         }
-        let inverse = scaled_inverse(&self.matrix).ok_or(FitError::Undetermined)?;
+        let inverse = invert_normal_equations(&self.sums.matrix).ok_or(FitError::Undetermined)?;
         let misfit = self.misfit();
         let robust = misfit > LARGEST_MISFIT;
         let covariance = if robust {
@@ -130,6 +133,45 @@ impl Normal {
     }
 }
 
+/// The sum of squares over dwells as a function of the parameters.
+struct DwellFit<F>(F);
+
+/// Step, in standard deviations of the parameters, that ends a fit: far below the width of any interval.
+const LAST_STEP: f64 = 1e-3;
+
+/// Relative increase of the sum of squares that still counts as no worse: weights change with the parameters.
+const NO_WORSE: f64 = 1e-6;
+
+impl<F: Fn(&DVector<f64>) -> Normal> Objective for DwellFit<F> {
+    type Point = DVector<f64>;
+    type Value = Normal;
+
+    fn value(&mut self, point: &DVector<f64>) -> Option<Normal> {
+        Some((self.0)(point))
+    }
+
+    fn linearize(&mut self, _: &DVector<f64>, value: &Normal) -> Option<NormalSums> {
+        Some(value.sums.clone())
+    }
+
+    fn moved(&self, point: &DVector<f64>, step: &DVector<f64>) -> DVector<f64> {
+        point + step
+    }
+
+    fn is_no_worse(&self, next: &Normal, now: &Normal) -> bool {
+        next.failed < now.failed || (next.failed == now.failed && next.sum <= now.sum * (1.0 + NO_WORSE))
+    }
+
+    fn has_converged(&self, length: f64, next: &Normal, now: &Normal) -> bool {
+        length < LAST_STEP && next.failed == now.failed
+    }
+
+    /// A dwell or two without a motion near the measured one may be found once the parameters are better; half of them are too many.
+    fn gives_up(&self, _: usize, value: &Normal, _: Option<&Normal>) -> bool {
+        value.failed * 2 > value.dwells
+    }
+}
+
 /// Parameters with the smallest sum of squares, by Levenberg–Marquardt steps from `start`. The first step adds the fraction
 /// `damping` to the diagonal of the normal matrix; 0 for a start near the minimum.
 ///
@@ -140,118 +182,46 @@ pub(super) fn minimum(
     damping: f64,
     of: impl Fn(&DVector<f64>) -> Normal,
 ) -> Result<(DVector<f64>, Normal), FitError> {
-    match descend(start, damping, 60, of)? {
-        (theta, normal, true) => Ok((theta, normal)),
-        (_, normal, false) => Err(FitError::NotConverged(normal.misfit())),
+    let found = descend(start, damping, 60, of)?;
+    if found.stop == Stop::Converged {
+        Ok((found.point, found.value))
+    } else {
+        Err(FitError::NotConverged(found.value.misfit()))
     }
 }
 
-/// Parameters nearer to the minimum than `start`: like [`minimum`], but with fewer steps and without a test of convergence.
+/// Parameters nearer to the minimum: as [`minimum`], but few steps suffice.
 ///
 /// # Errors
-/// The data do not determine them, or too many dwells have no motion.
+/// The data do not determine the parameters, or too many dwells have no motion.
 pub(super) fn nearer(
     start: DVector<f64>,
     damping: f64,
     of: impl Fn(&DVector<f64>) -> Normal,
 ) -> Result<DVector<f64>, FitError> {
-    descend(start, damping, 25, of).map(|(theta, ..)| theta)
+    descend(start, damping, 25, of).map(|found| found.point)
 }
 
-/// Parameters after at most `rounds` steps, their normal equations, and whether the minimum was reached.
 fn descend(
     start: DVector<f64>,
-    mut damping: f64,
-    rounds: usize,
+    damping: f64,
+    iterations_max: usize,
     of: impl Fn(&DVector<f64>) -> Normal,
-) -> Result<(DVector<f64>, Normal, bool), FitError> {
-    let mut theta = start;
-    let mut normal = of(&theta);
-    for _ in 0..rounds {
-        // Dwells without a predicted motion are tolerated up to one half: better parameters may give them one.
-        if normal.failed * 2 > normal.dwells {
-            return Err(normal.failure());
-        }
-        let mut matrix = normal.matrix.clone();
-        for i in 0..theta.len() {
-            matrix[(i, i)] *= 1.0 + damping;
-        }
-        let Some(step) = scaled_solve(&matrix, &normal.gradient) else {
-            // Far from the minimum the normal matrix may be singular although the data determine the parameters.
-            if damping >= 1.0 {
-                return Err(FitError::Undetermined);
-            }
-            damping = (10.0 * damping).max(1e-3);
-            continue;
-        };
-        let next = &theta + &step;
-        let tried = of(&next);
-        // Length of the step in standard deviations of the parameters. The weights depend on the parameters, so the sum of squares
-        // may rise slightly at convergence.
-        let length = step.dot(&(&normal.matrix * &step)).sqrt();
-        if length < 1e-3 && tried.failed == normal.failed {
-            return Ok((next, tried, true));
-        }
-        let better = tried.failed < normal.failed
-            || (tried.failed == normal.failed && tried.sum <= normal.sum * (1.0 + 1e-6));
-        if better {
-            (theta, normal) = (next, tried);
-            damping = if damping < 1e-6 { 0.0 } else { 0.1 * damping };
-        } else {
-            damping = (10.0 * damping).max(1e-3);
-            if damping > 1e8 {
-                break;
-            }
-        }
+) -> Result<Minimum<DVector<f64>, Normal>, FitError> {
+    let iteration = LevenbergMarquardt {
+        damping: Damping::tenfold(damping),
+        iterations_max,
+        // λ from 1e-3 to 1e8.
+        trials_max: 12,
+        ridge: 0.0,
+        idle: Idle::Refuse,
+    };
+    let found = iteration
+        .minimize(&mut DwellFit(of), start)
+        .ok_or(FitError::Undetermined)?;
+    match found.stop {
+        Stop::Singular => Err(FitError::Undetermined),
+        Stop::GivenUp => Err(found.value.failure()),
+        _ => Ok(found),
     }
-    Ok((theta, normal, false))
-}
-
-/// Least squares with columns scaled to length 1, because parameters differ by many powers of ten. `None` if the columns are
-/// linearly dependent.
-pub(super) fn scaled_least_squares(matrix: &DMatrix<f64>, right: &DVector<f64>) -> Option<DVector<f64>> {
-    let lengths = DVector::from_iterator(matrix.ncols(), matrix.column_iter().map(|column| column.norm()));
-    if lengths.iter().any(|length| *length <= 0.0 || !length.is_finite()) {
-        return None;
-    }
-    let mut scaled = matrix.clone();
-    for (mut column, length) in scaled.column_iter_mut().zip(lengths.iter()) {
-        column /= *length;
-    }
-    let svd = decompose(scaled, Vectors::Both).ok()?;
-    let largest = svd.singular_values.max();
-    // Singular values below the rounding of the data do not determine the solution.
-    if svd.singular_values.min() < FULL_RANK * largest {
-        return None;
-    }
-    let solution = svd.solve(right, 0.0).ok()?;
-    Some(solution.component_div(&lengths))
-}
-
-fn scaled(matrix: &DMatrix<f64>) -> Option<(Cholesky<f64, nalgebra::Dyn>, DVector<f64>)> {
-    let lengths = matrix.diagonal().map(f64::sqrt);
-    if lengths.iter().any(|length| *length <= 0.0 || !length.is_finite()) {
-        return None;
-    }
-    let scaled = DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |i, j| {
-        matrix[(i, j)] / (lengths[i] * lengths[j])
-    });
-    Some((Cholesky::new(scaled)?, lengths))
-}
-
-pub(super) fn scaled_solve(matrix: &DMatrix<f64>, right: &DVector<f64>) -> Option<DVector<f64>> {
-    let (cholesky, lengths) = scaled(matrix)?;
-    Some(
-        cholesky
-            .solve(&right.component_div(&lengths))
-            .component_div(&lengths),
-    )
-}
-
-pub(super) fn scaled_inverse(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
-    let (cholesky, lengths) = scaled(matrix)?;
-    let inverse = cholesky.inverse();
-    Some(DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |i, j| {
-        inverse[(i, j)] / (lengths[i] * lengths[j])
-    }))
 }

@@ -44,4 +44,15 @@ mod tests {
             );
         }
     }
+    #[test]
+    fn the_expansion_agrees_with_the_inverted_distribution() {
+        use quietcut_numerics::statistics::student_ninety_percent;
+        for freedoms in 1..100 {
+            let exact = student_ninety_percent(freedoms);
+            assert!(
+                (ninety_percent(freedoms) / exact - 1.0).abs() < 5e-3,
+                "{freedoms}"
+            );
+        }
+    }
 }

@@ -3,8 +3,8 @@
 use std::f64::consts::{PI, TAU};
 
 use nalgebra::{DMatrix, DVector};
+use quietcut_numerics::least_squares::{Idle, NormalEquations};
 
-use crate::least_squares::scaled_solve;
 use quietcut_recording::{Quantity, Recording, SpindleAngle};
 
 /// Motion under an unmeasured excitation.
@@ -122,15 +122,15 @@ fn without_harmonics(recording: &Recording, samples: &mut [Vec<f64>], high_hz: f
             right.column_mut(channel).axpy(samples[sample], &row, 1.0);
         }
     }
-    let mut harmonics_remain = false;
-    for (channel, samples) in samples.iter_mut().enumerate() {
-        let Some(found) = scaled_solve(&normal, &right.column(channel).into_owned()) else {
-            harmonics_remain = harmonics > 0;
-            continue;
-        };
-        for (sample, angle) in samples.iter_mut().zip(&angle) {
-            fill(&mut row, *angle);
-            *sample -= found.dot(&row);
+    let equations = NormalEquations::new(&normal, 0.0, Idle::Refuse);
+    let harmonics_remain = equations.is_none() && harmonics > 0;
+    if let Some(equations) = equations {
+        let found = equations.solve_columns(&right);
+        for (samples, found) in samples.iter_mut().zip(found.column_iter()) {
+            for (sample, angle) in samples.iter_mut().zip(&angle) {
+                fill(&mut row, *angle);
+                *sample -= found.dot(&row);
+            }
         }
     }
     Removal {

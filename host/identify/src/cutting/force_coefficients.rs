@@ -9,13 +9,15 @@
 use std::f64::consts::TAU;
 
 use nalgebra::{DMatrix, DVector, Vector3};
+use quietcut_numerics::least_squares::{
+    LinearFit, LinearProblem, invert_normal_equations, solve_normal_equations,
+};
 use rayon::prelude::*;
 
 use crate::criteria::{LEAST_METHOD_DIFFERENCE, SAME_FEED};
 use crate::cutting::chip::{Chip, chips};
 use crate::cutting::force_test::CuttingTest;
 use crate::cutting::prepared_test::{Prepared, prepared};
-use crate::least_squares::{scaled_inverse, scaled_least_squares, scaled_solve};
 use crate::student::NINETY_PERCENT;
 use crate::student::ninety_percent;
 use quietcut_model::milling::Runout;
@@ -274,7 +276,7 @@ impl Fitter<'_> {
         };
         let matrix = sums.matrix.view((0, 0), (known, known)).into_owned();
         let gradient = sums.gradient.rows(0, known).into_owned();
-        let step = scaled_solve(&matrix, &gradient).ok_or(ForceCoefficientError::Undetermined)?;
+        let step = solve_normal_equations(&matrix, &gradient).ok_or(ForceCoefficientError::Undetermined)?;
         let mut next = state.clone();
         for (place, index) in active.iter().enumerate() {
             next.coefficients[*index] += step[place];
@@ -333,7 +335,7 @@ impl Fitter<'_> {
     fn finish(&self, state: &State) -> Fit {
         let sums = self.sums(state);
         let (active, size) = (self.active(), self.size());
-        let covariance = scaled_inverse(&sums.matrix).map_or_else(
+        let covariance = invert_normal_equations(&sums.matrix).map_or_else(
             || DMatrix::from_element(size, size, f64::INFINITY),
             |inverse| &inverse * &sums.scatter * &inverse,
         );
@@ -404,9 +406,12 @@ impl Fitter<'_> {
         }
         let matrix = DMatrix::from_row_slice(right.len(), active.len(), &rows);
         let right = DVector::from_vec(right);
-        let solution = scaled_least_squares(&matrix, &right)?;
+        let LinearFit {
+            parameters: solution,
+            covariance: inverse,
+            ..
+        } = LinearProblem::new(&matrix, &right).solve().ok()?;
         let left = right - &matrix * &solution;
-        let inverse = scaled_inverse(&matrix.tr_mul(&matrix))?;
         let mut scatter = DMatrix::zeros(active.len(), active.len());
         for end in &ends {
             let from = end - directions;

@@ -4,6 +4,7 @@
 use std::f64::consts::TAU;
 
 use nalgebra::{DMatrix, DVector};
+use quietcut_numerics::least_squares::invert_normal_equations;
 
 use crate::criteria::{FORCE_ABOVE_NOISE, FORCE_BELOW_LARGEST, STEP_SCATTER, STEP_SHARE};
 use quietcut_model::structure::Direction;
@@ -215,7 +216,7 @@ impl Dwell {
         // Gauss–Newton steps in the frequency. The start is within half a line width, where each step squares the error.
         for round in 0..5 {
             let design = design(count, omega / rate, harmonics);
-            gram_inverse = (design.transpose() * &design).try_inverse()?;
+            gram_inverse = invert_normal_equations(&design.tr_mul(&design))?;
             lines.clear();
             let (mut slope, mut weight) = (0.0, 0.0);
             for (channel, direction) in &channels {

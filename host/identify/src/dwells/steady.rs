@@ -2,8 +2,9 @@
 
 use std::f64::consts::TAU;
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use num_complex::Complex64;
+use quietcut_numerics::least_squares::solve_normal_equations;
 
 use crate::criteria::{LEAST_DWELL_PERIODS, NOISE_OVER_TRANSIENT, STEADY_CHANGE, STEADY_DEVIATIONS};
 use crate::dwells::dwell::{Dwell, DwellSegment, direction_of, dwell_segments, pool_variances};
@@ -172,7 +173,10 @@ fn phasor(samples: &[f64], range: std::ops::Range<usize>, radians_per_sample: f6
         normal += row * row.transpose();
         right += row * *samples.get(k)?;
     }
-    let solution = normal.cholesky()?.solve(&right);
+    let solution = solve_normal_equations(
+        &DMatrix::from_column_slice(3, 3, normal.as_slice()),
+        &DVector::from_column_slice(right.as_slice()),
+    )?;
     Some(Complex64::new(solution[0], solution[1]))
 }
 

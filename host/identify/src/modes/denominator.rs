@@ -9,7 +9,7 @@ use num_complex::Complex64;
 use std::f64::consts::TAU;
 
 use super::receptances::Receptances;
-use quietcut_numerics::eigenvalues::{EigenvalueError, of_complex};
+use quietcut_numerics::eigenvalues::{EigenvalueError, polynomial_roots};
 
 /// Fraction of the unit circle that the band covers. A choice: the gap lets receptances differ between the two ends of the band.
 const ARC: f64 = 0.9;
@@ -130,18 +130,11 @@ fn ridge(matrix: &mut DMatrix<Complex64>) {
     }
 }
 
-/// Roots of a₀ + a₁z + … + a_n zⁿ: inverses of the eigenvalues of the companion matrix of the reversed polynomial, whose
-/// leading coefficient is a₀ = 1.
+/// Roots of a₀ + a₁z + … + a_n zⁿ with a₀ = 1, without those beyond 1e12. They are the inverses of the roots of the reversed polynomial,
+/// whose leading coefficient is a₀.
 fn roots(a: &[Complex64]) -> Result<Vec<Complex64>, EigenvalueError> {
-    let order = a.len() - 1;
-    let mut companion = DMatrix::<Complex64>::zeros(order, order);
-    for i in 0..order {
-        companion[(0, i)] = -a[i + 1];
-        if i + 1 < order {
-            companion[(i + 1, i)] = Complex64::ONE;
-        }
-    }
-    let inverses = of_complex(companion)?;
+    let reversed: Vec<Complex64> = a.iter().rev().copied().collect();
+    let inverses = polynomial_roots(&reversed)?;
     Ok(inverses
         .into_iter()
         .filter(|value| value.norm() > 1e-12)

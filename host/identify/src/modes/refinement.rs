@@ -1,7 +1,9 @@
 //! Refines modes in pole–residue form by weighted nonlinear least squares (Levenberg–Marquardt with exact derivatives).
 
-use nalgebra::{Cholesky, DMatrix, DVector};
+use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
+use quietcut_numerics::Stop;
+use quietcut_numerics::least_squares::{Damping, Idle, LevenbergMarquardt, NormalSums, Objective};
 use std::f64::consts::TAU;
 
 use super::covariance::covariance;
@@ -24,8 +26,6 @@ pub(super) struct Refined {
 
 /// Number of Levenberg–Marquardt steps after which the fit counts as not converged. A choice.
 const STEPS_MAX: usize = 200;
-
-const DAMPING_MAX: f64 = 1e12;
 
 /// Relative decrease of the sum of squares below which the iteration has converged. A choice.
 const SETTLED: f64 = 1e-10;
@@ -68,50 +68,67 @@ fn relative_error(data: &Receptances, fit: &PoleResidue) -> f64 {
     (Weights::of(&plain).squares(fit, data) / values as f64).sqrt()
 }
 
-fn least_squares(data: &Receptances, weights: &Weights, mut fit: PoleResidue) -> Option<PoleResidue> {
-    let mut squares = weights.squares(&fit, data);
-    let mut damping = 1e-3;
-    for _ in 0..STEPS_MAX {
-        let jacobian = jacobian(data, &fit, weights);
-        let normal = normal(&jacobian);
-        let mut gradient = DVector::zeros(normal.nrows());
-        for (of, left) in jacobian.iter().zip(weights.left(&fit, data)) {
-            gradient += of.map(|z| z.re) * left.map(|z| z.re) + of.map(|z| z.im) * left.map(|z| z.im);
-        }
-        let before = squares;
-        while damping < DAMPING_MAX {
-            if let Some(step) = step(&normal, &gradient, damping) {
-                let next = fit.moved(step.as_slice());
-                let then = weights.squares(&next, data);
-                if then <= squares {
-                    (fit, squares) = (next, then);
-                    damping = (0.1 * damping).max(1e-9);
-                    break;
-                }
-            }
-            damping *= 10.0;
-        }
-        if damping >= DAMPING_MAX || before - squares <= SETTLED * before {
-            return squares.is_finite().then_some(fit);
-        }
-    }
-    None
+/// Weighted sum of squares of the receptances as a function of the modes.
+struct ReceptanceFit<'a> {
+    data: &'a Receptances,
+    weights: &'a Weights,
 }
 
-/// Levenberg–Marquardt step: solution of (N + μ diag N) step = gradient, with N scaled to a unit diagonal.
-pub(super) fn step(normal: &DMatrix<f64>, gradient: &DVector<f64>, damping: f64) -> Option<DVector<f64>> {
-    let scale = normal
-        .diagonal()
-        .map(|entry| if entry > 0.0 { entry.sqrt().recip() } else { 0.0 });
-    let mut scaled = DMatrix::from_fn(normal.nrows(), normal.ncols(), |i, j| {
-        normal[(i, j)] * scale[i] * scale[j]
-    });
-    for i in 0..scaled.nrows() {
-        scaled[(i, i)] += damping;
+impl Objective for ReceptanceFit<'_> {
+    type Point = PoleResidue;
+    type Value = f64;
+
+    fn value(&mut self, fit: &PoleResidue) -> Option<f64> {
+        let squares = self.weights.squares(fit, self.data);
+        squares.is_finite().then_some(squares)
     }
-    let solution = Cholesky::new(scaled)?.solve(&gradient.component_mul(&scale));
-    let step = solution.component_mul(&scale);
-    step.iter().all(|value| value.is_finite()).then_some(step)
+
+    fn linearize(&mut self, fit: &PoleResidue, _: &f64) -> Option<NormalSums> {
+        let jacobian = jacobian(self.data, fit, self.weights);
+        let matrix = normal(&jacobian);
+        let mut gradient = DVector::zeros(matrix.nrows());
+        for (of, left) in jacobian.iter().zip(self.weights.left(fit, self.data)) {
+            gradient += of.map(|z| z.re) * left.map(|z| z.re) + of.map(|z| z.im) * left.map(|z| z.im);
+        }
+        Some(NormalSums { matrix, gradient })
+    }
+
+    fn moved(&self, fit: &PoleResidue, step: &DVector<f64>) -> PoleResidue {
+        fit.moved(step.as_slice())
+    }
+
+    fn is_no_worse(&self, next: &f64, now: &f64) -> bool {
+        next <= now
+    }
+
+    fn has_converged(&self, _: f64, next: &f64, now: &f64) -> bool {
+        next <= now && now - next <= SETTLED * now
+    }
+}
+
+fn least_squares(data: &Receptances, weights: &Weights, start: PoleResidue) -> Option<PoleResidue> {
+    let found = search(STEPS_MAX).minimize(&mut ReceptanceFit { data, weights }, start)?;
+    (found.stop != Stop::Iterations).then_some(found.point)
+}
+
+/// The iteration of a fit of modes, with a bound of the linearizations.
+///
+/// Damping never falls to zero: scale and phase of the shapes are free, so that N is singular.
+pub(super) fn search(iterations_max: usize) -> LevenbergMarquardt {
+    LevenbergMarquardt {
+        damping: Damping {
+            first: 1e-3,
+            shrink: 0.1,
+            growth: 10.0,
+            least: 1e-9,
+            least_retried: 0.0,
+        },
+        iterations_max,
+        // λ from 1e-9 to 1e12.
+        trials_max: 22,
+        ridge: 0.0,
+        idle: Idle::Hold,
+    }
 }
 
 impl Refined {

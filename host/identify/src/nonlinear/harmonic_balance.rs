@@ -7,6 +7,8 @@
 use std::f64::consts::TAU;
 
 use nalgebra::{DMatrix, DVector, Dyn, LU};
+use quietcut_numerics::Stop;
+use quietcut_numerics::newton::Newton;
 
 use crate::nonlinear::law::Law;
 
@@ -199,38 +201,26 @@ impl Grid {
             frequency_hz: problem.omega / TAU,
         };
         let theta = DVector::from_column_slice(problem.theta);
-        let mut x = start.clone();
-        let mut size = f64::INFINITY;
-        for _ in 0..30 {
-            let features = self.features(problem.law, problem.omega, &x);
+        let mut linearized = None;
+        // Quadratic convergence: after a step of 1e-8 the next one is rounding.
+        let newton = Newton::new(30, 1e-8).with_growth(2.0);
+        let found = newton.solve(start.clone(), |x: &DVector<f64>| {
+            let features = self.features(problem.law, problem.omega, x);
             let residual = &features * &theta - problem.force;
-            let (jacobian, by_omega) = self.jacobian(problem, &x);
+            let (jacobian, by_omega) = self.jacobian(problem, x);
             let jacobian = jacobian.lu();
-            let step = jacobian.solve(&residual).ok_or(failed)?;
-            // Convergence is quadratic: after a relative step of 1e-8 the error is rounding.
-            let (moved, length) = (step.norm(), x.norm().max(f64::MIN_POSITIVE));
-            if !moved.is_finite() {
-                return Err(failed);
-            }
-            if moved <= 1e-8 * length {
-                x -= step;
-                return Ok(Solution {
-                    x,
-                    jacobian,
-                    by_theta: features,
-                    by_omega,
-                });
-            }
-            // A step much longer than the motion is shortened.
-            let factor = if size.is_infinite() {
-                1.0
-            } else {
-                (2.0 * size / moved).min(1.0)
-            };
-            size = moved.min(2.0 * size);
-            x.axpy(-factor, &step, 1.0);
-        }
-        Err(failed)
+            let step = jacobian.solve(&residual).ok_or(Stop::Singular)?;
+            linearized = Some((jacobian, features, by_omega));
+            Ok(step)
+        });
+        let x = found.converged().ok_or(failed)?;
+        let (jacobian, by_theta, by_omega) = linearized.ok_or(failed)?;
+        Ok(Solution {
+            x,
+            jacobian,
+            by_theta,
+            by_omega,
+        })
     }
 }
 

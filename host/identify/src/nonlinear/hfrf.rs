@@ -2,11 +2,11 @@
 
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
+use quietcut_numerics::least_squares::LinearProblem;
 
 use crate::criteria::LEAST_LEVELS;
 use crate::dwells::differentiation::derivative;
 use crate::dwells::dwell::Dwell;
-use crate::least_squares::{scaled_inverse, scaled_least_squares};
 use crate::nonlinear::law::{Law, NonlinearTerm, Role};
 
 /// H₁, H₃(ω, ω, −ω) and H₅(ω, ω, ω, −ω, −ω) at one frequency, m/N, m/N³, m/N⁵.
@@ -98,7 +98,7 @@ pub fn higher_order(response: &Response) -> Option<HigherOrder> {
     });
     let part = |of: fn(&Complex64) -> f64| {
         let right = DVector::from_iterator(count, response.levels.iter().map(|(_, q)| of(q)));
-        scaled_least_squares(&powers, &right)
+        Some(LinearProblem::new(&powers, &right).solve().ok()?.parameters)
     };
     let (re, im) = (part(|q| q.re)?, part(|q| q.im)?);
     Some(HigherOrder {
@@ -162,10 +162,10 @@ fn regression(
     matrix: &DMatrix<f64>,
     right: &DVector<f64>,
 ) -> Result<(DVector<f64>, DVector<f64>), HfrfError> {
-    let solution = scaled_least_squares(matrix, right).ok_or(HfrfError::Undetermined)?;
-    let free = matrix.nrows().saturating_sub(matrix.ncols()).max(1) as f64;
-    let variance = (matrix * &solution - right).norm_squared() / free;
-    let inverse = scaled_inverse(&matrix.tr_mul(matrix)).ok_or(HfrfError::Undetermined)?;
-    let deviations = inverse.diagonal().map(|entry| (entry * variance).sqrt());
-    Ok((solution, deviations))
+    let fit = LinearProblem::new(matrix, right)
+        .solve()
+        .map_err(|_| HfrfError::Undetermined)?;
+    let variance = fit.sum_of_squares / fit.degrees_of_freedom.max(1) as f64;
+    let deviations = fit.covariance.diagonal().map(|entry| (entry * variance).sqrt());
+    Ok((fit.parameters, deviations))
 }

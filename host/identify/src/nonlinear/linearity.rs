@@ -7,6 +7,7 @@
 
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
+use quietcut_numerics::least_squares::LinearProblem;
 
 use crate::criteria::{
     DIFFERENT_LEVELS, EXPLAINED_SHARE, FORCE_HARMONIC_DEVIATIONS, HARMONIC_DEVIATIONS, KIND_EVIDENCE,
@@ -210,9 +211,9 @@ impl<'a> LinearModel<'a> {
         if features.is_empty() {
             return right.norm_squared();
         }
-        match crate::least_squares::scaled_least_squares(&matrix, &right) {
-            Some(solution) => (&right - matrix * solution).norm_squared(),
-            None => right.norm_squared(),
+        match LinearProblem::new(&matrix, &right).solve() {
+            Ok(fit) => fit.sum_of_squares,
+            Err(_) => right.norm_squared(),
         }
     }
 

@@ -2,8 +2,8 @@
 
 use nalgebra::{DMatrix, DVector, Matrix4, Vector4};
 use num_complex::Complex64;
-
-use crate::least_squares::{scaled_inverse, scaled_least_squares};
+use quietcut_numerics::least_squares::LinearProblem;
+use quietcut_numerics::roots::bisection;
 
 /// A receptance at constant force over frequency.
 #[derive(Clone, Debug, PartialEq)]
@@ -77,10 +77,8 @@ impl Map {
         if points.len() < 3 * size {
             return None;
         }
-        let solution = scaled_least_squares(&matrix, &right)?;
-        let left = &matrix * &solution - &right;
-        let variance = left.norm_squared() / (points.len() - 3 * size).max(1) as f64;
-        let inverse = scaled_inverse(&matrix.tr_mul(&matrix))?;
+        let fit = LinearProblem::new(&matrix, &right).solve().ok()?;
+        let variance = fit.sum_of_squares / fit.degrees_of_freedom.max(1) as f64;
         let ends = |of: fn(&Linearized) -> f64| {
             let values = points.iter().map(of);
             values.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], x| {
@@ -88,11 +86,11 @@ impl Map {
             })
         };
         Some(Self {
-            coefficients: solution.iter().copied().collect(),
+            coefficients: fit.parameters.iter().copied().collect(),
             deviations: (0..3 * size)
-                .map(|i| (variance * inverse[(i, i)]).sqrt())
+                .map(|i| (variance * fit.covariance[(i, i)]).sqrt())
                 .collect(),
-            relative_error: left.norm() / right.norm(),
+            relative_error: fit.sum_of_squares.sqrt() / right.norm(),
             range: [ends(|point| point.force_n), ends(|point| point.receptance)],
         })
     }
@@ -155,16 +153,11 @@ impl Curve {
             );
             a * b <= 0.0 && a != b
         })?;
-        let (mut low, mut high) = (self.points[start].0, self.points[start + 1].0);
+        let ends = [self.points[start].0, self.points[start + 1].0];
         let below = self.points[start].1.norm() < level;
-        for _ in 0..60 {
-            let middle = 0.5 * (low + high);
-            if (self.between(start, middle).norm() < level) == below {
-                low = middle;
-            } else {
-                high = middle;
-            }
-        }
+        let [low, _] = bisection(ends, 0.0, |omega| {
+            (self.between(start, omega).norm() < level) == below
+        });
         Some((low, self.between(start, low)))
     }
 

@@ -10,10 +10,11 @@ use std::sync::Arc;
 use crate::criteria::LEAST_PERIOD_SAMPLES;
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
-use quietcut_numerics::singular_values::{Vectors, decompose};
+use quietcut_numerics::Stop;
+use quietcut_numerics::least_squares::LinearProblem;
+use quietcut_numerics::newton::Newton;
 use rustfft::{Fft, FftPlanner};
 
-use crate::least_squares::scaled_least_squares;
 use crate::nonlinear::restoring_force::{ForceTerm, deviations};
 
 /// One period of a periodic test.
@@ -191,28 +192,20 @@ impl Balance {
     }
 
     /// Periodic motion under `force`, by Newton's method from `x`; `None` without convergence.
-    fn solve(&self, theta: &DVector<f64>, force: &[f64], mut x: Vec<f64>) -> Option<Vec<f64>> {
-        for _ in 0..25 {
+    fn solve(&self, theta: &DVector<f64>, force: &[f64], start: Vec<f64>) -> Option<Vec<f64>> {
+        // GMRES leaves an error of 1e-9 of each step: after a step of 1e-9 of the motion, both are rounding.
+        let newton = Newton::new(25, 1e-9);
+        let found = newton.solve(start, |x: &Vec<f64>| {
             let mut residual: Vec<f64> = force.iter().map(|f| -f).collect();
-            for (feature, theta) in self.features(&x).iter().zip(theta.iter()) {
+            for (feature, theta) in self.features(x).iter().zip(theta.iter()) {
                 for (sum, value) in residual.iter_mut().zip(feature) {
                     *sum += theta * value;
                 }
             }
-            let step = self.solve_linear(theta, &self.slopes(theta, &x), &residual)?;
-            let (moved, size) = (norm(&step), norm(&x));
-            for (x, step) in x.iter_mut().zip(&step) {
-                *x -= step;
-            }
-            if !moved.is_finite() {
-                return None;
-            }
-            // GMRES solves each step to a relative error of 1e-9, so a step of that size cannot be improved.
-            if moved <= 1e-9 * size {
-                return Some(x);
-            }
-        }
-        None
+            self.solve_linear(theta, &self.slopes(theta, x), &residual)
+                .ok_or(Stop::Singular)
+        });
+        found.converged()
     }
 }
 
@@ -250,14 +243,10 @@ fn gmres(apply: impl Fn(&[f64]) -> Vec<f64>, right: &[f64]) -> Option<Vec<f64>> 
         });
         let mut target = DVector::zeros(step + 2);
         target[0] = size;
-        let y = decompose(hessenberg.clone(), Vectors::Both)
-            .ok()?
-            .solve(&target, 0.0)
-            .ok()?;
-        let left = (&target - hessenberg * &y).norm();
-        if left <= 1e-9 * size || length <= 1e-14 * size {
+        let fit = LinearProblem::new(&hessenberg, &target).solve().ok()?;
+        if fit.sum_of_squares.sqrt() <= 1e-9 * size || length <= 1e-14 * size {
             let mut solution = vec![0.0; right.len()];
-            for (direction, y) in basis.iter().zip(y.iter()) {
+            for (direction, y) in basis.iter().zip(fit.parameters.iter()) {
                 for (sum, value) in solution.iter_mut().zip(direction) {
                     *sum += y * value;
                 }
@@ -305,9 +294,11 @@ pub fn fit(periods: &[Period<'_>], rate_hz: f64, terms: &[ForceTerm]) -> Result<
     let mut theta = first_guess(&balance, &forces, &motions).ok_or(PeriodicError::Undetermined)?;
     for _ in 0..12 {
         let (slope, left) = balance.linearized(&theta, &forces, &measured, &mut motions)?;
-        let step = scaled_least_squares(&slope, &left).ok_or(PeriodicError::Undetermined)?;
-        theta += &step;
-        let moved = step.component_div(&theta).amax();
+        let fit = LinearProblem::new(&slope, &left)
+            .solve()
+            .map_err(|_| PeriodicError::Undetermined)?;
+        theta += &fit.parameters;
+        let moved = fit.parameters.component_div(&theta).amax();
         // The relative change of every coefficient is below a millionth: far below any interval.
         if moved < 1e-6 {
             let (slope, left) = balance.linearized(&theta, &forces, &measured, &mut motions)?;
@@ -341,7 +332,9 @@ fn first_guess(balance: &Balance, forces: &[Vec<f64>], motions: &[Vec<f64>]) -> 
         right.extend(keep(force));
     }
     let columns: Vec<DVector<f64>> = columns.into_iter().map(DVector::from_vec).collect();
-    scaled_least_squares(&DMatrix::from_columns(&columns), &DVector::from_vec(right))
+    let (matrix, right) = (DMatrix::from_columns(&columns), DVector::from_vec(right));
+    let fit = LinearProblem::new(&matrix, &right).solve().ok()?;
+    Some(fit.parameters)
 }
 
 /// Angular frequency below which 99 % of the force power lies, rad/s.

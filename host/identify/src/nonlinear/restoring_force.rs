@@ -8,9 +8,9 @@
 use std::f64::consts::TAU;
 
 use nalgebra::{DMatrix, DVector};
+use quietcut_numerics::least_squares::{LinearProblem, invert_normal_equations};
 
 use crate::criteria::{BAND_SIGNAL_TO_NOISE, LEAST_SLICE_SAMPLES, SAMPLES_PER_TERM};
-use crate::least_squares::{scaled_inverse, scaled_least_squares};
 use crate::nonlinear::spectrum::{Spectral, band_of, dominant_frequency_hz};
 use crate::student::NINETY_PERCENT;
 use quietcut_recording::Quantity;
@@ -235,7 +235,10 @@ impl Record<'_> {
             };
             let columns: Vec<DVector<f64>> = columns.iter().map(|column| filtered(column)).collect();
             let (matrix, right) = (DMatrix::from_columns(&columns), filtered(&known));
-            let theta = scaled_least_squares(&matrix, &right).ok_or(SurfaceError::Undetermined)?;
+            let fit = LinearProblem::new(&matrix, &right)
+                .solve()
+                .map_err(|_| SurfaceError::Undetermined)?;
+            let theta = fit.parameters;
             let left = &right - &matrix * &theta;
             Ok((matrix, theta, left, right))
         };
@@ -332,7 +335,7 @@ fn receptance(terms: &[ForceTerm], theta: &DVector<f64>, mass: f64) -> impl Fn(f
 /// Standard deviations of a least-squares solution whose residual is correlated in time: sandwich covariance with sums over blocks
 /// (the block form of Newey and West).
 pub(crate) fn deviations(matrix: &DMatrix<f64>, left: &DVector<f64>) -> Option<DVector<f64>> {
-    let inverse = scaled_inverse(&matrix.tr_mul(matrix))?;
+    let inverse = invert_normal_equations(&matrix.tr_mul(matrix))?;
     let blocks = 40.min(matrix.nrows() / (2 * matrix.ncols()).max(1)).max(1);
     let size = matrix.nrows().div_ceil(blocks);
     let mut scatter = DMatrix::zeros(matrix.ncols(), matrix.ncols());
@@ -396,7 +399,7 @@ fn slice(along: &[f64], across: &[f64], restoring: &[f64], share: f64) -> Option
         [along[i], along[i].powi(3), across[i]][column]
     });
     let right = DVector::from_iterator(chosen.len(), chosen.iter().map(|&i| restoring[i]));
-    let solution = scaled_least_squares(&matrix, &right)?;
+    let solution = LinearProblem::new(&matrix, &right).solve().ok()?.parameters;
     let deviations = deviations(&matrix, &(&right - &matrix * &solution))?;
     Some(Slice {
         points: chosen.iter().map(|&i| (along[i], restoring[i])).collect(),

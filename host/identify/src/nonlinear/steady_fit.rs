@@ -6,11 +6,12 @@
 //! (sandwich covariance).
 
 use nalgebra::{DMatrix, DVector};
+use quietcut_numerics::least_squares::LinearProblem;
 
 use crate::dwells::differentiation::{derivative, undo};
 use crate::dwells::dwell::{Dwell, FourierSeries};
 pub use crate::least_squares::FitError;
-use crate::least_squares::{Normal, Spread, minimum, scaled_least_squares};
+use crate::least_squares::{Normal, Spread, minimum};
 use crate::nonlinear::harmonic_balance::{Grid, Problem, Solution};
 use crate::nonlinear::law::Law;
 use crate::nonlinear::whitening::OutputMap;
@@ -118,7 +119,8 @@ impl Data<'_> {
                 }
             }
         }
-        scaled_least_squares(&matrix, &right).ok_or(FitError::Undetermined)
+        let fit = LinearProblem::new(&matrix, &right).solve();
+        fit.map(|fit| fit.parameters).map_err(|_| FitError::Undetermined)
     }
 
     /// Whitened residual of a dwell, and its derivative by θ; `None` if the law has no motion near the measured one.

@@ -7,6 +7,7 @@
 
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
+use quietcut_numerics::least_squares::{Idle, NormalEquations};
 use rustfft::FftPlanner;
 
 use crate::criteria::{LEAST_SWEEP_CHANGE, LEAST_SWEEP_ESTIMATES, SWEEP_MISFIT};
@@ -102,7 +103,7 @@ impl Spectra {
         });
         let right = DVector::from_fn(rows, |row, _| self.motion[lines(row as i64 - R)]);
         let normal = matrix.adjoint() * &matrix;
-        let inverse = normal.try_inverse()?;
+        let inverse = NormalEquations::new(&normal, 0.0, Idle::Refuse)?.inverse();
         let solution = &inverse * matrix.adjoint() * &right;
         let left = (&right - &matrix * &solution).norm_squared();
         let off = (frequency_hz / self.spacing_hz - center as f64) / R as f64;

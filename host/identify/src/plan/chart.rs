@@ -1,6 +1,7 @@
 //! Uncertainty of the limits of a chart, from that of the parameters.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use quietcut_numerics::statistics::sample_quantile;
 
 use crate::criteria::NEVER_LOWEST;
 use crate::student::NINETY_PERCENT;
@@ -126,7 +127,7 @@ impl KnownChart {
             })
             .collect();
         lowest.sort_by(f64::total_cmp);
-        [0.05, 0.95].map(|share| quantile(&lowest, share))
+        [0.05, 0.95].map(|share| sample_quantile(&lowest, share).unwrap_or(f64::NAN))
     }
 }
 
@@ -155,12 +156,4 @@ fn triangular(vectors: &[DVector<f64>]) -> Vec<DVector<f64>> {
             along
         })
         .collect()
-}
-
-/// The value below which the fraction `share` of a sorted sample lies; the i-th value has the probability (i + 1/2)/n (Hazen).
-fn quantile(sorted: &[f64], share: f64) -> f64 {
-    let position = (share * sorted.len() as f64 - 0.5).max(0.0);
-    let below = (position as usize).min(sorted.len() - 1);
-    let above = (below + 1).min(sorted.len() - 1);
-    sorted[below] + (sorted[above] - sorted[below]) * position.fract()
 }

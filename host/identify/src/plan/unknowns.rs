@@ -2,8 +2,8 @@
 
 use std::f64::consts::TAU;
 
-use nalgebra::{Cholesky, DMatrix, DVector};
-use quietcut_numerics::eigenvalues::of_symmetric;
+use nalgebra::{DMatrix, DVector};
+use quietcut_numerics::eigenvalues::{EigenvalueError, of_symmetric_pencil};
 
 use super::means::Means;
 use quietcut_model::case::{Case, Deviation, Parameter};
@@ -240,11 +240,12 @@ fn of_matrices(matrices: &Matrices) -> Result<Vec<ModeChanges>, String> {
         symmetric(&matrices.damping),
         symmetric(&matrices.stiffness),
     );
-    let inverse = Cholesky::new(mass.clone())
-        .and_then(|cholesky| cholesky.l().try_inverse())
-        .ok_or("the mass matrix is not positive definite, so that the structure has no modes")?;
-    let eigen = of_symmetric(&inverse * &stiffness * inverse.transpose())
-        .map_err(|error| format!("the modes of the structure cannot be computed: {error}"))?;
+    let eigen = of_symmetric_pencil(&stiffness, &mass).map_err(|error| match error {
+        EigenvalueError::NotDefinite { .. } => {
+            "the mass matrix is not positive definite, so that the structure has no modes".into()
+        }
+        error => format!("the modes of the structure cannot be computed: {error}"),
+    })?;
     let mut order: Vec<usize> = (0..eigen.eigenvalues.len()).collect();
     order.sort_by(|&a, &b| eigen.eigenvalues[a].total_cmp(&eigen.eigenvalues[b]));
     let mode = |index: usize| {
@@ -252,7 +253,7 @@ fn of_matrices(matrices: &Matrices) -> Result<Vec<ModeChanges>, String> {
         if squared <= 0.0 {
             return None;
         }
-        let shape: DVector<f64> = inverse.transpose() * eigen.eigenvectors.column(index);
+        let shape: DVector<f64> = eigen.eigenvectors.column(index).into_owned();
         let driven = &mass * &shape;
         let unit = &driven * driven.transpose();
         let modal_damping = (shape.transpose() * &damping * &shape)[(0, 0)];

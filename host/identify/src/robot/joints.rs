@@ -10,11 +10,15 @@ use std::f64::consts::TAU;
 
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix3xX};
 use num_complex::Complex64;
+use quietcut_numerics::Stop;
+use quietcut_numerics::least_squares::{
+    Damping, Idle, LevenbergMarquardt, LinearProblem, NormalSums, Objective, invert_normal_equations,
+};
 use rayon::prelude::*;
 
 pub use super::joint_parameter::JointParameter;
 use crate::criteria::{GUESSED_STIFFNESS_RATIO, LEAST_RELATIVE_ERROR, NEARLY_STATIC};
-use crate::least_squares::{FitError, scaled_inverse, scaled_least_squares, scaled_solve};
+use crate::least_squares::FitError;
 use crate::student::NINETY_PERCENT;
 use crate::student::ninety_percent;
 use quietcut_frf::FrfTable;
@@ -84,8 +88,7 @@ struct PostureMatrices<'a> {
 }
 
 struct Normal {
-    matrix: DMatrix<f64>,
-    gradient: DVector<f64>,
+    sums: NormalSums,
     /// Σ g gᵀ over the receptances of all postures, with g the gradient of one receptance. The errors of one receptance at
     /// different lines are correlated; those of different receptances are not.
     scatter: DMatrix<f64>,
@@ -117,40 +120,86 @@ pub fn fit(start: &Robot, postures: &[PostureFrf], payload: bool) -> Result<Join
     let placed: Vec<PostureMatrices<'_>> = postures.iter().map(|frf| place(start, frf)).collect();
     let mut robot = start.clone();
     first_guess(&mut robot, &placed);
-    let mut normal = sums(&robot, &placed, &parameters);
+    let mut fit = ReceptanceFit {
+        placed: &placed,
+        parameters: &parameters,
+    };
+    let at_start = sums(&robot, &placed, &parameters);
     for (index, parameter) in parameters.iter().enumerate() {
-        if normal.matrix[(index, index)] <= 0.0 {
+        if at_start.sums.matrix[(index, index)] <= 0.0 {
             return Err(JointFitError::Undetermined(parameter.name()));
         }
     }
-    let mut damping = 1e-2;
-    for _ in 0..200 {
-        let mut matrix = normal.matrix.clone();
-        for i in 0..matrix.nrows() {
-            matrix[(i, i)] *= 1.0 + damping;
-        }
-        let step = scaled_solve(&matrix, &normal.gradient)
-            .ok_or_else(|| JointFitError::Undetermined("all parameters".into()))?;
-        // The logarithm of a parameter changes by at most 0.7 per step: a factor of two.
-        let step = &step * (0.7 / step.amax().max(0.7));
-        let tried = moved(&robot, &parameters, &step);
-        let next = sums(&tried, &placed, &parameters);
-        let length = step.dot(&(&normal.matrix * &step)).max(0.0).sqrt();
-        if next.sum <= normal.sum * (1.0 + 1e-12) {
-            (robot, normal) = (tried, next);
-            damping = (0.2 * damping).max(1e-12);
-            if length < 1e-3 {
-                return finish(robot, parameters, &normal);
-            }
-        } else if length < 1e-3 {
-            return finish(robot, parameters, &normal);
-        } else {
-            damping *= 8.0;
-        }
+    let undetermined = || JointFitError::Undetermined("all parameters".into());
+    let found = SEARCH.minimize(&mut fit, robot).ok_or_else(undetermined)?;
+    match found.stop {
+        // Where no step is better any more, the steps are shorter than the last one may be.
+        Stop::Converged | Stop::Stagnated => finish(found.point, parameters, &found.value),
+        Stop::Singular => Err(undetermined()),
+        _ => Err(JointFitError::NotConverged(
+            found.value.sum / found.value.rows.max(1) as f64,
+        )),
     }
-    Err(JointFitError::NotConverged(
-        normal.sum / normal.rows.max(1) as f64,
-    ))
+}
+
+/// The iteration. The start may be far away; damping falls slowly, and never to zero, since damping ratios of single joints are hardly
+/// determined.
+const SEARCH: LevenbergMarquardt = LevenbergMarquardt {
+    damping: Damping {
+        first: 1e-2,
+        shrink: 0.2,
+        growth: 8.0,
+        least: 1e-12,
+        least_retried: 0.0,
+    },
+    iterations_max: 200,
+    // λ from 1e-12 to 1e14.
+    trials_max: 30,
+    ridge: 0.0,
+    idle: Idle::Refuse,
+};
+
+/// Step, in standard deviations of the parameters, that ends the fit: far below the width of any interval.
+const LAST_STEP: f64 = 1e-3;
+
+/// Largest change of the logarithm of a parameter in one step: none more than doubles.
+const LARGEST_STEP: f64 = 0.7;
+
+/// The sum of squares over all receptances as a function of the robot.
+struct ReceptanceFit<'a> {
+    placed: &'a [PostureMatrices<'a>],
+    parameters: &'a [JointParameter],
+}
+
+impl Objective for ReceptanceFit<'_> {
+    type Point = Robot;
+    type Value = Normal;
+
+    fn value(&mut self, robot: &Robot) -> Option<Normal> {
+        Some(sums(robot, self.placed, self.parameters))
+    }
+
+    fn linearize(&mut self, _: &Robot, value: &Normal) -> Option<NormalSums> {
+        Some(value.sums.clone())
+    }
+
+    fn moved(&self, robot: &Robot, step: &DVector<f64>) -> Robot {
+        moved(robot, self.parameters, step)
+    }
+
+    fn limited(&self, step: DVector<f64>) -> DVector<f64> {
+        let share = LARGEST_STEP / step.amax().max(LARGEST_STEP);
+        step * share
+    }
+
+    fn is_no_worse(&self, next: &Normal, now: &Normal) -> bool {
+        // Rounding of the sum.
+        next.sum <= now.sum * (1.0 + 1e-12)
+    }
+
+    fn has_converged(&self, length: f64, next: &Normal, now: &Normal) -> bool {
+        length < LAST_STEP && self.is_no_worse(next, now)
+    }
 }
 
 impl JointFit {
@@ -262,8 +311,8 @@ fn first_guess(robot: &mut Robot, placed: &[PostureMatrices<'_>]) {
         return;
     }
     let matrix = DMatrix::from_row_slice(right.len(), joints, &rows);
-    if let Some(compliance) = scaled_least_squares(&matrix, &DVector::from_vec(right)) {
-        for (joint, compliance) in robot.joints.iter_mut().zip(compliance.iter()) {
+    if let Ok(fit) = LinearProblem::new(&matrix, &DVector::from_vec(right)).solve() {
+        for (joint, compliance) in robot.joints.iter_mut().zip(fit.parameters.iter()) {
             let guess = 1.0 / compliance;
             // A compliance with little effect on the receptances may come out negative or far off; then the first guess stays.
             let known = joint.stiffness_nm_per_rad;
@@ -287,8 +336,8 @@ fn moved(robot: &Robot, parameters: &[JointParameter], step: &DVector<f64>) -> R
 
 fn finish(robot: Robot, parameters: Vec<JointParameter>, normal: &Normal) -> Result<JointFit, JointFitError> {
     let misfit = normal.sum / normal.rows.saturating_sub(parameters.len()).max(1) as f64;
-    let inverse =
-        scaled_inverse(&normal.matrix).ok_or_else(|| JointFitError::Undetermined("all parameters".into()))?;
+    let inverse = invert_normal_equations(&normal.sums.matrix)
+        .ok_or_else(|| JointFitError::Undetermined("all parameters".into()))?;
     let count = normal.entries as f64;
     let few = ninety_percent(normal.entries.saturating_sub(1)) / NINETY_PERCENT;
     let taken = count / (count - parameters.len() as f64).max(1.0);
@@ -365,8 +414,8 @@ fn sums(robot: &Robot, placed: &[PostureMatrices<'_>], parameters: &[JointParame
         .collect();
     let size = parameters.len();
     of_postures.into_iter().fold(empty(size), |mut all, part| {
-        all.matrix += part.matrix;
-        all.gradient += part.gradient;
+        all.sums.matrix += part.sums.matrix;
+        all.sums.gradient += part.sums.gradient;
         all.scatter += part.scatter;
         all.entries += part.entries;
         all.sum += part.sum;
@@ -379,8 +428,10 @@ fn sums(robot: &Robot, placed: &[PostureMatrices<'_>], parameters: &[JointParame
 
 fn empty(size: usize) -> Normal {
     Normal {
-        matrix: DMatrix::zeros(size, size),
-        gradient: DVector::zeros(size),
+        sums: NormalSums {
+            matrix: DMatrix::zeros(size, size),
+            gradient: DVector::zeros(size),
+        },
         scatter: DMatrix::zeros(size, size),
         entries: 0,
         sum: 0.0,
@@ -420,14 +471,14 @@ fn sums_of(robot: &Robot, posture: &PostureMatrices<'_>, parameters: &[JointPara
                 for (row, slope) in row.iter_mut().zip(&slopes) {
                     *row = weight * part(slope[(i, j)]);
                 }
-                normal.matrix.ger(1.0, &row, &row, 1.0);
+                normal.sums.matrix.ger(1.0, &row, &row, 1.0);
                 gradient.axpy(weight * part(left), &row, 1.0);
             }
         }
     }
     for gradient in &gradients {
         normal.scatter.ger(1.0, gradient, gradient, 1.0);
-        normal.gradient += gradient;
+        normal.sums.gradient += gradient;
         normal.entries += 1;
     }
     normal

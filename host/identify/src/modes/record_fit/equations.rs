@@ -1,7 +1,8 @@
 //! Normal equations of one record for the parameters of the structure, with the transient of the record eliminated.
 
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix3, Vector3};
+use nalgebra::{Cholesky, DMatrix, DVector, Matrix3, Vector3};
 use num_complex::Complex64;
+use quietcut_numerics::least_squares::{Idle, NormalEquations};
 
 use super::data::Data;
 use super::line::{Line, of_forces, powers};
@@ -19,8 +20,7 @@ pub(super) struct Equations {
     /// Schur complement of Re(Jᴴ J) for the structure after elimination of the transient.
     pub(super) normal: DMatrix<f64>,
     pub(super) gradient: DVector<f64>,
-    transients: Cholesky<f64, Dyn>,
-    scale: DVector<f64>,
+    transients: NormalEquations,
     /// Coupling between transient and structure; rows transient, columns structure.
     mixed: DMatrix<f64>,
     of_transient: DVector<f64>,
@@ -29,8 +29,7 @@ pub(super) struct Equations {
 impl Equations {
     /// Step of the transient parameters for a given step of the structure parameters.
     pub(super) fn transient(&self, step: &DVector<f64>) -> DVector<f64> {
-        let right = (&self.of_transient - &self.mixed * step).component_mul(&self.scale);
-        self.transients.solve(&right).component_mul(&self.scale)
+        self.transients.solve(&(&self.of_transient - &self.mixed * step))
     }
 }
 
@@ -76,27 +75,20 @@ pub(super) fn equations(
 
 fn eliminated(gram: &DMatrix<f64>, structure: usize, transient: usize) -> Option<Equations> {
     let size = structure + transient;
-    let own = gram.view((structure, structure), (transient, transient));
-    let scale = own
-        .diagonal()
-        .map(|entry| if entry > 0.0 { entry.sqrt().recip() } else { 1.0 });
-    let scaled = DMatrix::from_fn(transient, transient, |i, j| {
-        own[(i, j)] * scale[i] * scale[j] + if i == j { RIDGE } else { 0.0 }
-    });
-    let transients = Cholesky::new(scaled)?;
+    let own = gram
+        .view((structure, structure), (transient, transient))
+        .into_owned();
+    let transients = NormalEquations::new(&own, RIDGE, Idle::Hold)?;
     let mixed = gram.view((structure, 0), (transient, structure)).into_owned();
     let of_transient = gram
         .view((structure, size), (transient, 1))
         .column(0)
         .into_owned();
-    let scaled_mixed = DMatrix::from_fn(transient, structure, |i, j| mixed[(i, j)] * scale[i]);
-    let explained = scaled_mixed.transpose() * transients.solve(&scaled_mixed);
-    let of_gradient = scaled_mixed.transpose() * transients.solve(&of_transient.component_mul(&scale));
     Some(Equations {
-        normal: gram.view((0, 0), (structure, structure)) - explained,
-        gradient: gram.view((0, size), (structure, 1)).column(0) - of_gradient,
+        normal: gram.view((0, 0), (structure, structure)) - mixed.tr_mul(&transients.solve_columns(&mixed)),
+        gradient: gram.view((0, size), (structure, 1)).column(0)
+            - mixed.tr_mul(&transients.solve(&of_transient)),
         transients,
-        scale,
         mixed,
         of_transient,
     })

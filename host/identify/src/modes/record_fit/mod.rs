@@ -27,13 +27,15 @@ mod variances;
 mod tests;
 
 use nalgebra::{DMatrix, DVector};
+use quietcut_numerics::Stop;
+use quietcut_numerics::least_squares::{NormalSums, Objective};
 
 pub use variances::ChannelNoise;
 
 use super::covariance::constrained_inverse;
 use super::error::ModesError;
 use super::model::{ModalModel, warnings};
-use super::refinement::{Refined, step};
+use super::refinement::{Refined, search};
 use super::shape;
 use data::Data;
 use equations::{Equations, equations};
@@ -48,7 +50,6 @@ const ROUNDS: usize = 30;
 const SAME_NOISE: f64 = 1e-3;
 
 const STEPS_MAX: usize = 100;
-const DAMPING_MAX: f64 = 1e12;
 
 /// Relative decrease of the cost below which the iteration has converged. A choice.
 const SETTLED: f64 = 1e-9;
@@ -95,40 +96,64 @@ fn squares(data: &Data<'_>, variances: &[Variances], unknowns: &Unknowns) -> f64
     (0..data.records.len()).map(of_record).sum()
 }
 
-/// Levenberg–Marquardt iteration; the transient of each record is eliminated.
-fn least_squares(data: &Data<'_>, variances: &[Variances], mut unknowns: Unknowns) -> Option<Unknowns> {
-    let mut least = squares(data, variances, &unknowns);
-    let mut damping = 1e-3;
-    for _ in 0..STEPS_MAX {
-        let all: Vec<Equations> = (0..data.records.len())
-            .map(|record| equations(data, record, &unknowns, &variances[record]))
+/// The cost as a function of the unknowns. The transient of each record is eliminated from the normal equations.
+struct RecordFit<'a> {
+    data: &'a Data<'a>,
+    variances: &'a [Variances],
+    /// Equations of each record at the last linearization, from which the steps of the transients follow.
+    equations: Vec<Equations>,
+}
+
+impl Objective for RecordFit<'_> {
+    type Point = Unknowns;
+    type Value = f64;
+
+    fn value(&mut self, unknowns: &Unknowns) -> Option<f64> {
+        let cost = squares(self.data, self.variances, unknowns);
+        cost.is_finite().then_some(cost)
+    }
+
+    fn linearize(&mut self, unknowns: &Unknowns, _: &f64) -> Option<NormalSums> {
+        self.equations = (0..self.data.records.len())
+            .map(|record| equations(self.data, record, unknowns, &self.variances[record]))
             .collect::<Option<_>>()?;
         let size = unknowns.structure.parameters().len();
-        let (mut normal, mut gradient) = (DMatrix::zeros(size, size), DVector::zeros(size));
-        for of_record in &all {
-            normal += &of_record.normal;
-            gradient += &of_record.gradient;
+        let mut sums = NormalSums {
+            matrix: DMatrix::zeros(size, size),
+            gradient: DVector::zeros(size),
+        };
+        for of_record in &self.equations {
+            sums.matrix += &of_record.normal;
+            sums.gradient += &of_record.gradient;
         }
-        let before = least;
-        while damping < DAMPING_MAX {
-            if let Some(step) = step(&normal, &gradient, damping) {
-                let transients: Vec<DVector<f64>> =
-                    all.iter().map(|of_record| of_record.transient(&step)).collect();
-                let next = unknowns.moved(&step, &transients);
-                let then = squares(data, variances, &next);
-                if then <= least {
-                    (unknowns, least) = (next, then);
-                    damping = (0.1 * damping).max(1e-9);
-                    break;
-                }
-            }
-            damping *= 10.0;
-        }
-        if damping >= DAMPING_MAX || before - least <= SETTLED * before {
-            return least.is_finite().then_some(unknowns);
-        }
+        Some(sums)
     }
-    None
+
+    fn moved(&self, unknowns: &Unknowns, step: &DVector<f64>) -> Unknowns {
+        let of_records = self.equations.iter();
+        let transients: Vec<DVector<f64>> = of_records.map(|of_record| of_record.transient(step)).collect();
+        unknowns.moved(step, &transients)
+    }
+
+    fn is_no_worse(&self, next: &f64, now: &f64) -> bool {
+        next <= now
+    }
+
+    fn has_converged(&self, _: f64, next: &f64, now: &f64) -> bool {
+        next <= now && now - next <= SETTLED * now
+    }
+}
+
+/// Levenberg–Marquardt iteration with given variances; `None` if it does not converge.
+fn least_squares(data: &Data<'_>, variances: &[Variances], unknowns: Unknowns) -> Option<Unknowns> {
+    let mut fit = RecordFit {
+        data,
+        variances,
+        equations: Vec::new(),
+    };
+    let found = search(STEPS_MAX).minimize(&mut fit, unknowns)?;
+    let is_found = !matches!(found.stop, Stop::Iterations | Stop::LeftDomain);
+    is_found.then_some(found.point)
 }
 
 /// Fit with its covariance B⁻¹ M B⁻¹. M is the covariance of the gradient and B the curvature of half the cost; the uncertainty of the

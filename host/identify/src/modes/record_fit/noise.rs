@@ -13,6 +13,7 @@ use super::variances::Variances;
 use crate::criteria::LEAST_RELATIVE_NOISE;
 use quietcut_frf::ChannelLines;
 use quietcut_numerics::eigenvalues::of_symmetric;
+use quietcut_numerics::least_squares::{Idle, NormalEquations};
 
 /// Number of Fisher scoring steps per round. A choice; later rounds continue the iteration.
 const STEPS: usize = 10;
@@ -149,7 +150,7 @@ fn scored(normal: &DMatrix<f64>, right: &DVector<f64>, current: &[f64], bounds: 
         for i in 0..size {
             scaled[(i, i)] += RIDGE * trace;
         }
-        let ratio = scaled.cholesky()?.solve(&target);
+        let ratio = NormalEquations::new(&scaled, 0.0, Idle::Refuse)?.solve(&target);
         let below: Vec<usize> = (0..size)
             .filter(|&i| ratio[i] * current[free[i]] < bounds[free[i]])
             .map(|i| free[i])
