@@ -1,6 +1,6 @@
 //! Loop with periodic directional coefficients: the truncated harmonic transfer matrix.
 
-use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+use nalgebra::{DMatrix, Matrix3, Vector3};
 use num_complex::Complex64;
 
 use super::limits::{AxisCrossing, limits};
@@ -176,16 +176,7 @@ impl<'a> HarmonicLoop<'a> {
         if let Some(forced) = forced {
             matrix += forced;
         }
-        let lu = matrix.lu();
-        let mut vector = DVector::from_fn(size, |i, _| Complex64::cis(i as f64));
-        for _ in 0..3 {
-            vector = lu.solve(&vector)?;
-            let norm = vector.norm();
-            if !(norm.is_finite() && norm > 0.0) {
-                return None;
-            }
-            vector.unscale_mut(norm);
-        }
+        let vector = eigenvalues::null_vector(matrix)?;
         let is_modulated = self.problem.process.axial_depth_modulation;
         let transfers = self.transfers(s)?;
         transfers

@@ -4,6 +4,7 @@
 use std::f64::consts::PI;
 
 use num_complex::Complex64;
+use quietcut_numerics::roots::SignChange;
 
 use crate::criteria::{ARGUMENT_CHANGE, LOCUS_BEND, LOCUS_LEVELS, LOCUS_MOVE};
 use crate::error::Breakdown;
@@ -257,42 +258,32 @@ pub(crate) struct LocusPoint {
 
 /// Zero of the residual between two points of a locus with residuals of opposite sign: the frequency, and the locus
 /// there. `at` returns all loci at a frequency with their residuals; the one nearest to the straight line is used.
-/// Regula falsi (Illinois), until the residual is below the tolerance. `None` if the residual jumps over zero, since
+/// Regula falsi, until the residual is below the tolerance. `None` if the residual jumps over zero, since
 /// two loci were then exchanged.
 pub(crate) fn zero(
-    mut low: LocusPoint,
-    mut high: LocusPoint,
+    low: LocusPoint,
+    high: LocusPoint,
     tolerance: f64,
     at: impl Fn(f64) -> Option<Vec<(Complex64, f64)>>,
 ) -> Option<(f64, Complex64)> {
-    let (ends, width) = ([low, high], high.omega - low.omega);
-    let mut last_side = 0;
+    let mut bracket = SignChange::new([low.omega, low.miss], [high.omega, high.miss]);
     for _ in 0..80 {
-        let omega = low.omega + (high.omega - low.omega) * low.miss / (low.miss - high.miss);
-        let share = (omega - ends[0].omega) / width;
-        let expected = ends[0].value + (ends[1].value - ends[0].value) * share;
+        let omega = bracket.next();
+        let share = (omega - low.omega) / (high.omega - low.omega);
+        let expected = low.value + (high.value - low.value) * share;
         let (value, miss) = at(omega)?
             .into_iter()
             .min_by(|p, q| (p.0 - expected).norm().total_cmp(&(q.0 - expected).norm()))?;
         // On an interval as narrow as rounding a residual of up to a thousand times the tolerance is accepted, since
         // eigenvalues have rounding too.
-        let is_narrow = (high.omega - low.omega).abs() <= 1e-15 * high.omega;
+        let is_narrow = bracket.width() <= 1e-15 * high.omega;
         if miss.abs() <= tolerance || is_narrow && miss.abs() <= 1e3 * tolerance {
             return Some((omega, value));
         }
         if is_narrow {
             return None;
         }
-        let mark = LocusPoint { omega, value, miss };
-        if (miss > 0.0) == (low.miss > 0.0) {
-            low = mark;
-            high.miss *= if last_side == 1 { 0.5 } else { 1.0 };
-            last_side = 1;
-        } else {
-            high = mark;
-            low.miss *= if last_side == -1 { 0.5 } else { 1.0 };
-            last_side = -1;
-        }
+        bracket.narrow(omega, miss);
     }
     None
 }

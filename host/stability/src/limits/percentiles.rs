@@ -1,5 +1,7 @@
 //! Percentiles of first limits, with confidence intervals from the scatter between batches of drawn machines.
 
+use quietcut_numerics::statistics::sample_quantile;
+
 use super::speed_line::SpeedLine;
 use crate::criteria::PERCENTILE_SETTLED;
 
@@ -102,16 +104,7 @@ impl Sorted {
 
     /// Quantile of the limits at `share`, interpolated between ranks at (i + 1/2)/n (Hazen); `None` if infinite.
     pub(super) fn quantile(&self, share: f64) -> Option<f64> {
-        let position = (share * self.0.len() as f64 - 0.5).max(0.0);
-        let (below, rest) = (position.floor(), position.fract());
-        let at = |index: f64| self.0.get(index as usize).or(self.0.last()).copied();
-        let (low, high) = (at(below)?, at(below + 1.0)?);
-        let value = if rest == 0.0 {
-            low
-        } else {
-            low + (high - low) * rest
-        };
-        value.is_finite().then_some(value)
+        sample_quantile(&self.0, share).filter(|value| value.is_finite())
     }
 }
 

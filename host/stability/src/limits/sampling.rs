@@ -1,8 +1,7 @@
 //! Random machines of a case with standard deviations: the independent variables, and stratified draws of them.
 
-use std::f64::consts::SQRT_2;
-
 use nalgebra::DVector;
+use quietcut_numerics::statistics::normal_quantile;
 use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -150,30 +149,10 @@ impl Basis {
     }
 }
 
-/// Quantile of the standard normal distribution at the probability `share`, to 1e-12.
-fn normal_quantile(share: f64) -> f64 {
-    // Probabilities below 1e-300 are clamped: the tail underflows there.
-    let share = share.clamp(1e-300, 1.0 - f64::EPSILON);
-    // By symmetry the lower half suffices, where erfc keeps its relative precision.
-    if share > 0.5 {
-        return -normal_quantile(1.0 - share);
-    }
-    // Start from the tail bound; each step of Halley's method triples the number of digits.
-    let mut x = -(-2.0 * (2.0 * share).ln()).sqrt();
-    for _ in 0..8 {
-        let density = (-0.5 * x * x).exp() / (2.0 * std::f64::consts::PI).sqrt();
-        let excess = (0.5 * libm::erfc(-x / SQRT_2) - share) / density;
-        let step = excess / (1.0 + 0.5 * x * excess);
-        x -= step;
-        if step.abs() < 1e-13 * x.abs().max(1.0) {
-            break;
-        }
-    }
-    x
-}
-
 #[cfg(test)]
 mod tests {
+    use quietcut_numerics::statistics::normal_probability;
+
     use super::*;
 
     #[test]
@@ -207,7 +186,7 @@ mod tests {
         for vector in &basis.vectors {
             let mut slices: Vec<usize> = points
                 .iter()
-                .map(|point| (0.5 * libm::erfc(-vector.dot(point) / SQRT_2) * 64.0) as usize)
+                .map(|point| (normal_probability(vector.dot(point)) * 64.0) as usize)
                 .collect();
             slices.sort_unstable();
             // The shift of the second vector wraps around: each slice contains one point, or its neighbour contains

@@ -6,7 +6,7 @@
 use std::collections::VecDeque;
 
 use nalgebra::{DMatrix, DVector};
-use quietcut_numerics::singular_values::{Vectors, decompose};
+use quietcut_numerics::least_squares::{MinimumNorm, Tolerance};
 
 /// Singular values of the residual matrix below this share of the largest are dropped as rounding.
 const RANK: f64 = 1e-10;
@@ -42,15 +42,11 @@ impl Anderson {
         let differences = DMatrix::from_fn(residual.len(), before, |row, column| {
             residual[row] - self.rounds[column].0[row]
         });
-        let Ok(decomposed) = decompose(differences, Vectors::Both) else {
-            return at + &residual * 0.5;
-        };
-        let least = RANK * decomposed.singular_values.max();
-        let Ok(shares) = decomposed.solve(&residual, least) else {
+        let Ok(equations) = MinimumNorm::new(differences, Tolerance::Relative(RANK)) else {
             return at + &residual * 0.5;
         };
         let mut next = to.clone();
-        for (share, (_, earlier)) in shares.iter().zip(&self.rounds) {
+        for (share, (_, earlier)) in equations.solve(&residual).iter().zip(&self.rounds) {
             next -= (to - earlier) * *share;
         }
         next

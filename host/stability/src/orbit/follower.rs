@@ -6,6 +6,7 @@
 
 use nalgebra::DVector;
 use num_complex::Complex64;
+use quietcut_numerics::roots::SignChange;
 
 use super::branch::{Branch, BranchPoint, Event, Extent};
 use super::forced::ForcedProblem;
@@ -267,34 +268,23 @@ impl<M: PeriodMap> Follower<M> {
     /// Crossing of the unit circle by the multiplier that moves from one value to another over a step, with the length
     /// of the step to it. Regula falsi with the weights of Anderson and Björck keeps the crossing enclosed.
     fn refine(&self, here: &Sample, step: f64, from: Complex64, to: Complex64) -> Option<(f64, Event)> {
-        let (mut low, mut high) = ((0.0, from.norm() - 1.0), (step, to.norm() - 1.0));
-        let outward = high.1 > 0.0;
-        let (mut low_root, mut high_root) = (from, to);
+        let outward = to.norm() > 1.0;
+        let mut bracket = SignChange::new([0.0, from.norm() - 1.0], [step, to.norm() - 1.0]);
+        let mut roots = [from, to];
         let mut sample = here.clone();
         let mut root = from;
-        let mut stays = None;
         for _ in 0..60 {
-            let middle = low.0 + (high.0 - low.0) * low.1 / (low.1 - high.1);
-            let share = ((middle - low.0) / (high.0 - low.0)).clamp(0.0, 1.0);
-            let expected = low_root + (high_root - low_root) * share;
+            let middle = bracket.next();
+            let [low, high] = bracket.ends();
+            let share = ((middle - low) / (high - low)).clamp(0.0, 1.0);
+            let expected = roots[0] + (roots[1] - roots[0]) * share;
             sample = self.step(here, middle).ok()?;
             root = nearest(&sample.roots, expected)?;
             let excess = root.norm() - 1.0;
-            if excess.abs() < 1e-11 || high.0 - low.0 < 1e-11 {
+            if excess.abs() < 1e-11 || bracket.width() < 1e-11 {
                 break;
             }
-            let is_high = (excess > 0.0) == outward;
-            let (new, new_root, old) = if is_high {
-                (&mut high, &mut high_root, &mut low)
-            } else {
-                (&mut low, &mut low_root, &mut high)
-            };
-            if stays == Some(!is_high) {
-                let gained = 1.0 - excess / new.1;
-                old.1 *= if gained > 0.0 { gained } else { 0.5 };
-            }
-            stays = Some(!is_high);
-            (*new, *new_root) = ((middle, excess), root);
+            roots[bracket.narrow(middle, excess)] = root;
         }
         let on_circle = root / root.norm();
         let kind = StabilityLoss::of(root);
@@ -310,7 +300,7 @@ impl<M: PeriodMap> Follower<M> {
                 _ => self.map.chatter_hz(&sample.orbit, on_circle),
             },
         };
-        Some((low.0, event))
+        Some((bracket.ends()[0], event))
     }
 
     /// Error of the depth of a crossing, m: the change of depth along the branch that moves the multiplier by its error

@@ -19,8 +19,8 @@ use super::periodic_orbit::{Orbit, PeriodIntegration, PeriodMap, SubintervalNode
 use crate::error::Breakdown;
 use crate::problem::revolution_mesh::{Fineness, Flight, RevolutionMesh, Source, Subinterval};
 use crate::spectrum::chatter_frequency::dominant_frequency_hz;
-use crate::spectrum::eigenvector::eigenvector;
 use crate::spectrum::period_map;
+use quietcut_numerics::eigenvalues::eigenvector;
 
 /// Cutting tooth at a node.
 struct Tooth {

@@ -9,6 +9,8 @@
 //! holds if and only if μ is a Floquet multiplier. Φ is a product over elements of real polynomials in κ.
 
 use num_complex::Complex64;
+use quietcut_numerics::Stop;
+use quietcut_numerics::newton::Newton;
 
 use super::crossing::Crossing;
 use super::root::Root;
@@ -166,23 +168,18 @@ impl Characteristic {
         reach: f64,
         work: &mut Workspace,
     ) -> Option<Complex64> {
-        let mut multiplier = guess;
-        for _ in 0..20 {
-            let Some(logarithmic) = self.logarithmic(multiplier, depth_m, work) else {
-                // F is exactly zero, so that this is the multiplier, or the numbers are out of range.
-                return multiplier.is_finite().then_some(multiplier);
-            };
-            let step = -inverse(logarithmic.by_multiplier);
-            multiplier += step;
-            if !multiplier.is_finite() || (multiplier - guess).norm() > reach {
-                return None;
+        let is_near = |multiplier: Complex64| (multiplier - guess).norm() <= reach;
+        let found = Newton::new(20, 1e-9).solve(guess, |&multiplier: &Complex64| {
+            if !is_near(multiplier) {
+                return Err(Stop::LeftDomain);
             }
-            // Convergence is quadratic: the next step would be below rounding.
-            if step.norm() < 1e-9 * multiplier.norm() {
-                return Some(multiplier);
-            }
-        }
-        None
+            // Without a logarithm F is exactly zero, so that this is the multiplier, or the numbers are out of range.
+            let logarithmic = self.logarithmic(multiplier, depth_m, work);
+            Ok(logarithmic.map_or(Complex64::ZERO, |logarithmic| inverse(logarithmic.by_multiplier)))
+        });
+        found
+            .converged()
+            .filter(|multiplier| multiplier.is_finite() && is_near(*multiplier))
     }
 
     /// The multiplier near a guess, with its derivative dμ/dw, by one Newton step; a real guess gives a real

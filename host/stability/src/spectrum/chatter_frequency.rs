@@ -5,10 +5,10 @@ use std::f64::consts::TAU;
 use nalgebra::{DMatrix, DVector, Vector3};
 use num_complex::Complex64;
 
-use super::eigenvector::eigenvector;
 use crate::problem::element::Port;
 use crate::problem::linear::Problem;
 use crate::problem::period::{Period, Rates};
+use quietcut_numerics::eigenvalues::eigenvector;
 
 /// Largest growth of any motion over a part of the period, as a factor on the growth of the Floquet mode over that
 /// part; beyond it the next part begins. The linear system of all parts then loses three digits.

@@ -13,10 +13,10 @@
 use nalgebra::{DMatrix, DVector, Vector3};
 use num_complex::Complex64;
 
-use super::eigenvector::eigenvector;
 use crate::problem::linear::Problem;
 use crate::problem::period::{DECAY_MAX, Rates, degree};
 use quietcut_model::structure::FirstOrder;
+use quietcut_numerics::eigenvalues::eigenvector;
 use quietcut_numerics::quadrature::Gauss;
 
 /// Largest phase angle of the fastest motion over a subinterval, rad. A choice: eleven Gauss nodes then reach

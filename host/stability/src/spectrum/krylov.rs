@@ -7,11 +7,10 @@
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 
-use super::eigenvector::eigenvector;
 use super::hessenberg::Shifted;
 use crate::criteria::{CROWD, KRYLOV_ANY};
 use crate::error::Breakdown;
-use quietcut_numerics::eigenvalues::{self, EigenvalueError};
+use quietcut_numerics::eigenvalues::{self, EigenvalueError, eigenvector};
 
 /// Number of vectors in a block: repeated eigenvalues are found up to this multiplicity, one for each direction in
 /// space.

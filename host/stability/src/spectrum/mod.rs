@@ -6,7 +6,6 @@ pub(crate) mod characteristic;
 pub(crate) mod chatter_frequency;
 pub(crate) mod collocated;
 pub(crate) mod crossing;
-pub(crate) mod eigenvector;
 pub(crate) mod floquet_mode;
 pub(crate) mod hessenberg;
 pub(crate) mod krylov;

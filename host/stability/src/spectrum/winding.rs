@@ -11,6 +11,8 @@
 //! over the circle of radius 1/R is the number of multipliers with |μ| > R.
 
 use num_complex::Complex64;
+use quietcut_numerics::Stop;
+use quietcut_numerics::newton::Newton;
 
 use super::characteristic::{Characteristic, Workspace};
 use crate::criteria::{FINE_MARGINS, MARGINS, WINDING_ERRORS, WOUND};
@@ -121,9 +123,13 @@ impl<'a> Search<'a> {
 
     /// The multiplier to which Newton's method converges from z = `start`.
     fn newton(&mut self, start: Complex64, known: &[Complex64]) -> Option<Complex64> {
-        let mut z = start;
-        for _ in 0..15 {
-            let mut slope = self.slope(z)?;
+        // The polynomials of the elements are not valid for larger |z|.
+        let is_valid = |z: Complex64| z.is_finite() && z.norm() <= WOUND.recip();
+        let found = Newton::new(15, 1e-9).solve(start, |&z: &Complex64| {
+            if z != start && !is_valid(z) {
+                return Err(Stop::LeftDomain);
+            }
+            let mut slope = self.slope(z).ok_or(Stop::LeftDomain)?;
             for known in known {
                 let zero = known.inv();
                 slope -= z / (z - zero);
@@ -131,20 +137,12 @@ impl<'a> Search<'a> {
                     slope -= z / (z - zero.conj());
                 }
             }
-            let step = -z / slope;
-            z += step;
-            // The polynomials in κ of the elements are valid for |z| up to 1/[`WOUND`] only.
-            if !z.is_finite() || z.norm() > WOUND.recip() {
-                return None;
-            }
-            if step.norm() < 1e-9 * z.norm() {
-                let multiplier = z.inv();
-                let is_real = multiplier.im.abs() < 1e-7 * multiplier.norm();
-                let im = if is_real { 0.0 } else { multiplier.im.abs() };
-                return Some(Complex64::new(multiplier.re, im));
-            }
-        }
-        None
+            Ok(z / slope)
+        });
+        let multiplier = found.converged().filter(|z| is_valid(*z))?.inv();
+        let is_real = multiplier.im.abs() < 1e-7 * multiplier.norm();
+        let im = if is_real { 0.0 } else { multiplier.im.abs() };
+        Some(Complex64::new(multiplier.re, im))
     }
 
     /// Largest multiplier found, and the radius beyond which the winding number counts none; `candidates` are starting
