@@ -295,3 +295,25 @@ pub(crate) const LARGEST_PROPOSED_MOTION: f64 = 10.0;
 
 /// Standard deviation of the noise of a sensor that no record has, as a share of its root mean square. Unfounded.
 pub(crate) const ASSUMED_NOISE: f64 = 0.01;
+
+#[cfg(test)]
+mod tests {
+    use quietcut_numerics::statistics::{chi_squared_probability, f_quantile, normal_probability};
+
+    use super::*;
+
+    #[test]
+    fn probabilities_of_chance_are_those_that_the_sentences_state() {
+        // The largest of 500 F-ratios of pure jitter, over 200 edges, exceeds 8 in one of a hundred records.
+        let largest = f_quantile(1.0 - 0.01 / 500.0, [3.0, 200.0]);
+        assert!((largest - 8.0).abs() < 1.0, "{largest}");
+        assert!(LEAST_MODULATION_F_RATIO > largest);
+        // One parameter that fits noise of 1 000 values.
+        let by_chance = 1.0 - chi_squared_probability(LEAST_GAIN + 1000.0_f64.ln(), 1.0);
+        assert!((by_chance / 2e-7 - 1.0).abs() < 0.5, "{by_chance:e}");
+        let wrong_leads = normal_probability(-(EQUIVALENT.sqrt()));
+        assert!((wrong_leads / 3e-5 - 1.0).abs() < 0.5, "{wrong_leads:e}");
+        let separates = (SEPARATING_DISTANCE - EQUIVALENT) / (2.0 * SEPARATING_DISTANCE.sqrt());
+        assert!((normal_probability(separates) - 0.998).abs() < 5e-4);
+    }
+}

@@ -1,14 +1,94 @@
 //! Levenberg–Marquardt search for the parameters of a simulated candidate model.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
+use quietcut_numerics::Stop;
+use quietcut_numerics::least_squares::{Damping, Idle, LevenbergMarquardt, NormalSums, Objective};
 
 use crate::criteria::{HOPELESS_LAG, SEARCH_SETTLED};
 use crate::fit::output_error::OutputError;
 use crate::fit::segment::Segment;
-use crate::fit::unknowns::{FitProblem, ParameterPoint, SearchResult, at_bounds, energy, predicted, stepped};
+use crate::fit::unknowns::{
+    FitProblem, ParameterPoint, RIDGE, SearchResult, at_bounds, energy, predicted, stepped,
+};
 
 /// Largest number of Levenberg–Marquardt iterations of a search.
 pub(crate) const ROUNDS: usize = 15;
+
+/// Damping of the search. It never falls to zero, since parameters of a candidate model may depend on each other.
+const DAMPING: Damping = Damping {
+    first: 1e-4,
+    shrink: 0.1,
+    growth: 10.0,
+    least: 1e-9,
+    least_retried: 1e-3,
+};
+
+/// Largest number of steps that are tried from one point: the last one has a damping of 10 or more. A limit on computing time.
+const TRIALS: usize = 6;
+
+/// Residuals of a point with their energy χ².
+struct Residuals {
+    of_segments: Vec<Vec<f64>>,
+    left: f64,
+}
+
+/// χ² of the simulated candidate model as a function of its free parameters.
+struct Search<'a, 'b, 'c> {
+    fit: &'a OutputError<'a>,
+    problem: &'b mut FitProblem<'c>,
+    segments: &'b [&'b Segment],
+    rival: f64,
+}
+
+impl Search<'_, '_, '_> {
+    /// Lag of a χ² behind that of the rival, beyond the one that is granted.
+    fn behind(&self, left: f64) -> f64 {
+        left - self.rival - HOPELESS_LAG
+    }
+}
+
+impl Objective for Search<'_, '_, '_> {
+    type Point = ParameterPoint;
+    type Value = Residuals;
+
+    fn value(&mut self, point: &ParameterPoint) -> Option<Residuals> {
+        let of_segments = self.fit.residuals(self.problem, self.segments, point)?;
+        let left = energy(&of_segments);
+        Some(Residuals { of_segments, left })
+    }
+
+    fn linearize(&mut self, point: &ParameterPoint, residuals: &Residuals) -> Option<NormalSums> {
+        let residuals = &residuals.of_segments;
+        let columns = self.fit.columns(self.problem, self.segments, point, residuals)?;
+        let (mut matrix, mut gradient) = self.fit.normal(self.problem, &columns, point, residuals);
+        at_bounds(self.problem, point, &mut matrix, &mut gradient);
+        Some(NormalSums { matrix, gradient })
+    }
+
+    fn moved(&self, point: &ParameterPoint, step: &DVector<f64>) -> ParameterPoint {
+        stepped(self.problem, point, step)
+    }
+
+    fn is_no_worse(&self, next: &Residuals, now: &Residuals) -> bool {
+        next.left < now.left
+    }
+
+    fn has_converged(&self, _: f64, next: &Residuals, now: &Residuals) -> bool {
+        next.left < now.left && now.left - next.left < SEARCH_SETTLED
+    }
+
+    /// A round that gained less than 40 % of the lag will not catch up with the rival.
+    fn gives_up(&self, round: usize, now: &Residuals, before: Option<&Residuals>) -> bool {
+        let behind = self.behind(now.left);
+        round >= 2 && behind > 0.0 && before.is_some_and(|before| behind > 0.6 * self.behind(before.left))
+    }
+
+    /// To first order most of the residual cannot be fitted.
+    fn gives_up_linearized(&self, round: usize, now: &Residuals, sums: &NormalSums) -> bool {
+        let promised = now.left - predicted(&sums.matrix, &sums.gradient);
+        round >= 1 && self.behind(promised) > 0.0 && promised > 0.5 * now.left
+    }
+}
 
 impl OutputError<'_> {
     /// Levenberg–Marquardt search from `start`; `None` if the start cannot be simulated. The search ends early if its χ² stays behind
@@ -21,45 +101,34 @@ impl OutputError<'_> {
         rounds: usize,
         rival: f64,
     ) -> Option<SearchResult> {
-        let mut point = start;
-        let mut residuals = self.residuals(problem, segments, &point)?;
-        let mut left = energy(&residuals);
-        let mut normal = DMatrix::zeros(0, 0);
         if problem.slots.is_empty() {
-            return Some(SearchResult { point, left, normal });
+            let left = energy(&self.residuals(problem, segments, &start)?);
+            return Some(SearchResult {
+                point: start,
+                left,
+                normal: DMatrix::zeros(0, 0),
+            });
         }
-        let mut trust = 1e-4;
-        for round in 0..rounds {
-            let columns = self.columns(problem, segments, &point, &residuals)?;
-            let mut gradient;
-            (normal, gradient) = self.normal(problem, &columns, &point, &residuals);
-            at_bounds(problem, &point, &mut normal, &mut gradient);
-            let before = left;
-            // The search is hopeless if, to first order, a whole step leaves χ² behind the rival and most of the residual unexplained.
-            let promised = left - predicted(&normal, &gradient);
-            if round >= 1 && promised - rival > HOPELESS_LAG && promised > 0.5 * left {
-                break;
-            }
-            let mut accepted = false;
-            for _ in 0..6 {
-                if let Some(next) = stepped(problem, &point, &normal, &gradient, trust)
-                    && let Some(after) = self.residuals(problem, segments, &next)
-                    && energy(&after) < left
-                {
-                    (point, left, residuals) = (next, energy(&after), after);
-                    trust = (0.1 * trust).max(1e-9);
-                    accepted = true;
-                    break;
-                }
-                trust = 10.0 * trust.max(1e-4);
-            }
-            let behind = |left: f64| left - rival - HOPELESS_LAG;
-            let hopeless = round >= 1 && behind(left) > 0.0 && behind(left) > 0.6 * behind(before);
-            if !accepted || before - left < SEARCH_SETTLED || hopeless {
-                break;
-            }
-        }
-        Some(SearchResult { point, left, normal })
+        let mut search = Search {
+            fit: self,
+            problem,
+            segments,
+            rival,
+        };
+        let iteration = LevenbergMarquardt {
+            damping: DAMPING,
+            iterations_max: rounds,
+            trials_max: TRIALS,
+            ridge: RIDGE,
+            idle: Idle::Hold,
+        };
+        let found = iteration.minimize(&mut search, start)?;
+        let normal = found.sums.map_or(DMatrix::zeros(0, 0), |sums| sums.matrix);
+        (found.stop != Stop::LeftDomain).then_some(SearchResult {
+            point: found.point,
+            left: found.value.left,
+            normal,
+        })
     }
 
     /// Improves `point` by searches on the beginning of every record, first on a short part, then on a longer one.

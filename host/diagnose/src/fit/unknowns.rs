@@ -1,6 +1,7 @@
 //! The free parameters of a prediction-error fit, and the steps of its search.
 
 use nalgebra::{DMatrix, DVector};
+use quietcut_numerics::least_squares::{Idle, NormalEquations};
 
 use crate::fit::candidate_model::Choice;
 use crate::fit::library::Library;
@@ -95,16 +96,12 @@ pub(crate) fn energy(residuals: &[Vec<f64>]) -> f64 {
     residuals.iter().map(|residual| dot(residual, residual)).sum()
 }
 
-/// Solves (Jᵀ J + trust·diag(Jᵀ J)) step = Jᵀ r and takes the step within the bounds; `None` if the matrix is singular.
+/// The point after a step of the free parameters, within their bounds.
 pub(crate) fn stepped(
     problem: &FitProblem<'_>,
     point: &ParameterPoint,
-    normal: &DMatrix<f64>,
-    gradient: &DVector<f64>,
-    trust: f64,
-) -> Option<ParameterPoint> {
-    let step = scaled(normal, 1e-12 + trust)?.solve(&gradient.component_mul(&roots(normal)));
-    let step = step.component_mul(&roots(normal));
+    step: &DVector<f64>,
+) -> ParameterPoint {
     let mut next = point.clone();
     for ((slot, _), step) in problem.slots.iter().zip(step.iter()) {
         let value = slot.of(&mut next);
@@ -116,13 +113,15 @@ pub(crate) fn stepped(
             *value = value.clamp(*low, *high);
         }
     }
-    Some(next)
+    next
 }
 
-/// Decrease of χ² by a whole Gauss–Newton step, to first order.
+/// Ridge on the unit diagonal of the normal equations of a search: the square of the accuracy of the simulation, about.
+pub(crate) const RIDGE: f64 = 1e-12;
+
+/// Decrease of χ² by a whole step, to first order.
 pub(crate) fn predicted(normal: &DMatrix<f64>, gradient: &DVector<f64>) -> f64 {
-    let right = gradient.component_mul(&roots(normal));
-    scaled(normal, 1e-9).map_or(0.0, |factor| right.dot(&factor.solve(&right)))
+    NormalEquations::new(normal, 1e-9, Idle::Hold).map_or(0.0, |equations| equations.explained(gradient))
 }
 
 /// Fixes the parameters that stand at a bound and would leave it.
@@ -148,36 +147,9 @@ pub(crate) fn at_bounds(
     }
 }
 
-/// One over the square roots of the diagonal entries; zero for a parameter without effect.
-fn roots(normal: &DMatrix<f64>) -> DVector<f64> {
-    normal.diagonal().map(|entry| {
-        if entry > 0.0 && entry.is_finite() {
-            entry.sqrt().recip()
-        } else {
-            0.0
-        }
-    })
-}
-
-/// Cholesky factor of `normal`, scaled to a unit diagonal and with `ridge` added to that diagonal.
-fn scaled(normal: &DMatrix<f64>, ridge: f64) -> Option<nalgebra::Cholesky<f64, nalgebra::Dyn>> {
-    let roots = roots(normal);
-    let mut scaled = DMatrix::from_fn(normal.nrows(), normal.ncols(), |i, j| {
-        normal[(i, j)] * roots[i] * roots[j]
-    });
-    for i in 0..scaled.nrows() {
-        scaled[(i, i)] = 1.0 + ridge;
-    }
-    scaled.cholesky()
-}
-
 /// (Jᵀ J)⁻¹: covariance of the free parameters for unit-variance noise; zero for a fixed parameter.
 pub(crate) fn covariance(normal: &DMatrix<f64>) -> Option<DMatrix<f64>> {
-    let roots = roots(normal);
-    let inverse = scaled(normal, 1e-12)?.inverse();
-    Some(DMatrix::from_fn(normal.nrows(), normal.ncols(), |i, j| {
-        inverse[(i, j)] * roots[i] * roots[j]
-    }))
+    Some(NormalEquations::new(normal, RIDGE, Idle::Hold)?.inverse())
 }
 
 /// By choice: covariance of its parameters for unit-variance noise, with the initial states unknown; zero for a fixed parameter.

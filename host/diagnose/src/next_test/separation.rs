@@ -1,6 +1,7 @@
 //! The distance of two candidate models in an experiment.
 
 use nalgebra::{DMatrix, DVector};
+use quietcut_numerics::least_squares::LinearProblem;
 
 use super::bench::Bench;
 use super::experiment::Experiment;
@@ -183,15 +184,14 @@ pub(super) fn least(apart: &DVector<f64>, columns: &[DVector<f64>], steps: &[f64
         return (apart.clone(), apart.norm_squared());
     }
     let jacobian = DMatrix::from_columns(columns);
-    let known = DVector::from_iterator(steps.len(), steps.iter().map(|step| step * step));
-    let normal = jacobian.tr_mul(&jacobian) + DMatrix::from_diagonal(&known);
-    let Some(step) = normal
-        .cholesky()
-        .map(|normal| normal.solve(&jacobian.tr_mul(apart)))
-    else {
+    let inverse_variances = DVector::from_iterator(steps.len(), steps.iter().map(|step| step * step));
+    let fit = LinearProblem::new(&jacobian, apart)
+        .with_prior(&DVector::zeros(steps.len()), &inverse_variances)
+        .solve();
+    let Ok(fit) = fit else {
         return (apart.clone(), apart.norm_squared());
     };
-    let left = apart - &jacobian * &step;
-    let squared = left.norm_squared() + step.component_mul(&step).dot(&known);
-    (left, squared)
+    let step = &fit.parameters;
+    let squared = fit.sum_of_squares + step.component_mul(step).dot(&inverse_variances);
+    (apart - &jacobian * step, squared)
 }
