@@ -14,6 +14,9 @@
 //!
 //! Arguments and results are matrices of `nalgebra`. The number of iterations is bounded everywhere, and a result states why an iteration
 //! stopped.
+//!
+//! `benches/linear_algebra.rs` measures least squares and eigenvalues beside nalgebra and faer. faer is not used: at up to twenty parameters
+//! its times are within a factor of two of ours, and it brings duplicate versions of three packages.
 
 pub mod crossing;
 pub mod dormand_prince;
