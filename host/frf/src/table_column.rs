@@ -45,14 +45,14 @@ pub(super) struct Meaning {
     pub(super) directions: Option<(Direction, Direction)>,
     /// Unit of the value; `None` if it is not stated.
     pub(super) unit: Option<FrfUnit>,
-    /// Words of the name that are no part, in lower case: the columns of one response have the same.
+    /// Title of the column in lower case without the words of a part (real, phase …): equal for all columns of one receptance.
     pub(super) label: String,
-    /// True if a word says mobility or accelerance, by its order of derivative.
+    /// Order of the time derivative that a word of the title names: 1 for mobility, 2 for accelerance, otherwise 0.
     word_derivatives: i32,
 }
 
 impl Meaning {
-    /// Unit that the words propose: that of a receptance, mobility or accelerance.
+    /// Unit that the title suggests, for messages: that of a receptance, mobility or accelerance.
     pub(super) fn proposed_unit(&self) -> &'static str {
         match self.word_derivatives {
             1 => "(m/s)/N",
@@ -62,10 +62,10 @@ impl Meaning {
     }
 }
 
-/// Words of frequencies, in lower case.
+/// Words of a title, in lower case, that mark a column of frequencies.
 const FREQUENCY: &[&str] = &["frequency", "freq", "frequenz", "frequencies", "hz"];
 
-/// Words of the parts of a complex value, in lower case.
+/// For each part of a complex value, the words of a title, in lower case, that mark it.
 const PARTS: &[(Part, &[&str])] = &[
     (Part::Real, &["real", "re", "realteil", "realpart"]),
     (
@@ -83,7 +83,7 @@ const PARTS: &[(Part, &[&str])] = &[
     ),
 ];
 
-/// Words that say nothing about the response that a column belongs to.
+/// Words of a title, in lower case, that do not distinguish one response from another.
 const EMPTY: &[&str] = &["frf", "h", "part", "of", "the", "in", "response", "function"];
 
 /// Meaning of a column.
@@ -144,7 +144,7 @@ fn by_name(name: &str, unit: Option<&str>, in_degrees: bool) -> Result<Meaning, 
         Some((pair_of(pair)?, part))
     });
     let Some((pair, part)) = found else {
-        // A name of its own makes the column one that is not used.
+        // A stated name that is no name of an FRF table means that the column is not used.
         return Ok(of(Content::Other, None, None));
     };
     let unit = match part {
@@ -178,7 +178,7 @@ fn phase(unit: Option<&str>) -> PhaseUnit {
     }
 }
 
-/// Meaning of the words and the unit in the head of a column.
+/// Meaning of a column from the words of its title and from its unit.
 fn by_words(name: &str, unit: Option<&str>) -> Result<Meaning, String> {
     let (name, unit) = match unit {
         Some(unit) => (name.to_owned(), Some(unit.to_owned())),
@@ -304,7 +304,7 @@ pub(super) fn is_head(titles: &[String]) -> bool {
         .iter()
         .any(|content| matches!(content, Ok(Content::Frequency(_))));
     let is_own = titles.iter().any(|title| title.starts_with("frequency_hz"));
-    // A unit that is wrong does not make the table a recording.
+    // A column with a wrong unit (error) still shows that the file is an FRF table and not a recording.
     let has_value = contents
         .iter()
         .any(|content| matches!(content, Ok(Content::Value(_)) | Err(_)));

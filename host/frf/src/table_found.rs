@@ -20,7 +20,7 @@ use quietcut_recording::{Import, Sidecar, TextColumn, TextTable};
 pub struct ImportedTable {
     /// The table, receptances in m/N.
     pub table: FrfTable,
-    /// One line: columns with their meaning; `None` for a table in the form of this program.
+    /// Description of the columns and their meaning in one line; `None` for a table in the format of this program.
     pub understood: Option<String>,
 }
 
@@ -77,7 +77,7 @@ fn assemble(
     let mut entries = Vec::new();
     let mut said = Vec::new();
     for pair in &pairs {
-        // Both are stated: the table is refused above otherwise.
+        // Directions and unit are stated, since `require_statements` has refused the table otherwise.
         let (Some((response, force)), Some(unit)) = (pair.directions(), pair.unit()) else {
             continue;
         };
@@ -126,14 +126,14 @@ fn assemble(
     })
 }
 
-/// Pairs the columns of the same response.
+/// Pairs the two columns of each response: real and imaginary part, or magnitude and phase.
 fn pairs<'a>(path: &Path, columns: &'a [(&'a TextColumn, Meaning)]) -> Result<Vec<Pair<'a>>, FrfError> {
     let mut pairs: Vec<Pair<'a>> = Vec::new();
     for (column, meaning) in columns {
         let Content::Value(part) = meaning.content else {
             continue;
         };
-        // The pair is made once, at its real part or magnitude.
+        // Each pair is made once, at the column of its real part or magnitude.
         if matches!(part, Part::Imaginary | Part::Phase(_)) {
             continue;
         }
@@ -267,7 +267,7 @@ impl Pair<'_> {
         self.first.1.directions
     }
 
-    /// Unit of the response per force: that of the first column, else that of the second.
+    /// Unit of the response per force: that of the first column, or if it has none, that of the column of the imaginary part.
     fn unit(&self) -> Option<FrfUnit> {
         self.first.1.unit.or(match self.second.1.content {
             Content::Value(Part::Imaginary) => self.second.1.unit,
@@ -275,7 +275,7 @@ impl Pair<'_> {
         })
     }
 
-    /// Complex values in the unit of the file.
+    /// Complex values of the pair, in the unit of the file.
     fn values(&self, path: &Path) -> Result<Vec<Complex64>, FrfError> {
         let (first, second) = (&self.first.0.values, &self.second.0.values);
         let to_radians = match self.second.1.content {
@@ -318,7 +318,7 @@ impl Pair<'_> {
 
 /// Factor to radians of a phase whose unit is not stated; `None` if the values allow both.
 ///
-/// More than two revolutions (4π) are degrees: the phase of few modes is within one revolution. Values within ±π that span 1.5 or more are
+/// A range beyond two revolutions (4π) is in degrees: the phase of a few modes stays within one revolution. Values within ±π that span 1.5 or more are
 /// radians: in degrees such a phase would not move at all, and no mode would be in the band.
 fn phase_unit(values: &[f64]) -> Option<f64> {
     let (low, high) = values
