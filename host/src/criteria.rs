@@ -3,6 +3,16 @@
 //! A number without a derivation or a campaign behind it is marked "Unfounded". Sizes of pictures, bounds of options and waiting times
 //! decide nothing about a machine and stay beside the code that uses them.
 
+// Frequency response functions
+
+/// Largest relative error of a peak by folding with which `frf` still answers: the ten per cent of the highest accuracy class that is
+/// of use for limits, whose depth is inversely proportional to the receptance. Unfounded.
+pub(crate) const LARGEST_FOLDING: f64 = 0.1;
+
+/// Relative error of a peak by folding above which `frf` warns: sensors of the usual class of 1 % err as much. The interval contains
+/// every error by folding.
+pub(crate) const SMALL_FOLDING: f64 = 0.01;
+
 // Identification
 
 /// Relative difference of two frequencies up to which they belong to the same step of a step-sine test. Unfounded.

@@ -31,6 +31,8 @@ pub(super) struct FrfLine {
     pub(super) coherence: [f64; 3],
     /// Standard deviation of |H| for each response and force (random error).
     pub(super) deviation: [[f64; 3]; 3],
+    /// Largest relative error of each response by folding from above half the sample rate; 0 where it was not estimated.
+    pub(super) folding: [f64; 3],
     /// Smallest and largest singular value of the force spectra, each force divided by its root mean square.
     pub(super) singular: (f64, f64),
 }
@@ -134,6 +136,7 @@ fn line(
         h,
         coherence: [0.0; 3],
         deviation: [[0.0; 3]; 3],
+        folding: [0.0; 3],
         singular,
     };
     for p in 0..counts.responses {

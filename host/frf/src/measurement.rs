@@ -1,5 +1,8 @@
 //! Measurement of receptances from recordings, with coherence and random error.
 
+mod folding;
+#[cfg(test)]
+mod folding_tests;
 mod recording_group;
 mod steady;
 mod stepped;
@@ -8,7 +11,7 @@ mod struck;
 mod tests;
 mod usable_lines;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use num_complex::Complex64;
 
@@ -19,12 +22,13 @@ use super::cross_spectra::CrossSpectra;
 use super::error::FrfError;
 use super::estimate::{self, ChannelCounts, Estimator, FrfLine};
 use super::excitation::Excitation;
+use super::exponential_window::without_exponential_window;
 use super::measurement_settings::MeasurementSettings;
 use super::table::{Frf, FrfTable};
 use super::test_channels::TestChannels;
 use quietcut_model::structure::Direction;
 use quietcut_recording::Recording;
-use recording_group::{MeasuredGroup, receptances};
+use recording_group::{MeasuredEntry, MeasuredGroup, receptances};
 use steady::steady;
 use stepped::stepped;
 use struck::struck;
@@ -37,6 +41,11 @@ pub struct Measurement {
     pub table: FrfTable,
     /// Standard deviation of |H| of each entry of the table at each frequency, m/N.
     pub deviation: Vec<Vec<f64>>,
+    /// False for each entry whose standard deviation says nothing, since it comes from fewer than three impacts.
+    pub has_deviation: Vec<bool>,
+    /// Largest relative error of each entry of the table at each frequency by content above half the sample rate that folds
+    /// into the record; 0 where it was not estimated, which is all excitation but a hammer's.
+    pub folding: Vec<Vec<f64>>,
     /// Groups of recordings that were evaluated together.
     pub groups: Vec<RecordingGroup>,
     /// Warnings for the user, such as of double impacts or of responses that had not settled.
@@ -46,7 +55,7 @@ pub struct Measurement {
 /// Measures receptances, m/N, from recordings.
 ///
 /// Recordings with the same forces are averaged; recordings with other forces add columns. Accelerations and velocities are divided by
-/// (iω)² and iω. 0 Hz is left out.
+/// (iω)² and iω. 0 Hz is left out. The damping of an exponential window is taken off again.
 ///
 /// # Errors
 /// A recording has no force or no response, or is too short for the resolution; the forces are dependent; the recordings have no common
@@ -71,6 +80,23 @@ pub fn measure(recordings: &[Recording], settings: &MeasurementSettings) -> Resu
             None => groups.push((excitation, vec![channels])),
         }
     }
+    let exponential_s = settings.hammer.exponential_s;
+    if let (Some(_), Some((other, _))) = (
+        exponential_s,
+        groups
+            .iter()
+            .find(|(excitation, _)| *excitation != Excitation::Hammer),
+    ) {
+        return Err(FrfError::Content {
+            path: recordings
+                .first()
+                .map_or_else(PathBuf::new, |recording| recording.path.clone()),
+            what: format!(
+                "an exponential window belongs to impacts of a hammer, and one of the recordings is {}; measure them one by one",
+                other.name()
+            ),
+        });
+    }
     let measured = groups
         .iter()
         .map(|(excitation, members)| measure_group(*excitation, members, settings))
@@ -78,7 +104,11 @@ pub fn measure(recordings: &[Recording], settings: &MeasurementSettings) -> Resu
     let path = recordings
         .first()
         .map_or(Path::new(""), |recording| &recording.path);
-    merged(path, measured)
+    let measurement = merged(path, measured)?;
+    match exponential_s {
+        Some(exponential_s) => without_exponential_window(measurement, exponential_s),
+        None => Ok(measurement),
+    }
 }
 
 /// Combines all groups at their common frequencies.
@@ -114,6 +144,8 @@ fn merged(path: &Path, measured: Vec<MeasuredGroup>) -> Result<Measurement, FrfE
         // A table cannot be empty; this placeholder is replaced below.
         table: FrfTable::new(path, vec![0.0], vec![placeholder()])?,
         deviation: Vec::new(),
+        has_deviation: Vec::new(),
+        folding: Vec::new(),
         groups: Vec::new(),
         warnings: Vec::new(),
     };
@@ -123,23 +155,28 @@ fn merged(path: &Path, measured: Vec<MeasuredGroup>) -> Result<Measurement, FrfE
             .iter()
             .filter_map(|&hertz| near(&group.frequency_hz, hertz))
             .collect();
-        for (entry, deviation) in group.entries {
-            if let Some(twice) = entries.iter().find(|other| other.name() == entry.name()) {
+        let has_deviation = group.group.has_scatter();
+        for MeasuredEntry {
+            frf,
+            deviation,
+            folding,
+        } in group.entries
+        {
+            if let Some(twice) = entries.iter().find(|other| other.name() == frf.name()) {
                 return Err(refused(format!(
                     "h{} comes from two kinds of recordings; measure them one by one",
                     twice.name()
                 )));
             }
+            let common = |all: &[f64]| -> Vec<f64> { lines.iter().map(|&line| all[line]).collect() };
             entries.push(Frf {
-                receptance: lines.iter().map(|&line| entry.receptance[line]).collect(),
-                coherence: entry
-                    .coherence
-                    .map(|all| lines.iter().map(|&line| all[line]).collect()),
-                ..entry
+                receptance: lines.iter().map(|&line| frf.receptance[line]).collect(),
+                coherence: frf.coherence.as_deref().map(common),
+                ..frf
             });
-            measurement
-                .deviation
-                .push(lines.iter().map(|&line| deviation[line]).collect());
+            measurement.deviation.push(common(&deviation));
+            measurement.folding.push(common(&folding));
+            measurement.has_deviation.push(has_deviation);
         }
         measurement.groups.push(group.group);
         measurement.warnings.extend(group.warnings);
@@ -207,8 +244,16 @@ fn measure_group(
             counts.forces, counts.responses
         )));
     }
+    // Largest powers near half the sample rate of each hammer test, for its folding.
+    let mut tops: Vec<Vec<f64>> = Vec::new();
     let spectra = match excitation {
-        Excitation::Hammer => struck(&mut group, members, settings, &mut warnings)?,
+        Excitation::Hammer => {
+            let (spectra, found) = struck(&mut group, members, settings, &mut warnings)?
+                .into_iter()
+                .unzip();
+            tops = found;
+            spectra
+        }
         _ => members
             .iter()
             .map(|channels| steady(excitation, channels, members, settings))
@@ -223,11 +268,29 @@ fn measure_group(
     }
     let mut lines = estimate::lines(&spectra, counts, settings.estimator);
     warnings.extend(singular_lines(&spectra, &lines));
+    add_folding(&mut lines, &spectra, &tops, counts.responses);
     if excitation == Excitation::Sweep {
         keep_excited(&mut lines, &spectra, counts);
     }
     independent(&mut lines, &mut group, counts).map_err(refused)?;
     Ok(receptances(group, &lines, first, warnings))
+}
+
+/// Adds the largest error by folding over all hammer tests to the lines.
+fn add_folding(lines: &mut [FrfLine], spectra: &[CrossSpectra], tops: &[Vec<f64>], responses: usize) {
+    let Some(frequency_hz) = spectra.first().map(|test| &test.frequency_hz) else {
+        return;
+    };
+    for line in lines {
+        let at = frequency_hz.partition_point(|&hertz| hertz < line.frequency_hz);
+        for response in 0..responses {
+            let errors = spectra
+                .iter()
+                .zip(tops)
+                .map(|(test, tops)| folding::relative_error(test, tops, at, response));
+            line.folding[response] = errors.fold(0.0, f64::max);
+        }
+    }
 }
 
 /// Warning of the frequencies without an estimate, where the matrix of the force spectra is singular; `None` if there are none.

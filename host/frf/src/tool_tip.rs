@@ -153,7 +153,10 @@ fn ratios(housing: &FrfTable, tip: &FrfTable) -> Result<Vec<ModeRatio>, FrfError
 
 /// Fits the smallest number of modes beyond which the residual hardly decreases. If no fit succeeds, the error of the first failed fit is
 /// returned.
-fn modes(frequency_hz: &[f64], functions: &[&[Complex64]]) -> Result<RationalFit, RationalFitError> {
+pub(super) fn modes(
+    frequency_hz: &[f64],
+    functions: &[&[Complex64]],
+) -> Result<RationalFit, RationalFitError> {
     let mut best: Option<RationalFit> = None;
     let mut refused = None;
     // Number of successive mode counts without improvement. The search stops after two, since a further mode may help only with the next.
@@ -184,7 +187,7 @@ fn modes(frequency_hz: &[f64], functions: &[&[Complex64]]) -> Result<RationalFit
 }
 
 /// Indices of the poles that count as modes: lightly damped, and with a significant peak in at least one function.
-fn mode_numbers(modes: &RationalFit) -> Vec<usize> {
+pub(super) fn mode_numbers(modes: &RationalFit) -> Vec<usize> {
     // Height of the resonance peak of a mode in a function: |residue| / decay rate.
     let height =
         |function: usize, mode: usize| modes.residues[function][mode].norm() / modes.poles[mode].re.abs();

@@ -109,9 +109,22 @@ pub struct RecordedChannel {
     /// Number of adjacent missing marks on the tachometer wheel (the gap that marks angle 0); default 0.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub missing: Option<u16>,
+    /// True if an anti-aliasing filter stands between the sensor and the samples, so that nothing above half the sample rate
+    /// folds into the record; default false.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub anti_aliasing: Option<bool>,
 }
 
 impl Sidecar {
+    /// Description of the channel with a standard name, whether the file uses that name or another; `None` if there is none.
+    pub fn channel(&self, name: &str) -> Option<&RecordedChannel> {
+        let renamed = self
+            .channels
+            .values()
+            .find(|channel| channel.name.as_deref() == Some(name));
+        renamed.or_else(|| self.channels.get(name))
+    }
+
     /// Path of the sidecar of `recording`: the same name with the extension `.toml`.
     pub fn path_of(recording: &Path) -> PathBuf {
         recording.with_extension("toml")

@@ -8,10 +8,11 @@ use serde::Serialize;
 
 use super::segment::{Recorded, RecordedSegment};
 use super::{Error, Output, finite, positive};
+use crate::criteria::{LARGEST_FOLDING, SMALL_FOLDING};
 use crate::file;
 use crate::frf::{
-    Estimator, Excitation, FrfError, FrfTable, HammerWindows, Measurement, MeasurementSettings, ModeRatio,
-    RecordingGroup, Window, calibrate, measure,
+    Estimator, Excitation, Frf, FrfError, FrfTable, HammerWindows, Measurement, MeasurementSettings,
+    ModeRatio, RecordingGroup, Window, calibrate, measure,
 };
 use crate::identify::student::NINETY_PERCENT;
 use crate::recording::UffForm;
@@ -55,7 +56,8 @@ pub struct Args {
     /// Channel to use where a recording has several forces, or several sensors of one direction; may be repeated.
     #[arg(long, value_name = "NAME")]
     channel: Vec<String>,
-    /// Time constant τ in s of the exponential window on hammer impacts. The window adds 1/τ to the decay rate of every mode.
+    /// Time constant τ in s of the exponential window on hammer impacts. The window adds 1/τ to the decay rate of every mode;
+    /// the written receptances have that damping taken off again.
     #[arg(long, value_name = "TAU", value_parser = positive, allow_negative_numbers = true)]
     exponential_window_s: Option<f64>,
     /// Force level in N to use where a step-sine test has several levels.
@@ -196,7 +198,8 @@ pub fn run(args: Args) -> Result<(), Error> {
         recordings,
         understood,
     } = args.segment.read(&args.recordings)?;
-    let measurement = measure(&recordings, &args.settings())?;
+    let mut measurement = measure(&recordings, &args.settings())?;
+    check_folding(&mut measurement)?;
     let (table, calibration) = match (&args.housing, &args.tip) {
         (Some(housing), Some(tip)) => calibrate(
             &measurement.table,
@@ -214,6 +217,41 @@ pub fn run(args: Args) -> Result<(), Error> {
     let answer = FrfOutput::new(&args, &measurement, &table, &calibration);
     let text = answer.text();
     args.output.answer_with(&understood, &answer, text)
+}
+
+/// Warns of folding that may change a peak, and refuses more than [`LARGEST_FOLDING`].
+fn check_folding(measurement: &mut Measurement) -> Result<(), Error> {
+    let at_peak = |(entry, folding): (&Frf, &Vec<f64>)| {
+        let peak = (0..folding.len())
+            .max_by(|&a, &b| entry.receptance[a].norm().total_cmp(&entry.receptance[b].norm()));
+        (entry.name(), peak.map_or(0.0, |peak| folding[peak]))
+    };
+    let worst = measurement
+        .table
+        .entries()
+        .iter()
+        .zip(&measurement.folding)
+        .map(at_peak)
+        .max_by(|a, b| a.1.total_cmp(&b.1));
+    let Some((name, error)) = worst.filter(|(_, error)| *error > 0.0) else {
+        return Ok(());
+    };
+    let remedy = "a softer tip of the hammer, a higher sample rate or an anti-aliasing filter helps; if there was a filter, say \
+                  anti_aliasing = true under [channels.fx] and under the channel of the response in the sidecar";
+    if error > LARGEST_FOLDING {
+        return Err(Error::input(format!(
+            "content above half the sample rate folds into the record and may change the peak of H{name} by {:.0} %, more than {:.0} %: {remedy}",
+            100.0 * error,
+            100.0 * LARGEST_FOLDING
+        )));
+    }
+    if error > SMALL_FOLDING {
+        measurement.warnings.push(format!(
+            "content above half the sample rate folds into the record: it may change the peak of H{name} by {:.1} %, which is in its interval; {remedy}",
+            100.0 * error
+        ));
+    }
+    Ok(())
 }
 
 fn write(target: &OutputFile, table: &FrfTable, is_binary: bool) -> Result<(), Error> {
@@ -282,7 +320,8 @@ struct ReceptanceAnswer {
 #[derive(Serialize)]
 struct PeakEstimate {
     value: f64,
-    ci90: [f64; 2],
+    /// `null` with fewer than three impacts, whose scatter tells nothing.
+    ci90: Option<[f64; 2]>,
 }
 
 #[derive(Serialize)]
@@ -341,13 +380,15 @@ impl FrfOutput {
             // Writing to a String cannot fail.
             let _ = write!(
                 text,
-                "\nH{}: {:.4} µm/N at {:.3} Hz, 90 % interval {:.4} to {:.4}",
+                "\nH{}: {:.4} µm/N at {:.3} Hz",
                 receptance.name,
                 1e6 * value,
-                receptance.peak_hz,
-                1e6 * ci90[0],
-                1e6 * ci90[1]
+                receptance.peak_hz
             );
+            let _ = match ci90 {
+                Some([from, to]) => write!(text, ", 90 % interval {:.4} to {:.4}", 1e6 * from, 1e6 * to),
+                None => write!(text, ", no interval from so few impacts"),
+            };
             if let Some(coherence) = &receptance.coherence {
                 let _ = write!(
                     text,
@@ -391,7 +432,7 @@ impl ColumnsAnswer {
 }
 
 impl ReceptanceAnswer {
-    /// Peak magnitude of one receptance with its 90 % interval from the random error of the estimate.
+    /// Peak magnitude of one receptance with its 90 % interval from the random error of the estimate and from folding.
     fn new(measurement: &Measurement, table: &FrfTable, index: usize) -> Self {
         let entry = &table.entries()[index];
         let size = |line: usize| entry.receptance[line].norm();
@@ -405,13 +446,14 @@ impl ReceptanceAnswer {
         } else {
             0.0
         };
-        let half = NINETY_PERCENT * relative * size(at);
+        // A random error and a bounded one that does not average out.
+        let half = (NINETY_PERCENT * relative).hypot(measurement.folding[index][at]) * size(at);
         Self {
             name: entry.name(),
             peak_hz: table.frequency_hz()[at],
             peak_m_per_n: PeakEstimate {
                 value: size(at),
-                ci90: [(size(at) - half).max(0.0), size(at) + half],
+                ci90: measurement.has_deviation[index].then(|| [(size(at) - half).max(0.0), size(at) + half]),
             },
             coherence: entry.coherence.as_ref().map(|coherence| {
                 let mut sorted = coherence.clone();

@@ -2,6 +2,7 @@
 
 use num_complex::Complex64;
 
+use crate::criteria::IMPACTS_MIN;
 use crate::estimate::FrfLine;
 use crate::excitation::Excitation;
 use crate::hammer::MeasuredImpact;
@@ -29,11 +30,30 @@ pub struct RecordingGroup {
     pub impacts: Option<(Vec<MeasuredImpact>, Vec<MeasuredImpact>)>,
 }
 
+impl RecordingGroup {
+    /// False for a hammer test with fewer than three single impacts: one impact has the coherence 1 by construction, and the
+    /// scatter of two tells nothing about an interval.
+    pub fn has_scatter(&self) -> bool {
+        self.impacts
+            .as_ref()
+            .is_none_or(|(used, _)| used.len() >= IMPACTS_MIN)
+    }
+}
+
+/// One receptance of a group with its errors at the frequencies of the group.
+pub(super) struct MeasuredEntry {
+    pub(super) frf: Frf,
+    /// Standard deviation of |H|, m/N.
+    pub(super) deviation: Vec<f64>,
+    /// Largest relative error by folding.
+    pub(super) folding: Vec<f64>,
+}
+
 /// Receptances of one group, with their standard deviations, at the frequencies of the group.
 pub(super) struct MeasuredGroup {
     pub(super) group: RecordingGroup,
     pub(super) frequency_hz: Vec<f64>,
-    pub(super) entries: Vec<(Frf, Vec<f64>)>,
+    pub(super) entries: Vec<MeasuredEntry>,
     pub(super) warnings: Vec<String>,
 }
 
@@ -58,17 +78,23 @@ pub(super) fn receptances(
             let integrated = |line: &FrfLine| {
                 Complex64::new(0.0, std::f64::consts::TAU * line.frequency_hz).powi(-response.derivatives)
             };
-            let entry = Frf {
+            let frf = Frf {
                 response: response.direction,
                 force,
                 receptance: lines.iter().map(|line| line.h[p][q] * integrated(line)).collect(),
-                coherence: Some(lines.iter().map(|line| line.coherence[p]).collect()),
+                coherence: group
+                    .has_scatter()
+                    .then(|| lines.iter().map(|line| line.coherence[p]).collect()),
             };
             let deviation = lines
                 .iter()
                 .map(|line| line.deviation[p][q] * integrated(line).norm())
                 .collect();
-            entries.push((entry, deviation));
+            entries.push(MeasuredEntry {
+                frf,
+                deviation,
+                folding: lines.iter().map(|line| line.folding[p]).collect(),
+            });
         }
     }
     MeasuredGroup {

@@ -67,6 +67,7 @@ pub(super) fn stepped(
                 h: crate::small_matrix::ZERO,
                 coherence: [0.0; 3],
                 deviation: [[0.0; 3]; 3],
+                folding: [0.0; 3],
                 singular: (1.0, 1.0),
             };
             for p in 0..step.h.len() {

@@ -1,5 +1,6 @@
 //! Spectra of hammer tests.
 
+use super::folding::top_powers;
 use super::recording_group::RecordingGroup;
 use crate::criteria::{END_AMPLITUDE, IMPACTS_MIN};
 use crate::cross_spectra::{CrossSpectra, Segments, averaged};
@@ -8,13 +9,14 @@ use crate::hammer::{self, MeasuredImpact};
 use crate::measurement_settings::{MeasurementSettings, band};
 use crate::test_channels::TestChannels;
 
-/// Auto- and cross-spectra of hammer tests with one segment for each single impact; one result for each recording.
+/// Auto- and cross-spectra of hammer tests with one segment for each single impact, and the largest powers of the channels near half the
+/// sample rate; one result for each recording.
 pub(super) fn struck(
     group: &mut RecordingGroup,
     members: &[TestChannels<'_>],
     settings: &MeasurementSettings,
     warnings: &mut Vec<String>,
-) -> Result<Vec<CrossSpectra>, FrfError> {
+) -> Result<Vec<(CrossSpectra, Vec<f64>)>, FrfError> {
     let mut windows = settings.hammer;
     if windows.segment_s.is_none() {
         windows.segment_s = settings.resolution_hz.map(|hertz| 1.0 / hertz);
@@ -37,7 +39,8 @@ pub(super) fn struck(
     let mut end_amplitude = 0.0_f64;
     let spectra = cuts
         .into_iter()
-        .map(|cut| {
+        .zip(members)
+        .map(|(cut, channels)| {
             let segments = Segments {
                 weights: vec![1.0; cut.length],
                 starts: (0..cut.used.len()).map(|impact| impact * cut.length).collect(),
@@ -46,11 +49,12 @@ pub(super) fn struck(
             };
             let signals: Vec<&[f64]> = cut.signals.iter().map(Vec::as_slice).collect();
             let spectra = averaged(&signals, rate, &segments, band(settings, rate, cut.length));
+            let tops = top_powers(channels, &signals, rate, &segments);
             used.extend(cut.used);
             double.extend(cut.double);
             cut_short.extend(cut.cut_short);
             end_amplitude = end_amplitude.max(cut.end_amplitude);
-            spectra
+            (spectra, tops)
         })
         .collect();
     let times = |impacts: &[MeasuredImpact]| {
@@ -72,7 +76,7 @@ pub(super) fn struck(
     }
     if used.len() < IMPACTS_MIN {
         warnings.push(format!(
-            "{} impacts: coherence and errors are uncertain with fewer than {IMPACTS_MIN}",
+            "{} impacts: there is no coherence and no interval with fewer than {IMPACTS_MIN}; strike {IMPACTS_MIN} times or more",
             used.len()
         ));
     }
@@ -80,12 +84,6 @@ pub(super) fn struck(
         warnings.push(format!(
             "the response still is {:.0} % of its peak where segments end, which biases resonances; longer segments or an exponential window help",
             100.0 * end_amplitude
-        ));
-    }
-    if let Some(tau) = windows.exponential_s {
-        warnings.push(format!(
-            "the exponential window adds {:.4} 1/s to the decay of every mode: take 1/(τω) off identified damping ratios",
-            1.0 / tau
         ));
     }
     group.impacts = Some((used, double));

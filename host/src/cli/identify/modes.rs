@@ -108,7 +108,11 @@ fn source(args: &Args, understood: &mut Vec<Understood>) -> Result<Source, Error
     let measurement = measure(&recordings, &settings)?;
     Ok(Source {
         table: measurement.table,
-        deviation: Some(measurement.deviation),
+        deviation: measurement
+            .has_deviation
+            .iter()
+            .all(|has| *has)
+            .then_some(measurement.deviation),
         warnings: measurement.warnings,
         records: record_spectra(&recordings, &settings)?,
     })

@@ -1,0 +1,69 @@
+//! Folding of hammer tests: content above half the sample rate that an analog-to-digital converter without an anti-aliasing
+//! filter adds to the record.
+//!
+//! A sample rate f_s folds the content at f_s − f and f_s + f onto the line f. What stands there is not in the record, but its
+//! level at half the sample rate is: both sides of f_s/2 add up there, so that the spectrum A(f_s/2) of the record is up to
+//! twice the true one. A force pulse has bounded variation, and its spectrum falls at least as 1/f (Bracewell, The Fourier
+//! Transform and Its Applications, chapter 8). At f_s ± f, with f far below f_s/2, it is therefore at most A(f_s/2)/4, and the
+//! two sides together fold at most
+//!
+//!   A(f_s/2)/2
+//!
+//! onto the line. The same bound is taken for the response. Relative to the line, the bounds of force and response add up to the
+//! largest relative error of the frequency response function.
+
+use crate::cross_spectra::{CrossSpectra, Segments, averaged};
+use crate::test_channels::TestChannels;
+
+/// Share of the lines below half the sample rate over which the largest level counts as that at half the sample rate. The
+/// spectrum of a pulse has zeros one per 1/(pulse length); a tenth of the band holds several lines between two zeros of
+/// pulses longer than 20 samples. A choice.
+const TOP: f64 = 0.1;
+
+/// Largest power of every channel near half the sample rate, at the scale of the spectra; 0 for a channel with an
+/// anti-aliasing filter. Forces come first.
+pub(super) fn top_powers(
+    channels: &TestChannels<'_>,
+    signals: &[&[f64]],
+    rate: f64,
+    segments: &Segments,
+) -> Vec<f64> {
+    let half = segments.weights.len() / 2;
+    let first = half - (TOP * half as f64) as usize;
+    let top = averaged(signals, rate, segments, first..half + 1);
+    let is_filtered = |name: &str| {
+        let described = channels.recording.sidecar.channel(name);
+        described
+            .and_then(|channel| channel.anti_aliasing)
+            .unwrap_or(false)
+    };
+    let forces = channels.forces.iter().map(|(_, channel)| channel.name.as_str());
+    let responses = channels
+        .responses
+        .iter()
+        .map(|response| response.channel.name.as_str());
+    forces
+        .chain(responses)
+        .enumerate()
+        .map(|(index, name)| {
+            if is_filtered(name) {
+                return 0.0;
+            }
+            let powers = (0..top.frequency_hz.len()).map(|line| top.at(line, index, index).re);
+            powers.fold(0.0, f64::max)
+        })
+        .collect()
+}
+
+/// Largest relative error by folding of the frequency response function of one response at one line, with one force.
+pub(super) fn relative_error(spectra: &CrossSpectra, tops: &[f64], line: usize, response: usize) -> f64 {
+    let share = |channel: usize| {
+        let power = spectra.at(line, channel, channel).re;
+        if tops[channel] > 0.0 {
+            0.5 * (tops[channel] / power.max(f64::MIN_POSITIVE)).sqrt()
+        } else {
+            0.0
+        }
+    };
+    share(0) + share(1 + response)
+}
