@@ -245,3 +245,51 @@ fn a_step_sine_test_at_several_forces_is_evaluated_at_the_given_force() {
     // Cubic damping lowers the resonance peak: at 9.5 N far more than at 1.8 N.
     assert!(peaks[1] < 0.9 * peaks[0], "{peaks:?}");
 }
+
+#[test]
+fn the_interval_of_an_unfiltered_record_holds_what_a_fast_record_shows() {
+    let folder = folder();
+    let here = folder.path();
+    let case = std::path::PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("cases/kuka-kr90-acetal.toml");
+    let peak = |rate: &str, more: &[&str]| -> (f64, f64, f64) {
+        let case = case.display().to_string();
+        let tap = [
+            "simulate",
+            &case,
+            "--experiment",
+            "hammer",
+            "--direction",
+            "y",
+            "--force-n",
+            "300",
+            "--sample-rate-hz",
+            rate,
+            "--noise-percent",
+            "0.1",
+            "--out",
+            "tap.csv",
+        ];
+        assert_eq!(quietcut(here, &tap).status, Some(0));
+        let answer = quietcut(
+            here,
+            &[&["frf", "tap.csv", "--band-hz", "10:30", "--json"], more].concat(),
+        )
+        .json();
+        let receptances = answer["receptances"].as_array().expect("receptances");
+        let hyy = receptances.iter().find(|one| one["name"] == "yy").expect("Hyy");
+        let number = |value: &Value| value.as_f64().expect("a number");
+        let found = &hyy["peak_m_per_n"];
+        (
+            number(&found["value"]),
+            number(&found["ci90"][0]),
+            number(&found["ci90"][1]),
+        )
+    };
+    // 16 times the rate folds a hundredth of what 512 Hz does.
+    let (truth, ..) = peak("8192", &[]);
+    for more in [&[][..], &["--exponential-window-s", "3"]] {
+        let (value, from, to) = peak("512", more);
+        assert!((from..to).contains(&truth), "{truth} {value} {from} {to}");
+        assert!(to - from < 0.1 * truth, "{from} {to}");
+    }
+}

@@ -221,9 +221,11 @@ pub fn run(args: Args) -> Result<(), Error> {
 
 /// Warns of folding that may change a peak, and refuses more than [`LARGEST_FOLDING`].
 fn check_folding(measurement: &mut Measurement) -> Result<(), Error> {
+    // The error by folding is inversely proportional to the spectra of force and response: |H| over that error is largest at the
+    // resonance that the impacts excite, and not where the force vanishes.
     let at_peak = |(entry, folding): (&Frf, &Vec<f64>)| {
-        let peak = (0..folding.len())
-            .max_by(|&a, &b| entry.receptance[a].norm().total_cmp(&entry.receptance[b].norm()));
+        let excited = |line: usize| entry.receptance[line].norm() / folding[line].max(f64::MIN_POSITIVE);
+        let peak = (0..folding.len()).max_by(|&a, &b| excited(a).total_cmp(&excited(b)));
         (entry.name(), peak.map_or(0.0, |peak| folding[peak]))
     };
     let worst = measurement
@@ -240,7 +242,8 @@ fn check_folding(measurement: &mut Measurement) -> Result<(), Error> {
                   anti_aliasing = true under [channels.fx] and under the channel of the response in the sidecar";
     if error > LARGEST_FOLDING {
         return Err(Error::input(format!(
-            "content above half the sample rate folds into the record and may change the peak of H{name} by {:.0} %, more than {:.0} %: {remedy}",
+            "{}: content above half the sample rate folds into the record and may change the peak of H{name} by {:.0} %, more than {:.0} %: {remedy}",
+            measurement.table.path().display(),
             100.0 * error,
             100.0 * LARGEST_FOLDING
         )));
