@@ -10,6 +10,7 @@ use quietcut::recording::{Channel, Quantity, Recording, Sidecar, TestKind};
 use quietcut::simulate::rig::{Rig, Signal};
 use quietcut::structure::Direction;
 use quietcut_tests::command::{folder, quietcut};
+use serde_json::Value;
 
 const RATE: f64 = 1024.0;
 const FREQUENCY_HZ: f64 = 17.4;
