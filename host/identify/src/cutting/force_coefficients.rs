@@ -292,6 +292,7 @@ impl Fitter<'_> {
         Ok((next, step.dot(&(matrix * &step)).max(0.0).sqrt()))
     }
 
+    /// Gauss–Newton iteration without damping: the forces are linear in the coefficients, and bilinear in coefficients and runout.
     fn settle(&self, mut state: State) -> Result<State, ForceCoefficientError> {
         let mut length = f64::INFINITY;
         for _ in 0..30 {

@@ -242,6 +242,9 @@ impl Orbit {
     ///
     /// With a normal along the depth this is Newton's method at fixed depth; with the tangent it passes folds. States
     /// at the nodes are corrected together with the start. Returns the orbit and its tangent, oriented along `normal`.
+    ///
+    /// The iteration is not that of `quietcut_numerics::newton`: the states at the nodes are unknowns without equations of
+    /// their own, and the last decomposition gives the tangent.
     pub(super) fn correct(
         map: &impl PeriodMap,
         guess: &Self,

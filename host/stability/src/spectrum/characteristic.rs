@@ -222,7 +222,7 @@ impl Characteristic {
     }
 
     /// The crossing of the unit circle near a guess, at a depth between `low_m` and `high_m`, by Newton's method in
-    /// depth and angle of μ.
+    /// depth and angle of μ. Each of both unknowns has a tolerance of its own.
     pub(crate) fn crossing_near(
         &self,
         guess: Crossing,

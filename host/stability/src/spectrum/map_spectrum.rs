@@ -100,6 +100,8 @@ impl<M: PeriodMap, F: Fn(f64) -> Option<M>, E: Fn(Complex64, f64) -> Option<f64>
         Some((nearest(deeper, own)? - own) / step_m)
     }
 
+    /// Newton's method for |μ| = 1 along the branch. Its derivative is a difference quotient, so that the last step is not applied:
+    /// the crossing is the depth at which the multiplier was computed.
     fn crossing_near(&mut self, guess: Crossing, low_m: f64, high_m: f64) -> Option<Crossing> {
         let (mut depth_m, mut expected) = (guess.depth_m, guess.multiplier);
         // Newton's method in the depth for |μ| = 1 along the branch of this multiplier.
