@@ -39,6 +39,7 @@ mod error;
 mod estimate;
 mod excitation;
 mod exponential_window;
+mod frf_unit;
 mod hammer;
 mod interpolation;
 mod measurement;

@@ -3,7 +3,7 @@
 use quietcut_model::structure::Direction;
 use quietcut_recording::{ColumnMap, RecordedChannel, Scale, TextColumn};
 
-use super::table_file::{FrfUnit, frf_unit, pair_of};
+use super::frf_unit::{FrfUnit, frf_unit, pair_of};
 
 /// Content of a column.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,13 +1,12 @@
 //! FRF tables in CSV files: `frequency_hz,hxx_re [m/N],hxx_im [m/N],hxy_re [m/N],…`, optional `coherence_xx`.
 
-use std::f64::consts::TAU;
 use std::path::Path;
 
 use num_complex::Complex64;
 
+use super::frf_unit::{DirectionPair, FrfUnit, frf_unit, pair_of};
 use super::{Frf, FrfError, FrfTable, ImportedTable};
-use quietcut_model::structure::Direction;
-use quietcut_recording::{Import, Quantity, TextTable, Unit};
+use quietcut_recording::{Import, TextTable};
 
 /// Content of a column of an FRF table, from its header.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -21,20 +20,10 @@ enum ColumnContent {
     Coherence(DirectionPair),
 }
 
-/// Directions of displacement and force of a receptance.
-type DirectionPair = (Direction, Direction);
-
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum ComplexPart {
     Real,
     Imaginary,
-}
-
-/// Unit of an FRF: conversion factor to SI, and order of the time derivative of displacement (0 receptance, 1 mobility, 2 accelerance).
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct FrfUnit {
-    pub(super) factor: f64,
-    pub(super) derivatives: i32,
 }
 
 struct Column {
@@ -216,71 +205,6 @@ fn column(path: &Path, title: &str) -> Result<Column, FrfError> {
     })
 }
 
-/// Parses directions such as `xy`: displacement in x, force in y.
-pub(super) fn pair_of(text: &str) -> Option<DirectionPair> {
-    let axis = |text: &str| {
-        let direction: Direction = text.parse().ok()?;
-        direction.axis().map(|_| direction)
-    };
-    let (response, force) = text.split_at_checked(1)?;
-    Some((axis(response)?, axis(force)?))
-}
-
-impl FrfUnit {
-    const SI: Self = Self {
-        factor: 1.0,
-        derivatives: 0,
-    };
-
-    /// Name of the function: receptance, mobility or accelerance.
-    pub(super) fn word(self) -> &'static str {
-        match self.derivatives {
-            0 => "receptance",
-            1 => "mobility",
-            _ => "accelerance",
-        }
-    }
-
-    /// Converts an FRF value in this unit to receptance, m/N; `None` for mobility and accelerance at 0 Hz, where no receptance follows.
-    fn receptance(self, value: Complex64, frequency_hz: f64) -> Option<Complex64> {
-        let rate = Complex64::new(0.0, TAU * frequency_hz).powi(self.derivatives);
-        let receptance = value * self.factor / rate;
-        receptance.is_finite().then_some(receptance)
-    }
-}
-
-/// Parses the unit of an FRF, such as `um/N`, `m/s^2/N` or `g/N`.
-pub(super) fn frf_unit(text: &str) -> Result<FrfUnit, String> {
-    let wrong = || {
-        format!(
-            "\"{text}\" is no unit of it; a displacement, velocity or acceleration per force such as m/N, um/N or \
-             (m/s^2)/N is needed"
-        )
-    };
-    // kg⁻¹ is (m/s²)/N.
-    let text = if text.trim() == "1/kg" { "m/s^2/N" } else { text };
-    let (response, force) = text.rsplit_once('/').ok_or_else(wrong)?;
-    let response = response
-        .strip_prefix('(')
-        .and_then(|inner| inner.strip_suffix(')'))
-        .unwrap_or(response);
-    let response: Unit = response.parse().map_err(|_| wrong())?;
-    let force: Unit = force.parse().map_err(|_| wrong())?;
-    let derivatives = match response.quantity {
-        Quantity::Displacement => 0,
-        Quantity::Velocity => 1,
-        Quantity::Acceleration => 2,
-        _ => return Err(wrong()),
-    };
-    if force.quantity != Quantity::Force {
-        return Err(wrong());
-    }
-    Ok(FrfUnit {
-        factor: response.factor / force.factor,
-        derivatives,
-    })
-}
-
 fn push_line(path: &Path, columns: &mut [Column], record: &csv::StringRecord) -> Result<(), FrfError> {
     let line = record.position().map_or(0, csv::Position::line);
     let wrong = |what: String| FrfError::Line {
@@ -411,6 +335,8 @@ fn coherence_of(columns: &[Column], pair: DirectionPair) -> Option<Vec<f64>> {
 
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::TAU;
+
     use super::*;
 
     fn parse(text: &str) -> Result<FrfTable, FrfError> {

@@ -9,8 +9,8 @@ use std::path::Path;
 
 use num_complex::Complex64;
 
+use super::frf_unit::FrfUnit;
 use super::table_column::{Content, Meaning, Part, PhaseUnit, meaning};
-use super::table_file::FrfUnit;
 use super::{Frf, FrfError, FrfTable};
 use quietcut_model::structure::Direction;
 use quietcut_recording::{Import, Sidecar, TextColumn, TextTable};

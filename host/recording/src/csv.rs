@@ -1,4 +1,4 @@
-//! Reader and writer of text tables: a row of names, then rows of numbers. [`super::text_head`] finds separator, decimal mark and names.
+//! Reader of text tables: a row of names, then rows of numbers. [`super::text_head`] finds separator, decimal mark and names.
 //!
 //! Files of hundreds of megabytes are read in chunks, without the whole text in memory. Lines that start with `#`, `%` or `//` are comments.
 //! Empty lines are skipped. Numbers may be quoted. Columns without any value are left out.
@@ -7,13 +7,12 @@ use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
+use super::RecordingError;
+use super::csv_number::{End, number};
 use super::raw::{FoundUnit, Raw, RawColumn};
-use super::text_head::{Dialect, Head, HeadColumn, Separator, head, is_comment};
-use super::{Quantity, Recording, RecordingError};
-use crate::file::{FileError, Prepared};
-
-/// Significant digits of written samples: nine digits represent every 32-bit float exactly.
-const DIGITS: usize = 9;
+use super::text_dialect::{Dialect, Separator};
+use super::text_head::{Head, HeadColumn, head, is_comment};
+use crate::file::FileError;
 
 /// Chunk size of reading, bytes; a choice.
 const CHUNK: usize = 1 << 18;
@@ -386,95 +385,6 @@ fn is_counting(samples: &[f64]) -> bool {
             .iter()
             .enumerate()
             .all(|(index, sample)| *sample == first + index as f64)
-}
-
-/// Separator after a number.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum End {
-    /// Comma: another field follows.
-    Field,
-    /// End of the line or of the file.
-    Line,
-}
-
-/// Parses the number at the start of `text`, with optional blanks and quotes. Returns its value, the number of bytes up to and including the
-/// separator, and the separator.
-#[inline]
-fn number(text: &[u8]) -> Option<(f64, usize, End)> {
-    // Fast path: a number without blanks and quotes.
-    if let Ok((value, length)) = fast_float2::parse_partial::<f64, _>(text) {
-        match &text[length..] {
-            [b',', ..] => return Some((value, length + 1, End::Field)),
-            [b'\n', ..] => return Some((value, length + 1, End::Line)),
-            [] => return Some((value, length, End::Line)),
-            _ => {}
-        }
-    }
-    let blanks = |text: &[u8]| {
-        text.iter()
-            .take_while(|byte| matches!(byte, b' ' | b'\t' | b'\r'))
-            .count()
-    };
-    let mut at = blanks(text);
-    let is_quoted = text.get(at) == Some(&b'"');
-    if is_quoted {
-        at += 1;
-        at += blanks(&text[at..]);
-    }
-    let (value, length) = fast_float2::parse_partial::<f64, _>(&text[at..]).ok()?;
-    at += length;
-    at += blanks(&text[at..]);
-    if is_quoted {
-        if text.get(at) != Some(&b'"') {
-            return None;
-        }
-        at += 1;
-        at += blanks(&text[at..]);
-    }
-    match text.get(at) {
-        Some(b',') => Some((value, at + 1, End::Field)),
-        Some(b'\n') => Some((value, at + 1, End::Line)),
-        None => Some((value, at, End::Line)),
-        Some(_) => None,
-    }
-}
-
-/// A recording as a CSV file that is written but not yet published: time in seconds, then one column per channel.
-pub(super) fn prepared(path: &Path, recording: &Recording) -> Result<Prepared, RecordingError> {
-    Ok(crate::file::prepare(path, |writer| {
-        let mut writer = csv::Writer::from_writer(writer);
-        let titles = recording.channels.iter().map(|channel| match channel.quantity {
-            Quantity::Unknown => channel.name.clone(),
-            quantity => format!("{} [{}]", channel.name, quantity.unit()),
-        });
-        writer.write_record(std::iter::once("t [s]".into()).chain(titles))?;
-        let mut row: Vec<String> = Vec::with_capacity(recording.channels.len() + 1);
-        for sample in 0..recording.len() {
-            row.clear();
-            // Time is written with all digits: nine digits resolve only 10 µs after an hour.
-            row.push(recording.time_s(sample).to_string());
-            row.extend(
-                recording
-                    .channels
-                    .iter()
-                    .map(|channel| number_text(channel.samples[sample])),
-            );
-            writer.write_record(&row)?;
-        }
-        writer.flush()
-    })?)
-}
-
-/// Shortest text of a number with [`DIGITS`] significant digits.
-fn number_text(value: f64) -> String {
-    let rounded: f64 = format!("{value:.*e}", DIGITS - 1).parse().unwrap_or(value);
-    let plain = rounded.to_string();
-    let exponent = format!("{rounded:e}");
-    if exponent.len() < plain.len() {
-        exponent
-    } else {
-        plain
-    }
 }
 
 #[cfg(test)]

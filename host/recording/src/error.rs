@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::understood::{Doubt, doubts_text};
+use super::doubt::{Doubt, doubts_text};
 use super::{Quantity, UnknownUnit};
 use crate::file::FileError;
 
@@ -57,7 +57,12 @@ pub enum RecordingError {
         cause: UnknownUnit,
     },
     /// The unit of a channel contradicts its name.
-    #[error("{}, column \"{column}\": {found} ({}), but a channel of this name is {expected}", path.display(), found.unit())]
+    #[error(
+        "{}, column \"{column}\": {found} ({}), but a channel of this name is {expected}; correct the head, or --map \"{column}=NAME:UNIT\" \
+         with the name and unit that hold",
+        path.display(),
+        found.unit()
+    )]
     Quantity {
         /// The file.
         path: PathBuf,

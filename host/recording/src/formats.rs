@@ -9,7 +9,7 @@ use super::recording::Recording;
 use super::segment::Segment;
 use super::sidecar::Sidecar;
 use super::uff::UffForm;
-use super::{csv, lvm, mat, tdms, uff, wav};
+use super::{csv, csv_writer, lvm, mat, tdms, uff, wav};
 use crate::file::Prepared;
 
 /// File extensions of the formats that can be written: CSV, UFF 58 as text (uff, unv), UFF 58 binary (bunv).
@@ -121,7 +121,7 @@ impl Recording {
     /// The extension is not one of [`WRITTEN`], or a file cannot be written.
     pub fn write(&self, path: &Path) -> Result<(), RecordingError> {
         match crate::file::ending(path).as_str() {
-            "csv" => self.publish(path, csv::prepared(path, self)?),
+            "csv" => self.publish(path, csv_writer::prepared(path, self)?),
             "uff" | "unv" => self.write_uff(path, UffForm::Text),
             "bunv" => self.write_uff(path, UffForm::Binary),
             ending => Err(RecordingError::Written {

@@ -7,7 +7,8 @@ use std::path::Path;
 
 use super::RecordingError;
 use super::raw::{FoundUnit, Raw, RawColumn};
-use super::text_head::{Dialect, Separator, latin};
+use super::text_dialect::{Dialect, Separator};
+use super::text_head::latin;
 
 /// Last line of the header of the file and of a block.
 const END: &str = "***End_of_Header***";

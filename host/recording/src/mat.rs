@@ -9,22 +9,23 @@
 //! headers state.
 
 mod records;
+mod source;
+mod value;
 
 use std::fs::File;
-use std::io::{BufRead, BufReader, ErrorKind, Read, copy, sink};
+use std::io::{BufRead, BufReader, Read, copy, sink};
 use std::path::Path;
 
 use flate2::bufread::ZlibDecoder;
 
 use super::RecordingError;
-use super::raw::{Raw, RawColumn};
+use super::raw::Raw;
 use crate::file::FileError;
+use source::{CHUNK, SMALL_MAX, Source, size_of_kind, word};
+use value::{Item, Value, Variable};
 
 /// Length of the file header, bytes (MAT-File Format, level 5).
 const HEADER: usize = 128;
-
-/// Chunk size of reading, bytes; a choice. It is a multiple of the size of every number type.
-const CHUNK: usize = 1 << 16;
 
 /// Largest compression factor of the deflate format (1032:1). An element with a larger factor is damaged.
 const INFLATION_MAX: u64 = 1032;
@@ -39,9 +40,6 @@ const VALUES_PER_BYTE: u64 = 200;
 
 /// Number of values for which memory is reserved before reading, even if the file is shorter. A choice; it bounds what a false header costs.
 const TRUSTED: u64 = 1 << 16;
-
-/// Largest element with flags, dimensions or a name, bytes. Valid names have up to 63 characters; the limit is a choice above that.
-const SMALL_MAX: u64 = 4096;
 
 /// Data type of a compressed element (miCOMPRESSED).
 const COMPRESSED: u32 = 15;
@@ -69,51 +67,6 @@ pub(super) fn read(path: &Path) -> Result<Vec<Raw>, RecordingError> {
     };
     let items = items(&mut BufReader::with_capacity(CHUNK, file), length).map_err(content)?;
     records::records(items).map_err(content)
-}
-
-/// A named value of the file, or of a structure.
-#[derive(Debug)]
-struct Item {
-    name: String,
-    value: Value,
-}
-
-/// A value of the file.
-#[derive(Debug)]
-enum Value {
-    Numbers(Variable),
-    Text(String),
-    /// Elements of a structure array, each with its fields; the elements of a cell array have one field without name.
-    Elements(Vec<Vec<Item>>),
-}
-
-/// A real numeric variable, split into channels; a row vector and a column vector are one channel.
-#[derive(Debug)]
-struct Variable {
-    name: String,
-    /// Samples of each channel; all channels have the same length.
-    values: Vec<Vec<f64>>,
-}
-
-impl Variable {
-    /// Number of samples per channel: the longer dimension of the matrix.
-    fn samples(&self) -> usize {
-        self.values.first().map_or(0, Vec::len)
-    }
-
-    /// Channels with their names: the name of the variable, numbered from 1 if there are several.
-    fn into_columns(self) -> Vec<RawColumn> {
-        let is_one = self.values.len() == 1;
-        let name = |index: usize| match is_one {
-            true => self.name.clone(),
-            false => format!("{}{}", self.name, index + 1),
-        };
-        self.values
-            .into_iter()
-            .enumerate()
-            .map(|(index, samples)| RawColumn::without_unit(name(index), samples))
-            .collect()
-    }
 }
 
 /// Reads all variables of a file of `length` bytes.
@@ -365,241 +318,6 @@ fn elements(
         elements.push(items);
     }
     Ok(elements)
-}
-
-impl Item {
-    /// The value with the name of its field; the elements of structures have no names of their own.
-    fn named(mut self, name: &str) -> Self {
-        self.name = name.into();
-        if let Value::Numbers(variable) = &mut self.value {
-            variable.name = name.into();
-        }
-        self
-    }
-}
-
-/// Size of a stored number type, bytes; `None` if the data type is not numeric.
-fn size_of_kind(kind: u32) -> Option<usize> {
-    Some(match kind {
-        1 | 2 => 1,
-        3 | 4 => 2,
-        5..=7 => 4,
-        9 | 12 | 13 => 8,
-        _ => return None,
-    })
-}
-
-/// Decodes numbers of data type `kind` and passes each to `take`. A matrix of doubles may be stored in a smaller integer type without loss.
-fn decode(kind: u32, data: &[u8], big_endian: bool, mut take: impl FnMut(f64)) {
-    macro_rules! decode {
-        ($type:ty) => {
-            for bytes in data.chunks_exact(size_of::<$type>()) {
-                let mut array = [0; size_of::<$type>()];
-                array.copy_from_slice(bytes);
-                take(if big_endian {
-                    <$type>::from_be_bytes(array) as f64
-                } else {
-                    <$type>::from_le_bytes(array) as f64
-                });
-            }
-        };
-    }
-    match kind {
-        1 => decode!(i8),
-        // Text in UTF-8 (16) has single bytes.
-        2 | 16 => decode!(u8),
-        3 => decode!(i16),
-        4 | 17 => decode!(u16),
-        5 => decode!(i32),
-        6 => decode!(u32),
-        7 => decode!(f32),
-        9 => decode!(f64),
-        12 => decode!(i64),
-        13 => decode!(u64),
-        _ => {}
-    }
-}
-
-/// Decodes a 32-bit unsigned integer from the first four bytes.
-fn word(bytes: &[u8], big_endian: bool) -> u32 {
-    let array = [bytes[0], bytes[1], bytes[2], bytes[3]];
-    if big_endian {
-        u32::from_be_bytes(array)
-    } else {
-        u32::from_le_bytes(array)
-    }
-}
-
-/// Tag of a data element: data type and length.
-struct Tag {
-    /// Data type of the element (miINT8 = 1 … miCOMPRESSED = 15).
-    kind: u32,
-    /// Length of the data, bytes.
-    length: u64,
-    /// Data of a small element, which are stored inside the tag (up to four bytes).
-    inside: Option<[u8; 4]>,
-}
-
-/// Sequential reader of the elements of a file or of a compressed element.
-struct Source<'a> {
-    reader: &'a mut dyn BufRead,
-    /// Offset of the next byte.
-    at: u64,
-    /// Upper bound of the bytes available: the length of the file or of the enclosing element.
-    available: u64,
-    big_endian: bool,
-}
-
-impl Source<'_> {
-    /// True if no byte is left.
-    fn is_at_end(&mut self) -> Result<bool, String> {
-        self.reader
-            .fill_buf()
-            .map(<[u8]>::is_empty)
-            .map_err(|error| error.to_string())
-    }
-
-    /// Reads exactly as many bytes as `bytes` holds.
-    fn fill(&mut self, bytes: &mut [u8]) -> Result<(), String> {
-        self.reader
-            .read_exact(bytes)
-            .map_err(|error| match error.kind() {
-                ErrorKind::UnexpectedEof => self.cut_off(bytes.len() as u64),
-                _ => format!("after byte {}: {error}", self.at),
-            })?;
-        self.at += bytes.len() as u64;
-        Ok(())
-    }
-
-    /// Message for a file that ends within an element of `length` bytes.
-    fn cut_off(&self, length: u64) -> String {
-        format!(
-            "it ends within an element of {length} bytes at byte {}: it is cut off",
-            self.at
-        )
-    }
-
-    /// Reads the next tag.
-    fn tag(&mut self) -> Result<Tag, String> {
-        let mut bytes = [0; 4];
-        self.fill(&mut bytes)?;
-        let first = word(&bytes, self.big_endian);
-        self.fill(&mut bytes)?;
-        let small = first >> 16;
-        if small > 4 {
-            return Err(format!(
-                "an element at byte {} has {small} bytes in 4",
-                self.at - 8
-            ));
-        }
-        Ok(if small > 0 {
-            Tag {
-                kind: first & 0xffff,
-                length: u64::from(small),
-                inside: Some(bytes),
-            }
-        } else {
-            Tag {
-                kind: first,
-                length: u64::from(word(&bytes, self.big_endian)),
-                inside: None,
-            }
-        })
-    }
-
-    /// Reads the next element, which holds flags, dimensions or a name: at most [`SMALL_MAX`] bytes.
-    fn small(&mut self) -> Result<Vec<u8>, String> {
-        let tag = self.tag()?;
-        if tag.length > SMALL_MAX {
-            return Err(format!(
-                "flags, dimensions or a name of {} bytes at byte {}; at most {SMALL_MAX} are possible",
-                tag.length, self.at
-            ));
-        }
-        let mut data = Vec::new();
-        self.chunks(&tag, |chunk| data.extend_from_slice(chunk))?;
-        Ok(data)
-    }
-
-    /// Reads the text of an element: UTF-8, UTF-16 or bytes.
-    fn text(&mut self, tag: &Tag) -> Result<String, String> {
-        let mut codes = Vec::new();
-        self.numbers(tag, |code| codes.push(code as u32))?;
-        // Data types 16 (UTF-8), 1 and 2 hold bytes of UTF-8; the others hold one code for each letter.
-        if matches!(tag.kind, 1 | 2 | 16) {
-            let bytes: Vec<u8> = codes.iter().map(|&code| code as u8).collect();
-            return Ok(String::from_utf8_lossy(&bytes).into_owned());
-        }
-        Ok(codes.into_iter().filter_map(char::from_u32).collect())
-    }
-
-    /// Reads the numbers of an element and passes each to `take`.
-    fn numbers(&mut self, tag: &Tag, mut take: impl FnMut(f64)) -> Result<(), String> {
-        let big_endian = self.big_endian;
-        self.chunks(tag, |chunk| decode(tag.kind, chunk, big_endian, &mut take))
-    }
-
-    /// Reads the data of an element in chunks, and its padding to a multiple of 8 bytes.
-    fn chunks(&mut self, tag: &Tag, mut take: impl FnMut(&[u8])) -> Result<(), String> {
-        if let Some(inside) = &tag.inside {
-            take(&inside[..tag.length as usize]);
-            return Ok(());
-        }
-        if tag.length > self.available {
-            return Err(self.cut_off(tag.length));
-        }
-        let mut chunk = vec![0; CHUNK.min(tag.length as usize)];
-        let mut left = tag.length as usize;
-        while left > 0 {
-            let length = left.min(CHUNK);
-            self.fill(&mut chunk[..length])?;
-            take(&chunk[..length]);
-            left -= length;
-        }
-        self.pad(tag.length)
-    }
-
-    /// Skips the padding after `length` bytes; the padding of the last element may be missing.
-    fn pad(&mut self, length: u64) -> Result<(), String> {
-        let padding = length.next_multiple_of(8) - length;
-        let read = copy(&mut (&mut *self.reader).take(padding), &mut sink());
-        self.at += read.map_err(|error| error.to_string())?;
-        Ok(())
-    }
-
-    /// Applies `read` to the data of an element, limited to that element, and skips data that `read` leaves.
-    fn within<T>(
-        &mut self,
-        tag: &Tag,
-        read: impl FnOnce(&mut Source<'_>) -> Result<T, String>,
-    ) -> Result<T, String> {
-        if tag.length > self.available {
-            return Err(self.cut_off(tag.length));
-        }
-        let end = self.at + tag.length;
-        let mut data = (&mut *self.reader).take(tag.length);
-        let found = read(&mut Source {
-            reader: &mut data,
-            at: self.at,
-            available: tag.length,
-            big_endian: self.big_endian,
-        })?;
-        copy(&mut data, &mut sink()).map_err(|error| error.to_string())?;
-        if data.limit() > 0 {
-            return Err(self.cut_off(tag.length));
-        }
-        self.at = end;
-        self.pad(tag.length)?;
-        Ok(found)
-    }
-
-    /// Skips an element.
-    fn skip(&mut self, tag: &Tag) -> Result<(), String> {
-        if tag.inside.is_some() {
-            return Ok(());
-        }
-        self.within(tag, |_| Ok(()))
-    }
 }
 
 #[cfg(test)]

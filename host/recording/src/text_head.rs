@@ -3,117 +3,10 @@
 //! The head is found from the numbers: the first line of numbers that is followed by another one, or preceded by a row of as many names.
 
 use super::raw::FoundUnit;
+use super::text_dialect::{Dialect, Separator, bare, blank_fields};
+use super::text_rate::rate;
 use super::unit::Unit;
 use super::words::name_and_unit;
-
-/// Separator between the fields of a line.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Separator {
-    Comma,
-    Semicolon,
-    Tab,
-    /// Any number of blanks and tabs.
-    Blank,
-}
-
-/// Form of the numbers of a text table.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Dialect {
-    pub(super) separator: Separator,
-    /// True if the decimal mark is a comma.
-    pub(super) decimal_comma: bool,
-}
-
-impl Dialect {
-    /// Comma between fields, decimal point.
-    pub(super) const PLAIN: Self = Self {
-        separator: Separator::Comma,
-        decimal_comma: false,
-    };
-
-    /// Fields of a line, without blanks and quotes around them.
-    pub(super) fn fields(self, line: &str) -> Vec<&str> {
-        let separator = match self.separator {
-            Separator::Blank => return blank_fields(line),
-            Separator::Comma => ',',
-            Separator::Semicolon => ';',
-            Separator::Tab => '\t',
-        };
-        let mut fields = Vec::new();
-        let mut start = 0;
-        let mut is_quoted = false;
-        // A quote that is not closed is a letter like others, so that it does not swallow the rest of the line.
-        let is_closed = line.matches('"').count().is_multiple_of(2);
-        for (at, letter) in line.char_indices() {
-            if letter == '"' && is_closed {
-                is_quoted = !is_quoted;
-            } else if letter == separator && !is_quoted {
-                fields.push(bare(&line[start..at]));
-                start = at + 1;
-            }
-        }
-        fields.push(bare(&line[start..]));
-        fields
-    }
-
-    /// The number of a field; `None` if it is none.
-    pub(super) fn number(self, field: &str) -> Option<f64> {
-        if self.decimal_comma && field.contains(',') {
-            if field.contains('.') {
-                return None;
-            }
-            return fast_float2::parse(field.replace(',', ".")).ok();
-        }
-        fast_float2::parse(field).ok()
-    }
-
-    /// Number of fields of a line of numbers; `None` if a field is text, or no field is a number.
-    fn count_of_numbers(self, line: &str) -> Option<usize> {
-        let fields = self.fields(line);
-        let numbers = fields.iter().filter(|field| self.number(field).is_some()).count();
-        let empty = fields.iter().filter(|field| field.is_empty()).count();
-        (numbers > 0 && numbers + empty == fields.len()).then_some(fields.len())
-    }
-
-    /// Description for the user; `None` for comma and point.
-    pub(super) fn note(self) -> Option<String> {
-        let separator = match self.separator {
-            Separator::Comma => "comma",
-            Separator::Semicolon => "semicolon",
-            Separator::Tab => "tab",
-            Separator::Blank => "blank",
-        };
-        match (self == Self::PLAIN, self.decimal_comma) {
-            (true, _) => None,
-            (_, true) => Some(format!("separator {separator}, decimal comma")),
-            (_, false) => Some(format!("separator {separator}")),
-        }
-    }
-}
-
-/// A field without blanks and quotes around it.
-fn bare(field: &str) -> &str {
-    let field = field.trim();
-    field
-        .strip_prefix('"')
-        .and_then(|inner| inner.strip_suffix('"'))
-        .map_or(field, str::trim)
-}
-
-/// Fields between blanks; a quoted field may hold blanks.
-fn blank_fields(line: &str) -> Vec<&str> {
-    let mut fields = Vec::new();
-    let mut rest = line.trim();
-    while !rest.is_empty() {
-        let end = match rest.strip_prefix('"').and_then(|inner| inner.find('"')) {
-            Some(inner) => inner + 2,
-            None => rest.find(char::is_whitespace).unwrap_or(rest.len()),
-        };
-        fields.push(bare(&rest[..end]));
-        rest = rest[end..].trim_start();
-    }
-    fields
-}
 
 /// A column of the head.
 #[derive(Clone, Debug, PartialEq)]
@@ -443,90 +336,6 @@ fn head_columns(titles: &[&str], units: Option<&[&str]>) -> Vec<HeadColumn> {
         .collect()
 }
 
-/// Words for a sample rate, in lower case.
-const RATE_WORDS: &[&str] = &[
-    "sample rate",
-    "sampling rate",
-    "samplerate",
-    "sample_rate",
-    "sampling_rate",
-    "sampling frequency",
-    "sample frequency",
-    "sampling freq",
-    "sampling_frequency",
-    "abtastrate",
-    "abtastfrequenz",
-    "samples per second",
-    "fs",
-];
-
-/// Words for a sample interval, in lower case.
-const INTERVAL_WORDS: &[&str] = &[
-    "sample interval",
-    "sampling interval",
-    "sample period",
-    "sample_interval",
-    "abtastintervall",
-    "delta t",
-    "delta_t",
-    "delta_x",
-    "time step",
-    "dt",
-];
-
-/// Sample rate, samples per second, that a line such as `Fs = 25600 Hz` or `dt: 0.1 ms` states.
-pub(super) fn rate(line: &str, decimal_comma: bool) -> Option<f64> {
-    let lower = line.to_lowercase();
-    let after = |words: &[&str]| {
-        words.iter().find_map(|word| {
-            let at = lower.find(word)?;
-            let before = lower[..at].chars().next_back();
-            let rest = &lower[at + word.len()..];
-            let is_word = !before.is_some_and(char::is_alphanumeric)
-                && !rest.chars().next().is_some_and(char::is_alphanumeric);
-            is_word.then(|| rest.to_owned())
-        })
-    };
-    let number = |rest: &str| {
-        let at = rest.find(|letter: char| letter.is_ascii_digit())?;
-        // Between word and number stand signs and a unit only, no other sentence.
-        if rest[..at].chars().filter(|letter| letter.is_alphabetic()).count() > 4 {
-            return None;
-        }
-        let mut digits = rest[at..].to_owned();
-        if decimal_comma {
-            digits = digits.replacen(',', ".", 1);
-        }
-        let (value, length) = fast_float2::parse_partial::<f64, _>(&digits).ok()?;
-        let units = format!("{} {}", &rest[..at], &digits[length..]);
-        (value.is_finite() && value > 0.0).then_some((value, units))
-    };
-    let has = |units: &str, word: &str| {
-        units
-            .split(|letter: char| !(letter.is_alphanumeric() || "µμ".contains(letter)))
-            .any(|part| part == word)
-    };
-    if let Some((value, units)) = after(RATE_WORDS).and_then(|rest| number(&rest)) {
-        let factor = if has(&units, "khz") || has(&units, "ks") {
-            1e3
-        } else if has(&units, "mhz") || has(&units, "ms") {
-            1e6
-        } else {
-            1.0
-        };
-        return Some(factor * value);
-    }
-    let (value, units) = after(INTERVAL_WORDS).and_then(|rest| number(&rest))?;
-    let factor = if has(&units, "ms") {
-        1e-3
-    } else if has(&units, "us") || has(&units, "µs") || has(&units, "μs") {
-        1e-6
-    } else {
-        1.0
-    };
-    Some(1.0 / (factor * value))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -583,23 +392,6 @@ mod tests {
         let latin = head(b"Zeit [s];a [m/s\xb2]\n0;1\n1;2\n").unwrap();
         assert_eq!(titles(&latin), ["Zeit [s]", "a [m/s²]"]);
         assert_eq!(latin.offset, 18);
-    }
-
-    #[test]
-    fn sample_rates_are_read_from_lines_of_prose() {
-        for (line, rate_hz) in [
-            ("Fs = 25600", Some(25_600.0)),
-            ("Sample Rate: 51.2 kHz", Some(51_200.0)),
-            ("Sample rate (Hz),2048", Some(2048.0)),
-            ("dt = 0.5 ms", Some(2000.0)),
-            ("Delta_X;0.001", Some(1000.0)),
-            ("offset 3", None),
-            ("Fs is the rate of the second channel 3", None),
-        ] {
-            let found = rate(line, false);
-            assert_eq!(found.map(|found| found.round()), rate_hz, "{line}");
-        }
-        assert_eq!(rate("Abtastrate: 25,6 kHz", true), Some(25_600.0));
     }
 
     #[test]

@@ -7,28 +7,13 @@
 use std::path::Path;
 
 use super::import::{ColumnMap, Import, Scale};
+use super::meaning::Meaning;
+use super::open_doubts::{Doubts, Open, prefix};
 use super::raw::{FoundUnit, RawColumn};
 use super::sidecar::RecordedChannel;
-use super::understood::{Basis, Doubt};
+use super::understood::Basis;
 use super::words::NameMeaning;
 use super::{Quantity, RecordingError, Sensitivity, Sidecar, Unit};
-
-/// Meaning of one column: the channel that it becomes.
-#[derive(Clone, Debug)]
-pub(super) struct Meaning {
-    /// Name of the channel.
-    pub(super) name: String,
-    pub(super) quantity: Quantity,
-    /// Factor from the samples in the file to SI.
-    pub(super) factor: f64,
-    /// True if the channel points against its axis.
-    pub(super) is_negative: bool,
-    pub(super) from: Basis,
-    /// Unit as it is stated, for the report.
-    pub(super) unit: Option<String>,
-    /// Sensitivity as it is stated, for the report.
-    pub(super) sensitivity: Option<String>,
-}
 
 /// What is stated about a column, whoever states it.
 #[derive(Default)]
@@ -388,16 +373,6 @@ fn by_words(
     Ok(found)
 }
 
-/// Start of the channel names of a quantity: `f`, none, `v` or `a`.
-fn prefix(quantity: Quantity) -> &'static str {
-    match quantity {
-        Quantity::Force => "f",
-        Quantity::Velocity => "v",
-        Quantity::Acceleration => "a",
-        _ => "",
-    }
-}
-
 /// Of several time columns, the one whose head has the exact name is time; the others are auxiliary.
 fn prefer_exact_time(meanings: &mut [Meaning]) {
     let is_exact = |meaning: &Meaning| meaning.name == "t" && meaning.from != Basis::Words;
@@ -411,116 +386,5 @@ fn prefer_exact_time(meanings: &mut [Meaning]) {
             }
             has_time = true;
         }
-    }
-}
-
-/// A column whose direction, unit or sensitivity is not stated.
-struct Open {
-    column: String,
-    quantity: Quantity,
-    axis: Option<char>,
-    is_negative: bool,
-    /// Quantity of the stated unit.
-    stated: Quantity,
-    /// True if another column has been understood as the same channel.
-    is_twice: bool,
-}
-
-/// Columns that are in doubt.
-#[derive(Default)]
-struct Doubts {
-    open: Vec<Open>,
-}
-
-impl Doubts {
-    /// Adds columns that were understood as a channel that another column already is.
-    fn twice(&mut self, columns: &[RawColumn], meanings: &[Meaning]) {
-        for (index, meaning) in meanings.iter().enumerate() {
-            let is_open = self.open.iter().any(|open| open.column == columns[index].name);
-            let is_twice = meanings[..index].iter().any(|other| other.name == meaning.name);
-            if meaning.from == Basis::Words && is_twice && !is_open && meaning.name != "t" {
-                self.open.push(Open {
-                    column: columns[index].name.clone(),
-                    quantity: meaning.quantity,
-                    axis: meaning.name.chars().last().filter(|last| "xyz".contains(*last)),
-                    is_negative: false,
-                    stated: meaning.quantity,
-                    is_twice: true,
-                });
-            }
-        }
-    }
-
-    /// The doubts with the names and units that are possible: each direction is proposed once.
-    fn suggested(&self, meanings: &[Meaning]) -> Vec<Doubt> {
-        let mut taken: Vec<String> = meanings.iter().map(|meaning| meaning.name.clone()).collect();
-        let mut doubts = Vec::new();
-        for open in &self.open {
-            let prefix = prefix(open.quantity);
-            let axes = open.axis.map_or_else(|| vec!['x', 'y', 'z'], |axis| vec![axis]);
-            let free = axes
-                .iter()
-                .map(|axis| format!("{prefix}{axis}"))
-                .find(|name| !taken.contains(name));
-            let name = free.unwrap_or_else(|| {
-                let first = format!("{prefix}{}", axes[0]);
-                (2..)
-                    .map(|number| format!("{first}_{number}"))
-                    .find(|name| !taken.contains(name))
-                    .unwrap_or(first)
-            });
-            taken.push(name.clone());
-            let has_unit = open.stated == open.quantity;
-            let sensitivity = (open.stated == Quantity::Voltage).then_some(match open.quantity {
-                Quantity::Force => "2.2 mV/N",
-                Quantity::Acceleration => "10 mV/g",
-                Quantity::Velocity => "1 V/(m/s)",
-                _ => "1 V/mm",
-            });
-            doubts.push(Doubt {
-                what: open.what(),
-                column: open.column.clone(),
-                name: if open.is_negative {
-                    format!("-{name}")
-                } else {
-                    name
-                },
-                unit: (!has_unit && sensitivity.is_none()).then(|| open.quantity.unit()),
-                sensitivity,
-            });
-        }
-        doubts
-    }
-}
-
-impl Open {
-    /// Sentence part: which column is what, and what is not stated.
-    fn what(&self) -> String {
-        let mut lacks = Vec::new();
-        if self.is_twice {
-            lacks.push("which of several sensors of this direction it is");
-        }
-        if self.axis.is_none() {
-            lacks.push("its direction");
-        }
-        if self.is_negative {
-            lacks.push("whether its sign is already turned");
-        }
-        match self.stated {
-            Quantity::Voltage if self.quantity != Quantity::Voltage => lacks.push("its sensitivity"),
-            stated if stated != self.quantity => lacks.push("its unit"),
-            _ => {}
-        }
-        let article = if self.quantity == Quantity::Acceleration {
-            "an"
-        } else {
-            "a"
-        };
-        format!(
-            "column \"{}\" is {article} {}, but the file does not state {}",
-            self.column,
-            self.quantity,
-            lacks.join(" and ")
-        )
     }
 }

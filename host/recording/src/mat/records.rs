@@ -3,7 +3,7 @@
 //! The variables of the file are one record if vectors or matrices are among them. Otherwise each element of each structure with vectors is a
 //! record of its own: an array of impacts gives as many records. A field that is a structure with one vector and a unit is a channel.
 
-use super::{Item, Value, Variable};
+use super::value::{Item, Value, Variable};
 use crate::raw::{FoundUnit, Raw, RawColumn};
 
 /// Names of a sample rate, samples per second, in lower case.

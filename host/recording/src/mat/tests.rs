@@ -5,6 +5,7 @@ use flate2::write::ZlibEncoder;
 use proptest::prelude::*;
 
 use super::*;
+use crate::raw::RawColumn;
 
 /// A data element of type `kind`, padded to a multiple of 8 bytes.
 fn element(kind: u32, data: &[u8]) -> Vec<u8> {

@@ -1,0 +1,233 @@
+//! Sequential reader of the elements of a MAT-file or of a compressed element.
+
+use std::io::{BufRead, ErrorKind, Read, copy, sink};
+
+/// Chunk size of reading, bytes; a choice. It is a multiple of the size of every number type.
+pub(super) const CHUNK: usize = 1 << 16;
+
+/// Largest element with flags, dimensions or a name, bytes. Valid names have up to 63 characters; the limit is a choice above that.
+pub(super) const SMALL_MAX: u64 = 4096;
+
+/// Size of a stored number type, bytes; `None` if the data type is not numeric.
+pub(super) fn size_of_kind(kind: u32) -> Option<usize> {
+    Some(match kind {
+        1 | 2 => 1,
+        3 | 4 => 2,
+        5..=7 => 4,
+        9 | 12 | 13 => 8,
+        _ => return None,
+    })
+}
+
+/// Decodes numbers of data type `kind` and passes each to `take`. A matrix of doubles may be stored in a smaller integer type without loss.
+fn decode(kind: u32, data: &[u8], big_endian: bool, mut take: impl FnMut(f64)) {
+    macro_rules! decode {
+        ($type:ty) => {
+            for bytes in data.chunks_exact(size_of::<$type>()) {
+                let mut array = [0; size_of::<$type>()];
+                array.copy_from_slice(bytes);
+                take(if big_endian {
+                    <$type>::from_be_bytes(array) as f64
+                } else {
+                    <$type>::from_le_bytes(array) as f64
+                });
+            }
+        };
+    }
+    match kind {
+        1 => decode!(i8),
+        // Text in UTF-8 (16) has single bytes.
+        2 | 16 => decode!(u8),
+        3 => decode!(i16),
+        4 | 17 => decode!(u16),
+        5 => decode!(i32),
+        6 => decode!(u32),
+        7 => decode!(f32),
+        9 => decode!(f64),
+        12 => decode!(i64),
+        13 => decode!(u64),
+        _ => {}
+    }
+}
+
+/// Decodes a 32-bit unsigned integer from the first four bytes.
+pub(super) fn word(bytes: &[u8], big_endian: bool) -> u32 {
+    let array = [bytes[0], bytes[1], bytes[2], bytes[3]];
+    if big_endian {
+        u32::from_be_bytes(array)
+    } else {
+        u32::from_le_bytes(array)
+    }
+}
+
+/// Tag of a data element: data type and length.
+pub(super) struct Tag {
+    /// Data type of the element (miINT8 = 1 … miCOMPRESSED = 15).
+    pub(super) kind: u32,
+    /// Length of the data, bytes.
+    pub(super) length: u64,
+    /// Data of a small element, which are stored inside the tag (up to four bytes).
+    inside: Option<[u8; 4]>,
+}
+
+/// Sequential reader of the elements of a file or of a compressed element.
+pub(super) struct Source<'a> {
+    pub(super) reader: &'a mut dyn BufRead,
+    /// Offset of the next byte.
+    pub(super) at: u64,
+    /// Upper bound of the bytes available: the length of the file or of the enclosing element.
+    pub(super) available: u64,
+    pub(super) big_endian: bool,
+}
+
+impl Source<'_> {
+    /// True if no byte is left.
+    pub(super) fn is_at_end(&mut self) -> Result<bool, String> {
+        self.reader
+            .fill_buf()
+            .map(<[u8]>::is_empty)
+            .map_err(|error| error.to_string())
+    }
+
+    /// Reads exactly as many bytes as `bytes` holds.
+    fn fill(&mut self, bytes: &mut [u8]) -> Result<(), String> {
+        self.reader
+            .read_exact(bytes)
+            .map_err(|error| match error.kind() {
+                ErrorKind::UnexpectedEof => self.cut_off(bytes.len() as u64),
+                _ => format!("after byte {}: {error}", self.at),
+            })?;
+        self.at += bytes.len() as u64;
+        Ok(())
+    }
+
+    /// Message for a file that ends within an element of `length` bytes.
+    pub(super) fn cut_off(&self, length: u64) -> String {
+        format!(
+            "it ends within an element of {length} bytes at byte {}: it is cut off",
+            self.at
+        )
+    }
+
+    /// Reads the next tag.
+    pub(super) fn tag(&mut self) -> Result<Tag, String> {
+        let mut bytes = [0; 4];
+        self.fill(&mut bytes)?;
+        let first = word(&bytes, self.big_endian);
+        self.fill(&mut bytes)?;
+        let small = first >> 16;
+        if small > 4 {
+            return Err(format!(
+                "an element at byte {} has {small} bytes in 4",
+                self.at - 8
+            ));
+        }
+        Ok(if small > 0 {
+            Tag {
+                kind: first & 0xffff,
+                length: u64::from(small),
+                inside: Some(bytes),
+            }
+        } else {
+            Tag {
+                kind: first,
+                length: u64::from(word(&bytes, self.big_endian)),
+                inside: None,
+            }
+        })
+    }
+
+    /// Reads the next element, which holds flags, dimensions or a name: at most [`SMALL_MAX`] bytes.
+    pub(super) fn small(&mut self) -> Result<Vec<u8>, String> {
+        let tag = self.tag()?;
+        if tag.length > SMALL_MAX {
+            return Err(format!(
+                "flags, dimensions or a name of {} bytes at byte {}; at most {SMALL_MAX} are possible",
+                tag.length, self.at
+            ));
+        }
+        let mut data = Vec::new();
+        self.chunks(&tag, |chunk| data.extend_from_slice(chunk))?;
+        Ok(data)
+    }
+
+    /// Reads the text of an element: UTF-8, UTF-16 or bytes.
+    pub(super) fn text(&mut self, tag: &Tag) -> Result<String, String> {
+        let mut codes = Vec::new();
+        self.numbers(tag, |code| codes.push(code as u32))?;
+        // Data types 16 (UTF-8), 1 and 2 hold bytes of UTF-8; the others hold one code for each letter.
+        if matches!(tag.kind, 1 | 2 | 16) {
+            let bytes: Vec<u8> = codes.iter().map(|&code| code as u8).collect();
+            return Ok(String::from_utf8_lossy(&bytes).into_owned());
+        }
+        Ok(codes.into_iter().filter_map(char::from_u32).collect())
+    }
+
+    /// Reads the numbers of an element and passes each to `take`.
+    pub(super) fn numbers(&mut self, tag: &Tag, mut take: impl FnMut(f64)) -> Result<(), String> {
+        let big_endian = self.big_endian;
+        self.chunks(tag, |chunk| decode(tag.kind, chunk, big_endian, &mut take))
+    }
+
+    /// Reads the data of an element in chunks, and its padding to a multiple of 8 bytes.
+    fn chunks(&mut self, tag: &Tag, mut take: impl FnMut(&[u8])) -> Result<(), String> {
+        if let Some(inside) = &tag.inside {
+            take(&inside[..tag.length as usize]);
+            return Ok(());
+        }
+        if tag.length > self.available {
+            return Err(self.cut_off(tag.length));
+        }
+        let mut chunk = vec![0; CHUNK.min(tag.length as usize)];
+        let mut left = tag.length as usize;
+        while left > 0 {
+            let length = left.min(CHUNK);
+            self.fill(&mut chunk[..length])?;
+            take(&chunk[..length]);
+            left -= length;
+        }
+        self.pad(tag.length)
+    }
+
+    /// Skips the padding after `length` bytes; the padding of the last element may be missing.
+    fn pad(&mut self, length: u64) -> Result<(), String> {
+        let padding = length.next_multiple_of(8) - length;
+        let read = copy(&mut (&mut *self.reader).take(padding), &mut sink());
+        self.at += read.map_err(|error| error.to_string())?;
+        Ok(())
+    }
+
+    /// Applies `read` to the data of an element, limited to that element, and skips data that `read` leaves.
+    pub(super) fn within<T>(
+        &mut self,
+        tag: &Tag,
+        read: impl FnOnce(&mut Source<'_>) -> Result<T, String>,
+    ) -> Result<T, String> {
+        if tag.length > self.available {
+            return Err(self.cut_off(tag.length));
+        }
+        let end = self.at + tag.length;
+        let mut data = (&mut *self.reader).take(tag.length);
+        let found = read(&mut Source {
+            reader: &mut data,
+            at: self.at,
+            available: tag.length,
+            big_endian: self.big_endian,
+        })?;
+        copy(&mut data, &mut sink()).map_err(|error| error.to_string())?;
+        if data.limit() > 0 {
+            return Err(self.cut_off(tag.length));
+        }
+        self.at = end;
+        self.pad(tag.length)?;
+        Ok(found)
+    }
+
+    /// Skips an element.
+    pub(super) fn skip(&mut self, tag: &Tag) -> Result<(), String> {
+        if tag.inside.is_some() {
+            return Ok(());
+        }
+        self.within(tag, |_| Ok(()))
+    }
+}

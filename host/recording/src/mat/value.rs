@@ -1,0 +1,59 @@
+//! Values of a MAT-file: numbers split into channels, text, structures and cells.
+
+use crate::raw::RawColumn;
+
+/// A named value of the file, or of a structure.
+#[derive(Debug)]
+pub(super) struct Item {
+    pub(super) name: String,
+    pub(super) value: Value,
+}
+
+/// A value of the file.
+#[derive(Debug)]
+pub(super) enum Value {
+    Numbers(Variable),
+    Text(String),
+    /// Elements of a structure array, each with its fields; the elements of a cell array have one field without name.
+    Elements(Vec<Vec<Item>>),
+}
+
+/// A real numeric variable, split into channels; a row vector and a column vector are one channel.
+#[derive(Debug)]
+pub(super) struct Variable {
+    pub(super) name: String,
+    /// Samples of each channel; all channels have the same length.
+    pub(super) values: Vec<Vec<f64>>,
+}
+
+impl Variable {
+    /// Number of samples per channel: the longer dimension of the matrix.
+    pub(super) fn samples(&self) -> usize {
+        self.values.first().map_or(0, Vec::len)
+    }
+
+    /// Channels with their names: the name of the variable, numbered from 1 if there are several.
+    pub(super) fn into_columns(self) -> Vec<RawColumn> {
+        let is_one = self.values.len() == 1;
+        let name = |index: usize| match is_one {
+            true => self.name.clone(),
+            false => format!("{}{}", self.name, index + 1),
+        };
+        self.values
+            .into_iter()
+            .enumerate()
+            .map(|(index, samples)| RawColumn::without_unit(name(index), samples))
+            .collect()
+    }
+}
+
+impl Item {
+    /// The value with the name of its field; the elements of structures have no names of their own.
+    pub(super) fn named(mut self, name: &str) -> Self {
+        self.name = name.into();
+        if let Value::Numbers(variable) = &mut self.value {
+            variable.name = name.into();
+        }
+        self
+    }
+}

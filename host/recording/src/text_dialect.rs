@@ -1,0 +1,110 @@
+//! Form of the lines of a text table: separator between fields and decimal mark.
+
+/// Separator between the fields of a line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Separator {
+    Comma,
+    Semicolon,
+    Tab,
+    /// Any number of blanks and tabs.
+    Blank,
+}
+
+/// Form of the numbers of a text table.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Dialect {
+    pub(super) separator: Separator,
+    /// True if the decimal mark is a comma.
+    pub(super) decimal_comma: bool,
+}
+
+impl Dialect {
+    /// Comma between fields, decimal point.
+    pub(super) const PLAIN: Self = Self {
+        separator: Separator::Comma,
+        decimal_comma: false,
+    };
+
+    /// Fields of a line, without blanks and quotes around them.
+    pub(super) fn fields(self, line: &str) -> Vec<&str> {
+        let separator = match self.separator {
+            Separator::Blank => return blank_fields(line),
+            Separator::Comma => ',',
+            Separator::Semicolon => ';',
+            Separator::Tab => '\t',
+        };
+        let mut fields = Vec::new();
+        let mut start = 0;
+        let mut is_quoted = false;
+        // A quote that is not closed is a letter like others, so that it does not swallow the rest of the line.
+        let is_closed = line.matches('"').count().is_multiple_of(2);
+        for (at, letter) in line.char_indices() {
+            if letter == '"' && is_closed {
+                is_quoted = !is_quoted;
+            } else if letter == separator && !is_quoted {
+                fields.push(bare(&line[start..at]));
+                start = at + 1;
+            }
+        }
+        fields.push(bare(&line[start..]));
+        fields
+    }
+
+    /// The number of a field; `None` if it is none.
+    pub(super) fn number(self, field: &str) -> Option<f64> {
+        if self.decimal_comma && field.contains(',') {
+            if field.contains('.') {
+                return None;
+            }
+            return fast_float2::parse(field.replace(',', ".")).ok();
+        }
+        fast_float2::parse(field).ok()
+    }
+
+    /// Number of fields of a line of numbers; `None` if a field is text, or no field is a number.
+    pub(super) fn count_of_numbers(self, line: &str) -> Option<usize> {
+        let fields = self.fields(line);
+        let numbers = fields.iter().filter(|field| self.number(field).is_some()).count();
+        let empty = fields.iter().filter(|field| field.is_empty()).count();
+        (numbers > 0 && numbers + empty == fields.len()).then_some(fields.len())
+    }
+
+    /// Description for the user; `None` for comma and point.
+    pub(super) fn note(self) -> Option<String> {
+        let separator = match self.separator {
+            Separator::Comma => "comma",
+            Separator::Semicolon => "semicolon",
+            Separator::Tab => "tab",
+            Separator::Blank => "blank",
+        };
+        match (self == Self::PLAIN, self.decimal_comma) {
+            (true, _) => None,
+            (_, true) => Some(format!("separator {separator}, decimal comma")),
+            (_, false) => Some(format!("separator {separator}")),
+        }
+    }
+}
+
+/// A field without blanks and quotes around it.
+pub(super) fn bare(field: &str) -> &str {
+    let field = field.trim();
+    field
+        .strip_prefix('"')
+        .and_then(|inner| inner.strip_suffix('"'))
+        .map_or(field, str::trim)
+}
+
+/// Fields between blanks; a quoted field may hold blanks.
+pub(super) fn blank_fields(line: &str) -> Vec<&str> {
+    let mut fields = Vec::new();
+    let mut rest = line.trim();
+    while !rest.is_empty() {
+        let end = match rest.strip_prefix('"').and_then(|inner| inner.find('"')) {
+            Some(inner) => inner + 2,
+            None => rest.find(char::is_whitespace).unwrap_or(rest.len()),
+        };
+        fields.push(bare(&rest[..end]));
+        rest = rest[end..].trim_start();
+    }
+    fields
+}
