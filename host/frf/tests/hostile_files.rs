@@ -223,6 +223,23 @@ fn samples(folder: &Path) -> Vec<Sample> {
             bytes: mat(&[matrix([3, 200], 9, 600 * 8, &numbers(600))]),
         },
         Sample {
+            name: "record.lvm",
+            bytes: lvm(),
+        },
+        Sample {
+            name: "record.tdms",
+            bytes: tdms(100, &numbers(200)),
+        },
+        Sample {
+            name: "german.csv",
+            bytes: b"Messung 3\nFs = 1000 Hz\n\nKraft X [N];Acc X [m/s\xb2]\n0,5;1,5\n-0,5;2,5\n1;2\n"
+                .repeat(3),
+        },
+        Sample {
+            name: "frf-found.csv",
+            bytes: b"Freq [Hz];Mag Hxx [um/N];Phase Hxx [deg]\n1;2,5;-10\n2;3,5;-100\n3;1;-170\n".to_vec(),
+        },
+        Sample {
             name: "record.wav",
             bytes: wav(2, 400 * 4, &numbers(200)),
         },
@@ -257,6 +274,7 @@ fn crafted() -> Vec<(&'static str, Vec<u8>)> {
             "promise.mat",
             mat(&[compressed(&matrix([1, 1 << 28], 9, 1 << 31, &some))]),
         ),
+        ("promise.tdms", tdms(u64::MAX / 16, &some)),
         ("channels.wav", wav(65_535, u32::MAX - 1023, &some)),
         ("length.wav", wav(1, u32::MAX - 1023, &some)),
         ("stereo.wav", wav(2, 4 * 63, &some)),
@@ -269,6 +287,53 @@ fn numbers(count: u32) -> Vec<u8> {
     (0..count)
         .flat_map(|k| f64::from(k).sin().to_le_bytes())
         .collect()
+}
+
+/// A LabVIEW measurement file with one block.
+fn lvm() -> Vec<u8> {
+    let mut text = String::from(
+        "LabVIEW Measurement\nSeparator\tTab\nDecimal_Separator\t.\n***End_of_Header***\n\nChannels\t2\nY_Unit_Label\tN\tg\n\
+         X_Dimension\tTime\tTime\nDelta_X\t0.001\t0.001\n***End_of_Header***\nX_Value\tForce X\tAcc X\tComment\n",
+    );
+    for k in 0..100 {
+        text += &format!(
+            "{}\t{}\t{}\t\n",
+            0.001 * f64::from(k),
+            f64::from(k).sin(),
+            f64::from(k).cos()
+        );
+    }
+    text.into_bytes()
+}
+
+/// A TDMS file with one segment of two channels, each of `count` numbers as it says.
+fn tdms(count: u64, data: &[u8]) -> Vec<u8> {
+    let text = |text: &str| [&(text.len() as u32).to_le_bytes()[..], text.as_bytes()].concat();
+    let channel = |name: &str| {
+        [
+            text(&format!("/'taps'/'{name}'")),
+            20u32.to_le_bytes().to_vec(),
+            10u32.to_le_bytes().to_vec(),
+            1u32.to_le_bytes().to_vec(),
+            count.to_le_bytes().to_vec(),
+            1u32.to_le_bytes().to_vec(),
+            text("wf_increment"),
+            10u32.to_le_bytes().to_vec(),
+            1e-3f64.to_le_bytes().to_vec(),
+        ]
+        .concat()
+    };
+    let metadata = [2u32.to_le_bytes().to_vec(), channel("Force X"), channel("Acc X")].concat();
+    [
+        b"TDSm".to_vec(),
+        14u32.to_le_bytes().to_vec(),
+        4713u32.to_le_bytes().to_vec(),
+        ((metadata.len() + data.len()) as u64).to_le_bytes().to_vec(),
+        (metadata.len() as u64).to_le_bytes().to_vec(),
+        metadata,
+        data.to_vec(),
+    ]
+    .concat()
 }
 
 /// A MAT-file of these elements.

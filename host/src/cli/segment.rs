@@ -72,10 +72,20 @@ impl RecordedSegment {
         let import = self.import();
         let mut read = Recorded::default();
         for path in paths {
-            for imported in Recording::import_all(path, &import)? {
+            let records = Recording::import_all(path, &import)?;
+            let count = records.len();
+            for (index, imported) in records.into_iter().enumerate() {
                 if imported.understood.is_interpreted() {
-                    progress::clear();
-                    eprintln!("understood: {}", imported.understood);
+                    // The records of a file usually have the same columns: one line shows the first of them.
+                    if index == 0 {
+                        progress::clear();
+                        let others = if count > 1 {
+                            format!(" (the first of {count} records)")
+                        } else {
+                            String::new()
+                        };
+                        eprintln!("understood: {}{others}", imported.understood);
+                    }
                     read.understood.push(imported.understood);
                 }
                 read.recordings.push(imported.recording);
