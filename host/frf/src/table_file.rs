@@ -66,6 +66,15 @@ impl FrfTable {
                 Self::parse(path, &quietcut_recording::file::read_text(path)?)?
             }
         };
+        if let Some(map) = import.map.first() {
+            return Err(FrfError::Content {
+                path: path.into(),
+                what: format!(
+                    "--map {}: the file states names and units of its columns itself; omit --map",
+                    map.column
+                ),
+            });
+        }
         Ok(ImportedTable {
             table,
             understood: None,

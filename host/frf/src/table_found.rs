@@ -29,6 +29,20 @@ pub(super) fn read(path: &Path, import: &Import) -> Result<ImportedTable, FrfErr
     let text = TextTable::read(path)?;
     let sidecar = Sidecar::beside(path)?;
     let names: Vec<String> = text.columns.iter().map(|column| column.name.clone()).collect();
+    if let Some(stranger) = import
+        .map
+        .iter()
+        .find(|map| !(0..names.len()).any(|index| map.is_about(&names[index], index + 1, &names)))
+    {
+        return Err(FrfError::Content {
+            path: path.into(),
+            what: format!(
+                "--map {}: the file has no such column, but {}",
+                stranger.column,
+                names.join(", ")
+            ),
+        });
+    }
     let mut columns = Vec::with_capacity(text.columns.len());
     for (index, column) in text.columns.iter().enumerate() {
         let map = import

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::criteria::UNEVEN;
+use super::criteria::{LOWEST_RATE, UNEVEN};
 use super::import::Import;
 use super::plausibility;
 use super::raw::Raw;
@@ -105,6 +105,20 @@ pub(super) fn recording(
         channels,
         sidecar,
     };
+    let mut warnings = plausibility::warnings(&recording);
+    let time_without_unit = columns
+        .iter()
+        .find(|column| column.channel == "t" && column.unit.is_none());
+    if let Some(column) = time_without_unit
+        && rate_from == "time column"
+        && sample_rate_hz < LOWEST_RATE
+    {
+        warnings.push(format!(
+            "column \"{name}\" has no unit and is read in seconds, which gives {sample_rate_hz} samples/s; --map {name}=t:ms if it is in \
+             milliseconds",
+            name = column.column
+        ));
+    }
     Ok(Imported {
         understood: Understood {
             file: path.into(),
@@ -113,7 +127,7 @@ pub(super) fn recording(
             rate_from,
             columns,
             notes,
-            warnings: plausibility::warnings(&recording),
+            warnings,
         },
         recording,
     })

@@ -18,6 +18,10 @@ pub(crate) const LEAST_SWING: f64 = 0.02;
 /// signals with coarse counts; three need a peak flatter than one count over two intervals. Unfounded beyond that.
 pub(crate) const CLIPPED_RUN: usize = 3;
 
+/// Distance of an extreme value from the median, as a share of the range of the samples, from which equal samples there are clipping and not
+/// rest. A sensor clips far from rest; the force of an impact test rests at its smallest value. Unfounded.
+pub(crate) const FAR_FROM_REST: f64 = 0.1;
+
 /// Duration of equal samples, in samples, that counts as a dropout of a channel that otherwise changes. Unfounded.
 pub(crate) const DROPOUT_RUN: usize = 32;
 
@@ -47,3 +51,7 @@ pub(crate) fn plausible_peak(quantity: Quantity) -> Option<(f64, f64)> {
         _ => None,
     }
 }
+
+/// Lowest sample rate, samples per second, at which a time column without unit is taken for seconds without a warning. Milliseconds read as
+/// seconds give a rate that is a thousandth: below 50 for loggers of up to 50 kHz. Tests of machine tools are sampled faster than that. A choice.
+pub(crate) const LOWEST_RATE: f64 = 50.0;

@@ -2,8 +2,8 @@
 
 use serde::Serialize;
 
-use super::Channel;
-use super::criteria::{AT_REST, CLIPPED_RUN, DROPOUT_RUN};
+use super::criteria::{AT_REST, CLIPPED_RUN, DROPOUT_RUN, FAR_FROM_REST};
+use super::{Channel, Quantity};
 
 /// Figures of one channel, in the SI unit of its quantity.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -45,11 +45,15 @@ impl ChannelSummary {
         let constant = minimum == maximum;
         let runs = runs(samples);
         let is_extreme = |value: f64| value == minimum || value == maximum;
-        let clipped = if constant {
+        let rest = median(samples);
+        // The force of an impact test rests at its smallest value; a tachometer has two levels.
+        let is_clipping =
+            |value: f64| is_extreme(value) && (value - rest).abs() > FAR_FROM_REST * (maximum - minimum);
+        let clipped = if constant || channel.quantity == Quantity::Level {
             0
         } else {
             runs.iter()
-                .filter(|run| is_extreme(samples[run.0]) && run.1 >= CLIPPED_RUN)
+                .filter(|run| is_clipping(samples[run.0]) && run.1 >= CLIPPED_RUN)
                 .map(|run| run.1)
                 .sum()
         };
@@ -75,6 +79,16 @@ impl ChannelSummary {
             dropouts_s,
         }
     }
+}
+
+/// Median of the samples; 0 without samples.
+fn median(samples: &[f64]) -> f64 {
+    let mut sorted = samples.to_vec();
+    let middle = sorted.len() / 2;
+    if sorted.is_empty() {
+        return 0.0;
+    }
+    *sorted.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
 /// Runs of equal samples: index of the first sample and length.
@@ -113,7 +127,6 @@ pub fn envelope(samples: &[f64], width: usize) -> Vec<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::Quantity;
     use super::*;
 
     fn summary(samples: Vec<f64>) -> ChannelSummary {
@@ -143,6 +156,18 @@ mod tests {
                 .collect(),
         );
         assert_eq!(dropped.dropouts_s, [[0.2, 0.25]]);
+        let impact = summary(
+            (0..1000)
+                .map(|k| {
+                    if (200..210).contains(&k) {
+                        sine(k - 200)
+                    } else {
+                        0.0
+                    }
+                })
+                .collect(),
+        );
+        assert_eq!((impact.clipped, impact.dropouts_s.len()), (0, 0));
         assert!(summary(vec![3.0; 10]).constant);
     }
 
