@@ -139,6 +139,10 @@ struct DwellFit<F>(F);
 /// Step, in standard deviations of the parameters, that ends a fit: far below the width of any interval.
 const LAST_STEP: f64 = 1e-3;
 
+/// χ² per degree of freedom below which a fit is exact: residuals are below a thousandth of the noise, so that rounding of the predicted
+/// motion moves every step.
+const EXACT_MISFIT: f64 = 1e-6;
+
 /// Relative increase of the sum of squares that still counts as no worse: weights change with the parameters.
 const NO_WORSE: f64 = 1e-6;
 
@@ -183,7 +187,7 @@ pub(super) fn minimum(
     of: impl Fn(&DVector<f64>) -> Normal,
 ) -> Result<(DVector<f64>, Normal), FitError> {
     let found = descend(start, damping, 60, of)?;
-    if found.stop == Stop::Converged {
+    if found.stop == Stop::Converged || found.value.misfit() < EXACT_MISFIT {
         Ok((found.point, found.value))
     } else {
         Err(FitError::NotConverged(found.value.misfit()))
@@ -211,8 +215,8 @@ fn descend(
     let iteration = LevenbergMarquardt {
         damping: Damping::tenfold(damping),
         iterations_max,
-        // λ from 1e-3 to 1e8.
-        trials_max: 12,
+        // λ = 0, then from 1e-3 to 1e8: the last steps are shorter than [`LAST_STEP`] even where rounding hides the minimum.
+        trials_max: 13,
         ridge: 0.0,
         idle: Idle::Refuse,
     };
