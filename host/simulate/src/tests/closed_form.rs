@@ -164,3 +164,79 @@ fn runout_changes_the_chip_thickness_of_each_tooth() {
         );
     }
 }
+
+/// Displacements, m, where the velocity changes sign, in a free motion of the undamped oscillator under f_r = `c2`·|v|·v from `start_m`.
+fn reversals_m(c2: f64, start_m: f64, relative: f64) -> Vec<f64> {
+    let mut structure = case("insperger-1dof-ad1").structure.unwrap();
+    if let quietcut_model::structure::Form::Matrices(matrices) = &mut structure.form {
+        matrices.damping.fill(0.0);
+    }
+    let effects = Effects::parse([format!("quadratic-damping={c2}").as_str()]).unwrap();
+    let (dynamics, restoring_forces) = effects.dynamics(&structure).unwrap();
+    let model = Model {
+        dynamics,
+        cutting: None,
+        drive: None,
+        restoring_forces,
+    };
+    let mut workspace = Workspace::new(&model);
+    let (mut found, mut sign) = (Vec::new(), 0.0);
+    model
+        .run_from(vec![start_m, 0.0], 0.02, exact(relative), |segment| {
+            let mut at = |t: f64| {
+                let motion = segment.motion(t, &mut workspace);
+                (motion.displacement_m[0], motion.velocity_m_per_s[0])
+            };
+            // Away from the ends by a millionth of the step: the velocity there is zero to rounding where an event ends a step.
+            let inset = 1e-6 * (segment.to_s() - segment.from_s());
+            let (mut before, mut after) = (segment.from_s() + inset, segment.to_s() - inset);
+            let (first, last) = (at(before).1, at(after).1);
+            if sign * first < 0.0 {
+                found.push(at(segment.from_s()).0);
+            }
+            if first * last < 0.0 {
+                for _ in 0..60 {
+                    let middle = 0.5 * (before + after);
+                    if first * at(middle).1 > 0.0 {
+                        before = middle;
+                    } else {
+                        after = middle;
+                    }
+                }
+                found.push(at(before).0);
+            }
+            sign = last;
+        })
+        .unwrap();
+    found
+}
+
+#[test]
+fn reversals_under_quadratic_damping_follow_their_first_integral() {
+    // Between reversals v² = (ω²/a)·(x + 1/2a) + K·exp(2a·x) for v < 0, with a = c2/m: each magnitude follows from the one before,
+    // (1 − 2a·X')·exp(2a·X') = (1 + 2a·X)·exp(−2a·X).
+    let (c2, start_m) = (60.0, 1e-4);
+    let a2 = 2.0 * c2 / MASS_KG;
+    for relative in [1e-8, 1e-10, 1e-12] {
+        let found = reversals_m(c2, start_m, relative);
+        assert!(found.len() > 30, "{found:?}");
+        let (mut magnitude, mut worst) = (a2 * start_m, 0.0_f64);
+        for found_m in found {
+            let target = (1.0 + magnitude) * (-magnitude).exp();
+            let next = |x: f64| (1.0 - x) * x.exp() - target;
+            let (mut low, mut high) = (0.0, magnitude);
+            for _ in 0..80 {
+                let middle = 0.5 * (low + high);
+                if next(middle) > 0.0 {
+                    low = middle;
+                } else {
+                    high = middle;
+                }
+            }
+            magnitude = low;
+            worst = worst.max((found_m.abs() * a2 / magnitude - 1.0).abs());
+        }
+        // The largest of 36 reversals: three local errors each.
+        assert!(worst < 200.0 * relative, "{relative:e}: {worst:e}");
+    }
+}
