@@ -1,4 +1,5 @@
-//! The structure of the workspace: crates and rooms form layers, no import circle exists, and each file holds one noun.
+//! The structure of the workspace: crates and rooms form layers, no import circle exists, each file holds one noun, and the name of each
+//! effect stands in one place.
 //!
 //! The import graph is read from the code: `use` declarations and paths of every file, without code that is compiled for tests
 //! only. A name that a parent module re-exports is attributed to the file that defines it.
@@ -7,6 +8,7 @@
 
 mod circles;
 mod crates;
+mod effect_names;
 mod graph;
 mod module;
 mod rooms;

@@ -51,7 +51,7 @@ fn parsed(path: &Path) -> syn::File {
 }
 
 /// True if an item is compiled for tests only.
-fn is_of_tests(attributes: &[Attribute]) -> bool {
+pub(crate) fn is_of_tests(attributes: &[Attribute]) -> bool {
     attributes.iter().any(|attribute| {
         let text = attribute.to_token_stream().to_string().replace(' ', "");
         text == "#[test]" || text.starts_with("#[cfg(test") || text.starts_with("#[cfg(all(test")
@@ -133,7 +133,7 @@ fn imports(tree: &UseTree, path: &mut Vec<String>, is_reexport: bool, found: &mu
     }
 }
 
-fn attributes_of(item: &Item) -> &[Attribute] {
+pub(crate) fn attributes_of(item: &Item) -> &[Attribute] {
     match item {
         Item::Const(item) => &item.attrs,
         Item::Enum(item) => &item.attrs,

@@ -9,6 +9,7 @@ use crate::identify::case_file::{self, Estimate};
 use crate::identify::force_coefficients::{Fit, KEYS, Value, fit, runout};
 use crate::identify::force_test::{CuttingTest, Setup};
 use crate::recording::Recording;
+use crate::simulate::effect::EffectName;
 
 pub(super) fn force_coefficients(args: &Args, recordings: &[Recording]) -> Result<IdentifyOutput, Error> {
     let full_cut_s = match args.cut_s[..] {
@@ -81,7 +82,7 @@ pub(super) fn force_coefficients(args: &Args, recordings: &[Recording]) -> Resul
             feeds: fit.feeds,
         }),
         table,
-        ..IdentifyOutput::of("force-coefficients", Vec::new(), estimates)
+        ..IdentifyOutput::of(EffectName::ForceCoefficients.name(), Vec::new(), estimates)
     })
 }
 
