@@ -236,13 +236,30 @@ fn blocks(axes: &[Option<&Channel>; 3], count: f64, rate: f64) -> Vec<Block> {
         .collect()
 }
 
-/// Rising edges of the channel `tacho`, in order; empty without this channel.
-pub(super) fn edges(recording: &Recording) -> Vec<Edge> {
-    let Some(tacho) = recording.channel("tacho") else {
-        return Vec::new();
-    };
-    let (low, high) = tacho
-        .samples
+/// Rising edges of the channel `tacho` as the device finds them, in order; empty without this channel.
+fn edges(recording: &Recording) -> Vec<Edge> {
+    let level = recording.channel("tacho").map(|tacho| tacho.samples.as_slice());
+    rises(level.unwrap_or_default())
+        .map(|rise| Edge {
+            time: stamp(
+                rise.sample as f64 - f64::from(rise.before),
+                recording.sample_rate_hz,
+            ),
+        })
+        .collect()
+}
+
+/// A rising edge of a level.
+pub(super) struct Rise {
+    /// Sample at which the detector of the device finds it.
+    pub(super) sample: usize,
+    /// Time from the edge to that sample, in sample intervals.
+    before: f32,
+}
+
+/// Rising edges of a level as the device finds them, in order.
+pub(super) fn rises(level: &[f64]) -> impl Iterator<Item = Rise> {
+    let (low, high) = level
         .iter()
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &level| {
             (low.min(level), high.max(level))
@@ -251,15 +268,8 @@ pub(super) fn edges(recording: &Recording) -> Vec<Edge> {
         least_swing: (LEAST_SWING * (high - low)).max(f64::from(f32::MIN_POSITIVE)) as f32,
     };
     let mut state = LevelDetectorState::default();
-    tacho
-        .samples
-        .iter()
-        .enumerate()
-        .filter_map(|(index, &level)| {
-            let part = detector.step(&mut state, level as f32)?;
-            Some(Edge {
-                time: stamp(index as f64 - f64::from(part), recording.sample_rate_hz),
-            })
-        })
-        .collect()
+    level.iter().enumerate().filter_map(move |(sample, &level)| {
+        let before = detector.step(&mut state, level as f32)?;
+        Some(Rise { sample, before })
+    })
 }

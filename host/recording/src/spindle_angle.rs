@@ -1,10 +1,6 @@
 //! Spindle angle at every sample, interpolated between the tachometer edges.
 
-use std::f64::consts::TAU;
-
-use quietcut_core::tachometer::Wheel;
-
-use super::{Recording, RecordingError, blocks};
+use super::{Recording, RecordingError, TachometerEdges};
 
 /// Spindle angle φ, rad, of all samples between the first and the last tachometer edge.
 ///
@@ -24,17 +20,14 @@ impl SpindleAngle {
     /// There is no tachometer; there are fewer than two edges; the edges do not match the wheel described in the sidecar; or the wheel
     /// has no gap and its number of positions does not divide the number of teeth, so that the edges do not define the tooth angle.
     pub fn new(recording: &Recording, teeth: u32) -> Result<Self, RecordingError> {
-        let Some(wheel) = blocks::wheel(recording) else {
+        let Some(edges) = TachometerEdges::new(recording) else {
             return Err(recording.lacks("tacho channel, which defines the angle of the teeth"));
         };
+        let (edges_s, wheel) = (&edges.times_s, edges.wheel);
         let content = |what: String| RecordingError::Content {
             path: recording.path.clone(),
             what,
         };
-        let edges_s: Vec<f64> = blocks::edges(recording)
-            .iter()
-            .map(|edge| edge.time.0 as f64 * 1e-9)
-            .collect();
         if edges_s.len() < 2 {
             return Err(content(format!(
                 "tacho has {} rising edges; at least two are needed",
@@ -47,7 +40,7 @@ impl SpindleAngle {
                 wheel.positions
             )));
         }
-        let edges_rad = angles(&edges_s, wheel).map_err(content)?;
+        let edges_rad = edges.angles_rad().map_err(content)?;
         let rate_hz = recording.sample_rate_hz;
         let first = (edges_s[0] * rate_hz).ceil() as usize;
         let mut edge = 0;
@@ -65,64 +58,10 @@ impl SpindleAngle {
     }
 }
 
-/// Spindle angle of every tachometer edge, rad, for edge times in s.
-fn angles(edges_s: &[f64], wheel: Wheel) -> Result<Vec<f64>, String> {
-    let positions = f64::from(wheel.positions);
-    if wheel.missing == 0 {
-        return Ok((0..edges_s.len())
-            .map(|edge| TAU * edge as f64 / positions)
-            .collect());
-    }
-    let missing = f64::from(wheel.missing);
-    let intervals: Vec<f64> = edges_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    // The speed changes little between adjacent edges. So an interval is the gap if it exceeds its shorter neighbour by a factor of
-    // 1 + missing/2, halfway between the ratio 1 of equal intervals and the ratio 1 + missing of the gap.
-    let is_gap = |interval: usize| {
-        let neighbours = [
-            interval.checked_sub(1),
-            Some(interval + 1).filter(|&next| next < intervals.len()),
-        ];
-        let shortest = neighbours
-            .into_iter()
-            .flatten()
-            .map(|neighbour| intervals[neighbour])
-            .fold(f64::INFINITY, f64::min);
-        intervals[interval] > (1.0 + 0.5 * missing) * shortest
-    };
-    // With one edge per revolution every interval contains the gap, and no interval is longer than its neighbours.
-    let lone = wheel.positions - wheel.missing == 1;
-    let gaps: Vec<usize> = (0..intervals.len())
-        .filter(|&interval| lone || is_gap(interval))
-        .collect();
-    let Some(&first) = gaps.first() else {
-        return Err(format!(
-            "tacho has no gap, but the sidecar sets missing = {} of {} positions; does the sidecar belong to this wheel?",
-            wheel.missing, wheel.positions
-        ));
-    };
-    let expected = usize::from(wheel.positions - wheel.missing);
-    if let Some(pair) = gaps.windows(2).find(|pair| pair[1] - pair[0] != expected) {
-        return Err(format!(
-            "tacho has {} edges in the revolution that begins at {:.4} s; {expected} are expected of a wheel with {} positions of which {} are missing",
-            pair[1] - pair[0],
-            edges_s[pair[0] + 1],
-            wheel.positions,
-            wheel.missing
-        ));
-    }
-    // The edge after the first gap has the angle 0; earlier edges have negative angles.
-    let mut position = -(first as f64 + 1.0 + missing);
-    let mut angles = vec![TAU * position / positions];
-    for interval in 0..intervals.len() {
-        let is_gap = gaps.binary_search(&interval).is_ok();
-        position += if is_gap { 1.0 + missing } else { 1.0 };
-        angles.push(TAU * position / positions);
-    }
-    Ok(angles)
-}
-
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::TAU;
+
     use super::super::{Channel, Quantity, RecordedChannel, Sidecar};
     use super::*;
 

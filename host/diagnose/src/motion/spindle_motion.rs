@@ -6,7 +6,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::criteria::{LARGEST_MODULATION, LEAST_MODULATION_F_RATIO, LEAST_TACHOMETER_EDGES};
 use crate::error::DiagnoseError;
-use quietcut_recording::Recording;
+use quietcut_recording::{Recording, TachometerEdges};
 use quietcut_simulate::{Fluctuation, Spindle};
 
 /// The spindle angle over the time of a record.
@@ -31,15 +31,17 @@ impl SpindleMotion {
         recording: &Recording,
         fluctuation: Option<Fluctuation>,
     ) -> Result<Self, DiagnoseError> {
-        let level = recording.channel("tacho").ok_or_else(|| {
+        let edges = TachometerEdges::new(recording).ok_or_else(|| {
             recording
                 .lacks("channel tacho, whose rising edges give the angle of the teeth (a cut cannot be diagnosed without it)")
         })?;
-        let tacho = recording.sidecar.channels.get("tacho");
-        let per_revolution = tacho.and_then(|tacho| tacho.pulses_per_rev).unwrap_or(1);
-        let missing = tacho.and_then(|tacho| tacho.missing).unwrap_or(0);
-        let all_s = rises_s(&level.samples, recording.sample_rate_hz, recording.since_s);
-        let edges_s = first_of_each_revolution(&all_s, usize::from(per_revolution), usize::from(missing));
+        let starts_s = edges
+            .revolutions_s()
+            .map_err(|what| DiagnoseError::record(&recording.path, what))?;
+        let edges_s: Vec<f64> = starts_s
+            .iter()
+            .map(|start_s| recording.since_s + start_s)
+            .collect();
         if edges_s.len() < LEAST_TACHOMETER_EDGES {
             return Err(DiagnoseError::record(
                 &recording.path,
@@ -131,51 +133,6 @@ impl SpindleMotion {
     pub(crate) fn revolution_s(&self) -> f64 {
         60.0 / self.rpm
     }
-}
-
-/// Times of rising edges, s. An edge is an upward crossing of the middle of the range after the level was in the lower quarter; its time is
-/// interpolated linearly.
-///
-/// The device adapts its threshold to the signal while it runs; here the range of the whole record is known.
-fn rises_s(level: &[f64], rate_hz: f64, since_s: f64) -> Vec<f64> {
-    let (low, high) = level
-        .iter()
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
-            (low.min(*value), high.max(*value))
-        });
-    let (middle, quarter) = (0.5 * (low + high), low + 0.25 * (high - low));
-    let mut is_armed = false;
-    let mut rises_s = Vec::new();
-    for (index, pair) in level.windows(2).enumerate() {
-        is_armed |= pair[0] < quarter;
-        if is_armed && pair[0] < middle && pair[1] >= middle {
-            let share = (middle - pair[0]) / (pair[1] - pair[0]);
-            rises_s.push(since_s + (index as f64 + share) / rate_hz);
-            is_armed = false;
-        }
-    }
-    rises_s
-}
-
-/// The first edge of each revolution: the one after the gap of the tachometer wheel, or every `positions`-th without a gap.
-fn first_of_each_revolution(edges_s: &[f64], positions: usize, missing: usize) -> Vec<f64> {
-    if positions <= 1 {
-        return edges_s.to_vec();
-    }
-    let there = positions - missing;
-    let intervals: Vec<f64> = edges_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    // The widest interval of the first revolution is the gap of the wheel.
-    let first = if missing == 0 || there < 2 {
-        0
-    } else {
-        intervals
-            .iter()
-            .take(there)
-            .enumerate()
-            .max_by(|a, b| a.1.total_cmp(b.1))
-            .map_or(0, |(index, _)| index + 1)
-    };
-    edges_s.iter().skip(first).step_by(there).copied().collect()
 }
 
 /// Step of the grid of modulation frequencies, in periods per record.
@@ -350,6 +307,7 @@ fn without_line(edges_s: &[f64], of: impl Fn(f64) -> f64) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use quietcut_recording::{Channel, Quantity, RecordedChannel, Sidecar};
 
     fn spindle_motion(edges_s: Vec<f64>) -> SpindleMotion {
         SpindleMotion {
@@ -361,6 +319,57 @@ mod tests {
             edges_s,
         }
         .fitted()
+    }
+
+    /// A pulse of 4 ms per position of a wheel at 7 rev/s, read as `tacho` from the column `encoder`.
+    fn recording(positions: u16, missing: u16) -> Recording {
+        let level = |sample: usize| {
+            let turns = 7.0 * (sample as f64 * 1e-4 - 0.05) + 10.0;
+            let place = turns.fract() * f64::from(positions);
+            f64::from(u8::from(
+                place.fract() < 0.5 && (place as u16) < positions - missing,
+            ))
+        };
+        let mut sidecar = Sidecar::default();
+        sidecar.channels.insert(
+            "encoder".into(),
+            RecordedChannel {
+                name: Some("tacho".into()),
+                pulses_per_rev: Some(positions),
+                missing: Some(missing),
+                ..RecordedChannel::default()
+            },
+        );
+        Recording {
+            path: "cut.csv".into(),
+            sample_rate_hz: 1e4,
+            start_s: 0.0,
+            since_s: 0.0,
+            channels: vec![Channel {
+                name: "tacho".into(),
+                quantity: Quantity::Level,
+                samples: (0..20_000).map(level).collect(),
+            }],
+            sidecar,
+        }
+    }
+
+    #[test]
+    fn the_wheel_of_a_renamed_channel_gives_the_speed() {
+        for (positions, missing) in [(1, 0), (4, 0), (6, 1), (12, 2)] {
+            let found = SpindleMotion::new(&recording(positions, missing), None).unwrap();
+            assert!(
+                (found.rpm() - 420.0).abs() < 0.1,
+                "{positions} {missing}: {}",
+                found.rpm()
+            );
+            // Angle 0 at 0.05 s with a gap, else at the first edge; an edge is located to half a sample.
+            let turns = found.angle_rad(0.05) / TAU * f64::from(if missing > 0 { 1 } else { positions });
+            assert!(
+                (turns - turns.round()).abs() < 5e-3 * f64::from(positions),
+                "{positions} {missing}: {turns}"
+            );
+        }
     }
 
     #[test]
