@@ -2,11 +2,10 @@
 
 use std::f64::consts::TAU;
 
-pub use super::immersion::Immersion;
-
 use super::force_law::ForceLaw;
 use crate::ModelError;
-use crate::milling::{Cut, Material, Runout, Tool};
+pub use crate::milling::Immersion;
+use crate::milling::{Cut, EdgeAngle, Material, Runout, Tool};
 
 /// The engaged tool in SI units and in the machine's axes.
 ///
@@ -31,8 +30,7 @@ pub struct Cutter {
     /// Cutting force law.
     pub force: ForceLaw,
     feed_direction: [f64; 2],
-    sin_edge: f64,
-    cos_edge: f64,
+    edge: EdgeAngle,
 }
 
 /// Angle, runout and neighbours of one tooth.
@@ -58,13 +56,7 @@ impl Cutter {
     /// # Errors
     /// The number of pitch angles differs from the number of teeth, or their sum is not 360 degrees.
     pub fn new(tool: &Tool, material: &Material, cut: &Cut, axial_depth_m: f64) -> Result<Self, ModelError> {
-        let edge_rad = tool.edge_angle_deg.to_radians();
-        // Exact sine and cosine of 90°: axial vibration then has no influence on the chip thickness, not even by rounding.
-        let (sin_edge, cos_edge) = if tool.edge_angle_deg == 90.0 {
-            (1.0, 0.0)
-        } else {
-            edge_rad.sin_cos()
-        };
+        let edge = EdgeAngle::new(tool.edge_angle_deg);
         let feed_rad = cut.feed_direction_deg.to_radians();
         let mut cutter = Self {
             teeth: teeth(tool, cut.feed_per_tooth_mm * 1e-3)?,
@@ -75,9 +67,8 @@ impl Cutter {
             radius_m: tool.diameter_mm.map(|diameter_mm| 0.5e-3 * diameter_mm),
             axial_depth_modulation: false,
             feed_direction: [feed_rad.cos(), feed_rad.sin()],
-            sin_edge,
-            cos_edge,
-            force: ForceLaw::new(*material, [sin_edge, cos_edge]),
+            edge,
+            force: ForceLaw::new(*material, edge),
         };
         if let Some(runout) = tool.runout {
             cutter.set_runout(runout);
@@ -97,32 +88,25 @@ impl Cutter {
 
     /// Sets the radial runout of all teeth from the offset of the tool axis to the spindle axis.
     pub fn set_runout(&mut self, runout: Runout) {
-        let count = self.teeth.len() as f64;
+        let count = self.teeth.len();
         for (index, tooth) in self.teeth.iter_mut().enumerate() {
-            let angle = runout.angle_deg.to_radians() + TAU * index as f64 / count;
-            tooth.radial_m = 1e-6 * runout.offset_um * angle.cos();
+            tooth.radial_m = runout.radial_m(index, count);
         }
     }
 
     /// Sine and radial direction at the immersion angle `phi_rad`, rad.
     pub fn immersion(&self, phi_rad: f64) -> Immersion {
-        let (sin, cos) = phi_rad.sin_cos();
-        let [a, b] = self.feed_direction;
-        Immersion {
-            sin,
-            outward: [sin * a - cos * b, sin * b + cos * a],
-        }
+        Immersion::new(phi_rad).in_machine(self.feed_direction)
     }
 
     /// Position of the edge of a tooth along the chip thickness, m, at the displacement `x` of the tool, m: thesis eq. 3.1 without feed.
     pub fn reach_m(&self, tooth: &Tooth, at: Immersion, x: [f64; 3]) -> f64 {
-        let outward = at.outward[0] * x[0] + at.outward[1] * x[1];
-        (outward + tooth.radial_m) * self.sin_edge - x[2] * self.cos_edge
+        self.edge.reach_m(at, tooth.radial_m, x)
     }
 
     /// Contribution of a feed `feed_m`, m, to the chip thickness, m: feed·sin φ·sin γ.
     pub fn recession_m(&self, at: Immersion, feed_m: f64) -> f64 {
-        feed_m * at.sin * self.sin_edge
+        self.edge.recession_m(at, feed_m)
     }
 
     /// Axial depth of cut, m, for the nominal depth `nominal_m` and the axial displacement `z_m` of the tool; never negative.

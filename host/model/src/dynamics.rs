@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, Matrix3xX, MatrixXx3};
 
 use crate::criteria::VELOCITY_JUMP;
-use crate::structure::{FirstOrder, Form, Matrices, Structure, StructureError};
+use crate::structure::{CubicForce, FirstOrder, Form, Structure, StructureError};
 use quietcut_numerics::dormand_prince::Quartic;
 
 /// Equation of motion ẋ = A x + B F − f₃(x), u = C x: [`FirstOrder`] with the cubic terms f₃ of the structure, if it has any.
@@ -24,18 +24,9 @@ pub struct Dynamics {
     cb: [[f64; 3]; 3],
     /// C A B, 1/kg: acceleration of the tool per force.
     cab: [[f64; 3]; 3],
-    cubic: Option<Cubic>,
+    cubic: Option<CubicForce>,
     sizes: Vec<f64>,
     velocity_jumps: bool,
-}
-
-/// Cubic terms f₃ = damping·v∘³ + stiffness·q∘³ of v̇, where q are the first `degrees_of_freedom` states, v the following ones, and ∘³ is
-/// the cube of each element.
-#[derive(Clone, Debug)]
-struct Cubic {
-    degrees_of_freedom: usize,
-    damping: Vec<f64>,
-    stiffness: Vec<f64>,
 }
 
 impl Dynamics {
@@ -53,7 +44,10 @@ impl Dynamics {
         // Modes of a structure with a mass matrix have C B = 0, except for rounding and the digits of the case file.
         let velocity_jumps = jump.amax() > VELOCITY_JUMP * c.amax() * b.amax() * order as f64;
         let cubic = match structure.equation() {
-            Some(matrices) if structure.is_nonlinear() => Some(cubic(&matrices, &a)?),
+            Some(matrices) if structure.is_nonlinear() => {
+                let scale = a[(0, matrices.mass.nrows())];
+                Some(CubicForce::in_first_order(&matrices, scale)?)
+            }
             _ => None,
         };
         // State for a tool displacement of 1 m: 1/|C| for modes and joints; the states of matrices are displacements in m.
@@ -225,17 +219,10 @@ impl Dynamics {
             *rate = dot(a, x) + b[0] * force[0] + b[1] * force[1] + b[2] * force[2];
         }
         if let Some(cubic) = &self.cubic {
-            let degrees_of_freedom = cubic.degrees_of_freedom;
-            let (q, v) = (
-                &x[..degrees_of_freedom],
-                &x[degrees_of_freedom..2 * degrees_of_freedom],
-            );
-            for ((rate, damping), stiffness) in rate[degrees_of_freedom..]
-                .iter_mut()
-                .zip(cubic.damping.chunks_exact(degrees_of_freedom))
-                .zip(cubic.stiffness.chunks_exact(degrees_of_freedom))
-            {
-                *rate -= dot_cubes(damping, v) + dot_cubes(stiffness, q);
+            let size = cubic.size();
+            let (q, v) = (&x[..size], &x[size..2 * size]);
+            for (rate, force) in rate[size..].iter_mut().zip(cubic.at(q, v)) {
+                *rate -= force;
             }
         }
     }
@@ -243,27 +230,4 @@ impl Dynamics {
 
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
-}
-
-fn dot_cubes(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b * b * b).sum()
-}
-
-/// Cubic coefficient matrices M⁻¹C₃·s² and M⁻¹K₃/s for the states (q, q̇/s).
-fn cubic(matrices: &Matrices, a: &DMatrix<f64>) -> Result<Cubic, StructureError> {
-    let degrees_of_freedom = matrices.mass.nrows();
-    let scale = a[(0, degrees_of_freedom)];
-    let mass = matrices.mass.clone().lu();
-    let of = |matrix: &Option<DMatrix<f64>>, factor: f64| -> Result<Vec<f64>, StructureError> {
-        let Some(matrix) = matrix else {
-            return Ok(vec![0.0; degrees_of_freedom * degrees_of_freedom]);
-        };
-        let divided = mass.solve(matrix).ok_or(StructureError::SingularMass)?;
-        Ok((divided.transpose() * factor).as_slice().to_vec())
-    };
-    Ok(Cubic {
-        degrees_of_freedom,
-        damping: of(&matrices.cubic_damping, scale * scale)?,
-        stiffness: of(&matrices.cubic_stiffness, scale.recip())?,
-    })
 }

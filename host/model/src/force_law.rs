@@ -1,7 +1,6 @@
 //! Cutting force on an edge: linear-edge law, chip-thickness exponent, process damping and wear.
 
-use super::immersion::Immersion;
-use crate::milling::Material;
+use crate::milling::{EdgeAngle, EdgeForce, Immersion, Material};
 
 /// Cutting force on an edge of axial depth b at the chip thickness h (thesis eqs 3.2 to 3.4): the tangential, radial and axial components are
 /// F = b·(K_c·h + K_e/sin γ) each. Optional extensions:
@@ -13,10 +12,9 @@ use crate::milling::Material;
 pub struct ForceLaw {
     /// Cutting coefficients K_c and edge coefficients K_e of the workpiece material.
     material: Material,
-    sin_edge: f64,
-    cos_edge: f64,
-    cutting: Coefficients,
-    edge: Coefficients,
+    edge_angle: EdgeAngle,
+    cutting: EdgeForce,
+    edge: EdgeForce,
     /// Power law of the chip thickness; `None` for a force linear in the chip thickness.
     pub chip: Option<ChipLaw>,
     /// Process damping of the flank; `None` without process damping.
@@ -58,57 +56,22 @@ pub struct ProcessDamping {
     pub friction: f64,
 }
 
-/// Force components of an edge in the axes of the tool: tangential, inwards (towards the tool axis) and along the tool axis. The latter two
-/// follow from the radial and axial components normal and parallel to the edge, and from the edge angle.
-#[derive(Clone, Copy, Debug)]
-struct Coefficients {
-    tangential: f64,
-    inward: f64,
-    axial: f64,
-}
-
-impl Coefficients {
-    fn new(tangential: f64, radial: f64, axial: f64, sin_edge: f64, cos_edge: f64) -> Self {
-        Self {
-            tangential,
-            inward: radial * sin_edge + axial * cos_edge,
-            axial: radial * cos_edge - axial * sin_edge,
-        }
-    }
-
-    fn are_zero(self) -> bool {
-        self.tangential == 0.0 && self.inward == 0.0 && self.axial == 0.0
-    }
-
-    /// Force vector in the machine's x, y, z. The tangential force is directed against the cutting motion of the tooth: (−cos φ, sin φ) in
-    /// feed and normal direction.
-    fn force(self, at: Immersion) -> [f64; 3] {
-        let [x, y] = at.outward;
-        [
-            -self.tangential * y - self.inward * x,
-            self.tangential * x - self.inward * y,
-            self.axial,
-        ]
-    }
-}
-
 impl ForceLaw {
-    /// The linear-edge law of a material; the edge angle γ is given as [sin γ, cos γ].
-    pub fn new(material: Material, [sin_edge, cos_edge]: [f64; 2]) -> Self {
-        let of = |[tangential, radial, axial]: [f64; 3]| {
-            Coefficients::new(tangential, radial, axial, sin_edge, cos_edge)
-        };
+    /// The linear-edge law of a material at an edge angle γ.
+    pub fn new(material: Material, edge_angle: EdgeAngle) -> Self {
         Self {
             material,
-            sin_edge,
-            cos_edge,
-            cutting: of([material.ktc_mpa, material.krc_mpa, material.kac_mpa].map(|mpa| 1e6 * mpa)),
-            edge: of([
-                material.kte_n_per_mm,
-                material.kre_n_per_mm,
-                material.kae_n_per_mm,
-            ]
-            .map(|n_per_mm| 1e3 * n_per_mm / sin_edge)),
+            edge_angle,
+            cutting: edge_angle
+                .force([material.ktc_mpa, material.krc_mpa, material.kac_mpa].map(|mpa| 1e6 * mpa)),
+            edge: edge_angle.force(
+                [
+                    material.kte_n_per_mm,
+                    material.kre_n_per_mm,
+                    material.kae_n_per_mm,
+                ]
+                .map(|n_per_mm| 1e3 * n_per_mm / edge_angle.sin()),
+            ),
             chip: None,
             process_damping: None,
             wear_per_s: 0.0,
@@ -127,7 +90,7 @@ impl ForceLaw {
             chip: self.chip,
             process_damping: self.process_damping,
             wear_per_s: self.wear_per_s,
-            ..Self::new(material, [self.sin_edge, self.cos_edge])
+            ..Self::new(material, self.edge_angle)
         }
     }
 
@@ -143,12 +106,12 @@ impl ForceLaw {
             .chip
             .map_or(thickness_m, |chip| chip.effective_m(thickness_m));
         let of = |cutting: f64, edge: f64, depth_m: f64| depth_m * (cutting * thickness_m + edge);
-        Coefficients {
+        EdgeForce {
             tangential: of(self.cutting.tangential, self.edge.tangential, depths_m[0]),
             inward: of(self.cutting.inward, self.edge.inward, depths_m[1]),
             axial: of(self.cutting.axial, self.edge.axial, depths_m[2]),
         }
-        .force(at)
+        .at(at)
     }
 
     /// Matrix D of process damping, N s/m, in the force F = −D v at the cutting speed V, m/s; without wear.
@@ -156,15 +119,10 @@ impl ForceLaw {
         let Some(damping) = self.process_damping else {
             return [[0.0; 3]; 3];
         };
-        let normal = [
-            at.outward[0] * self.sin_edge,
-            at.outward[1] * self.sin_edge,
-            -self.cos_edge,
-        ];
-        // Direction of a unit flank force along the chip thickness, towards the tool axis, together with its friction force.
-        let force = Coefficients::new(damping.friction, 1.0, 0.0, self.sin_edge, self.cos_edge).force(at);
         let size = damping.n_per_m / cutting_speed_m_per_s * depth_m;
-        force.map(|force| normal.map(|normal| -size * force * normal))
+        self.edge_angle
+            .flank(damping.friction, at)
+            .map(|row| row.map(|entry| size * entry))
     }
 
     /// Wear factor 1 + r·t of the cutting force at the time `t`, s.
@@ -175,7 +133,7 @@ impl ForceLaw {
     /// True if the cutting force or its derivative is discontinuous at loss of contact: with edge force, process damping or an exponent
     /// below 1.
     pub fn jumps_at_contact(&self) -> bool {
-        !self.edge.are_zero()
+        !self.edge.is_zero()
             || self.process_damping.is_some()
             || self.chip.is_some_and(|chip| chip.exponent < 1.0)
     }

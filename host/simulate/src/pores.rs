@@ -1,6 +1,6 @@
 //! Porous workpiece material: the solid fraction of the axial depth at the location of a tooth.
 
-use quietcut_model::cutter::{Cutter, Tooth};
+use quietcut_model::cutter::{Cutter, Immersion, Tooth};
 use quietcut_model::spindle::Spindle;
 
 /// A random foam whose pores are columns along the tool axis.
@@ -29,7 +29,7 @@ impl Pores {
     pub(super) fn at_tooth(&self, cutter: &Cutter, spindle: &Spindle, tooth: &Tooth, t: f64) -> [f64; 3] {
         let revolutions = spindle.speed_rad_per_s() * t / std::f64::consts::TAU;
         let fed_m = cutter.feed_per_tooth_m * cutter.teeth.len() as f64 * revolutions;
-        let (sin, cos) = (spindle.angle_rad(t) + tooth.angle_rad).sin_cos();
+        let [sin, cos] = Immersion::new(spindle.angle_rad(t) + tooth.angle_rad).outward;
         let radius_m = cutter.radius_m.unwrap_or(0.0);
         self.at(fed_m + radius_m * sin, radius_m * cos)
     }

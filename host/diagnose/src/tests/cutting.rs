@@ -8,7 +8,7 @@ use crate::records::study::Study;
 use crate::tests::virtual_records::record;
 use crate::{Diagnosis, Options, diagnose};
 use quietcut_model::case::Case;
-use quietcut_model::milling::{Engagement, ToothForce};
+use quietcut_model::milling::{EdgeAngle, Engagement, ToothForce};
 use quietcut_recording::{Quantity, Recording};
 use quietcut_simulate::{Effects, Entry, VirtualCut};
 
@@ -199,7 +199,7 @@ fn mean_slopes_of_a_cut_equal_the_averaged_directional_matrix() {
     let recordings = records(&[], false, 7);
     let study = Study::new(&baseline, &recordings).unwrap();
     let (tool, cut) = (baseline.tool().unwrap(), baseline.cut().unwrap());
-    let force = ToothForce::new(tool, baseline.material().unwrap());
+    let force = ToothForce::new(EdgeAngle::new(tool.edge_angle_deg), baseline.material().unwrap());
     // The deeper of the two cuts: 60 revolutions in feed direction x, without its ends.
     let averaged = force.averaged(&Engagement::new(tool, cut), 1e-3 * cut.feed_per_tooth_mm);
     let expected = averaged.directional * 0.8e-3;

@@ -1,8 +1,7 @@
 //! Chip thickness of every tooth in a recorded cut, from the surface that earlier tooth passings left.
 
-use nalgebra::Vector3;
-
 use crate::cutting::force_test::CuttingTest;
+use quietcut_model::milling::Immersion;
 
 /// Chip of one tooth at one sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -38,7 +37,6 @@ pub fn chips(test: &CuttingTest, runout_m: &[f64]) -> Vec<Vec<Chip>> {
     };
     let pitch = test.pitch();
     let passes = ((first - test.exit) / pitch).floor() as i64..=((last - test.start) / pitch).ceil() as i64;
-    let (sin_edge, cos_edge) = test.edge_angle.sin_cos();
     let mut surface: Vec<SurfacePoint> = Vec::new();
     for pass in passes {
         let turned = pass as f64 * pitch;
@@ -48,18 +46,19 @@ pub fn chips(test: &CuttingTest, runout_m: &[f64]) -> Vec<Vec<Chip>> {
         let mut left = Vec::with_capacity(samples.len());
         for sample in samples {
             let phi = test.angle[sample] - turned;
-            let (sin, cos) = phi.sin_cos();
-            let u = test.displacement.as_ref().map_or(Vector3::zeros(), |u| u[sample]);
-            let own = (sin * u.x + cos * u.y) * sin_edge - u.z * cos_edge;
-            let recession = test.feed_per_tooth_m * sin * sin_edge;
+            let immersion = Immersion::new(phi);
+            let u = test.displacement.as_ref().map_or([0.0; 3], |u| u[sample].into());
+            let own = test.edge_angle.reach_m(immersion, 0.0, u);
+            let recession = test.edge_angle.recession_m(immersion, test.feed_per_tooth_m);
             // Where no earlier tooth passing is recorded, the surface is that of a tooth passing without vibration.
             let before = surface_at(&surface, phi, &mut place).unwrap_or(SurfacePoint {
                 phi,
                 reach_m: 0.0,
                 owner: (tooth + 1) % test.teeth,
             });
-            let thickness_m =
-                own - before.reach_m + (runout_m[tooth] - runout_m[before.owner]) * sin_edge + recession;
+            let thickness_m = own - before.reach_m
+                + (runout_m[tooth] - runout_m[before.owner]) * test.edge_angle.sin()
+                + recession;
             if thickness_m > 0.0 {
                 chips[sample].push(Chip {
                     phi,

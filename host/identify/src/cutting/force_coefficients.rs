@@ -146,8 +146,8 @@ pub fn fit(tests: &[CuttingTest]) -> Result<Fit, ForceCoefficientError> {
         return Err(ForceCoefficientError::Teeth(first.teeth, other.teeth));
     }
     let has_axial = tests.iter().all(|test| test.has_axial_force);
-    if !has_axial && first.edge_angle.cos().abs() > 1e-9 {
-        return Err(ForceCoefficientError::NoAxialForce(first.edge_angle.to_degrees()));
+    if !has_axial && first.edge_angle.sees_axial_displacement() {
+        return Err(ForceCoefficientError::NoAxialForce(first.edge_angle.degrees()));
     }
     let mut fitter = Fitter {
         tests: tests.iter().map(prepared).collect(),

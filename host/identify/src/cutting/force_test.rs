@@ -5,6 +5,7 @@ use std::f64::consts::TAU;
 use nalgebra::Vector3;
 
 use crate::criteria::{ENGAGED_SHARE, LEAST_REVOLUTIONS};
+use quietcut_model::milling::EdgeAngle;
 use quietcut_model::structure::feed_axes;
 use quietcut_recording::{Quantity, Recording, RecordingError, SpindleAngle};
 
@@ -21,8 +22,8 @@ pub struct CuttingTest {
     pub feed_per_tooth_m: f64,
     /// Number of teeth, at equal pitch.
     pub teeth: usize,
-    /// Edge angle γ, rad.
-    pub edge_angle: f64,
+    /// Edge angle γ.
+    pub edge_angle: EdgeAngle,
     /// Spindle angle of each sample, rad, ascending.
     pub angle: Vec<f64>,
     /// Force on the tool, N.
@@ -92,7 +93,7 @@ impl CuttingTest {
             exit: exit_deg.to_radians(),
             feed_per_tooth_m: 1e-3 * feed_mm,
             teeth: teeth as usize,
-            edge_angle: setup.edge_angle_deg.to_radians(),
+            edge_angle: EdgeAngle::new(setup.edge_angle_deg),
             angle,
             force,
             has_axial_force: recording.channel("fz").is_some(),

@@ -6,7 +6,7 @@ use std::f64::consts::TAU;
 use nalgebra::Vector3;
 
 use crate::cutting::force_test::CuttingTest;
-use quietcut_model::milling::{Material, RotatingVector, Tool, ToothForce};
+use quietcut_model::milling::{Immersion, Material, RotatingVector, ToothForce};
 
 /// A cutting test with the quantities that stay constant during the fit.
 pub(super) struct Prepared<'a> {
@@ -25,13 +25,6 @@ pub(super) struct Prepared<'a> {
 
 /// Force per unit of each of the three coefficient pairs, for an axial depth of 1 m.
 fn vectors(test: &CuttingTest) -> [ToothForce; 3] {
-    let tool = Tool {
-        teeth: test.teeth,
-        edge_angle_deg: test.edge_angle.to_degrees(),
-        diameter_mm: None,
-        pitch_deg: vec![360.0 / test.teeth as f64; test.teeth],
-        runout: None,
-    };
     std::array::from_fn(|index| {
         let unit = |place: usize| f64::from(u8::from(place == index));
         let material = Material {
@@ -42,16 +35,11 @@ fn vectors(test: &CuttingTest) -> [ToothForce; 3] {
             kre_n_per_mm: unit(1),
             kae_n_per_mm: unit(2),
         };
-        ToothForce::new(&tool, &material)
+        ToothForce::new(test.edge_angle, &material)
     })
 }
 
 pub(super) fn prepared(test: &CuttingTest) -> Prepared<'_> {
-    let scaled = |vector: RotatingVector| RotatingVector {
-        constant: vector.constant * test.depth_m,
-        cosine: vector.cosine * test.depth_m,
-        sine: vector.sine * test.depth_m,
-    };
     let vectors = vectors(test);
     let [from, to] = test.full_cut;
     let mut switching = BTreeSet::new();
@@ -64,8 +52,8 @@ pub(super) fn prepared(test: &CuttingTest) -> Prepared<'_> {
     }
     Prepared {
         test,
-        cutting: vectors.map(|force| scaled(force.cutting)),
-        edge: vectors.map(|force| scaled(force.edge)),
+        cutting: vectors.map(|force| force.cutting.scaled(test.depth_m)),
+        edge: vectors.map(|force| force.edge.scaled(test.depth_m)),
         switching,
         revolutions: test.revolutions(),
         weights: [1.0; 3],
@@ -89,7 +77,9 @@ impl Prepared<'_> {
                 if phi < test.start || phi >= test.exit {
                     continue;
                 }
-                let thickness_m = test.feed_per_tooth_m * phi.sin() * test.edge_angle.sin();
+                let thickness_m = test
+                    .edge_angle
+                    .recession_m(Immersion::new(phi), test.feed_per_tooth_m);
                 for part in 0..3 {
                     sums[part] += self.cutting[part].at(phi) * thickness_m;
                     sums[part + 3] += self.edge[part].at(phi);

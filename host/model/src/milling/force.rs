@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::{Engagement, Material, Tool};
+use super::{EdgeAngle, Engagement, Immersion, Material};
 
 /// A vector that rotates with a tooth: v(φ) = constant + cosine·cos φ + sine·sin φ, in feed, normal and axial direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -16,10 +16,36 @@ pub struct RotatingVector {
 }
 
 impl RotatingVector {
+    /// The vector of a function that is linear in the radial direction (sin φ, cos φ), with a constant.
+    fn of(of: impl Fn(Immersion) -> [f64; 3]) -> Self {
+        let at = |sin: f64, cos: f64| {
+            Vector3::from(of(Immersion {
+                sin,
+                outward: [sin, cos],
+            }))
+        };
+        let constant = at(0.0, 0.0);
+        Self {
+            constant,
+            cosine: at(0.0, 1.0) - constant,
+            sine: at(1.0, 0.0) - constant,
+        }
+    }
+
     /// The vector v(φ) at the immersion angle φ, rad.
     pub fn at(&self, angle: f64) -> Vector3<f64> {
         let (sin, cos) = angle.sin_cos();
         self.constant + self.cosine * cos + self.sine * sin
+    }
+
+    /// The vector times a factor.
+    #[must_use]
+    pub fn scaled(self, factor: f64) -> Self {
+        Self {
+            constant: self.constant * factor,
+            cosine: self.cosine * factor,
+            sine: self.sine * factor,
+        }
     }
 
     /// ∫ v(φ) uᵀ(φ) dφ over the immersion angle from `start` to `exit`, rad, with u = `other`; closed form.
@@ -63,27 +89,20 @@ pub struct ToothForce {
 }
 
 impl ToothForce {
-    /// The force on a tooth of `tool` in a workpiece `material`.
-    pub fn new(tool: &Tool, material: &Material) -> Self {
-        let (sin, cos) = tool.edge_angle_deg.to_radians().sin_cos();
+    /// The force on a tooth with an edge angle in a workpiece `material`.
+    pub fn new(edge_angle: EdgeAngle, material: &Material) -> Self {
         const PA_PER_MPA: f64 = 1e6;
         const N_PER_M: f64 = 1e3;
-        let cutting = projected(material.ktc_mpa, material.krc_mpa, material.kac_mpa, sin, cos);
-        let edge = projected(
+        let cutting = edge_angle.force([material.ktc_mpa, material.krc_mpa, material.kac_mpa]);
+        let edge = edge_angle.force([
             material.kte_n_per_mm,
             material.kre_n_per_mm,
             material.kae_n_per_mm,
-            sin,
-            cos,
-        );
+        ]);
         Self {
-            cutting: scaled(cutting, PA_PER_MPA),
-            normal: RotatingVector {
-                constant: Vector3::new(0.0, 0.0, -cos),
-                cosine: Vector3::new(0.0, sin, 0.0),
-                sine: Vector3::new(sin, 0.0, 0.0),
-            },
-            edge: scaled(edge, N_PER_M / sin),
+            cutting: RotatingVector::of(|at| cutting.at(at)).scaled(PA_PER_MPA),
+            normal: RotatingVector::of(|at| edge_angle.normal(at)),
+            edge: RotatingVector::of(|at| edge.at(at)).scaled(N_PER_M / edge_angle.sin()),
         }
     }
 
@@ -115,28 +134,10 @@ pub struct Averaged {
     pub forced: Vector3<f64>,
 }
 
-/// The vector in feed, normal and axial direction of a tangential, radial and axial force on a tooth with edge angle γ (thesis eq. 3.4).
-fn projected(tangential: f64, radial: f64, axial: f64, sin: f64, cos: f64) -> RotatingVector {
-    let inward = radial * sin + axial * cos;
-    RotatingVector {
-        constant: Vector3::new(0.0, 0.0, radial * cos - axial * sin),
-        cosine: Vector3::new(-tangential, -inward, 0.0),
-        sine: Vector3::new(-inward, tangential, 0.0),
-    }
-}
-
-fn scaled(vector: RotatingVector, factor: f64) -> RotatingVector {
-    RotatingVector {
-        constant: vector.constant * factor,
-        cosine: vector.cosine * factor,
-        sine: vector.sine * factor,
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::milling::Cut;
+    use crate::milling::{Cut, Tool};
 
     fn tool(teeth: usize, edge_angle_deg: f64) -> Tool {
         Tool {
@@ -165,7 +166,7 @@ mod tests {
 
     #[test]
     fn tooth_force_is_that_of_equations_3_2_and_3_4() {
-        let force = ToothForce::new(&tool(4, 50.0), &MATERIAL);
+        let force = ToothForce::new(EdgeAngle::new(50.0), &MATERIAL);
         let gamma = 50.0_f64.to_radians();
         let (depth, feed) = (0.67e-3, 0.05e-3);
         for step in 0..=36 {
@@ -188,7 +189,7 @@ mod tests {
 
     #[test]
     fn directional_coefficients_are_those_of_equation_6_7() {
-        let force = ToothForce::new(&tool(2, 90.0), &MATERIAL);
+        let force = ToothForce::new(EdgeAngle::new(90.0), &MATERIAL);
         let kr = 1132.0 / 1835.0;
         for step in 0..=36 {
             let angle = f64::from(step) * 5.0_f64.to_radians();
@@ -210,7 +211,7 @@ mod tests {
 
     #[test]
     fn averages_in_closed_form_are_those_of_quadrature() {
-        let force = ToothForce::new(&tool(4, 50.0), &MATERIAL);
+        let force = ToothForce::new(EdgeAngle::new(50.0), &MATERIAL);
         for (start, exit) in [(0.0, 180.0), (126.87, 180.0), (0.0, 60.0), (70.0, 110.0)] {
             let cut = Cut {
                 start_deg: start,

@@ -66,7 +66,7 @@ fn integral(engagement: &Engagement, m: i32, k: i32) -> Complex64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::milling::{Cut, Material, Tool};
+    use crate::milling::{Cut, EdgeAngle, Material, Tool};
 
     fn tool(teeth: usize) -> Tool {
         Tool {
@@ -102,7 +102,7 @@ mod tests {
                 feed_per_tooth_mm: 0.05,
                 feed_direction_deg: 0.0,
             };
-            let force = ToothForce::new(&tool, &MATERIAL);
+            let force = ToothForce::new(EdgeAngle::new(50.0), &MATERIAL);
             let engagement = Engagement::new(&tool, &cut);
             let averaged = force.averaged(&engagement, 0.05e-3);
             let zeroth = force.harmonic(&engagement, 0.05e-3, 0);

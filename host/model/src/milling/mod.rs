@@ -7,6 +7,7 @@ mod harmonics;
 mod material;
 mod process;
 mod tool;
+mod tooth;
 
 pub use cut::Cut;
 pub use engagement::{Engagement, Subinterval};
@@ -15,3 +16,4 @@ pub use harmonics::Harmonic;
 pub use material::Material;
 pub use process::Process;
 pub use tool::{Runout, Tool};
+pub use tooth::{EdgeAngle, EdgeForce, Immersion};

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::{Cut, Engagement, Material, Tool, ToothForce};
+use super::{Cut, EdgeAngle, Engagement, Material, Tool, ToothForce};
 
 /// The linear cutting process of a tool with equal pitch: force coefficients, engagement and feed.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -21,7 +21,7 @@ impl Process {
     /// The cutting process of a case with equal pitch.
     pub fn new(tool: &Tool, material: &Material, cut: &Cut, axial_depth_modulation: bool) -> Self {
         Self {
-            force: ToothForce::new(tool, material),
+            force: ToothForce::new(EdgeAngle::new(tool.edge_angle_deg), material),
             engagement: Engagement::new(tool, cut),
             feed_per_tooth_m: cut.feed_per_tooth_mm * 1e-3,
             axial_depth_modulation,

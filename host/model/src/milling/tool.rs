@@ -1,5 +1,7 @@
 //! The milling tool.
 
+use std::f64::consts::TAU;
+
 use crate::criteria::VARIABLE_PITCH_DEG;
 
 /// A milling tool without helix: each cutting edge is straight, in a plane with the tool axis, at the edge angle to the normal plane of
@@ -26,6 +28,14 @@ pub struct Runout {
     pub offset_um: f64,
     /// Angle ψ of the first tooth from the direction of the offset, degrees.
     pub angle_deg: f64,
+}
+
+impl Runout {
+    /// Radial runout of tooth `index`, from 0, of `teeth` teeth: its radius minus the mean radius, m.
+    pub fn radial_m(self, index: usize, teeth: usize) -> f64 {
+        let angle = self.angle_deg.to_radians() + TAU * index as f64 / teeth as f64;
+        1e-6 * self.offset_um * angle.cos()
+    }
 }
 
 impl Tool {

@@ -1,5 +1,6 @@
 //! The structure: linear dynamics of the tool centre point, with optional cubic terms.
 
+mod cubic_force;
 mod definiteness;
 mod direction;
 mod error;
@@ -11,6 +12,7 @@ mod modes;
 
 use std::borrow::Cow;
 
+pub use cubic_force::CubicForce;
 pub use definiteness::{Indefinite, Remedy};
 pub use direction::{Direction, feed_axes};
 pub use error::StructureError;

@@ -12,7 +12,8 @@ use crate::problem::pitched::Pitched;
 use crate::process::extension::{about_orbit, radial_m};
 use crate::process::treatment::is_not_smooth;
 use quietcut_model::case::Case;
-use quietcut_model::structure::FirstOrder;
+use quietcut_model::milling::{EdgeAngle, Immersion};
+use quietcut_model::structure::{CubicForce, FirstOrder};
 use quietcut_model::{ChipLaw, MotionState, ProcessDamping, RestoringForce};
 
 /// Equation of the forced orbit, eqs 6.1 and 3.6 in first-order form:
@@ -36,7 +37,7 @@ pub struct ForcedProblem {
     /// Unequal pitch or runout; `None` if all teeth are alike.
     pub(super) uneven: Option<Uneven>,
     /// Cubic terms; `None` for a linear structure.
-    pub(super) cubic: Option<Cubic>,
+    pub(super) cubic: Option<CubicForce>,
     /// Smooth restoring forces of extensions, with the structure in the machine's axes.
     smooth: Option<Smooth>,
     /// Chip law; `None` if the cutting force is proportional to the chip thickness.
@@ -61,7 +62,7 @@ pub(super) struct Uneven {
 impl Uneven {
     /// Unequal pitch or runout of a case; `None` if all teeth are alike.
     fn of(case: &Case, pitched: &Pitched) -> Result<Option<Self>, StabilityError> {
-        let sin_edge = case.tool()?.edge_angle_deg.to_radians().sin();
+        let sin_edge = EdgeAngle::new(case.tool()?.edge_angle_deg).sin();
         let radial_m = radial_m(case)?;
         let before = radial_m.iter().cycle().skip(1);
         let runout_m: Vec<f64> = radial_m
@@ -93,6 +94,7 @@ struct Smooth {
 #[derive(Clone, Debug)]
 struct Flank {
     law: ProcessDamping,
+    edge: EdgeAngle,
     radius_m: f64,
     /// Velocity matrix C A in feed, normal and axial direction.
     velocity: DMatrix<f64>,
@@ -125,42 +127,20 @@ impl Smooth {
     }
 }
 
-/// Cubic terms N(x) = stiffness·q∘³ + damping·(q̇/s)∘³, in the lower half of the states.
-#[derive(Clone, Debug)]
-pub(super) struct Cubic {
-    /// Coefficient M⁻¹ K₃/s.
-    stiffness: DMatrix<f64>,
-    /// Coefficient M⁻¹ C₃ s².
-    damping: DMatrix<f64>,
-}
-
-impl Cubic {
-    /// Cubic terms of a case, for the states of its linear problem; `None` for a linear structure.
-    fn of(case: &Case, linear: &Problem) -> Result<Option<Self>, StabilityError> {
-        let structure = case.structure()?;
-        let Some(matrices) = structure.equation().filter(|_| structure.is_nonlinear()) else {
-            return Ok(None);
-        };
-        let size = matrices.mass.nrows();
-        // q̇ = s·(lower half): the scale s stands in the upper right corner of A.
-        let scale = linear.structure.a[(0, size)];
-        let inverse_mass = matrices
-            .mass
-            .clone()
-            .try_inverse()
-            .ok_or_else(|| StabilityError::Structure {
-                path: case.path.clone(),
-                cause: quietcut_model::structure::StructureError::SingularMass,
-            })?;
-        let part = |matrix: &Option<DMatrix<f64>>, factor: f64| match matrix {
-            Some(matrix) => &inverse_mass * matrix * factor,
-            None => DMatrix::zeros(size, size),
-        };
-        Ok(Some(Self {
-            stiffness: part(&matrices.cubic_stiffness, scale.recip()),
-            damping: part(&matrices.cubic_damping, scale * scale),
-        }))
-    }
+/// Cubic terms N(x) of a case in the lower half of the states of its linear problem; `None` for a linear structure.
+fn cubic_force(case: &Case, linear: &Problem) -> Result<Option<CubicForce>, StabilityError> {
+    let structure = case.structure()?;
+    let Some(matrices) = structure.equation().filter(|_| structure.is_nonlinear()) else {
+        return Ok(None);
+    };
+    // q̇ = s·(lower half): the scale s stands in the upper right corner of A.
+    let scale = linear.structure.a[(0, matrices.mass.nrows())];
+    CubicForce::in_first_order(&matrices, scale)
+        .map(Some)
+        .map_err(|cause| StabilityError::Structure {
+            path: case.path.clone(),
+            cause,
+        })
 }
 
 impl ForcedProblem {
@@ -180,7 +160,7 @@ impl ForcedProblem {
         let pitched = Pitched::new(case, CubicTerms::Kept)?;
         let linear = pitched.with_mean_pitch().clone();
         let uneven = Uneven::of(case, &pitched)?;
-        let cubic = Cubic::of(case, &linear)?;
+        let cubic = cubic_force(case, &linear)?;
         let about = about_orbit(case)?;
         let machine = linear.structure.rotated(-case.cut()?.feed_direction_deg);
         let jump = (&machine.c * &machine.b).amax();
@@ -196,6 +176,7 @@ impl ForcedProblem {
         let flank = match (about.law.process_damping, case.tool()?.diameter_mm) {
             (Some(law), Some(diameter_mm)) => Some(Flank {
                 law,
+                edge: EdgeAngle::new(case.tool()?.edge_angle_deg),
                 radius_m: 0.5e-3 * diameter_mm,
                 velocity: Smooth::new(Vec::new(), &linear.structure).velocity,
             }),
@@ -278,12 +259,10 @@ impl ForcedProblem {
     ) -> Option<Matrix3<f64>> {
         let flank = self.flank.as_ref()?;
         let size = flank.law.n_per_m / (flank.radius_m * speed_rad_per_s);
-        let process = &self.linear.process;
         let sum: Matrix3<f64> = angles
             .map(|angle| {
-                let normal = process.force.normal.at(angle);
-                let tangent = Vector3::new(-angle.cos(), angle.sin(), 0.0);
-                (normal - tangent * flank.law.friction) * normal.transpose()
+                let rows = flank.edge.flank(flank.law.friction, Immersion::new(angle));
+                Matrix3::from_fn(|i, j| rows[i][j])
             })
             .sum();
         Some(sum * size)
@@ -346,14 +325,10 @@ impl ForcedProblem {
             }
         }
         let Some(cubic) = &self.cubic else { return };
-        let size = cubic.stiffness.nrows();
-        for i in 0..size {
-            let mut sum = 0.0;
-            for j in 0..size {
-                sum += cubic.stiffness[(i, j)] * state[j].powi(3)
-                    + cubic.damping[(i, j)] * state[size + j].powi(3);
-            }
-            rate[size + i] -= sum;
+        let size = cubic.size();
+        let (q, v) = (&state[..size], &state[size..2 * size]);
+        for (rate, force) in rate.as_mut_slice()[size..].iter_mut().zip(cubic.at(q, v)) {
+            *rate -= force;
         }
     }
 
@@ -372,12 +347,13 @@ impl ForcedProblem {
         let structure = &self.linear.structure;
         let mut jacobian = structure.a.clone();
         if let Some(cubic) = &self.cubic {
-            let size = cubic.stiffness.nrows();
+            let size = cubic.size();
+            let (q, v) = (&state[..size], &state[size..2 * size]);
             for i in 0..size {
                 for j in 0..size {
-                    jacobian[(size + i, j)] -= 3.0 * cubic.stiffness[(i, j)] * state[j] * state[j];
-                    jacobian[(size + i, size + j)] -=
-                        3.0 * cubic.damping[(i, j)] * state[size + j] * state[size + j];
+                    let [by_q, by_v] = cubic.slopes((i, j), q, v);
+                    jacobian[(size + i, j)] -= by_q;
+                    jacobian[(size + i, size + j)] -= by_v;
                 }
             }
         }
