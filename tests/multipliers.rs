@@ -8,7 +8,7 @@
 use quietcut::case::Case;
 use quietcut::simulate::{
     Cutter, Cutting, Drive, Dynamics, Entry, Model, Motion, Regeneration, Settings, Spindle, VirtualCut,
-    WorkpieceTraverse, Workspace,
+    WorkpieceTraverse,
 };
 use quietcut::stability::orbit::ForcedProblem;
 use quietcut::stability::{self, CubicTerms, Method, Pitched, Problem, RevolutionCollocation};
@@ -50,20 +50,9 @@ fn motions_from(
     every_s: f64,
     end_s: f64,
 ) -> Vec<Motion> {
-    let mut found: Vec<Motion> = Vec::new();
-    let mut workspace = Workspace::new(model);
     model
-        .run_from(states, end_s, settings, |segment| {
-            loop {
-                let t = first_s + found.len() as f64 * every_s;
-                if t > segment.to_s() {
-                    break;
-                }
-                found.push(segment.motion(t, &mut workspace));
-            }
-        })
-        .unwrap();
-    found
+        .motions_from(states, settings, [first_s, every_s, end_s])
+        .unwrap()
 }
 
 fn exact(relative: f64) -> Settings {

@@ -1,6 +1,6 @@
 //! Time integration of a model from its initial state.
 
-use super::dense_step::DenseStep;
+use super::dense_step::{DenseStep, Motion, Workspace};
 use super::error::SimulateError;
 use super::integrator::{Integrator, Statistics};
 use super::model::Model;
@@ -42,5 +42,29 @@ impl Model {
             return Err(SimulateError::NoDiameter);
         }
         Integrator::new(self, settings, y).run(end_s, observe)
+    }
+
+    /// Motion at the times `first_s` + k·`every_s` up to `end_s`, s, from the initial states `y`; otherwise as [`Self::run_from`].
+    ///
+    /// # Errors
+    /// As [`Self::run`].
+    pub fn motions_from(
+        &self,
+        y: Vec<f64>,
+        settings: Settings,
+        [first_s, every_s, end_s]: [f64; 3],
+    ) -> Result<Vec<Motion>, SimulateError> {
+        let mut motions: Vec<Motion> = Vec::new();
+        let mut workspace = Workspace::new(self);
+        self.run_from(y, end_s, settings, |step| {
+            loop {
+                let t = first_s + motions.len() as f64 * every_s;
+                if t > step.to_s() {
+                    break;
+                }
+                motions.push(step.motion(t, &mut workspace));
+            }
+        })?;
+        Ok(motions)
     }
 }

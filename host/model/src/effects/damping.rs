@@ -1,6 +1,6 @@
 //! The damping differs from the case: C → C·(1 + r).
 
-use super::linear_change::{ABOVE_MINUS_ONE, Matrix, build};
+use super::linear_change::{Matrix, RELATIVE_CHANGE, build};
 use super::{Argument, Class, EffectName, EffectSpec, Locations, Parameter, Prior, Treatment};
 
 /// The specification.
@@ -17,14 +17,7 @@ pub(super) const DAMPING: EffectSpec = EffectSpec {
         )
         .within(Prior::POSITIVE),
         Parameter::number("damping_ratio", "", "damping ratio of a single mode").within(Prior::POSITIVE),
-        Parameter::number(
-            "relative_change",
-            "",
-            "relative change of the matrix, or of its entry",
-        )
-        .within(ABOVE_MINUS_ONE)
-        .linear()
-        .main(),
+        RELATIVE_CHANGE,
     ],
     treatment: Treatment::LinearStructure,
     candidates: &["the whole matrix, or one diagonal entry"],

@@ -8,11 +8,18 @@ use std::sync::Arc;
 
 use nalgebra::DMatrix;
 
-use super::{Effect, EffectError, EffectName, Prior, Values};
+use super::{Effect, EffectError, EffectName, Parameter, Prior, Values};
 use crate::structure::{Direction, Form, Mode, Structure};
 
-/// Bounds of a relative change: a mass, stiffness or damping that vanishes or changes its sign is not possible.
-pub(super) const ABOVE_MINUS_ONE: Prior = Prior::open(-1.0, f64::INFINITY, "a relative change above −1");
+/// The relative change r. A mass, stiffness or damping that vanishes or changes its sign is not possible.
+pub(super) const RELATIVE_CHANGE: Parameter = Parameter::number(
+    "relative_change",
+    "",
+    "relative change of the matrix, or of its entry",
+)
+.within(Prior::open(-1.0, f64::INFINITY, "a relative change above −1"))
+.linear()
+.main();
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Matrix {

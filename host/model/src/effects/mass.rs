@@ -1,6 +1,6 @@
 //! The mass differs from the case: M → M·(1 + r).
 
-use super::linear_change::{ABOVE_MINUS_ONE, Matrix, build};
+use super::linear_change::{Matrix, RELATIVE_CHANGE, build};
 use super::{Class, EffectName, EffectSpec, Locations, Parameter, Prior, Treatment};
 
 /// The specification.
@@ -11,14 +11,7 @@ pub(super) const MASS: EffectSpec = EffectSpec {
     locations: Locations::WholeOrDirection,
     parameters: &[
         Parameter::number("mass_kg", "kg", "diagonal entry of the mass matrix").within(Prior::POSITIVE),
-        Parameter::number(
-            "relative_change",
-            "",
-            "relative change of the matrix, or of its entry",
-        )
-        .within(ABOVE_MINUS_ONE)
-        .linear()
-        .main(),
+        RELATIVE_CHANGE,
     ],
     treatment: Treatment::LinearStructure,
     candidates: &["the whole matrix, or one diagonal entry"],

@@ -61,20 +61,9 @@ fn motions_from(
     every_s: f64,
     end_s: f64,
 ) -> Vec<Motion> {
-    let mut found: Vec<Motion> = Vec::new();
-    let mut workspace = Workspace::new(model);
     model
-        .run_from(states, end_s, settings, |step| {
-            loop {
-                let t = first_s + found.len() as f64 * every_s;
-                if t > step.to_s() {
-                    break;
-                }
-                found.push(step.motion(t, &mut workspace));
-            }
-        })
-        .unwrap();
-    found
+        .motions_from(states, settings, [first_s, every_s, end_s])
+        .unwrap()
 }
 
 fn exact(relative: f64) -> Settings {
