@@ -154,11 +154,11 @@ fn pairs<'a>(path: &Path, columns: &'a [(&'a TextColumn, Meaning)]) -> Result<Ve
         let is_other = |other: &&(&TextColumn, Meaning)| {
             let belongs = other.1.label == meaning.label && other.1.directions == meaning.directions;
             belongs
-                && match (part, other.1.content) {
-                    (Part::Real, Content::Value(Part::Imaginary)) => true,
-                    (Part::Magnitude | Part::Decibel, Content::Value(Part::Phase(_))) => true,
-                    _ => false,
-                }
+                && matches!(
+                    (part, other.1.content),
+                    (Part::Real, Content::Value(Part::Imaginary))
+                        | (Part::Magnitude | Part::Decibel, Content::Value(Part::Phase(_)))
+                )
         };
         let Some((other, of_other)) = columns
             .iter()

@@ -269,7 +269,7 @@ fn names(dialect: Dialect, line: &str, width: usize) -> Option<Vec<&str>> {
     }
     // `Time (s)  Acc X (g)`: columns apart by two blanks or tabs.
     let wide: Vec<&str> = line
-        .split(|letter: char| letter == '\t')
+        .split('\t')
         .flat_map(|part| part.split("  "))
         .map(bare)
         .filter(|part| !part.is_empty())
