@@ -55,3 +55,7 @@ pub(crate) fn plausible_peak(quantity: Quantity) -> Option<(f64, f64)> {
 /// Lowest sample rate, samples per second, at which a time column without unit is taken for seconds without a warning. Milliseconds read as
 /// seconds give a rate that is a thousandth: below 50 for loggers of up to 50 kHz. Tests of machine tools are sampled faster than that. A choice.
 pub(crate) const LOWEST_RATE: f64 = 50.0;
+
+/// Largest height above its foot, as a fraction of the pulse, at which the level may begin before the first tachometer edge. A recording that
+/// begins within a rise does not show where that edge crosses its middle. A choice, halfway from the foot to the middle.
+pub(crate) const LARGEST_START: f64 = 0.25;

@@ -5,6 +5,7 @@ use std::f64::consts::TAU;
 use quietcut_core::tachometer::Wheel;
 
 use super::{Recording, blocks};
+use crate::criteria::LARGEST_START;
 
 /// Edges of the channel `tacho` of a recording, in order, and its wheel.
 ///
@@ -16,9 +17,6 @@ pub struct TachometerEdges {
     /// Positions of the wheel and the missing ones among them.
     pub wheel: Wheel,
 }
-
-/// Fraction of its height that the first pulse may start above its foot: a recording that begins within a rise does not show that edge.
-const LARGEST_START: f64 = 0.25;
 
 impl TachometerEdges {
     /// The edges of a recording; `None` without a channel `tacho`.
