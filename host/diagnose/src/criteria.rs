@@ -290,7 +290,8 @@ pub(crate) const SAME_FEED: f64 = 1e-3;
 /// standard deviation 2D. It exceeds `EQUIVALENT` with a probability of Φ((60 − 16)/(2·√60)) = 99.8 %.
 pub(crate) const SEPARATING_DISTANCE: f64 = 60.0;
 
-/// Displacement of a cut, as a multiple of the largest in the records, above which the cut is not proposed. Unfounded.
+/// Largest displacement of the tool in a simulated cut, as a multiple of the largest displacement in the records, above which the cut is
+/// not proposed. Unfounded.
 pub(crate) const LARGEST_PROPOSED_MOTION: f64 = 10.0;
 
 /// Standard deviation of the noise of a sensor that no record has, as a share of its root mean square. Unfounded.

@@ -17,7 +17,8 @@ pub(crate) const LEAST_IMPACT: f64 = 0.1;
 /// sample: once in 10⁸ recordings of 10⁷ samples.
 pub(crate) const PULSE_ABOVE_NOISE: f64 = 8.0;
 
-/// Force at the two ends of a pulse, as a fraction of the smallest peak of an impact. Unfounded.
+/// Force at the two ends of a pulse, as a fraction of the force above which a pulse counts as an impact, the larger of [`LEAST_IMPACT`] and
+/// [`PULSE_ABOVE_NOISE`]. Unfounded.
 pub(crate) const PULSE_END: f64 = 0.05;
 
 /// Force at the two ends of a pulse, in standard deviations of the force noise, if that is larger than [`PULSE_END`]. Gaussian noise stays

@@ -20,7 +20,8 @@ const OVERSAMPLING: usize = 4;
 /// N = (A − 7.95)/(2.285 Δω) with a stop band of A = 70 dB and a transition band Δω = 2π·0.27/[`OVERSAMPLING`]: N = 64 = 2·32.
 const TAPS_PER_SIDE: usize = 32;
 
-/// A triaxial digital accelerometer at the tool, aligned with the machine axes.
+/// A simulated triaxial digital accelerometer, aligned with the machine axes. It reads the motion of the tool tip, or of another point of
+/// the structure with [`Sampler::at_sensor`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Accelerometer {
     /// Full scale, g, at ±32 768 counts.

@@ -117,9 +117,10 @@ impl Column {
     fn distance_to_unstable_mm(&self, depth_mm: f32) -> f32 {
         let below = self.intervals.iter().rev().find(|i| i.to.0 <= depth_mm);
         let above = self.intervals.iter().find(|i| i.from.0 > depth_mm);
+        // With no unstable interval below, the smallest depth of the table limits the margin, unless it is 0: no cut has a depth
+        // below 0.
         let from_mm = match below {
             Some(interval) => interval.to.0,
-            // There is no depth below 0, so the lower end does not limit the margin.
             None if self.depth_from_mm > 0.0 => self.depth_from_mm,
             None => f32::NEG_INFINITY,
         };

@@ -31,7 +31,8 @@ pub struct ResidualView {
     pub deviation: f64,
     /// Measured samples, in the unit of the channel.
     pub measured: Vec<f64>,
-    /// Residual of the baseline along the measured motion.
+    /// Measured samples minus those that the baseline (the case file with its extensions) predicts along the measured motion, in the unit
+    /// of the channel.
     pub residual: Vec<f64>,
     /// Residual of the extended case; empty without an extension.
     pub left: Vec<f64>,

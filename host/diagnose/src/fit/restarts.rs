@@ -8,7 +8,8 @@ use crate::fit::unknowns::{FitProblem, FreeParameter, ParameterPoint, SearchResu
 
 /// Relative changes of one parameter from the end of a search with friction, at which the search restarts.
 const NEARBY: [f64; 6] = [5e-4, 1e-3, 2e-3, 4e-3, 8e-3, 0.016];
-/// Factors on the start values of a search at which it restarts.
+/// Factors that multiply the start value of each parameter of the cause where the fit of a free decay restarts; two parameters take every
+/// pair of factors.
 const SIZES: [f64; 6] = [0.1, 0.25, 0.5, 1.0, 2.0, 4.0];
 /// Largest number of parameters with which a search restarts from other amplitudes: the number of starts grows exponentially with it.
 const MOST_PARAMETERS: usize = 2;

@@ -26,7 +26,8 @@ pub(super) struct Predicted {
     moved: Vec<(Vec<SimulatedReading>, f64)>,
 }
 
-/// Distance between two candidate models in an experiment.
+/// Distance between the readings that two candidate models predict in an experiment, in standard deviations of the noise, after the
+/// parameters of one model are fitted to the other within their uncertainty.
 #[derive(Clone, Debug)]
 pub(super) struct Difference {
     /// min over δ of ‖y_A − y_B − J_B δ‖² + ‖δ‖², or the same with A and B exchanged if that is smaller. Readings y are in standard

@@ -10,7 +10,7 @@ use crate::table::Frf;
 use crate::test_channels::TestChannels;
 use quietcut_model::structure::Direction;
 
-/// Group of recordings with the same forces and excitation, evaluated together.
+/// Recordings with the same force directions, the same measured responses and the same kind of excitation, evaluated together.
 #[derive(Clone, Debug)]
 pub struct RecordingGroup {
     /// Number of recordings in the group.

@@ -250,7 +250,9 @@ impl Record<'_> {
             right.norm()
         };
         let mut force_error = left.norm() / scale;
-        // A free decay is a transient: a weight as narrow as the resonance would spread it over the ends of the record.
+        // Each frequency is weighted with the receptance of the fitted linear terms, relative to the static compliance; this
+        // needs a stiffness term. A free decay is not weighted: it is a transient, which a filter as narrow as the resonance
+        // would spread over the ends of the record.
         if driven && terms.contains(&ForceTerm::Stiffness) {
             for _ in 0..REWEIGHTINGS {
                 let receptance = receptance(&terms, &theta, mass);

@@ -125,7 +125,7 @@ impl ToothForce {
     }
 }
 
-/// Averages over one tooth-passing period of the sum over all teeth in cut.
+/// Directional coefficients and force per axial depth, summed over the teeth in cut and averaged over one tooth-passing period.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Averaged {
     /// Averaged directional coefficient matrix K_tc α₀, Pa.

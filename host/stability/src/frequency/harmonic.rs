@@ -90,7 +90,8 @@ impl<'a> HarmonicLoop<'a> {
         Some(limits(&thinned, depth_m).unwrap_or_default())
     }
 
-    /// Number of frequencies s + ipΩ in the loop, 2K + 2.
+    /// Number of frequencies s + ipΩ of the vibration, with p from −K−1 to K and the tooth-passing frequency Ω: 2K + 2.
+    /// The number is even, so that at s = iΩ/2 they are symmetric about 0.
     fn count(&self) -> usize {
         2 * self.harmonics + 2
     }

@@ -79,7 +79,8 @@ impl Disagreement {
     }
 }
 
-/// Lines of the method at several speeds inside every gap of a table, in every layer and half way between layers.
+/// Stability computed by the method at several spindle speeds between every two neighbouring speeds of a table, in
+/// every layer and half way between neighbouring layers. The interpolated table is compared with it.
 pub(super) struct Checks<'a> {
     checked_layers: &'a [CheckedLayers],
     speeds: &'a [f64],

@@ -55,7 +55,9 @@ impl OrbitError {
 pub struct Orbit {
     /// Axial depth, m.
     pub depth_m: f64,
-    /// State of the period map: states of the structure, followed by the delayed displacements that act.
+    /// State of the orbit at the start of the period: states of the structure, then, for an orbit of the revolution,
+    /// the displacements along the chip normals with which the preceding revolution left the surface that this one
+    /// cuts.
     pub start: DVector<f64>,
     /// States at the nodes of each subinterval, n × m.
     pub(super) states: Vec<DMatrix<f64>>,

@@ -159,7 +159,8 @@ pub(crate) fn larger_than(
 struct Map<'a> {
     period: &'a Period,
     depth_m: f64,
-    /// LU factors of I − w Q of each element, with the axial depth w and the kernel Q.
+    /// LU factors of I − w Q for each subinterval of the tooth-passing period, with the axial depth w and the
+    /// kernel Q, which is the response of the displacements along the chip normals to the regenerative chips, 1/m.
     implicit: Vec<LU<f64, Dyn, Dyn>>,
 }
 

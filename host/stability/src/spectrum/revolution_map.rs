@@ -16,7 +16,8 @@ use crate::problem::revolution_mesh::{Series, Source};
 pub(crate) struct RevolutionMap<'a> {
     revolution: Rc<Revolution<'a>>,
     depth_m: f64,
-    /// LU factors of I − w Q of each element, with the axial depth w and the kernel Q.
+    /// LU factors of I − w Q for each subinterval of the revolution, with the axial depth w and the kernel Q,
+    /// which is the response of the displacements along the chip normals to the regenerative chips, 1/m.
     factors: Vec<LU<f64, Dyn, Dyn>>,
 }
 
