@@ -3,7 +3,7 @@
 use std::fs;
 use std::io::{self, BufRead, IsTerminal, Write};
 use std::num::NonZeroU8;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
@@ -206,7 +206,7 @@ fn list_materials(output: Output) -> Result<(), Error> {
     output.answer(&MaterialsOutput { materials }, lines.join("\n"))
 }
 
-fn answers_of(path: &PathBuf) -> Result<Given, Error> {
+fn answers_of(path: &Path) -> Result<Given, Error> {
     let text = file::read_text(path)?;
     toml::from_str(&text).map_err(|error| Error::input(format!("{}: {error}", path.display())))
 }
