@@ -2,23 +2,23 @@
 //! filter adds to the record.
 //!
 //! A sample rate f_s folds the content at f_s − f and f_s + f onto the line f. What stands there is not in the record, but its
-//! level at half the sample rate is: both sides of f_s/2 add up there, so that the spectrum A(f_s/2) of the record is up to
-//! twice the true one. A force pulse has bounded variation, and its spectrum falls at least as 1/f (Bracewell, The Fourier
-//! Transform and Its Applications, chapter 8). At f_s ± f, with f far below f_s/2, it is therefore at most A(f_s/2)/4, and the
-//! two sides together fold at most
+//! level at half the sample rate is: both sides of f_s/2 add up there, so that the level A(f_s/2) of the record is up to twice
+//! the true one. The force of an impact begins and ends at zero without a jump, and the spectrum of such a pulse falls as 1/f²
+//! (Bracewell, The Fourier Transform and Its Applications, chapter 8). At f_s ± f, with f far below f_s/2, it is therefore at
+//! most A(f_s/2)/8, and the two sides together fold at most
 //!
-//!   A(f_s/2)/2
+//!   A(f_s/2)/4
 //!
-//! onto the line. The same bound is taken for the response. Relative to the line, the bounds of force and response add up to the
-//! largest relative error of the frequency response function.
+//! onto the line. The same bound holds for the response, even as an acceleration, which follows a force without jumps. Relative
+//! to the line, the bounds of force and response add up to the largest relative error of the frequency response function.
 
 use crate::cross_spectra::{CrossSpectra, Segments, averaged};
 use crate::test_channels::TestChannels;
 
-/// Share of the lines below half the sample rate over which the largest level counts as that at half the sample rate. The
-/// spectrum of a pulse has zeros one per 1/(pulse length); a tenth of the band holds several lines between two zeros of
-/// pulses longer than 20 samples. A choice.
-const TOP: f64 = 0.1;
+/// Share of the band below half the sample rate over which the largest level counts as that at half the sample rate. The
+/// spectrum of a pulse of n samples has zeros at every n-th part of the sample rate: a quarter of the band holds more than one
+/// maximum between zeros for pulses of more than 8 samples.
+const TOP: f64 = 0.25;
 
 /// Largest power of every channel near half the sample rate, at the scale of the spectra; 0 for a channel with an
 /// anti-aliasing filter. Forces come first.
@@ -60,7 +60,7 @@ pub(super) fn relative_error(spectra: &CrossSpectra, tops: &[f64], line: usize, 
     let share = |channel: usize| {
         let power = spectra.at(line, channel, channel).re;
         if tops[channel] > 0.0 {
-            0.5 * (tops[channel] / power.max(f64::MIN_POSITIVE)).sqrt()
+            0.25 * (tops[channel] / power.max(f64::MIN_POSITIVE)).sqrt()
         } else {
             0.0
         }
