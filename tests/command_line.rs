@@ -57,6 +57,8 @@ fn bad_usage_has_status_2() {
     run(&[]).refused(&["Usage: quietcut"]);
     run(&["mill"]).refused(&["mill"]);
     run(&["info"]).refused(&["<PORT>"]);
+    run(&["lobes", "a.toml", "--rpm", "600-2400", "--depth-mm", "1:2:3"])
+        .refused(&["600-2400", "first:last:count"]);
     run(&["lobes", "a.toml", "--rpm", "600:2400", "--depth-mm", "1:2:3"])
         .refused(&["--rpm", "first:last:count"]);
     let working_point = |depth, feed| {

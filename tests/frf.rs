@@ -248,6 +248,33 @@ fn a_step_sine_test_at_several_forces_is_evaluated_at_the_given_force() {
 }
 
 #[test]
+fn a_band_above_half_the_rate_and_an_output_over_an_input_are_refused() {
+    let folder = folder();
+    let here = folder.path();
+    impacts(1.0).write(&here.join("hammer.csv")).expect("written");
+    let before = std::fs::read(here.join("hammer.csv")).expect("the recording");
+    quietcut(here, &["frf", "hammer.csv", "--band-hz", "90000:100000"]).refused(&[
+        "hammer.csv",
+        "90000 Hz",
+        "samples per second",
+    ]);
+    let cut = quietcut(here, &["frf", "hammer.csv", "--band-hz", "12:100000", "--json"]);
+    assert_eq!(cut.status, Some(0), "{cut:?}");
+    assert!(cut.stderr.contains("half the sample rate"), "{cut:?}");
+    for line in [
+        "frf hammer.csv --band-hz 12:24 --out hammer.csv",
+        "identify hammer.csv --method modes --out ./hammer.csv",
+    ] {
+        let arguments: Vec<&str> = line.split(' ').collect();
+        quietcut(here, &arguments).refused(&["--out", "overwrite", "hammer.csv"]);
+    }
+    assert_eq!(
+        std::fs::read(here.join("hammer.csv")).expect("the recording"),
+        before
+    );
+}
+
+#[test]
 fn the_interval_of_an_unfiltered_record_holds_what_a_fast_record_shows() {
     let folder = folder();
     let here = folder.path();

@@ -152,6 +152,9 @@ fn what_is_missing_is_named_with_the_option_that_gives_it() {
     )
     .refused(&["cheese", "aluminium-alloy", "--ktc-mpa"]);
     quietcut(folder, &["next", "mill"]).refused(&["mill", "quietcut setup mill"]);
+    // A number of teeth that no case can have leaves nothing behind.
+    quietcut(folder, &with("2", "100")).refused(&["teeth", "64"]);
+    assert!(!folder.join("mill").exists());
     // A file completes the options, and options win.
     fs::write(
         folder.join("answers.toml"),
@@ -169,6 +172,7 @@ fn what_is_missing_is_named_with_the_option_that_gives_it() {
     ] {
         assert!(case.contains(words), "{words}: {case}");
     }
+    quietcut(folder, &["next", "mill/case.toml"]).refused(&["mill/case.toml", "give the folder"]);
     // What is there is not replaced unasked.
     quietcut(folder, &["setup", "mill", "--answers", "answers.toml"])
         .refused(&["mill/case.toml", "--replace"]);

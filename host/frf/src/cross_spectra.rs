@@ -83,7 +83,8 @@ pub(super) fn averaged(
 ) -> CrossSpectra {
     let length = segments.weights.len();
     let mut transform = Transform::new(length);
-    let lines = lines.start..lines.end.min(length / 2 + 1);
+    let end = lines.end.min(length / 2 + 1);
+    let lines = lines.start.min(end)..end;
     let count = lines.len();
     let channels = signals.len();
     let mut spectra = CrossSpectra {

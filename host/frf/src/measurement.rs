@@ -80,6 +80,9 @@ pub fn measure(recordings: &[Recording], settings: &MeasurementSettings) -> Resu
             None => groups.push((excitation, vec![channels])),
         }
     }
+    for recording in recordings {
+        check_band(recording, settings)?;
+    }
     let exponential_s = settings.hammer.exponential_s;
     if let (Some(_), Some((other, _))) = (
         exponential_s,
@@ -104,10 +107,35 @@ pub fn measure(recordings: &[Recording], settings: &MeasurementSettings) -> Resu
     let path = recordings
         .first()
         .map_or(Path::new(""), |recording| &recording.path);
-    let measurement = merged(path, measured)?;
+    let mut measurement = merged(path, measured)?;
+    let slowest_hz = recordings
+        .iter()
+        .map(|recording| 0.5 * recording.sample_rate_hz)
+        .fold(f64::INFINITY, f64::min);
+    if let Some((_, last_hz)) = settings.band_hz.filter(|(_, last_hz)| *last_hz > slowest_hz) {
+        measurement.warnings.push(format!(
+            "the band ends at {slowest_hz} Hz, half the sample rate, and not at {last_hz} Hz"
+        ));
+    }
     match exponential_s {
         Some(exponential_s) => without_exponential_window(measurement, exponential_s),
         None => Ok(measurement),
+    }
+}
+
+/// Refuses a band that begins above half the sample rate of a recording.
+fn check_band(recording: &Recording, settings: &MeasurementSettings) -> Result<(), FrfError> {
+    let half_hz = 0.5 * recording.sample_rate_hz;
+    match settings.band_hz {
+        Some((first_hz, _)) if first_hz >= half_hz => Err(FrfError::Content {
+            path: recording.path.clone(),
+            what: format!(
+                "the band begins at {first_hz} Hz, but {} samples per second show frequencies up to {half_hz} Hz only; take a lower band, or \
+                 check the unit of the time",
+                recording.sample_rate_hz
+            ),
+        }),
+        _ => Ok(()),
     }
 }
 

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use maud::html;
 use serde::Serialize;
 
+use super::output::keep_inputs;
 use super::segment::{Recorded, RecordedSegment};
 use super::{Error, Output, finite, positive};
 use crate::criteria::{LARGEST_FOLDING, SMALL_FOLDING};
@@ -194,6 +195,10 @@ impl Args {
 
 /// Runs the verb.
 pub fn run(args: Args) -> Result<(), Error> {
+    for target in &args.out {
+        let inputs = args.recordings.iter().chain(&args.housing).chain(&args.tip);
+        keep_inputs(inputs.map(PathBuf::as_path), &target.path)?;
+    }
     let Recorded {
         recordings,
         understood,

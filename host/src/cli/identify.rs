@@ -11,9 +11,10 @@ mod modes;
 mod records;
 mod without_force;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::Error;
+use super::output::keep_inputs;
 use super::segment::Recorded;
 use crate::case::Case;
 use answer::IdentifyOutput;
@@ -22,6 +23,9 @@ use args::Method;
 
 /// Runs the verb.
 pub fn run(args: Args) -> Result<(), Error> {
+    if let Some(out) = &args.out {
+        keep_inputs(args.recordings.iter().map(PathBuf::as_path), out)?;
+    }
     let others = match args.method {
         Method::Joints | Method::InverseStability => args.case.as_deref().or(args.start.as_deref()),
         _ => args.case.as_deref(),

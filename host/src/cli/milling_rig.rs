@@ -141,7 +141,7 @@ fn fastest_hz(cut: &VirtualCut, case: &Case) -> f64 {
 }
 
 /// Copy of the case with the entry and exit angles of the options.
-fn immersed(case: &Case, rig: &MillingRig) -> Result<Case, Error> {
+pub(super) fn immersed(case: &Case, rig: &MillingRig) -> Result<Case, Error> {
     let mut case = case.clone();
     if let Some(cut) = &mut case.cut {
         cut.start_deg = rig.start_deg.unwrap_or(cut.start_deg);

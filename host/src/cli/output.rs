@@ -2,11 +2,30 @@
 
 use std::fmt::Display;
 use std::io::{self, Write};
+use std::path::Path;
 
 use serde::Serialize;
 
 use super::Error;
 use crate::recording::Understood;
+
+/// Refuses an output file that is one of the input files.
+pub(super) fn keep_inputs<'a>(inputs: impl IntoIterator<Item = &'a Path>, out: &Path) -> Result<(), Error> {
+    let Ok(target) = out.canonicalize() else {
+        return Ok(());
+    };
+    let same = inputs
+        .into_iter()
+        .find(|input| input.canonicalize().is_ok_and(|input| input == target));
+    match same {
+        Some(input) => Err(Error::input(format!(
+            "--out {}: this would overwrite the input {}; choose another name",
+            out.display(),
+            input.display()
+        ))),
+        None => Ok(()),
+    }
+}
 
 /// Output format of a verb, text or JSON; part of the arguments of every verb.
 #[derive(Clone, Copy, Debug, Default, clap::Args)]

@@ -86,7 +86,11 @@ impl FromStr for Range {
         let parts: Vec<&str> = text.split(':').collect();
         match parts[..] {
             [one] => {
-                let value = finite(one)?;
+                let value = finite(one).map_err(|_| {
+                    format!(
+                        "`{text}` is neither a number nor of the form first:last:count, such as 600:2400:91"
+                    )
+                })?;
                 Ok(Self {
                     first: value,
                     last: value,

@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use super::{Error, Output, angle, count, finite, positive};
+use crate::case::Case;
 use crate::file;
 use crate::machine::{
     Answers, Immersion, MachineFolder, MaterialAnswer, MaterialRange, NextStep, RANGES, case_text, next_step,
@@ -70,7 +71,7 @@ struct Given {
     /// Tangential cutting coefficient in MPa, instead of --material.
     #[arg(long, value_name = "K", value_parser = positive)]
     ktc_mpa: Option<f64>,
-    /// Radial cutting coefficient in MPa.
+    /// Radial cutting coefficient in MPa. Default: 0.3 of the tangential one, which the case then says.
     #[arg(long, value_name = "K", value_parser = finite, requires = "ktc_mpa", allow_negative_numbers = true)]
     krc_mpa: Option<f64>,
     /// Axial cutting coefficient in MPa. Default: 0.
@@ -141,6 +142,9 @@ pub fn run(args: Args) -> Result<(), Error> {
         .file_name()
         .map_or_else(|| "machine".into(), |name| name.to_string_lossy().into_owned());
     let answers = given.complete(&default_name, ask)?;
+    let text = case_text(&answers);
+    // A value that no case can have is refused before anything is written.
+    Case::parse(&path, &text)?;
     for name in ["taps", "frf", "cuts"] {
         fs::create_dir_all(folder.join(name)).map_err(|error| {
             Error::input(format!(
@@ -149,7 +153,7 @@ pub fn run(args: Args) -> Result<(), Error> {
             ))
         })?;
     }
-    file::write(&path, case_text(&answers).as_bytes())?;
+    file::write(&path, text.as_bytes())?;
     let next = next_step(&MachineFolder::read(&folder)?);
     let text = format!(
         "{}\n\n{TAPS}\nnext: {}\nwhy:  {}",
@@ -379,6 +383,7 @@ impl Given {
         Ok(MaterialAnswer::Given {
             cutting_mpa: [ktc_mpa, krc_mpa, self.kac_mpa.unwrap_or(0.0)],
             ktc_std_mpa: self.ktc_mpa_std,
+            radial_is_assumed: self.krc_mpa.is_none(),
         })
     }
 

@@ -178,6 +178,7 @@ pub fn run(args: Args) -> Result<(), Error> {
         }
         return experiment::run(&case, kind, &args.experiment, &common, args.output);
     }
+    let case = milling_rig::immersed(&case, &args.milling_rig)?;
     let tachometer = tachometer(&args)?;
     let sample_rate_hz = args.sample_rate_hz.unwrap_or(SAMPLE_RATE_HZ);
     let effects = Effects::parse_over(args.effect.iter().map(String::as_str), args.seconds);

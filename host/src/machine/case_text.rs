@@ -56,6 +56,8 @@ pub enum MaterialAnswer {
         cutting_mpa: [f64; 3],
         /// Standard deviation of the tangential coefficient, MPa.
         ktc_std_mpa: Option<f64>,
+        /// The radial coefficient is assumed and not given.
+        radial_is_assumed: bool,
     },
 }
 
@@ -153,7 +155,16 @@ fn write_material(text: &mut String, answers: &Answers) -> std::fmt::Result {
         MaterialAnswer::Given {
             cutting_mpa,
             ktc_std_mpa,
-        } => (cutting_mpa, ktc_std_mpa.map(|std| [std, 0.0])),
+            radial_is_assumed,
+        } => {
+            if radial_is_assumed {
+                writeln!(
+                    text,
+                    "# krc is assumed to be 0.3 ktc. Measure it: quietcut identify --method force-coefficients."
+                )?;
+            }
+            (cutting_mpa, ktc_std_mpa.map(|std| [std, 0.0]))
+        }
     };
     for (key, value) in [("ktc_mpa", ktc), ("krc_mpa", krc), ("kac_mpa", kac)] {
         writeln!(text, "{key} = {}", float(value))?;

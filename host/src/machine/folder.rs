@@ -24,6 +24,12 @@ pub enum FolderError {
         /// The folder.
         path: PathBuf,
     },
+    /// The path is a file.
+    #[error("{}: a file; give the folder of the machine, which contains case.toml", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+    },
     /// The folder cannot be read.
     #[error("{}: the folder cannot be read", path.display())]
     Unreadable {
@@ -77,6 +83,9 @@ impl MachineFolder {
     /// # Errors
     /// The folder cannot be read, or `case.toml` is wrong.
     pub fn read(path: &Path) -> Result<Self, FolderError> {
+        if path.is_file() {
+            return Err(FolderError::File { path: path.into() });
+        }
         if !path.is_dir() {
             return Err(FolderError::Missing { path: path.into() });
         }

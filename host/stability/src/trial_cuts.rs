@@ -1,5 +1,6 @@
 //! Trial cuts with observed outcomes, and how often a method predicts them correctly.
 
+use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::error::StabilityError;
@@ -49,7 +50,7 @@ impl Calls {
     /// Compares the predictions of a method, computed at the speed of each cut, with the observed outcomes.
     ///
     /// # Errors
-    /// As [`Method::lines`].
+    /// As [`Method::line`].
     pub fn new<M: Method + ?Sized>(method: &M, cuts: &[TrialCut]) -> Result<Self, StabilityError> {
         Ok(Self::of(&calls(method, cuts)?))
     }
@@ -96,8 +97,16 @@ pub fn calls<M: Method + ?Sized>(method: &M, cuts: &[TrialCut]) -> Result<Vec<Ca
     let mut speeds_rpm: Vec<f64> = cuts.iter().map(|cut| cut.rpm).collect();
     speeds_rpm.sort_by(f64::total_cmp);
     speeds_rpm.dedup();
-    let deepest_mm = cuts.iter().map(|cut| cut.depth_mm).fold(0.0, f64::max);
-    let lines = method.lines(&speeds_rpm, deepest_mm, SAMPLES)?;
+    // Each speed is searched as deep as its own cuts: a line at a low speed costs the more the deeper it goes.
+    let deepest_mm = |rpm: f64| {
+        let depths = cuts.iter().filter(|cut| cut.rpm == rpm).map(|cut| cut.depth_mm);
+        depths.fold(0.0, f64::max)
+    };
+    let lines: Vec<Result<SpeedLine, StabilityError>> = speeds_rpm
+        .par_iter()
+        .map(|&rpm| method.line(rpm, deepest_mm(rpm), SAMPLES))
+        .collect();
+    let lines = lines.into_iter().collect::<Result<Vec<_>, _>>()?;
     Ok(cuts.iter().map(|cut| call(&lines, cut)).collect())
 }
 

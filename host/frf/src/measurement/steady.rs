@@ -23,11 +23,16 @@ pub(super) fn steady(
     let forces = channels.forces.len();
     let too_short = |needed: usize| FrfError::Content {
         path: channels.recording.path.clone(),
-        what: format!(
-            "{samples} samples ({:.3} s), but a resolution of {} Hz needs {needed}",
-            samples as f64 / rate,
-            settings.resolution_hz.unwrap_or_default()
-        ),
+        what: match settings.resolution_hz {
+            Some(hertz) => format!(
+                "{samples} samples ({:.3} s), but a resolution of {hertz} Hz needs {needed}",
+                samples as f64 / rate
+            ),
+            None => format!(
+                "{samples} samples ({:.3} s) are too few for {SEGMENTS_PER_FORCE} segments per force of 16 samples or more; a longer record is needed",
+                samples as f64 / rate
+            ),
+        },
     };
     if excitation == Excitation::Sweep {
         let length = fast_length(channels.recording.len());
