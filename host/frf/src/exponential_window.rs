@@ -16,17 +16,18 @@ use num_complex::Complex64;
 
 use super::criteria::LARGEST_WINDOW_SHARE;
 use super::tool_tip::{mode_numbers, modes};
-use super::{Frf, FrfError, FrfTable, Measurement};
+use super::{Frf, FrfError, FrfTable};
 
-/// The measurement without the damping of an exponential window of time constant τ (`exponential_s`, s) on all its impacts.
+/// The table without the damping of an exponential window of time constant τ (`exponential_s`, s) on all its impacts; the
+/// standard deviations of its entries follow.
 ///
 /// # Errors
 /// No mode can be fitted, or the decay of a mode is that of the window, so that its own cannot be told.
-pub fn without_exponential_window(
-    mut measurement: Measurement,
+pub(super) fn without_exponential_window(
+    table: &FrfTable,
+    deviation: &mut [Vec<f64>],
     exponential_s: f64,
-) -> Result<Measurement, FrfError> {
-    let table = &measurement.table;
+) -> Result<FrfTable, FrfError> {
     let refused = |what: String| FrfError::Content {
         path: table.path().into(),
         what,
@@ -70,15 +71,10 @@ pub fn without_exponential_window(
             }
         }
     }
-    for ((entry, before), deviation) in entries
-        .iter()
-        .zip(table.entries())
-        .zip(&mut measurement.deviation)
-    {
+    for ((entry, before), deviation) in entries.iter().zip(table.entries()).zip(deviation) {
         for ((h, windowed), deviation) in entry.receptance.iter().zip(&before.receptance).zip(deviation) {
             *deviation *= (h.norm_sqr() / windowed.norm_sqr().max(f64::MIN_POSITIVE)).max(1.0);
         }
     }
-    measurement.table = FrfTable::new(table.path(), table.frequency_hz().to_vec(), entries)?;
-    Ok(measurement)
+    FrfTable::new(table.path(), table.frequency_hz().to_vec(), entries)
 }

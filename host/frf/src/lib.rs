@@ -60,7 +60,6 @@ mod window;
 pub use error::FrfError;
 pub use estimate::Estimator;
 pub use excitation::Excitation;
-pub use exponential_window::without_exponential_window;
 pub use hammer::{HammerWindows, MeasuredImpact, true_damping};
 pub use interpolation::Interpolation;
 pub use measurement::{Measurement, RecordingGroup, measure};

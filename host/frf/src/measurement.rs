@@ -117,10 +117,11 @@ pub fn measure(recordings: &[Recording], settings: &MeasurementSettings) -> Resu
             "the band ends at {slowest_hz} Hz, half the sample rate, and not at {last_hz} Hz"
         ));
     }
-    match exponential_s {
-        Some(exponential_s) => without_exponential_window(measurement, exponential_s),
-        None => Ok(measurement),
+    if let Some(exponential_s) = exponential_s {
+        measurement.table =
+            without_exponential_window(&measurement.table, &mut measurement.deviation, exponential_s)?;
     }
+    Ok(measurement)
 }
 
 /// Refuses a band that begins above half the sample rate of a recording.
