@@ -4,10 +4,10 @@
 //! A sample rate f_s folds the content at f_s − f and f_s + f onto the line f. What stands there is not in the record, but its
 //! level at half the sample rate is: both sides of f_s/2 add up there, so that the level A(f_s/2) of the record is up to twice
 //! the true one. The force of an impact begins and ends at zero without a jump, and the spectrum of such a pulse falls as 1/f²
-//! (Bracewell, The Fourier Transform and Its Applications, chapter 8). At f_s ± f, with f far below f_s/2, it is therefore at
-//! most A(f_s/2)/8, and the two sides together fold at most
+//! (Bracewell, The Fourier Transform and Its Applications, chapter 8). At k f_s ± f, with f far below f_s/2, it is therefore at
+//! most A(f_s/2)/(8 k²), and all k and both sides together fold at most
 //!
-//!   A(f_s/2)/4
+//!   A(f_s/2)/4 · Σ 1/k² = π²/24 · A(f_s/2)
 //!
 //! onto the line. The same bound holds for the response, even as an acceleration, which follows a force without jumps. Relative
 //! to the line, the bounds of force and response add up to the largest relative error of the frequency response function.
@@ -15,10 +15,13 @@
 use crate::cross_spectra::{CrossSpectra, Segments, averaged};
 use crate::test_channels::TestChannels;
 
-/// Share of the band below half the sample rate over which the largest level counts as that at half the sample rate. The
-/// spectrum of a pulse of n samples has zeros at every n-th part of the sample rate: a quarter of the band holds more than one
-/// maximum between zeros for pulses of more than 8 samples.
+/// Share of the band below half the sample rate whose largest level, carried on by 1/f², counts as that at half the sample rate.
+/// The spectrum of a pulse of n samples has zeros at every n-th part of the sample rate: a quarter of the band holds more than
+/// one maximum between zeros for pulses of more than 8 samples.
 const TOP: f64 = 0.25;
+
+/// Content that folds onto a line, relative to the level at half the sample rate: π²/24.
+const FOLDED: f64 = std::f64::consts::PI * std::f64::consts::PI / 24.0;
 
 /// Largest power of every channel near half the sample rate, at the scale of the spectra; 0 for a channel with an
 /// anti-aliasing filter. Forces come first.
@@ -49,7 +52,10 @@ pub(super) fn top_powers(
             if is_filtered(name) {
                 return 0.0;
             }
-            let powers = (0..top.frequency_hz.len()).map(|line| top.at(line, index, index).re);
+            let half_hz = 0.5 * rate;
+            // The level at each line is carried on to half the sample rate by 1/f², in power 1/f⁴.
+            let powers = (0..top.frequency_hz.len())
+                .map(|line| top.at(line, index, index).re * (top.frequency_hz[line] / half_hz).powi(4));
             powers.fold(0.0, f64::max)
         })
         .collect()
@@ -60,7 +66,7 @@ pub(super) fn relative_error(spectra: &CrossSpectra, tops: &[f64], line: usize, 
     let share = |channel: usize| {
         let power = spectra.at(line, channel, channel).re;
         if tops[channel] > 0.0 {
-            0.25 * (tops[channel] / power.max(f64::MIN_POSITIVE)).sqrt()
+            FOLDED * (tops[channel] / power.max(f64::MIN_POSITIVE)).sqrt()
         } else {
             0.0
         }
