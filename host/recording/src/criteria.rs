@@ -56,6 +56,6 @@ pub(crate) fn plausible_peak(quantity: Quantity) -> Option<(f64, f64)> {
 /// seconds give a rate that is a thousandth: below 50 for loggers of up to 50 kHz. Tests of machine tools are sampled faster than that. A choice.
 pub(crate) const LOWEST_RATE: f64 = 50.0;
 
-/// Largest height above its foot, as a fraction of the pulse, at which the level may begin before the first tachometer edge. A recording that
-/// begins within a rise does not show where that edge crosses its middle. A choice, halfway from the foot to the middle.
-pub(crate) const LARGEST_START: f64 = 0.25;
+/// Largest difference of the levels between pulses, as a fraction of the range of the level, at which the base line of the tachometer is
+/// steady. Noise of some percent moves these medians by less; a base line that wanders by a tenth of the range moves them by more. Unfounded.
+pub(crate) const STEADY_MIDDLE: f64 = 0.1;

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use quietcut_core::tachometer::Wheel;
 
 use super::{Recording, blocks};
-use crate::criteria::LARGEST_START;
+use crate::criteria::STEADY_MIDDLE;
 
 /// Edges of the channel `tacho` of a recording, in order, and its wheel.
 ///
@@ -21,25 +21,32 @@ pub struct TachometerEdges {
 impl TachometerEdges {
     /// The edges of a recording; `None` without a channel `tacho`.
     ///
-    /// The device's detector finds each pulse, whose base line may wander. The edge is where the level crosses the middle between the lowest
-    /// level before the pulse and the highest level of the pulse, by linear interpolation.
+    /// The device's detector finds each pulse, whose base line may wander. The edge is where the level crosses the middle between the level
+    /// before the pulse and that of the pulse, each a median, by linear interpolation.
     pub fn new(recording: &Recording) -> Option<Self> {
         let (wheel, level) = (blocks::wheel(recording)?, recording.channel("tacho")?);
         let level = level.samples.as_slice();
         let found: Vec<usize> = blocks::rises(level).map(|rise| rise.sample).collect();
         let valley = |edge: usize| {
             let from = if edge == 0 { 0 } else { found[edge - 1] };
-            lowest(&level[from..=found.get(edge).map_or(level.len() - 1, |sample| *sample)])
+            lower_plateau(&level[from..=found.get(edge).map_or(level.len() - 1, |sample| *sample)])
         };
+        // One middle for all edges where the base line is steady: a middle of each pulse would depend on how few samples show it.
+        let steady = middle_of_range(level);
+        let swing = level.iter().copied().fold(f64::NEG_INFINITY, f64::max)
+            - level.iter().copied().fold(f64::INFINITY, f64::min);
+        let valleys = (1..found.len()).map(valley);
+        let (least, largest) = valleys.fold((f64::INFINITY, f64::NEG_INFINITY), |(least, largest), value| {
+            (least.min(value), largest.max(value))
+        });
+        let wanders = largest - least > STEADY_MIDDLE * swing;
         let mut times_s = Vec::with_capacity(found.len());
         for (edge, sample) in found.iter().enumerate() {
             let end = found.get(edge + 1).map_or(level.len(), |next| *next);
-            let (low, high) = (valley(edge), highest(&level[*sample..end]));
-            let foot = valley(edge + 1);
-            if edge == 0 && low > foot + LARGEST_START * (high - foot) {
-                continue;
-            }
-            if let Some(at) = crossing(level, *sample, 0.5 * (low + high)) {
+            // A record may begin within the first rise: its foot is the valley after the pulse then.
+            let (low, high) = (valley(edge.max(1)), upper_plateau(&level[*sample..end]));
+            let middle = if wanders { 0.5 * (low + high) } else { steady };
+            if let Some(at) = crossing(level, *sample, middle) {
                 times_s.push(at / recording.sample_rate_hz);
             }
         }
@@ -70,12 +77,28 @@ impl TachometerEdges {
     }
 }
 
-fn lowest(level: &[f64]) -> f64 {
-    level.iter().copied().fold(f64::INFINITY, f64::min)
+/// Median of the samples below the middle of their range: the level between two pulses. Extremes of a noisy level would move
+/// the middle from pulse to pulse, and by more samples on the longer side.
+fn lower_plateau(level: &[f64]) -> f64 {
+    let middle = middle_of_range(level);
+    median(level.iter().copied().filter(|value| *value <= middle).collect())
 }
 
-fn highest(level: &[f64]) -> f64 {
-    level.iter().copied().fold(f64::NEG_INFINITY, f64::max)
+/// Median of the samples above the middle of their range: the level of a pulse.
+fn upper_plateau(level: &[f64]) -> f64 {
+    let middle = middle_of_range(level);
+    median(level.iter().copied().filter(|value| *value >= middle).collect())
+}
+
+fn middle_of_range(level: &[f64]) -> f64 {
+    let least = level.iter().copied().fold(f64::INFINITY, f64::min);
+    let largest = level.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    0.5 * (least + largest)
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
 }
 
 /// Sample index, with its fraction, at which the level rises through `middle` near sample `near`.
