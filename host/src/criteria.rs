@@ -5,12 +5,14 @@
 
 // Frequency response functions
 
-/// Largest relative error of a peak by folding with which `frf` still answers: the ten per cent of the highest accuracy class that is
-/// of use for limits, whose depth is inversely proportional to the receptance. Unfounded.
+/// Largest relative error of the peak of a measured FRF from folding (aliasing of content above half the sample rate)
+/// up to which `frf` answers; it refuses the record above. The limiting depth is inversely proportional to the
+/// receptance, so that it then errs by ten per cent, more than is of use. Unfounded.
 pub(crate) const LARGEST_FOLDING: f64 = 0.1;
 
-/// Relative error of a peak by folding above which `frf` warns: sensors of the usual class of 1 % err as much. The interval contains
-/// every error by folding.
+/// Relative error of the peak of a measured FRF from folding (aliasing of content above half the sample rate) above
+/// which `frf` warns. Sensors of the usual class of 1 % err as much. The stated interval of the FRF contains the error
+/// from folding, however small.
 pub(crate) const SMALL_FOLDING: f64 = 0.01;
 
 // Identification
@@ -33,17 +35,20 @@ pub(crate) const SAME_POSTURE_DEG: f64 = 1e-3;
 /// them: the residual is twice the stated error. Unfounded.
 pub(crate) const LARGEST_JOINT_MISFIT: f64 = 4.0;
 
-/// Prediction error of higher-order FRF above which the user is warned of their bias: relative to that of harmonic balance, and in
-/// addition to it. Noise alone makes both errors equal. Unfounded.
+/// Largest prediction error of a nonlinear model that is fitted to higher-order FRFs: (factor, offset). The user is
+/// warned of a bias above factor × the prediction error of the harmonic-balance fit to the same data + offset, as a
+/// share of the measured response. Noise alone makes the two errors equal. Unfounded.
 pub(crate) const BIASED_PREDICTION: (f64, f64) = (2.0, 1e-3);
 
 // Stability
 
-/// Interpolation error between the lines of an FRF table, relative to its peak, above which the user is warned. Unfounded.
+/// Interpolation error between the frequency lines of an FRF table, relative to the highest peak of the table, above
+/// which the user is warned of a coarse frequency resolution. Unfounded.
 pub(crate) const COARSE_TABLE: f64 = 0.01;
 
-/// Relative change of a stability limit below which the limit counts as unchanged. Multipliers are accurate to 1e-7, and ln |μ| changes by
-/// about as much as the relative depth; ten times that is taken.
+/// Relative change of a stability limit by the extension of a case below which the report states the limit as
+/// unchanged. Floquet multipliers μ are accurate to 1e-7, and ln |μ| changes by about as much as ln of the depth, so
+/// that limits are accurate to about 1e-7; the threshold is ten times that.
 pub(crate) const UNCHANGED_LIMIT: f64 = 1e-6;
 
 // Reports
@@ -52,5 +57,6 @@ pub(crate) const UNCHANGED_LIMIT: f64 = 1e-6;
 /// change of the estimated chatter frequency. Unfounded.
 pub(crate) const SAME_SPEED: f64 = 0.01;
 
-/// Ratio of the largest to the smallest amplitude from which stiffness and damping are drawn over the amplitude. Unfounded.
+/// Ratio of the largest to the smallest vibration amplitude in the records from which on the report draws missing
+/// stiffness and damping over the amplitude. Unfounded.
 pub(crate) const AMPLITUDE_RATIO: f64 = 1.2;

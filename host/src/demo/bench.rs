@@ -118,7 +118,8 @@ impl Bench {
         Ok(trial)
     }
 
-    /// Collects the events of the device up to block `last`.
+    /// Collects the events of the device into the trial, up to the report of block `last` and the spectra and map
+    /// points that follow it.
     fn collect(&mut self, trial: &mut Trial, last: u32) -> Result<(), DeviceError> {
         let mut is_over = false;
         let mut start = None;
@@ -129,7 +130,7 @@ impl Bench {
             is_over = matches!(&event, Event::Report(report) if report.sequence == last);
             take(trial, event, &mut start);
         }
-        // Spectra and map points of the last block arrive before the reply to the next request.
+        // Spectra and points of the stroboscopic map of the last block arrive before the reply to the next request.
         self.client.subscribe(Subscription::default())?;
         while let Some(event) = self.client.next_event(Duration::ZERO)? {
             take(trial, event, &mut start);
@@ -138,7 +139,7 @@ impl Bench {
     }
 }
 
-/// Adds one event to the trial; times are counted from the first report of the cut.
+/// Adds one event of the device to the record of a cut; report times are counted from the first report of the cut.
 fn take(trial: &mut Trial, event: Event, start: &mut Option<Nanoseconds>) {
     match event {
         Event::Spectrum(chunk) => trial.take_spectrum(&chunk),

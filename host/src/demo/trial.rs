@@ -8,11 +8,11 @@ use super::trace::Trace;
 /// Power spectrum from the device.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Spectrum {
-    /// Sequence number of the block that completed the spectrum.
+    /// Sequence number of the block of samples that completed this power spectrum.
     pub sequence: u32,
-    /// Width of a frequency bin, Hz.
+    /// Distance between two lines of the power spectrum, Hz.
     pub bin_hz: f64,
-    /// Mean square of the acceleration in each bin, (m/s²)².
+    /// Mean square of the acceleration in each line of the power spectrum, (m/s²)².
     pub power: Vec<f64>,
 }
 
@@ -27,7 +27,7 @@ pub struct Trial {
     pub teeth: u8,
     /// Start and end of full engagement, s since the first sample.
     pub full_cut_s: [f64; 2],
-    /// Low-pass filtered acceleration at the sensor.
+    /// Acceleration at the sensor during the cut, low-pass filtered to the structure band.
     pub trace: Trace,
     /// Reports of the device, one for each block; times are counted from the start of the cut.
     pub reports: Vec<Report>,
@@ -38,14 +38,14 @@ pub struct Trial {
 }
 
 impl Trial {
-    /// First report with chatter; `None` for a quiet cut.
+    /// First report of the device that states chatter in this cut; `None` for a quiet cut.
     pub fn alarm(&self) -> Option<&Report> {
         self.reports
             .iter()
             .find(|report| report.judgement.verdict.is_chatter())
     }
 
-    /// Last report before the tool begins to leave the workpiece.
+    /// Last report of the device before the tool begins to leave the workpiece.
     pub fn last_in_cut(&self) -> Option<&Report> {
         let end = self
             .reports
@@ -87,7 +87,7 @@ impl Trial {
             .collect()
     }
 
-    /// Latest power spectrum of full engagement.
+    /// Latest power spectrum that the device sent during full engagement.
     pub fn spectrum_in_cut(&self) -> Option<&Spectrum> {
         let last = self.last_in_cut()?.sequence;
         self.spectra

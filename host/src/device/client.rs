@@ -25,7 +25,7 @@ const REPLY: Duration = Duration::from_millis(if cfg!(test) { 20 } else { 1200 }
 /// waiting blocks.
 pub(super) const REPLY_AFTER_ERASE: Duration = Duration::from_secs(3);
 
-/// Longest wait for a reply after an unreadable frame: a choice.
+/// Longest wait for the reply to a request after an unreadable frame: a choice.
 const AFTER_NOISE: Duration = Duration::from_millis(if cfg!(test) { 10 } else { 150 });
 
 /// Longest time to send one frame: a choice above the 0.6 s of the largest frame at 9600 bit/s.
@@ -33,7 +33,8 @@ const SEND: Duration = Duration::from_secs(2);
 
 /// Message that the device sends without a request.
 #[derive(Clone, Debug, PartialEq)]
-// Most events are reports, and the queue holds only a few.
+// The largest variant sets the size of an event. Most events are reports, and the queue of received events holds only a
+// few, so that little memory is wasted.
 #[allow(clippy::large_enum_variant)]
 pub enum Event {
     /// Report of the signal chain after a block.
@@ -73,7 +74,7 @@ impl Client {
         // A zero byte ends a frame that noise may have started.
         client.port.send(&[0], SEND)?;
         let info = client.hello()?;
-        // Earlier events belong to another session.
+        // Events received before the reply to hello belong to an earlier connection and are dropped.
         client.events.clear();
         client.lost_frames = 0;
         Ok((client, info))
@@ -89,7 +90,7 @@ impl Client {
         self.lost_frames
     }
 
-    /// Repeats the hello, as after a restart of the device.
+    /// Sends the request hello again, as needed after a restart of the device.
     pub(super) fn hello(&mut self) -> Result<Info, DeviceError> {
         match self.exchange(&Request::Hello, "hello", REPLY)? {
             Reply::Info(info) if info.protocol == VERSION => Ok(info),
@@ -157,17 +158,18 @@ impl Client {
         self.command(&Request::Subscribe(subscription), "subscription")
     }
 
-    /// Resets the signal chain to its initial state and returns it to the sensor.
+    /// Resets the signal chain of the device to its initial state. The device then processes samples of its sensor
+    /// again in place of fed ones.
     pub fn reset(&mut self) -> Result<(), DeviceError> {
         self.command(&Request::Reset, "reset")
     }
 
-    /// Sends a request whose reply is `Done`.
+    /// Sends a request to which the device replies `Done`, and waits for this reply.
     pub(super) fn command(&mut self, request: &Request, name: &'static str) -> Result<(), DeviceError> {
         self.command_within(request, name, REPLY)
     }
 
-    /// Sends a request whose reply is `Done` within `timeout`.
+    /// Sends a request to which the device replies `Done`, and waits at most `timeout` for each reply.
     pub(super) fn command_within(
         &mut self,
         request: &Request,
@@ -255,7 +257,8 @@ impl Client {
                 Some(ReplyFrame::Unreadable(error)) => {
                     tracing::debug!("{}: request {number}: {error}", self.port.name());
                     *fault = Some(error);
-                    // The unreadable frame may have been a report with the reply behind it.
+                    // An unreadable frame may have been a report that arrived just before the awaited reply: the wait
+                    // goes on for a short time.
                     deadline = deadline.min(Instant::now() + AFTER_NOISE);
                 }
                 Some(ReplyFrame::Again(error)) => {
@@ -317,7 +320,7 @@ impl Client {
             Response::Reply { reply, .. } => {
                 return Some(match order {
                     Ok(()) => ReplyFrame::Reply(reply),
-                    // The device repeats its reply to a repeated request; the second transmission decides.
+                    // Frames before this reply were lost: the request is sent again, and the device repeats its reply.
                     Err(error) => ReplyFrame::Again(error),
                 });
             }

@@ -109,7 +109,7 @@ pub enum DeviceError {
         /// Reason of the refusal.
         refusal: Refusal,
     },
-    /// The reply does not belong to the request.
+    /// The reply of the device does not belong to the request of the host.
     #[error("{port}: the device answers `{reply}` to {request}: it does not keep to the protocol")]
     Unexpected {
         /// Name of the port.
@@ -125,7 +125,7 @@ pub enum DeviceError {
         /// Reason.
         error: TableError,
     },
-    /// The request is larger than a frame.
+    /// The request of the host is larger than a frame of the protocol.
     #[error("the {request} does not fit a frame: a fault in quietcut itself")]
     TooLarge {
         /// Name of the request.

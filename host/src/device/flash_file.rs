@@ -20,7 +20,7 @@ const ERASED: u8 = 0xff;
 /// Failure of the state file of the simulated device.
 #[derive(Debug, thiserror::Error)]
 pub enum FlashFileError {
-    /// The file cannot be opened, read or created.
+    /// The state file of the simulated device cannot be opened, read or created.
     #[error("{}: cannot use it as the memory of the simulated device: {cause}", path.display())]
     Access {
         /// Path of the file.
@@ -28,7 +28,7 @@ pub enum FlashFileError {
         /// Error of the operating system.
         cause: std::io::Error,
     },
-    /// The file has another length than the flash memory.
+    /// The state file of the simulated device has another length than its flash memory.
     #[error("{}: {found} bytes; a memory of the simulated device has {FLASH_BYTES}; name a new file to begin with an empty one", path.display())]
     Length {
         /// Path of the file.
@@ -91,7 +91,7 @@ impl FlashFile {
         })
     }
 
-    /// Writes the bytes between two offsets to the file.
+    /// Writes the bytes of the flash memory between two offsets to the state file of the simulated device.
     fn store(&mut self, from: u32, to: u32) -> Result<(), NorFlashErrorKind> {
         let Some(file) = &mut self.file else { return Ok(()) };
         let changed = self.flash.mapped().get(from as usize..to as usize);

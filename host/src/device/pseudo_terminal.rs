@@ -11,7 +11,8 @@ use super::DeviceError;
 pub struct PseudoTerminal {
     path: String,
     device_end: TTYPort,
-    /// Host end, kept open without a lock, so that a host can open, close and reopen it.
+    /// Host end of the pseudo-terminal. It is kept open without a lock, so that a host can open, close and reopen the
+    /// port.
     _host_end: TTYPort,
 }
 

@@ -34,7 +34,7 @@ pub enum Pace {
 /// Settings of the simulated device.
 #[derive(Clone, Copy, Debug)]
 pub struct Setup<'a> {
-    /// File that keeps the flash memory; `None` keeps it only in memory.
+    /// State file that keeps the flash memory of the simulated device; `None` keeps the flash only in memory.
     pub state: Option<&'a Path>,
     /// Number of teeth of the tool.
     pub teeth: u8,
@@ -204,7 +204,8 @@ impl Machine {
         }
     }
 
-    /// Whether the next block exists and its time has come.
+    /// True if the virtual spindle has a further block of samples that is due: in real time once the time of its
+    /// samples has passed, else at once.
     fn step_due(&mut self, clock: &SharedClock, began: Instant) -> bool {
         let now = clock.now();
         let Some((block, _)) = self.spindle.peek(now) else {

@@ -16,7 +16,7 @@ const RESTARTS: u32 = 3;
 pub struct Uploaded {
     /// Identity and memory of the device after the upload.
     pub info: Info,
-    /// First byte that was sent; greater than 0 if an interrupted upload was resumed.
+    /// Offset of the first byte of the lobe table that was sent; greater than 0 if an interrupted upload was resumed.
     pub resumed_at: u32,
 }
 
@@ -70,7 +70,8 @@ impl Client {
             Reply::Upload(Upload { received, .. }) => received,
             other => return Err(self.unexpected(BEGIN, &other)),
         };
-        // The request that starts the upload already contains the header.
+        // The request that starts the upload already contains the header of the table: reception of the header alone is
+        // no resumed upload.
         resumed_at.get_or_insert(if received > HEADER_LENGTH as u32 {
             received
         } else {
@@ -95,7 +96,8 @@ impl Client {
         match self.exchange(&Request::UploadChunk { offset, data }, CHUNK, REPLY_AFTER_ERASE) {
             Ok(Reply::Upload(Upload { received, .. })) if received > offset => Ok(received),
             Ok(other) => Err(self.unexpected(CHUNK, &other)),
-            // The offset of the device is valid: a reply was lost, or the device was restarted.
+            // The device refuses the chunk and states the offset that it expects: a reply was lost, or the device was
+            // restarted. The upload goes on from there.
             Err(DeviceError::Refused {
                 refusal: Refusal::ChunkOffset { expected, .. },
                 ..

@@ -9,7 +9,7 @@ use quietcut_core::units::Nanoseconds;
 
 use crate::simulate::SensedCut;
 
-/// Block of samples with the tachometer edges before the next block.
+/// Block of acceleration samples with the tachometer edges that precede the next block.
 pub(super) type Step = (Block, Vec<Edge>);
 
 /// Joins cuts, each of which starts at its own time 0 and block 0, to one sequence of blocks.
@@ -34,7 +34,7 @@ impl VirtualSpindle {
     pub(super) fn peek(&mut self, now: Nanoseconds) -> Option<&Step> {
         if self.steps.is_empty() {
             let sensed = self.cuts.try_recv().ok()?;
-            // A pause of the spindle is no gap in the samples: the sensor was off.
+            // The sensor was off while the spindle stood still, so that a pause does not count as lost samples.
             self.next_time = self.next_time.max(now.0);
             self.append(sensed);
         }

@@ -14,7 +14,7 @@ pub struct Immersion {
 }
 
 impl Immersion {
-    /// Both teeth flanks in full: a slot.
+    /// Immersion of a slot, where the radial depth equals the diameter: from 0 to 180°.
     pub const SLOT: Self = Self {
         start_deg: 0.0,
         exit_deg: 180.0,
@@ -45,12 +45,13 @@ fn engaged_deg(radial_depth_mm: f64, diameter_mm: f64) -> f64 {
         .to_degrees()
 }
 
-/// The material, by one of two ways.
+/// Cutting coefficients of the workpiece material: a range from the literature, or values of the user.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum MaterialAnswer {
-    /// A class of materials: the coefficients lie anywhere in a range.
+    /// Class of materials, whose coefficients are only known to lie in a range.
     Range(&'static MaterialRange),
-    /// Coefficients that the user gives: tangential, radial, axial, MPa, and the standard deviation of the first if known.
+    /// Specific cutting coefficients that the user gives: tangential, radial and axial, MPa, with the standard
+    /// deviation of the tangential one if it is known.
     Given {
         /// Cutting coefficients, MPa.
         cutting_mpa: [f64; 3],
@@ -86,7 +87,8 @@ pub struct Answers {
     pub power_w: Option<f64>,
 }
 
-/// The case file, with a comment for each section. The structure is left to the taps.
+/// Text of a case file from the answers of the user, with a comment for each section. It has no structure: `identify`
+/// adds that from tap tests.
 pub fn case_text(answers: &Answers) -> String {
     let mut text = String::new();
     // Writing to a String cannot fail.
@@ -148,7 +150,7 @@ fn write_material(text: &mut String, answers: &Answers) -> std::fmt::Result {
                 "# (a + b)/2 and the standard deviation (b - a)/sqrt(12). Limits get a band from it. Measure your own:"
             )?;
             writeln!(text, "# quietcut identify --method force-coefficients.")?;
-            // Independent ktc and krc/ktc: the variance of the product to first order.
+            // Standard deviation of the product krc = ktc · (krc/ktc) of two independent factors, to first order.
             let krc_std = ((ratio * ktc_std).powi(2) + (ktc * ratio_std).powi(2)).sqrt();
             ([ktc, ratio * ktc, 0.0], Some([ktc_std, krc_std]))
         }

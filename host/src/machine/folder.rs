@@ -7,15 +7,15 @@ use std::time::SystemTime;
 
 use crate::case::{Case, CaseError};
 
-/// Endings of the files that hold recordings.
+/// File name extensions of recordings.
 const RECORDINGS: [&str; 10] = [
     "csv", "mat", "uff", "unv", "wav", "txt", "dat", "lvm", "tdms", "uf",
 ];
 
-/// Endings of the tables of receptances that `identify` reads.
+/// File name extensions of the tables of receptances that `identify` reads.
 const RECEPTANCES: [&str; 4] = ["csv", "uff", "unv", "uf"];
 
-/// The folder of a machine cannot be used.
+/// Reason why the folder of a machine cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum FolderError {
     /// There is no such folder.
@@ -52,7 +52,7 @@ pub struct DatedFile {
     pub changed: SystemTime,
 }
 
-/// What the folder of one machine holds.
+/// Files in the folder of one machine.
 #[derive(Clone, Debug)]
 pub struct MachineFolder {
     /// The folder as the user gave it.
@@ -69,7 +69,7 @@ pub struct MachineFolder {
     pub tried: Option<DatedFile>,
     /// `lobes.html`, the chart.
     pub chart: Option<DatedFile>,
-    /// `table.qct`, the lobe table of the device.
+    /// `table.qct`, the lobe table that is uploaded to the device.
     pub table: Option<DatedFile>,
     /// `diagnosis/extended.toml`, the case with the cause that `diagnose` found.
     pub extended: Option<DatedFile>,
@@ -78,7 +78,7 @@ pub struct MachineFolder {
 }
 
 impl MachineFolder {
-    /// Reads what the folder holds.
+    /// Lists the files in the folder of a machine and reads its case.
     ///
     /// # Errors
     /// The folder cannot be read, or `case.toml` is wrong.
@@ -117,7 +117,7 @@ impl MachineFolder {
     }
 }
 
-/// Files of a folder with one of the endings, by name; none if there is no such folder.
+/// Files of a folder whose names have one of the extensions, sorted by name; none if there is no such folder.
 fn files_in(folder: &Path, endings: &[&str]) -> io::Result<Vec<DatedFile>> {
     let entries = match fs::read_dir(folder) {
         Ok(entries) => entries,
@@ -135,7 +135,7 @@ fn files_in(folder: &Path, endings: &[&str]) -> io::Result<Vec<DatedFile>> {
     Ok(files)
 }
 
-/// The file with its age; `None` if it is no file.
+/// The file at a path, with the time of its last change; `None` if it is no regular file.
 fn dated(path: PathBuf) -> Option<DatedFile> {
     let about = fs::metadata(&path).ok()?;
     let changed = about.is_file().then(|| about.modified().ok()).flatten()?;

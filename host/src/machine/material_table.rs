@@ -13,15 +13,15 @@ pub struct MaterialRange {
     pub name: &'static str,
     /// The class.
     pub what: &'static str,
-    /// Least and largest tangential coefficient, MPa.
+    /// Least and largest tangential specific cutting coefficient of the class, MPa.
     pub ktc_mpa: [f64; 2],
-    /// Least and largest ratio of the radial to the tangential coefficient.
+    /// Least and largest ratio krc/ktc of the radial to the tangential specific cutting coefficient.
     pub radial_ratio: [f64; 2],
-    /// Author, year, and place in the source.
+    /// Source of the range: author, year and table.
     pub source: &'static str,
 }
 
-/// Classes of materials without coefficients of their own.
+/// Classes of materials for which the literature gives a range of cutting coefficients, but no single values.
 pub const RANGES: &[MaterialRange] = &[MaterialRange {
     name: "aluminium-alloy",
     what: "aluminium alloys 6061, 6082 and 7075, milled dry with cemented carbide",
@@ -31,7 +31,7 @@ pub const RANGES: &[MaterialRange] = &[MaterialRange {
 }];
 
 impl MaterialRange {
-    /// The range of a name; `None` if there is no such range.
+    /// Range of cutting coefficients of the material class with this name; `None` if there is no such class.
     pub fn of(name: &str) -> Option<&'static Self> {
         RANGES.iter().find(|range| range.name == name)
     }

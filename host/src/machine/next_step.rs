@@ -7,21 +7,22 @@ use serde::Serialize;
 
 use super::folder::{DatedFile, MachineFolder};
 
-/// The next step for a machine.
+/// Next useful command for a machine, with its reason.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct NextStep {
-    /// What is there, one statement each.
+    /// State of the machine's folder, one statement for each kind of file.
     pub state: Vec<String>,
     /// The command to run next.
     pub command: String,
-    /// What the command does, and why it is the next.
+    /// Effect of the proposed command, and the reason why it is the next.
     pub why: String,
 }
 
-/// Number of speeds of the proposed chart. Lines between them are added where limits bend.
+/// Number of spindle speeds of the proposed stability chart. The chart adds speeds between them where limits bend.
 const CHART_SPEEDS: usize = 60;
 
-/// Deepest cut of the proposed chart in mm where the case gives no diameter; else one diameter, the usual limit of a slot.
+/// Largest axial depth of the proposed stability chart, mm, where the case gives no tool diameter. With a diameter the
+/// chart is one diameter deep, the usual limit of a slot.
 const DEEPEST_MM: f64 = 10.0;
 
 /// Finds the next step.
@@ -163,7 +164,7 @@ fn is_newer(file: &Option<DatedFile>, than: SystemTime) -> bool {
     file.as_ref().is_some_and(|file| file.changed >= than)
 }
 
-/// Ranges of speed and depth of the chart: the speeds of the spindle, and one diameter deep.
+/// Options of the proposed chart: the speed range of the spindle, and depths up to one tool diameter.
 fn ranges(folder: &MachineFolder) -> String {
     let case = folder.case.as_ref().map(|(_, case)| case);
     let speeds = case.and_then(|case| {

@@ -92,15 +92,16 @@ pub(crate) const MARGINS: [f64; 5] = [2.8, 0.3, 0.05, 0.01, 2e-3];
 /// found inside, so that the verdict is open. Unfounded.
 pub(crate) const FINE_MARGINS: [f64; 2] = [4e-4, 1e-4];
 
-/// Largest distances of the means over three successive numbers of points from one integer, latest first, at which a
-/// winding number counts as converged. Each doubling of the points squares the error once they resolve the nearest
-/// zero, which takes 0.4 to 0.16 and to 0.03.
+/// Convergence of a winding number, which is the mean of an argument over points on a circle. It counts as converged if
+/// the means with the latest, the previous and the one before that number of points differ from one integer by less
+/// than these three values. Each doubling of the points squares the error once they resolve the nearest zero: 0.4
+/// becomes 0.16, and that 0.03.
 pub(crate) const WINDING_ERRORS: [f64; 3] = [0.02, 0.1, 0.4];
 
 // Limits along the depth.
 
-/// Least number of steps in depth of a chart. With 40 steps the lines of random machines agree with single depths
-/// (`tests/multipliers.rs`, eight depths of each line).
+/// Least number of steps in depth at which a line of a chart is sampled. With 40 steps the limits of random machines
+/// agree with verdicts at single depths (`tests/multipliers.rs`, eight depths of each line).
 pub(crate) const CHART_SAMPLES_MIN: usize = 40;
 
 /// Number of halvings of a depth interval in which multipliers cannot be followed. With 40 steps the last interval is
@@ -112,27 +113,31 @@ pub(crate) const LINE_LEVELS: u32 = 12;
 /// unfounded.
 pub(crate) const LINE_FOLLOWED: f64 = 0.3;
 
-/// Distance of |μ| from 1 beyond which a multiplier only counts as inside or outside and is not followed along the
-/// depth. Unfounded; lines of random machines agree with single depths with it (`tests/multipliers.rs`).
+/// Distance of |μ| from 1 beyond which a multiplier only counts as inside or outside the unit circle and is not
+/// followed along the depth. Unfounded; with it the limits of random machines agree with verdicts at single depths
+/// (`tests/multipliers.rs`).
 pub(crate) const LINE_FAR: f64 = 0.5;
 
 /// Distance of |μ| from 1 within which Newton's method corrects a multiplier of the scan before it counts as inside or
 /// outside the unit circle. It is 1e5 times the error of the scan, 1e-8 per element.
 pub(crate) const LINE_POLISHED: f64 = 1e-3;
 
-/// Distance by which the tangents of a multiplier from two sampled depths may miss each other half way, as a share of
-/// the distance that it travels between them; a larger one is another multiplier. Unfounded.
+/// Largest distance, half way between two sampled depths, between the tangents to a multiplier's path from both depths,
+/// as a share of the distance that the multiplier travels between them. A pair with a larger distance is taken as two
+/// different multipliers. Unfounded.
 pub(crate) const TANGENT_MISS: f64 = 0.25;
 
-/// Factor on the move of a multiplier along its tangent, over a step in depth, within which it may reach the unit
-/// circle and is followed. Unfounded.
+/// Safety factor on |dμ/dw| × (step in depth), the linear estimate of a multiplier's move. A multiplier is followed if
+/// its distance from the unit circle is at most this factor times that move, plus [`REACH_LEAST`]. Unfounded.
 pub(crate) const REACH_FACTOR: f64 = 3.0;
 
-/// Distance of |μ| from 1 within which a multiplier is followed, however small its derivative. Unfounded.
+/// Distance of |μ| from 1 within which a multiplier is followed along the depth, however small its derivative dμ/dw.
+/// Unfounded.
 pub(crate) const REACH_LEAST: f64 = 0.02;
 
-/// Least distance of |μ| from 1 within a depth interval, by the cubic between its ends, as a share of the smaller
-/// distance at the ends; below it the multiplier may touch the circle and the interval is halved. Unfounded.
+/// Least distance from the unit circle that the cubic interpolant of |μ| between two sampled depths may reach, as a
+/// share of the smaller distance at the two depths. If it comes closer, the multiplier may touch the circle, and the
+/// depth interval is halved. Unfounded.
 pub(crate) const TOUCHING: f64 = 0.3;
 
 // Charts between the requested speeds.
@@ -184,19 +189,20 @@ pub(crate) const CELL_FOLLOWED: f64 = 0.4;
 
 // Spread of limits.
 
-/// Number of drawn machines in a batch: a power of 2, as stratification requires. The choice of 64 is unfounded.
+/// Number of randomly drawn machines in a batch: a power of 2, as stratification requires. The choice of 64 is
+/// unfounded.
 pub(crate) const BATCH: u32 = 64;
 
-/// Least and largest number of batches. Four give an estimate of their scatter; 128 are 8 192 machines, a limit on
-/// computing time.
+/// Least and largest number of batches of randomly drawn machines. Four batches give an estimate of their scatter; 128
+/// are 8 192 machines, a limit on computing time.
 pub(crate) const BATCHES: std::ops::RangeInclusive<u32> = 4..=128;
 
 /// Number of pilot batches, after which the directions of stratification are computed anew from the machines drawn: the
 /// least of [`BATCHES`].
 pub(crate) const PILOT: u32 = 4;
 
-/// Half the width of the 90 % confidence interval of a percentile, relative to the percentile, at which no further
-/// batch is drawn. Unfounded: percentiles accurate to 1 % are the aim.
+/// Half the width of the 90 % confidence interval of a percentile of the limiting depth, relative to the percentile, at
+/// which no further batch of machines is drawn. Unfounded: percentiles accurate to 1 % are the aim.
 pub(crate) const PERCENTILE_SETTLED: f64 = 7e-3;
 
 /// Largest share of drawn machines that are not physical (negative damping, indefinite matrices); beyond it the
@@ -217,8 +223,9 @@ pub(crate) const PEAK_SHARE: f64 = 0.01;
 /// case. Unfounded.
 pub(crate) const UNDAMPED: f64 = 1e-9;
 
-/// Relative difference in depth up to which limits of two computations are one limit, from whose change the error is
-/// stated. The computations differ in the lines of the receptance table or in the number of harmonics. Unfounded.
+/// Relative difference in depth up to which limits of two computations count as the same limit. The computations differ
+/// in the lines of the receptance table or in the number of harmonics, and the stated error of the limit follows from
+/// the difference. Unfounded.
 pub(crate) const SAME_LIMIT: f64 = 0.1;
 
 /// Largest relative change of a limit by doubling the harmonics at which no more are added. Doubling divides the
@@ -234,20 +241,21 @@ pub(crate) const HARMONICS_SETTLED_MULTIPLIER: f64 = 1e-6;
 /// number. Unfounded.
 pub(crate) const SAME_WITH_TWICE_HARMONICS: f64 = 0.1;
 
-/// Distance from an end of the frequency range with real loci at which their imaginary parts give the direction of
-/// crossings, as a share of the end frequency, or at ω = 0 of the first grid frequency. It lies far above rounding and
-/// far below the width of a resonance; the value is unfounded.
+/// Distance from an end of the frequency range, relative to the frequency of that end, at which the imaginary parts of
+/// characteristic loci are evaluated. At the end itself the loci are real; next to it their imaginary parts tell the
+/// direction in which a root crosses. At the end ω = 0 the first grid frequency is the base. The value lies far above
+/// rounding and far below the width of a resonance; it is unfounded.
 pub(crate) const REAL_END_OFFSET: f64 = 1e-5;
 
-/// Largest number of halvings of a frequency interval in which characteristic loci cannot be told apart. Unfounded.
+/// Largest number of halvings of a frequency interval in which two characteristic loci cannot be told apart. Unfounded.
 pub(crate) const LOCUS_LEVELS: u32 = 16;
 
 /// Largest deviation of a characteristic locus, at the middle of a frequency interval, from the straight line between
 /// its values at both ends, as a share of the larger of the two; beyond it the interval is halved. Unfounded.
 pub(crate) const LOCUS_BEND: f64 = 0.1;
 
-/// Largest move of a characteristic locus over a frequency interval, as a factor on its largest allowed deviation from
-/// a straight line. Unfounded.
+/// Largest distance between the values of a characteristic locus at both ends of a frequency interval, as a multiple of
+/// the deviation from a straight line that [`LOCUS_BEND`] allows. Unfounded.
 pub(crate) const LOCUS_MOVE: f64 = 6.0;
 
 /// Largest change of the argument of a determinant over half a frequency interval, as a share of π; a larger one halves
@@ -279,12 +287,14 @@ pub(crate) const ZOA_BEND: f64 = 0.1;
 /// value is unfounded.
 pub(crate) const VELOCITY_JUMP: f64 = 1e-6;
 
-/// Longest step along a branch of forced orbits, in units of the last depth and of the norm of the orbit at that depth.
-/// Unfounded: a branch up and down takes about a hundred steps.
+/// Longest step along a branch of forced orbits: the norm of the relative changes of depth and orbit, with the largest
+/// depth of the branch and the norm of the orbit at that depth as bases. Unfounded: a branch up and down takes about a
+/// hundred steps.
 pub(crate) const BRANCH_STEP_MAX: f64 = 1.0 / 30.0;
 
-/// Shortest step along a branch of forced orbits, in the units of [`BRANCH_STEP_MAX`]. Multipliers that meet within it
-/// are paired with the nearest ones, at any distance. Unfounded.
+/// Shortest step along a branch of forced orbits, in the units of [`BRANCH_STEP_MAX`]. In steps up to twice this length
+/// each multiplier is paired with the nearest one of the next orbit, at any distance, since two real multipliers that
+/// meet move infinitely fast. Unfounded.
 pub(crate) const BRANCH_STEP_MIN: f64 = 1e-5;
 
 /// Factor in the stated error on the change of an orbit's multiplier and depth from the working to the finer mesh. Nine
@@ -320,12 +330,12 @@ pub(crate) const DISTURBANCE_PERIODS: usize = 40;
 
 // Lobe tables.
 
-/// Number of layers (feeds times feed directions) of one case beyond which refinement adds none, unless neighbouring
-/// directions are too far apart for interpolation. It limits the size of a table. Unfounded.
+/// Largest number of layers (feeds times feed directions) that refinement gives a lobe table for one case. Directions
+/// too far apart for interpolation are divided beyond it. It limits the size of a table. Unfounded.
 pub(crate) const LAYERS_MAX: usize = 12;
 
-/// Number of speeds at which limits half way between two feeds, or two feed directions, are compared with the mean of
-/// both. Unfounded.
+/// Number of spindle speeds at which limits half way between two feeds, or two feed directions, are compared with the
+/// mean of the limits at both, to decide on a further layer of a lobe table. Unfounded.
 pub(crate) const LAYER_PROBES: usize = 16;
 
 /// Difference between a limit and the straight line between the neighbouring entries of a lobe table, as a share of the
@@ -337,17 +347,17 @@ pub(crate) const TABLE_TOLERANCE: f64 = 0.003;
 /// of that value.
 pub(crate) const LEAST_CHECKS: f64 = 2.0;
 
-/// Largest distance between checked speeds in a gap between two entries, relative to the speed. Unfounded; tables with
-/// four speeds over a factor of three are held by `lobe_table/accuracy_tests.rs`.
+/// Largest distance between the spindle speeds at which a lobe table is checked between two of its speeds, relative to
+/// the speed. Unfounded; `lobe_table/accuracy_tests.rs` holds it for tables with four speeds over a factor of three.
 pub(crate) const CHECK_STEP: f64 = 0.01;
 
-/// Disagreement between table and method in a gap, as a share of the tolerance, beyond which the gap is checked at more
-/// speeds. A smooth limit that passed refinement errs by a quarter of the tolerance at most, since its gap was halved
-/// after the check; twice as much means a corner.
+/// Disagreement between lobe table and method between two speeds of the table, as a share of the table's tolerance,
+/// beyond which further speeds are checked there. A smooth limit that passed refinement errs by a quarter of the
+/// tolerance at most, since the gap was halved after the check; twice as much means a corner.
 pub(crate) const SUSPECT: f64 = 0.5;
 
-/// Factor by which the largest disagreement in a gap must grow with a doubling of its checked speeds for another
-/// doubling. [`TABLE_ROOM`] contains the same factor.
+/// Factor by which the largest disagreement between lobe table and method in a gap must grow with a doubling of its
+/// checked speeds for another doubling. [`TABLE_ROOM`] contains the same factor.
 pub(crate) const CHECK_GROWTH: f64 = 1.2;
 
 /// Factor of the stated depth error on the largest disagreement at the checked speeds. Two checks of a smooth limit see

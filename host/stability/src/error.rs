@@ -35,7 +35,7 @@ pub enum StabilityError {
     NotCovered {
         /// The case file.
         path: PathBuf,
-        /// The feature, and what to do instead.
+        /// Feature of the case that the method does not cover, and what to do instead.
         what: &'static str,
     },
     /// A mode has no damping, so that its receptance is infinite.
@@ -158,7 +158,8 @@ pub(crate) enum Breakdown {
 
 impl From<EigenvalueError> for Breakdown {
     fn from(cause: EigenvalueError) -> Self {
-        // A matrix that is not finite has no better reason than the equations behind it.
+        // A matrix that is not finite comes from equations over a period without a finite solution: that reason is
+        // stated.
         match cause {
             EigenvalueError::NotFinite { .. } => Self::NoSolution,
             _ => Self::Eigenvalues(cause),

@@ -20,14 +20,15 @@ pub(crate) struct AveragedLoop<'a> {
     delay_s: Option<f64>,
     /// Averaged directional coefficients K_tc α₀, Pa.
     directional: Matrix3<f64>,
-    /// Axial (z) column of β₀, N/m; zero without axial-depth modulation.
+    /// Axial (z) column of β₀, the averaged coefficients of edge and feed forces, N/m; zero without axial-depth
+    /// modulation.
     forced: Vector3<f64>,
     /// Indices of the directions (0 feed, 1 normal, 2 axial) in which the tool moves and changes the chip thickness.
     axes: Vec<usize>,
 }
 
 impl<'a> AveragedLoop<'a> {
-    /// Loop at a spindle speed in rev/min; without regeneration if the speed is `None`.
+    /// Open loop with averaged coefficients at a spindle speed in rev/min; without regeneration if the speed is `None`.
     pub(crate) fn new(problem: &'a FrequencyProblem, rpm: Option<f64>) -> Self {
         let process = &problem.process;
         let averaged = process
@@ -81,7 +82,8 @@ impl<'a> AveragedLoop<'a> {
         })
     }
 
-    /// Factor 1 + (Hβ₀)_zz, which equals det(I + Hβ₀).
+    /// Determinant det(I + Hβ₀) of receptances H and averaged edge and feed coefficients β₀. It is 1 + (Hβ₀)_zz, since
+    /// only the axial column of β₀ differs from zero.
     fn modulation(&self, h: &Matrix3<Complex64>) -> Complex64 {
         Complex64::ONE + (h.row(2) * self.forced.map(Complex64::from))[0]
     }
@@ -127,8 +129,8 @@ impl OpenLoop for AveragedLoop<'_> {
     }
 
     fn real_end(&self) -> Result<Option<RealEnd>, Breakdown> {
-        // At ω = 0 loci with regeneration are 0. Without regeneration they are real there: eigenvalues of the static
-        // compliance times α₀.
+        // At ω = 0 the characteristic loci with regeneration are 0. Without regeneration they are real there:
+        // eigenvalues of the static compliance times α₀.
         if self.delay_s.is_some() {
             return Ok(None);
         }
@@ -153,14 +155,16 @@ impl OpenLoop for AveragedLoop<'_> {
             let matrix = self.matrix(Complex64::new(0.0, omega));
             Ok(2.0 * matrix.ok_or(Breakdown::NoSolution)?.norm())
         };
-        // Above all resonances the loci decrease with the frequency: the grid ends where they fall below the floor.
+        // Above all resonances the characteristic loci decrease with the frequency: the grid ends where they fall below
+        // the floor.
         while end > 0.0 && size(end)? >= floor {
             end *= 1.4;
         }
         let mut grid = around(&resonances, end);
         grid.extend(lines.into_iter().filter(|&line| line < end));
         if let Some(delay_s) = self.delay_s {
-            // The locus rotates by ωτ/2: at least six steps for each revolution of it.
+            // The regeneration factor rotates the characteristic locus by ωτ/2: the grid has at least six steps for
+            // each revolution of it.
             let steps = (end * delay_s * 3.0 / std::f64::consts::TAU).ceil();
             grid.extend((1..steps as usize).map(|i| end * i as f64 / steps));
         }

@@ -26,7 +26,7 @@ pub(crate) struct HarmonicLoop<'a> {
     passing: f64,
     /// Highest harmonic K.
     harmonics: usize,
-    /// Harmonics of the coefficients, from −(2K + 1) to 2K + 1.
+    /// Fourier coefficients of the directional coefficients α and β over a tooth period, of order −(2K + 1) to 2K + 1.
     coefficients: Vec<Harmonic>,
     /// Indices of the directions (0 feed, 1 normal, 2 axial) in which the tool moves and changes the chip thickness or
     /// the axial depth.
@@ -34,7 +34,7 @@ pub(crate) struct HarmonicLoop<'a> {
 }
 
 impl<'a> HarmonicLoop<'a> {
-    /// Loop at a spindle speed (rev/min) with harmonics up to K.
+    /// Open loop with periodic coefficients at a spindle speed (rev/min), with harmonics of the vibration up to K.
     pub(crate) fn new(problem: &'a FrequencyProblem, rpm: f64, harmonics: usize) -> Self {
         let process = &problem.process;
         let most = 2 * harmonics as i32 + 1;
@@ -107,9 +107,11 @@ impl<'a> HarmonicLoop<'a> {
             .collect()
     }
 
-    /// Harmonic p − q of the coefficients, which couples frequency q to frequency p.
+    /// Fourier coefficient of order p − q of α and β, which couples the vibration at frequency q to the force at
+    /// frequency p.
     fn coefficient(&self, p: usize, q: usize) -> &Harmonic {
-        // Both indices are below the number of frequencies, so that the difference is within the stored harmonics.
+        // Both indices are below the number 2K + 2 of frequencies, so that Fourier coefficients of the order p − q are
+        // stored.
         &self.coefficients[p + 2 * self.harmonics + 1 - q]
     }
 
@@ -156,7 +158,8 @@ impl<'a> HarmonicLoop<'a> {
         }
     }
 
-    /// Real eigenvalues at s = iΩ/2, 1/m, where multipliers are −1.
+    /// Real eigenvalues λ of the loop matrix at s = iΩ/2, 1/m, half the tooth-passing frequency: they belong to Floquet
+    /// multipliers of −1 (flip).
     fn flips(&self) -> Result<Vec<f64>, Breakdown> {
         let matrix = self.matrix(Complex64::new(0.0, 0.5 * self.passing));
         let matrix = matrix.ok_or(Breakdown::NoSolution)?;
@@ -215,13 +218,14 @@ impl HarmonicLoop<'_> {
     }
 }
 
-/// Real form of the matrix at s = iΩ/2 in cosines and sines; its entries for (p, q) are conjugate to those for (−p−1,
-/// −q−1).
+/// Loop matrix at s = iΩ/2 transformed to real form, from complex harmonics to cosines and sines. There its entry for
+/// the frequencies (p, q) is the conjugate of that for (−p−1, −q−1).
 fn real_form(matrix: &DMatrix<Complex64>, count: usize, axes: usize) -> DMatrix<f64> {
     let mirrored = |index: usize| (count - 1 - index / axes) * axes + index % axes;
     let half = std::f64::consts::FRAC_1_SQRT_2;
     let is_upper = |index: usize| index / axes >= count / 2;
-    // Row i of the unitary transformation to cosines (upper half) and sines (lower half).
+    // The two entries of row i of the unitary transformation from complex harmonics to cosines (upper half) and sines
+    // (lower half).
     let factors = |index: usize| {
         if is_upper(index) {
             (Complex64::from(half), Complex64::from(half))
@@ -274,7 +278,7 @@ impl OpenLoop for HarmonicLoop<'_> {
     fn real_end(&self) -> Result<Option<RealEnd>, Breakdown> {
         Ok(Some(RealEnd {
             omega: 0.5 * self.passing,
-            // The factor κ/w is 2 at s = iΩ/2.
+            // The regeneration factor κ/w = 1 − e^{−sτ} is 2 at s = iΩ/2.
             loci: self.flips()?.into_iter().map(|value| 2.0 * value).collect(),
             kind: StabilityLoss::Flip,
         }))

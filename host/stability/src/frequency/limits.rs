@@ -11,16 +11,16 @@ use crate::error::{Breakdown, StabilityError};
 use crate::limits::speed_line::{SpeedLine, Switch};
 use crate::spectrum::stability_loss::StabilityLoss;
 
-/// Limit: an axial depth at which a root of the loop crosses the imaginary axis.
+/// Limit of a loop: an axial depth at which a root of the loop crosses the imaginary axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct AxisCrossing {
     /// Depth, m.
     pub(crate) depth_m: f64,
-    /// Imaginary part ω of the root iω, rad/s.
+    /// Imaginary part ω of the root iω of the loop at this limit, rad/s.
     pub(crate) omega: f64,
     /// Kind of stability loss.
     pub(crate) kind: StabilityLoss,
-    /// True if the root becomes unstable with growing depth.
+    /// True if the root of the loop moves into the right half plane (becomes unstable) with growing depth.
     pub(crate) outward: bool,
 }
 
@@ -34,8 +34,8 @@ pub(crate) fn limits(open_loop: &impl OpenLoop, depth_m: f64) -> Result<Vec<Axis
     let real_end = open_loop.real_end()?;
     let mut limits = Vec::new();
     if let Some(end) = &real_end {
-        // The real loci at this end are crossings themselves. Samples closer to the end are left out, where rounding of
-        // imaginary parts would show further crossings.
+        // The real characteristic loci at this end of the frequency range are crossings themselves. Samples closer to
+        // the end are left out, where rounding of imaginary parts would show further crossings.
         let next_to_end = if end.omega > 0.0 {
             let next_to_end = end.omega * (1.0 - REAL_END_OFFSET);
             grid.retain(|&omega| omega < next_to_end);
@@ -118,8 +118,8 @@ fn error_m(limit: &AxisCrossing, others: &[Vec<AxisCrossing>]) -> Option<f64> {
     })
 }
 
-/// Line of given limits at a spindle speed. `others` are limits of the computations for the error estimate;
-/// `chatter_hz` returns the vibration frequency at a limit.
+/// Stability at one spindle speed from the limits of a loop. `others` are the limits of the computations from whose
+/// difference the error is estimated; `chatter_hz` returns the vibration frequency at a limit.
 ///
 /// # Errors
 /// The roots at depth 0 cannot be counted, or a vibration lies outside the measured frequencies.
@@ -155,7 +155,8 @@ pub(crate) fn speed_line(
     Ok(SpeedLine::of_switches(rpm, depth_mm, outside, switches))
 }
 
-/// Number of unstable roots at depth 0: edge and feed forces that depend on the axial vibration may cause some.
+/// Number of unstable roots of a loop at depth 0: edge and feed forces that depend on the axial vibration may cause
+/// some.
 pub(crate) fn outside_at_no_depth(open_loop: &impl OpenLoop) -> Option<i32> {
     if open_loop.problem().process.axial_depth_modulation {
         unstable_roots(open_loop, 0.0, 0.0)

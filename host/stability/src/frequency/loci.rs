@@ -16,26 +16,28 @@ pub(crate) struct Sample {
     pub(crate) values: Vec<Complex64>,
 }
 
-/// Crossing of the positive real axis by a locus.
+/// Crossing of the positive real axis by a characteristic locus.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Crossing {
     /// Frequency, rad/s.
     pub(crate) omega: f64,
-    /// Value of the locus on the axis.
+    /// Value of the characteristic locus where it crosses the real axis.
     pub(crate) value: f64,
-    /// True if the imaginary part rises with the frequency.
+    /// True if the imaginary part of the locus rises with the frequency where it crosses the real axis.
     pub(crate) rises: bool,
 }
 
-/// Function of the frequency (rad/s) that returns all eigenvalues of absolute value `floor` and above.
+/// Characteristic loci: function of the frequency (rad/s) that returns all eigenvalues of a loop of absolute value
+/// `floor` and above.
 pub(crate) trait Loci: Fn(f64) -> Result<Vec<Complex64>, Breakdown> {}
 impl<F: Fn(f64) -> Result<Vec<Complex64>, Breakdown>> Loci for F {}
 
-/// Samples the loci on a grid, so densely that every locus of at least `floor` can be told from the others between
-/// samples and is nearly straight: its middle deviates by at most `bend` times a tenth of its size.
+/// Samples characteristic loci on a frequency grid, so densely that every locus of at least `floor` can be told from
+/// the others between two samples and is nearly straight: its middle deviates from the straight line by at most `bend`
+/// × [`LOCUS_BEND`] of its size.
 ///
 /// # Errors
-/// As the function.
+/// Those of the function `loci`.
 pub(crate) fn trace(loci: &impl Loci, grid: &[f64], floor: f64, bend: f64) -> Result<Vec<Sample>, Breakdown> {
     let sample = |omega: f64| {
         Ok(Sample {
@@ -58,7 +60,8 @@ pub(crate) fn trace(loci: &impl Loci, grid: &[f64], floor: f64, bend: f64) -> Re
     Ok(samples)
 }
 
-/// Adds samples between two samples until every locus is straight and told apart from the others.
+/// Adds frequency samples between two samples until every characteristic locus is straight and told apart from the
+/// others.
 fn divide(
     sample: &impl Fn(f64) -> Result<Sample, Breakdown>,
     low: &Sample,
@@ -107,14 +110,14 @@ fn is_straight(low: &Sample, middle: &Sample, high: &Sample, (floor, bend): (f64
                     && (to - from).norm() <= LOCUS_MOVE * bend * size
                     && is_alone(middle, index, (to - from).norm())
             }
-            // A locus without a partner in a neighbouring sample must lie below the floor.
+            // A characteristic locus without a partner in a neighbouring frequency sample must lie below the floor.
             _ => value.norm() < floor,
         }
     })
 }
 
-/// True if a locus that moves by `travel` cannot be confused with another, or if confusion has no effect because it is
-/// far from the positive real axis.
+/// True if a characteristic locus that moves by `travel` cannot be confused with another, or if confusion has no effect
+/// because the locus is far from the positive real axis.
 fn is_alone(sample: &Sample, index: usize, travel: f64) -> bool {
     let value = sample.values[index];
     let is_near_axis = |value: Complex64| value.re > -travel && value.im.abs() <= 2.0 * travel;
@@ -126,7 +129,7 @@ fn is_alone(sample: &Sample, index: usize, travel: f64) -> bool {
     others.all(|(_, other)| (other - value).norm() > travel || !is_near_axis(value) || !is_near_axis(*other))
 }
 
-/// Pairs the values of two samples, nearest first. `None` if a value of at least `floor` has no partner.
+/// Pairs the eigenvalues at two frequencies, nearest first. `None` if an eigenvalue of at least `floor` has no partner.
 fn pairs(a: &Sample, b: &Sample, floor: f64) -> Option<Vec<(usize, usize)>> {
     let mut near: Vec<(f64, usize, usize)> = Vec::with_capacity(a.values.len() * b.values.len());
     for (i, p) in a.values.iter().enumerate() {
@@ -147,12 +150,13 @@ fn pairs(a: &Sample, b: &Sample, floor: f64) -> Option<Vec<(usize, usize)>> {
     (!left).then_some(pairs)
 }
 
-/// Part of a locus between two samples: frequency (rad/s) and value at both ends.
+/// Part of a characteristic locus between two frequency samples: frequency (rad/s) and value at both ends.
 pub(crate) type Step = [(f64, Complex64); 2];
 
-/// Steps between two samples, one for each locus.
+/// Steps between two frequency samples, one for each characteristic locus.
 fn steps_between(low: &Sample, high: &Sample) -> Vec<Step> {
-    // With an infinite floor no value must have a partner; values without one lie below every floor in use.
+    // With an infinite floor no eigenvalue needs a partner, so that pairing cannot fail. Eigenvalues without a partner
+    // lie below every floor that callers use.
     let pairs = pairs(low, high, f64::INFINITY).unwrap_or_default();
     pairs
         .into_iter()
@@ -167,12 +171,13 @@ pub(crate) fn steps(samples: &[Sample]) -> impl Iterator<Item = Step> {
         .flat_map(|pair| steps_between(&pair[0], &pair[1]))
 }
 
-/// Collects the solutions that `solve` finds on the steps between samples.
+/// Collects the solutions that `solve` finds on every step of every characteristic locus between neighbouring frequency
+/// samples.
 ///
 /// If `solve` fails on a step because two close loci were exchanged, the interval is halved and solved again.
 ///
 /// # Errors
-/// As the function `loci`, or `solve` fails however short the interval.
+/// Those of the function `loci`, or `solve` fails however short the interval.
 pub(crate) fn solve_steps<T>(
     loci: &impl Loci,
     samples: &[Sample],
@@ -209,7 +214,8 @@ fn solve_between<T>(
     Ok(found)
 }
 
-/// Crossings of the positive real axis by loci of at least `floor`, largest first, to 1e-12 of the value.
+/// Crossings of the positive real axis by characteristic loci of at least `floor`, largest value first, each accurate
+/// to 1e-12 of its value.
 ///
 /// # Errors
 /// As [`solve_steps`].
@@ -248,7 +254,8 @@ pub(crate) fn crossings(
     Ok(found)
 }
 
-/// Point of a locus with its residual, which vanishes at the solution.
+/// Point of a characteristic locus with the residual of the equation that is solved along the locus; it vanishes at the
+/// solution.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LocusPoint {
     pub(crate) omega: f64,

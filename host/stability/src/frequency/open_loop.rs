@@ -41,7 +41,7 @@ pub(crate) trait OpenLoop: Sync {
     /// Determinant det(I − (κα − β)H): its zeros are the roots, its poles the poles of the structure.
     fn determinant(&self, s: Complex64, kappa: Complex64) -> Option<Complex64>;
 
-    /// End of the frequency range with real loci; `None` if there is none.
+    /// End of the frequency range at which the characteristic loci are real; `None` if there is none.
     ///
     /// # Errors
     /// As [`eigenvalues`](Self::eigenvalues).

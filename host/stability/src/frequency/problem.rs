@@ -22,7 +22,7 @@ pub struct FrequencyProblem {
     pub teeth: usize,
 }
 
-/// Source of the receptance matrix H(s).
+/// Source of the receptance matrix H(s): modelled structure, or table of measured receptances.
 #[derive(Clone, Debug)]
 enum Receptance {
     /// Modelled structure, with its poles.
@@ -39,7 +39,7 @@ pub(crate) struct Resonance {
 }
 
 impl FrequencyProblem {
-    /// Builds the problem of a case.
+    /// Builds the frequency-domain problem of a case with a modelled structure.
     ///
     /// # Errors
     /// As [`Problem::new`] and [`FrequencyProblem::of_model`].
@@ -109,7 +109,8 @@ impl FrequencyProblem {
         }
     }
 
-    /// The same problem on every second line of a table; `None` for a model, or if too few lines remain.
+    /// Frequency-domain problem with every second line of its FRF table only; `None` for a modelled structure, or if
+    /// too few lines remain.
     pub(crate) fn thinned(&self) -> Option<Self> {
         let Receptance::Table(interpolation) = &self.receptance else {
             return None;
@@ -120,7 +121,7 @@ impl FrequencyProblem {
         })
     }
 
-    /// Measured frequency range, Hz; `None` for a model.
+    /// Frequency range of the measured receptances, Hz; `None` for a modelled structure.
     pub(crate) fn band_hz(&self) -> Option<(f64, f64)> {
         match &self.receptance {
             Receptance::Model(..) => None,
@@ -205,7 +206,8 @@ fn peaks(interpolation: &Interpolation) -> Vec<Resonance> {
         if peak < size[index - 1] || peak <= size[index + 1] || peak < PEAK_SHARE * highest {
             continue;
         }
-        // Distance on one side to 1/√2 of the peak, or to the foot of the next peak.
+        // Distance, on one side of the resonance, from the peak to the frequency at which the receptance falls to 1/√2
+        // of it, or to the foot of the next peak.
         let falls = |range: &mut dyn Iterator<Item = usize>| {
             let mut last = index;
             for other in range {

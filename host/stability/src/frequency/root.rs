@@ -108,7 +108,7 @@ fn from_line(
     Ok(best)
 }
 
-/// True if no root lies further right.
+/// True if the loop has no root to the right of the given one, that is with a larger real part.
 fn is_rightmost(open_loop: &impl OpenLoop, depth_m: f64, root: Complex64, decay: f64) -> bool {
     // The roots are counted to the right of a line Re s = const slightly right of the given root.
     let sigma = root.re + 1e-3 * (root.re.abs() + 1e-3 * decay);
@@ -120,7 +120,8 @@ fn is_rightmost(open_loop: &impl OpenLoop, depth_m: f64, root: Complex64, decay:
     unstable_roots(open_loop, depth_m, 0.0).is_some_and(|unstable| (unstable > 0) == (root.re > 0.0))
 }
 
-/// Characteristic loci κλ/w at any s, 1/m.
+/// Characteristic loci κλ/w at a complex exponent s off the imaginary axis as well, 1/m, of absolute value `floor` and
+/// above.
 fn loci_at(open_loop: &impl OpenLoop, s: Complex64, floor: f64) -> Result<Vec<Complex64>, Breakdown> {
     let regeneration = open_loop.regeneration(s);
     let size = regeneration.norm();
@@ -134,7 +135,8 @@ fn loci_at(open_loop: &impl OpenLoop, s: Complex64, floor: f64) -> Result<Vec<Co
     Ok(loci)
 }
 
-/// Root near a guess, by secant steps on w − 1/locus, with the locus for which it is smallest.
+/// Root s of a loop near a guess, by secant steps on w − 1/λ with the axial depth w and the characteristic locus λ(s)
+/// for which the difference is smallest. `None` if the steps do not converge.
 pub(crate) fn polish(open_loop: &impl OpenLoop, depth_m: f64, guess: Complex64) -> Option<Complex64> {
     // Depth, m, that sets the floor of loci at depth 0: roots are then poles, where a locus is infinite.
     const SHALLOW_M: f64 = 1e-3;

@@ -48,7 +48,8 @@ impl Chart {
         lines.sort_by(|a, b| a.rpm.total_cmp(&b.rpm));
         lines.dedup_by(|a, b| a.rpm == b.rpm);
         let asked = lines.len();
-        // Added lines have fewer steps in depth, which are steps of the requested lines, so that both can be compared.
+        // Added speeds have fewer steps in depth than the requested ones. These are steps of the requested ones too, so
+        // that |μ| of both can be compared.
         let stride = stride(samples);
         for line in &mut lines {
             line.largest = line.largest.iter().step_by(stride).copied().collect();
@@ -139,7 +140,8 @@ fn contains(intervals: &[[f64; 2]], depth_mm: f64) -> bool {
         .any(|[from, to]| (*from..=*to).contains(&depth_mm))
 }
 
-/// Speeds at which a gap is to be divided, rev/min; none if straight lines draw it, or if it has the least width.
+/// Spindle speeds at which a gap between two speeds of a chart is to be divided, rev/min; none if straight lines draw
+/// the limits in it, or if it has the least width.
 fn speeds_within(lines: &[SpeedLine], right: usize, teeth: usize) -> Vec<f64> {
     let (left, right_line) = (&lines[right - 1], &lines[right]);
     let width = right_line.rpm / left.rpm - 1.0;
@@ -154,7 +156,7 @@ fn speeds_within(lines: &[SpeedLine], right: usize, teeth: usize) -> Vec<f64> {
     } else {
         2.0
     };
-    // The number of parts is bounded: no lobe has more lines than the range has least widths.
+    // The gap is divided into intervals of at least the least width [`CHART_SPEED`], which bounds their number.
     let parts = parts.min((width / CHART_SPEED).ceil()) as usize;
     let step_rpm = (right_line.rpm - left.rpm) / parts as f64;
     (1..parts).map(|part| left.rpm + step_rpm * part as f64).collect()
@@ -217,8 +219,8 @@ impl Gap<'_> {
         })
     }
 
-    /// Differences of the values at both ends of the gap from the straight lines through the gap's other end and the
-    /// neighbour beyond it: (right end, left end).
+    /// Prediction errors of linear extrapolation at both ends of the gap: (right end, left end). Each is the value at
+    /// that end less the value of the straight line through the other end and the neighbouring speed beyond it.
     fn misses(&self, before: Option<f64>, left: f64, right: f64, after: Option<f64>) -> [Option<f64>; 2] {
         let width = self.right.rpm - self.left.rpm;
         let at_right = self.before.zip(before).map(|(line, value)| {
@@ -247,7 +249,8 @@ impl Gap<'_> {
             }
             let side = if a > 0.0 { 1.0 } else { -1.0 };
             let misses = self.misses(self.before.and_then(log), a, b, self.after.and_then(log));
-            // Bending towards the circle makes both extrapolations miss in the direction away from it.
+            // If |μ| bends towards the unit circle within the gap, both extrapolations err in the direction away from
+            // the circle.
             let Some(bulge) = kink_between(misses.map(|miss| miss.map(|miss| (side * miss).max(0.0)))) else {
                 return false;
             };
@@ -268,8 +271,8 @@ impl Gap<'_> {
     }
 }
 
-/// True if |μ| < 1 has a maximum over the depth that rises above the minima on both sides by more than its distance from
-/// the circle.
+/// True if the largest |μ| over the depth shows a tongue of instability beside this speed: a maximum below 1 that rises
+/// above the minima on both sides by more than its distance 1 − |μ| from the unit circle.
 fn shows_a_tongue(largest: &[f64]) -> bool {
     let least = |sizes: &[f64]| sizes.iter().copied().fold(f64::INFINITY, f64::min);
     (1..largest.len().saturating_sub(1)).any(|step| {
@@ -280,8 +283,8 @@ fn shows_a_tongue(largest: &[f64]) -> bool {
     })
 }
 
-/// Distance by which a kink within a gap lies off the straight line between its ends, from the misses of both
-/// extrapolations; of one alone, its bound. `None` if neither neighbour exists.
+/// Distance by which a kink within a gap lies off the straight line between the ends of the gap, from the prediction
+/// errors of both extrapolations; from one error alone, an upper bound. `None` if neither neighbour exists.
 fn kink_between(misses: [Option<f64>; 2]) -> Option<f64> {
     match misses {
         [Some(right), Some(left)] => {
@@ -309,7 +312,7 @@ fn bend(largest: &[f64], step: usize, side: f64) -> f64 {
     })
 }
 
-/// ln|μ|, bounded below at a thousandth: smaller multipliers are all far inside the circle.
+/// ln|μ|, with |μ| bounded below at a thousandth: smaller multipliers are all far inside the unit circle.
 fn logarithm(size: f64) -> f64 {
     size.max(1e-3).ln()
 }
@@ -325,7 +328,7 @@ fn narrowest_island_rpm(lines: &[SpeedLine], depth_mm: f64) -> Option<f64> {
     widths.into_iter().min_by(f64::total_cmp)
 }
 
-/// Depths from 0 to the last that lie outside ascending intervals.
+/// Depth intervals between 0 and `depth_mm` that lie outside the given ascending intervals.
 fn complement(intervals: &[[f64; 2]], depth_mm: f64) -> Vec<[f64; 2]> {
     let starts = std::iter::once(0.0).chain(intervals.iter().map(|interval| interval[1]));
     let ends = intervals
@@ -342,7 +345,8 @@ fn complement(intervals: &[[f64; 2]], depth_mm: f64) -> Vec<[f64; 2]> {
 /// Widths in speed of all connected regions that touch neither the first nor the last line, rev/min. Intervals of
 /// neighbouring lines belong to one region if they overlap in depth. A region extends half way to the next lines.
 fn island_widths_rpm(lines: &[SpeedLine], intervals: &dyn Fn(&SpeedLine) -> Vec<[f64; 2]>) -> Vec<f64> {
-    // Each region with its first and last line, and the intervals that it has at the newest line.
+    // Regions that reach the newest line, each with the index of its first line and its depth intervals at the newest
+    // line.
     let mut open: Vec<(usize, Vec<[f64; 2]>)> = Vec::new();
     let mut widths = Vec::new();
     for (index, line) in lines.iter().enumerate() {

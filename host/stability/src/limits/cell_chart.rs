@@ -8,14 +8,14 @@ use super::method::{Label, Method};
 use crate::error::StabilityError;
 use crate::spectrum::verdict::Verdict;
 
-/// Cells at one spindle speed, in the order of the depths of the chart.
+/// Cells of a chart at one spindle speed, in the order of the depths of the chart.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CellLine {
     /// Spindle speed, rev/min.
     pub rpm: f64,
-    /// Absolute value |μ| of the dominant multiplier at each depth.
+    /// Absolute value |μ| of the dominant Floquet multiplier at each depth.
     pub multiplier_abs: Vec<f64>,
-    /// Error estimate of |μ| at each depth.
+    /// Error estimate of |μ| of the dominant Floquet multiplier at each depth.
     pub error: Vec<f64>,
     /// Verdict at each depth.
     pub verdict: Vec<Verdict>,
