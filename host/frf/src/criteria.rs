@@ -13,121 +13,145 @@ pub(crate) const BOUNCE_S: f64 = 0.4;
 /// Unfounded.
 pub(crate) const LEAST_IMPACT: f64 = 0.1;
 
-/// Smallest peak of a force pulse, in standard deviations of the force noise. Gaussian noise exceeds it with a probability of 1.2e-15 per
-/// sample: once in 10⁸ recordings of 10⁷ samples.
+/// Smallest peak of a force pulse that counts as an impact of a hammer, in standard deviations of the force noise.
+/// Gaussian noise exceeds it with a probability of 1.2e-15 per sample: once in 10⁸ recordings of 10⁷ samples.
 pub(crate) const PULSE_ABOVE_NOISE: f64 = 8.0;
 
-/// Force at the two ends of a pulse, as a fraction of the force above which a pulse counts as an impact, the larger of [`LEAST_IMPACT`] and
-/// [`PULSE_ABOVE_NOISE`]. Unfounded.
+/// Force at which a hammer pulse begins and ends, as a fraction of the smallest peak force of an impact. That peak
+/// force is the larger one of [`LEAST_IMPACT`] and [`PULSE_ABOVE_NOISE`], both in N. Unfounded.
 pub(crate) const PULSE_END: f64 = 0.05;
 
-/// Force at the two ends of a pulse, in standard deviations of the force noise, if that is larger than [`PULSE_END`]. Gaussian noise stays
-/// below two standard deviations in 95 % of the samples, so that it hardly lengthens a pulse.
+/// Smallest force at which a hammer pulse begins and ends, in standard deviations of the force noise; it replaces the
+/// force of [`PULSE_END`] if it is larger. Gaussian noise stays below two standard deviations in 95 % of the samples,
+/// so that it hardly lengthens a pulse.
 pub(crate) const PULSE_END_ABOVE_NOISE: f64 = 2.0;
 
-/// Smallest second pulse that makes an impact double, as a fraction of the first peak. The force window removes the second pulse but not its
-/// response, so that a smaller one causes an error of the FRF of up to this fraction. That 3 % are tolerable is unfounded.
+/// Smallest second force pulse of a hammer that makes an impact a double impact, as a fraction of the first peak. The
+/// force window removes the second pulse but not its response, so that a smaller one causes an error of the FRF of up
+/// to this fraction. That 3 % are tolerable is unfounded.
 pub(crate) const SECOND_PULSE: f64 = 0.03;
 
-/// Largest share of an exponential window in the decay rate of a mode with which the rest is taken as the mode's own. The
-/// relative error of the damping then is twenty times that of the measured decay rate: 20 % where that is known to 1 %. Unfounded.
+/// Largest contribution of an exponential window to the measured decay rate of a mode, as a fraction of that rate. The
+/// difference of both is the decay rate of the mode itself. At the limit its relative error is twenty times that of the
+/// measured rate: 20 % where that is known to 1 %. Unfounded.
 pub(crate) const LARGEST_WINDOW_SHARE: f64 = 0.95;
 
-/// Smallest number of single impacts without a warning. The expected coherence of unrelated signals is 1/n with n averages: 1 with one impact,
-/// 1/2 with two. That three suffice is unfounded.
+/// Smallest number of single impacts of a hammer test; with fewer, a warning replaces coherence and standard deviation.
+/// The expected coherence of unrelated signals is 1/n with n averages: 1 with one impact, 1/2 with two. That three
+/// suffice is unfounded.
 pub(crate) const IMPACTS_MIN: usize = 3;
 
-/// Largest amplitude of a response at the end of a segment without a warning, as a fraction of its peak. Truncation of an exponential decay at
-/// the fraction a lowers the resonance peak by the fraction a. That 2 % are tolerable is unfounded.
+/// Largest amplitude of a hammer response at the end of its segment, as a fraction of the peak of the response; a
+/// larger one causes a warning. Truncation of an exponential decay at the fraction a lowers the resonance peak by the
+/// fraction a. That 2 % are tolerable is unfounded.
 pub(crate) const END_AMPLITUDE: f64 = 0.02;
 
 // Independence of forces
 
-/// Smallest singular value of the force spectra, each force divided by its root mean square, for independent forces. Below it, noise of 1 % of
-/// a force causes errors as large as the FRF.
+/// Smallest singular value of the force spectra with which several simultaneous forces are linearly independent at a
+/// frequency line. Each force is divided by its root mean square first. Below it, noise of 1 % of a force causes errors
+/// as large as the FRF.
 pub(crate) const DEPENDENT: f64 = 1e-2;
 
-/// Smallest number of independent averages beyond the number of forces. With as many averages as forces, the coherence is 1 whatever the
-/// noise. The half average is unfounded.
+/// Smallest excess of the number of independent averages of the spectra over the number of forces; with less, an FRF
+/// measurement is refused. With as many averages as forces, the coherence is 1 whatever the noise. The half average is
+/// unfounded.
 pub(crate) const SPARE_AVERAGES: f64 = 0.5;
 
-/// Smallest force power of a frequency line within the range of a sweep, as a fraction of the largest. At resonances the force of a shaker
-/// drops to about 1e-2 of the largest power; the tenth of that is unfounded.
+/// Smallest force power of a frequency line that lies within the swept range of a swept sine, as a fraction of the
+/// largest force power of all lines. At resonances the force of a shaker drops to about 1e-2 of the largest power; the
+/// tenth of that is unfounded.
 pub(crate) const EXCITED: f64 = 1e-3;
 
 // Step-sine tests
 
-/// Smallest number of periods of a frequency step: the median absolute deviation of the periods needs several. Unfounded.
+/// Smallest number of excitation periods in one frequency step of a step-sine test: the median absolute deviation of
+/// the periods needs several. Unfounded.
 pub(crate) const PERIODS_MIN: usize = 8;
 
-/// Smallest relative change of the period that begins a new frequency step. Usual increments within a resonance are four times as large.
-/// Unfounded.
+/// Smallest relative change of the excitation period that begins a new frequency step of a step-sine test. Usual
+/// increments between steps near a resonance are four times as large. Unfounded.
 pub(crate) const FREQUENCY_STEP: f64 = 1.5e-3;
 
-/// Deviation of a period from the mean of its step that begins a new step, in standard deviations of the periods. Two periods in a row must
-/// deviate so far; a Gaussian deviation exceeds it once in 2 million periods.
+/// Smallest deviation of an excitation period from the mean period of its frequency step that begins a new step, in
+/// standard deviations of the periods of the step. Two periods in a row must deviate so far; a Gaussian deviation
+/// exceeds it once in 2 million periods.
 pub(crate) const PERIOD_SCATTER: f64 = 5.0;
 
-/// Largest standard deviation of the periods of a step, as a multiple of [`FREQUENCY_STEP`]; a larger one is a change of frequency. Unfounded.
+/// Largest standard deviation of the excitation periods within a frequency step, relative to their mean, as a multiple
+/// of [`FREQUENCY_STEP`]. With a larger one, the frequency of the sine changes and no step begins. Unfounded.
 pub(crate) const STEADY_SCATTER: f64 = 10.0;
 
-/// Smallest deviation of a period from the mean of its step, relative, that is a pause. A pause without a zero crossing at least doubles the
-/// period, noise changes it by some percent. The half is unfounded.
+/// Smallest deviation of an excitation period from the mean period of its frequency step that marks a pause of the
+/// sine, as a fraction of that mean. A pause without a zero crossing at least doubles the period, noise changes it by
+/// some percent. The half is unfounded.
 pub(crate) const PAUSE: f64 = 0.5;
 
-/// Smallest number of subsegments of a frequency step: two for the steady state and two for the transient before. Unfounded.
+/// Smallest number of subsegments into which a frequency step of a step-sine test is divided: two for the steady state
+/// and two for the transient before. Unfounded.
 pub(crate) const SUBSEGMENTS_MIN: usize = 4;
 
-/// Smallest number of samples of a subsegment. A fit of cosine, sine, offset and drift has four unknowns; the noise needs one sample more.
+/// Smallest number of samples in a subsegment of a frequency step. The fit of cosine, sine, offset and drift to the
+/// subsegment has four unknowns; the estimate of the noise needs one sample more.
 pub(crate) const SUBSEGMENT_SAMPLES_MIN: usize = 5;
 
-/// Largest relative deviation of the phasor ratio (response/force) of a settled response from its mean over the second half. Unfounded.
+/// Largest deviation of the phasor ratio response/force of a subsegment from its mean over the second half of the
+/// frequency step with which the response counts as settled, as a fraction of that mean. Unfounded.
 pub(crate) const SETTLED: f64 = 2e-3;
 
-/// Largest deviation of a settled phasor ratio that noise explains, in standard deviations. The error of a phasor is complex and Gaussian: 1 of
-/// 8000 subsegments exceeds three deviations, e⁻⁹.
+/// Largest deviation of the phasor ratio response/force from its mean that noise explains in a settled response, in
+/// standard deviations of the ratio. The error of a phasor is complex and Gaussian: 1 of 8000 subsegments exceeds three
+/// deviations, e⁻⁹.
 pub(crate) const SETTLED_NOISE: f64 = 3.0;
 
-/// Largest ratio of forces that count as one force level of a recording. The amplitude of a controlled shaker varies by some percent.
-/// Unfounded.
+/// Largest ratio of the median force amplitudes of two passes through the frequency range of a step-sine test that
+/// count as one force level. The amplitude of a controlled shaker varies by some percent. Unfounded.
 pub(crate) const SAME_LEVEL: f64 = 1.05;
 
-/// Largest ratio of forces that count as one level where the user selects a level, and without a warning of a varying force. Unfounded.
+/// Largest ratio of force amplitudes in a step-sine test: between the force level that the user selects and the level
+/// that is evaluated, and between the frequency steps of a level without a warning of a varying force. Unfounded.
 pub(crate) const SAME_FORCE: f64 = 1.2;
 
-/// Smallest length of a repeated frequency step, relative to the longest at this frequency, that replaces it as the newer one. Unfounded.
+/// Smallest length of a repeated frequency step with which it replaces the earlier step of the same frequency, as a
+/// fraction of the length of that step. Unfounded.
 pub(crate) const REPEATED_STEP: f64 = 0.9;
 
 // Noise plateau of a spectrum
 
-/// Number of adjacent bands of a spectrum whose mean powers are compared to find the noise plateau. Unfounded.
+/// Number of adjacent frequency bands of equal width into which a spectrum is divided; their mean powers are compared
+/// to find the noise plateau. Unfounded.
 pub(crate) const BANDS: usize = 64;
 
-/// Smallest number of bands with equal power that form a noise plateau. Unfounded.
+/// Smallest number of frequency bands with equal mean power that form the noise plateau of a spectrum. Unfounded.
 pub(crate) const PLATEAU_BANDS: usize = 3;
 
-/// Smallest number of frequency lines per band. The standard deviation of the mean power of a band, 1/√50, is then 14 %. Unfounded.
+/// Smallest number of frequency lines in each band of the search for the noise plateau of a spectrum. The relative
+/// standard deviation of the mean power of a band, 1/√50, is then 14 %. Unfounded.
 pub(crate) const LINES_PER_BAND_MIN: usize = 50;
 
-/// Largest distance of the power of a band of the plateau above the lowest band, in standard deviations. The range of 64 normal variables is 4.8
-/// on average and rarely above 6; without its highest bands a plateau keeps its median.
+/// Largest excess of the mean power of a frequency band in the noise plateau over the power of the lowest band, in
+/// standard deviations of that power. The range of 64 normal variables is 4.8 on average and rarely above 6; without
+/// its highest bands a plateau keeps its median.
 pub(crate) const PLATEAU_RANGE: f64 = 6.0;
 
 // Tool-tip calibration
 
-/// Smallest relative decrease of the residual by which a further mode is accepted. A mode that fits only noise decreases it by some percent, half
-/// its share of the unknowns. Unfounded.
+/// Smallest relative decrease of the RMS residual of a vector fit by which a further mode is accepted. A mode that fits
+/// only noise decreases the residual by some percent: by half the number of added unknowns per equation. Unfounded.
 pub(crate) const RESIDUAL_DECREASE: f64 = 0.3;
 
-/// Relative residual below which no further mode is added, near the noise of a good measurement. Unfounded.
+/// RMS residual of a vector fit, relative to the fitted receptances, below which no further mode is added. It is near
+/// the noise of a good measurement. Unfounded.
 pub(crate) const SMALL_RESIDUAL: f64 = 2e-3;
 
-/// Largest shift of a natural frequency between calibration and cut, |ln(f₁/f₂)|. Unfounded.
+/// Largest shift |ln(f₁/f₂)| between the natural frequency f₁ of a mode in the tool-tip calibration and f₂ during the
+/// cut with which both count as the same mode. Unfounded.
 pub(crate) const SAME_MODE: f64 = 0.15;
 
-/// Smallest peak of a mode, as a fraction of the largest peak of a function; a pole with a lower peak is noise. Unfounded.
+/// Smallest resonance peak of a fitted mode in a receptance, as a fraction of the largest peak of all modes in that
+/// receptance. A pole with a lower peak in every receptance is noise. Unfounded.
 pub(crate) const LEAST_PEAK: f64 = 2e-3;
 
-/// Largest damping ratio of a mode. A pole with more damping has no peak that stands out of its neighbours: its half-power bandwidth is more
-/// than half its frequency. Unfounded.
+/// Largest damping ratio with which a pole of a vector fit counts as a mode. The peak of a pole with more damping does
+/// not stand out of its neighbours: its half-power bandwidth is more than half its frequency. Unfounded.
 pub(crate) const LARGEST_DAMPING_RATIO: f64 = 0.3;

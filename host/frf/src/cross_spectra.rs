@@ -7,10 +7,12 @@ use std::sync::Arc;
 
 use super::window::effective_averages;
 
-/// Number of segments whose transforms are multiplied in one pass over the sums. A choice that reduces memory traffic.
+/// Number of record segments whose Fourier transforms are buffered before their products are added to the sums of the
+/// cross-spectra. A choice that reduces memory traffic.
 const BATCH: usize = 4;
 
-/// Number of frequency lines multiplied in one pass over the sums. A choice: the lines of all channels then fit into the cache of a core.
+/// Number of frequency lines that are processed together when the products of all channel pairs are added to the
+/// cross-spectra. A choice: the lines of all channels then fit into the cache of a core.
 const LINES: usize = 256;
 
 /// Cross-spectra S_ab(f) = E[A(f) B*(f)] of all pairs of channels; X = H F then gives S_xf = H S_ff.
@@ -43,7 +45,7 @@ impl CrossSpectra {
     }
 }
 
-/// Segments of a record for averaged spectra.
+/// Division of a record into windowed segments, over which its cross-spectra are averaged.
 #[derive(Clone, Debug)]
 pub(super) struct Segments {
     /// Window weight of each sample of a segment; their number is the segment length.
@@ -52,7 +54,8 @@ pub(super) struct Segments {
     pub(super) starts: Vec<usize>,
     /// True if the mean of each segment is subtracted before its transform.
     pub(super) without_mean: bool,
-    /// Effective number of independent averages of the segments.
+    /// Effective number of independent averages that the segments of the record yield; overlapping segments are partly
+    /// dependent.
     pub(super) averages: f64,
 }
 

@@ -14,14 +14,14 @@ pub enum FrfError {
     /// A recording that cannot be read or lacks a required channel.
     #[error(transparent)]
     Recording(RecordingError),
-    /// A line of the file is malformed.
+    /// A line of a CSV or UFF file of an FRF table is malformed.
     #[error("{}, line {line}: {what}", path.display())]
     Line {
         /// The file.
         path: PathBuf,
         /// Number of the line, from 1.
         line: u64,
-        /// The fault, and the expected content.
+        /// Description of the fault in the line, and the content expected there.
         what: String,
     },
     /// A column of the file has an unknown name or unit.
@@ -31,15 +31,15 @@ pub enum FrfError {
         path: PathBuf,
         /// The header of the column.
         column: String,
-        /// The fault, and the expected content.
+        /// Description of the fault in the name or unit of the column, and the name or unit expected there.
         what: String,
     },
     /// The content of the file or the given values are not a valid table.
     #[error("{}: {what}", path.display())]
     Content {
-        /// The file, or the origin of the values.
+        /// Path of the file with the invalid table, or a name for the origin of values that are not from a file.
         path: PathBuf,
-        /// The fault, and the expected content.
+        /// Description of the fault in the table, and the content expected.
         what: String,
     },
 }

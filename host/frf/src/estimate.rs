@@ -29,11 +29,13 @@ pub(super) struct FrfLine {
     pub(super) h: Matrix,
     /// Multiple coherence of each response (thesis eq. 7.10): fraction of the power of the response that is linearly related to the forces.
     pub(super) coherence: [f64; 3],
-    /// Standard deviation of |H| for each response and force (random error).
+    /// Standard deviation of |H| for each response and force from random errors, in the unit of `h`.
     pub(super) deviation: [[f64; 3]; 3],
-    /// Largest relative error of each response by folding from above half the sample rate; 0 where it was not estimated.
+    /// Largest relative error of the FRF of each response by aliasing of content above half the sample rate; 0 where it
+    /// was not estimated.
     pub(super) folding: [f64; 3],
-    /// Smallest and largest singular value of the force spectra, each force divided by its root mean square.
+    /// Smallest and largest singular value of the force spectra at this line, with each force divided by its root mean
+    /// square.
     pub(super) singular: (f64, f64),
 }
 
@@ -176,7 +178,8 @@ fn h2(xf: &Matrix, xx: &Matrix, counts: ChannelCounts) -> Option<Matrix> {
     Some(product(xx, &inverse))
 }
 
-/// Blocks W_i of the pseudo-inverse of S = [S_ff,1 S_ff,2 …], and the smallest and largest singular value of S with rows of unit norm.
+/// Blocks W_i of the pseudo-inverse of the force spectra S = [S_ff,1 S_ff,2 …] of all tests i, and the smallest and
+/// largest singular value of S with rows of unit norm.
 ///
 /// For full row rank, S⁺ = Sᴴ (S Sᴴ)⁻¹.
 fn stacked(powers: &[Powers], forces: usize) -> Option<(Vec<Matrix>, (f64, f64))> {

@@ -11,7 +11,7 @@ pub enum Excitation {
     Sweep,
     /// Hammer test: one segment per impact.
     Hammer,
-    /// Step sine: phasors of force and response at each frequency.
+    /// Step sine: one phasor ratio response/force at each frequency step.
     StepSine,
 }
 

@@ -1,14 +1,15 @@
 //! Removal of the damping that an exponential window adds to a hammer test.
 //!
-//! With e^{−t/τ} on force and response the estimate is H(iω + 1/τ): every pole λ appears at λ − 1/τ, so that resonances are lower
-//! and limits computed from them deeper than they are. Modes are fitted to the estimate, and each is replaced by the one with its
-//! pole moved back:
+//! With e^{−t/τ} on force and response the estimate is H(iω + 1/τ): every pole λ appears at λ − 1/τ. The resonance
+//! peaks are then too low, and depth limits computed from them too high. Modes are fitted to the estimate, and each is
+//! replaced by the mode with its pole at λ:
 //!
 //!   H(iω) = H_w(iω) + Σ_r [R_r/(iω − λ_r − 1/τ) − R_r/(iω − λ_r)] + conjugate pairs.
 //!
-//! Modes outside the band change little over the distance 1/τ and stay. A relative error of the measured decay rate σ_w
-//! becomes σ_w/σ times as large for the true one, and so does that of the peak 1/σ: the standard deviation of a line grows by
-//! |H/H_w|².
+//! The sum runs over the poles λ_r and residues R_r fitted to the windowed estimate H_w. The contribution of modes
+//! outside the band is left as it is: it changes little over the distance 1/τ. A relative error of the measured decay
+//! rate σ_w is larger by the factor σ_w/σ for the decay rate σ of the mode itself, and so is that of the peak 1/σ: the
+//! standard deviation of a line grows by the factor |H/H_w|².
 
 use std::f64::consts::TAU;
 
@@ -18,11 +19,12 @@ use super::criteria::LARGEST_WINDOW_SHARE;
 use super::tool_tip::{mode_numbers, modes};
 use super::{Frf, FrfError, FrfTable};
 
-/// The table without the damping of an exponential window of time constant τ (`exponential_s`, s) on all its impacts; the
-/// standard deviations of its entries follow.
+/// FRF table without the damping that an exponential window of time constant τ (`exponential_s`, s) on all impacts has
+/// added. The standard deviations `deviation` of its entries are scaled in place.
 ///
 /// # Errors
-/// No mode can be fitted, or the decay of a mode is that of the window, so that its own cannot be told.
+/// No mode can be fitted, or the decay rate of a mode is nearly that of the window alone, so that the damping of the
+/// mode is not identifiable.
 pub(super) fn without_exponential_window(
     table: &FrfTable,
     deviation: &mut [Vec<f64>],

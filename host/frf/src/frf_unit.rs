@@ -33,7 +33,7 @@ impl FrfUnit {
         derivatives: 0,
     };
 
-    /// Name of the function: receptance, mobility or accelerance.
+    /// Name of the kind of FRF in this unit: receptance, mobility or accelerance.
     pub(super) fn word(self) -> &'static str {
         match self.derivatives {
             0 => "receptance",

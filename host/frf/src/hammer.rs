@@ -6,7 +6,8 @@ use super::criteria::{
 };
 use super::test_channels::TestChannels;
 
-/// Part of a segment before the impact, as a fraction of the segment; its mean gives the offset of the sensor. A choice.
+/// Length of the part of a hammer segment before the impact, as a fraction of the segment length. The mean of this part
+/// is subtracted from the segment as the offset of the sensor. A choice.
 const BEFORE: f64 = 0.01;
 
 /// One impact of the hammer.
@@ -19,16 +20,17 @@ pub struct MeasuredImpact {
     /// Largest second force pulse within the segment: delay after the first peak, s, and height as a fraction of that peak; `None` for a single
     /// impact.
     pub second: Option<(f64, f64)>,
-    /// Index of the first sample of the force pulse.
+    /// Index of the first sample of the force pulse of this impact in the record.
     first: usize,
-    /// Index of the last sample of the force pulse.
+    /// Index of the last sample of the force pulse of this impact in the record.
     last: usize,
 }
 
 /// Segment length and exponential window of a hammer test.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct HammerWindows {
-    /// Length of the segment of each impact, s; `None` for the longest without overlap of two impacts.
+    /// Length of the segment of each impact, s; `None` for the greatest length with which the segments of successive
+    /// impacts do not overlap.
     pub segment_s: Option<f64>,
     /// Time constant τ of the exponential window on force and response, s; `None` for no window.
     ///
@@ -52,7 +54,7 @@ pub fn true_damping(frequency_hz: f64, damping_ratio: f64, exponential_s: f64) -
 pub(super) struct ImpactSegments {
     /// Windowed signals: the force, then the responses. The segments of each signal are concatenated.
     pub(super) signals: Vec<Vec<f64>>,
-    /// Number of samples of each segment.
+    /// Number of samples in the segment of each impact; it is even and equal for all impacts.
     pub(super) length: usize,
     /// Single impacts, whose segments are evaluated.
     pub(super) used: Vec<MeasuredImpact>,
@@ -185,7 +187,7 @@ fn pulse_weight(impact: &MeasuredImpact, sample: usize) -> f64 {
     }
 }
 
-/// Length, in samples, of the longest segments that do not overlap between impacts.
+/// Greatest length, in samples, of segments of equal length, one per impact, that do not overlap.
 fn longest_segment(impacts: &[MeasuredImpact], samples: usize) -> usize {
     let ends = impacts.iter().skip(1).map(|impact| impact.first).chain([samples]);
     let shortest = impacts
@@ -264,7 +266,7 @@ fn noise(force: &[f64], middle: f64) -> f64 {
     1.4826 * median(force.iter().map(|f| (f - middle).abs()).collect())
 }
 
-/// Median of the values; 0 if there are none.
+/// Median of the values; 0 for an empty list.
 fn median(mut values: Vec<f64>) -> f64 {
     if values.is_empty() {
         return 0.0;

@@ -37,14 +37,15 @@ use usable_lines::{independent, keep_excited};
 /// Measured receptances with their statistics.
 #[derive(Clone, Debug)]
 pub struct Measurement {
-    /// Receptances. With several forces the coherence is the multiple coherence of the response.
+    /// Measured receptances with the coherence of each response. With several forces it is the multiple coherence.
     pub table: FrfTable,
-    /// Standard deviation of |H| of each entry of the table at each frequency, m/N.
+    /// Standard deviation of |H| of each entry of the table at each of its frequencies, m/N.
     pub deviation: Vec<Vec<f64>>,
-    /// False for each entry whose standard deviation says nothing, since it comes from fewer than three impacts.
+    /// One value per entry of the table. False if its standard deviation is meaningless, since it comes from fewer than
+    /// three impacts of a hammer.
     pub has_deviation: Vec<bool>,
-    /// Largest relative error of each entry of the table at each frequency by content above half the sample rate that folds
-    /// into the record; 0 where it was not estimated, which is all excitation but a hammer's.
+    /// Largest relative error of each entry of the table at each frequency by aliasing of content above half the sample
+    /// rate. It is estimated for hammer tests only, and 0 for all other excitation.
     pub folding: Vec<Vec<f64>>,
     /// Groups of recordings that were evaluated together.
     pub groups: Vec<RecordingGroup>,
@@ -54,12 +55,13 @@ pub struct Measurement {
 
 /// Measures receptances, m/N, from recordings.
 ///
-/// Recordings with the same forces are averaged; recordings with other forces add columns. Accelerations and velocities are divided by
-/// (iω)² and iω. 0 Hz is left out. The damping of an exponential window is taken off again.
+/// Recordings with the same force directions are averaged; recordings with other force directions add columns to the
+/// receptance matrix. Accelerations and velocities are divided by (iω)² and iω. 0 Hz is left out. The damping that an
+/// exponential window adds is removed.
 ///
 /// # Errors
-/// A recording has no force or no response, or is too short for the resolution; the forces are dependent; the recordings have no common
-/// frequencies.
+/// A recording has no force or no response, or is too short for the resolution; the forces are dependent; the
+/// recordings have no common frequencies.
 pub fn measure(recordings: &[Recording], settings: &MeasurementSettings) -> Result<Measurement, FrfError> {
     let channels = recordings
         .iter()
@@ -140,7 +142,8 @@ fn check_band(recording: &Recording, settings: &MeasurementSettings) -> Result<(
     }
 }
 
-/// Combines all groups at their common frequencies.
+/// Combines the receptances of all groups of recordings in one table, at the frequencies that all groups have in
+/// common.
 fn merged(path: &Path, measured: Vec<MeasuredGroup>) -> Result<Measurement, FrfError> {
     let refused = |what: String| FrfError::Content {
         path: path.into(),
@@ -214,7 +217,7 @@ fn merged(path: &Path, measured: Vec<MeasuredGroup>) -> Result<Measurement, FrfE
     Ok(measurement)
 }
 
-/// Receptance of one line, which fills a table until the measured entries are known.
+/// Receptance with one line, xx = 0, for a table that must not be empty before the measured entries are known.
 fn placeholder() -> Frf {
     Frf {
         response: Direction::X,
@@ -273,7 +276,8 @@ fn measure_group(
             counts.forces, counts.responses
         )));
     }
-    // Largest powers near half the sample rate of each hammer test, for its folding.
+    // For each hammer test, the largest power of every channel near half the sample rate, from which the error by
+    // aliasing is estimated.
     let mut tops: Vec<Vec<f64>> = Vec::new();
     let spectra = match excitation {
         Excitation::Hammer => {
@@ -305,7 +309,7 @@ fn measure_group(
     Ok(receptances(group, &lines, first, warnings))
 }
 
-/// Adds the largest error by folding over all hammer tests to the lines.
+/// Sets the error by aliasing of every FRF line: the largest over all hammer tests, for each response.
 fn add_folding(lines: &mut [FrfLine], spectra: &[CrossSpectra], tops: &[Vec<f64>], responses: usize) {
     let Some(frequency_hz) = spectra.first().map(|test| &test.frequency_hz) else {
         return;

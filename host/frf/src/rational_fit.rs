@@ -12,10 +12,12 @@ use quietcut_numerics::eigenvalues::{EigenvalueError, of_real};
 use quietcut_numerics::least_squares::{MinimumNorm, Tolerance, eliminated};
 use quietcut_numerics::singular_values::SingularValueError;
 
-/// Number of pole relocations. A choice: the poles usually converge within a few.
+/// Number of times that a vector fit relocates its poles. A choice: the poles usually converge within a few
+/// relocations.
 const ROUNDS: usize = 20;
 
-/// Singular value of normalized columns below which they depend on each other: about the rounding of their sums.
+/// Smallest singular value of the normalized columns of a vector fit's equations; columns below it are linearly
+/// dependent. It is about the rounding error of the sums.
 const DEPENDENT: Tolerance = Tolerance::Absolute(1e-13);
 
 /// Error of fitting a sum of modes.
@@ -26,7 +28,7 @@ pub enum RationalFitError {
     Undetermined {
         /// Number of frequencies.
         lines: usize,
-        /// Number of functions that are not zero.
+        /// Number of fitted receptances that are not zero at all frequencies.
         functions: usize,
         /// Number of modes.
         modes: usize,
@@ -34,7 +36,7 @@ pub enum RationalFitError {
     /// The least-squares equations have no computable singular values.
     #[error(transparent)]
     Equations(#[from] SingularValueError),
-    /// The list of orders to try is empty.
+    /// The list of mode numbers to try is empty.
     #[error("no model order is tried")]
     NoOrder,
     /// The poles cannot be computed.
@@ -67,7 +69,7 @@ impl RationalFit {
     }
 }
 
-/// Fits `modes` modes to `functions`, each with one value per frequency.
+/// Fits `modes` modes with common poles to the receptances `functions`, each with one value per frequency.
 ///
 /// # Errors
 /// There are too few frequencies, or an iteration exceeds its bound.
@@ -93,7 +95,8 @@ pub(super) fn fit(
     residues(frequency_hz, functions, poles)
 }
 
-/// Basis functions of a conjugate pole pair at s: those of the real and of the imaginary part of the residue.
+/// Basis functions of a pair of conjugate poles at s, whose real coefficients are the real and the imaginary part of
+/// the residue.
 fn pair(s: Complex64, pole: Complex64) -> [Complex64; 2] {
     let (a, b) = ((s - pole).inv(), (s - pole.conj()).inv());
     [a + b, Complex64::i() * (a - b)]
@@ -108,7 +111,7 @@ fn basis(frequency_hz: f64, poles: &[Complex64], scale: f64) -> Vec<Complex64> {
     row
 }
 
-/// Error for fewer equations than unknowns.
+/// Error of a vector fit with fewer equations than unknowns.
 fn undetermined(frequency_hz: &[f64], functions: &[&[Complex64]], modes: usize) -> RationalFitError {
     let is_zero = |function: &&&[Complex64]| function.iter().all(|h| h.norm_sqr() == 0.0);
     RationalFitError::Undetermined {
@@ -151,7 +154,8 @@ fn relocated(
             matrix[(2 * k, width + own)] = h.re;
             matrix[(2 * k + 1, width + own)] = h.im;
         }
-        // Eliminates the residues of this function: the remaining equations have the common unknowns c_n only.
+        // Eliminates the residues of this receptance: the remaining equations have only the unknowns c_n, which all
+        // receptances share.
         let common = eliminated(matrix, width);
         let count = common.nrows().min(own);
         let at = left.nrows();
@@ -170,7 +174,8 @@ fn relocated(
     Ok(zeros(poles, &c)?)
 }
 
-/// Zeros of σ = 1 + Σ c_n φ_n: the eigenvalues of A − b cᵀ in real form. Zeros with positive real part are mirrored at the imaginary axis.
+/// Zeros of σ = 1 + Σ c_n φ_n: the eigenvalues of A − b cᵀ in real form, where A holds the poles of σ and b the inputs
+/// of its state-space form. Zeros with positive real part are mirrored at the imaginary axis.
 fn zeros(poles: &[Complex64], c: &DVector<f64>) -> Result<Vec<Complex64>, EigenvalueError> {
     let size = 2 * poles.len();
     let mut matrix = DMatrix::<f64>::zeros(size, size);
@@ -198,7 +203,7 @@ fn zeros(poles: &[Complex64], c: &DVector<f64>) -> Result<Vec<Complex64>, Eigenv
     Ok(upper)
 }
 
-/// Residues for given poles by linear least squares.
+/// Residues of the receptances `functions` for given poles by linear least squares.
 ///
 /// # Errors
 /// There is no frequency, or an iteration exceeds its bound.
@@ -216,7 +221,7 @@ pub fn residues(
             matrix[(2 * k + 1, column)] = value.im;
         }
     }
-    // The basis spans many powers of ten.
+    // Each basis function is normalized, since their magnitudes span many powers of ten.
     let norms: Vec<f64> = matrix.column_iter().map(|column| column.norm()).collect();
     for (mut column, norm) in matrix.column_iter_mut().zip(&norms) {
         if *norm > 0.0 {
@@ -230,7 +235,8 @@ pub fn residues(
         let values = function.iter().flat_map(|h| [h.re, h.im]);
         let right = DVector::from_iterator(2 * frequency_hz.len(), values);
         let solution = equations.solve(&right);
-        // Residual of each function relative to the function itself, so that all functions have equal weight.
+        // The residual of each receptance is divided by the receptance itself, so that all receptances have equal
+        // weight.
         let norm = right.norm_squared();
         if norm > 0.0 {
             residual += (&matrix * &solution - &right).norm_squared() / norm;

@@ -42,9 +42,9 @@ pub struct RecordSpectra {
     pub seconds: f64,
     /// Frequencies of the lines, Hz.
     pub frequency_hz: Vec<f64>,
-    /// Transforms of the forces, in the order x, y, z.
+    /// Transforms of the force channels, in the order x, y, z.
     pub forces: Vec<ChannelLines>,
-    /// Transforms of the responses, in the order x, y, z.
+    /// Transforms of the response channels, in the order x, y, z.
     pub responses: Vec<ChannelLines>,
 }
 

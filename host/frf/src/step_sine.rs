@@ -13,13 +13,16 @@ use super::criteria::{
 };
 use super::test_channels::TestChannels;
 
-/// Decay time of the tracked force amplitude, in periods of the excitation. A choice: more than one period, and less than a frequency step.
+/// Decay time of the amplitude with which the force of a step-sine test is tracked, in periods of the excitation. A
+/// choice: more than one period, and less than a frequency step.
 const FORGET: f64 = 3.0;
 
-/// Longest decay time of the tracked force amplitude, s; also the decay time before the first period is known. A choice.
+/// Longest decay time of the amplitude with which the force of a step-sine test is tracked, s; also the decay time
+/// before the first period is known. A choice.
 const FORGET_S: f64 = 1.0;
 
-/// Number of subsegments of a step that are demodulated separately, to estimate noise and settling. A choice.
+/// Number of subsegments of a frequency step in which force and response are demodulated separately, to estimate noise
+/// and settling. A choice.
 const SUBSEGMENTS: usize = 8;
 
 /// Result of one frequency step.
@@ -28,22 +31,22 @@ pub(super) struct FrequencyStep {
     pub(super) frequency_hz: f64,
     /// Number of samples of the frequency step.
     samples: usize,
-    /// Mean amplitude of the force, N.
+    /// Mean amplitude of the force over the frequency step, N.
     pub(super) force_n: f64,
-    /// Phasor ratio response/force of each response, in SI units of the measured quantity.
+    /// Ratio of the response phasor to the force phasor for each response, (m, m/s or m/s²)/N as measured.
     pub(super) h: Vec<Complex64>,
     /// Coherence of each response over the subsegments of the step.
     pub(super) coherence: Vec<f64>,
     /// Standard deviation of |H| of each response, in the unit of `h`.
     pub(super) deviation: Vec<f64>,
-    /// True if all responses reached steady state within the step.
+    /// True if the phasor ratios of all responses reached their steady state within the step.
     pub(super) is_settled: bool,
 }
 
 /// All steps of a record at one force level.
 #[derive(Clone, Debug)]
 pub(super) struct ForceLevel {
-    /// Median of the force amplitudes of the steps, N.
+    /// Median of the force amplitudes of the frequency steps, N.
     pub(super) force_n: f64,
     /// Steps by ascending frequency. Of several steps at one frequency the longest is kept; of steps of about equal length, the last.
     pub(super) steps: Vec<FrequencyStep>,
@@ -115,7 +118,8 @@ pub(super) fn step_sine(channels: &TestChannels<'_>) -> Result<StepSine, FrfErro
     })
 }
 
-/// Divides the steps into passes through the frequency range: a new pass begins when the frequency of an earlier step returns.
+/// Divides the frequency steps, in the order of time, into passes through the frequency range: a new pass begins when
+/// the frequency of an earlier step returns.
 fn passes(steps: Vec<FrequencyStep>) -> Vec<Vec<FrequencyStep>> {
     let mut passes: Vec<Vec<FrequencyStep>> = Vec::new();
     for step in steps {
@@ -185,7 +189,8 @@ fn tone_segments(force: &[f64], rate: f64) -> Vec<ToneSegment> {
         }
         while to < periods.len() {
             let now = mean(to);
-            // One deviating period may be noise; two in a row begin a new step; a single long period is a pause.
+            // One deviating excitation period may be noise; two in a row begin a new frequency step; a single long
+            // period is a pause of the sine.
             let off = |k: usize| periods.get(k).map_or(0.0, |period| (period - now).abs());
             let is_off = |k: usize| off(k) > tolerance(now);
             let drift = || (crossings[to] - crossings[to - PERIODS_MIN]) / PERIODS_MIN as f64 - now;
@@ -256,7 +261,7 @@ fn demodulated(
 ) -> Option<FrequencyStep> {
     let period = refined(force, tone);
     let periods = ((tone.last - tone.first) as f64 / period).floor() as usize;
-    // Whole number of periods in each subsegment.
+    // Number of excitation periods in each subsegment; it is whole, so that each subsegment averages over full periods.
     let periods_per_subsegment = (periods / SUBSEGMENTS).max(1);
     let subsegments = periods / periods_per_subsegment;
     let length = (periods_per_subsegment as f64 * period).round() as usize;
@@ -314,7 +319,7 @@ fn demodulated(
     Some(step)
 }
 
-/// H1 estimate over the subsegments of a step, its coherence, and the standard deviation of |H|.
+/// H1 estimate over the subsegments of a frequency step, its coherence, and the standard deviation of |H|.
 fn averaged(forces: &[Phasor], responses: &[Phasor]) -> (Complex64, f64, f64) {
     let count = forces.len() as f64;
     let pairs = || responses.iter().zip(forces).map(|(x, f)| (x.value, f.value));
@@ -414,7 +419,8 @@ fn phasor(signal: &[f64], first: usize, length: usize, period: f64) -> Option<Ph
     let count = length as f64;
     Some(Phasor {
         value: Complex64::new(solution[0], solution[1]),
-        // Sum of the variances of real and imaginary part, 2σ²/n each, with the residual variance σ².
+        // Variance of the complex amplitude: the sum of the variances of its real and imaginary part, 2σ²/n each, with
+        // the residual variance σ² of n samples.
         variance: 4.0 * residual / (count - 4.0).max(1.0) / count,
     })
 }

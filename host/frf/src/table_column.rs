@@ -8,9 +8,9 @@ use super::frf_unit::{FrfUnit, frf_unit, pair_of};
 /// Content of a column.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Content {
-    /// Frequency, with the factor to Hz.
+    /// Column of frequencies; the factor converts its values to Hz.
     Frequency(f64),
-    /// A part of a frequency response function.
+    /// Column with one part of complex FRF values, such as the real part or the phase.
     Value(Part),
     /// Coherence.
     Coherence,
@@ -24,7 +24,7 @@ pub(super) enum Part {
     Real,
     Imaginary,
     Magnitude,
-    /// Magnitude in decibels, 20·log₁₀ of the value in its unit.
+    /// Magnitude in decibels: 20·log₁₀ of the magnitude in the unit of the column.
     Decibel,
     Phase(PhaseUnit),
 }
@@ -43,16 +43,19 @@ pub(super) struct Meaning {
     pub(super) content: Content,
     /// Directions of response and force.
     pub(super) directions: Option<(Direction, Direction)>,
-    /// Unit of the value; `None` if it is not stated.
+    /// Unit of the FRF values in the column, response per force; `None` if the file does not state it.
     pub(super) unit: Option<FrfUnit>,
-    /// Title of the column in lower case without the words of a part (real, phase …): equal for all columns of one receptance.
+    /// Title of the column in lower case without the words for real part, phase and the like; it is equal for all
+    /// columns of one receptance.
     pub(super) label: String,
-    /// Order of the time derivative that a word of the title names: 1 for mobility, 2 for accelerance, otherwise 0.
+    /// Order of the time derivative of displacement that a word of the column title names: 1 for mobility, 2 for
+    /// accelerance, otherwise 0.
     word_derivatives: i32,
 }
 
 impl Meaning {
-    /// Unit that the title suggests, for messages: that of a receptance, mobility or accelerance.
+    /// Unit that the column title suggests, proposed to the user in messages: that of a receptance, mobility or
+    /// accelerance.
     pub(super) fn proposed_unit(&self) -> &'static str {
         match self.word_derivatives {
             1 => "(m/s)/N",
@@ -62,10 +65,10 @@ impl Meaning {
     }
 }
 
-/// Words of a title, in lower case, that mark a column of frequencies.
+/// Words that mark a column of frequencies if they occur in its title, in lower case.
 const FREQUENCY: &[&str] = &["frequency", "freq", "frequenz", "frequencies", "hz"];
 
-/// For each part of a complex value, the words of a title, in lower case, that mark it.
+/// For each part of a complex FRF value, the words that mark it in a column title, in lower case.
 const PARTS: &[(Part, &[&str])] = &[
     (Part::Real, &["real", "re", "realteil", "realpart"]),
     (
@@ -83,13 +86,14 @@ const PARTS: &[(Part, &[&str])] = &[
     ),
 ];
 
-/// Words of a title, in lower case, that do not distinguish one response from another.
+/// Words of a column title that do not distinguish one receptance from another, in lower case.
 const EMPTY: &[&str] = &["frf", "h", "part", "of", "the", "in", "response", "function"];
 
-/// Meaning of a column.
+/// Meaning of a column of a text table: from the name that the option `--map` or the sidecar states, otherwise from its
+/// title.
 ///
 /// # Errors
-/// The unit is unknown, or contradicts the name that option or sidecar give.
+/// The unit is unknown, or contradicts the stated name.
 pub(super) fn meaning(
     column: &TextColumn,
     map: Option<&ColumnMap>,
@@ -115,7 +119,8 @@ pub(super) fn meaning(
     }
 }
 
-/// Meaning of a stated name, such as `hxx_re`, `hxy_phase`, `coherence_xx` or `frequency_hz`.
+/// Meaning of a column from the name that option or sidecar state for it, such as `hxx_re`, `hxy_phase`, `coherence_xx`
+/// or `frequency_hz`.
 fn by_name(name: &str, unit: Option<&str>, in_degrees: bool) -> Result<Meaning, String> {
     let of = |content, directions, unit| Meaning {
         content,
@@ -144,7 +149,7 @@ fn by_name(name: &str, unit: Option<&str>, in_degrees: bool) -> Result<Meaning, 
         Some((pair_of(pair)?, part))
     });
     let Some((pair, part)) = found else {
-        // A stated name that is no name of an FRF table means that the column is not used.
+        // If the name that the user states for a column is none of an FRF table, the column is not used.
         return Ok(of(Content::Other, None, None));
     };
     let unit = match part {
@@ -158,7 +163,7 @@ fn by_name(name: &str, unit: Option<&str>, in_degrees: bool) -> Result<Meaning, 
     })
 }
 
-/// Unit behind `dB re 1 m/N`, `dB m/N` or `dB`.
+/// Unit in the level units `dB re 1 m/N` and `dB m/N`, here `m/N`; empty for `dB` alone.
 fn unit_of_level(unit: &str) -> &str {
     let lower = unit.to_lowercase();
     let rest = lower
@@ -178,7 +183,7 @@ fn phase(unit: Option<&str>) -> PhaseUnit {
     }
 }
 
-/// Meaning of a column from the words of its title and from its unit.
+/// Meaning of a column of a text table from the words of its title and from its unit.
 fn by_words(name: &str, unit: Option<&str>) -> Result<Meaning, String> {
     let (name, unit) = match unit {
         Some(unit) => (name.to_owned(), Some(unit.to_owned())),
@@ -243,7 +248,8 @@ fn by_words(name: &str, unit: Option<&str>) -> Result<Meaning, String> {
     Ok(found)
 }
 
-/// Splits `Hxx Real (m/N)` and `Hxx (dB re 1 m/N)`, whose unit is no unit of a channel.
+/// Splits titles such as `Hxx Real (m/N)` and `Hxx (dB re 1 m/N)` into name and unit. The reader of recordings leaves
+/// such units in the title, since they are no units of a channel.
 fn name_and_ratio(title: &str) -> (String, Option<String>) {
     let inner = title.trim().strip_suffix(')');
     if let Some(inner) = inner {
@@ -260,7 +266,8 @@ fn name_and_ratio(title: &str) -> (String, Option<String>) {
     (title.into(), None)
 }
 
-/// Order of the time derivative that a word names: 0 receptance, 1 mobility, 2 accelerance.
+/// Order of the time derivative of displacement that a word of a column title names: 0 receptance, 1 mobility, 2
+/// accelerance.
 fn derivatives(word: &str) -> Option<i32> {
     match word {
         "receptance" | "compliance" | "flexibility" | "nachgiebigkeit" => Some(0),
@@ -290,7 +297,7 @@ fn directions(label: &[&str]) -> Option<(Direction, Direction)> {
     }
 }
 
-/// True if titles are those of an FRF table: a column of frequencies and a part of a response.
+/// True if the column titles are those of an FRF table: one column has frequencies, and one has a part of an FRF.
 pub(super) fn is_head(titles: &[String]) -> bool {
     let of = |title: &String| {
         let (name, unit) = match title.strip_suffix(']').and_then(|inner| inner.rsplit_once('[')) {

@@ -45,12 +45,15 @@ impl FrfTable {
         Self::import(path, &Import::default()).map(|imported| imported.table)
     }
 
-    /// Reads an FRF table with what the user states about its columns; also says how it was understood.
+    /// Reads an FRF table with what the user states about its columns; the result also describes the meaning found for
+    /// each column.
     ///
-    /// Text tables of other programs have the extension csv, txt, dat, tsv or asc: real and imaginary part, or magnitude (also in dB) and phase.
+    /// Text tables of other programs have the extension csv, txt, dat, tsv or asc: real and imaginary part, or
+    /// magnitude (also in dB) and phase.
     ///
     /// # Errors
-    /// As [`FrfTable::read`]; also if directions or units are not stated. The message names the option that states them.
+    /// As [`FrfTable::read`]; also if directions or units are not stated. The message names the option that states
+    /// them.
     pub fn import(path: impl AsRef<Path>, import: &Import) -> Result<ImportedTable, FrfError> {
         let path = path.as_ref();
         let ending = quietcut_recording::file::ending(path);
@@ -295,7 +298,8 @@ fn assemble(path: &Path, columns: Vec<Column>) -> Result<FrfTable, FrfError> {
                 column.title
             )));
         };
-        // The receptance is created once, at the column of its real part.
+        // Real and imaginary column form one receptance; it is created at its real column, and the imaginary column is
+        // skipped.
         if part == ComplexPart::Imaginary {
             continue;
         }

@@ -1,8 +1,10 @@
-//! FRF tables in text files of other programs: real and imaginary part, or magnitude and phase, of receptance, mobility or accelerance.
+//! FRF tables in text files of other programs: real and imaginary part, or magnitude and phase, of receptance, mobility
+//! or accelerance.
 //!
-//! Columns are understood from words and units: `Frequency (Hz)`, `Real`, `Imag`, `Mag (dB)`, `Phase (deg)`, `Hxx Real (m/N)`. What is not
-//! stated is asked for: the option `--map` or the sidecar names the column (`hxx_re`, `hxx_im`, `hxx_mag`, `hxx_phase`, `hxx_db`,
-//! `coherence_xx`, `frequency_hz`) and its unit.
+//! The meaning of a column follows from the words and units of its title: `Frequency (Hz)`, `Real`, `Imag`, `Mag (dB)`,
+//! `Phase (deg)`, `Hxx Real (m/N)`. If the title does not state it, the user must: the option `--map` or the sidecar
+//! names the column (`hxx_re`, `hxx_im`, `hxx_mag`, `hxx_phase`, `hxx_db`, `coherence_xx`, `frequency_hz`) and its
+//! unit.
 
 use std::f64::consts::TAU;
 use std::path::Path;
@@ -15,7 +17,7 @@ use super::{Frf, FrfError, FrfTable};
 use quietcut_model::structure::Direction;
 use quietcut_recording::{Import, Sidecar, TextColumn, TextTable};
 
-/// An FRF table, and how its columns were understood.
+/// An FRF table read from a file, with a description of how its columns were interpreted.
 #[derive(Clone, Debug)]
 pub struct ImportedTable {
     /// The table, receptances in m/N.
@@ -60,7 +62,7 @@ pub(super) fn read(path: &Path, import: &Import) -> Result<ImportedTable, FrfErr
     assemble(path, &columns, text.notes)
 }
 
-/// Real and imaginary part of one response, or its magnitude and phase.
+/// The two columns of one receptance: real and imaginary part, or magnitude and phase.
 struct Pair<'a> {
     label: &'a str,
     first: (&'a TextColumn, &'a Meaning),
@@ -91,7 +93,7 @@ fn assemble(
     let mut entries = Vec::new();
     let mut said = Vec::new();
     for pair in &pairs {
-        // Directions and unit are stated, since `require_statements` has refused the table otherwise.
+        // Directions and unit of the receptance are stated, since `require_statements` has refused the table otherwise.
         let (Some((response, force)), Some(unit)) = (pair.directions(), pair.unit()) else {
             continue;
         };
@@ -147,7 +149,7 @@ fn pairs<'a>(path: &Path, columns: &'a [(&'a TextColumn, Meaning)]) -> Result<Ve
         let Content::Value(part) = meaning.content else {
             continue;
         };
-        // Each pair is made once, at the column of its real part or magnitude.
+        // Each pair of columns is formed once, at the column of the real part or magnitude.
         if matches!(part, Part::Imaginary | Part::Phase(_)) {
             continue;
         }
@@ -195,7 +197,8 @@ fn pairs<'a>(path: &Path, columns: &'a [(&'a TextColumn, Meaning)]) -> Result<Ve
     Ok(pairs)
 }
 
-/// Refuses pairs without directions, unit of response per force, or unit of the phase, with the option that states them.
+/// Refuses column pairs without directions, unit of response per force, or unit of the phase. The message names the
+/// option that states them.
 fn require_statements(path: &Path, pairs: &[Pair<'_>]) -> Result<(), FrfError> {
     const PROPOSED: [&str; 9] = ["xx", "yx", "zx", "xy", "yy", "zy", "xz", "yz", "zz"];
     let mut taken: Vec<String> = pairs
@@ -281,7 +284,8 @@ impl Pair<'_> {
         self.first.1.directions
     }
 
-    /// Unit of the response per force: that of the first column, or if it has none, that of the column of the imaginary part.
+    /// Unit of response per force of the column pair: that of its first column, or if it has none, that of its column
+    /// of the imaginary part.
     fn unit(&self) -> Option<FrfUnit> {
         self.first.1.unit.or(match self.second.1.content {
             Content::Value(Part::Imaginary) => self.second.1.unit,
@@ -289,7 +293,7 @@ impl Pair<'_> {
         })
     }
 
-    /// Complex values of the pair, in the unit of the file.
+    /// Complex FRF values of the column pair, in the unit of the file.
     fn values(&self, path: &Path) -> Result<Vec<Complex64>, FrfError> {
         let (first, second) = (&self.first.0.values, &self.second.0.values);
         let to_radians = match self.second.1.content {
@@ -330,10 +334,12 @@ impl Pair<'_> {
     }
 }
 
-/// Factor to radians of a phase whose unit is not stated; `None` if the values allow both.
+/// Factor to radians of a column of phases whose unit is not stated; `None` if the values allow both degrees and
+/// radians.
 ///
-/// A range beyond two revolutions (4π) is in degrees: the phase of a few modes stays within one revolution. Values within ±π that span 1.5 or more are
-/// radians: in degrees such a phase would not move at all, and no mode would be in the band.
+/// An absolute value above two revolutions (4π) is in degrees: the phase of a few modes stays within one revolution.
+/// Values within ±π that span 1.5 or more are radians: a phase that spans 1.5 degrees would not show any resonance in
+/// the band.
 fn phase_unit(values: &[f64]) -> Option<f64> {
     let (low, high) = values
         .iter()
@@ -350,7 +356,8 @@ fn phase_unit(values: &[f64]) -> Option<f64> {
     }
 }
 
-/// Coherence of the same directions or label; of a table with one response, the only one.
+/// Coherence of the receptance with the given directions or column label; if the table has one receptance only, its
+/// only coherence.
 fn coherence(
     columns: &[(&TextColumn, Meaning)],
     label: &str,

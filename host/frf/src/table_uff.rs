@@ -222,8 +222,8 @@ impl FrfTable {
         Ok(())
     }
 
-    /// First frequency and line spacing, Hz, both rounded to seven digits, if they give every frequency of the table within 0.001 spacings;
-    /// otherwise `None`.
+    /// First frequency and line spacing of an evenly spaced table, Hz, both rounded to seven digits. `None` if they
+    /// miss a frequency of the table by more than 0.001 line spacings.
     fn even(&self) -> Option<(f64, f64)> {
         let (&first, &last) = (self.frequency_hz().first()?, self.frequency_hz().last()?);
         let count = self.frequency_hz().len();

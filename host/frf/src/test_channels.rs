@@ -10,11 +10,11 @@ use super::FrfError;
 pub(super) struct TestChannels<'a> {
     /// The recording.
     pub(super) recording: &'a Recording,
-    /// Force channels with directions, in the order x, y, z.
+    /// Force channels with their directions, in the order x, y, z.
     pub(super) forces: Vec<(Direction, &'a Channel)>,
     /// Response channels, in the order x, y, z.
     pub(super) responses: Vec<Response<'a>>,
-    /// Warnings about channels that were selected among several in one direction.
+    /// Warnings for the user: of several channels in one direction, only one is used.
     pub(super) warnings: Vec<String>,
 }
 

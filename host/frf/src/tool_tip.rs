@@ -11,7 +11,8 @@ use super::rational_fit::{RationalFit, RationalFitError, fit};
 use super::{Frf, FrfError, FrfTable};
 use quietcut_model::structure::Direction;
 
-/// Largest number of modes in a fit. A choice; vector fitting of more modes needs a narrower band.
+/// Largest number of modes that a vector fit tries for the tool-tip calibration. A choice; vector fitting of more modes
+/// needs a narrower band.
 const MODES_MAX: usize = 8;
 
 /// Ratio of the mode shape at tool tip and sensor, for one mode and response direction.
@@ -21,7 +22,7 @@ pub struct ModeRatio {
     pub frequency_hz: f64,
     /// Direction of the response at tip and sensor.
     pub response: Direction,
-    /// Mode shape ratio φ_T/φ_S (tip over sensor).
+    /// Mode shape ratio φ_T/φ_S: displacement of the tool tip T over that of the sensor S on the housing.
     pub ratio: f64,
     /// RMS deviation of the residues at the tip from `ratio` times those at the sensor, relative to this product. A rigid body in a measurement
     /// with little noise gives a few 0.01.
@@ -159,13 +160,15 @@ pub(super) fn modes(
 ) -> Result<RationalFit, RationalFitError> {
     let mut best: Option<RationalFit> = None;
     let mut refused = None;
-    // Number of successive mode counts without improvement. The search stops after two, since a further mode may help only with the next.
+    // Number of successive fits, each with one mode more, without improvement of the residual. The search stops after
+    // two, since a further mode may help only with the next.
     let mut without_improvement = 0;
     for count in 1..=MODES_MAX {
         let next = match fit(frequency_hz, functions, count) {
             Ok(next) => next,
             Err(error) => {
-                // The reason of the smallest number of modes is reported: it is the easiest to remedy.
+                // If no number of modes can be fitted, the error of the smallest number is reported: it is the easiest
+                // to remedy.
                 refused.get_or_insert(error);
                 continue;
             }
@@ -186,9 +189,10 @@ pub(super) fn modes(
     best.ok_or_else(|| refused.unwrap_or(RationalFitError::NoOrder))
 }
 
-/// Indices of the poles that count as modes: lightly damped, and with a significant peak in at least one function.
+/// Indices of the fitted poles that count as modes: lightly damped, and with a significant peak in at least one
+/// receptance.
 pub(super) fn mode_numbers(modes: &RationalFit) -> Vec<usize> {
-    // Height of the resonance peak of a mode in a function: |residue| / decay rate.
+    // Height of the resonance peak of a mode in a receptance, m/N: |residue| / decay rate.
     let height =
         |function: usize, mode: usize| modes.residues[function][mode].norm() / modes.poles[mode].re.abs();
     let functions = 0..modes.residues.len();

@@ -1,30 +1,33 @@
-//! Folding of hammer tests: content above half the sample rate that an analog-to-digital converter without an anti-aliasing
-//! filter adds to the record.
+//! Error of hammer tests by aliasing: an analog-to-digital converter without an anti-aliasing filter folds content
+//! above half the sample rate into the record.
 //!
-//! A sample rate f_s folds the content at f_s − f and f_s + f onto the line f. What stands there is not in the record, but its
-//! level at half the sample rate is: both sides of f_s/2 add up there, so that the level A(f_s/2) of the record is up to twice
-//! the true one. The force of an impact begins and ends at zero without a jump, and the spectrum of such a pulse falls as 1/f²
-//! (Bracewell, The Fourier Transform and Its Applications, chapter 8). At k f_s ± f, with f far below f_s/2, it is therefore at
-//! most A(f_s/2)/(8 k²), and all k and both sides together fold at most
+//! A sample rate f_s folds the content at f_s − f and f_s + f onto the line f. The record does not show this content,
+//! but it bounds it: at half the sample rate the contents of both sides of f_s/2 add up, so that the level A(f_s/2) of
+//! the record is up to twice the true one. The force of an impact begins and ends at zero without a jump, and the
+//! spectrum of such a pulse falls as 1/f² (Bracewell, The Fourier Transform and Its Applications, chapter 8). At k f_s
+//! ± f, with f far below f_s/2, it is therefore at most A(f_s/2)/(8 k²), and all k and both sides together fold at most
 //!
 //!   A(f_s/2)/4 · Σ 1/k² = π²/24 · A(f_s/2)
 //!
-//! onto the line. The same bound holds for the response, even as an acceleration, which follows a force without jumps. Relative
-//! to the line, the bounds of force and response add up to the largest relative error of the frequency response function.
+//! onto the line. The same bound holds for the response, even as an acceleration, which follows a force without jumps.
+//! The bounds of force and response, each relative to the level of its channel at the line, add up to the largest
+//! relative error of the frequency response function.
 
 use crate::cross_spectra::{CrossSpectra, Segments, averaged};
 use crate::test_channels::TestChannels;
 
-/// Share of the band below half the sample rate whose largest level, carried on by 1/f², counts as that at half the sample rate.
-/// The spectrum of a pulse of n samples has zeros at every n-th part of the sample rate: a quarter of the band holds more than
-/// one maximum between zeros for pulses of more than 8 samples.
+/// Width of the band below half the sample rate from which the level there is estimated, as a fraction of half the
+/// sample rate. The largest level of the band, scaled to half the sample rate by 1/f², is used. The spectrum of a pulse
+/// of n samples has zeros at every n-th part of the sample rate: a quarter of the band holds more than one maximum
+/// between zeros for pulses of more than 8 samples.
 const TOP: f64 = 0.25;
 
-/// Content that folds onto a line, relative to the level at half the sample rate: π²/24.
+/// Largest spectral level that aliasing adds to a frequency line, as a fraction of the level at half the sample rate:
+/// π²/24.
 const FOLDED: f64 = std::f64::consts::PI * std::f64::consts::PI / 24.0;
 
-/// Largest power of every channel near half the sample rate, at the scale of the spectra; 0 for a channel with an
-/// anti-aliasing filter. Forces come first.
+/// Largest power of every channel of a hammer test near half the sample rate, at the scale of the cross-spectra; 0 for
+/// a channel with an anti-aliasing filter. Forces come first.
 pub(super) fn top_powers(
     channels: &TestChannels<'_>,
     signals: &[&[f64]],
@@ -53,7 +56,7 @@ pub(super) fn top_powers(
                 return 0.0;
             }
             let half_hz = 0.5 * rate;
-            // The level at each line is carried on to half the sample rate by 1/f², in power 1/f⁴.
+            // The level of a channel at each line is scaled to half the sample rate by 1/f², its power by 1/f⁴.
             let powers = (0..top.frequency_hz.len())
                 .map(|line| top.at(line, index, index).re * (top.frequency_hz[line] / half_hz).powi(4));
             powers.fold(0.0, f64::max)
@@ -61,7 +64,7 @@ pub(super) fn top_powers(
         .collect()
 }
 
-/// Largest relative error by folding of the frequency response function of one response at one line, with one force.
+/// Largest relative error by aliasing of the frequency response function of one response at one line, with one force.
 pub(super) fn relative_error(spectra: &CrossSpectra, tops: &[f64], line: usize, response: usize) -> f64 {
     let share = |channel: usize| {
         let power = spectra.at(line, channel, channel).re;

@@ -21,7 +21,7 @@ pub struct RecordingGroup {
     pub excitation: Excitation,
     /// Effective number of independent averages of the spectra of the group.
     pub averages: f64,
-    /// Frequencies left out because the forces are linearly dependent there, Hz.
+    /// Frequencies left out because the forces of the group are linearly dependent there, Hz.
     pub left_out_hz: Vec<f64>,
     /// Smallest singular value of the force spectra over all frequencies of the group, each force divided by its root mean square; 1 for a
     /// single force.
@@ -31,8 +31,9 @@ pub struct RecordingGroup {
 }
 
 impl RecordingGroup {
-    /// False for a hammer test with fewer than three single impacts: one impact has the coherence 1 by construction, and the
-    /// scatter of two tells nothing about an interval.
+    /// True if coherence and standard deviation of the group are meaningful. False for a hammer test with fewer than
+    /// three single impacts: one impact has the coherence 1 by construction, and the scatter of two determines no
+    /// interval.
     pub fn has_scatter(&self) -> bool {
         self.impacts
             .as_ref()
@@ -40,7 +41,8 @@ impl RecordingGroup {
     }
 }
 
-/// One receptance of a group with its errors at the frequencies of the group.
+/// One receptance of a group of recordings, with its random error and its error by aliasing at each frequency of the
+/// group.
 pub(super) struct MeasuredEntry {
     pub(super) frf: Frf,
     /// Standard deviation of |H|, m/N.

@@ -67,10 +67,12 @@ pub(super) fn steady(
     ))
 }
 
-/// Number of segments for each force if no frequency resolution is set. A choice between random error and resolution.
+/// Number of half-overlapping segments of a random record for each force if no frequency resolution is set. A choice
+/// between random error and resolution.
 const SEGMENTS_PER_FORCE: usize = 8;
 
-/// Number of averaged lines for each force of a sweep if no frequency resolution is set. A choice between random error and resolution.
+/// Number of neighbouring frequency lines averaged in a swept-sine test for each force if no frequency resolution is
+/// set. A choice between random error and resolution.
 const LINES_PER_FORCE: usize = 8;
 
 /// Length of the taper at each end of the record of a sweep, as a fraction of the record. A choice: the taper reduces leakage from vibration

@@ -82,7 +82,7 @@ pub(super) fn stepped(
     Ok(receptances(group, &lines, first, warnings))
 }
 
-/// Force level to evaluate: the only level of the test, or the level nearest to `force_n`, N.
+/// Force level of a step-sine test to evaluate: the only level of the test, or the level nearest to `force_n`, N.
 fn level(
     channels: &TestChannels<'_>,
     mut levels: Vec<ForceLevel>,

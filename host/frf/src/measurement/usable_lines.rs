@@ -25,7 +25,8 @@ pub(super) fn keep_excited(lines: &mut Vec<FrfLine>, spectra: &[CrossSpectra], c
     lines.retain(is_excited);
 }
 
-/// Removes the frequency lines at which the forces are linearly dependent; an error if these are more than half of all lines.
+/// Removes the frequency lines at which the forces are linearly dependent, and lists them in `group`. An error if these
+/// are more than half of all lines.
 pub(super) fn independent(
     lines: &mut Vec<FrfLine>,
     group: &mut RecordingGroup,
