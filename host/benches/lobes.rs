@@ -1,9 +1,9 @@
-//! Time of every method, per point and per chart, at equal accuracy.
+//! Computing time of every stability method, per point of a chart and per chart, at equal accuracy of the Floquet multipliers.
 //!
-//! `cargo bench -p quietcut --bench lobes` first prints how fine each method must be for a relative error of 1e-4 in
-//! every multiplier with |μ| ≤ 2 of a coarse chart, what a point and a chart then cost, and the ratio to the default; then what
-//! a limit costs where a structure has cubic terms;
-//! then criterion measures the default on the charts of 200 × 100 cells. All of it on one thread.
+//! `cargo bench -p quietcut --bench lobes` first prints the number of steps with which each method reaches a relative error of 1e-4 in
+//! every Floquet multiplier μ with |μ| ≤ 2 on a coarse chart, the time per point and per chart with that number of steps, and the ratio of
+//! that time to the default method's. It then prints the time per stability limit of structures with cubic terms. Criterion then measures
+//! the default method on charts of 200 × 100 cells. All of it runs on one thread.
 
 #![allow(missing_docs, clippy::expect_used, clippy::panic)]
 
@@ -18,13 +18,13 @@ use quietcut::stability::{
     Pitched, Problem, Sdm, SdmOrder, SemiDiscretization, Zoa, cell_chart,
 };
 
-/// Relative error that every method has to reach.
+/// Largest relative error of |μ| that each stability method may have, μ being the largest Floquet multiplier.
 const ACCURACY: f64 = 1e-4;
 
-/// Beyond this size a multiplier only has to be on the right side.
+/// Largest |μ| of a Floquet multiplier whose value must be accurate. Of a larger multiplier, only |μ| > 1 (unstable) must be right.
 const LARGE: f64 = 2.0;
 
-/// The finest mesh that is tried.
+/// Largest number of steps per period with which a stability method is tried.
 const STEPS_MAX: usize = 3000;
 
 struct Setting {
@@ -74,10 +74,11 @@ fn spaced(from: f64, to: f64, count: usize) -> Vec<f64> {
         .collect()
 }
 
-/// |μ| of every point of a grid.
+/// The points ((spindle speed in rev/min, axial depth in mm), |μ|) of a chart, μ being the largest Floquet multiplier.
 type Grid = Vec<((f64, f64), f64)>;
 
-/// The points of a coarse chart, with |μ| by the default method, whose error is below 1e-6.
+/// A chart of 5 speeds × 5 depths with |μ| of the largest Floquet multiplier by the default method, whose error is below 1e-6 · max(1,
+/// |μ|).
 fn reference(method: &dyn Method, setting: &Setting) -> Grid {
     let mut grid = Grid::new();
     for rpm in setting.speeds_rpm(5) {
@@ -90,7 +91,8 @@ fn reference(method: &dyn Method, setting: &Setting) -> Grid {
     grid
 }
 
-/// The largest relative error of the multipliers that must be accurate; infinite where a large one is on the wrong side.
+/// The largest relative error of |μ| over the chart points with |μ| ≤ [`LARGE`]. It is infinite if a point with larger |μ| is found stable,
+/// or if a point has no result.
 fn worst_error(grid: &Grid, size: impl Fn(f64, f64) -> Option<f64>) -> f64 {
     grid.iter()
         .map(|&((rpm, depth_mm), expected)| match size(rpm, depth_mm) {
@@ -101,8 +103,9 @@ fn worst_error(grid: &Grid, size: impl Fn(f64, f64) -> Option<f64>) -> f64 {
         .fold(0.0, f64::max)
 }
 
-/// Steps that the accuracy takes, about a tenth more than the fewest; `None` where the finest mesh does not reach it.
-/// `size` is |μ| with so many steps at a speed and depth, with an error of second order in the step.
+/// Number of steps per period with which |μ| reaches [`ACCURACY`] at all chart points, about a tenth more than the smallest such number;
+/// `None` if [`STEPS_MAX`] steps do not reach it. `size` computes |μ| from the number of steps, the speed in rev/min and the depth in mm,
+/// with an error of second order in the step.
 fn steps_needed(grid: &Grid, size: impl Fn(usize, f64, f64) -> Option<f64>) -> Option<usize> {
     let mut steps = 50;
     while steps <= STEPS_MAX {
@@ -116,7 +119,7 @@ fn steps_needed(grid: &Grid, size: impl Fn(usize, f64, f64) -> Option<f64>) -> O
     None
 }
 
-/// Seconds that each of the grid's points takes, in the mean; a grid is run through until it has taken long enough.
+/// Mean computing time per chart point, s. The points are computed at least once each and for at least 0.2 s, but not longer than 20 s.
 fn seconds_per_point(grid: &Grid, mut run: impl FnMut(f64, f64)) -> f64 {
     let began = Instant::now();
     let mut count = 0;
@@ -131,7 +134,7 @@ fn seconds_per_point(grid: &Grid, mut run: impl FnMut(f64, f64)) -> f64 {
     began.elapsed().as_secs_f64() / count as f64
 }
 
-/// Cells of the chart that is timed, in speed and depth.
+/// Number of spindle speeds and number of axial depths of the chart whose computing time is measured.
 const CELLS: (usize, usize) = (200, 100);
 
 fn print_row(name: &str, fineness: &str, per_point_s: f64, chart_s: f64, default_s: f64) {
@@ -198,7 +201,7 @@ fn compare(setting: &Setting) {
     compare_limits(setting, &default, &receptances);
 }
 
-/// Limits over speed: what methods by receptances are made for.
+/// Compares the computing times of stability limits at 50 spindle speeds: default method against the methods that use receptances.
 fn compare_limits(setting: &Setting, default: &Collocation, receptances: &FrequencyProblem) {
     println!("  limits at 50 speeds up to {} mm", setting.depth_mm);
     let speeds_rpm = setting.speeds_rpm(50);
@@ -239,7 +242,8 @@ fn compare_limits(setting: &Setting, default: &Collocation, receptances: &Freque
     }
 }
 
-/// Limits about the forced orbits of structures with cubic terms: over a whole range, and where feed moves them most.
+/// Computing times of stability limits about the forced orbits of structures with cubic terms, over a wide speed range and where feed moves
+/// the limits most.
 fn limits_with_cubic_terms() {
     for (file, rpm) in [
         ("kuka-kr90-full-cubic.toml", (480.0, 1_060.0)),

@@ -7,16 +7,17 @@ use rayon::prelude::*;
 use crate::signal::grid::Grid;
 use quietcut_model::structure::FirstOrder;
 
-/// Relative distance below which two poles count as one: rounding of the eigenvalues.
+/// Largest relative difference |λ₁ − λ₂|/|λ| of two poles of the structure that count as one pole: the rounding error of eigenvalues.
 const SAME: f64 = 1e-9;
-/// Least inverse modal mass of a mode along an axis, as a share of the largest there, with which the axis is said to excite the mode.
+/// Smallest inverse modal mass along an axis with which a mode counts as excited along that axis, as a fraction of the largest inverse
+/// modal mass there.
 const LEAST_INVERSE_MASS_SHARE: f64 = 1e-3;
 
 /// H(s) = Σ_r R_r/(s − λ_r) of a structure in first-order form, m/N; rows displacement, columns force.
 #[derive(Clone, Debug)]
 pub(crate) struct Receptance {
     terms: Vec<(Complex64, Matrix3<Complex64>)>,
-    /// The first-order form itself, if its matrix is defective and no sum over poles represents the receptance; otherwise `None`.
+    /// The first-order form of the structure, if its matrix is defective and no sum over poles represents the receptance; otherwise `None`.
     whole: Option<FirstOrder>,
 }
 

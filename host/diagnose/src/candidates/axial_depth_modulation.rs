@@ -11,7 +11,8 @@ use quietcut_model::effects::EffectName;
 
 pub(super) struct AxialDepthModulationCause;
 
-/// Largest distance from 1 of the coefficient of this effect, which is 1 in theory because the effect is on or off.
+/// Largest distance from 1 of the fitted coefficient of axial depth modulation b = b₀ − z, for the effect to be accepted. In theory the
+/// coefficient is 1.
 const ROUNDING: f64 = 0.35;
 
 impl Cause for AxialDepthModulationCause {

@@ -18,24 +18,24 @@ use quietcut_recording::Quantity;
 /// Where a cause acts.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub(crate) enum Location {
-    /// The cause acts on the whole machine.
+    /// Location of a cause that acts on the whole machine.
     Everywhere,
-    /// The cause acts along one of the machine's axes (0, 1, 2).
+    /// Location of a cause that acts along one of the machine's axes (0, 1, 2).
     Axis(usize),
-    /// The cause acts along each of these axes, with separate coefficients for each axis.
+    /// Location of a cause that acts along each of these machine axes, with separate coefficients for each axis.
     EachOf(Vec<usize>),
-    /// The cause couples two of the machine's axes.
+    /// Location of a cause that couples two of the machine's axes.
     Axes(usize, usize),
-    /// The cause acts in the channel of this name.
+    /// Location of a sensor error in the channel of this name.
     Channel(String),
-    /// The cause acts in each of these channels, with the same coefficients.
+    /// Location of a sensor error in all channels of these names, with the same coefficients.
     Channels(Vec<String>),
-    /// The cause acts in the channel of this name, which also reads this axis of the machine.
+    /// Location of a cross-axis error: the channel of this name also reads this axis of the machine.
     ChannelFrom(String, usize),
 }
 
 impl Location {
-    /// The direction of a location on one axis; otherwise `None`.
+    /// Direction x, y or z of a cause's location, if the location has exactly one axis; otherwise `None`.
     pub(crate) fn direction(&self) -> Option<Direction> {
         match self {
             Self::Axis(axis) | Self::ChannelFrom(_, axis) => Some(direction_of(*axis)),
@@ -43,7 +43,7 @@ impl Location {
         }
     }
 
-    /// The name of the channel of a location in one channel; otherwise `None`.
+    /// Channel name of a cause's location, if the location is exactly one channel; otherwise `None`.
     pub(crate) fn channel(&self) -> Option<&str> {
         match self {
             Self::Channel(name) | Self::ChannelFrom(name, _) => Some(name),
@@ -51,7 +51,7 @@ impl Location {
         }
     }
 
-    /// The keys `direction`, `directions` and `channel` of this location in a table `[extension.NAME]`.
+    /// The keys `direction`, `directions` and `channel` by which a table `[extension.NAME]` states this location of the cause.
     pub(crate) fn table(&self) -> toml::Table {
         let mut table = toml::Table::new();
         if let Some(direction) = self.direction() {
@@ -85,15 +85,15 @@ impl fmt::Display for Location {
     }
 }
 
-/// Contribution of a cause to a record, per unit of one coefficient.
+/// Contribution of a candidate cause to the residual of a record, per unit of one coefficient of the cause.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Regressor {
     /// Restoring force f_r along the machine's axes, N, upsampled. A record in the response domain compares −H·f_r with the residual, a
     /// record in the force domain f_r itself.
     pub restoring_n: [Vec<f64>; 3],
-    /// Direct contribution to the reading of each channel, at the samples of the record; empty for channels without one.
+    /// Contribution of a sensor error to the reading of each channel, at the samples of the record; empty for channels without one.
     pub observed: Vec<Vec<f64>>,
-    /// Contribution to the cutting force, of a cut.
+    /// Contribution of the cause to the cutting force, in a record of a cut; otherwise `None`.
     pub cut: Option<CutForce>,
 }
 
@@ -122,7 +122,8 @@ impl Regressor {
         }
     }
 
-    /// Contribution to the residual of each channel of `record`, sample by sample.
+    /// Contribution of this regressor to the residual of each channel of `record`, in the unit of the channel per unit of the coefficient,
+    /// sample by sample.
     pub(crate) fn columns(&self, record: &Record) -> Vec<Vec<f64>> {
         let count = record.grid.count();
         let mut columns: Vec<Vec<f64>> = (0..record.channels.len())
@@ -180,16 +181,16 @@ impl Regressor {
 /// Regressors of a cause in a record, one for each coefficient, or the reason why they cannot be computed there.
 pub(crate) type Regressors = Result<Vec<Regressor>, String>;
 
-/// Reason of a cause that is asked for regressors at a location it does not have.
+/// Error text for a request of regressors at a location where the cause cannot act.
 pub(crate) const WRONG_LOCATION: &str = "the cause cannot act at this location";
 
-/// Reason of a cause that is asked for regressors with another number of nonlinear parameters than it has.
+/// Error text for a request of regressors with a wrong number of nonlinear parameters.
 pub(crate) const WRONG_PARAMETERS: &str = "the number of nonlinear parameters is wrong";
 
 /// A fitted parameter: its key in `parameters` of the answer and in the extension, and its value.
 pub(crate) type Parameter = (&'static str, f64);
 
-/// One effect name of a cause, with its location, parameters and extension.
+/// One named effect of a candidate cause, with its location, its parameters and its table for the case file.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct LocatedEffect {
     /// The effect's name, as in `[extension.NAME]`.
@@ -261,8 +262,8 @@ pub(crate) trait Cause: Send + Sync {
         coefficients: &[f64],
     ) -> Option<Vec<Parameter>>;
 
-    /// Nonlinear parameters that follow from the fitted coefficients, for a cause whose regressors are exact at those values. They are then
-    /// found by fixed-point iteration, not by a search. `None` for other causes.
+    /// Nonlinear parameters computed from the fitted coefficients, for a cause whose regressors are exact at those values: they are found
+    /// by fixed-point iteration, not by a search. `None` for other causes.
     fn settled(&self, _nonlinear_parameters: &[f64], _coefficients: &[f64]) -> Option<Vec<f64>> {
         None
     }
@@ -276,7 +277,7 @@ pub(crate) trait Cause: Send + Sync {
         table
     }
 
-    /// Entries of the answer, one for each effect name and axis: parameters and extension.
+    /// Entries of the cause in the answer, one for each effect name and axis, with parameters and extension table.
     fn located_effects(&self, location: &Location, parameters: &[Parameter]) -> Vec<LocatedEffect> {
         vec![LocatedEffect {
             name: self.name(),

@@ -12,11 +12,11 @@ use quietcut_simulate::Cutter;
 pub(super) struct Coefficients {
     pub(super) effect: EffectName,
     pub(super) keys: [&'static str; 3],
-    /// The tangential, radial and axial coefficient in a material.
+    /// Returns the tangential, radial and axial coefficient (all cutting or all edge coefficients) of a material.
     pub(super) of: fn(&mut Material) -> [&mut f64; 3],
-    /// Step of a coefficient, in its unit, of the size of the coefficients themselves.
+    /// Step of the finite difference of the cutting force with respect to one coefficient, in the unit of the coefficient.
     pub(super) step: fn(&Cutter) -> f64,
-    /// True for a physically possible tangential coefficient.
+    /// True if a tangential coefficient of this value is physically possible.
     pub(super) can_be: fn(f64) -> bool,
 }
 

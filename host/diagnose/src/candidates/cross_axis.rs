@@ -14,7 +14,7 @@ use quietcut_model::effects::EffectName;
 
 pub(super) struct CrossAxis;
 
-/// Fraction p of the finite difference from which the change of the chip, and so of the cutting force, is computed.
+/// Cross-axis fraction p of the finite difference that gives the change of chip thickness and cutting force.
 const SMALL_FRACTION: f64 = 0.05;
 
 impl Cause for CrossAxis {
@@ -47,7 +47,7 @@ impl Cause for CrossAxis {
         weights[*axis] = 1.0;
         let read = readings_at(record, location, |_| weights, |_| Complex64::ONE);
         let other = record.motion.clone();
-        // The true motion is x = y − p·(the other direction).
+        // A channel reads y = x + p·(the other direction), so the true motion is x = y − p·(the other direction).
         Ok(with_chip_of_true_motion(
             record,
             location,

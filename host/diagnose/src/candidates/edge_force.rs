@@ -17,7 +17,8 @@ pub(super) const EDGE_FORCE: Coefficients = Coefficients {
             &mut material.kae_n_per_mm,
         ]
     },
-    // Step: the cutting force per mm of edge at a chip as thick as the feed per tooth, N/mm.
+    // Step of a finite difference with respect to an edge coefficient, N/mm: the tangential force per mm of axial depth at a chip thickness
+    // equal to the feed per tooth.
     step: |cutter| {
         (1e3 * cutter.feed_per_tooth_m * cutter.force.material().ktc_mpa)
             .abs()

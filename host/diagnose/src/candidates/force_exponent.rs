@@ -15,7 +15,8 @@ use quietcut_simulate::ChipLaw;
 
 pub(super) struct ForceExponent;
 
-/// Smallest step of the finite differences in p and q.
+/// Smallest step, in magnitude, of the finite differences with respect to the parameters p − 1 and q of the force law F =
+/// K·b·e^q·h*·(h/h*)^p.
 const LEAST: f64 = 1e-3;
 
 /// Reference chip thickness h*, m: half the feed per tooth of the first cut.

@@ -243,7 +243,8 @@ fn of_folded_forces(record: &Record) -> Option<[Option<Vec<Complex64>>; 3]> {
         .then(|| record.cut_spectra(&cut.force))
 }
 
-/// F_eff of the file's head, N, at each bin, by axis.
+/// The force F_eff = F + H*(x − H F)/(|H|² + ε²) that explains the measured displacement x, N: by axis and frequency bin. F is the measured
+/// force, H the receptance, and ε keeps the division regular where H nearly vanishes.
 fn effective_force(study: &Study<'_>, record: &Record) -> [Vec<Complex64>; 3] {
     let baseline = &study.baseline;
     let (axes, grid) = (&baseline.axes, &record.grid);

@@ -25,7 +25,8 @@ pub(super) struct MissingMode;
 
 /// Damping ratios of a missing mode at which its search starts.
 const DAMPING: [f64; 3] = [0.008, 0.025, 0.08];
-/// Number of start values: the highest peaks of the search over frequency and damping ratio.
+/// Number of candidate modes (frequency, damping ratio) that are kept as start values of a missing mode: those with the largest reduction
+/// of χ².
 const KEPT: usize = 4;
 
 impl Cause for MissingMode {
@@ -167,8 +168,8 @@ impl Cause for MissingMode {
         Ok(vec![Regressor::of_channels(observed)])
     }
 
-    /// `None` if the baseline has a mode at least as large whose half-power bandwidth overlaps with that of this one: the fit then
-    /// describes a change of that mode.
+    /// Frequency, damping ratio and modal mass of the missing mode. `None` if the baseline has a mode at least as large whose half-power
+    /// bandwidth overlaps with that of the missing mode: the fit then describes a change of the baseline's mode.
     fn parameters(
         &self,
         study: &Study<'_>,
@@ -255,8 +256,8 @@ fn free_decays<'a>(study: &'a Study<'_>, axis: usize, left: &'a [Vec<Vec<f64>>])
     all
 }
 
-/// One bin of a channel: ω in rad/s; the force multiplied by the sensor's factor; the residual. Force and residual are over the standard
-/// deviation of the channel's noise.
+/// One frequency bin of a channel: ω in rad/s; the force spectrum as the channel would read it as displacement (factor of the sensor
+/// included); the residual spectrum. The latter two are divided by the standard deviation of the channel's noise.
 type Bin = (f64, Complex64, Complex64);
 
 fn bins(study: &Study<'_>, axis: usize, left: &[Vec<Vec<f64>>]) -> Vec<Bin> {
@@ -280,7 +281,8 @@ fn bins(study: &Study<'_>, axis: usize, left: &[Vec<Vec<f64>>]) -> Vec<Bin> {
     all
 }
 
-/// Reduction of χ² by a mode of this frequency and damping ratio with the best modal mass; 0 if that mass is negative.
+/// Reduction of the residual's χ² by a missing mode of this frequency and damping ratio, with the modal mass that fits best; 0 if that mass
+/// is negative.
 fn chi_square_reduction(
     bins: &[Bin],
     free_decays: &[FreeDecay<'_>],

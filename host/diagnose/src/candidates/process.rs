@@ -11,7 +11,8 @@ use crate::records::record::Record;
 use crate::records::study::Study;
 use quietcut_simulate::Cutter;
 
-/// The location of a cause of the cutting process: everywhere. Empty if the study has no cut or the case has this extension already.
+/// Location of a cause in the cutting process: the whole machine. Empty if the study has no cut, or if the case already has an extension
+/// with the cause's name.
 pub(super) fn everywhere(study: &Study<'_>, name: &str) -> Vec<Location> {
     let known = study.baseline.case.extensions.contains_key(name);
     if known || cutter(study).is_none() {
@@ -21,7 +22,7 @@ pub(super) fn everywhere(study: &Study<'_>, name: &str) -> Vec<Location> {
     }
 }
 
-/// The tool of the first cut of the study.
+/// The cutter (teeth, geometry and force law) of the first cut of the study.
 pub(super) fn cutter<'a>(study: &'a Study<'_>) -> Option<&'a Cutter> {
     study
         .records
@@ -29,13 +30,13 @@ pub(super) fn cutter<'a>(study: &'a Study<'_>) -> Option<&'a Cutter> {
         .find_map(|record| Some(&record.cut.as_ref()?.cut.cutter))
 }
 
-/// True if the structure has an axial direction.
+/// True if the structure moves along the axial direction z.
 pub(super) fn has_axial(study: &Study<'_>) -> bool {
     study.baseline.axes.contains(&2)
 }
 
-/// Change of the cutting force between the tools `before` and `after`, divided by the change `over` of the parameter; empty for a record
-/// without a cut.
+/// Regressor of a parameter of the cutter: the cutting force with the cutter `after` minus the force with the cutter `before`, divided by
+/// the parameter change `over`; empty for a record without a cut.
 pub(super) fn added(
     record: &Record,
     before: impl Fn(&mut Cutter),
@@ -49,8 +50,8 @@ pub(super) fn added(
     Regressor::of_cut(after.difference(&before, over))
 }
 
-/// Change of the cutting force from the baseline's tool to the tool `after`, divided by the change `over` of the parameter; empty for a
-/// record without a cut.
+/// Regressor of a parameter of the cutter: the cutting force with the cutter `after` minus the force of the baseline, divided by the
+/// parameter change `over`; empty for a record without a cut.
 pub(super) fn changed(record: &Record, after: impl Fn(&mut Cutter), over: f64) -> Regressor {
     let Some(cut) = &record.cut else {
         return Regressor::default();

@@ -11,24 +11,24 @@ use quietcut_simulate::path::restoring_along;
 /// A restoring force f_r = Σ coefficient · f(x, v, t; nonlinear parameters).
 pub(super) struct Restoring {
     pub(super) effect: EffectName,
-    /// Keys of the coefficients, in which the force is linear.
+    /// Parameter keys of the coefficients in which the restoring force is linear.
     pub(super) linear: &'static [&'static str],
     /// Keys of the nonlinear parameters.
     pub(super) nonlinear_parameters: &'static [&'static str],
-    /// Number of axes that one force couples: 1 or 2.
+    /// Number of axes whose displacements enter the restoring force: 1 or 2.
     pub(super) axes: usize,
-    /// True if the force is symmetric in its two axes: (a, b) and (b, a) are then one location.
+    /// True if exchanging the two axes leaves the restoring force unchanged: (a, b) and (b, a) are then one location.
     pub(super) is_symmetric: bool,
-    /// True if a further candidate acts along all axes with the same coefficients.
+    /// True if the diagnosis also tries this restoring force along all axes with the same coefficients.
     pub(super) everywhere: bool,
-    /// True if a further candidate acts along all axes with separate coefficients, as in joints of one kind. Such a force has no nonlinear
-    /// parameters.
+    /// True if the diagnosis also tries this restoring force along all axes with separate coefficients, as in joints of one kind. Such a
+    /// force has no nonlinear parameters.
     pub(super) each: bool,
-    /// Start values of the nonlinear parameters, from the amplitudes in the study along an axis.
+    /// Start values of the restoring force's nonlinear parameters for one axis, from the displacement amplitudes along it in the study.
     pub(super) nonlinear_grid: fn(&Study<'_>, usize) -> Vec<Vec<f64>>,
     /// Bounds of the nonlinear parameters.
     pub(super) bounds: fn(&Study<'_>, usize) -> Vec<[f64; 2]>,
-    /// True if the force acts behind a backlash, which the answer then names too.
+    /// True if the restoring force acts behind a backlash; the answer then also names the backlash.
     pub(super) behind_backlash: bool,
     /// True for physically possible coefficients.
     pub(super) physical: fn(coefficients: &[f64]) -> bool,
@@ -86,7 +86,8 @@ fn first_axis(location: &Location) -> usize {
     }
 }
 
-/// The locations that have coefficients of their own: each axis for [`Location::EachOf`], otherwise the location itself.
+/// Splits the location of a cause into locations with coefficients of their own: one for each axis of [`Location::EachOf`], otherwise the
+/// location itself.
 fn single_locations(location: &Location) -> Vec<Location> {
     match location {
         Location::EachOf(axes) => axes.iter().map(|axis| Location::Axis(*axis)).collect(),
@@ -102,7 +103,7 @@ pub(super) fn logarithmic(first: f64, last: f64, count: usize) -> Vec<f64> {
 }
 
 impl Restoring {
-    /// True if the case has an extension of this name already: it can hold only one.
+    /// True if the case already has an extension with a name of this cause. A case can hold only one extension of each name.
     fn in_baseline(&self, study: &Study<'_>) -> bool {
         self.names()
             .iter()
@@ -122,7 +123,7 @@ impl Restoring {
         table
     }
 
-    /// Entries of the answer for the force along one axis.
+    /// Entries of the answer for a restoring force along one axis: the force, and the backlash before it if there is one.
     fn effects_along_one_axis(&self, location: &Location, parameters: &[Parameter]) -> Vec<LocatedEffect> {
         let of_play = |(key, _): &&Parameter| self.behind_backlash && self.nonlinear_parameters.contains(key);
         let own: Vec<Parameter> = parameters.iter().filter(|p| !of_play(p)).copied().collect();

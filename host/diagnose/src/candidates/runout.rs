@@ -46,7 +46,8 @@ impl Cause for RunoutCause {
             .tool
             .as_ref()
             .is_some_and(|tool| tool.runout.is_none());
-        // With one tooth, runout changes no chip: that tooth cuts its own surface.
+        // Start values (e cos ψ, −e sin ψ) of the runout in µm: zero, and a tenth and a quarter of the feed per tooth in several
+        // directions.
         if runs_true && teeth(study) > 1 {
             everywhere(study, self.name())
         } else {

@@ -26,14 +26,14 @@ pub(super) fn channels(study: &Study<'_>) -> Vec<String> {
     names
 }
 
-/// Locations of a sensor error: each channel of motion and, if there are several, all of them with one value. Empty if the case has this
-/// extension.
+/// Locations of a sensor error (gain, delay, offset): each motion channel and, if there are several and a force is measured, all of them
+/// with one common value. Empty if the case already has this extension, or if there is neither a measured force nor a second channel.
 pub(super) fn one_or_all(study: &Study<'_>, name: &str) -> Vec<Location> {
     if study.baseline.case.extensions.contains_key(name) {
         return Vec::new();
     }
     let names = channels(study);
-    // Without a known force, only a second channel shows that a channel reads too much or too late.
+    // Without a measured force in any record, the error of the only motion channel is not identifiable.
     let free = study
         .records
         .iter()
@@ -137,7 +137,7 @@ pub(super) fn reading_in_cut(
     let mut changed = record.read_response(&force, channel);
     let readings = record.readings[channel].iter().zip(&known);
     let mut rest: Vec<f64> = readings.map(|(all, known)| all - known).collect();
-    // A sample that is not compared takes the value before it.
+    // Samples that the fit skips are replaced by the sample before, so that the spectrum has no gap.
     for &sample in record.skipped[channel].iter().filter(|sample| **sample > 0) {
         rest[sample] = rest[sample - 1];
     }

@@ -14,10 +14,11 @@ use quietcut_model::effects::EffectName;
 
 pub(super) struct SensorDelayCause;
 
-/// Longest delay of the search, in periods of the highest frequency of the motion.
+/// Longest sensor delay that the search tries, in periods of the highest frequency of the motion.
 const LONGEST: f64 = 0.4;
 
-/// Factor between the fitted delay and the delay at which the regressor is computed from which on the fit does not describe a delay.
+/// Largest ratio, and inverse of the smallest ratio, of the fitted sensor delay to the delay for which its regressor was computed. Beyond
+/// it the fit does not describe a delay.
 const ANOTHER: f64 = 100.0;
 
 impl Cause for SensorDelayCause {
@@ -53,7 +54,7 @@ impl Cause for SensorDelayCause {
         nonlinear_parameters: &[f64],
     ) -> Regressors {
         let delay = *nonlinear_parameters.first().ok_or(WRONG_PARAMETERS)?;
-        // Divided by the delay, so that the coefficient is the delay in seconds.
+        // The regressor of the sensor delay τ is (1 − e^(iωτ))/τ times the reading, so that its coefficient is the delay in seconds.
         let change = |omega: f64| (Complex64::ONE - Complex64::cis(omega * delay)) / delay;
         let read = if record.cut.is_some() {
             let of = |channel: usize| {
@@ -72,7 +73,7 @@ impl Cause for SensorDelayCause {
         } else {
             readings_at(record, location, |channel| channel.pickup.weights, change)
         };
-        // The true motion is x(t) = y(t + τ).
+        // A late channel reads y(t) = x(t − τ), so the true motion is x(t) = y(t + τ).
         Ok(with_chip_of_true_motion(
             record,
             location,
@@ -84,7 +85,8 @@ impl Cause for SensorDelayCause {
         ))
     }
 
-    /// The fitted delay: the regressor is exact at the delay for which it is computed.
+    /// The fitted sensor delay, s, as new nonlinear parameter, because the regressor is exact at the delay for which it is computed. `None`
+    /// if the delay is not positive.
     fn settled(&self, _: &[f64], coefficients: &[f64]) -> Option<Vec<f64>> {
         coefficients
             .first()
@@ -92,7 +94,7 @@ impl Cause for SensorDelayCause {
             .map(|delay| vec![*delay])
     }
 
-    /// `None` if the fitted delay differs too much from the one for which the regressor is computed.
+    /// The fitted sensor delay. `None` if it differs by a factor above [`ANOTHER`] from the delay for which the regressor is computed.
     fn parameters(
         &self,
         _: &Study<'_>,

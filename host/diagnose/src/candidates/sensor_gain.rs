@@ -43,7 +43,7 @@ impl Cause for SensorGainCause {
             |channel| channel.pickup.weights,
             |_| Complex64::ONE,
         );
-        // The true motion is x = (1 − share)·y.
+        // A channel with gain g reads y = g·x, so the true motion is x = (1 − share)·y with share = 1 − 1/g.
         Ok(with_chip_of_true_motion(
             record,
             location,

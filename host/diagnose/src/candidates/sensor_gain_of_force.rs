@@ -13,10 +13,10 @@ use quietcut_recording::Quantity;
 
 pub(super) struct ForceSensorGainCause;
 
-/// Least gain g: below it the reading would hardly contain the force.
+/// Smallest gain g of a force sensor that is accepted: with a smaller gain the reading would hardly contain the force.
 const LEAST: f64 = 0.02;
 
-/// Names of the channels of a location; empty if it is not in channels.
+/// Names of the channels at the location of a sensor error; empty if the location is no channel.
 fn names(location: &Location) -> &[String] {
     match location {
         Location::Channel(name) => std::slice::from_ref(name),
@@ -52,7 +52,7 @@ impl Cause for ForceSensorGainCause {
                 return Vec::new();
             }
             let mut force = channel.predicted.clone();
-            // Samples that are not compared have no residual.
+            // Samples that the fit skips have no residual, so the regressor of the force sensor's gain is zero there.
             for &sample in &record.skipped[index] {
                 force[sample] = 0.0;
             }

@@ -26,11 +26,12 @@ const RATIOS: [&str; 9] = [
     "ratio_1", "ratio_2", "ratio_3", "ratio_4", "ratio_5", "ratio_6", "ratio_7", "ratio_8", "ratio_9",
 ];
 
-/// Least response of a mode along an axis, as a share of the largest, for the mode to have a ratio of its own there.
+/// Smallest response of a mode along the sensor's axis for which the mode has a sensor-to-tool-tip ratio of its own, as a fraction of the
+/// largest modal response there.
 const SEEN: f64 = 1e-6;
 
-/// Indices of the modes that have a ratio of their own in the channel, and the number of modes of the case; `None` if there is one ratio
-/// for all.
+/// Indices of the modes that have a sensor-to-tool-tip ratio of their own in the channel, and the number of modes of the case; `None` if
+/// one ratio holds for all modes.
 fn modes(study: &Study<'_>, location: &Location) -> Option<(Vec<usize>, usize)> {
     let name = location.channel()?;
     let Form::Modes(modes) = &study.baseline.structure.form else {

@@ -17,7 +17,8 @@ use quietcut_simulate::Fluctuation;
 
 pub(super) struct SpeedFluctuationCause;
 
-/// Largest distance of the coefficient from 1 at which the records confirm the speed modulation of the tachometer.
+/// Largest distance from 1 of the fitted coefficient of the speed modulation at which the records confirm the modulation found in the
+/// tachometer signal.
 const ROUNDING: f64 = 0.5;
 
 /// The speed modulation in the tachometer signals of all cuts.
@@ -77,7 +78,7 @@ impl Cause for SpeedFluctuationCause {
         Ok(vec![Regressor::of_cut(force.difference(&cut.force, 1.0))])
     }
 
-    /// The nonlinear parameters come from the tachometer and are not fitted.
+    /// The nonlinear parameters of the speed modulation (amplitude, frequency, phase) come from the tachometer, not from the fit.
     fn settled(&self, nonlinear_parameters: &[f64], _: &[f64]) -> Option<Vec<f64>> {
         Some(nonlinear_parameters.to_vec())
     }

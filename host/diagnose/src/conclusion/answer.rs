@@ -23,12 +23,12 @@ pub enum Outcome {
     Unexplained,
 }
 
-/// A value and its 90 % interval.
+/// An estimated quantity and its 90 % confidence interval.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Figure {
-    /// The value, in the unit of its key.
+    /// The estimated value, in the unit that its key in `parameters` states.
     pub value: f64,
-    /// 90 % interval of the value, in the same unit.
+    /// Ends of the 90 % confidence interval of the estimated value, in the same unit.
     pub ci90: [f64; 2],
 }
 
@@ -37,7 +37,7 @@ pub struct Figure {
 pub struct EstimatedCause {
     /// Name of the cause, as in `[extension.NAME]`.
     pub name: &'static str,
-    /// Confidence in the cause, 0 to 1.
+    /// Confidence that the cause is present, from 0 to 1.
     pub confidence: f64,
     /// Direction x, y or z in which the cause acts, if it acts along one axis.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -134,7 +134,7 @@ impl Gain {
 /// The unexplained residual.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Unexplained {
-    /// Share of the residual energy that is neither explained nor noise.
+    /// Share of the baseline's residual energy above the noise that no candidate model explains.
     pub fraction: f64,
     /// Channel, frequency and time at which the residual is largest.
     #[serde(rename = "where")]
@@ -147,32 +147,33 @@ pub struct Unexplained {
 /// The experiment that separates confounded candidate models.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct NextTest {
-    /// Kind of the test, as in a sidecar.
+    /// Kind of the proposed test, in the words of a recording's sidecar.
     pub kind: &'static str,
-    /// Direction of the force, in a test of the structure.
+    /// Direction of the exciting force of the proposed test, if it is a test of the structure.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub direction: Option<&'static str>,
-    /// Force amplitudes, one after the other, N; peak force of an impact.
+    /// Force amplitudes of the proposed test, applied one after the other, N; for an impact the peak force.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub force_n: Vec<f64>,
-    /// First and last frequency of a sweep, Hz; for a step sine both are its frequency.
+    /// First and last frequency of the proposed sweep, Hz; for a step sine both are the same.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub band_hz: Option<[f64; 2]>,
-    /// Spindle speed of a cut, rev/min.
+    /// Spindle speed of the proposed cut, rev/min.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub spindle_rpm: Option<f64>,
-    /// Axial depth of a cut, mm.
+    /// Axial depth of the proposed cut, mm.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub axial_depth_mm: Option<f64>,
-    /// Feed per tooth of a cut, mm.
+    /// Feed per tooth of the proposed cut, mm.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub feed_per_tooth_mm: Option<f64>,
     /// Duration, s.
     pub seconds: f64,
-    /// Further quantities to measure beside the channels of the records.
+    /// Quantities that the proposed test measures in addition to the channels of the present records.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub measure: Option<&'static str>,
-    /// Smallest distance between two candidate models in this test, in standard deviations. About 8 separate them nearly always.
+    /// Smallest distance between the predictions of two candidate models in the proposed test, in standard deviations of the noise. About 8
+    /// separate two models nearly always.
     pub distance: f64,
     /// The candidate models that the test separates, and the channel in which they differ most.
     pub why: String,

@@ -156,7 +156,8 @@ fn of_baseline(
     }
 }
 
-/// Largest share of the baseline's residual energy above the noise that the candidate model `best` may leave.
+/// Largest share of the baseline's residual energy above the noise that may stay unexplained by the candidate model `best` for `best` to be
+/// accepted.
 fn allowed_residual(study: &Study<'_>, best: Option<&CandidateModel>) -> f64 {
     match best {
         _ if study.all_in(Domain::Force) => UNEXPLAINED_OF_FORCE,
@@ -167,7 +168,7 @@ fn allowed_residual(study: &Study<'_>, best: Option<&CandidateModel>) -> f64 {
     }
 }
 
-/// Warnings about sensor gains that are near the ratio of a wrong unit.
+/// Warnings about estimated sensor gains close to the factor of a unit mix-up (such as 9.81 for g instead of m/s²).
 fn unit_warnings(causes: &[EstimatedCause]) -> Vec<String> {
     causes
         .iter()
@@ -214,7 +215,8 @@ fn confound(diagnosis: &mut Diagnosis, shared: &[&'static str]) {
     diagnosis.equivalent = vec![group];
 }
 
-/// Confidence from `ahead`, the gain beyond that of the best rival, and from `left`, the residual as a share of the allowed one.
+/// Confidence that a cause is present, 0 to 1. `ahead` is the lead of its candidate model over the best non-equivalent rival; `left` is the
+/// model's residual over the allowed residual.
 fn confidence(ahead: f64, left: f64) -> f64 {
     let by_rivals = 1.0 / (1.0 + (-(ahead - 0.5 * EQUIVALENT) / CONFIDENCE_WIDTH).exp());
     let by_rest = 1.0 - CONFIDENCE_LOSS * left.clamp(0.0, 1.0).powi(2);

@@ -28,10 +28,10 @@ const SHALLOWEST_MM: f64 = 0.01;
 /// Largest axial depth to which [`depth_mm`] searches the lowest limit, mm.
 const DEEPEST_MM: f64 = 200.0;
 
-/// Largest axial depth of a chart, as a multiple of its lowest limit.
+/// Largest axial depth of a stability chart without cuts, as a multiple of the lowest stability limit in the speed range.
 const DEPTH: f64 = 4.0;
 
-/// Largest axial depth of a chart, as a multiple of the deepest cut in it.
+/// Largest axial depth of a stability chart, as a multiple of the axial depth of the deepest trial or recorded cut in it.
 const BELOW_CUTS: f64 = 1.2;
 
 /// Stability limit at one spindle speed before and after the extension; `None` if it is above the largest depth of the search.
@@ -71,7 +71,7 @@ pub struct CallsChange {
 pub struct Chart {
     /// Name of the stability method.
     pub method: &'static str,
-    /// Largest depth of the search for limits, mm.
+    /// Largest axial depth up to which stability limits were searched, mm.
     pub searched_mm: f64,
     /// The stability limits, by spindle speed.
     pub lines: Vec<SpeedLine>,
@@ -87,9 +87,9 @@ pub struct Lobes {
     /// Limits at the speed of the first recorded cut; without one, at the speed where the two cases differ most.
     #[serde(flatten)]
     pub at: Change,
-    /// Largest depth of the search for limits, mm.
+    /// Largest axial depth up to which stability limits were searched, mm.
     pub searched_mm: f64,
-    /// Time at which limits with drift or wear hold: the end of the longest recording, s.
+    /// Time since the start of the recording for which stability limits with drift or wear hold: the end of the longest recording, s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub after_s: Option<f64>,
     /// Name of the stability method of the extended case.
@@ -310,7 +310,7 @@ fn after_s(cases: &[&Case], recordings: &[Recording]) -> Option<f64> {
 }
 
 fn is_costly(case: &Case) -> bool {
-    // A case without forced problem is refused when its limits are computed.
+    // A case whose forced orbit cannot be set up is refused later, when its stability limits are computed.
     needs_orbit(case) && ForcedProblem::new(case).is_ok_and(|problem| problem.is_over_revolution())
 }
 

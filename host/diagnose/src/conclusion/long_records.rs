@@ -60,7 +60,7 @@ fn revolutions_s(recording: &Recording) -> Option<f64> {
 }
 
 /// The answer from the first parts of the records, if it holds for the rest too; `None` if not, or if the records are too short to be
-/// divided. A warning says if a part of the records cannot be compared alone.
+/// divided. The second value is a warning if the first parts or the rest cannot be evaluated on their own.
 pub(crate) fn concluded(
     case: &Case,
     recordings: &[Recording],

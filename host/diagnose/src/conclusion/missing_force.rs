@@ -18,7 +18,7 @@ const SMOOTHED: usize = 9;
 /// Duration of a segment in periods of the lowest natural frequency. One amplitude is assigned to each segment.
 const PERIODS: f64 = 2.0;
 
-/// The missing restoring force along one axis, with the motion on which it depends.
+/// Restoring force along one axis that the baseline lacks, with the displacement and velocity on which it depends.
 #[derive(Clone, Debug)]
 pub struct MissingForce {
     /// Displacement along the axis, m.

@@ -133,7 +133,8 @@ pub(crate) fn by_common_factor(
                 let of = |change: f64| cause.parameters(study, &known.location, &[], &[change]);
                 let parameters = of(change)?;
                 let (key, value) = *parameters.first()?;
-                // A parameter is linear in the relative change: its slope converts the deviation.
+                // Each reported parameter is linear in the relative change, so one slope converts the standard deviation of the change into
+                // that of the parameter.
                 let (_, beyond) = *of(change + 1.0)?.first()?;
                 let scale = beyond - value;
                 let extension = cause.extension(&known.location, &parameters);
@@ -174,8 +175,8 @@ fn figure(value: f64, deviation: f64) -> Figure {
     }
 }
 
-/// The cause's parts with parameters at both ends of the 90 % interval along each principal direction of its covariance. A parameter set
-/// that is not physical is replaced by the estimate.
+/// The effects of a cause with their parameters at both ends of the 90 % interval along each principal direction of the covariance. A
+/// parameter set that is not physical is replaced by the estimate.
 fn moved(
     parts_of: &dyn Fn(&[f64]) -> Option<Vec<LocatedEffect>>,
     inner: &[f64],
@@ -217,7 +218,8 @@ fn moved(
         .collect()
 }
 
-/// Standard deviations of the reported `values`, from the covariance of the inner coefficients and numerical derivatives.
+/// Standard deviations of the reported parameters `values`, from the covariance of the fitted parameters `inner` and numerical derivatives
+/// of the former by the latter.
 fn deviations(
     values: &dyn Fn(&[f64]) -> Option<Vec<f64>>,
     inner: &[f64],

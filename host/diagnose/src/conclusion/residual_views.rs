@@ -34,9 +34,9 @@ pub struct ResidualView {
     /// Measured samples minus those that the baseline (the case file with its extensions) predicts along the measured motion, in the unit
     /// of the channel.
     pub residual: Vec<f64>,
-    /// Residual of the extended case; empty without an extension.
+    /// Measured samples minus those that the extended case predicts, in the unit of the channel; empty without an extension.
     pub left: Vec<f64>,
-    /// The missing restoring force that the residual of the baseline implies; `None` if the channel's axis has no motion.
+    /// The restoring force that would explain the residual of the baseline in this channel; `None` if the channel's axis has no motion.
     pub missing: Option<MissingForce>,
     /// Spindle motion of a cut; `None` for other tests.
     pub spindle_motion: Option<SpindleMotionView>,
@@ -124,7 +124,7 @@ pub(crate) fn residual_views(
     all
 }
 
-/// Residual of a candidate model in each channel, minus the free decay that fits it best.
+/// Residual of each channel after the candidate model `best` and after the free decay that fits the rest best.
 fn left_by(study: &Study<'_>, library: &Library, record: &Record, best: &CandidateModel) -> Vec<Vec<f64>> {
     let explained = library.explained(study, record, best);
     let left: Vec<Vec<f64>> = record

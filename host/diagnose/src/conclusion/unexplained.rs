@@ -6,9 +6,9 @@ use crate::conclusion::residual_views::ResidualView;
 use crate::signal::grid::Grid;
 use crate::signal::noise::rms;
 
-/// Number of segments of equal length into which a record is divided.
+/// Number of segments of equal length into which a record is divided to find when the residual is largest.
 const SEGMENTS: usize = 40;
-/// Number of spectral lines on each side of the largest line whose energy counts with it.
+/// Number of spectral lines on each side of the residual's largest line whose energy counts as that of the line.
 const NEAR: usize = 8;
 
 /// Words for the channel whose residual is largest relative to its noise: amplitude, frequency, spindle order and time. The residual is
@@ -80,7 +80,7 @@ fn segment_length(samples: &[f64]) -> usize {
     samples.len().div_ceil(SEGMENTS).max(1)
 }
 
-/// Sum of squares in each segment.
+/// Residual energy (sum of squared samples) in each of the [`SEGMENTS`] segments of a record.
 fn segment_energies(samples: &[f64]) -> Vec<f64> {
     samples
         .chunks(segment_length(samples))
