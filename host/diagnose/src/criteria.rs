@@ -8,8 +8,8 @@ use std::ops::RangeInclusive;
 
 // Signals
 
-/// Least white part of a frequency band's noise, as a share of all noise in the band. Where other known noise is larger than the band's
-/// noise, this share keeps the white part positive. Unfounded.
+/// Smallest white part of the noise power in a frequency band of a channel, as a share of all noise power in the band. The white part is
+/// all noise minus the noise known from other sources; this share keeps it positive if the latter is larger. Unfounded.
 pub(crate) const LEAST_WHITE_SHARE: f64 = 0.05;
 
 /// Least noise of a channel, as a share of its root mean square: −90 dB, the level to which the integration of a simulation accumulates
@@ -57,25 +57,25 @@ pub(crate) const CLIPPED_IMPACT_SAMPLES: RangeInclusive<usize> = 3..=64;
 /// smooth peak with a flat top of three samples falls by at most 10 steps there.
 pub(crate) const CLIPPED_IMPACT_STEP: f64 = 16.0;
 
-/// Largest distance between the logarithms of a channel's ratio to its prediction and of the ratio of pounds and newtons at which that unit
-/// is suspected. It is small, because stiffness errors of a baseline reach this ratio too. Unfounded.
+/// Tolerance within which a channel's ratio of measured to predicted counts as the ratio of pounds to newtons, as a difference of natural
+/// logarithms. It is small, because stiffness errors of a baseline reach this ratio too. Unfounded.
 pub(crate) const POUND_TOLERANCE: f64 = 0.1;
 
-/// Largest distance between the logarithms of a channel's ratio to its prediction and of the ratio of any other wrong unit at which that
-/// unit is suspected. The ratios of these units are about 10 and more. Unfounded.
+/// Tolerance within which a channel's ratio of measured to predicted counts as the ratio of any other unit mix-up, as a difference of
+/// natural logarithms. The ratios of these units are about 10 and more. Unfounded.
 pub(crate) const UNIT_TOLERANCE: f64 = 0.4;
 
-/// Ratio of a measured to a predicted channel from which on a unit is suspected: 4.448/e^0.1 = 4.02, the smallest ratio of a unit in the
-/// list, pounds for newtons, less its tolerance.
+/// Ratio of measured to predicted amplitude of a channel above which a wrong unit is suspected: 4.448/e^0.1 = 4.02, the smallest ratio of a
+/// unit in the list (pounds for newtons) less its tolerance.
 pub(crate) const WRONG_UNIT_RATIO: f64 = 4.0;
 
 /// Ratio of a measured to a predicted channel that no resonance and no nonlinearity of a machine reaches: a mode with a damping ratio of
 /// 0.2 % amplifies the static response by 250.
 pub(crate) const IMPOSSIBLE_RATIO: f64 = 250.0;
 
-/// Ratio of a measured to a predicted channel below which a unit is suspected: e^0.4/9.81 = 0.152, the largest ratio of accelerations in g
-/// read as m/s², with its tolerance. Newtons read as pounds (0.22) lie above, because friction reduces a response as much; they are
-/// reported as a gain of the sensor.
+/// Ratio of measured to predicted amplitude of a channel below which a wrong unit is suspected: e^0.4/9.81 = 0.152, the ratio of
+/// accelerations in g read as m/s², with its tolerance. Newtons read as pounds (0.22) lie above, because friction reduces a response as
+/// much; they are reported as a gain of the sensor.
 pub(crate) const FRICTION_RATIO: f64 = 0.15;
 
 /// Largest distance between the logarithms of an estimated gain and of a unit's ratio at which the gain is reported as a likely wrong unit.
@@ -86,12 +86,12 @@ pub(crate) const GAIN_UNIT_TOLERANCE: f64 = 0.03;
 /// 5, below which much of the prediction is noise.
 pub(crate) const LEAST_ENERGY_OVER_FORCE_NOISE: f64 = 25.0;
 
-/// Least squared correlation of measured and predicted samples at which a wrong unit is reported, if a known unit has their ratio.
-/// Unfounded.
+/// Smallest squared correlation of measured and predicted samples of a channel at which a wrong unit is reported, if the ratio of their
+/// amplitudes is that of a common unit mix-up. Unfounded.
 pub(crate) const LEAST_CORRELATION_OF_KNOWN_UNIT: f64 = 0.3;
 
-/// Least squared correlation of measured and predicted samples at which a wrong unit is reported, if no known unit has their ratio.
-/// Unfounded.
+/// Smallest squared correlation of measured and predicted samples of a channel at which a wrong unit is reported, if the ratio of their
+/// amplitudes is that of no common unit mix-up. Unfounded.
 pub(crate) const LEAST_CORRELATION_OF_UNKNOWN_UNIT: f64 = 0.8;
 
 /// Least root mean square of a channel over the standard deviation of its noise at which the axis counts as moving: three standard
@@ -108,38 +108,43 @@ pub(crate) const RELATIVE_ERROR_OF_CUTS: f64 = 2e-4;
 
 // Full engagement
 
-/// Level of a revolution, as a share of the level in the cut, below which it counts as air if one channel is below it. Unfounded.
+/// Vibration level below which a revolution of a cut counts as air if one channel is below it. The level is the channel's standard
+/// deviation over the revolution, as a share of its level in the cut. Unfounded.
 pub(crate) const AIR_LEVEL: f64 = 0.2;
 
-/// Level of a revolution, as a share of the level in the cut, above which the tool counts as engaged if every channel is above it.
-/// Unfounded.
+/// Vibration level above which the tool counts as engaged in a revolution if every channel is above it. The level is the channel's standard
+/// deviation over the revolution, as a share of its level in the cut. Unfounded.
 pub(crate) const ENGAGED_LEVEL: f64 = 0.8;
 
-/// Time from air to full engagement over the time from air to `ENGAGED_LEVEL`: (1 − 0.2)/(0.8 − 0.2) = 4/3 for a level that grows linearly
-/// from `AIR_LEVEL`, with a margin of 5 %.
+/// Time from air to full engagement of the tool over the time until the vibration level reaches `ENGAGED_LEVEL`: (1 − 0.2)/(0.8 − 0.2) =
+/// 4/3 for a level that grows linearly from `AIR_LEVEL`, with a margin of 5 %.
 pub(crate) const ENGAGEMENT_AFTER_LEVEL: f64 = 1.4;
 
-/// Factor on the time of the tool's entry by its geometry: the first contact itself is below `AIR_LEVEL` and is seen late. Unfounded.
+/// Factor on the time that the tool's entry takes by its geometry: at the first contact the vibration level is still below `AIR_LEVEL`, so
+/// that the entry is noticed late. Unfounded.
 pub(crate) const ENTRY_MARGIN: f64 = 1.1;
 
-/// Share of the tool's exit, by its geometry, that is over when the level falls to `AIR_LEVEL`: the chips are thin at its end. Unfounded.
+/// Share of the time that the tool's exit takes by its geometry which has passed when the vibration level falls to `AIR_LEVEL`: the chips
+/// are thin at the end of the exit. Unfounded.
 pub(crate) const EXIT_SHARE: f64 = 0.7;
 
-/// Median level of a cut, as a multiple of the response to the feed alone, above which it counts as chatter. Unfounded.
+/// Median vibration level over the revolutions of a cut, as a multiple of the level that the feed alone causes in the baseline, above which
+/// the cut counts as chatter. Unfounded.
 pub(crate) const CHATTER_LEVEL: f64 = 2.0;
 
-/// Level of a channel in the cut over the standard deviation of its noise from which on the channel can show air: three standard
-/// deviations.
+/// Vibration level of a channel in the cut over the standard deviation of its noise from which on the channel can distinguish air from
+/// cutting: three standard deviations.
 pub(crate) const AIR_OVER_NOISE: f64 = 3.0;
 
-/// Fewest successive revolutions in air at an end of a recording: a single one may be a minimum of beating vibration. Unfounded.
+/// Smallest number of successive low-level revolutions that count as air at an end of a recording: a single one may be a minimum of beating
+/// vibration. Unfounded.
 pub(crate) const LEAST_AIR_AT_ENDS: usize = 2;
 
-/// Fewest successive revolutions in air within a recording, where chatter may beat. Unfounded.
+/// Smallest number of successive low-level revolutions that count as air inside a recording, where chatter may beat. Unfounded.
 pub(crate) const LEAST_AIR_WITHIN: usize = 4;
 
-/// Least factor between the levels of the second and the first revolution of a vibration that starts from rest. Two revolutions in air have
-/// equal levels. Unfounded.
+/// Smallest ratio of the vibration level in the second revolution of a recording to that in the first at which the recording begins with
+/// the cut, from rest. Two revolutions in air have equal levels. Unfounded.
 pub(crate) const GROWTH_FROM_REST: f64 = 2.0;
 
 /// Fewest revolutions of full engagement with which a cut is diagnosed. Unfounded.
@@ -151,24 +156,28 @@ pub(crate) const LEAST_ENGAGED_REVOLUTIONS: f64 = 8.0;
 /// iteration has converged: it adds 0.03² = 0.001 of the noise to χ².
 pub(crate) const CLOSED_LOOP_SETTLED: f64 = 0.03;
 
-/// Least decrease of χ² by a step of a search. Smaller steps end the search: they are shorter than √0.1 = 0.3 standard deviations.
+/// Smallest decrease of χ² by a step of a prediction-error search. A smaller decrease ends the search: its step is shorter than √0.1 = 0.3
+/// standard deviations of the parameters.
 pub(crate) const SEARCH_SETTLED: f64 = 0.1;
 
-/// Excess of χ² over that of another candidate model at which a search is given up. A candidate model is not selected if its χ² is 16
-/// (`EQUIVALENT`) larger; the linear prediction of a search errs by a multiple of that. Unfounded.
+/// Excess of a candidate model's χ² over that of the best rival at which its prediction-error search is given up. A candidate model is not
+/// selected if its χ² is 16 (`EQUIVALENT`) larger; the linear prediction of a search errs by a multiple of that. Unfounded.
 pub(crate) const HOPELESS_LAG: f64 = 300.0;
 
-/// χ² of a start value, as a multiple of that of the regression, above which the beginning of each record is fitted first. Unfounded.
+/// χ² of a simulated candidate model at the start of its search, over the χ² of its linear regression, above which the search first fits
+/// the beginning of each record alone. Unfounded.
 pub(crate) const FAR_START: f64 = 2.0;
 
-/// χ² of a candidate model, as a multiple of the least of all, above which its start value is not improved. Unfounded.
+/// χ² of a candidate model's regression over the smallest χ² of all candidate models above which the start of its search is not improved by
+/// a fit of the beginning of each record. Unfounded.
 pub(crate) const FAR_BEHIND: f64 = 4.0;
 
-/// χ² per compared value above which a search counts as stuck. It is also the largest factor over the χ² of another candidate model up to
-/// which a stuck search is repeated. Unfounded.
+/// χ² per compared value (1 for noise alone) above which a prediction-error search counts as stuck. A stuck search with friction is
+/// repeated only if its χ² is at most this factor times the χ² of the best rival. Unfounded.
 pub(crate) const STUCK: f64 = 1.1;
 
-/// Reduction of χ² by a candidate model, as a share of the best, above which its nonlinear parameters are refined. Unfounded.
+/// Reduction of χ² by a candidate model, as a share of the reduction by the best one, above which its nonlinear parameters are refined
+/// between the grid points. Unfounded.
 pub(crate) const REFINED_SHARE: f64 = 0.5;
 
 /// Least decrease of χ² by a Gauss–Newton step in the nonlinear parameters: that of a step of a tenth of a standard deviation.
@@ -212,11 +221,12 @@ pub(crate) const LEAST_SHARE: f64 = 0.2;
 /// Energy of a residual, as a multiple of the energy of computation errors, above which it has another origin: twice their amplitude.
 pub(crate) const OVER_COMPUTATION_ERROR: f64 = 4.0;
 
-/// Least gain of a further cause of a cut if fewer causes are sufficient, as a share of the noise. The noise floor and the computation near
-/// a resonance err by about as much. Unfounded.
+/// Addition to the smallest gain (`LEAST_GAIN`) of a further cause of a cut if fewer causes are sufficient, as a share of the noise energy
+/// (one per compared value). The noise floor and the computation near a resonance err by about as much. Unfounded.
 pub(crate) const LEAST_SHARE_BESIDE_ENOUGH: f64 = 5e-3;
 
-/// Residual energy, as a multiple of the least noise energy of the sensors, below which there is nothing to explain. Unfounded.
+/// χ² of the baseline per compared value (1 for noise alone) below which nothing is to explain: the residual is then smaller than the
+/// smallest noise that a sensor is assumed to have. Unfounded.
 pub(crate) const NOTHING_TO_EXPLAIN: f64 = 0.5;
 
 /// Largest excess of χ² over its mean, in its standard deviations √(2n) for n values, that counts as noise: four standard deviations, which
@@ -237,13 +247,15 @@ pub(crate) const UNEXPLAINED_OF_FORCE: f64 = 0.15;
 /// much of a residual, but leave more than this. Unfounded.
 pub(crate) const UNEXPLAINED_PER_FURTHER_CAUSE: f64 = 0.05;
 
-/// Residual energy above noise and chance, as a share of the noise, from which on a simulated candidate model is doubted. Unfounded.
+/// Residual energy of a simulated candidate model above the noise, as a share of the noise energy, above which the model is doubted; chance
+/// (`CHANCE_OF_DOUBT`) is added to this share. Unfounded.
 pub(crate) const DOUBTFUL_RESIDUAL: f64 = 0.03;
 
-/// Standard deviations of χ² that are added to `DOUBTFUL_RESIDUAL` as chance. Unfounded.
+/// Random scatter that a residual above `DOUBTFUL_RESIDUAL` is granted before its candidate model is doubted, in standard deviations √(2/n)
+/// of χ²/n over n compared values. Unfounded.
 pub(crate) const CHANCE_OF_DOUBT: f64 = 5.0;
 
-/// Factor on the confidence in a candidate model whose residual is larger than `DOUBTFUL_RESIDUAL` and chance. Unfounded.
+/// Factor on the confidence in a candidate model whose residual energy exceeds `DOUBTFUL_RESIDUAL` plus chance. Unfounded.
 pub(crate) const DOUBT: f64 = 0.8;
 
 /// NRMSE on the whole records, as a multiple of that on the held-out segments, above which the user is warned. Unfounded.
@@ -271,17 +283,20 @@ pub(crate) const LEAST_EXPLAINED_BY_GUESS: f64 = 0.1;
 /// a relative standard deviation of 1/3: six standard deviations.
 pub(crate) const MISSING_FORCE_OVER_NOISE: f64 = 3.0;
 
-/// Amplitude of a segment, as a share of the largest, below which its stiffness and damping are not shown. Unfounded.
+/// Displacement amplitude of a segment, as a share of the largest amplitude in the record, below which the segment's added stiffness and
+/// damping are not shown. Unfounded.
 pub(crate) const LEAST_AMPLITUDE: f64 = 0.02;
 
 /// Share of the samples in the first parts of the records below which only these parts are searched. With a larger share, little time is
 /// gained. Unfounded.
 pub(crate) const SHORTENED_SHARE: f64 = 0.5;
 
-/// Largest difference between immersion angles of one chart, degrees. Unfounded.
+/// Largest difference between the immersion angles of a recorded cut and of the case at which the cut is drawn in the case's stability
+/// chart, degrees. Unfounded.
 pub(crate) const SAME_IMMERSION_DEG: f64 = 0.5;
 
-/// Largest relative difference between feeds of one chart. Unfounded.
+/// Largest relative difference between the feeds per tooth of a recorded cut and of the case at which the cut is drawn in the case's
+/// stability chart. Unfounded.
 pub(crate) const SAME_FEED: f64 = 1e-3;
 
 // Next test
@@ -294,7 +309,7 @@ pub(crate) const SEPARATING_DISTANCE: f64 = 60.0;
 /// not proposed. Unfounded.
 pub(crate) const LARGEST_PROPOSED_MOTION: f64 = 10.0;
 
-/// Standard deviation of the noise of a sensor that no record has, as a share of its root mean square. Unfounded.
+/// Assumed standard deviation of the noise of a sensor that no record has, as a share of the root mean square of its reading. Unfounded.
 pub(crate) const ASSUMED_NOISE: f64 = 0.01;
 
 #[cfg(test)]

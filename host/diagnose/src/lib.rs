@@ -64,6 +64,7 @@ pub fn diagnose(
 
 /// [`diagnose`] with a callback at the beginning of each stage.
 ///
+/// # Errors
 /// The case cannot be simulated, or a recording cannot be compared: too short, clipped, or without a required channel.
 pub fn diagnose_watched(
     case: &Case,

@@ -110,8 +110,10 @@ pub struct Lobes {
 /// An extended case with parameters at both ends of the 90 % interval along one principal direction of their covariance.
 pub type IntervalEnds = [Case; 2];
 
-/// The lobes of a case over the speeds of trial cuts, else around those of recorded cuts, else over the speed range of the machine.
+/// The stability lobes of a case over the spindle speeds of trial cuts, else around those of recorded cuts, else over the speed range of
+/// the machine.
 ///
+/// # Errors
 /// The case has no tool, material or cut, or its limits cannot be computed.
 pub fn baseline_lobes(
     case: &Case,
@@ -124,9 +126,10 @@ pub fn baseline_lobes(
     Chart::new(&*method, &range, &cuts)
 }
 
-/// Stability limits of a case and of its extended case over the same speeds. `moved` holds the extended case at the ends of its parameters'
-/// intervals.
+/// Stability limits of a case and of its extended case over the same spindle speeds. `moved` holds the extended case with parameters at
+/// both ends of their 90 % intervals.
 ///
+/// # Errors
 /// The case or the extended case has no tool, material or cut, or its limits cannot be computed.
 pub fn lobes(
     case: &Case,

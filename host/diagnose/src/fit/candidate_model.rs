@@ -7,19 +7,19 @@ use nalgebra::DMatrix;
 use crate::fit::regression::Fit;
 use crate::records::record::Clean;
 
-/// A candidate with one set of its nonlinear parameters.
+/// A cause at one location with one set of values of its nonlinear parameters, referred to by indices into the library of candidates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub(crate) struct Choice {
-    /// Index of the candidate in the library.
+    /// Index, in the library, of the candidate: a cause at one location.
     pub candidate: usize,
-    /// Index of the set of nonlinear parameters among the candidate's variants.
+    /// Index of the chosen set of nonlinear parameters among those that the library holds for the candidate.
     pub variant: usize,
 }
 
 /// A set of causes with fitted parameters.
 #[derive(Clone, Debug)]
 pub(crate) struct CandidateModel {
-    /// The causes of the model, each at its location.
+    /// The causes of this candidate model, each at its location and with one set of nonlinear parameters.
     pub choices: Vec<Choice>,
     /// The linear fit of all coefficients, in the order of `choices`.
     pub fit: Fit,
@@ -33,9 +33,10 @@ pub(crate) struct CandidateModel {
 /// Result of a prediction-error fit.
 #[derive(Clone, Debug)]
 pub(crate) struct Simulated {
-    /// By choice: covariance of the coefficients, followed by the nonlinear parameters, for unit-variance noise.
+    /// For each cause of the candidate model: covariance of its coefficients and, after them, of its nonlinear parameters, for
+    /// unit-variance noise.
     pub covariance: Vec<DMatrix<f64>>,
-    /// By record: fitted initial state; empty for a start from rest.
+    /// For each record: the fitted initial state of the simulation; empty for a start from rest.
     pub starts: Vec<Vec<f64>>,
     /// Prediction of the records by the extended case, if a later stage needs it.
     pub reading: Option<Arc<ExtendedPrediction>>,

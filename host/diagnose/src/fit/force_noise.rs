@@ -28,11 +28,13 @@ use crate::fit::unknowns::{FreeParameter, at_bounds, covariance};
 /// Least and largest number of draws of force noise. The relative error of a standard deviation from n draws is 1/√(2n): a third for 4
 /// draws, a fifth for 16.
 const DRAWS: [usize; 2] = [4, 16];
-/// Largest number of samples simulated in all draws together, if that allows more than the least number of draws.
+/// Largest total number of samples simulated in all draws of force noise, as long as the smallest number of draws is kept.
 const SIMULATED: usize = 400_000;
-/// Least number of draws after which the test of `LEAST_FORCE_NOISE_VARIANCE` decides whether more are drawn.
+/// Smallest number of draws of force noise before the test whether more are drawn; they are not if the added variance is below
+/// `LEAST_FORCE_NOISE_VARIANCE`.
 const FIRST: usize = 4;
-/// Stream of the random generator. It makes the draws differ from the noise of a simulated record with the same seed.
+/// Stream number of the random generator for draws of force noise, so that they differ from the noise of a simulated record with the same
+/// seed.
 const STREAM: u64 = 0x666f_7263_6573;
 
 /// Forces along the machine's axes, N, at the samples of a record.
@@ -71,7 +73,8 @@ impl OutputError<'_> {
         at_bounds(&problem, &point, &mut normal, &mut gradient);
         let covariance = covariance(&normal)?;
         let size = problem.slots.len();
-        // δ² − δ'² of one draw, by parameter; `None` if the simulation diverges.
+        // δ² − δ'² for each parameter and one draw of force noise: squared parameter shift by that noise minus its linear part. `None` if
+        // the simulation diverges.
         let more_of = |draw: usize| {
             let noise = self.drawn(draw as u64);
             let closed = ClosedLoop::driven_by(self.study, &self.with(&noise));
@@ -103,7 +106,8 @@ impl OutputError<'_> {
             return None;
         }
         drawn.extend(draws(first..most));
-        // With few draws the normal distribution becomes Student's t with ν degrees of freedom and variance ν/(ν − 2).
+        // The variance comes from few draws of force noise, so the normal distribution becomes Student's t with ν degrees of freedom and
+        // variance ν/(ν − 2).
         let degrees = drawn.iter().flatten().count().max(3) as f64;
         let more = mean(&drawn)? * (degrees / (degrees - 2.0));
         let mut spread = model.clone();
@@ -179,7 +183,8 @@ impl OutputError<'_> {
     }
 }
 
-/// Mean over the draws. A draw whose simulation diverged counts as the elementwise maximum of the others; `None` if all diverged.
+/// Mean, for each parameter, over the draws of force noise. A draw whose simulation diverged counts as the elementwise maximum of the
+/// others; `None` if all diverged.
 fn mean(drawn: &[Option<DVector<f64>>]) -> Option<DVector<f64>> {
     let largest = drawn.iter().flatten().cloned().reduce(|a, b| a.sup(&b))?;
     let sum: DVector<f64> = drawn.iter().map(|draw| draw.as_ref().unwrap_or(&largest)).sum();

@@ -16,7 +16,7 @@ pub(crate) struct Candidate {
     pub cause: usize,
     /// Axis, axes or channel in which the cause acts.
     pub location: Location,
-    /// Sets of nonlinear parameters, each with the numbers of its regression columns.
+    /// Each set of the cause's nonlinear parameters, with the indices of its regression columns.
     pub variants: Vec<(Vec<f64>, Vec<usize>)>,
 }
 
@@ -160,7 +160,7 @@ impl Library {
             .collect()
     }
 
-    /// The numbers of a choice's regression columns.
+    /// Indices of the regression columns that belong to one cause with one set of nonlinear parameters.
     pub(crate) fn columns(&self, choice: Choice) -> &[usize] {
         &self.candidates[choice.candidate].variants[choice.variant].1
     }
@@ -187,7 +187,8 @@ impl Library {
         self.parameters(study, &model).map(|_| model)
     }
 
-    /// Number of fitted parameters of a choice. Nonlinear parameters that follow from the coefficients ([`Cause::settled`]) do not count.
+    /// Number of fitted parameters of one cause of a candidate model. Nonlinear parameters that follow from the coefficients
+    /// ([`Cause::settled`]) do not count.
     pub(crate) fn parameter_count(&self, choice: Choice) -> usize {
         let (nonlinear_parameters, columns) = &self.candidates[choice.candidate].variants[choice.variant];
         let settles = self
@@ -197,7 +198,7 @@ impl Library {
         columns.len() + if settles { 0 } else { nonlinear_parameters.len() }
     }
 
-    /// The column numbers of a candidate model, one choice after the other.
+    /// Indices of all regression columns of a candidate model, cause after cause.
     pub(crate) fn columns_of(&self, model: &CandidateModel) -> Vec<usize> {
         model
             .choices
@@ -207,7 +208,7 @@ impl Library {
             .collect()
     }
 
-    /// Coefficients of the choice at `position` in a candidate model.
+    /// Fitted coefficients of the cause at index `position` of a candidate model.
     pub(crate) fn coefficients(&self, model: &CandidateModel, position: usize) -> Vec<f64> {
         let from: usize = model.choices[..position]
             .iter()
@@ -291,8 +292,8 @@ impl Library {
         Some(parts.map(|part| (part.name, part.extension)).collect())
     }
 
-    /// By choice: numbers of the columns that hold the derivatives with respect to its nonlinear parameters; none if these follow from the
-    /// coefficients.
+    /// For each cause of the candidate model: indices of the regression columns that hold derivatives with respect to its nonlinear
+    /// parameters; none if these parameters follow from the coefficients.
     pub(crate) fn slopes_of(
         &self,
         study: &Study<'_>,
@@ -316,8 +317,8 @@ impl Library {
             .collect()
     }
 
-    /// Adds the derivatives of a choice's contribution with respect to its nonlinear parameters, by central differences, and returns their
-    /// column numbers; `None` if they cannot be computed.
+    /// Adds regression columns with the derivatives of a cause's contribution with respect to its nonlinear parameters, by central
+    /// differences, and returns their indices; `None` if they cannot be computed.
     pub(crate) fn slopes(
         &self,
         study: &Study<'_>,
@@ -368,8 +369,8 @@ impl Library {
             .collect()
     }
 
-    /// χ² with one common factor on mass, stiffness and damping at `location`, and the best factor minus one; `None` if the causes have no
-    /// such location or the factor has no effect.
+    /// χ² of a linear fit that changes mass, stiffness and damping at `location` by one common relative change, and that change; `None` if
+    /// the library lacks one of the three there, or if the change has no effect.
     pub(crate) fn common_factor(&self, regression: &Regression, location: &Location) -> Option<(f64, f64)> {
         let columns: Vec<usize> = OF_DYNAMIC_STIFFNESS
             .iter()

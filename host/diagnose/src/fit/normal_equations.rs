@@ -5,29 +5,29 @@ use nalgebra::DMatrix;
 /// Samples per block of a matrix product, so few that the block of all columns stays in the cache.
 const BLOCK: usize = 1024;
 
-/// Inner products of the columns on one subset of the records.
+/// Inner products of the regression columns, over one subset of the records' segments.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Products {
     /// Lower triangle of the Gram matrix, row by row, of the columns up to the last call of [`Self::complete`].
     gram: Vec<Vec<f64>>,
     /// Squared length of every column.
     squares: Vec<f64>,
-    /// Inner product of every column with the residual.
+    /// Inner product of every regression column with the baseline's residual.
     pub(crate) with_residual: Vec<f64>,
     /// Squared length of the residual.
     pub(crate) residual: f64,
-    /// Number of compared values minus those that the projection on free decays and offsets removes.
+    /// Number of compared values of the subset, minus those that the projection on free decays and sensor offsets removes.
     pub(crate) count: usize,
 }
 
 impl Products {
-    /// Adds a column, given its squared length and its product with the residual.
+    /// Adds a regression column, given its squared length and its inner product with the baseline's residual.
     pub(crate) fn add(&mut self, square: f64, with_residual: f64) {
         self.squares.push(square);
         self.with_residual.push(with_residual);
     }
 
-    /// Adds the products of further columns with all columns before them, given as rows.
+    /// Adds the inner products of new regression columns with all columns up to themselves: one row of `rows` for each new column.
     pub(crate) fn complete(&mut self, rows: &DMatrix<f64>) {
         for row in rows.row_iter() {
             let until = self.gram.len() + 1;
@@ -40,7 +40,7 @@ impl Products {
         self.squares[column]
     }
 
-    /// Inner product of two columns; `None` if it is not computed yet.
+    /// Inner product of two regression columns; `None` if it is not computed yet.
     pub(crate) fn known(&self, i: usize, j: usize) -> Option<f64> {
         if i == j {
             return Some(self.squares[i]);
@@ -49,7 +49,7 @@ impl Products {
     }
 }
 
-/// Inner products of the columns from `first` on with all `columns`, one row for each.
+/// Inner products of the regression columns from index `first` on with all `columns`, one row for each.
 ///
 /// The cost is 2·(new columns)·(columns)·(samples) flops. Products of blocks stay in the cache, whereas single inner products would be
 /// limited by memory.

@@ -21,25 +21,27 @@ use quietcut_simulate::Effects;
 /// Shares of each record, from its beginning, on which a poor start value is fitted first, one after the other.
 const HORIZONS: [f64; 2] = [0.12, 0.35];
 
-/// Least step of a finite difference, as a share of its parameter. Smaller steps drown in the rounding errors of the integration.
+/// Smallest step of the finite difference by which a simulated response is differentiated, relative to the parameter. Smaller steps drown
+/// in the rounding errors of the integration.
 pub(crate) const LEAST_STEP: f64 = 1e-7;
 
-/// Least step of a finite difference, as a share of its parameter, with dry friction. Accelerations jump when friction slips or sticks, and
-/// the time of a jump changes by whole samples: a step must shift it by many samples.
+/// Smallest step of the finite difference by which a simulated response with dry friction is differentiated, relative to the parameter.
+/// Accelerations jump when friction slips or sticks, and the time of a jump changes by whole samples: a step must shift it by many samples.
 const LEAST_STEP_OF_FRICTION: f64 = 3e-3;
 
 /// Compares simulations of candidate models with the records of a study.
 pub(crate) struct OutputError<'a> {
     pub(crate) study: &'a Study<'a>,
     pub(crate) closed: ClosedLoop,
-    /// Segments of all subsets, in the order of the records.
+    /// Fitted, held-out and whole segments of all records, in the order of the records.
     segments: Vec<Segment>,
     pub(crate) horizons: Vec<Vec<Segment>>,
     /// True if every record is a free decay.
     pub(crate) is_free_decay: bool,
 }
 
-/// One column of the Jacobian: record, free parameter, values.
+/// One column of the Jacobian of a simulation, in one record: index of the record, index of the free parameter, and the derivatives of the
+/// whitened samples.
 pub(crate) type Column = (usize, usize, Vec<f64>);
 
 /// Jᵀ r, the product of the Jacobian's columns with the residuals, for `size` free parameters.
@@ -55,7 +57,7 @@ impl<'a> OutputError<'a> {
     /// Prepares the simulations of a study; `None` if one of its records cannot be simulated.
     pub(crate) fn new(study: &'a Study<'a>) -> Option<Self> {
         let closed = ClosedLoop::new(study)?;
-        // The initial state of a free decay is fitted, and not projected out.
+        // The unknown initial state of a free decay is fitted with the parameters, so only sensor offsets are projected out there.
         let nuisance = |record: &crate::records::record::Record| {
             if starts_anywhere(record) {
                 Nuisance::Offsets
@@ -88,7 +90,8 @@ impl<'a> OutputError<'a> {
             .collect()
     }
 
-    /// Whitened residual of some segments of one record under the forces of `closed`.
+    /// Whitened difference between measured and simulated samples of one record, in some of its segments, under the forces of the closed
+    /// loop `closed`.
     fn residual(
         &self,
         closed: &ClosedLoop,
@@ -127,7 +130,7 @@ impl<'a> OutputError<'a> {
         self.residuals_by(&self.closed, problem, segments, point)
     }
 
-    /// [`Self::residuals`] of a simulation with the forces of `closed` instead of the measured forces.
+    /// The same residuals as [`Self::residuals`], but simulated with the forces of the closed loop `closed` instead of the measured forces.
     pub(crate) fn residuals_by(
         &self,
         closed: &ClosedLoop,

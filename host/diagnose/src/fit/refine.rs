@@ -138,7 +138,7 @@ fn search(
             for sign in [1.0, -1.0] {
                 let mut moved = nonlinear_parameters.clone();
                 let step = sign * steps[parameter];
-                // A parameter with a positive lower bound moves by factors, any other by shares of its range.
+                // A nonlinear parameter with a positive lower bound is changed by a factor, any other by a share of its range.
                 moved[parameter] = if low > 0.0 {
                     nonlinear_parameters[parameter] * (1.0 + step)
                 } else {

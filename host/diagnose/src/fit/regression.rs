@@ -13,11 +13,11 @@ use crate::fit::segment::{Nuisance, Segment, split};
 use crate::records::study::Study;
 use crate::signal::dot::dot;
 
-/// Ridge on the unit diagonal of normal equations with all columns of the library, which are nearly dependent.
+/// Ridge added to the unit diagonal of the scaled normal equations with all regression columns of the library, which are nearly dependent.
 const SOFTENED: f64 = 1e-9;
 
-/// Ridge on the unit diagonal of the normal equations of a fit: rounding. For cuts, whose columns are less accurate, the square of their
-/// relative error replaces it.
+/// Ridge added to the unit diagonal of the scaled normal equations of one fit: the rounding error. For cuts, whose regression columns are
+/// less accurate, the square of their relative error replaces it.
 const ROUNDING: f64 = 1e-13;
 
 /// Result of a linear fit of some columns to the residual.
@@ -27,7 +27,7 @@ pub(crate) struct Fit {
     pub coefficients: Vec<f64>,
     /// Covariance of the coefficients for unit-variance noise.
     pub covariance: DMatrix<f64>,
-    /// χ²: residual sum of squares in units of the noise.
+    /// χ² of the linear fit: residual sum of squares in units of the noise.
     pub left: f64,
 }
 
@@ -38,21 +38,21 @@ pub(crate) struct Refit {
     pub change: Vec<f64>,
     /// χ² before the change.
     pub before: f64,
-    /// Decrease of χ² by the change of the coefficients.
+    /// Decrease of χ² by the changed coefficients, against the candidate model before the refit.
     pub taken: f64,
 }
 
 /// The residuals and regression columns of a study, whitened and by segment.
 pub(crate) struct Regression {
     segments: Vec<Segment>,
-    /// Whitened values, by column and segment.
+    /// Whitened regression columns: by column and segment, the values of the segment's samples.
     columns: Vec<Vec<Vec<f64>>>,
     residuals: Vec<Vec<f64>>,
-    /// Inner products on the fitted segments, on the held-out segments and on the whole records.
+    /// Inner products of the regression columns over the fitted segments, over the held-out segments and over the whole records.
     products: [Products; 3],
-    /// Number of columns whose inner products with each other are computed.
+    /// Number of regression columns, from the first, whose inner products with each other are computed.
     complete: usize,
-    /// Ridge on the unit diagonal of the normal equations of every fit.
+    /// Ridge added to the unit diagonal of the scaled normal equations of every fit of this study.
     ridge: f64,
 }
 
@@ -84,7 +84,7 @@ impl Regression {
         regression
     }
 
-    /// Recomputes the products of each column with itself and with the residual.
+    /// Recomputes the inner product of each regression column with itself and with the baseline's residual.
     fn sum(&mut self) {
         self.products = std::array::from_fn(|_| Products::default());
         self.complete = 0;
@@ -144,7 +144,7 @@ impl Regression {
         self.sum();
     }
 
-    /// χ² of one segment after a fit of all columns.
+    /// χ² of one segment of a record after a fit of all regression columns of the library to this segment alone.
     fn residual_of_segment(&self, segment: usize) -> f64 {
         let residual = &self.residuals[segment];
         let mut columns: Vec<&[f64]> = self.columns.iter().map(|column| &column[segment][..]).collect();
@@ -169,7 +169,7 @@ impl Regression {
         }
     }
 
-    /// Σ y² of the measured samples of whole records, in units of the noise.
+    /// Energy Σ (y/σ)² of the measured samples y of all records, σ being the standard deviation of their noise.
     pub(crate) fn signal(&self, study: &Study<'_>) -> f64 {
         let of_segment = |segment: &Segment| {
             let channels = study.records[segment.record].channels.iter();
@@ -220,12 +220,13 @@ impl Regression {
         self.complete = size;
     }
 
-    /// Euclidean length of a column on a subset, per unit of its coefficient.
+    /// Euclidean length of a whitened regression column over a subset of segments: standard deviations of noise per unit of the
+    /// coefficient.
     pub(crate) fn length(&self, subset: Subset, column: usize) -> f64 {
         self.products(subset).square(column).sqrt()
     }
 
-    /// Inner product of two columns on a subset.
+    /// Inner product of two whitened regression columns over a subset of segments.
     fn product(&self, subset: Subset, i: usize, j: usize) -> f64 {
         self.products(subset).known(i, j).unwrap_or_else(|| {
             let of_subset = self
@@ -243,12 +244,12 @@ impl Regression {
         &self.products[subset as usize]
     }
 
-    /// χ² of the baseline on a subset: without any column.
+    /// χ² of the baseline, without any cause, over a subset of segments.
     pub(crate) fn residual(&self, subset: Subset) -> f64 {
         self.products(subset).residual
     }
 
-    /// Number of compared values on a subset.
+    /// Number of compared values over a subset of segments, without those that the projection on free decays and offsets removes.
     pub(crate) fn count(&self, subset: Subset) -> usize {
         self.products(subset).count
     }
@@ -279,8 +280,8 @@ impl Regression {
         self.solve(subset, columns, self.ridge)
     }
 
-    /// Coefficients of `columns` that fit the column `target`, and the energy that they explain; `None` if the columns are dependent or
-    /// zero.
+    /// Coefficients with which the regression columns `columns` fit the regression column `target`, and the energy of `target` that they
+    /// explain; `None` if the columns are dependent or zero.
     pub(crate) fn fit_column(
         &self,
         subset: Subset,

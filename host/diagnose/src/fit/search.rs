@@ -26,7 +26,7 @@ const DAMPING: Damping = Damping {
 /// Largest number of steps that are tried from one point: the last one has a damping of 10 or more. A limit on computing time.
 const TRIALS: usize = 6;
 
-/// Residuals of a point with their energy χ².
+/// Residuals of a simulated candidate model with given parameter values, and their energy χ².
 struct Residuals {
     of_segments: Vec<Vec<f64>>,
     left: f64,
@@ -41,7 +41,7 @@ struct Search<'a, 'b, 'c> {
 }
 
 impl Search<'_, '_, '_> {
-    /// Lag of a χ² behind that of the rival, beyond the one that is granted.
+    /// Lag of a search: its χ² minus the χ² of the rival candidate model minus [`HOPELESS_LAG`]. A positive lag may end the search.
     fn behind(&self, left: f64) -> f64 {
         left - self.rival - HOPELESS_LAG
     }
@@ -77,13 +77,14 @@ impl Objective for Search<'_, '_, '_> {
         next.left < now.left && now.left - next.left < SEARCH_SETTLED
     }
 
-    /// A round that gained less than 40 % of the lag will not catch up with the rival.
+    /// Gives up if an iteration has reduced the lag behind the rival candidate model by less than 40 %: the search will not catch up.
     fn gives_up(&self, round: usize, now: &Residuals, before: Option<&Residuals>) -> bool {
         let behind = self.behind(now.left);
         round >= 2 && behind > 0.0 && before.is_some_and(|before| behind > 0.6 * self.behind(before.left))
     }
 
-    /// To first order most of the residual cannot be fitted.
+    /// Gives up if even the linearized model predicts a χ² that lags behind the rival candidate model and is more than half of the present
+    /// χ².
     fn gives_up_linearized(&self, round: usize, now: &Residuals, sums: &NormalSums) -> bool {
         let promised = now.left - predicted(&sums.matrix, &sums.gradient);
         round >= 1 && self.behind(promised) > 0.0 && promised > 0.5 * now.left

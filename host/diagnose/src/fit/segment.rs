@@ -39,7 +39,7 @@ pub(crate) enum Nuisance {
     Offsets,
 }
 
-/// A subset of the segments, on which a sum is taken.
+/// Names the segments over which a sum (χ², inner product) is taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Subset {
     /// Segments to which coefficients are fitted.
@@ -138,7 +138,8 @@ impl Segment {
         column
     }
 
-    /// Number of degrees of freedom that the projection removes or that are not compared.
+    /// Number of samples of the segment that do not count as compared: one for each projected free decay or offset, and the skipped
+    /// samples.
     pub(crate) fn taken(&self) -> usize {
         self.nuisance.len() + self.skipped.iter().map(Vec::len).sum::<usize>()
     }
@@ -175,7 +176,7 @@ fn nuisance(record: &Record, segment: &Segment, unknown: Nuisance) -> Vec<Vec<f6
         Nuisance::Offsets => 0,
     };
     for state in 0..states {
-        // The free decay of a segment begins with the segment.
+        // The unit free decays begin at the first sample of the segment, with a state of their own.
         let shifted: Vec<Vec<f64>> = (0..channels)
             .map(|channel| {
                 let column = record.decays.column(channel, state);

@@ -12,9 +12,9 @@ use quietcut_simulate::Effects;
 /// Values of all parameters and initial states of a candidate model.
 #[derive(Clone, Debug)]
 pub(crate) struct ParameterPoint {
-    /// By choice: coefficients, followed by the nonlinear parameters.
+    /// For each cause of the candidate model: its coefficients, followed by its nonlinear parameters.
     pub(crate) inner: Vec<Vec<f64>>,
-    /// By record: initial state; empty for a start from rest.
+    /// For each record: the initial state of the simulation; empty for a start from rest.
     pub(crate) starts: Vec<Vec<f64>>,
 }
 
@@ -37,7 +37,7 @@ pub(crate) struct FitProblem<'a> {
     pub(crate) library: &'a Library,
     pub(crate) choices: &'a [Choice],
     pub(crate) slots: Vec<(FreeParameter, f64)>,
-    /// Least step of a finite difference, as a share of its parameter.
+    /// Smallest step of a finite difference with respect to any free parameter, relative to the parameter.
     pub(crate) least_step: f64,
 }
 
@@ -57,7 +57,8 @@ impl FreeParameter {
         }
     }
 
-    /// True if the parameter changes the simulated response of `record`.
+    /// True if this free parameter changes the simulated response of the record with index `record`: an initial state changes only its own
+    /// record.
     pub(crate) fn affects(self, record: usize) -> bool {
         match self {
             Self::Inner { .. } => true,
@@ -116,15 +117,16 @@ pub(crate) fn stepped(
     next
 }
 
-/// Ridge on the unit diagonal of the normal equations of a search: the square of the accuracy of the simulation, about.
+/// Ridge added to the unit diagonal of the scaled normal equations of a prediction-error search: about the square of the simulation's
+/// accuracy.
 pub(crate) const RIDGE: f64 = 1e-12;
 
-/// Decrease of χ² by a whole step, to first order.
+/// Decrease of χ² by a whole Gauss–Newton step, predicted by the linearized model.
 pub(crate) fn predicted(normal: &DMatrix<f64>, gradient: &DVector<f64>) -> f64 {
     NormalEquations::new(normal, 1e-9, Idle::Hold).map_or(0.0, |equations| equations.explained(gradient))
 }
 
-/// Fixes the parameters that stand at a bound and would leave it.
+/// Fixes every free parameter that lies at one of its bounds and whose next step would leave it: its gradient, row and column become zero.
 pub(crate) fn at_bounds(
     problem: &FitProblem<'_>,
     point: &ParameterPoint,
@@ -152,7 +154,8 @@ pub(crate) fn covariance(normal: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     Some(NormalEquations::new(normal, RIDGE, Idle::Hold)?.inverse())
 }
 
-/// By choice: covariance of its parameters for unit-variance noise, with the initial states unknown; zero for a fixed parameter.
+/// For each cause of the candidate model: covariance of its parameters for unit-variance noise, with the initial states unknown; zero for a
+/// fixed parameter.
 pub(crate) fn by_choice(slots: &[FreeParameter], found: &SearchResult) -> Vec<DMatrix<f64>> {
     let mut all: Vec<DMatrix<f64>> = found
         .point

@@ -13,11 +13,13 @@ use crate::records::record::Record;
 #[derive(Default)]
 pub(crate) struct Whitening {
     channels: usize,
-    /// By bin: number of real values per channel, 1 for a real bin and 2 for a complex one.
+    /// For each frequency bin: number of real values per channel, 1 for a real bin (zero and half the sample rate) and 2 for a complex one.
     numbers: Vec<usize>,
-    /// By bin and channel: one over the diagonal element of L.
+    /// For each frequency bin and channel: one over the diagonal element of L, the Cholesky factor of the noise covariance between
+    /// channels.
     weights: Vec<f64>,
-    /// By bin: rows of L to the left of the diagonal; empty if the channels are independent.
+    /// For each frequency bin: elements left of the diagonal of L, the Cholesky factor of the noise covariance between channels; empty if
+    /// the channels' noise is independent.
     common: Vec<Complex64>,
 }
 
@@ -100,7 +102,8 @@ impl Whitening {
     }
 }
 
-/// Writes h σ_f of each channel at ω, rad/s, into `read`. `forces` holds the axis and standard deviation of each force.
+/// Writes into `read` each channel's response at ω (rad/s) to one standard deviation σ_f of the noise of each force. `forces` holds the
+/// axis and σ_f of each force.
 fn read_of_noise(record: &Record, omega: f64, forces: &[(usize, f64)], read: &mut [Complex64]) {
     let nearest = (omega / record.grid.omega(1)).round() as usize;
     let of_channels = read.chunks_exact_mut(forces.len().max(1));
@@ -130,7 +133,7 @@ fn factorize(deviations: &[f64], read: &[Complex64], rows: &mut [Complex64]) {
                 sum -= rows[i * channels + k] * rows[j * channels + k].conj();
             }
             rows[i * channels + j] = if i == j {
-                // Rounding must not make the variance smaller than that of the channel's own sensor.
+                // Rounding must not make the whitened variance smaller than that of the channel's own sensor noise.
                 Complex64::from(sum.re.max(own).sqrt())
             } else {
                 sum / rows[j * channels + j].re

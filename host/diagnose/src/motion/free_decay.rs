@@ -88,7 +88,7 @@ impl Decays {
                 }
             }
         }
-        // States that no channel observes keep the value zero.
+        // The initial value of a state variable that no channel observes stays zero.
         let scale: Vec<f64> = (0..order).map(|i| gram[(i, i)].sqrt()).collect();
         for i in 0..order {
             for j in 0..order {

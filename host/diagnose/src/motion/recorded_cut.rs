@@ -15,9 +15,10 @@ use quietcut_recording::Recording;
 use quietcut_simulate::path::SampledMotion;
 use quietcut_simulate::{Cutter, Effects, Spindle};
 
-/// Least sin φ, the share of the feed in the chip thickness, down to which the surfaces of earlier passes are evaluated.
+/// Smallest sin φ of the immersion angle φ at which surfaces of passes before the last are still evaluated. The feed adds f·sin φ to the
+/// chip thickness, so nearer to the ends of a slot a tooth could miss any number of passes.
 const SHALLOW: f64 = 0.1;
-/// Largest number of passes during which a tooth may miss the workpiece.
+/// Largest number of successive passes for which a tooth may leave the workpiece uncut.
 const MOST_MISSED: usize = 24;
 
 /// A recorded cut: the tool, its engagement and the spindle angle.
@@ -31,7 +32,8 @@ pub(crate) struct RecordedCut {
     rate_hz: f64,
     /// Number of samples of the record.
     count: usize,
-    /// Number of earlier passes that may have left the surface, if teeth miss passes; `None` if only the last pass left it.
+    /// Number of earlier tooth passes that may have left the present surface, if vibrating teeth miss passes; `None` if it is always the
+    /// last pass.
     passes: Option<usize>,
 }
 

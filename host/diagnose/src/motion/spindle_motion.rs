@@ -26,6 +26,7 @@ pub(crate) struct SpindleMotion {
 impl SpindleMotion {
     /// Fits the spindle angle to the tachometer of a recording: constant speed, with the speed modulation of the case if there is one.
     ///
+    /// # Errors
     /// The recording has no tachometer channel, or its tachometer has too few edges.
     pub(crate) fn new(
         recording: &Recording,
@@ -62,7 +63,7 @@ impl SpindleMotion {
         .fitted())
     }
 
-    /// The spindle angle fitted to the same edges with another speed modulation.
+    /// The spindle motion fitted to the same tachometer edges, but with the speed modulation `fluctuation`.
     pub(crate) fn with(&self, fluctuation: Fluctuation) -> Self {
         Self {
             fluctuation: Some(fluctuation),
@@ -71,8 +72,8 @@ impl SpindleMotion {
         .fitted()
     }
 
-    /// Least-squares fit of speed and start angle to the edges. The speed modulation depends on the mean speed only through its amplitude,
-    /// so that three iterations converge.
+    /// Least-squares fit of mean speed and start angle to the tachometer edges. The speed modulation depends on the mean speed only through
+    /// its amplitude, so that three iterations converge.
     fn fitted(mut self) -> Self {
         let count = self.edges_s.len() as f64;
         for _ in 0..3 {
@@ -135,7 +136,7 @@ impl SpindleMotion {
     }
 }
 
-/// Step of the grid of modulation frequencies, in periods per record.
+/// Step of the grid of tried frequencies of a speed modulation, in modulation periods per record duration.
 const STEP: f64 = 0.2;
 
 /// A speed modulation estimated from tachometer edges.
@@ -244,7 +245,7 @@ fn deviation(
 
 /// Result of a least-squares fit of a modulation with given frequency.
 struct ModulationFit {
-    /// Amplitude components δ cos ψ (`along`) and δ sin ψ (`across`).
+    /// Components of the relative speed amplitude δ in cosine and sine phase: δ cos ψ (`along`) and δ sin ψ (`across`).
     along: f64,
     across: f64,
     /// Residual sum of squares of the edge times, s², with the modulation (`left`) and without it (`without`).

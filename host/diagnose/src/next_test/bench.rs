@@ -15,15 +15,16 @@ use quietcut_model::case::Case;
 use quietcut_model::milling::Cut;
 use quietcut_recording::{Channel, Quantity, Recording, TestKind};
 
-/// Largest number of samples of a simulated test.
+/// Largest number of samples per channel of a simulated test that may be proposed.
 const SAMPLES: f64 = 8192.0;
-/// Least and largest duration of a test, in periods of the lowest natural frequency.
+/// Smallest and largest duration of a proposed test, in periods of the lowest natural frequency.
 const PERIODS: [f64; 2] = [20.0, 60.0];
-/// Samples per period of the highest natural frequency.
+/// Samples of a simulated test per period of the highest natural frequency of the baseline.
 const SAMPLES_PER_PERIOD: f64 = 24.0;
-/// Duration of the simulated transient before a cut is compared, in longest time constants of the structure.
+/// Duration of the transient that is simulated before a proposed cut is compared, in multiples of the longest time constant of the
+/// structure.
 const SETTLED: f64 = 12.0;
-/// Largest duration of the simulated transient of a cut, in durations of the compared cut.
+/// Largest duration of the simulated transient of a proposed cut, as a multiple of the duration of the cut itself.
 const WAITED: f64 = 4.0;
 
 /// A channel of motion that the records contain.
@@ -52,12 +53,12 @@ pub(super) struct Bench<'a> {
     pub(super) modes_hz: [f64; 2],
     /// True if a recorded cut has a channel of force.
     pub(super) has_force: bool,
-    /// Peak force of tests of the structure, N: that of the records. If they have none, the force that reaches `largest_m` at the lowest
-    /// natural frequency.
+    /// Peak force of proposed tests of the structure, N: the largest force in records of such tests. Without such records, the force that
+    /// causes the displacement `largest_m` at the lowest natural frequency.
     pub(super) force_n: f64,
     /// Largest displacement in the records, m.
     pub(super) largest_m: f64,
-    /// Standard duration of a test, s.
+    /// Standard duration of a proposed test, s.
     pub(super) seconds: f64,
     pub(super) rate_hz: f64,
     pub(super) cut: Option<CutSoFar>,
@@ -119,7 +120,7 @@ impl<'a> Bench<'a> {
         })
     }
 
-    /// The largest static compliance along an axis, m/N.
+    /// Static compliance of the baseline along its most compliant axis, m/N.
     pub(super) fn static_compliance(&self) -> f64 {
         compliance(&self.baseline, 0.0)
     }
@@ -203,7 +204,7 @@ fn cut_so_far(case: &Case, recording: &Recording) -> Option<CutSoFar> {
     Some(CutSoFar {
         rpm: given.spindle_rpm?,
         depth_mm: given.axial_depth_mm?,
-        // The preparation of the records has refused a case without a cut.
+        // A case without a cut cannot come here: the preparation of the records has refused it.
         cut: cut_of(case, recording).ok()?,
     })
 }

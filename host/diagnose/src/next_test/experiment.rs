@@ -31,7 +31,7 @@ pub(super) enum Excitation {
     },
 }
 
-/// An excitation with its sample rate and effort.
+/// A test that may be proposed: its excitation, its sample rate and its effort.
 #[derive(Clone, Debug)]
 pub(super) struct Experiment {
     pub(super) excitation: Excitation,
@@ -255,7 +255,7 @@ impl Experiment {
         }
     }
 
-    /// The test as the entry `next_test` of the answer.
+    /// A second sensor next to a mounted one is taken as free of errors, so the sensor extensions of the case are removed for it.
     pub(super) fn described(&self, sensors: Sensors, distance: f64, why: String) -> NextTest {
         let plain = NextTest {
             kind: "",

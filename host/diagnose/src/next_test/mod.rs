@@ -27,7 +27,7 @@ use quietcut_recording::Recording;
 struct Proposal<'a> {
     experiment: &'a Experiment,
     sensors: Sensors,
-    /// Difference of the two candidate models that the experiment separates least; `between` holds their indices.
+    /// Distance between the two candidate models that the experiment separates least; `between` holds the indices of these two models.
     least: Difference,
     between: [usize; 2],
 }

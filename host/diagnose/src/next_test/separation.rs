@@ -10,8 +10,8 @@ use crate::candidates::extension_tables::joined;
 use crate::conclusion::answer::{EstimatedCause, Figure, NINETY_PERCENT};
 use quietcut_model::case::Case;
 
-/// Least step of a finite difference, as a share of its parameter. The simulation is accurate to 1e-9, so that the slope is accurate to
-/// 1e-5.
+/// Smallest step of the finite difference of simulated readings, relative to the parameter. The simulation is accurate to 1e-9, so that the
+/// derivative is accurate to 1e-5.
 const LEAST_STEP: f64 = 1e-4;
 
 /// A candidate model in a comparison: the causes that act together.
@@ -22,7 +22,8 @@ pub(super) struct Rival<'a> {
 /// Readings of an experiment under a candidate model.
 pub(super) struct Predicted {
     readings: Vec<SimulatedReading>,
-    /// By parameter: readings with the parameter changed by a step, and that step in standard deviations of the parameter.
+    /// For each uncertain parameter: readings simulated with the parameter changed by a step, and that step in standard deviations of the
+    /// parameter.
     moved: Vec<(Vec<SimulatedReading>, f64)>,
 }
 
@@ -35,13 +36,15 @@ pub(super) struct Difference {
     pub(super) squared: f64,
     /// The channel in which the two models differ most.
     pub(super) channel: String,
-    /// Root mean square of the difference in that channel, in standard deviations of its noise.
+    /// Root mean square of the two models' difference in that channel after the fit, in standard deviations of the channel's noise.
     pub(super) times_noise: f64,
 }
 
 impl Rival<'_> {
-    /// The readings of an experiment with this candidate model. A parameter whose step cannot be simulated counts as known.
+    /// Simulated readings of an experiment if this candidate model is the true machine. A parameter whose step cannot be simulated counts
+    /// as known.
     ///
+    /// # Errors
     /// The experiment cannot be simulated with this candidate model; the error is a sentence.
     pub(super) fn simulated(&self, bench: &Bench<'_>, experiment: &Experiment) -> Result<Predicted, String> {
         let readings = experiment.readings(bench, &self.case(bench.case, None))?;
@@ -56,7 +59,8 @@ impl Rival<'_> {
         Ok(Predicted { readings, moved })
     }
 
-    /// Uncertain parameters: index of the cause, key, step, and the step in standard deviations.
+    /// Steps for the uncertain parameters of a candidate model: index of the cause, key of the parameter, step in its unit, and step in its
+    /// standard deviations.
     fn steps(&self) -> Vec<(usize, &'static str, f64, f64)> {
         let of = |(index, cause): (usize, &EstimatedCause)| {
             let figures: Vec<(&'static str, Figure)> = cause

@@ -17,7 +17,8 @@ pub(crate) struct Observed {
     pub predicted: Vec<f64>,
     /// Standard deviation of the channel's white noise, SI units.
     pub deviation: f64,
-    /// Averaging time of the channel, s: one sampling interval for accelerations whose velocity jumps, otherwise zero.
+    /// Time over which a reading of the channel averages, s: one sampling interval for accelerations if a force step makes the velocity
+    /// jump, otherwise zero.
     pub(super) mean_s: f64,
     /// Receptance at the sensor, if the baseline has mode shapes there; otherwise `None`: see
     /// [`Record::seen_by`](super::record::Record::seen_by).

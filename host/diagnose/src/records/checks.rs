@@ -95,7 +95,7 @@ pub(crate) fn unit(
     if own <= LEAST_ENERGY_OVER_FORCE_NOISE * by_noise || whole <= 0.0 {
         return Ok(());
     }
-    // The response to a constant force contains no information on the vibration.
+    // The check uses only the varying part of the predicted response: the response to a constant force says nothing about the vibration.
     if spread(response).powi(2) * response.len() as f64 > LEAST_ENERGY_OVER_FORCE_NOISE * by_noise {
         far_off(path, name, response, measured)?;
     }
@@ -164,7 +164,7 @@ fn spread(samples: &[f64]) -> f64 {
     rms(&samples.iter().map(|x| x - mean).collect::<Vec<_>>())
 }
 
-/// The wrong unit that a fitted gain may stand for; `None` if the gain is near no unit's ratio.
+/// The unit mix-up (such as g for m/s²) that a fitted sensor gain may stand for; `None` if the gain is near the ratio of no such mix-up.
 pub(crate) fn unit_of_gain(gain: f64) -> Option<&'static str> {
     unit_within(gain.abs(), |_| GAIN_UNIT_TOLERANCE)
 }

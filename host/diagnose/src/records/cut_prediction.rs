@@ -10,7 +10,8 @@ use crate::records::{amplification, checks, motion_estimate};
 use crate::signal::noise::rms;
 use quietcut_recording::{Quantity, Recording};
 
-/// Iterations between force and motion: the force determines the motion, and the motion determines the chip thickness and so the force.
+/// Number of iterations between cutting force and motion: the force determines the motion, and the motion determines the chip thickness and
+/// so the force.
 const ROUNDS: usize = 4;
 /// Largest number of iterations if a candidate model supplies the motion. They end earlier if the motion is within [`CLOSED_LOOP_SETTLED`]
 /// of the closed-loop prediction.
@@ -18,6 +19,7 @@ const ROUNDS_OF_A_MODEL: usize = 8;
 
 /// Completes the record of a cut: predicts all channels, and corrects the motion by the residual.
 ///
+/// # Errors
 /// The case cannot describe the cut, or the size of a channel is impossible.
 pub(super) fn predicted(
     mut record: Record,
@@ -92,7 +94,7 @@ pub(super) fn predicted(
             break;
         }
     }
-    // The regressors of causes are differences from the force along the final motion, which is computed here.
+    // The regressors of causes are differences from the cutting force along the final motion, so that force is computed here.
     cutting.follow(&record.motion);
     record.cut = Some(cutting);
     Ok(record)
@@ -105,7 +107,7 @@ fn check_units(record: &Record) -> Result<(), DiagnoseError> {
     for (index, channel) in record.channels.iter().enumerate() {
         let mut response = record.decays.without(index, &channel.predicted);
         let mut measured = channel.measured.clone();
-        // Samples that are not compared were set to the measured value.
+        // Skipped samples carry the measured value as prediction; both are set to zero so that they do not count in the check of units.
         for &sample in &record.skipped[index] {
             (response[sample], measured[sample]) = (0.0, 0.0);
         }
@@ -120,7 +122,8 @@ fn check_units(record: &Record) -> Result<(), DiagnoseError> {
     checks::unless_one_is_right(forces)
 }
 
-/// Excludes the first revolution from the comparison and, unless the record is short, the last.
+/// Excludes from the comparison the first revolutions, whose chips depend on passes before the record, and, unless the record is short, as
+/// many samples at its end.
 fn compare_without_ends(record: &mut Record, cut: &RecordedCut) {
     let (ends, count) = (cut.first_revolutions(), record.grid.count());
     record.compared = ends..if count > 4 * ends { count - ends } else { count };

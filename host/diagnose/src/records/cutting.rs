@@ -26,9 +26,10 @@ pub(crate) struct Cutting {
 }
 
 impl Cutting {
-    /// The cut of a recording along `motion`, which has `finer` samples per sample of the record. `with_force` is true if forces are
-    /// measured.
+    /// The cut of a recording with the cutting force of the baseline along `motion`, which has `finer` samples per sample of the record.
+    /// `with_force` is true if forces are measured.
     ///
+    /// # Errors
     /// The case or the recording lacks a value that describes the cut, or an extension does not apply to it.
     pub(super) fn new(
         baseline: &Baseline<'_>,
@@ -63,7 +64,7 @@ impl Cutting {
         self.chips.mean_slopes(&self.cut.cutter, &self.cut.spindle_motion)
     }
 
-    /// Recomputes chips and force along another motion.
+    /// Recomputes chip thickness and cutting force of the baseline along another motion of the tool.
     pub(super) fn follow(&mut self, motion: &SampledMotion) {
         self.chips = self
             .cut
@@ -71,7 +72,8 @@ impl Cutting {
         self.force = self.force_of(&self.cut.cutter, motion);
     }
 
-    /// The cutting force of another tool with the same chips. `motion` is that of the chips.
+    /// The cutting force of the tool `cutter` with the chips of this cut. `motion` must be the motion along which these chips were
+    /// computed.
     pub(crate) fn force_of(&self, cutter: &Cutter, motion: &SampledMotion) -> CutForce {
         self.chips.force(cutter, &self.cut.spindle_motion, motion)
     }

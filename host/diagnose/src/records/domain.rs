@@ -14,8 +14,9 @@ pub(crate) enum Domain {
 }
 
 impl Domain {
-    /// The domain of a recording, from its kind, its input and its channels.
+    /// The domain (motion or force) in which a recording is compared, from its kind, its input and its channels.
     ///
+    /// # Errors
     /// The recording lacks a channel or has no known excitation.
     pub(super) fn of(baseline: &Baseline<'_>, recording: &Recording) -> Result<Self, DiagnoseError> {
         let has = |quantity: Quantity| {

@@ -30,9 +30,10 @@ use quietcut_simulate::{Cutter, Spindle, WorkpieceTraverse};
 /// Number of angles per revolution at which the cutting force is evaluated.
 const ANGLES: usize = 512;
 
-/// The recordings, each shortened to its segment of full engagement, and one warning for each that was shortened or could not be examined.
+/// The recordings, each cut to its segment of full engagement, and one warning for each that was shortened or could not be examined.
 /// Recordings with full engagement throughout, and those of other tests, stay as they are.
 ///
+/// # Errors
 /// A recording has too few revolutions of full engagement.
 pub(crate) fn in_full_engagement<'a>(
     case: &Case,
@@ -211,7 +212,8 @@ fn force_n(cutter: &Cutter, angle_rad: f64) -> Vector3<f64> {
 /// the response to the feed alone if that is smaller, as in chatter.
 struct Levels {
     count: usize,
-    /// True if the median of some channel exceeds the response to the feed by the factor `CHATTER_LEVEL`.
+    /// True if the median vibration level of some channel over the revolutions exceeds the level that the feed alone causes by the factor
+    /// `CHATTER_LEVEL`.
     chatters: bool,
     /// Levels by channel and revolution.
     of: Vec<Vec<f64>>,
