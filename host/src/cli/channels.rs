@@ -10,7 +10,8 @@ use crate::simulate::rig::Noise;
 #[derive(Debug, clap::Args)]
 #[command(next_help_heading = "Channels")]
 pub(super) struct Channels {
-    /// Motions to record besides the force, in every direction of the structure.
+    /// Motion quantities (displacement, velocity, acceleration) to record besides the force, in every direction of the
+    /// structure.
     #[arg(
         long,
         value_name = "WHAT,…",
@@ -38,7 +39,7 @@ enum Measured {
 }
 
 impl Channels {
-    /// Motion quantities to record besides the force.
+    /// Motion quantities that a simulated recording contains besides the force, from the option `--measure`.
     pub(super) fn measured(&self) -> Vec<Quantity> {
         self.measure
             .iter()

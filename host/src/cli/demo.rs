@@ -59,11 +59,12 @@ struct StoryAnswer {
 struct TrialAnswer {
     rpm: f64,
     depth_mm: f64,
-    /// First report of chatter; `null` if the device reports none.
+    /// First report in which the device detects chatter during one cut of the demonstration; `null` if it detects none.
     alarm: Option<VerdictAnswer>,
-    /// Last verdict before the tool begins to leave the workpiece.
+    /// Last verdict of the device on one cut of the demonstration, before the tool begins to leave the workpiece.
     verdict: Option<&'static str>,
-    /// Root mean square of the acceleration along x, y and z over the last quarter of full engagement, m/s².
+    /// Root mean square of the acceleration in one cut of the demonstration along x, y and z over the last quarter of
+    /// full engagement, m/s².
     vibration_m_per_s2: [f64; 3],
 }
 
@@ -305,7 +306,8 @@ impl TrialAnswer {
 
 impl From<BenchError> for Error {
     fn from(error: BenchError) -> Self {
-        // The demonstration has no input of the user that could cause the error.
+        // The user gives the demonstration no input that could cause an error of its test bench, so the exit status is
+        // 1.
         Self::other(error)
     }
 }

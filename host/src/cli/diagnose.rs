@@ -72,8 +72,8 @@ pub fn run(args: Args) -> Result<(), Error> {
     args.output.answer_with(&understood, &diagnosis, text(&diagnosis))
 }
 
-/// Adds the stability limits to the diagnosis: before and after the extension, or only those of the case if there is no
-/// extension but there are trial cuts. A failure becomes a warning.
+/// Adds stability limits to the diagnosis: those of the case and of the extended case, or only those of the case if the
+/// diagnosis extends nothing and trial cuts are given. A failed computation of limits becomes a warning.
 fn add_limits(case: &Case, recordings: &[Recording], cuts: &[TrialCut], diagnosis: &mut Diagnosis) {
     let has_cuts = || !cuts.is_empty() || !recorded_cuts(case, recordings).0.is_empty();
     let found = match diagnosis.extended(case) {
@@ -94,8 +94,8 @@ fn add_limits(case: &Case, recordings: &[Recording], cuts: &[TrialCut], diagnosi
     }
 }
 
-/// Length of the progress bar: the number of stages of a diagnosis, including the stability limits and the second search of
-/// long recordings.
+/// Length of the progress bar of `quietcut diagnose`: the number of stages of a diagnosis, including the stability
+/// limits and the second search for causes in long recordings.
 const STAGES: u64 = 9;
 
 fn stage_message(stage: Stage) -> &'static str {

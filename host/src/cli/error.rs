@@ -1,4 +1,4 @@
-//! Errors of the verbs and their exit status.
+//! Errors of the verbs (subcommands) of `quietcut`, and the exit status of each.
 
 use std::error::Error as StdError;
 use std::io;
@@ -14,7 +14,7 @@ use crate::stability::StabilityError;
 
 type Cause = Box<dyn StdError + Send + Sync>;
 
-/// The failure of a verb.
+/// The error with which a verb (subcommand) of `quietcut` ends.
 ///
 /// The `From` conversions decide for each error of the library crates whether it is an input error.
 #[derive(Debug)]
@@ -73,7 +73,7 @@ impl StdError for Error {}
 impl From<FileError> for Error {
     fn from(error: FileError) -> Self {
         match error {
-            // The user gave the folder or the file.
+            // The user gave the path that cannot be read or is no text, so this is an input error.
             FileError::Read { .. } | FileError::NotText { .. } => Self::input(error),
             FileError::Write { ref cause, .. } => match cause.kind() {
                 io::ErrorKind::NotFound
@@ -146,7 +146,8 @@ impl From<DeviceError> for Error {
             DeviceError::PseudoTerminal { .. } | DeviceError::TooLarge { .. } | DeviceError::Cell(_) => {
                 Self::other(error)
             }
-            // The user can correct the port, the cable, the device or the table.
+            // These errors concern the port, the cable, the device or the lobe table, which the user can correct: they
+            // are input errors.
             _ => Self::input(error),
         }
     }

@@ -20,7 +20,7 @@ pub(super) struct Experiment {
     /// Simulate a vibration test with this excitation instead of a cut.
     #[arg(long, value_name = "KIND")]
     pub(super) experiment: Option<ExperimentKind>,
-    /// Direction of the force. Default: the first direction of the structure.
+    /// Direction of the excitation force of a vibration test. Default: the first direction of the structure.
     #[arg(long, value_name = "x|y|z")]
     direction: Option<Direction>,
     /// Frequencies in Hz: the steps of step-sine, the first and last frequency of a sweep, or the tones of a shaker.
@@ -39,13 +39,13 @@ pub(super) struct Experiment {
     /// Sweep rate in Hz per minute.
     #[arg(long, value_name = "R", default_value_t = 6.0, value_parser = positive, allow_negative_numbers = true)]
     hz_per_min: f64,
-    /// Sweep from the last frequency to the first.
+    /// Sweep downwards, from the last frequency of --frequency-hz to the first.
     #[arg(long)]
     backward: bool,
     /// Number of hammer impacts.
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u16).range(1..))]
     impacts: u16,
-    /// Duration of an impact, in ms.
+    /// Duration of the force pulse of one hammer impact, in ms.
     #[arg(long, value_name = "T", default_value_t = 10.0, value_parser = positive, allow_negative_numbers = true)]
     pulse_ms: f64,
     /// Time between impacts, in s.
@@ -179,8 +179,9 @@ fn direction(options: &Experiment, structure: &Structure) -> Result<Direction, S
         .ok_or_else(|| "the structure has no direction in which a force can act".into())
 }
 
-/// Default sampling rate in Hz: a power of two of at least 20 times the highest excited frequency, so that the eighth harmonic
-/// lies below the Nyquist frequency. An impact of duration T excites up to about 1/T.
+/// Default sampling rate of a simulated vibration test in Hz: a power of two of at least 20 times the highest excited
+/// frequency, so that the eighth harmonic lies below the Nyquist frequency. An impact of duration T excites up to about
+/// 1/T.
 fn default_rate_hz(kind: ExperimentKind, options: &Experiment) -> f64 {
     let highest_hz = match kind {
         ExperimentKind::Hammer => 1e3 / options.pulse_ms,

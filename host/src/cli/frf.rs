@@ -39,19 +39,20 @@ pub struct Args {
     /// combines several cuts, in each of which the forces are linearly dependent.
     #[arg(long, value_enum, default_value_t)]
     method: Method,
-    /// Excitation of the structure; overrides the kind in the sidecar file.
+    /// Kind of excitation in the recordings; overrides the key kind of the sidecar file.
     #[arg(long, value_enum)]
     excitation: Option<ExcitationKind>,
-    /// First and last frequency in Hz.
+    /// First and last frequency of the estimated receptances, in Hz.
     #[arg(long, value_name = "FIRST:LAST", value_parser = band)]
     band_hz: Option<(f64, f64)>,
-    /// Frequency resolution in Hz. Default: eight segments, or eight averages of a sweep, for each force.
+    /// Distance between the frequency lines of the receptances, in Hz. Default: for each force, that of eight segments
+    /// of a record of random excitation, or of eight averaged lines of a sweep.
     #[arg(long, value_name = "D", value_parser = positive, allow_negative_numbers = true)]
     resolution_hz: Option<f64>,
-    /// Window of the segments of random excitation.
+    /// Window function on each segment of a record of random excitation.
     #[arg(long, value_enum, default_value_t)]
     window: WindowName,
-    /// Overlap of the segments of random excitation, as a fraction of their length.
+    /// Overlap of neighbouring segments of a record of random excitation, as a fraction of the segment length.
     #[arg(long, value_name = "FRACTION", value_parser = overlap, default_value = "0.5", allow_negative_numbers = true)]
     overlap: f64,
     /// Channel to use where a recording has several forces, or several sensors of one direction; may be repeated.
@@ -224,10 +225,11 @@ pub fn run(args: Args) -> Result<(), Error> {
     args.output.answer_with(&understood, &answer, text)
 }
 
-/// Warns of folding that may change a peak, and refuses more than [`LARGEST_FOLDING`].
+/// Warns if aliasing (content above half the sample rate, folded into the record) may change the peak of a receptance,
+/// and refuses a relative change above [`LARGEST_FOLDING`].
 fn check_folding(measurement: &mut Measurement) -> Result<(), Error> {
-    // The error by folding is inversely proportional to the spectra of force and response: |H| over that error is largest at the
-    // resonance that the impacts excite, and not where the force vanishes.
+    // The error by aliasing is inversely proportional to the spectra of force and response. So |H| divided by this
+    // error is largest at the resonance that the impacts excite, and small where the force spectrum vanishes.
     let at_peak = |(entry, folding): (&Frf, &Vec<f64>)| {
         let excited = |line: usize| entry.receptance[line].norm() / folding[line].max(f64::MIN_POSITIVE);
         let peak = (0..folding.len()).max_by(|&a, &b| excited(a).total_cmp(&excited(b)));
@@ -328,7 +330,8 @@ struct ReceptanceAnswer {
 #[derive(Serialize)]
 struct PeakEstimate {
     value: f64,
-    /// `null` with fewer than three impacts, whose scatter tells nothing.
+    /// 90 % interval of the peak magnitude of a receptance; `null` with fewer than three impacts, whose scatter gives
+    /// no standard deviation.
     ci90: Option<[f64; 2]>,
 }
 
@@ -359,7 +362,7 @@ impl FrfOutput {
                 Method::Mean => "mean",
                 Method::PseudoInverse => "pseudo-inverse",
             },
-            // An FRF table has at least one frequency line.
+            // This index is safe: a table of frequency response functions has at least one frequency line.
             frequency_hz: [frequency_hz[0], frequency_hz[frequency_hz.len() - 1]],
             lines: frequency_hz.len(),
             parts: measurement.groups.iter().map(ColumnsAnswer::new).collect(),
@@ -447,14 +450,16 @@ impl ReceptanceAnswer {
         let at = (0..entry.receptance.len())
             .max_by(|&a, &b| size(a).total_cmp(&size(b)))
             .unwrap_or(0);
-        // The tool-tip calibration multiplies the value and its standard deviation by the same factor.
+        // The standard deviation is divided by the receptance before the tool-tip calibration. The calibration
+        // multiplies both by the same factor, so that their ratio also holds after it.
         let before = measurement.table.entries()[index].receptance[at].norm();
         let relative = if before > 0.0 {
             measurement.deviation[index][at] / before
         } else {
             0.0
         };
-        // A random error and a bounded one that does not average out.
+        // Half-width of the 90 % interval: the root of the sum of squares of the random error and the error by
+        // aliasing. The latter is a bound and does not average out.
         let half = (NINETY_PERCENT * relative).hypot(measurement.folding[index][at]) * size(at);
         Self {
             name: entry.name(),

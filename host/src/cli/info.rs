@@ -47,7 +47,7 @@ struct DeviceOutput {
 pub fn run(args: Args) -> Result<(), Error> {
     let (mut client, info) = args.port.connect()?;
     let (settings, status) = (client.settings()?, client.status()?);
-    // The last request, since older firmware rejects requests of the feed direction.
+    // Asked last, because a device with older firmware rejects the request for the feed direction.
     let direction = client.feed_direction()?;
     let answer = DeviceOutput {
         feed_direction_deg: direction.map(|direction| number(direction.0)),

@@ -61,7 +61,8 @@ pub struct Args {
     /// Chart or table to write; the ending sets the format: svg, html, csv or json.
     #[arg(long, value_name = "FILE", requires = "rpm")]
     out: Option<PathBuf>,
-    /// Spindle speed in rev/min and axial depth in mm, as RPM,MM; may be repeated.
+    /// Working point at which to compute the dominant Floquet multiplier: spindle speed in rev/min and axial depth in
+    /// mm, as RPM,MM; may be repeated.
     #[arg(long, value_name = "RPM,MM", conflicts_with = "rpm", value_parser = working_point)]
     at: Vec<(f64, f64)>,
     #[command(flatten)]
@@ -147,7 +148,7 @@ struct ChartRequest {
     rpm: Range,
     depth_mm: Range,
     probability: bool,
-    /// Lines at further speeds are added where limits bend.
+    /// Whether stability limits are also computed at further speeds, where the limits bend.
     refine: bool,
     cuts: Option<Vec<TrialCut>>,
 }
@@ -259,7 +260,8 @@ fn limits_as_text(chart: &Chart) -> String {
     text
 }
 
-/// Number of lines between the requested speeds, accuracy between all, and what remains open.
+/// Text about the resolution of a stability chart: the number of added spindle speeds, the error of straight lines
+/// between neighbouring speeds, the narrowest island, and the gaps between speeds where the verdict stays open.
 fn resolution_as_text(chart: &Chart, resolution: &Resolution) -> String {
     let mut text = format!(
         "\n{} further speeds; straight lines between all speeds are right to {} % in depth or {} % in speed",
@@ -315,7 +317,7 @@ fn write_chart(case: &Case, chart: &Chart, depth_mm: f64, marks: &[Mark], path: 
 
 fn picture(case: &Case, chart: &Chart, depth_mm: f64, marks: &[Mark]) -> Result<String, Error> {
     let columns: Vec<Column> = chart.lines().into_iter().map(Column::from).collect();
-    // Drawing fails if the user gives only one spindle speed: an input error.
+    // The chart cannot be drawn if the user gives only one spindle speed: this is an input error.
     let title = format!("{}, method: {}", case.name, chart.label);
     lobe_chart(&title, &columns, depth_mm, marks).map_err(Error::input)
 }
@@ -388,7 +390,7 @@ fn as_csv(chart: &Chart) -> Result<String, Error> {
     ];
     if chart.speeds.iter().any(|line| line.spread.is_some()) {
         header.extend(["limit_5 [mm]", "limit_50 [mm]", "limit_95 [mm]"]);
-        // Ends of the 90 % confidence interval of each percentile.
+        // Lower and upper end of the 90 % confidence interval of each percentile of the first stability limit.
         header.extend(["limit_5_from [mm]", "limit_5_to [mm]"]);
         header.extend(["limit_50_from [mm]", "limit_50_to [mm]"]);
         header.extend(["limit_95_from [mm]", "limit_95_to [mm]"]);

@@ -10,7 +10,8 @@ use crate::report::cell_map::cell_map;
 use crate::report::page::{figure, page};
 use crate::stability::{CellChart, Method, Verdict, cell_chart};
 
-/// Computes the grid, writes it to the file of `--out`, and prints the counts of stable and unstable points.
+/// Computes the Floquet multipliers on the grid, writes them to the file of `--out`, and prints the counts of stable
+/// and unstable points.
 pub(super) fn run(
     case: &Case,
     method: &dyn Method,
@@ -75,7 +76,7 @@ fn picture(case: &Case, chart: &CellChart) -> Result<String, Error> {
     let mut sorted = chart.clone();
     sorted.speeds.sort_by(|a, b| a.rpm.total_cmp(&b.rpm));
     let title = format!("{}: |multiplier|, method: {}", case.name, chart.label);
-    // Drawing fails for a single spindle speed and for descending depths: input errors.
+    // The map cannot be drawn for a single spindle speed or for descending depths: these are input errors.
     cell_map(&title, &sorted).map_err(Error::input)
 }
 

@@ -51,7 +51,7 @@ struct RecordOutput {
     sidecar: String,
 }
 
-/// One table of frequency response functions.
+/// Summary of one file that holds a table of frequency response functions.
 #[derive(Serialize)]
 struct TableOutput {
     file: PathBuf,
@@ -62,7 +62,7 @@ struct TableOutput {
     receptances: Vec<ReceptanceSummary>,
 }
 
-/// Largest receptance of one pair of directions.
+/// Peak of one receptance, that is of one pair of response direction and force direction, over all frequency lines.
 #[derive(Serialize)]
 struct ReceptanceSummary {
     name: String,
@@ -138,7 +138,7 @@ fn table(path: &Path, import: &Import) -> Result<TableOutput, Error> {
     });
     Ok(TableOutput {
         file: path.into(),
-        // An FRF table has at least one line.
+        // This index is safe: a table of frequency response functions has at least one frequency line.
         frequency_hz: [frequency_hz[0], frequency_hz[frequency_hz.len() - 1]],
         lines: frequency_hz.len(),
         receptances: receptances.collect(),
@@ -275,7 +275,7 @@ impl RecordOutput {
     }
 }
 
-/// A number with four significant digits.
+/// Formats a number with four significant digits.
 fn shown(value: f64) -> String {
     let size = value.abs();
     if size == 0.0 {

@@ -16,19 +16,20 @@ use crate::stability::{
     needs_orbit,
 };
 
-/// Default number of steps per tooth period of semi- and full discretization: a choice.
+/// Default number of time steps per tooth-passing period of semi-discretization and full discretization: a choice.
 const STEPS: usize = 100;
 
-/// Upper bound of `--steps`, a choice: with 20 000 steps per tooth period a step is at most 0.018 degrees of rotation.
+/// Upper bound of `--steps`, time steps per tooth-passing period. A choice: of 20 000 steps each is a rotation of at
+/// most 0.018 degrees.
 const STEPS_MAX: usize = 20_000;
 
 /// Upper bound of `--harmonics`, a choice: more harmonics make the truncated Hill matrix too large to be useful.
 const HARMONICS_MAX: usize = 400;
 
-/// The case after some time, s, with wear and drift as they are then.
+/// Copy of the case with the values that its wear and drift give the parameters after `after_s` seconds of operation.
 ///
 /// # Errors
-/// The case has neither wear nor drift, so that the time would change nothing; or their values are not possible.
+/// The case has neither wear nor drift, so that the time would change nothing; or these give impossible values.
 pub(super) fn case_after(case: &Case, after_s: f64) -> Result<Case, Error> {
     if !case.has(EffectName::Wear) && !case.has(EffectName::Drift) {
         return Err(Error::input(format!(
@@ -54,8 +55,8 @@ pub(super) struct MethodChoice {
     /// coherence_xx. Several with commas between; may be repeated.
     #[arg(long, value_name = "COLUMN=NAME[:UNIT],…", value_delimiter = ',', value_parser = ColumnMap::parse, requires = "frf")]
     map: Vec<ColumnMap>,
-    /// Harmonics of the directional coefficients. Default: multi-frequency adds harmonics until the limits converge; nyquist
-    /// uses 0, the averaged coefficients.
+    /// Highest harmonic of the directional coefficients in the stability computation. Default: multi-frequency adds
+    /// harmonics until the limits converge; nyquist uses 0, the averaged coefficients.
     #[arg(long, value_name = "N", value_parser = harmonics)]
     harmonics: Option<usize>,
     /// Ignore the cubic terms of the structure: limits of the linear structure, valid for vanishing feed.
@@ -64,7 +65,7 @@ pub(super) struct MethodChoice {
     /// Operating time in s at which drift and wear of the case are evaluated.
     #[arg(long, value_name = "T", value_parser = non_negative, allow_negative_numbers = true)]
     after_s: Option<f64>,
-    /// Steps per tooth period of sdm and fdm. Default: 100.
+    /// Time steps per tooth-passing period of sdm and fdm. Default: 100.
     #[arg(long, value_name = "N", value_parser = steps)]
     steps: Option<usize>,
     /// Order of sdm: interpolation of the delayed displacement within a step, constant (0) or linear (1).
@@ -83,9 +84,10 @@ enum MethodName {
     Sdm,
     /// First-order full discretization (Ding) with a fixed number of steps.
     Fdm,
-    /// Zeroth-order approximation (Altintas, Budak): averaged coefficients in closed form; does not find flips.
+    /// Zeroth-order approximation (Altintas, Budak): averaged directional coefficients in closed form; does not find
+    /// flips.
     Zoa,
-    /// Nyquist criterion on the receptances: averaged coefficients, or periodic coefficients with --harmonics.
+    /// Nyquist criterion on the receptances: averaged directional coefficients, or periodic ones with --harmonics.
     Nyquist,
     /// Multi-frequency solution: harmonics of the directional coefficients; finds flips.
     MultiFrequency,
@@ -221,7 +223,8 @@ impl MethodChoice {
     }
 }
 
-/// Warns about receptances that the table lacks, a possible mode below its first line, and a resolution that is too coarse.
+/// Warns about receptances that a table of receptances lacks, about a possible mode below its first frequency line, and
+/// about frequency lines that are too far apart.
 fn warn_of_table(table: &FrfTable) -> Result<(), Error> {
     let file = table.path().display();
     let missing = table.missing();
@@ -234,8 +237,8 @@ fn warn_of_table(table: &FrfTable) -> Result<(), Error> {
         .iter()
         .filter(|entry| entry.response == entry.force)
     {
-        // A receptance far below all modes is nearly its positive static compliance; another phase indicates a mode below the first
-        // line.
+        // A direct receptance far below all modes is nearly its positive static compliance. Another phase at the first
+        // frequency line indicates a mode below this line.
         if let (Some(first), Some(hz)) = (entry.receptance.first(), table.frequency_hz().first())
             && first.im.abs() > first.re
         {

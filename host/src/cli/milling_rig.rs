@@ -19,16 +19,16 @@ pub(super) struct MillingRig {
     /// Volume fraction of pores in the material of porous, in percent.
     #[arg(long, value_name = "P", default_value_t = 50.0, value_parser = share, allow_negative_numbers = true)]
     pores_percent: f64,
-    /// Size of the pores in mm.
+    /// Size of the pores in the material of porous, in mm.
     #[arg(long, value_name = "D", default_value_t = 0.2, value_parser = positive, allow_negative_numbers = true)]
     pore_mm: f64,
     /// Independent variation of the tangential, radial and axial cutting coefficients of the porous material, in percent.
     #[arg(long, value_name = "P", default_value_t = 40.0, value_parser = share, allow_negative_numbers = true)]
     strength_percent: f64,
-    /// Entry immersion angle in degrees; replaces that of the case.
+    /// Immersion angle in degrees where the teeth enter; replaces that of the case.
     #[arg(long, value_name = "A", value_parser = non_negative, allow_negative_numbers = true)]
     start_deg: Option<f64>,
-    /// Exit immersion angle in degrees; replaces that of the case.
+    /// Immersion angle in degrees where the teeth leave; replaces that of the case.
     #[arg(long, value_name = "A", value_parser = positive, allow_negative_numbers = true)]
     exit_deg: Option<f64>,
 }
@@ -127,8 +127,9 @@ pub(super) fn run(
     output.answer(&answer, text)
 }
 
-/// Internal sampling rate of the simulation, Hz: the larger of 1000 times the tooth-passing frequency (teeth enter and leave
-/// suddenly) and three times the rate at which a tooth passes pores, π·D·n/size.
+/// Internal sampling rate of the simulation, Hz: the larger of 1000 times the tooth-passing frequency (teeth enter and
+/// leave suddenly) and three times the rate at which a tooth passes pores, π·D·n/size with tool diameter D, n
+/// revolutions per second and the pore size.
 fn fastest_hz(cut: &VirtualCut, case: &Case) -> f64 {
     let revolutions_hz = cut.spindle_rpm.max(cut.last_rpm.unwrap_or(0.0)) / 60.0;
     let tool = case.tool.as_ref();

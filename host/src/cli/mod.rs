@@ -118,7 +118,8 @@ fn leave_nothing_half_written(verb: &Verb) -> Result<(), ctrlc::Error> {
 }
 
 impl Verb {
-    /// Activity for the progress line; `None` for a verb that shows its own progress or finishes at once.
+    /// Activity that the progress line names while the verb computes; `None` for a verb that shows its own progress or
+    /// finishes at once.
     fn doing(&self) -> Option<&'static str> {
         match self {
             Self::Simulate(_) => Some("simulating"),

@@ -42,7 +42,7 @@ pub fn run(args: Args) -> Result<(), Error> {
         reports: Reports::All,
         ..Subscription::default()
     })?;
-    // A duration beyond the range of the clock means no end.
+    // With a `--seconds` beyond the range of the clock, `monitor` runs without end.
     let end = args
         .seconds
         .and_then(|seconds| Instant::now().checked_add(Duration::try_from_secs_f64(seconds).ok()?));
@@ -59,7 +59,8 @@ pub fn run(args: Args) -> Result<(), Error> {
     args.output.answer(&log, &log.summary)
 }
 
-/// Prints changes of verdict or advice, and the unchanged state from time to time, until `is_over` returns true.
+/// Prints each report of the device whose verdict or advice differs from the previous one, and the unchanged state
+/// every [`UNCHANGED_LINE_PERIOD`], until `is_over` returns true.
 fn listen(client: &mut Client, output: Output, is_over: impl Fn() -> bool) -> Result<VerdictLog, Error> {
     let mut log = VerdictLog::default();
     let mut printed = Instant::now();

@@ -28,10 +28,10 @@ pub struct Args {
     /// Axial depths in mm, first:last:count. Limits are searched from depth 0 to the last, in steps no wider than these.
     #[arg(long, value_name = "R", value_parser = Range::non_negative)]
     depth_mm: Range,
-    /// Required width of the 90 % interval of every limit, in percent of the limit.
+    /// Required width of the 90 % interval of every stability limit, in percent of the limit.
     #[arg(long, value_name = "W", value_parser = positive, allow_negative_numbers = true)]
     width_percent: f64,
-    /// Ignore the cubic terms of the structure.
+    /// Ignore the cubic terms of the structure: plan for the stability limits of the linear structure.
     #[arg(long)]
     linear: bool,
     #[command(flatten)]
@@ -49,16 +49,16 @@ pub struct Args {
 #[derive(Debug, clap::Args)]
 #[command(next_help_heading = "Standard deviations, where the case has no keys that end in _std")]
 struct Assumed {
-    /// Standard deviation of natural frequencies, in percent.
+    /// Standard deviation assumed for every natural frequency, in percent of its value.
     #[arg(long, value_name = "P", default_value_t = 100.0 * Prior::default().frequency, value_parser = positive)]
     assume_frequency_percent: f64,
-    /// Standard deviation of damping ratios, in percent.
+    /// Standard deviation assumed for every damping ratio, in percent of its value.
     #[arg(long, value_name = "P", default_value_t = 100.0 * Prior::default().damping, value_parser = positive)]
     assume_damping_percent: f64,
-    /// Standard deviation of modal stiffnesses, in percent.
+    /// Standard deviation assumed for every modal stiffness, in percent of its value.
     #[arg(long, value_name = "P", default_value_t = 100.0 * Prior::default().stiffness, value_parser = positive)]
     assume_stiffness_percent: f64,
-    /// Standard deviation of the cutting coefficients, in percent.
+    /// Standard deviation assumed for the cutting coefficients, in percent of their values.
     #[arg(long, value_name = "P", default_value_t = 100.0 * Prior::default().force, value_parser = positive)]
     assume_force_percent: f64,
 }
@@ -67,10 +67,11 @@ struct Assumed {
 #[derive(Debug, clap::Args)]
 #[command(next_help_heading = "Tests")]
 struct Tests {
-    /// Width of the bracket of a limit from trial cuts, in percent of the limit.
+    /// Final distance between the deepest stable and the shallowest unstable trial cut at one spindle speed, in percent
+    /// of the limit.
     #[arg(long, value_name = "P", default_value_t = 100.0 * Means::default().bracket, value_parser = positive)]
     bracket_percent: f64,
-    /// Standard deviation of a measured chatter frequency, in percent.
+    /// Standard deviation of a measured chatter frequency, in percent of the frequency.
     #[arg(long, value_name = "P", default_value_t = 100.0 * Means::default().chatter_frequency, value_parser = positive)]
     chatter_frequency_percent: f64,
     /// Number of impacts of a hammer test.
@@ -79,16 +80,19 @@ struct Tests {
     /// Peak force of an impact in N.
     #[arg(long, value_name = "F", default_value_t = Means::default().peak_n, value_parser = positive)]
     peak_n: f64,
-    /// Noise of the accelerometer in µg per √Hz.
+    /// Noise density of the accelerometer of a hammer test, in µg per √Hz.
     #[arg(long, value_name = "N", default_value_t = 1e6 * Means::default().accelerometer_g_per_root_hertz, value_parser = positive)]
     noise_ug: f64,
-    /// Standard deviation of the gain of hammer and accelerometer, and of the gain of the dynamometer, in percent.
+    /// Standard deviation of the calibration: of the common gain of hammer and accelerometer, and of the gain of the
+    /// dynamometer, in percent.
     #[arg(long, value_name = "P", default_value_t = 100.0 * Means::default().calibration, value_parser = positive)]
     calibration_percent: f64,
-    /// Standard deviation of the change of natural frequencies from standstill to cutting, in percent.
+    /// Standard deviation of the change of each natural frequency from standstill, where hammer tests are made, to
+    /// cutting, in percent.
     #[arg(long, value_name = "P", default_value_t = 100.0 * Means::default().standstill_frequency, value_parser = positive)]
     standstill_frequency_percent: f64,
-    /// Standard deviation of the change of damping ratios from standstill to cutting, in percent.
+    /// Standard deviation of the change of each damping ratio from standstill, where hammer tests are made, to cutting,
+    /// in percent.
     #[arg(long, value_name = "P", default_value_t = 100.0 * Means::default().standstill_damping, value_parser = positive)]
     standstill_damping_percent: f64,
 }

@@ -56,7 +56,7 @@ pub struct TableAnswer {
 }
 
 impl TableAnswer {
-    /// Converts the summary that the device sends.
+    /// Converts the summary of the lobe table that the device sends into the form of the output.
     pub fn new(table: &TableSummary) -> Self {
         Self {
             name: table.name.as_str().into(),
@@ -97,26 +97,26 @@ impl std::fmt::Display for TableAnswer {
 pub enum SlotAnswer {
     /// The slot holds no table.
     Empty,
-    /// The slot holds an incomplete upload.
+    /// The slot holds the received part of a lobe table whose upload is incomplete.
     Unfinished {
         /// Bytes received so far.
         received: u32,
-        /// Size of the whole table, bytes.
+        /// Size of the complete lobe table, bytes.
         length: u32,
     },
-    /// The slot holds bytes that are no valid table.
+    /// The slot holds bytes that are no valid lobe table.
     Damaged {
-        /// Reason why the table is invalid.
+        /// Reason why the bytes in the slot are no valid lobe table.
         error: String,
     },
-    /// The slot holds a valid table that is not in use.
+    /// The slot holds a valid lobe table that the device does not use at present.
     Valid {
         /// Size of the table, bytes.
         length: u32,
-        /// Generation number of the table; each upload increases it by one.
+        /// Generation number of the lobe table; each upload increases it by one.
         generation: u32,
     },
-    /// The slot holds the table in use.
+    /// The slot holds the lobe table that the device uses.
     InUse {
         /// Size of the table, bytes.
         length: u32,
@@ -126,7 +126,7 @@ pub enum SlotAnswer {
 }
 
 impl SlotAnswer {
-    /// Converts the slot state that the device sends.
+    /// Converts the state of a memory slot that the device sends into the form of the output.
     pub fn new(slot: &Slot) -> Self {
         match slot {
             Slot::Empty => Self::Empty,
@@ -185,7 +185,7 @@ pub struct WorkingPointAnswer {
 }
 
 impl WorkingPointAnswer {
-    /// Converts the working point that the device sends.
+    /// Converts the working point that the device sends into the form of the output.
     pub fn new(point: &WorkingPoint) -> Self {
         Self {
             depth_mm: number(point.axial_depth.0),

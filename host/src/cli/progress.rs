@@ -11,7 +11,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 /// Period of the animation of the progress line: a choice, short enough to show that the command works.
 const TICK: Duration = Duration::from_millis(200);
 
-/// The progress line on the terminal; `None` if there is none.
+/// The progress line that stands on the terminal at present; `None` if there is none.
 static SHOWN: Mutex<Option<ProgressBar>> = Mutex::new(None);
 
 /// Shows a progress line with the activity `doing` and the elapsed time, until [`clear`].

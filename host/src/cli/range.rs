@@ -26,12 +26,12 @@ impl Range {
         self.last
     }
 
-    /// Number of values, at least 1.
+    /// Number of values in the range, at least 1.
     pub fn count(&self) -> usize {
         self.count
     }
 
-    /// All values in order; the first and the last are exact.
+    /// All values of the range in order; the first and the last are exactly those given.
     pub fn values(&self) -> Vec<f64> {
         let steps = self.count.saturating_sub(1).max(1) as f64;
         (0..self.count)

@@ -132,7 +132,8 @@ fn on_device(args: &Args, port: &str, sensed: &Sensed, table: Option<&[u8]>) -> 
         .then(|| client.feed_direction())
         .transpose()?;
     let log = feed_recording(args, &mut client, sensed);
-    // The settings are restored even if feeding failed; the error of feeding is reported first.
+    // The settings of the device are restored even if sending the recording to it failed; the error of sending is
+    // reported first.
     let restored = client
         .subscribe(Subscription::default())
         .and_then(|()| client.set_working_point(status.working_point))

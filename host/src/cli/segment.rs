@@ -44,7 +44,7 @@ pub(super) struct Recorded {
 }
 
 impl StatedColumns {
-    /// The options as an import of `segment`.
+    /// The options `--map`, `--rate` and `--record` with `segment`, as the instructions for reading a file.
     pub(super) fn import(&self, segment: Segment) -> Import {
         Import {
             segment,
@@ -76,7 +76,8 @@ impl RecordedSegment {
             let count = records.len();
             for (index, imported) in records.into_iter().enumerate() {
                 if imported.understood.is_interpreted() {
-                    // The records of a file usually have the same columns: one line shows the first of them.
+                    // The records of one file usually have the same columns, so the message describes only the first
+                    // record.
                     if index == 0 {
                         progress::clear();
                         let others = if count > 1 {

@@ -40,7 +40,7 @@ pub struct Args {
     output: Output,
 }
 
-/// Answers that were given by options or by a file; each may be missing.
+/// Answers of the user about the machine, the tool and the cut, given by options or by a file; each may be missing.
 #[derive(Clone, Debug, Default, clap::Args, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
 struct Given {
@@ -71,19 +71,20 @@ struct Given {
     /// Tangential cutting coefficient in MPa, instead of --material.
     #[arg(long, value_name = "K", value_parser = positive)]
     ktc_mpa: Option<f64>,
-    /// Radial cutting coefficient in MPa. Default: 0.3 of the tangential one, which the case then says.
+    /// Radial cutting coefficient in MPa. Default: 0.3 of the tangential one; a comment in the case then says so.
     #[arg(long, value_name = "K", value_parser = finite, requires = "ktc_mpa", allow_negative_numbers = true)]
     krc_mpa: Option<f64>,
     /// Axial cutting coefficient in MPa. Default: 0.
     #[arg(long, value_name = "K", value_parser = finite, requires = "ktc_mpa", allow_negative_numbers = true)]
     kac_mpa: Option<f64>,
-    /// Standard deviation of the tangential cutting coefficient in MPa; limits then get a band.
+    /// Standard deviation of the tangential cutting coefficient in MPa; the stability limits then get a probability
+    /// band.
     #[arg(long, value_name = "S", value_parser = positive, requires = "ktc_mpa")]
     ktc_mpa_std: Option<f64>,
     /// Radial depth in mm of a down-milling cut.
     #[arg(long, value_name = "AE", value_parser = positive, conflicts_with_all = ["up_milling_mm", "slot"])]
     down_milling_mm: Option<f64>,
-    /// Radial depth in mm of an up-milling cut.
+    /// Radial depth in mm of an up-milling cut, instead of --down-milling-mm.
     #[arg(long, value_name = "AE", value_parser = positive, conflicts_with = "slot")]
     up_milling_mm: Option<f64>,
     /// The cut is a slot.
@@ -143,7 +144,7 @@ pub fn run(args: Args) -> Result<(), Error> {
         .map_or_else(|| "machine".into(), |name| name.to_string_lossy().into_owned());
     let answers = given.complete(&default_name, ask)?;
     let text = case_text(&answers);
-    // A value that no case can have is refused before anything is written.
+    // Parsing the text of the new case refuses impossible values before any file is written.
     Case::parse(&path, &text)?;
     for name in ["taps", "frf", "cuts"] {
         fs::create_dir_all(folder.join(name)).map_err(|error| {
@@ -215,14 +216,14 @@ fn answers_of(path: &Path) -> Result<Given, Error> {
     toml::from_str(&text).map_err(|error| Error::input(format!("{}: {error}", path.display())))
 }
 
-/// One missing answer: the option that gives it, and the question on a terminal.
+/// One missing answer of the user: the option that would give it, and the question that the terminal shows.
 struct Question {
     option: &'static str,
     question: &'static str,
 }
 
 impl Given {
-    /// These answers, completed by others where one is missing.
+    /// These answers of the user; each that is missing here is taken from `other`.
     fn or(self, other: Self) -> Self {
         let has_material = self.material.is_some() || self.ktc_mpa.is_some();
         let has_cut = self.down_milling_mm.is_some() || self.up_milling_mm.is_some() || self.slot;
@@ -250,7 +251,8 @@ impl Given {
         }
     }
 
-    /// All answers; missing ones are asked for on the terminal, or refused with the options that give them.
+    /// Answers of the user with nothing missing. A missing answer is asked for on the terminal if `ask`; otherwise the
+    /// error names the option that gives it.
     fn complete(mut self, default_name: &str, ask: bool) -> Result<Answers, Error> {
         let missing = self.missing();
         if !missing.is_empty() && !ask {
@@ -325,7 +327,7 @@ impl Given {
             .collect()
     }
 
-    /// Asks one question until its answer is understood.
+    /// Asks the user one question on the terminal until the answer is valid.
     fn ask(&mut self, question: &Question) -> Result<(), Error> {
         loop {
             eprint!("{}: ", question.question);
@@ -344,7 +346,7 @@ impl Given {
         }
     }
 
-    /// Takes the answer to one question.
+    /// Stores the user's answer to the question that belongs to `option`; the error says why the answer is not valid.
     fn take(&mut self, option: &str, answer: &str) -> Result<(), String> {
         match option {
             "--teeth" => self.teeth = Some(count(answer)?),

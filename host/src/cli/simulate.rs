@@ -62,8 +62,8 @@ pub struct Args {
     /// Record the exact motion, without noise, quantization and clock error of the sensor.
     #[arg(long, conflicts_with_all = ["range_g", "noise_ug", "clock_error_percent", "tacho_jitter_us"])]
     ideal: bool,
-    /// Sampling rate in Hz; nominal, if a sensor samples. Default: 26667 in a cut; in a vibration test at least 20 times the
-    /// highest excited frequency.
+    /// Sampling rate in Hz; in a cut without --ideal it is the nominal rate of the accelerometer. Default: 26667 in a
+    /// cut; in a vibration test at least 20 times the highest excited frequency.
     #[arg(long, value_name = "N", value_parser = positive, allow_negative_numbers = true)]
     sample_rate_hz: Option<f64>,
     /// Range of the accelerometer in g: 2, 4, 8 or 16.
@@ -102,9 +102,9 @@ const SAMPLE_RATE_HZ: f64 = 26_667.0;
 enum EntryKind {
     /// Through the side faces of the workpiece: the immersion increases at entry and decreases at exit.
     Feed,
-    /// Ramp of the axial depth at entry and exit.
+    /// The axial depth rises linearly from 0 at entry and falls linearly to 0 at exit.
     Ramp,
-    /// Full engagement from start to end.
+    /// The tool is fully engaged from the start of the record to its end.
     None,
 }
 

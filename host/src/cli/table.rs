@@ -31,7 +31,7 @@ pub struct Args {
     /// Largest axial depth in mm. Default: four times the lowest stability limit.
     #[arg(long, value_name = "MM", value_parser = super::positive, allow_negative_numbers = true, requires = "cases")]
     depth_mm: Option<f64>,
-    /// Initial number of spindle speeds; more are added where the limits curve. Default: 121.
+    /// Initial number of spindle speeds in the lobe table; more are added where the limits curve. Default: 121.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(2..=2000), requires = "cases")]
     speeds: Option<u16>,
     /// Feeds per tooth in mm, separated by commas, for cases whose limits depend on the feed. Each becomes a layer; more

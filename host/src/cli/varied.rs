@@ -43,7 +43,8 @@ struct ChartOutput {
 }
 
 impl Varied {
-    /// The parameter to vary, if an option names one.
+    /// The parameter of the cut, feed direction or feed per tooth, that the options vary over a range; `None` without
+    /// such an option.
     pub(super) fn variation(&self) -> Option<Variation> {
         let direction = self.feed_direction_deg.map(|range| Variation {
             name: "feed_direction_deg",

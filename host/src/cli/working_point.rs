@@ -22,7 +22,7 @@ pub struct Args {
     /// Immersion angle in degrees where a tooth enters, clockwise from the normal to the feed.
     #[arg(long, value_name = "D", value_parser = angle, allow_negative_numbers = true)]
     start: f64,
-    /// Immersion angle in degrees where a tooth leaves.
+    /// Immersion angle in degrees where a tooth leaves the workpiece.
     #[arg(long, value_name = "D", value_parser = angle, allow_negative_numbers = true)]
     exit: f64,
     /// Feed per tooth in mm.
@@ -42,7 +42,7 @@ pub struct Args {
 struct WorkingPointOutput<'a> {
     port: &'a str,
     working_point: WorkingPointAnswer,
-    /// Feed direction in degrees; `null` if none is set.
+    /// Feed direction that the device uses, in degrees from the machine's x towards its y; `null` if none is set.
     feed_direction_deg: Option<f64>,
 }
 
@@ -63,7 +63,7 @@ pub fn run(args: Args) -> Result<(), Error> {
     };
     let (mut client, _) = args.port.connect()?;
     client.set_working_point(Some(point))?;
-    // Read back from the device, to report the working point that it uses.
+    // The working point is read back from the device, so that the output states the one that the device uses.
     let point = client.status()?.working_point;
     let point = point.ok_or_else(|| {
         Error::other(format!(
@@ -71,7 +71,8 @@ pub fn run(args: Args) -> Result<(), Error> {
             args.port.name()
         ))
     })?;
-    // The last request, since older firmware rejects requests of the feed direction. An earlier direction is replaced or removed.
+    // This request comes last, because older firmware rejects requests for the feed direction. The device's earlier
+    // feed direction is replaced or removed.
     let direction = args.feed_direction_deg.map(|degrees| Degrees(degrees as f32));
     if direction.is_some() || client.feed_direction()?.is_some() {
         client.set_feed_direction(direction)?;

@@ -90,13 +90,13 @@ pub struct VerdictLog {
 pub struct Summary {
     /// First kind of chatter that was detected; without chatter the last verdict. `None` without any report.
     pub verdict: Option<&'static str>,
-    /// Time from which this verdict was given, s.
+    /// Time of the first report with the main verdict, s, on the clock of the samples.
     pub since_s: Option<f64>,
     /// Number of evaluated blocks.
     pub blocks: u64,
     /// Number of clipped samples.
     pub clipped: u32,
-    /// Number of gaps where samples are missing.
+    /// Number of gaps in the sequence of samples, where samples are missing.
     pub gaps: u32,
     #[serde(skip)]
     lost: u32,
@@ -148,7 +148,8 @@ fn is_same_advice(a: Option<&AdviceAnswer>, b: Option<&AdviceAnswer>) -> bool {
         (None, None) => true,
         (Some(a), Some(b)) => {
             let near = (a.rpm - b.rpm).abs() <= SAME_SPEED * a.rpm;
-            // The advice to keep cutting does not depend on the measured speed.
+            // Two advices to keep cutting are equal whatever speed is measured; other advice is equal if speed and
+            // depth are.
             let same_target = a.action == "keep" || (near && a.depth_mm == b.depth_mm);
             a.action == b.action && a.source == b.source && same_target
         }

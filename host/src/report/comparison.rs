@@ -29,11 +29,11 @@ pub enum LineRole {
     BaselineResidual,
     /// Residual of the extended model.
     ExtendedResidual,
-    /// Horizontal level, such as the noise level.
+    /// Horizontal line at a constant level, such as the noise level.
     Level,
     /// Points instead of a line.
     Points,
-    /// Points of a second quantity, in another colour.
+    /// Points of a second quantity in the same chart, in another colour.
     OtherPoints,
 }
 

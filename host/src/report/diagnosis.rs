@@ -9,7 +9,8 @@ use super::residual_pictures::{file_name, pictures};
 use crate::diagnose::answer::{EstimatedCause, Figure, Outcome};
 use crate::diagnose::{Diagnosis, ResidualView};
 
-/// Number of channels with pictures, those with the largest normalized residual: a choice.
+/// Number of channels of which the page of a diagnosis shows residual pictures, those with the largest normalized
+/// residual: a choice.
 const PICTURED: usize = 3;
 
 /// Renders the page of `diagnosis`; `case_name` names the baseline model, `extended` is the text of the extended case.

@@ -28,12 +28,13 @@ pub struct Column {
     pub rpm: f64,
     /// Stable depths, mm, as ascending intervals.
     pub stable_mm: Vec<(f64, f64)>,
-    /// Undecided depths, mm, as ascending intervals: the multiplier is 1 within the error of the method.
+    /// Undecided depths, mm, as ascending intervals in which the modulus of the dominant Floquet multiplier is 1 within
+    /// the error of the method.
     pub undecided_mm: Vec<(f64, f64)>,
-    /// First limit; `None` if all depths up to the last one are stable.
+    /// First stability limit at this speed; `None` if all depths up to the largest computed one are stable.
     pub first_limit: Option<FirstLimit>,
-    /// 5, 50 and 95 % percentiles of the first limit, mm; an entry is `None` beyond the last depth. `None` if the case has no
-    /// standard deviations.
+    /// 5, 50 and 95 % percentiles of the first stability limit at this speed, mm. An entry is `None` if the percentile
+    /// is deeper than the largest computed depth. `None` in all if the case has no standard deviations.
     pub percentiles_mm: Option<[Option<f64>; 3]>,
 }
 
@@ -94,7 +95,7 @@ impl From<&SpeedLine> for Column {
     }
 }
 
-// Opaque fill colours, so that overlapping areas do not mix.
+// Fill colour of stable areas. It is opaque, so that overlapping areas do not mix their colours.
 const STABLE: RGBColor = RGBColor(0xd2, 0xea, 0xdc);
 const UNDECIDED: RGBColor = RGBColor(0xd6, 0xd8, 0xdc);
 const UNSTABLE: RGBColor = RGBColor(0xfa, 0xec, 0xec);
@@ -151,7 +152,7 @@ pub fn lobe_chart(
     })
 }
 
-/// Draws the undecided depths, if any interval is at least one pixel high.
+/// Draws the undecided depths of a lobe diagram, if any interval is at least one pixel high.
 fn draw_undecided(
     chart: &mut Axes<'_, '_>,
     columns: &[Column],
@@ -239,7 +240,7 @@ fn draw_limits(
 ) -> Result<(), PictureError> {
     let (color, name) = limit_look(kind);
     for (index, run) in limit_runs(columns, depth_max_mm, kind).into_iter().enumerate() {
-        // A circle shows a kind that occurs at a single speed only.
+        // A kind of stability loss that occurs at a single speed has no line to draw; a circle marks it.
         chart.draw_series(run.iter().map(|&at| Circle::new(at, 1, color.filled())))?;
         let line = chart.draw_series(LineSeries::new(run, color.stroke_width(3)))?;
         if index == 0 {

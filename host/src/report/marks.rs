@@ -52,7 +52,7 @@ impl From<&TrialCut> for Mark {
     }
 }
 
-/// Rectangle in pixels: left, top, right, bottom.
+/// Rectangle on the picture, in pixels from its upper left corner: left, top, right, bottom.
 type Area = (i32, i32, i32, i32);
 
 fn overlap(a: Area, b: Area) -> bool {
@@ -116,7 +116,7 @@ fn draw_label(
     let (w, h) = canvas.estimate_text_size(label, &style)?;
     let (w, h) = (w as i32 + 12, h as i32 + 6);
     let width = canvas.dim_in_pixel().0 as i32;
-    // Shifted sideways to stay within the picture.
+    // The label is shifted sideways so that it stays within the picture.
     let left = (at.0 - w / 2).clamp(0, (width - w).max(0));
     let tops = [
         at.1 - h - 11,

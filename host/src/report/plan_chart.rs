@@ -81,7 +81,7 @@ pub fn plan_chart(title: &str, plan: &Plan, depth_max_mm: f64) -> Result<String,
     })
 }
 
-/// Band of intervals over the spindle speed with its colour, opacity and name.
+/// Shaded area of a chart between a lower and an upper value at each spindle speed, with its colour, opacity and name.
 struct Band {
     interval: fn(&Speed) -> [f64; 2],
     color: RGBColor,

@@ -135,7 +135,8 @@ fn spectra(view: &ResidualView, points: usize, last_hz: f64, scale: f64) -> Vec<
             role,
         })
         .collect();
-    // Expected amplitude of white noise with standard deviation σ in n samples: 2σ/√n per frequency line.
+    // White noise with standard deviation σ in a record of n samples has the expected amplitude 2σ/√n at each frequency
+    // line.
     let noise = 2.0 * view.deviation / (view.measured.len().max(1) as f64).sqrt();
     if let (Some(&(first, _)), Some(&(last, _))) = (lines[0].points.first(), lines[0].points.last())
         && noise > 0.0
@@ -159,7 +160,7 @@ fn over_orders(view: &ResidualView, spindle: &SpindleMotionView) -> Result<Strin
     let unit = format!("log10 of {} [{}]", view.channel, view.unit);
     let revolutions_hz = spindle.rpm / 60.0;
     let last_hz = (ORDERS_PER_TOOTH * spindle.teeth as f64 * revolutions_hz).min(0.5 * view.rate_hz);
-    // The number of points gives ten frequency lines per spindle order.
+    // With this number of points the spectrum has ten frequency lines per spindle order.
     let points = (5.0 * view.rate_hz / revolutions_hz) as usize;
     let lines = spectra(view, points, last_hz, revolutions_hz.recip());
     comparison(HALF_WIDTH_SIZE, ["", "spindle order", &unit], &lines, None)
@@ -171,10 +172,13 @@ fn stroboscopic_map(samples: &[(u32, f64)], what: &str, view: &ResidualView) -> 
     samples_per_tooth("", &quantity, shown, None)
 }
 
-/// Missing stiffness and damping over amplitude; `None` if the amplitudes differ by less than [`AMPLITUDE_RATIO`].
+/// Pictures of the stiffness and damping that the case lacks, over the vibration amplitude; `None` if the amplitudes
+/// differ by less than the factor [`AMPLITUDE_RATIO`].
 fn over_amplitude(records: &[&MissingForce]) -> Result<Option<String>, PictureError> {
     let rms = |a: &[f64]| (a.iter().map(|x| x * x).sum::<f64>() / a.len().max(1) as f64).sqrt();
-    // Amplitude in µm, k/k_static and ω·c/k_static, where ω is the ratio of the root mean squares of velocity and displacement.
+    // One point for each amplitude: displacement amplitude in µm; missing stiffness k divided by the static stiffness;
+    // ω·c divided by the static stiffness, with the missing damping c and ω as the ratio of the root mean squares of
+    // velocity and displacement.
     let mut all: Vec<[f64; 3]> = Vec::new();
     for missing in records.iter().filter(|missing| missing.stiffness > 0.0) {
         let omega = rms(&missing.v) / rms(&missing.x).max(f64::MIN_POSITIVE);

@@ -77,7 +77,7 @@ fn diagram(
             mode.mode.frequency_hz,
             100.0 * mode.mode.damping_ratio
         );
-        // Labels of neighbouring modes are staggered vertically.
+        // Labels of modes with neighbouring frequencies get different heights, so that they do not overlap.
         let at = chart.backend_coord(&(mode.mode.frequency_hz, top + 2.6 - (index % 3) as f64));
         let origin = canvas.get_base_pixel();
         label(canvas, (at.0 - origin.0 + 4, at.1 - origin.1), &words, QUIET)?;

@@ -1,4 +1,4 @@
-//! Chart of a signal over time with marked events.
+//! Chart of one signal over time, on which events such as the first chatter are marked.
 
 use std::ops::Range;
 
@@ -7,7 +7,7 @@ use plotters::style::Color;
 
 use super::picture::{BLUE, CHATTER, INK, Labels, PictureError, axes, draw, label, span};
 
-/// Marked event on the time axis.
+/// Event that a chart of a signal over time marks.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TimeMark {
     /// Time of the event, s.
@@ -50,7 +50,7 @@ pub fn time_signal(
             let line = [(moment.t_s, y.start), (moment.t_s, y.end)];
             chart.draw_series([PathElement::new(line, CHATTER.stroke_width(2))])?;
             let (x, top) = chart.backend_coord(&(moment.t_s, y.end));
-            // Labels of near events are staggered so that they do not overlap.
+            // Labels of events at neighbouring times get different heights, so that they do not overlap.
             let row = 16 * (index as i32 % 3);
             label(canvas, (x + 6, top + 4 + row), &moment.label, INK)?;
         }

@@ -229,7 +229,8 @@ pub fn not_known(why: &NotKnown) -> String {
     }
 }
 
-/// Working point that the advice assumes because none is set.
+/// Text that states the working point (depth, immersion, feed) that the advice assumes because none is set on the
+/// device.
 fn assumed(point: &WorkingPoint) -> String {
     format!(
         "no working point is set; assuming an axial depth of {:.2} mm, immersion from {} to {}, {} per tooth (set it with \

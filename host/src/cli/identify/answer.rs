@@ -16,31 +16,32 @@ use crate::identify::student::NINETY_PERCENT;
 use crate::identify::sweep::Comparison;
 use crate::structure::Direction;
 
-/// Output of every method; fields that a method does not compute stay empty.
+/// Output of `quietcut identify` for any method; a field that the method does not compute stays empty.
 #[derive(Debug, Default, Serialize)]
 pub(super) struct IdentifyOutput {
     pub(super) method: &'static str,
-    /// Complex modes in order of frequency.
+    /// Complex modes that `--method modes` identified, in ascending order of natural frequency.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub(super) complex_modes: Vec<ComplexMode>,
-    /// Poles that were rejected as modes, with the reason.
+    /// Poles of the fitted receptance matrix that were rejected as structural modes, with the reason.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub(super) rejected: Vec<Rejected>,
     /// Median coherence of each response.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub(super) coherence: BTreeMap<&'static str, f64>,
-    /// Noise of each channel, if the modes were fitted to the time records.
+    /// Measurement noise of each recorded channel, if the modes were fitted to the time records.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub(super) noise: Vec<ChannelNoise>,
     /// Identified parameters, grouped by direction or pair of directions.
     pub(super) models: Vec<Model>,
-    /// Root mean square of the residual divided by that of the data.
+    /// Root mean square of the residual of the identified model divided by the root mean square of the measured data.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) fit_error: Option<f64>,
-    /// Reduced χ²: weighted sum of squared residuals divided by the number of residuals minus parameters.
+    /// Reduced χ² of the identified model: weighted sum of squared residuals divided by (number of residuals − number
+    /// of parameters).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) misfit: Option<f64>,
-    /// Number of steady responses (dwells) used.
+    /// Number of steady sine responses (dwells) to which the model was fitted.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) dwells: Option<usize>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -58,13 +59,14 @@ pub(super) struct IdentifyOutput {
     pub(super) warnings: Vec<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) case: Option<PathBuf>,
-    /// Case file of a method whose parameters are not those of an equation of motion.
+    /// Content of the case file that `joints` (robot joints) or `inverse-stability` (modes) writes. `None` for a method
+    /// that identifies the parameters of an equation of motion.
     #[serde(skip)]
     pub(super) table: Option<toml::Table>,
-    /// Modal model that is written into the case file.
+    /// Modal model of the structure that is written into the case file.
     #[serde(skip)]
     pub(super) modal: Option<ModalModel>,
-    /// Estimated parameters that are written into the case file.
+    /// Estimated parameters of the structure that are written into the case file.
     #[serde(skip)]
     pub(super) estimates: Vec<Estimate>,
     #[serde(skip)]
@@ -74,7 +76,7 @@ pub(super) struct IdentifyOutput {
     pub(super) messages: Vec<String>,
 }
 
-/// Parameters of one direction, or of a pair of directions.
+/// Identified parameters of one direction of the structure, or of a pair of directions.
 #[derive(Debug, Serialize)]
 pub(super) struct Model {
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -84,14 +86,15 @@ pub(super) struct Model {
     pub(super) parameters: BTreeMap<&'static str, Figure>,
 }
 
-/// Estimated value with its 90 % interval.
+/// Estimated value of one parameter with its 90 % interval.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub(super) struct Figure {
     pub(super) value: f64,
     pub(super) ci90: [f64; 2],
 }
 
-/// Complex mode with left and right mode shapes (eq. 7.15 of the thesis).
+/// Identified complex mode with its left and right mode shapes (eq. 7.15 of the thesis that the example data come
+/// from).
 #[derive(Debug, Serialize)]
 pub(super) struct ComplexMode {
     pub(super) frequency_hz: Figure,
@@ -100,7 +103,7 @@ pub(super) struct ComplexMode {
     pub(super) right: BTreeMap<&'static str, ComplexFigure>,
 }
 
-/// Real and imaginary part of one component of a mode shape.
+/// Real and imaginary part of one component of a complex mode shape, each with its 90 % interval.
 #[derive(Debug, Serialize)]
 pub(super) struct ComplexFigure {
     pub(super) re: Figure,
@@ -110,9 +113,9 @@ pub(super) struct ComplexFigure {
 /// Results of `--method linearity`.
 #[derive(Debug, Default, Serialize)]
 pub(super) struct Linearity {
-    /// Whether all checks agree with a linear structure.
+    /// Whether all linearity checks agree with a linear structure.
     pub(super) linear: bool,
-    /// Checks of steady sine responses, one entry for each direction of the force.
+    /// Linearity checks of steady sine responses, one entry for each direction of the force.
     pub(super) tones: Vec<TonesLinearity>,
     /// Comparisons of two sine sweeps.
     pub(super) sweeps: Vec<SweepPair>,
@@ -124,7 +127,8 @@ pub(super) struct TonesLinearity {
     pub(super) direction: &'static str,
     #[serde(flatten)]
     pub(super) verdict: Verdict,
-    /// Regions of the amplitude X(F) of a sine with increasing force, and the forces of its jumps in N.
+    /// Regions of the displacement amplitude X over the force amplitude F of a sine with increasing force, at constant
+    /// frequency.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub(super) regions: Vec<Region>,
     #[serde(skip_serializing_if = "Vec::is_empty")]

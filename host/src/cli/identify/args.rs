@@ -26,7 +26,7 @@ pub struct Args {
     /// Case file to write.
     #[arg(long, value_name = "CASE.toml")]
     pub(super) out: Option<PathBuf>,
-    /// Nonlinear terms of harmonic-balance and joints.
+    /// Nonlinear terms of the restoring force that harmonic-balance and joints identify.
     #[arg(
         long,
         value_name = "TERM,…",
@@ -34,11 +34,11 @@ pub struct Args {
         default_value = "cubic-stiffness,cubic-damping"
     )]
     pub(super) terms: Vec<NonlinearTerm>,
-    /// Number of harmonics of the response in the harmonic balance and in the fit.
+    /// Number of harmonics of the response to a sine that are taken from the record and used in the fit.
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u8).range(1..=40))]
     pub(super) harmonics: u8,
-    /// Duration of the transient at the start of each dwell, in s. Default: estimated from the decay of the structure and
-    /// the noise.
+    /// Time at the start of each dwell that is left out because the transient has not yet decayed, in s. Default:
+    /// estimated from the decay rate of the structure and the noise.
     #[arg(long, value_name = "T", value_parser = non_negative, allow_negative_numbers = true)]
     pub(super) settle_s: Option<f64>,
     /// Period of a multisine in samples: harmonic-balance uses the last N samples of each recording as one period.
@@ -62,7 +62,8 @@ pub struct Args {
     /// Width of the slices of the restoring-force surface, as a fraction of the largest velocity or displacement.
     #[arg(long, value_name = "SHARE", default_value_t = 0.01, value_parser = positive, allow_negative_numbers = true)]
     pub(super) slice: f64,
-    /// Degree of the maps of ncma in the force: 1 as in eqs 4.8 and 4.9, 2 for a mode with cubic stiffness.
+    /// Degree in the force F of the coefficients of the maps that ncma fits: 1 for a linear dependence, 2 for a mode
+    /// with cubic stiffness.
     #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u8).range(1..=2))]
     pub(super) degree: u8,
     /// Case with the initial values. For joints: geometry and inertia of the links, and initial stiffness and damping. For
@@ -72,13 +73,14 @@ pub struct Args {
     /// For joints: also estimate the mass of the last link, which includes tool and payload.
     #[arg(long)]
     pub(super) payload: bool,
-    /// For inverse-stability: standard deviation of the axial depths, in percent.
+    /// For inverse-stability: standard deviation of the axial depth of each cut, in percent of the depth.
     #[arg(long, value_name = "P", default_value_t = 2.0, value_parser = positive, allow_negative_numbers = true)]
     pub(super) depth_error_percent: f64,
-    /// For inverse-stability: standard deviation of chatter frequencies, in percent.
+    /// For inverse-stability: standard deviation of each measured chatter frequency, in percent of the frequency.
     #[arg(long, value_name = "P", default_value_t = 0.3, value_parser = positive, allow_negative_numbers = true)]
     pub(super) chatter_error_percent: f64,
-    /// Seed of the structures that inverse-stability draws; the same seed gives the same result.
+    /// For inverse-stability: seed of the random structures among which it searches; the same seed gives the same
+    /// result.
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub(super) seed: u64,
     /// For force-coefficients: edge angle κ of the tool in degrees; 90 is a square end mill.
@@ -104,17 +106,19 @@ pub struct Args {
 /// Identification methods.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(super) enum Method {
-    /// Complex modes with left and right mode shapes (eq. 7.15), from receptances or from recordings of force and response.
+    /// Complex modes with left and right mode shapes, from receptances or from recordings of force and response.
     Modes,
     /// Mass, damping, stiffness and nonlinear terms from step-sine tests by harmonic balance, without the bias of hfrf.
     HarmonicBalance,
-    /// Higher-order frequency response functions (eqs 5.15 to 5.17 of the thesis).
+    /// Higher-order frequency response functions: the receptance as a polynomial of the force; exact for vanishing
+    /// force.
     Hfrf,
-    /// Restoring-force surface (eq. 5.4) of any record, and the force law fitted to it.
+    /// Restoring-force surface (force minus mass times acceleration, over displacement and velocity) of any record, and
+    /// the force law fitted to it.
     RestoringForce,
-    /// Nonlinear complex mode: natural frequency and loss factor over force and receptance (eqs 4.5 to 4.9).
+    /// Nonlinear complex mode: natural frequency and loss factor as functions of force and receptance.
     Ncma,
-    /// Tests of linearity, and the kind of nonlinearity.
+    /// Tests whether the structure is linear, and names the kind of nonlinearity if it is not.
     Linearity,
     /// Stiffness and damping of robot joints from hammer or shaker tests at several postures; with --terms from step-sine
     /// tests at several forces.

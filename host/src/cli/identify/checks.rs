@@ -95,7 +95,8 @@ pub(super) fn linearity(args: &Args, recordings: &[Recording]) -> Result<Identif
     })
 }
 
-/// Length of the analysis window of a sine with increasing force, in periods: a choice.
+/// Length of the analysis window on a sine of constant frequency and increasing force, in periods of the sine: a
+/// choice.
 const PERIODS: f64 = 10.0;
 
 fn response(dwell: &Dwell) -> Option<(f64, f64)> {

@@ -101,7 +101,7 @@ fn dwells(args: &Args, postures: &[AtPosture], settling: Settling) -> Vec<(Postu
         .collect()
 }
 
-/// Whether the force of any direction has more than one level.
+/// Whether the steady responses `dwells` contain two different force amplitudes in the same direction.
 fn has_levels(dwells: &[Dwell]) -> bool {
     let forces: Vec<(Direction, f64)> = dwells
         .iter()
@@ -212,7 +212,8 @@ fn from_receptances(args: &Args, start: &Robot, postures: &[AtPosture]) -> Resul
     let estimates = fit.parameters.iter().enumerate().map(|(index, parameter)| {
         let value = parameter.value(&fit.robot);
         let share = fit.covariance[(index, index)].max(0.0).sqrt();
-        // The standard deviation of the logarithm, so that the interval is multiplicative.
+        // `share` is the standard deviation of the logarithm of the parameter, so the interval is value/factor to
+        // value·factor.
         let factor = (NINETY_PERCENT * share).exp();
         let figure = Figure {
             value,

@@ -167,7 +167,8 @@ pub(super) fn hfrf(args: &Args, recordings: &[Recording]) -> Result<IdentifyOutp
     };
     let predicted = data.relative_error(&fit.theta);
     let mut warnings = found.warnings;
-    // A model that is correct within the noise has about the same prediction error as the best fit.
+    // A parameter set that is correct within the noise predicts the steady responses about as well as the least-squares
+    // fit does. A larger prediction error shows that the parameters from higher-order FRFs are biased.
     if predicted > BIASED_PREDICTION.0 * found.fit.relative_error + BIASED_PREDICTION.1 {
         let mut shifts = Vec::new();
         for role in [Role::CubicDamping(0), Role::CubicStiffness(0)] {

@@ -8,7 +8,7 @@ use super::super::positive;
 #[derive(Debug, clap::Args)]
 #[command(next_help_heading = "Modes")]
 pub(super) struct ModeOptions {
-    /// Number of modes. Default: all stable poles of the stabilization diagram.
+    /// Number of modes to select. Default: all stable poles of the stabilization diagram.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     pub(super) modes: Option<u16>,
     /// Highest model order of the stabilization diagram.

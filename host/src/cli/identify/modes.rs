@@ -58,12 +58,12 @@ pub(super) fn modes(args: &Args, understood: &mut Vec<Understood>) -> Result<Ide
     })
 }
 
-/// Receptances with their standard deviations and coherence.
+/// Receptances from which the modes are identified, with their standard deviations and coherence.
 struct Source {
     table: FrfTable,
     deviation: Option<Vec<Vec<f64>>>,
     warnings: Vec<String>,
-    /// Spectra of the time records, if each record is one continuous test.
+    /// Spectra of the recorded forces and responses; `None` unless each record is one continuous test.
     records: Option<Vec<RecordSpectra>>,
 }
 

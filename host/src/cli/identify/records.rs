@@ -110,7 +110,8 @@ pub(super) fn restoring_force(args: &Args, recordings: &[Recording]) -> Result<I
         terms: args.surface.iter().map(|term| term.term()).collect(),
         mass_kg: args.mass_kg,
         band_hz,
-        // Trim at both ends: two seconds, or a tenth of a short record. It contains several periods of the lowest frequency in the band.
+        // Duration cut off at both ends of the record, s: two seconds, or a tenth of a record shorter than 20 s. A
+        // choice; it contains several periods of the lowest frequency in the band.
         trim_s: (0.1 * recording.len() as f64 / recording.sample_rate_hz).min(2.0),
     };
     let record = Record {
