@@ -27,13 +27,14 @@ pub struct CellChart {
     /// Label of the method that computed the chart.
     #[serde(flatten)]
     pub label: Label,
-    /// Axial depths, mm, in the requested order.
+    /// Axial depths of the cells, mm, in the requested order.
     pub depths_mm: Vec<f64>,
     /// Cells at each spindle speed, in the requested order.
     pub speeds: Vec<CellLine>,
 }
 
-/// Dominant multiplier at every speed and depth, in parallel over speeds.
+/// Computes a cell chart: the dominant Floquet multiplier at every spindle speed and axial depth, in parallel over
+/// speeds.
 ///
 /// The result does not depend on the number of threads.
 ///

@@ -17,12 +17,12 @@ use crate::spectrum::along_depth::Spectrum;
 use crate::spectrum::root::Root;
 use crate::spectrum::verdict::Verdict;
 
-/// Number of depth intervals whose ends are sampled first; if there are fewer cells, all are computed directly. A
-/// choice.
+/// Number of depth intervals of a cell chart at whose ends all multipliers are computed first. If there are fewer
+/// cells, all are computed directly. A choice.
 const INTERVALS: usize = 10;
 
-/// Share of the depth range for which the first mesh of the period is built; each further mesh covers twice the depth
-/// of the one before.
+/// Share of the largest depth of a cell chart for which the first mesh of the period is built. Each further mesh covers
+/// twice the depth of the one before.
 const FIRST_SHARE: f64 = 0.125;
 
 /// Implements [`Method::cells`] for a method with a spectrum; `spectrum` returns the multipliers at this speed, valid
@@ -76,30 +76,32 @@ pub(crate) fn cells_of<S: Spectrum>(
     Ok(cells)
 }
 
-/// All multipliers that may be dominant, at the depth of one cell.
+/// All Floquet multipliers that may be dominant, sampled at the depth of one cell.
 struct Sample {
     index: usize,
     depth_m: f64,
-    /// Multipliers with derivatives; `None` if one of them lacks a derivative, so that the sample cannot be
-    /// interpolated.
+    /// Floquet multipliers with their derivatives dμ/dw; `None` if one of them lacks a derivative, so that cells next
+    /// to this depth cannot be interpolated.
     roots: Option<Vec<Root>>,
 }
 
 impl Sample {
-    /// Absolute value of the largest multiplier.
+    /// Absolute value of the largest Floquet multiplier at this depth.
     fn largest(&self) -> f64 {
         let sizes = self.roots.iter().flatten().map(|root| root.multiplier.norm());
         sizes.fold(0.0, f64::max)
     }
 }
 
-/// Cubic in the fraction t of an interval, plus a quartic that vanishes with its slope at both ends.
+/// Floquet multiplier between two sampled depths: a cubic in the fraction t of the depth interval, plus a quartic that
+/// vanishes with its slope at both ends.
 #[derive(Clone, Copy)]
 struct Curve {
     from: Root,
     to: Root,
     step_m: f64,
-    /// Coefficient of the quartic: the error of the cubic where it was checked, divided by t²(1 − t)² there.
+    /// Coefficient of the quartic: the error of the cubic interpolant of the multiplier at the fraction t where it was
+    /// checked, divided by t²(1 − t)².
     correction: Complex64,
 }
 
@@ -112,8 +114,8 @@ impl Curve {
             + self.correction * (product * product)
     }
 
-    /// Sets the quartic from the error of the cubic at the fraction `share` of the interval; returns the error of the
-    /// cubic at its middle.
+    /// Sets the quartic from the error of the cubic interpolant at the fraction `share` of the depth interval; returns
+    /// the error of the cubic at the middle of the interval.
     fn correct(&mut self, share: f64, error: Complex64) -> f64 {
         let product = share * (1.0 - share);
         self.correction = error / (product * product);
@@ -130,7 +132,7 @@ struct Column<S> {
 }
 
 impl<S: Spectrum> Column<S> {
-    /// Computes all multipliers at the depth of a cell, and fills the cell.
+    /// Computes all Floquet multipliers at the depth of a cell, and stores the largest in the cell.
     fn sample(&mut self, index: usize) -> Result<Sample, StabilityError> {
         let depth_m = self.depths_m[index];
         let all = self
@@ -151,8 +153,8 @@ impl<S: Spectrum> Column<S> {
                 roots = None;
                 continue;
             };
-            // Newton's step corrects the error of the period map. The error that remains is far smaller, so that the
-            // least error is stated.
+            // Newton's step on the characteristic matrix corrects the error of the period map. The remaining error is
+            // far smaller, so that [`LEAST_ERROR`] is stated.
             let size = root.multiplier.norm();
             sizes = (sizes.0.max(size), sizes.1.max(LEAST_ERROR * size.max(1.0)));
             if let Some(roots) = &mut roots {
@@ -167,7 +169,7 @@ impl<S: Spectrum> Column<S> {
         })
     }
 
-    /// Fills the cells between two samples, halving the interval if interpolation fails.
+    /// Fills the cells between two sampled depths, halving the depth interval if interpolation fails.
     fn between(&mut self, low: &Sample, high: &Sample) -> Result<(), StabilityError> {
         if high.index - low.index < 2 {
             return Ok(());
@@ -181,7 +183,7 @@ impl<S: Spectrum> Column<S> {
         self.between(&middle, high)
     }
 
-    /// Follows every multiplier that may be dominant between two samples, and fills the cells.
+    /// Follows every multiplier that may be dominant between two sampled depths, and fills the cells there.
     fn follow(&mut self, low: &Sample, high: &Sample) -> Followed {
         let Some(mut curves) = curves(low, high) else {
             return Followed::Lost;
@@ -214,8 +216,8 @@ impl<S: Spectrum> Column<S> {
             roots: Some(roots),
         };
         self.cells[index] = Cell::exact(middle.largest());
-        // Stated error of the cells: a factor of two on the error of the cubic, although the quartic corrects it. Far
-        // outside the unit circle, where intervals are wide, a factor of four.
+        // Stated error of interpolated cells: twice the error of the cubic in depth, although the quartic corrects it.
+        // Far outside the unit circle, where depth intervals are wide, four times that error.
         let error = if least > CELL_FAR {
             4.0 * worst
         } else {
@@ -228,18 +230,18 @@ impl<S: Spectrum> Column<S> {
         }
     }
 
-    /// The multiplier near a guess, with a second Newton step if the first was long.
+    /// Floquet multiplier near a guess, from one Newton step, or two if the first was long.
     fn polished(&mut self, guess: Complex64, depth_m: f64) -> Option<Root> {
         let root = self.spectrum.root_near(guess, depth_m)?;
-        // The remaining error is about the square of the relative step: 1e-10.
+        // After a relative Newton step below 1e-5 the remaining relative error is about its square: 1e-10.
         if (root.multiplier - guess).norm() < 1e-5 * guess.norm() {
             return Some(root);
         }
         self.spectrum.root_near(root.multiplier, depth_m)
     }
 
-    /// Fills the cells between two samples from curves with a given error; `None` if a cell is undecided and its
-    /// multiplier cannot be computed directly.
+    /// Fills the cells between two sampled depths from interpolants of the multipliers with a given error; `None` if a
+    /// cell is undecided and its multiplier cannot be computed directly.
     fn fill(&mut self, low: &Sample, high: &Sample, curves: &[Curve], error: f64) -> Option<()> {
         for index in low.index + 1..high.index {
             if index == middle_of(low, high) {
@@ -263,17 +265,17 @@ impl<S: Spectrum> Column<S> {
     }
 }
 
-/// Result of following multipliers from one sample to the next.
+/// Result of following multipliers from one sampled depth to the next.
 enum Followed {
     /// All multipliers were followed, and the cells are filled.
     Filled,
-    /// The error of the curves is too large; the multipliers at the middle are known.
+    /// The interpolants of the multipliers err too much; the multipliers at the middle of the depth interval are known.
     Bent(Sample),
-    /// Multipliers of the two samples could not be paired, or two curves led to one multiplier.
+    /// Multipliers at the two depths could not be paired, or two interpolants led to one multiplier.
     Lost,
 }
 
-/// True if the multiplier differs from all of `others`.
+/// True if the multiplier differs from all of `others` by more than 1e-6 of its size.
 fn is_new(root: &Root, others: &[Root]) -> bool {
     let distance = |other: &Root| (other.multiplier - root.multiplier).norm();
     others
@@ -285,7 +287,8 @@ fn middle_of(low: &Sample, high: &Sample) -> usize {
     (low.index + high.index) / 2
 }
 
-/// Curves of all multipliers that may be dominant between two samples; `None` if they cannot be paired.
+/// Interpolants of all multipliers that may be dominant between two sampled depths; `None` if the multipliers cannot be
+/// paired.
 fn curves(low: &Sample, high: &Sample) -> Option<Vec<Curve>> {
     let step_m = high.depth_m - low.depth_m;
     let mut free = high.roots.clone()?;

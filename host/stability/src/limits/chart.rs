@@ -23,10 +23,12 @@ pub struct Chart {
     /// not requested or not needed.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub refined: Vec<SpeedLine>,
-    /// Accuracy between speeds; `None` if no lines were added between the requested ones.
+    /// Accuracy of the limits between the speeds of the chart; `None` if no lines were added between the requested
+    /// ones.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub resolution: Option<Resolution>,
-    /// Depths, mm, at which lines contain the share of stable machines; empty if not requested.
+    /// Depths of cells, mm, at which every line of the chart states the share of drawn machines that are stable; empty
+    /// if not requested.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub cells_mm: Vec<f64>,
 }
@@ -58,9 +60,10 @@ pub struct Refinement {
     /// Largest difference between a limit and the straight line between the limits at neighbouring speeds, as a share
     /// of the largest depth.
     pub tolerance: f64,
-    /// Least distance between neighbouring speeds, relative to the speed; closer ones get no speed between them.
+    /// Least distance between neighbouring speeds of the chart, relative to the speed; no speed is added between closer
+    /// ones.
     pub least_step: f64,
-    /// Number of speeds from which no further round of refinement begins.
+    /// Number of speeds of the chart from which no further round of refinement begins.
     pub most_speeds: usize,
 }
 
@@ -101,8 +104,8 @@ impl Chart {
         refinement: Refinement,
     ) -> Result<Self, StabilityError> {
         let tolerance_mm = refinement.tolerance * depth_mm;
-        // Every interval is tested once; later rounds divide only intervals whose middle deviated from the straight
-        // line.
+        // Every gap between two speeds is tested once; later rounds divide only gaps whose middle deviated from the
+        // straight line.
         let mut open: Vec<bool> = vec![true; self.speeds.len().saturating_sub(1)];
         while open.iter().any(|&is_open| is_open) && self.speeds.len() < refinement.most_speeds {
             let middles: Vec<f64> = self
@@ -142,7 +145,8 @@ impl Chart {
     }
 }
 
-/// True if the middle line has the same switches as both ends, each near the straight line between them.
+/// True if the middle speed has as many stable intervals and the same kind of first stability loss as both outer
+/// speeds, and if each end of an interval lies near the straight line between the outer speeds.
 fn is_between(left: &SpeedLine, middle: &SpeedLine, right: &SpeedLine, tolerance_mm: f64) -> bool {
     let share = (middle.rpm - left.rpm) / (right.rpm - left.rpm);
     let (a, m, b) = (&left.stable_mm, &middle.stable_mm, &right.stable_mm);

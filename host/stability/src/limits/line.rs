@@ -17,8 +17,8 @@ use crate::spectrum::crossing::Crossing;
 use crate::spectrum::root::Root;
 use crate::spectrum::stability_loss::StabilityLoss;
 
-/// Share of the depth range for which the first mesh of the period is built; each further mesh covers twice the depth
-/// of the one before.
+/// Share of the largest depth of a line for which the first mesh of the period is built. Each further mesh covers twice
+/// the depth of the one before.
 const FIRST_SHARE: f64 = 0.125;
 
 /// Relative error of the depth of a crossing on a given mesh, at which Newton's method stops.
@@ -82,7 +82,7 @@ pub(crate) fn line_of<S: Spectrum>(
     })
 }
 
-/// True if the multiplier may reach the unit circle within a step in depth.
+/// True if a multiplier may reach the unit circle within a step in axial depth.
 fn is_near(root: &Root, step_m: f64) -> bool {
     root.excess().abs() < (REACH_FACTOR * root.slope.norm() * step_m + REACH_LEAST).min(LINE_FAR)
 }
@@ -90,13 +90,13 @@ fn is_near(root: &Root, step_m: f64) -> bool {
 #[derive(Clone, Debug)]
 struct Sample {
     depth_m: f64,
-    /// Absolute value of the largest multiplier, to the error of the scan.
+    /// Absolute value of the largest multiplier at this depth, to the error of the scan.
     largest: f64,
     roots: Vec<Root>,
 }
 
 impl Sample {
-    /// Number of multipliers outside the unit circle.
+    /// Number of multipliers outside the unit circle at this depth.
     fn outside(&self) -> i32 {
         self.roots
             .iter()
@@ -146,8 +146,8 @@ impl<S: Spectrum> Scan<S> {
         })
     }
 
-    /// A multiplier with its derivative. Near the unit circle it is first refined by Newton's method, so that its side
-    /// is right.
+    /// Floquet multiplier with its derivative dμ/dw. Near the unit circle Newton's method refines it first, so that it
+    /// certainly counts on the right side of the circle.
     fn root(&mut self, coarse: Complex64, depth_m: f64) -> Root {
         let spectrum = &mut self.spectrum;
         let multiplier = if (coarse.norm() - 1.0).abs() < LINE_POLISHED {
@@ -203,7 +203,7 @@ impl<S: Spectrum> Scan<S> {
                 return None;
             }
         }
-        // A multiplier of the deeper sample without a partner in the other must be far from the unit circle.
+        // A multiplier at the larger depth without a partner at the smaller one must be far from the unit circle.
         if free.iter().any(|root| is_near(root, step_m)) {
             return None;
         }
@@ -227,7 +227,8 @@ impl<S: Spectrum> Scan<S> {
         })
     }
 
-    /// Bisects on the number of multipliers outside, for an interval too short for other means.
+    /// Bisects a depth interval on the number of multipliers outside the unit circle, where the interval is too short
+    /// to follow multipliers.
     fn by_halving(&mut self, low: &Sample, high: &Sample) -> Result<Vec<DirectedCrossing>, StabilityError> {
         let (mut low, mut high) = (low.clone(), high.clone());
         if low.outside() == high.outside() {
@@ -290,7 +291,7 @@ impl<S: Spectrum> Scan<S> {
         while reach_m < deepest_m {
             let sides = [(-reach_m, outward), (reach_m, !outward)];
             let mut is_beyond = |(shift_m, inside): (f64, bool)| {
-                // A distance that reaches below depth 0 suffices on the shallow side.
+                // If the distance reaches below depth 0, no multiplier needs to be computed on the shallow side.
                 depth_m + shift_m <= 0.0 || {
                     let guess = multiplier + slope * shift_m;
                     let there = self.spectrum.multiplier_near(guess, depth_m + shift_m, 0.1);

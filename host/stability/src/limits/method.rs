@@ -25,7 +25,8 @@ pub trait Method: Sync {
         None
     }
 
-    /// True if a line takes seconds, so that a chart has lines at the requested speeds only unless the user asks for more.
+    /// True if one spindle speed takes seconds to compute. A chart then has lines at the requested speeds only, unless
+    /// the user asks for more.
     fn takes_seconds(&self) -> bool {
         false
     }

@@ -8,15 +8,15 @@ use crate::criteria::PERCENTILE_SETTLED;
 /// Two-sided 90 % quantile of the standard normal distribution.
 const CONFIDENCE_90: f64 = 1.644_853_626_951_473;
 
-/// First limits of all machines and of every batch.
+/// First stability limits of all drawn machines, in all and by batch.
 pub(super) struct Limits {
     pub(super) all: Sorted,
     pub(super) by_batch: Vec<Sorted>,
 }
 
 impl Limits {
-    /// Confidence interval (90 %) of the percentile at `share`, mm (Woodruff 1952); `None` for an end beyond the last
-    /// depth.
+    /// Confidence interval (90 %, Woodruff 1952), mm, of the depth below which the share `share` of the machines has
+    /// its first limit; `None` for an end beyond the last depth.
     pub(super) fn interval(&self, share: f64) -> [Option<f64>; 2] {
         let all = &self.all.0;
         let least = 1.0 / all.len().max(1) as f64;
@@ -26,13 +26,13 @@ impl Limits {
             .iter()
             .map(|batch| batch.share_below(percentile_mm))
             .collect();
-        // The share of machines below a depth is not resolved more finely than one machine.
+        // The share of machines with a limit below a depth cannot be resolved more finely than one machine.
         let reach = (student_90(below.len()) * standard_error(&below)).max(least);
         [share - reach, share + reach].map(|share| self.all.quantile(share.clamp(0.0, 1.0)))
     }
 
-    /// Half the width of the confidence interval relative to the percentile; an end beyond the last depth counts as the
-    /// last depth.
+    /// Half the width of the 90 % confidence interval of a percentile of the limiting depth, relative to the
+    /// percentile; an end beyond the last depth counts as the last depth.
     pub(super) fn relative_width(&self, share: f64, depth_mm: f64) -> f64 {
         let [low, high] = self.interval(share).map(|end| end.unwrap_or(depth_mm));
         let percentile_mm = self.all.quantile(share).unwrap_or(depth_mm);
@@ -60,7 +60,8 @@ fn student_90(count: usize) -> f64 {
     z * (1.0 + first / freedom + second / freedom.powi(2))
 }
 
-/// First depth that is not surely stable, mm: where stability is lost, or where a second stable orbit begins.
+/// First depth at one spindle speed that is not certainly stable, mm: where stability is lost, or where a second stable
+/// orbit begins.
 pub(crate) fn limit_of(line: &SpeedLine) -> Option<f64> {
     // A machine that is unstable at depth 0 has the limit 0.
     if line.stable_mm.first().is_none_or(|interval| interval[0] > 0.0) {
@@ -83,7 +84,7 @@ pub(super) fn is_stable(line: &SpeedLine, depth_mm: f64) -> bool {
     within(&line.stable_mm) && !within(&line.bistable_mm)
 }
 
-/// First limits in ascending order; infinite for machines that stay stable.
+/// First stability limits of drawn machines, mm, in ascending order; infinite for machines that stay stable.
 pub(super) struct Sorted(Vec<f64>);
 
 impl Sorted {
@@ -95,14 +96,15 @@ impl Sorted {
         Self(limits)
     }
 
-    /// Share of the limits that lie below a depth; limits at the depth count half.
+    /// Share of the machines whose first limit lies below a depth; limits at that depth count half.
     fn share_below(&self, depth_mm: f64) -> f64 {
         let below = self.0.partition_point(|limit| *limit < depth_mm);
         let up_to = self.0.partition_point(|limit| *limit <= depth_mm);
         0.5 * (below + up_to) as f64 / self.0.len().max(1) as f64
     }
 
-    /// Quantile of the limits at `share`, interpolated between ranks at (i + 1/2)/n (Hazen); `None` if infinite.
+    /// Quantile of the first limits at `share`, mm, interpolated between ranks at (i + 1/2)/n (Hazen); `None` if
+    /// infinite.
     pub(super) fn quantile(&self, share: f64) -> Option<f64> {
         sample_quantile(&self.0, share).filter(|value| value.is_finite())
     }

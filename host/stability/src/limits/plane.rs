@@ -12,27 +12,28 @@ use crate::error::StabilityError;
 use crate::problem::linear::{CubicTerms, Problem};
 use quietcut_model::case::Case;
 
-/// Half width of the central difference of the problem along a variable, in standard deviations. If one side is no
-/// valid machine, the difference is one-sided.
+/// Change of an uncertain variable to each side, in standard deviations, from which the central difference of the delay
+/// problem is computed. If one side is no valid machine, the difference is one-sided.
 const STEP: f64 = 0.05;
 
-/// Message for a variable along which the problem has no derivative.
+/// Message about an uncertain parameter for which the delay problem has no difference quotient, since both sides lie
+/// out of bounds.
 const OUT_OF_BOUNDS: &str = "a parameter leaves its bounds if it changes by a twentieth of its standard deviation to either side; \
     a smaller deviation is needed";
 
-/// Linear problem of a case with its derivative along each variable, per standard deviation.
+/// Linear delay problem of a case with its derivative along each uncertain variable, per standard deviation.
 #[derive(Clone, Debug)]
 pub struct Linearized {
     problem: Problem,
     tangents: Vec<Tangent>,
 }
 
-/// Loss of stability linearized over the variables.
+/// Loss of stability as a linear function of the uncertain variables of a case.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plane {
     /// Axial depth of the limit of the nominal machine, mm.
     pub depth_mm: f64,
-    /// Gradient of the depth over the variables, mm per standard deviation.
+    /// Gradient of the limiting depth over the uncertain variables, mm per standard deviation.
     pub gradient: DVector<f64>,
     /// Chatter frequency, Hz, with its gradient, Hz per standard deviation; `None` at a flip, whose frequency follows
     /// from the spindle speed alone.
@@ -40,7 +41,7 @@ pub struct Plane {
 }
 
 impl Linearized {
-    /// Linearizes the problem of a case along its variables.
+    /// Linearizes the delay problem of a case along its uncertain variables.
     ///
     /// # Errors
     /// The linear part of the case is not covered, or that of a case varied to either side is not valid.
@@ -69,7 +70,8 @@ impl Linearized {
         Ok(Self { problem, tangents })
     }
 
-    /// Linearized losses of stability along a line, the first limit first, each with the reason if it has no derivative.
+    /// Losses of stability at one spindle speed, each linearized over the uncertain variables, the first limit first. A
+    /// limit without derivative has the reason.
     pub fn planes(&self, line: &SpeedLine) -> Vec<Result<Plane, StabilityError>> {
         let losses = line.switches.iter().filter(|switch| !switch.gain);
         losses.map(|switch| self.plane(line.rpm, switch)).collect()
@@ -89,8 +91,8 @@ impl Linearized {
             .filter(|_| slopes.iter().any(|slope| slope.angle != 0.0));
         let chatter_hz = chatter_hz.map(|hz| {
             let period_s = self.problem.tooth_period_s(rpm);
-            // ωτ is the angle of the multiplier or its negative, modulo 2π; derivatives refer to the angle above the
-            // real axis.
+            // The product ωτ of chatter frequency and tooth period is the angle of the multiplier or its negative,
+            // modulo 2π; derivatives refer to the angle above the real axis.
             let sign = if (hz * period_s).fract() > 0.5 { -1.0 } else { 1.0 };
             let per_angle = sign / (TAU * period_s);
             (

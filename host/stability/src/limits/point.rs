@@ -90,7 +90,8 @@ pub fn point(problem: &Problem, rpm: f64, depth_mm: f64) -> Result<CutStability,
         Some(rough) => confirmed(problem, rpm, depth_m, rough),
         None => None,
     };
-    // If Newton's method does not converge from the eigenvalues of the map, rounding has moved these.
+    // Newton's method from the eigenvalues of the period map does not converge if rounding has moved these eigenvalues;
+    // a winding number is used then.
     let found = found
         .or_else(|| searched(problem, rpm, depth_m, &candidates.multipliers))
         .or_else(of_maps)
@@ -108,24 +109,25 @@ pub fn point(problem: &Problem, rpm: f64, depth_mm: f64) -> Result<CutStability,
     })
 }
 
-/// Dominant multiplier with its error, before the chatter frequency is known.
+/// Dominant Floquet multiplier of a cut with its error, before the chatter frequency is known.
 struct Solution {
     multiplier: Complex64,
     error: f64,
     /// Mesh of the tooth period at the working resolution.
     period: Period,
-    /// Verdict, if it is more certain than |μ| and its error show; otherwise `None`.
+    /// Verdict on the cut, if it is more certain than |μ| and its error show; otherwise `None`.
     verdict: Option<Verdict>,
 }
 
-/// Error from the change between the working and a finer mesh; at least `least`, relative to max(1, |μ|).
+/// Error of a multiplier from its change between the working and a finer mesh; at least `least`, relative to max(1,
+/// |μ|).
 fn error(coarse: Complex64, fine: Complex64, least: f64) -> f64 {
     (MESH_ROOM * (coarse - fine).norm()).max(least * fine.norm().max(1.0))
 }
 
-/// Multipliers of a coarse period map.
+/// Floquet multipliers from a coarse mesh of the tooth period, as starting values.
 struct ScannedMultipliers {
-    /// Multipliers; of a conjugate pair the upper one.
+    /// Floquet multipliers on the coarse mesh; of a conjugate pair the upper one.
     multipliers: Vec<Complex64>,
     /// Largest complex depth |w (1 − 1/μ)| of these multipliers, m, and at least 2 w, which is its bound on the unit
     /// circle.
@@ -147,7 +149,8 @@ impl ScannedMultipliers {
     }
 }
 
-/// Dominant multiplier on the working and a finer mesh by Newton's method; `None` if it does not converge.
+/// Dominant Floquet multiplier of a cut on the working and a finer mesh by Newton's method; `None` if it does not
+/// converge.
 fn confirmed(problem: &Problem, rpm: f64, depth_m: f64, rough: &ScannedMultipliers) -> Option<Solution> {
     let dominant = |resolution, guesses: &[Complex64]| {
         let period = Period::new(problem, rpm, rough.kappa_m, resolution);
@@ -164,7 +167,8 @@ fn confirmed(problem: &Problem, rpm: f64, depth_m: f64, rough: &ScannedMultiplie
     })
 }
 
-/// Dominant multiplier from the maps of the working and a finer mesh, for multipliers too small for Newton's method.
+/// Dominant Floquet multiplier of a cut from the period maps on the working and a finer mesh, for multipliers too small
+/// for Newton's method.
 fn of_maps(problem: &Problem, rpm: f64, depth_m: f64, rough: &ScannedMultipliers) -> Option<Solution> {
     let kappa_m = rough.kappa_m.min(KAPPA_MAX * depth_m);
     let largest = |resolution, share| {
@@ -188,7 +192,8 @@ fn of_maps(problem: &Problem, rpm: f64, depth_m: f64, rough: &ScannedMultipliers
     })
 }
 
-/// Dominant multiplier if the maps are not reliable: the largest found, and a radius beyond which there is none.
+/// Dominant Floquet multiplier of a cut if period maps are not reliable: the largest one found, and a radius beyond
+/// which a winding number counts none.
 fn searched(problem: &Problem, rpm: f64, depth_m: f64, candidates: &[Complex64]) -> Option<Solution> {
     let kappa_m = (1.0 + WOUND.recip()) * depth_m;
     let working = Period::new(problem, rpm, kappa_m, Resolution::WORKING);
@@ -198,7 +203,7 @@ fn searched(problem: &Problem, rpm: f64, depth_m: f64, candidates: &[Complex64])
         return None;
     }
     let Some(coarse) = beyond.multiplier else {
-        // All multipliers lie within the radius. Which of the candidates is the largest may remain open.
+        // All multipliers lie within this radius. It may remain open which of the candidates is the largest.
         let within = |candidate: &&Complex64| candidate.norm() < beyond.radius;
         return Some(Solution {
             multiplier: *candidates.iter().find(within)?,
@@ -212,7 +217,7 @@ fn searched(problem: &Problem, rpm: f64, depth_m: f64, candidates: &[Complex64])
     let own = error(coarse, fine, LEAST_ERROR);
     Some(Solution {
         multiplier: fine,
-        // A larger multiplier may lie between this one and the radius beyond which none was counted.
+        // A larger multiplier may lie between the largest one found and the radius beyond which none was counted.
         error: own.max(beyond.radius - fine.norm()),
         period: working,
         // If this multiplier lies outside the unit circle, a larger one would lie outside as well.

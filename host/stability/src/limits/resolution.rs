@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-/// Accuracy between the speeds of a chart, and where it is not reached.
+/// Accuracy of stability limits between the speeds of a chart, and where it is not reached.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Resolution {
     /// Largest error of a limit on the straight line between two neighbouring speeds, relative to its depth.

@@ -78,14 +78,15 @@ pub struct Basis {
 }
 
 impl Basis {
-    /// Basis from `leading` vectors by falling importance; vectors that vanish or depend on earlier ones are skipped.
+    /// Orthonormal basis that starts with the directions of the vectors `leading`, the most important first. Vectors
+    /// that vanish or depend on earlier ones are skipped; unit vectors complete the basis.
     pub fn new(size: usize, leading: &[DVector<f64>]) -> Self {
         let unit = |index: usize| DVector::from_fn(size, |i, _| if i == index { 1.0 } else { 0.0 });
         let mut vectors: Vec<DVector<f64>> = Vec::with_capacity(size);
         for candidate in leading.iter().cloned().chain((0..size).map(unit)) {
             let length = candidate.norm();
             let mut rest = candidate;
-            // Two passes of orthogonalization leave only rounding along the vectors before.
+            // Two passes of orthogonalization leave only rounding along the earlier basis vectors.
             for _ in 0..2 {
                 for vector in &vectors {
                     let along = vector.dot(&rest);
@@ -93,7 +94,7 @@ impl Basis {
                 }
             }
             let left = rest.norm();
-            // While directions are missing, some unit vector keeps at least 1/√size of its length after
+            // While basis vectors are missing, some unit vector keeps at least 1/√size of its length after
             // orthogonalization, far above the threshold of 1e-3.
             if vectors.len() < size && left > 1e-3 * length && left.is_finite() && left > 0.0 {
                 vectors.push(rest / left);
@@ -102,7 +103,7 @@ impl Basis {
         Self { vectors }
     }
 
-    /// Point, in the variables, with the given coordinates in this basis.
+    /// Values of the uncertain variables at the point with the given coordinates in this basis.
     fn point(&self, coordinates: &[f64]) -> DVector<f64> {
         let size = self.vectors.first().map_or(0, |vector| vector.len());
         let mut point = DVector::zeros(size);
@@ -122,7 +123,8 @@ impl Basis {
         rng.set_stream(stream);
         let size = self.vectors.len();
         let n = f64::from(count);
-        // Radical inverse 0, 1/2, 1/4, 3/4 …; with 1/8 added, four batches lie at the middles of their slices.
+        // Position of this batch in the slices along the first basis vector: the radical inverse 0, 1/2, 1/4, 3/4 … of
+        // its number. With 1/8 added, four batches lie at the middles of their slices.
         let first = f64::from(batch.reverse_bits()) / 2.0_f64.powi(32) + 0.125;
         let second: f64 = rng.random();
         let mut latin: Vec<Vec<f64>> = Vec::with_capacity(size.saturating_sub(2));

@@ -19,13 +19,13 @@ use crate::spectrum::stability_loss::StabilityLoss;
 use quietcut_model::milling::{RotatingVector, ToothForce};
 use quietcut_model::structure::{FirstOrder, ModalPart};
 
-/// Derivative of the problem along one parameter, per unit of the parameter.
+/// Derivative of the linear delay problem along one parameter, per unit of the parameter.
 #[derive(Clone, Debug)]
 pub struct Tangent {
-    /// Derivative of A, B and C in feed, normal and axial direction.
+    /// Derivative of the structure's matrices A, B and C, in feed, normal and axial direction.
     structure: Option<FirstOrder>,
-    /// Derivative of the vectors `cutting`, `normal` and `edge` of a tooth; `None` if they do not depend on the
-    /// parameter.
+    /// Derivative of a tooth's force direction (`cutting`), chip normal (`normal`) and edge force (`edge`); `None` if
+    /// they do not depend on the parameter.
     force: Option<ToothForce>,
     feed_per_tooth_m: f64,
     start: f64,
@@ -41,18 +41,19 @@ impl Tangent {
         exit: 0.0,
     };
 
-    /// Derivative per rad/s of the natural frequency of a mode, at constant damping ratio and mode shape.
+    /// Derivative of the delay problem per rad/s of the natural frequency of a mode, at constant damping ratio and mode
+    /// shape.
     pub fn omega(problem: &Problem, mode: &ModalPart) -> Self {
         Self::of_flow(problem, mode.by_omega())
     }
 
-    /// Derivative per unit of the damping ratio of a mode, at constant frequency and mode shape.
+    /// Derivative of the delay problem per unit of the damping ratio of a mode, at constant frequency and mode shape.
     pub fn damping_ratio(problem: &Problem, mode: &ModalPart) -> Self {
         Self::of_flow(problem, mode.by_damping_ratio())
     }
 
-    /// Derivative per relative change of K_tc, with constant ratios K_rc/K_tc and K_ac/K_tc and constant edge
-    /// coefficients.
+    /// Derivative of the delay problem per relative change of K_tc, with constant ratios K_rc/K_tc and K_ac/K_tc and
+    /// constant edge coefficients.
     pub fn cutting_force(problem: &Problem) -> Self {
         let zero = RotatingVector {
             constant: Vector3::zeros(),
@@ -111,12 +112,13 @@ fn slope(low: &RotatingVector, high: &RotatingVector, length: f64) -> RotatingVe
     }
 }
 
-/// Derivatives of a crossing, per unit of a parameter.
+/// Derivatives of depth and angle of a crossing of the unit circle by a multiplier, per unit of a parameter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Slope {
     /// dw/dp, mm.
     pub depth_mm: f64,
-    /// Derivative dθ/dp of the angle of the multiplier, rad; 0 at a flip.
+    /// Derivative dθ/dp of the angle θ of the multiplier e^{iθ} at the crossing, rad per unit of the parameter p; 0 at
+    /// a flip.
     pub angle: f64,
 }
 
@@ -146,7 +148,7 @@ impl<'a> Sensitivity<'a> {
         };
         let multiplier = match (switch.kind, switch.chatter_hz) {
             (StabilityLoss::Flip, _) => -Complex64::ONE,
-            // ωτ is the angle of the multiplier, modulo 2π.
+            // The product ωτ of chatter frequency and tooth period is the angle of the multiplier, modulo 2π.
             (StabilityLoss::Hopf, Some(hz)) => {
                 let angle = std::f64::consts::TAU * (hz * problem.tooth_period_s(rpm)).fract();
                 Complex64::new(angle.cos(), angle.sin().abs())
@@ -175,7 +177,7 @@ impl<'a> Sensitivity<'a> {
         Some(sensitivity)
     }
 
-    /// Derivative of the crossing along a change of the problem.
+    /// Derivatives of the crossing of the unit circle along a change of the delay problem.
     ///
     /// `None` if the depth is not differentiable in the parameter: at the tip of an island.
     pub fn slope(&self, tangent: &Tangent) -> Option<Slope> {
@@ -183,7 +185,8 @@ impl<'a> Sensitivity<'a> {
         let mu = self.multiplier;
         let by_depth = self.by_kappa * (Complex64::ONE - mu.inv());
         let by_angle = if mu.im == 0.0 {
-            // μ stays real: an imaginary coefficient of dθ forces dθ = 0, since the rest is real.
+            // At a flip μ stays real. The equation for dw and dθ is then real except for the coefficient of dθ, so that
+            // dθ = 0.
             None
         } else {
             let turning = self.by_kappa * self.depth_m / mu - mu * self.motion.overlap;

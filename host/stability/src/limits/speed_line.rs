@@ -28,7 +28,8 @@ pub struct Switch {
 pub struct Limit {
     /// Axial depth, mm.
     pub depth_mm: f64,
-    /// Error estimate of the depth, mm, as in [`Switch`].
+    /// Error estimate of the limiting depth, mm: within it |μ| differs from 1 by no more than the error of the
+    /// multiplier.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error_mm: Option<f64>,
     /// Kind of stability loss.
@@ -42,7 +43,7 @@ pub struct Limit {
 pub struct SpeedLine {
     /// Spindle speed, rev/min.
     pub rpm: f64,
-    /// Stable depths, mm, as intervals in ascending order, from 0 to the last depth.
+    /// Stable depths at this spindle speed, mm, as intervals in ascending order between 0 and the last depth.
     pub stable_mm: Vec<[f64; 2]>,
     /// Depths, mm, whose stability is open within the error, as intervals in ascending order around the ends of the
     /// stable intervals.
@@ -53,9 +54,10 @@ pub struct SpeedLine {
     pub bistable_mm: Vec<[f64; 2]>,
     /// Limit at which stability is first lost; `None` if it is not lost up to the last depth.
     pub first_limit: Option<Limit>,
-    /// Every crossing of the unit circle by depth, including those while another multiplier is outside.
+    /// Every crossing of the unit circle by a multiplier, by depth, including those while another multiplier is
+    /// outside.
     pub switches: Vec<Switch>,
-    /// Spread of the limit; `None` if the case has no deviations, or if it was not requested.
+    /// Spread of the first limit over drawn machines; `None` if the case has no deviations, or if it was not requested.
     #[serde(flatten)]
     pub spread: Option<LimitSpread>,
     /// Absolute value of the largest Floquet multiplier at the equal steps in depth of the scan, from depth 0 to the last;
@@ -65,8 +67,8 @@ pub struct SpeedLine {
 }
 
 impl SpeedLine {
-    /// Line from its switches (by depth) over depths from 0 to `depth_mm`, with `outside` multipliers outside the unit
-    /// circle at depth 0.
+    /// Stability at one spindle speed from its switches (by depth) over depths from 0 to `depth_mm`, with `outside`
+    /// multipliers outside the unit circle at depth 0.
     pub(crate) fn of_switches(rpm: f64, depth_mm: f64, mut outside: i32, switches: Vec<Switch>) -> Self {
         let mut stable_from = (outside == 0).then_some(0.0);
         let mut stable_mm = Vec::new();

@@ -2,16 +2,17 @@
 
 use serde::Serialize;
 
-/// The 5, 50 and 95 % percentiles of the first limit over all machines, mm; `None` beyond the last depth.
+/// The 5, 50 and 95 % percentiles of the first stability limit over all drawn machines, mm; `None` beyond the last
+/// depth.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Percentiles {
-    /// The 5 % percentile: nineteen machines of twenty are stable up to this depth.
+    /// The 5 % percentile of the first limit, mm: nineteen machines of twenty are stable up to this depth.
     #[serde(rename = "5")]
     pub low: Option<f64>,
     /// The median.
     #[serde(rename = "50")]
     pub median: Option<f64>,
-    /// The 95 % percentile: one machine of twenty is stable up to this depth.
+    /// The 95 % percentile of the first limit, mm: one machine of twenty is stable up to this depth.
     #[serde(rename = "95")]
     pub high: Option<f64>,
 }
@@ -19,23 +20,23 @@ pub struct Percentiles {
 /// Confidence intervals (90 %) of the [`Percentiles`], mm; `None` for an end beyond the last depth.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct PercentileIntervals {
-    /// Interval of the 5 % percentile.
+    /// Confidence interval of the 5 % percentile of the first limit, mm.
     #[serde(rename = "5")]
     pub low: [Option<f64>; 2],
     /// Interval of the median.
     #[serde(rename = "50")]
     pub median: [Option<f64>; 2],
-    /// Interval of the 95 % percentile.
+    /// Confidence interval of the 95 % percentile of the first limit, mm.
     #[serde(rename = "95")]
     pub high: [Option<f64>; 2],
 }
 
-/// One percentile of the first limit with its confidence interval.
+/// One percentile of the first stability limit over drawn machines, with its confidence interval.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Percentile {
-    /// Percentile, mm; `None` beyond the last depth.
+    /// Percentile of the first limit, mm; `None` beyond the last depth.
     pub depth_mm: Option<f64>,
-    /// Confidence interval (90 %) of the percentile, mm; `None` for an end beyond the last depth.
+    /// Confidence interval (90 %) of the percentile of the first limit, mm; `None` for an end beyond the last depth.
     pub ci90_mm: [Option<f64>; 2],
 }
 
@@ -54,11 +55,11 @@ impl Percentile {
 pub struct LimitSpread {
     /// Percentiles of the first limit.
     pub limit_percentiles_mm: Percentiles,
-    /// Confidence intervals (90 %) of the percentiles, mm.
+    /// Confidence intervals (90 %) of the percentiles of the first limit, mm.
     pub limit_percentiles_ci90_mm: PercentileIntervals,
     /// Number of machines drawn.
     pub machines: usize,
-    /// Share of machines that are stable at each requested depth; empty if none was requested.
+    /// Share of drawn machines that are stable at each requested depth; empty if none was requested.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub stable_share: Vec<f64>,
 }

@@ -35,28 +35,29 @@ const SHARES: [f64; 3] = [0.05, 0.5, 0.95];
 /// derivatives. If it finds none, the whole depth is searched.
 const SAMPLES_NEAR: usize = 16;
 
-/// Number of depth steps of a search over the whole depth: the least number of a chart.
+/// Number of depth steps of a search for a machine's limit over the whole depth: the least number of a chart.
 const SAMPLES: usize = 40;
 
-/// Function that builds the method for a case; the reason if the case is not a valid machine.
+/// Function that builds the stability method for a case; the reason if the case is not a valid machine.
 pub type MethodOfCase<'a> = dyn Fn(&Case) -> Result<Box<dyn Method>, String> + Sync + 'a;
 
-/// Case with deviations, and the method for its machines.
+/// Case with standard deviations of its parameters, and the stability method for machines drawn from them.
 pub struct Uncertainty<'a> {
     case: &'a Case,
     method_of: &'a MethodOfCase<'a>,
     variables: Vec<Variable>,
-    /// Derivatives of limits along the variables, which give the directions of stratification.
+    /// Derivatives of the limits along the uncertain variables, which give the directions of stratification.
     linear: Option<Linearized>,
     seed: u64,
 }
 
 impl<'a> Uncertainty<'a> {
-    /// Prepares the draws; `None` if the case has no deviations.
+    /// Prepares draws of machines from a case; `None` if the case has no standard deviations.
     pub fn new(case: &'a Case, method_of: &'a MethodOfCase<'a>, seed: u64) -> Option<Self> {
         let variables = Variable::of_case(case);
         (!variables.is_empty()).then(|| Self {
-            // Without derivatives draws are not stratified: more of them are needed, and the result holds as well.
+            // Without derivatives of the limits draws are not stratified: more of them are needed, and the result holds
+            // as well.
             linear: Linearized::new(case, &variables).ok(),
             case,
             method_of,
@@ -65,8 +66,8 @@ impl<'a> Uncertainty<'a> {
         })
     }
 
-    /// Spread of the first limit at the speed of a line, searched up to `depth_mm`, and the probability of stability at
-    /// `cells_mm`.
+    /// Spread of the first limit over drawn machines at one spindle speed, searched up to `depth_mm`, and the share of
+    /// stable machines at `cells_mm`.
     ///
     /// The result depends only on the seed and the speed.
     ///
@@ -104,7 +105,8 @@ impl<'a> Uncertainty<'a> {
         })
     }
 
-    /// Percentile: the depth below which the given share of all machines has its first limit, at the speed of a line.
+    /// Percentile of the first limit at one spindle speed: the depth below which the given share of all drawn machines
+    /// loses stability.
     ///
     /// # Errors
     /// As [`spread`](Self::spread).
@@ -122,7 +124,8 @@ impl<'a> Uncertainty<'a> {
         })
     }
 
-    /// Lines of batches of machines, at least `least`, until the percentiles at these shares have settled.
+    /// Draws batches of machines and computes their limits at the speed of the nominal line: at least `least` batches,
+    /// and more until the percentiles at the given shares have settled.
     fn batches(
         &self,
         nominal: &SpeedLine,
@@ -135,7 +138,7 @@ impl<'a> Uncertainty<'a> {
             .linear
             .as_ref()
             .map_or_else(Vec::new, |linear| linear.planes(nominal));
-        // A limit without a derivative, at the tip of an island, has no direction to stratify along.
+        // A limit without a derivative, at the tip of an island, gives no direction of stratification.
         let planes: Vec<Plane> = planes.into_iter().filter_map(Result::ok).collect();
         let gradients: Vec<DVector<f64>> = planes.iter().map(|plane| plane.gradient.clone()).collect();
         let mut basis = Basis::new(self.variables.len(), &gradients);
@@ -181,7 +184,8 @@ impl<'a> Uncertainty<'a> {
         Ok(())
     }
 
-    /// Line of a machine, at least up to its first limit; the reason if the machine is not valid.
+    /// Stability of a drawn machine at one spindle speed, at least up to its first limit; the reason if the machine is
+    /// not valid.
     fn line(
         &self,
         machine: &DVector<f64>,
@@ -216,7 +220,8 @@ impl<'a> Uncertainty<'a> {
     }
 }
 
-/// Drawn machine, by its standard normal variables, with its line; the reason if the machine is not valid.
+/// Drawn machine, given by its standard normal variables, with its stability at one spindle speed; the reason if the
+/// machine is not valid.
 struct Drawn {
     machine: DVector<f64>,
     line: Result<SpeedLine, String>,
@@ -252,8 +257,8 @@ impl Batches {
         }
     }
 
-    /// Directions along which the share of limits below each percentile changes, those of the least certain percentiles
-    /// first.
+    /// Directions of the uncertain variables along which the share of machines with a limit below each percentile
+    /// changes, those of the least certain percentiles first.
     fn directions(&self, shares: &[f64], depth_mm: f64) -> Vec<DVector<f64>> {
         let limits = self.limits();
         let mut shares = shares.to_vec();

@@ -11,25 +11,28 @@ use crate::criteria::{CHECK_GROWTH, CHECK_STEP, LEAST_CHECKS, SUSPECT, TABLE_ROO
 use crate::error::StabilityError;
 use crate::limits::speed_line::SpeedLine;
 
-/// Position of a checked speed within its share of a gap (0 to 1), alternating from gap to gap. It avoids the middle,
-/// which refinement has tested, and is not symmetric, so that lobes symmetric about the gap are detected.
+/// Position of a checked speed within its part of a gap between two speeds of a table (0 to 1), alternating from gap to
+/// gap. It avoids the middle, which refinement has tested, and is not symmetric, so that lobes symmetric about the gap
+/// are detected.
 const OFFSETS: [f64; 2] = [0.38, 0.62];
 
-/// Largest number of times that a suspect gap is checked at further speeds, half way between those checked before: two
-/// speeds become five, eleven, 23.
+/// Largest number of times that a suspect gap between two speeds of a table is checked at further speeds, half way
+/// between those checked before: two speeds become five, eleven, 23.
 const ROUNDS: usize = 3;
 
 /// Largest disagreement between table and method, as distance of a depth from the nearest limit of the method, mm.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Disagreement {
-    /// Largest distance over depths that are stable in the table only (unsafe side).
+    /// Largest distance, mm, from a depth that is stable in the table only to the nearest limit of the method (unsafe
+    /// side).
     pub(super) unsafe_mm: f64,
-    /// Largest distance over depths that are stable by the method only (cautious side).
+    /// Largest distance, mm, from a depth that is stable by the method only to its nearest limit (cautious side).
     pub(super) cautious_mm: f64,
 }
 
 impl Disagreement {
-    /// Disagreement of two sets of stable depths up to `depth_mm`; depth 0 counts as a limit if nothing is stable.
+    /// Disagreement between the stable depths of the method (`truth`) and of the table, up to `depth_mm`; depth 0
+    /// counts as a limit if the method finds nothing stable.
     pub(super) fn between(truth: &[[f64; 2]], tabulated: &[[f64; 2]], depth_mm: f64) -> Self {
         let ends = |set: &[[f64; 2]]| -> Vec<f64> { set.iter().flatten().copied().collect() };
         let mut limits: Vec<f64> = ends(truth)
@@ -85,12 +88,12 @@ pub(super) struct Checks<'a> {
     checked_layers: &'a [CheckedLayers],
     speeds: &'a [f64],
     depth_mm: f64,
-    /// Lines by checked layers and gap, each by ascending speed.
+    /// Lines of the method at the checked speeds, by checked layers and gap of the table, each by ascending speed.
     lines: Vec<Vec<Vec<SpeedLine>>>,
 }
 
 impl<'a> Checks<'a> {
-    /// Computes lines at two speeds per gap, or more if the gap is wide.
+    /// Computes lines of the method at two spindle speeds in every gap of the table, or more if the gap is wide.
     pub(super) fn new(
         checked_layers: &'a [CheckedLayers],
         speeds: &'a [f64],
@@ -102,7 +105,7 @@ impl<'a> Checks<'a> {
             .map(|(pair, offset)| {
                 let width = pair[1] - pair[0];
                 let count = (width / (CHECK_STEP * pair[0])).ceil().max(LEAST_CHECKS);
-                // A table covers a few decades of speed at most, so that the count is small.
+                // A table covers a few decades of speed at most, so that the number of checked speeds is small.
                 (0..count as usize)
                     .map(|index| pair[0] + width * (index as f64 + offset) / count)
                     .collect()
@@ -120,7 +123,7 @@ impl<'a> Checks<'a> {
         Ok(checks)
     }
 
-    /// Adds lines of checked layers at further speeds, given by gap.
+    /// Computes lines of the method for checked layers at further spindle speeds, given by gap of the table.
     fn add(&mut self, layers: usize, places: &[Vec<f64>]) -> Result<(), StabilityError> {
         let all: Vec<f64> = places.iter().flatten().copied().collect();
         let lines = self.checked_layers[layers]
@@ -134,10 +137,10 @@ impl<'a> Checks<'a> {
         Ok(())
     }
 
-    /// Checks suspect gaps at more speeds, until the largest disagreement stops growing.
+    /// Checks suspect gaps of the table at more speeds, until the largest disagreement stops growing.
     ///
     /// # Errors
-    /// As the method.
+    /// The method cannot compute a line.
     pub(super) fn resolve(&mut self, table: &LobeTable<'_>, tolerance_mm: f64) -> Result<(), StabilityError> {
         let least = Disagreement {
             unsafe_mm: SUSPECT * tolerance_mm,
@@ -168,7 +171,7 @@ impl<'a> Checks<'a> {
         Ok(())
     }
 
-    /// Midpoints between the checked speeds of a gap, including its ends.
+    /// Speeds half way between neighbouring checked speeds of a gap, the ends of the gap included.
     fn middles(&self, layers: usize, gap: usize) -> Vec<f64> {
         let mut known = vec![self.speeds[gap]];
         known.extend(self.lines[layers][gap].iter().map(|line| line.rpm));
@@ -176,7 +179,7 @@ impl<'a> Checks<'a> {
         known.windows(2).map(|pair| 0.5 * (pair[0] + pair[1])).collect()
     }
 
-    /// Largest disagreement in every gap, for one of the checked layers.
+    /// Largest disagreement between table and method in every gap, for one of the checked layers.
     fn misses(&self, table: &LobeTable<'_>, layers: usize) -> Vec<Disagreement> {
         let table_layer = &self.checked_layers[layers].table_layer;
         let miss = |line: &SpeedLine| {
@@ -241,10 +244,10 @@ impl<'a> Checks<'a> {
         guarded
     }
 
-    /// Checks gaps (by checked layers) at more speeds, half way between the checked ones.
+    /// Checks gaps of the table (by checked layers) at more speeds, half way between the checked ones.
     ///
     /// # Errors
-    /// As the method.
+    /// The method cannot compute a line.
     pub(super) fn check_again(&mut self, gaps: &[Vec<bool>]) -> Result<(), StabilityError> {
         for (layers, gaps) in gaps.iter().enumerate() {
             let places = gaps.iter().enumerate();
@@ -283,14 +286,14 @@ impl<'a> Checks<'a> {
         }
         InterpolationError {
             depth: Millimeters((TABLE_ROOM * depth + f64::from(table.depth_step().0)) as f32),
-            // A relative width of 1 would be no bound; refinement never leaves such a gap.
+            // A stated relative error in speed of 1 would be no bound; refinement never leaves a gap that wide.
             speed: speed.min(0.999) as f32,
         }
     }
 }
 
-/// Column of the table at the speed of a checked line. `None` if the table has none there, which counts as unstable at
-/// every depth, as on the device.
+/// Column of the lobe table at the speed of a checked line. `None` if the table has none there, which counts as
+/// unstable at every depth, as on the device.
 fn column_of(table: &LobeTable<'_>, table_layer: &TableLayer, rpm: f64) -> Option<Column> {
     let point = WorkingPoint {
         axial_depth: Millimeters(0.0),

@@ -19,7 +19,7 @@ use quietcut_model::case::Case;
 /// unstable intervals.
 const BYTES: usize = 32 * 1024;
 
-/// Default number of speeds before refinement. A choice.
+/// Default number of speeds of a lobe table before refinement. A choice.
 const SPEEDS: usize = 121;
 
 /// Largest number of corrections of entries to the safe side. The speeds checked in a correction need not be the worst

@@ -23,11 +23,12 @@ pub(super) struct Derivatives {
     pub(super) warning: Option<String>,
 }
 
-/// Derivatives of the limits at one speed, each with the depth of its limit, mm.
+/// Derivatives of the limits at one speed with respect to modes and cutting force, each with the depth of its limit,
+/// mm.
 pub(super) struct SlopesOfLine(Vec<(f64, Slopes)>);
 
 impl SlopesOfLine {
-    /// Derivatives of both ends of an entry; 0 for an end that is no limit.
+    /// Derivatives of the depths at both ends of an entry (an unstable depth interval); 0 for an end that is no limit.
     pub(super) fn of(&self, entry: &Entry) -> IntervalSlopes {
         let at = |depth_mm: f64| {
             let found = self.0.iter().find(|(switch_mm, _)| *switch_mm == depth_mm);
@@ -40,7 +41,7 @@ impl SlopesOfLine {
     }
 }
 
-/// Number of modes for which every layer has derivatives.
+/// Number of modes for whose parameters every layer of the table has derivatives.
 pub(super) fn mode_count(table_layers: &[TableLayer]) -> Result<usize, BuildError> {
     let counts = table_layers
         .iter()
@@ -55,7 +56,8 @@ pub(super) fn mode_count(table_layers: &[TableLayer]) -> Result<usize, BuildErro
     }
 }
 
-/// Derivatives of one switch by frequency and damping of each mode and by cutting force, mm per relative change.
+/// Derivatives of one limiting depth with respect to natural frequency and damping of each mode and to the cutting
+/// force, mm per relative change.
 struct SwitchDerivatives {
     depth_mm: f64,
     by_mode: Vec<[f64; 2]>,
@@ -63,7 +65,7 @@ struct SwitchDerivatives {
 }
 
 impl Derivatives {
-    /// Derivatives of all switches, for the `count` modes with the largest influence on limits.
+    /// Derivatives of all limits of a layer, for the `count` modes with the largest influence on limits.
     pub(super) fn new(
         table_layer: &TableLayer,
         lines: &[SpeedLine],
@@ -86,8 +88,8 @@ impl Derivatives {
             .collect();
         let influence = |mode: usize| {
             let switches = all.iter().flatten();
-            // Influence of a mode: the sum of absolute derivatives over all limits. A median would miss a mode that
-            // governs one lobe only.
+            // Influence of a mode: the sum of the absolute derivatives of all limits with respect to its natural
+            // frequency. A median would miss a mode that governs one lobe only.
             switches.map(|switch| switch.by_mode[mode][0].abs()).sum::<f64>()
         };
         let mut chosen: Vec<usize> = (0..parts.len()).collect();
@@ -148,7 +150,7 @@ fn warning(
     ))
 }
 
-/// Derivatives of one switch.
+/// Derivatives of one limiting depth with respect to modes and cutting force.
 ///
 /// # Errors
 /// The limit has no Floquet mode, or is not differentiable (the tip of an island).

@@ -28,7 +28,7 @@ pub(super) struct Table<'a> {
     pub(super) speeds: &'a [f64],
     /// Entries by layer and speed.
     pub(super) entries: &'a [Vec<Vec<Entry>>],
-    /// Derivatives by layer; empty if not requested.
+    /// Derivatives of the limits, by layer; empty if not requested.
     pub(super) derivatives: &'a [Derivatives],
     pub(super) depth_mm: f64,
 }

@@ -1,4 +1,4 @@
-//! Entries of a column of the table: the unstable depths of a line.
+//! Entries of a column of the lobe table: the unstable depths at one spindle speed.
 
 use quietcut_core::lobes::{Interval, IntervalKind, format::MAX_INTERVALS};
 use quietcut_core::units::{Hertz, Millimeters};
@@ -6,7 +6,7 @@ use quietcut_core::units::{Hertz, Millimeters};
 use crate::limits::speed_line::SpeedLine;
 use crate::spectrum::stability_loss::StabilityLoss;
 
-/// Interval of unstable depths, with both ends in full precision.
+/// Entry of a lobe table: an interval of unstable depths, with both ends in full precision.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Entry {
     pub(super) interval: Interval,
@@ -33,7 +33,7 @@ pub(super) fn surely_stable(line: &SpeedLine, depth_mm: f64) -> Vec<[f64; 2]> {
     stable
 }
 
-/// Unstable depths up to `depth_mm`, ascending.
+/// Entries for the unstable depths of a line up to `depth_mm`, ascending.
 pub(super) fn unstable(line: &SpeedLine, depth_mm: f64) -> Vec<Entry> {
     let mut entries: Vec<Entry> = Vec::new();
     let mut from_mm = 0.0;
@@ -66,7 +66,8 @@ pub(super) fn unstable(line: &SpeedLine, depth_mm: f64) -> Vec<Entry> {
     limited(entries)
 }
 
-/// Union of the entries with `others`; where both overlap, the kind of stability loss is that of `entries`.
+/// Union of the unstable depths of `entries` and `others`; where both overlap, the kind of stability loss is that of
+/// `entries`.
 pub(super) fn with_all_of(entries: &[Entry], others: &[Entry]) -> Vec<Entry> {
     let mut all = entries.to_vec();
     for other in others {
@@ -83,7 +84,7 @@ pub(super) fn with_all_of(entries: &[Entry], others: &[Entry]) -> Vec<Entry> {
 }
 
 impl Entry {
-    /// Part of the entry between two depths; `None` if there is no overlap.
+    /// Part of this unstable interval between two depths; `None` if there is no overlap.
     fn part(&self, from_mm: f64, to_mm: f64) -> Option<Self> {
         (from_mm < to_mm).then_some(Self {
             interval: Interval {
@@ -97,7 +98,8 @@ impl Entry {
     }
 }
 
-/// Limits the entries to the capacity of a column: the narrowest stable gaps are given up, which errs on the safe side.
+/// Limits the unstable intervals to the capacity of a column: the narrowest stable gaps between them become unstable,
+/// which errs on the safe side.
 fn limited(mut entries: Vec<Entry>) -> Vec<Entry> {
     while entries.len() > MAX_INTERVALS {
         let gap = |i: usize| entries[i + 1].from_mm - entries[i].to_mm;

@@ -23,7 +23,7 @@ pub enum BuildError {
         /// Number of teeth of the first case.
         expected: usize,
     },
-    /// The request does not fit a case.
+    /// The requested table does not fit a case.
     #[error("{}: {what}", path.display())]
     NotPossible {
         /// The case file.

@@ -35,7 +35,7 @@ pub(super) fn default_depth(
     Ok(DEEPEST_MM)
 }
 
-/// Union of the refined speeds of all layers, ascending, with the lines of every layer at all of these speeds.
+/// Union of the refined spindle speeds of all layers, ascending, with the lines of every layer at all of these speeds.
 pub(super) fn lines_of_all(
     table_layers: &[TableLayer],
     coarse: &[f64],
@@ -53,7 +53,7 @@ pub(super) fn lines_of_all(
     }
     let mut speeds: Vec<f64> = known.iter().flatten().map(|line| line.rpm).collect();
     speeds.sort_by(f64::total_cmp);
-    // The table stores speeds in single precision: equal ones are merged.
+    // The table stores speeds in single precision: speeds that become equal are merged.
     speeds.dedup_by_key(|rpm| *rpm as f32);
     let lines = table_layers.iter().zip(known);
     let lines = lines

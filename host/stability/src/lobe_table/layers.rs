@@ -30,10 +30,11 @@ const SEED: u64 = 1;
 /// One layer of a table: its case, the method that computes its limits, and the cuts for which it is valid.
 pub(super) struct TableLayer {
     pub(super) method: Box<dyn Method>,
-    /// Linear problem with the mean pitch; equal to the problem of the method if structure and pitch allow.
+    /// Linear delay problem of the layer's case with the mean pitch; equal to the problem of the method if structure
+    /// and pitch allow.
     pub(super) linear: Problem,
     pub(super) validity: Validity,
-    /// Feed direction, degrees; `None` if the table does not state it.
+    /// Feed direction of the layer, degrees; `None` if the table does not state it.
     pub(super) direction_deg: Option<f64>,
     pub(super) teeth: usize,
     case: Case,
@@ -82,7 +83,7 @@ impl TableLayer {
         self.case.cut.map_or(0.0, |cut| cut.feed_per_tooth_mm)
     }
 
-    /// The same case at another feed and direction.
+    /// Layer of the same case at another feed per tooth and feed direction.
     fn at(&self, feed_mm: f64, direction_deg: Option<f64>) -> Result<Self, BuildError> {
         Self::new(
             at(&self.case, feed_mm, direction_deg),
@@ -96,28 +97,29 @@ impl TableLayer {
         (a.posture, a.start, a.exit) == (b.posture, b.start, b.exit)
     }
 
-    /// Difference of the feeds, mm, if this layer has a larger feed and equals the other in all else; otherwise `None`.
+    /// Difference of the feeds per tooth, mm, if this layer has the larger feed and equals the other in all else;
+    /// otherwise `None`.
     fn feeds_beyond(&self, other: &Self) -> Option<f64> {
         let more_mm = self.feed_mm() - other.feed_mm();
         let is_same = self.is_of_cut(other) && self.direction_deg == other.direction_deg;
         (is_same && depends_on_feed(&self.case) && more_mm > 0.0).then_some(more_mm)
     }
 
-    /// Difference of the feed directions, degrees, if the layers are equal in all else; `None` if lookups do not
-    /// interpolate over it.
+    /// Angle between the feed directions of two layers, degrees, if the layers are equal in all else; `None` if lookups
+    /// of the device do not interpolate over it.
     fn turned_from(&self, other: &Self) -> Option<f64> {
         let turn = (self.direction_deg? - other.direction_deg?).rem_euclid(360.0);
         let is_same = self.is_of_cut(other) && self.feed_mm() == other.feed_mm();
         (is_same && turn > 0.0 && turn <= f64::from(FEED_DIRECTION_SPAN.0)).then_some(turn)
     }
 
-    /// Lines at these speeds; with a percentile, lines of that percentile.
+    /// Stability of the layer's case at these spindle speeds; with a percentile, that percentile of the drawn machines.
     pub(super) fn lines(&self, speeds_rpm: &[f64], depth_mm: f64) -> Result<Vec<SpeedLine>, StabilityError> {
         self.lines_with_known(Vec::new(), speeds_rpm, depth_mm)
     }
 
-    /// Lines at these speeds like [`lines`](Self::lines). `known` contains lines of the method at some of them, which
-    /// are not computed again.
+    /// Stability at these spindle speeds like [`lines`](Self::lines). `known` contains lines of the method at some of
+    /// them, which are not computed again.
     pub(super) fn lines_with_known(
         &self,
         known: Vec<SpeedLine>,
@@ -148,7 +150,8 @@ impl TableLayer {
     }
 }
 
-/// The line with stability only up to a limit; the kind of stability loss is that of the nominal first limit.
+/// Line that is stable up to a percentile of the limit only; the kind of stability loss is that of the nominal first
+/// limit.
 fn up_to(line: SpeedLine, percentile: &Percentile, depth_mm: f64) -> SpeedLine {
     let error_mm = percentile.error_mm(depth_mm);
     let limit = percentile.depth_mm.and_then(|depth_mm| {
@@ -202,14 +205,16 @@ fn depends_on_feed(case: &Case) -> bool {
     case.axial_depth_modulation() || needs_orbit(case)
 }
 
-/// Layers between which a table is checked: a single one, or the middle of two between which lookups interpolate.
+/// Layers of a table that are checked together against the method: a single layer, or two neighbours, half way between
+/// which lookups interpolate.
 pub(super) struct CheckedLayers {
     pub(super) table_layer: TableLayer,
-    /// Index of the single layer, or indices of the two layers.
+    /// Index of the single layer of the table, or indices of the two layers.
     pub(super) layers: Vec<usize>,
 }
 
-/// All layers, and the middles of all neighbours in feed or in feed direction.
+/// All layers of a table, and the middles of all neighbours in feed or in feed direction, for the check against the
+/// method.
 pub(super) fn checked_layers(table_layers: &[TableLayer]) -> Result<Vec<CheckedLayers>, BuildError> {
     let mut checked_layers = Vec::new();
     for (index, table_layer) in table_layers.iter().enumerate() {
@@ -236,7 +241,7 @@ pub(super) fn checked_layers(table_layers: &[TableLayer]) -> Result<Vec<CheckedL
     Ok(checked_layers)
 }
 
-/// The layer at the least distance from another; `None` if no distance is defined.
+/// Index of the layer with the least distance from the layer `index`; `None` if no distance is defined.
 fn nearest(
     table_layers: &[TableLayer],
     index: usize,
@@ -339,8 +344,9 @@ fn divisions(cases: &[Case], request: &TableRequest) -> Result<Vec<Division>, Bu
     cases.iter().map(|case| division(case, request)).collect()
 }
 
-/// Adds feeds and directions between the requested ones, until first limits half way differ from the mean of both sides
-/// by less than `tolerance_mm` at the probe speeds, or until the number of layers is exhausted.
+/// Adds feeds and feed directions between the requested ones. It stops when the first limits half way between two
+/// layers differ from the mean of both by less than `tolerance_mm` at the probe speeds, or when the number of layers is
+/// exhausted.
 pub(super) fn refined(
     cases: &[Case],
     request: &TableRequest,
@@ -382,14 +388,14 @@ pub(super) fn refined(
 struct Axis {
     tolerance: f64,
     most: usize,
-    /// Largest distance between layers over which lookups interpolate; layers further apart always get one between
-    /// them.
+    /// Largest distance between two layers over which lookups of the device interpolate; layers further apart always
+    /// get one between them.
     widest: f64,
 }
 
 impl Axis {
-    /// Given values, ascending, with values added between them until `limits` half way agrees with the mean of both
-    /// sides.
+    /// Feeds or directions of the layers, ascending: the given ones, and others between them until the limits half way
+    /// agree with the mean of both sides.
     fn filled(
         &self,
         values: &[f64],

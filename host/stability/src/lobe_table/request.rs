@@ -15,9 +15,9 @@ pub struct TableRequest {
     /// Feed directions, degrees from the machine's x towards its y, one layer each; more are added between them where
     /// limits bend. If empty, the direction of each case, which the table then does not state.
     pub feed_directions_deg: Vec<f64>,
-    /// Number of speeds before refinement, at least 2. Default: 121.
+    /// Number of spindle speeds of the table before refinement, at least 2. Default: 121.
     pub speeds: Option<usize>,
-    /// True to store the derivatives of every entry.
+    /// True to store the derivatives of the limits in every entry.
     pub derivatives: bool,
     /// Percentile, percent: entries are the depth up to which all but this share of the machines described by the
     /// deviations are stable, in place of the limits of the case. Stable depths above that limit are omitted.

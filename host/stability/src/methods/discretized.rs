@@ -23,7 +23,7 @@ pub(crate) trait Discretization: Sync {
     /// Order p of convergence: the error of multipliers falls with the p-th power of the step.
     fn order(&self) -> u32;
 
-    /// Map over one period at an axial depth, m; `None` if the equations of a step are singular.
+    /// Map of the delayed state over one period at an axial depth, m; `None` if the equations of a step are singular.
     fn map<'a>(&self, pitched: &'a Pitched, mesh: &'a Mesh, depth_m: f64) -> Option<Stepped<'a>>;
 }
 
@@ -34,7 +34,7 @@ pub struct Discretized<D> {
     pub pitched: Pitched,
     /// Scheme of one time step.
     pub discretization: D,
-    /// Number of steps in each tooth period, at least 1.
+    /// Number of time steps in each tooth period, at least 1.
     pub steps: usize,
 }
 
@@ -73,7 +73,8 @@ impl<D: Discretization> Discretized<D> {
         })
     }
 
-    /// Error of a multiplier computed with the configured steps, from twice and four times as many steps.
+    /// Error of a multiplier computed with the configured number of steps, from the results with twice and four times
+    /// as many steps.
     fn error(&self, rpm: f64, depth_mm: f64, multiplier: Complex64) -> Result<f64, StabilityError> {
         let finer = |times: usize| {
             with_dominant(self, rpm, depth_mm, times * self.steps, |dominant, _| {
@@ -100,7 +101,8 @@ impl<D: Discretization> Method for Discretized<D> {
         ))
     }
 
-    /// Computes the multiplier with the configured steps and its error from twice and four times as many.
+    /// Computes the dominant multiplier with the configured number of steps, and its error from the results with twice
+    /// and four times as many.
     fn point(&self, rpm: f64, depth_mm: f64) -> Result<CutStability, StabilityError> {
         check_speed(rpm)?;
         check_depth(depth_mm)?;
@@ -115,7 +117,7 @@ impl<D: Discretization> Method for Discretized<D> {
         Ok(CutStability::new(rpm, depth_mm, multiplier, error, chatter_hz))
     }
 
-    /// Computes limits with the configured steps; their errors follow from those of the multipliers.
+    /// Computes limits with the configured number of steps; their errors follow from those of the multipliers.
     fn line(&self, rpm: f64, depth_mm: f64, samples: usize) -> Result<SpeedLine, StabilityError> {
         check_speed(rpm)?;
         let mesh = Mesh::new(&self.pitched, rpm, self.steps);

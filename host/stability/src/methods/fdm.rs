@@ -22,13 +22,14 @@ pub struct FullDiscretization;
 /// Full discretization with a given number of steps, applied to a problem.
 pub type Fdm = Discretized<FullDiscretization>;
 
-/// Matrix exponential e^{Ah} and integrals ∫ e^{A(h−s)} B p(σ) ds for the products p of two linear functions, n × 3.
+/// Matrix exponential e^{Ah} of a time step of duration h, and integrals ∫ e^{A(h−s)} B p(σ) ds over the step for the
+/// products p of two linear functions of σ = s/h, n × 3.
 struct Weights {
     duration_s: f64,
     flow: DMatrix<f64>,
-    /// Integral with p = (1 − σ)².
+    /// Integral over the step with p = (1 − σ)².
     start: DMatrix<f64>,
-    /// Integral with p = σ (1 − σ).
+    /// Integral over the step with p = σ (1 − σ).
     mixed: DMatrix<f64>,
     /// Integral with p = σ².
     end: DMatrix<f64>,
@@ -71,7 +72,8 @@ impl Discretization for FullDiscretization {
                 .filter(|weights| (weights.duration_s - duration_s).abs() < 1e-9 * duration_s)
                 .unwrap_or_else(|| Weights::new(&structure.a, &b, duration_s));
             let (first, last) = (mesh.at(pitched, index, 0.0), mesh.at(pitched, index, 1.0));
-            // Integrals of a linear coefficient times 1 − σ (`falling`) and times σ (`rising`).
+            // Integrals over a step of a force coefficient that is linear between `a` and `b`, times 1 − σ (`falling`)
+            // and times σ (`rising`).
             let falling =
                 |a: &Matrix3<f64>, b: &Matrix3<f64>| pushed(&weights.start, a) + pushed(&weights.mixed, b);
             let rising =

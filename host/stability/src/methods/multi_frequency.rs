@@ -37,7 +37,7 @@ impl MultiFrequency {
     }
 
     /// Loop with as many harmonics as the limits need to settle, its limits, and the limits with half as many
-    /// harmonics. If the number K is set: loop and limits with K, and the limits with 2K + 1.
+    /// harmonics. If the user sets the number K: loop and limits with K, and the limits with 2K + 1.
     fn settled(&self, rpm: f64, depth_mm: f64) -> Result<Settled<'_>, StabilityError> {
         let broke_down = |what| StabilityError::BrokeDown { rpm, depth_mm, what };
         let find = |harmonics| {
@@ -70,7 +70,7 @@ impl MultiFrequency {
 
 type Settled<'a> = (HarmonicLoop<'a>, Vec<AxisCrossing>, Vec<AxisCrossing>);
 
-/// Largest relative change between two lists of limits; `None` if the lists do not contain the same limits.
+/// Largest relative change in depth between two lists of limits; `None` if the lists do not contain the same limits.
 fn largest_change(coarse: &[AxisCrossing], fine: &[AxisCrossing], depth_m: f64) -> Option<f64> {
     // A limit close to the last depth may lie beyond it in one of the lists; such limits are not compared.
     let inside = |limits: &[AxisCrossing]| -> Vec<AxisCrossing> {
@@ -111,7 +111,8 @@ impl Method for MultiFrequency {
         true
     }
 
-    /// Computes the multiplier with twice the harmonics; its error is the change from the single to the doubled number.
+    /// Computes the dominant multiplier with twice the harmonics; its error is the change from the single to the
+    /// doubled number.
     fn point(&self, rpm: f64, depth_mm: f64) -> Result<CutStability, StabilityError> {
         check_speed(rpm)?;
         check_depth(depth_mm)?;

@@ -60,7 +60,8 @@ impl Nyquist {
     }
 }
 
-/// Limits up to a depth. Between every two of them a count of unstable roots must agree with the crossings.
+/// Limits up to an axial depth. Between every two of them a count of unstable roots must agree with the crossings of
+/// the loci.
 fn confirmed(
     open_loop: &impl OpenLoop,
     rpm: f64,

@@ -19,9 +19,9 @@ use crate::problem::pitched::Pitched;
 /// Polynomial that approximates the delayed displacement within a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum SdmOrder {
-    /// Constant: the value at the start of the step.
+    /// Constant within the step: the displacement at the delayed time of the start of the step.
     Zeroth,
-    /// Linear between the values at both ends of the step.
+    /// Linear within the step, between the displacements at the delayed times of both ends of the step.
     #[default]
     First,
 }

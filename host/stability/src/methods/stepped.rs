@@ -14,11 +14,12 @@ use crate::spectrum::chatter_frequency::dominant_frequency_hz;
 use crate::spectrum::krylov::LinearMap;
 use crate::spectrum::map_spectrum::PeriodMap;
 
-/// Distance of a delayed time from the start or end of a step, as a share of the step, within which it counts as that
-/// start or end. Larger than rounding, far below the discretization error.
+/// Distance of a delayed time from the start or end of a time step, as a share of the step, within which it counts as
+/// that start or end. Larger than rounding, far below the discretization error.
 const ON_STEP: f64 = 1e-9;
 
-/// Nodes and weights of the mean over a step: three Gauss nodes, exact for polynomial coefficients up to degree 5.
+/// Nodes and weights of the mean of force coefficients over a time step: three Gauss nodes, exact for polynomials up to
+/// degree 5.
 const GAUSS: [(f64, f64); 3] = [
     (0.112_701_665_379_258_3, 5.0 / 18.0),
     (0.5, 8.0 / 18.0),
@@ -28,13 +29,13 @@ const GAUSS: [(f64, f64); 3] = [
 /// Times of the steps of a period, including every entry and exit of a tooth.
 #[derive(Clone, Debug)]
 pub(crate) struct Mesh {
-    /// Times from 0 to the period, s, ascending.
+    /// Starts and ends of all time steps, from 0 to the period, s, ascending.
     pub(crate) times_s: Vec<f64>,
     pub(crate) passages: ToothPassages,
 }
 
 impl Mesh {
-    /// Mesh with about `steps` steps in each tooth period, at least one between two entries or exits.
+    /// Mesh with about `steps` time steps in each tooth period, and at least one between two entries or exits of teeth.
     pub(crate) fn new(pitched: &Pitched, rpm: f64, steps: usize) -> Self {
         let passages = ToothPassages::new(pitched, rpm);
         let shortest_s = passages
@@ -57,7 +58,7 @@ impl Mesh {
         self.times_s.len() - 1
     }
 
-    /// Start and duration of a step, s.
+    /// Start and duration of a time step, s.
     pub(crate) fn step(&self, index: usize) -> (f64, f64) {
         let start_s = self.times_s[index];
         (start_s, self.times_s[index + 1] - start_s)
@@ -72,15 +73,15 @@ impl Mesh {
         Coefficients::mean(pitched, &self.passages, start_s + 0.5 * duration_s, nodes)
     }
 
-    /// Force coefficients at the fraction `share` of a step; at its ends the one-sided limits from within.
+    /// Force coefficients at the fraction `share` of a time step; at its ends the one-sided limits from within.
     pub(crate) fn at(&self, pitched: &Pitched, index: usize, share: f64) -> Coefficients {
         let (start_s, duration_s) = self.step(index);
         let node = std::iter::once((start_s + duration_s * share, 1.0));
         Coefficients::mean(pitched, &self.passages, start_s + 0.5 * duration_s, node)
     }
 
-    /// The two steps adjacent to a time (at most the period, or negative), with their weights in linear interpolation.
-    /// Negative indices are steps of the preceding period.
+    /// The two time steps adjacent to a time (at most the period, or negative), with their weights in linear
+    /// interpolation. Negative indices are steps of the preceding period.
     fn around(&self, time_s: f64) -> [(isize, f64); 2] {
         let (period_s, count) = (self.passages.period_s, self.count() as isize);
         let turns = (time_s / period_s).floor();
@@ -105,14 +106,14 @@ impl Mesh {
 /// One time step.
 #[derive(Clone, Debug)]
 pub(crate) struct Step {
-    /// Matrix P of the present state, n × n.
+    /// Matrix P of the step, n × n, by which the state at its start acts on the state at its end.
     pub(crate) flow: DMatrix<f64>,
-    /// Indices of earlier steps whose displacements act, with their matrices R, n × 3.
+    /// Indices of earlier steps whose displacements act on this step, with their matrices R, n × 3.
     past: Vec<(isize, DMatrix<f64>)>,
 }
 
 impl Step {
-    /// Time step in which only the present state acts so far.
+    /// Time step on which only the state at its start acts so far, through the matrix `flow`.
     pub(crate) fn new(flow: DMatrix<f64>) -> Self {
         Self {
             flow,
@@ -120,7 +121,8 @@ impl Step {
         }
     }
 
-    /// Adds `response` (n × 3) times the displacement at a time, s, interpolated linearly between steps.
+    /// Lets the displacement at a time, s, act on this step through the matrix `response` (n × 3); the displacement is
+    /// interpolated linearly between steps.
     pub(crate) fn add_past(&mut self, mesh: &Mesh, time_s: f64, response: &DMatrix<f64>) {
         for (index, share) in mesh.around(time_s) {
             if share == 0.0 {
@@ -141,11 +143,12 @@ pub(crate) struct Stepped<'a> {
     mesh: &'a Mesh,
     depth_m: f64,
     steps: Vec<Step>,
-    /// Number K of earlier displacements in the state.
+    /// Number K of earlier displacements in the state of the period map.
     history: usize,
-    /// Indices of the d displacement components that are stored: those of directions in which the tool moves.
+    /// Indices of the d displacement components that the state of the map stores: those of directions in which the tool
+    /// moves.
     seen: Vec<usize>,
-    /// Rows of C of the stored components, d × n.
+    /// Rows of the output matrix C for the stored displacement components, d × n.
     observe: DMatrix<f64>,
 }
 
@@ -179,7 +182,8 @@ impl<'a> Stepped<'a> {
         self.observe.ncols()
     }
 
-    /// State at the end of the period, and the displacements y_{−K} … y_N stacked in order of time.
+    /// State of the structure at the end of the period, and the displacements y_{−K} … y_N stacked in order of time,
+    /// for each column of initial states.
     fn trace(&self, columns: &DMatrix<f64>) -> (DMatrix<f64>, DMatrix<f64>) {
         let (order, kept, width) = (self.order(), self.seen.len(), columns.ncols());
         let mut trace = DMatrix::zeros((self.history + self.steps.len() + 1) * kept, width);
@@ -196,7 +200,8 @@ impl<'a> Stepped<'a> {
         for step in &self.steps {
             step.flow.mul_to(&state, &mut next);
             for (index, response) in &step.past {
-                // The earliest displacement has the index −K, so that the row in the trace is not negative.
+                // The earliest displacement has the index −K, so that its row in the stacked displacements is not
+                // negative.
                 let row = (index + self.history as isize) as usize * kept;
                 next.gemm(1.0, response, &trace.rows(row, kept), 1.0);
             }
@@ -260,7 +265,7 @@ impl PeriodMap for Stepped<'_> {
     }
 }
 
-/// Product B K, n × 3.
+/// Product of a force response B and a matrix K of force coefficients, n × 3.
 pub(crate) fn pushed(response: &DMatrix<f64>, force: &Matrix3<f64>) -> DMatrix<f64> {
     DMatrix::from_fn(response.nrows(), 3, |i, j| {
         (0..3).map(|axis| response[(i, axis)] * force[(axis, j)]).sum()

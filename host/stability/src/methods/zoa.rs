@@ -38,7 +38,7 @@ pub struct Zoa {
 }
 
 impl Zoa {
-    /// Eigenvalues at all frequencies at which a limit may lie, up to an axial depth in m.
+    /// Eigenvalues of H̃ α₀ at all frequencies at which a limit may lie, up to an axial depth in m.
     fn samples(&self, depth_m: f64) -> Result<Vec<Sample>, Breakdown> {
         let open_loop = AveragedLoop::new(&self.problem, None);
         // |1 − e^{−iωτ}| is at most 2, so that a limit requires |λ| ≥ 1/(2 w).
@@ -52,13 +52,14 @@ impl Zoa {
         )
     }
 
-    /// The same method on every second line of its table of receptances; `None` for a modelled structure.
+    /// The same method with every second line of its table of receptances only; `None` for a modelled structure.
     fn thinned(&self) -> Option<Self> {
         let problem = self.problem.thinned()?;
         Some(Self { problem })
     }
 
-    /// Limits at one speed; `others` are thinned tables with their eigenvalues, from which errors are estimated.
+    /// Limits at one spindle speed. `samples` are eigenvalues of this method, `others` thinned tables with their
+    /// eigenvalues, from which errors are estimated.
     fn line_of(
         &self,
         samples: &[Sample],
@@ -80,7 +81,7 @@ impl Zoa {
         speed_line(&open_loop, rpm, depth_mm, &find(self, samples)?, &others, hertz)
     }
 
-    /// All limits with a tooth period `delay_s` (s), up to an axial depth in m.
+    /// All limits of the averaged cut with a tooth period `delay_s` (s), up to an axial depth in m.
     fn limits(&self, samples: &[Sample], delay_s: f64, depth_m: f64) -> Result<Vec<AxisCrossing>, Breakdown> {
         let open_loop = AveragedLoop::new(&self.problem, None);
         let loci = |omega: f64| open_loop.eigenvalues(Complex64::new(0.0, omega), 0.0);
@@ -92,7 +93,8 @@ impl Zoa {
                 return Some(limits);
             }
             let start = phase(low, from, delay_s);
-            // The phase is continuous along the locus, independent of the branch of the argument.
+            // The phase mismatch is continuous along the locus of the eigenvalue, independent of the branch of the
+            // argument.
             let end = start + (high - low) * delay_s + 2.0 * (from / to).arg();
             let (least, most) = (start.min(end), start.max(end));
             let mut lobe = (least / TAU).ceil() * TAU;

@@ -8,7 +8,7 @@ use std::collections::VecDeque;
 use nalgebra::{DMatrix, DVector};
 use quietcut_numerics::least_squares::{MinimumNorm, Tolerance};
 
-/// Singular values of the residual matrix below this share of the largest are dropped as rounding.
+/// Singular values of the matrix of residuals G(z) − z below this share of the largest are dropped as rounding.
 const RANK: f64 = 1e-10;
 
 /// Last iterations of the accelerated fixed-point iteration.
@@ -35,7 +35,8 @@ impl Anderson {
             self.rounds.pop_front();
         }
         let before = self.rounds.len() - 1;
-        // The first step is halved, since some of the maps oscillate about their fixed point.
+        // The first step of the fixed-point iteration is halved, since some of the maps oscillate about their fixed
+        // point.
         if before == 0 {
             return at + &residual * 0.5;
         }

@@ -7,7 +7,7 @@ use serde::Serialize;
 use crate::limits::speed_line::{Limit, SpeedLine, Switch, union};
 use crate::spectrum::stability_loss::StabilityLoss;
 
-/// Forced orbit on a branch, by depth, amplitude and stability.
+/// Forced orbit on a branch, given by its depth, amplitude and stability.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct BranchPoint {
     /// Axial depth, mm.
@@ -16,7 +16,7 @@ pub struct BranchPoint {
     pub amplitude_mm: [f64; 3],
     /// Absolute value of the largest Floquet multiplier of the orbit.
     pub multiplier_abs: f64,
-    /// Number of multipliers outside the unit circle.
+    /// Number of Floquet multipliers of the orbit outside the unit circle.
     pub outside: i32,
 }
 
@@ -25,9 +25,10 @@ pub struct BranchPoint {
 pub struct Event {
     /// Axial depth, mm.
     pub depth_mm: f64,
-    /// Error estimate of the depth, mm: within it |μ| differs from 1 by no more than the error of the multiplier.
+    /// Error estimate of the depth of the bifurcation, mm: within it |μ| differs from 1 by no more than the error of
+    /// the multiplier.
     pub error_mm: f64,
-    /// Kind of crossing; at a fold the branch turns back in depth. With unequal teeth the kind is that of the
+    /// Kind of bifurcation; at a fold the branch turns back in depth. With unequal teeth the kind is that of the
     /// multiplier over the revolution.
     pub kind: StabilityLoss,
     /// True if the number of multipliers outside the unit circle falls along the branch.
@@ -50,12 +51,12 @@ pub struct Branch {
     pub events: Vec<Event>,
 }
 
-/// Extent to which a branch is followed.
+/// Extent to which a branch of forced orbits is followed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Extent {
-    /// To the first loss of stability, which suffices for a limit.
+    /// To the first loss of stability along the branch, which suffices for a limit.
     FirstLoss,
-    /// To the last depth, through folds.
+    /// To the last requested depth, through folds of the branch.
     Whole,
 }
 

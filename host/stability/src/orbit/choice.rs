@@ -11,8 +11,8 @@ use crate::problem::pitched::Pitched;
 use crate::process::treatment::{is_not_smooth, needs_orbit};
 use quietcut_model::case::Case;
 
-/// Collocation of the map over one tooth period; over the revolution for unequal pitch; about the forced orbit if
-/// limits depend on it, with equivalent stiffness and damping of friction, backlash and hysteresis.
+/// Collocation method that suits a case: over one tooth period; over the revolution for unequal pitch; about the forced
+/// orbit if limits depend on it, with equivalent stiffness and damping of friction, backlash and hysteresis.
 ///
 /// # Errors
 /// A feature that no collocation method treats.

@@ -4,16 +4,16 @@ use nalgebra::{DMatrix, DVector};
 
 use quietcut_numerics::quadrature::Gauss;
 
-/// Subinterval after one Newton step from its start.
+/// Collocated motion in a subinterval after one Newton step, from a given state at its start.
 pub(super) struct Advanced {
-    /// States at the nodes, n × m.
+    /// States at the nodes of the subinterval, n states × m nodes.
     pub(super) states: DMatrix<f64>,
     /// State at the end.
     pub(super) end: DVector<f64>,
-    /// Derivatives of the states at the nodes with respect to the start of the period and the depth, (n m) × number of
-    /// these variables.
+    /// Derivatives of the states at the nodes of the subinterval with respect to the start of the period and the depth,
+    /// (n m) × number of these variables.
     pub(super) values: DMatrix<f64>,
-    /// Derivatives of the state at the end of the subinterval with respect to the same variables.
+    /// Derivatives of the state at the end of the subinterval with respect to the start of the period and the depth.
     pub(super) end_by: DMatrix<f64>,
     /// Largest change of a state at a node by the Newton step, relative to the largest state in the subinterval.
     pub(super) moved: f64,
@@ -54,12 +54,14 @@ impl<'a> Linearized<'a> {
         self.jacobians[0].nrows()
     }
 
-    /// Solves the collocation equations for the values at the nodes, (n m) × columns; `None` if they are singular.
+    /// Solves the collocation equations for the changes of the states at the nodes, (n m) × columns; `None` if they are
+    /// singular.
     pub(super) fn solve(&self, right: &DMatrix<f64>) -> Option<DMatrix<f64>> {
         self.factored.solve(right)
     }
 
-    /// Contribution of the values at the nodes to x₁: h Σ b_j J_j Y_j.
+    /// Contribution of the states Y_j at the nodes to the state at the end of the subinterval: h Σ b_j J_j Y_j, with
+    /// the Jacobians J_j and Gauss weights b_j.
     pub(super) fn gather(&self, values: &DMatrix<f64>) -> DMatrix<f64> {
         let order = self.order();
         let mut sum = DMatrix::zeros(order, values.ncols());
@@ -70,8 +72,9 @@ impl<'a> Linearized<'a> {
         sum
     }
 
-    /// Newton step of a subinterval from a start with derivatives `by`. Arguments are the states at the nodes, their
-    /// rates, and the explicit derivatives of the rates (those not through the states), n × number of variables each.
+    /// Newton step of a subinterval from a start with derivatives `by`. `states` are the states at the nodes, `rates`
+    /// their time derivatives, and `forces` the explicit derivatives of the rates (those not through the states), n ×
+    /// number of variables each.
     ///
     /// `None` if the equations are singular or a result is not finite.
     pub(super) fn advance(
@@ -84,7 +87,7 @@ impl<'a> Linearized<'a> {
     ) -> Option<Advanced> {
         let (order, nodes, columns) = (self.order(), self.gauss.nodes.len(), by.ncols());
         // Right-hand sides: the first column is the residual of the collocation equations, the others belong to the
-        // derivatives.
+        // derivatives with respect to the variables.
         let mut right = DMatrix::zeros(order * nodes, columns + 1);
         for i in 0..nodes {
             let mut block = right.view_mut((i * order, 0), (order, columns + 1));
@@ -120,7 +123,7 @@ impl<'a> Linearized<'a> {
         })
     }
 
-    /// Derivatives of the values at the nodes and of the end with respect to the start.
+    /// Derivatives of the states at the nodes and at the end of the subinterval with respect to the state at its start.
     pub(super) fn flow(&self) -> Option<(DMatrix<f64>, DMatrix<f64>)> {
         let (order, nodes) = (self.order(), self.gauss.nodes.len());
         let start = DMatrix::from_fn(order * nodes, order, |row, column| {

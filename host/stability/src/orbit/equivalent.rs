@@ -44,7 +44,8 @@ const ROUNDS: usize = 200;
 /// Number of iterations of springs and orbit that Anderson acceleration stores. A choice.
 const REMEMBERED: usize = 5;
 
-/// Width to which the depth interval around a crossing of the unit circle is narrowed, relative to the last depth.
+/// Width to which the depth interval around a crossing of the unit circle by a multiplier is narrowed, relative to the
+/// last depth.
 const CROSSING: f64 = 1e-6;
 
 /// Axial depth, mm, that replaces a depth of 0: there the tool is at rest, and equivalent stiffness and damping are not
@@ -58,28 +59,28 @@ pub struct EquivalentProblem {
     smooth: ForcedProblem,
     terms: Vec<Box<dyn RestoringForce>>,
     feed_direction_deg: f64,
-    /// Matrix from the states to the displacement along the machine's axes, 3 × n.
+    /// Matrix from the states of the structure to the displacement along the machine's axes, 3 × n.
     displacement: DMatrix<f64>,
-    /// Matrix from the states to the velocity along the machine's axes, 3 × n.
+    /// Matrix from the states of the structure to the velocity along the machine's axes, 3 × n.
     velocity: DMatrix<f64>,
-    /// Static stiffness along each axis, N/m; 0 for a rigid axis.
+    /// Static stiffness of the structure along each axis, N/m; 0 for a rigid axis.
     stiffness: [f64; 3],
     /// Damping constant along each axis that stands for sticking friction, N s/m.
     most_damping: [f64; 3],
 }
 
-/// Forced orbit and the equivalent springs that follow from it.
+/// Forced orbit and its equivalent springs, which agree with each other.
 #[derive(Clone)]
 struct Settled {
     springs: [Spring; 3],
     orbit: Orbit,
 }
 
-/// Floquet multipliers at one axial depth.
+/// Forced orbit at one axial depth, with its Floquet multipliers.
 #[derive(Clone)]
 struct Sample {
     settled: Settled,
-    /// Multipliers in the upper half plane or on the real axis, largest first.
+    /// Floquet multipliers of the orbit in the upper half plane or on the real axis, largest first.
     roots: Vec<Complex64>,
 }
 
@@ -93,14 +94,14 @@ impl Sample {
         outside.map(|root| StabilityLoss::of(*root).count()).sum()
     }
 
-    /// Distance of the largest multiplier from the unit circle, |μ| − 1.
+    /// Distance |μ| − 1 of the orbit's largest multiplier from the unit circle.
     fn excess(&self) -> f64 {
         self.roots.first().map_or(-1.0, |root| root.norm() - 1.0)
     }
 }
 
 impl EquivalentProblem {
-    /// Builds the problem of a case.
+    /// Builds the stability problem of a case with friction, backlash or hysteresis.
     ///
     /// # Errors
     /// As [`ForcedProblem::new`], or the structure has no mass at the tool.
@@ -166,7 +167,7 @@ impl EquivalentProblem {
     }
 }
 
-/// Follows the branch of orbits at one spindle speed.
+/// Follows the branch of forced orbits and their equivalent springs at one spindle speed.
 struct Follower<'a> {
     problem: &'a EquivalentProblem,
     rpm: f64,
@@ -205,7 +206,7 @@ impl<'a> Follower<'a> {
         }
     }
 
-    /// Orbit and springs that agree with each other at a depth, from a guess.
+    /// Forced orbit and equivalent springs that agree with each other at a depth, from a guess.
     fn settle(&self, depth_m: f64, guess: &Settled) -> Result<Settled, StabilityError> {
         let all = self.problem;
         let mut now = guess.clone();
@@ -229,7 +230,7 @@ impl<'a> Follower<'a> {
         ))
     }
 
-    /// Orbit with given springs at the depth of a guess.
+    /// Forced orbit with given equivalent springs, at the depth of a guess.
     fn orbit(&self, springs: &[Spring; 3], guess: &Orbit) -> Result<Orbit, StabilityError> {
         let problem = self.problem.with(springs);
         let map = self.map.of(&problem);
@@ -259,7 +260,7 @@ impl<'a> Follower<'a> {
         Ok(Sample { settled, roots })
     }
 
-    /// Floquet multipliers about an orbit with given springs.
+    /// Floquet multipliers about an orbit with given equivalent springs.
     fn roots(&self, springs: &[Spring; 3], orbit: &Orbit) -> Result<Vec<Complex64>, StabilityError> {
         let problem = self.problem.with(springs);
         let singular = "the equations of the forced orbit are singular";
@@ -277,7 +278,8 @@ impl<'a> Follower<'a> {
         self.map.of(&problem).chatter_hz(&sample.settled.orbit, root)
     }
 
-    /// Error of |μ|: the difference from the multiplier with the stiffness and damping that a small disturbance sees.
+    /// Error of |μ|: the distance from the multiplier with the incremental stiffness and damping that a small
+    /// disturbance of the orbit sees.
     fn error(
         &self,
         sample: &Sample,
@@ -298,19 +300,20 @@ impl<'a> Follower<'a> {
             .iter()
             .map(|other| (other - root).norm())
             .fold(f64::INFINITY, f64::min);
-        // If a small disturbance has no multiplier above [`EQUIVALENT_FOLLOWED`], the error is |μ| itself.
+        // If no multiplier of the small disturbance exceeds [`EQUIVALENT_FOLLOWED`], the error is |μ| itself.
         Ok(nearest.min(root.norm()).max(LEAST_ERROR * root.norm().max(1.0)))
     }
 
-    /// Switches between two samples at which the number of multipliers outside changes, by depth.
+    /// Stability switches between two sampled depths at which the number of multipliers outside the unit circle
+    /// changes, by depth.
     fn between(&self, low: &Sample, high: &Sample, last_m: f64) -> Result<Vec<Switch>, StabilityError> {
         let (mut low, mut high) = (low.clone(), high.clone());
         let mut switches = Vec::new();
         let top = high.clone();
         while low.outside() != top.outside() {
             high.clone_from(&top);
-            // If no multiplier is outside at one end, the largest one crosses and |μ| − 1 is interpolated. Otherwise
-            // one of several crosses, and the interval is bisected.
+            // If no multiplier is outside the unit circle at one end of the depth interval, the largest one crosses and
+            // |μ| − 1 is interpolated. Otherwise one of several crosses, and the interval is bisected.
             let is_largest = |low: &Sample, high: &Sample| (low.outside() == 0) != (high.outside() == 0);
             let mut halves = 0;
             while high.depth_m() - low.depth_m() > CROSSING * last_m {
@@ -334,7 +337,7 @@ impl<'a> Follower<'a> {
         Ok(switches)
     }
 
-    /// Switch between two samples at the tolerance of the depth.
+    /// Stability switch between two depths that have been narrowed to the tolerance of the depth.
     fn switch(&self, low: &Sample, high: &Sample, last_m: f64) -> Result<Switch, StabilityError> {
         let gain = high.outside() < low.outside();
         let outer = if gain { low } else { high };
@@ -350,7 +353,7 @@ impl<'a> Follower<'a> {
             _ => self.chatter_hz(outer, crossed),
         };
         let error = self.error(outer, crossed, chatter_hz)?;
-        // Slope of |μ| from a difference over a thousandth of the depth.
+        // Slope d|μ|/dw over the axial depth w, from a difference over a thousandth of the depth.
         let step_m = 1e-3 * high.depth_m();
         let beyond = self.sample(high.depth_m() + step_m, &high.settled)?;
         let next = beyond
@@ -376,7 +379,8 @@ impl<'a> Follower<'a> {
     }
 }
 
-/// Units that scale force, stiffness and damping of all axes to one order of magnitude.
+/// Units of the equivalent springs, by axis, that scale constant force, stiffness and damping to one order of magnitude
+/// for the fixed-point iteration.
 struct Units([[f64; 3]; 3]);
 
 impl Units {

@@ -42,11 +42,11 @@ pub fn follow_depth(
     }
 }
 
-/// Dominant Floquet multiplier of an orbit.
+/// Dominant Floquet multiplier of a forced orbit.
 pub(super) struct Dominant {
-    /// Multiplier; of a conjugate pair the one above the real axis.
+    /// Dominant multiplier of the orbit; of a conjugate pair the one above the real axis.
     pub(super) multiplier: Complex64,
-    /// Vibration frequency of the motion that belongs to the multiplier, Hz.
+    /// Vibration frequency of the Floquet mode that belongs to the multiplier, Hz.
     pub(super) chatter_hz: Option<f64>,
 }
 

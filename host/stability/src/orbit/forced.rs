@@ -32,11 +32,11 @@ use quietcut_model::{ChipLaw, MotionState, ProcessDamping, RestoringForce};
 /// damping −w D(φ) u̇.
 #[derive(Clone, Debug)]
 pub struct ForcedProblem {
-    /// Linear part and cutting process, with the mean pitch.
+    /// Linear part of the structure and cutting process, with the mean pitch of the teeth.
     pub linear: Problem,
-    /// Unequal pitch or runout; `None` if all teeth are alike.
+    /// Unequal pitch or runout of the teeth; `None` if all teeth are alike.
     pub(super) uneven: Option<Uneven>,
-    /// Cubic terms; `None` for a linear structure.
+    /// Cubic stiffness and damping terms; `None` for a linear structure.
     pub(super) cubic: Option<CubicForce>,
     /// Smooth restoring forces of extensions, with the structure in the machine's axes.
     smooth: Option<Smooth>,
@@ -44,7 +44,7 @@ pub struct ForcedProblem {
     chip: Option<ChipLaw>,
     /// Process damping; `None` if absent.
     flank: Option<Flank>,
-    /// Input matrix B times a constant force along the machine's axes; `None` without such a force.
+    /// Input matrix B times a constant force along the machine's axes; `None` if no such force acts.
     push: Option<DVector<f64>>,
     /// True if a force does not make the velocity jump: the structure has a mass at the tool.
     inertial: bool,
@@ -55,7 +55,7 @@ pub struct ForcedProblem {
 pub(super) struct Uneven {
     /// Linear problem with the revolution as its period.
     pub(super) pitched: Pitched,
-    /// Increase of the chip of each tooth by the radius difference to the preceding tooth, m.
+    /// Increase of the chip thickness of each tooth by the radius difference to the preceding tooth (runout), m.
     pub(super) runout_m: Vec<f64>,
 }
 
@@ -82,7 +82,7 @@ impl Uneven {
 #[derive(Clone, Debug)]
 struct Smooth {
     terms: Vec<Arc<dyn RestoringForce>>,
-    /// Input matrix B in the machine's axes.
+    /// Input matrix B of the structure for forces along the machine's axes.
     b: DMatrix<f64>,
     /// Matrix C, in the machine's axes, that gives the displacement from the states.
     displacement: DMatrix<f64>,
@@ -96,7 +96,7 @@ struct Flank {
     law: ProcessDamping,
     edge: EdgeAngle,
     radius_m: f64,
-    /// Velocity matrix C A in feed, normal and axial direction.
+    /// Output matrix C A of the structure for the velocity in feed, normal and axial direction.
     velocity: DMatrix<f64>,
 }
 
@@ -133,7 +133,8 @@ fn cubic_force(case: &Case, linear: &Problem) -> Result<Option<CubicForce>, Stab
     let Some(matrices) = structure.equation().filter(|_| structure.is_nonlinear()) else {
         return Ok(None);
     };
-    // q̇ = s·(lower half): the scale s stands in the upper right corner of A.
+    // The lower half of the states is q̇/s. The scale s stands in the upper right corner of A, so that q̇ = s·(lower
+    // half).
     let scale = linear.structure.a[(0, matrices.mass.nrows())];
     CubicForce::in_first_order(&matrices, scale)
         .map(Some)
@@ -144,7 +145,7 @@ fn cubic_force(case: &Case, linear: &Problem) -> Result<Option<CubicForce>, Stab
 }
 
 impl ForcedProblem {
-    /// Builds the forced problem of a case.
+    /// Builds the forced problem of a case, whose solutions are forced periodic orbits.
     ///
     /// # Errors
     /// As [`Problem::new`], except that cubic terms are accepted. Friction, backlash and hysteresis are refused;
@@ -235,12 +236,13 @@ impl ForcedProblem {
         changed
     }
 
-    /// True if the structure has a mass at the tool, so that a force does not make the velocity jump.
+    /// True if the structure has a mass at the tool, so that a force at the tool does not make its velocity jump.
     pub(super) fn is_inertial(&self) -> bool {
         self.inertial
     }
 
-    /// True if orbits have the period of the revolution; a speed then costs a hundred times that of a tooth period.
+    /// True if forced orbits have the period of the revolution, not of a tooth. One spindle speed then takes about a
+    /// hundred times the computing time.
     pub fn is_over_revolution(&self) -> bool {
         self.uneven.is_some()
     }
@@ -268,7 +270,8 @@ impl ForcedProblem {
         Some(sum * size)
     }
 
-    /// Matrix B D C A by which process damping enters the equation of motion, per axial depth; zero without it.
+    /// Matrix B D C A by which process damping enters the equation of motion, per axial depth; zero without process
+    /// damping.
     pub(super) fn damped(&self, damping: &Matrix3<f64>) -> DMatrix<f64> {
         let Some(flank) = &self.flank else {
             return DMatrix::zeros(self.order(), self.order());
@@ -276,7 +279,8 @@ impl ForcedProblem {
         &self.linear.structure.b * damping * &flank.velocity
     }
 
-    /// Slope of the chip law at the forced chip at an immersion angle (rad).
+    /// Slope of the chip law, the derivative of effective over geometric chip thickness, at the forced chip thickness
+    /// at an immersion angle (rad).
     pub(super) fn chip_slope(&self, angle: f64) -> f64 {
         let process = &self.linear.process;
         self.chip.map_or(1.0, |chip| {
@@ -313,7 +317,8 @@ impl ForcedProblem {
             .sum()
     }
 
-    /// Subtracts N(x) and B f_r from `rate` and adds the constant force.
+    /// Subtracts the cubic terms N(x) and the smooth restoring forces B f_r from the time derivative `rate` of the
+    /// state, and adds the constant force.
     pub(super) fn subtract_smooth(&self, state: &[f64], rate: &mut DVector<f64>) {
         if let Some(push) = &self.push {
             *rate += push;
@@ -332,7 +337,8 @@ impl ForcedProblem {
         }
     }
 
-    /// Axial depth in a state, m: reduced by the axial displacement under axial-depth modulation.
+    /// Axial depth of cut when the structure is in a state, m: reduced by the axial displacement of the tool under
+    /// axial-depth modulation.
     pub(super) fn depth_at(&self, state: &DVector<f64>, depth_m: f64) -> f64 {
         if self.linear.process.axial_depth_modulation {
             depth_m - (self.linear.structure.c.row(2) * state)[0]

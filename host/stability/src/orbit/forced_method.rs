@@ -1,4 +1,4 @@
-//! Charts and single cuts of structures whose limits depend on the forced orbit.
+//! Stability method of structures whose limits depend on the forced orbit, for charts and single cuts.
 
 use super::branch::Extent;
 use super::follower::{follow_depth, multiplier_at};
@@ -26,12 +26,14 @@ impl Method for ForcedProblem {
             .map(|_| "teeth that leave the surface within the forced orbit")
     }
 
-    /// Evaluates the orbit reached when the depth grows from 0; the error is the change with a mesh twice as fine.
+    /// Evaluates the orbit that is reached when the depth grows from 0; the error of its multiplier is the change with
+    /// a mesh twice as fine.
     fn point(&self, rpm: f64, depth_mm: f64) -> Result<CutStability, StabilityError> {
         let fail = |cause| broke_down(rpm, depth_mm, cause);
         let [coarse, fine] = multiplier_at(self, rpm, depth_mm).map_err(fail)?;
         let multiplier = fine.multiplier;
-        // The coarse mesh errs by far more than the fine one, so that their difference bounds the error of the latter.
+        // The coarse mesh errs by far more than the fine one, so that their difference bounds the error of the fine
+        // one.
         let error = (ORBIT_ROOM * (coarse.multiplier - multiplier).norm())
             .max(LEAST_ERROR * multiplier.norm().max(1.0));
         Ok(CutStability::new(
@@ -43,7 +45,7 @@ impl Method for ForcedProblem {
         ))
     }
 
-    /// Follows the branch of orbits with its own steps; `samples` is not used.
+    /// Follows the branch of forced orbits with its own steps in depth; `samples` is not used.
     fn line(&self, rpm: f64, depth_mm: f64, _samples: usize) -> Result<SpeedLine, StabilityError> {
         follow_depth(self, rpm, depth_mm, Extent::Whole)
             .map(|branch| branch.speed_line())

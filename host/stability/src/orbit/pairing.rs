@@ -6,14 +6,15 @@ use num_complex::Complex64;
 use crate::criteria::MULTIPLIER_MOVE_MAX;
 use crate::spectrum::stability_loss::StabilityLoss;
 
-/// Least |μ| of the multipliers that are followed along a branch. It lies two and a half of the largest moves in one
-/// step inside the unit circle.
+/// Least |μ| of the multipliers that are followed along a branch: 1 less 2.5 times the largest allowed move of a
+/// multiplier in one step, so that it takes at least three steps to reach the unit circle.
 pub(super) const FOLLOWED: f64 = 1.0 - 2.5 * MULTIPLIER_MOVE_MAX;
 
-/// Pairs the multipliers of two samples; `None` if one near the unit circle cannot be identified.
+/// Pairs the multipliers of two neighbouring orbits of a branch; `None` if a multiplier near the unit circle cannot be
+/// identified.
 ///
-/// With `anyhow` the nearest one is taken at any distance. Two real multipliers that meet and leave the real axis move
-/// infinitely fast there, so that no step is short enough.
+/// With `anyhow` each multiplier is paired with the nearest one, at any distance. Two real multipliers that meet and
+/// leave the real axis move infinitely fast there, so that no step is short enough.
 pub(super) fn pair(
     from: &[Complex64],
     to: &[Complex64],
@@ -38,7 +39,7 @@ pub(super) fn pair(
                 pairs.push((root, next));
                 free.swap_remove(index);
             }
-            // The multiplier has fallen below the followed size, or belongs to a pair that met on the real axis.
+            // The multiplier has become smaller than [`FOLLOWED`], or belongs to a pair that met on the real axis.
             None if is_far(root) || anyhow => {}
             _ if is_far(root) => {}
             _ => return None,
@@ -47,8 +48,8 @@ pub(super) fn pair(
     (anyhow || free.iter().all(|&root| is_far(root))).then_some(pairs)
 }
 
-/// Removes conjugate pairs of one sample that are two real multipliers in the other, on the same side of the unit
-/// circle: they met on the real axis, and neither has crossed the circle.
+/// Removes conjugate pairs of one orbit that are two real multipliers of the neighbouring orbit, on the same side of
+/// the unit circle: they met on the real axis, and neither has crossed the circle.
 fn remove_met_pairs(conjugate: &mut Vec<Complex64>, real: &mut Vec<Complex64>) {
     conjugate.retain(|&root| {
         let reach = MULTIPLIER_MOVE_MAX * root.norm().max(1.0);
@@ -67,12 +68,12 @@ fn remove_met_pairs(conjugate: &mut Vec<Complex64>, real: &mut Vec<Complex64>) {
     });
 }
 
-/// True if a multiplier cannot reach the unit circle within a step.
+/// True if a multiplier cannot reach the unit circle within a step along the branch.
 fn is_far(multiplier: Complex64) -> bool {
     (multiplier.norm() - 1.0).abs() > MULTIPLIER_MOVE_MAX
 }
 
-/// Multiplier nearest to an expected value.
+/// Multiplier of a list that lies nearest to an expected value.
 pub(super) fn nearest(roots: &[Complex64], expected: Complex64) -> Option<Complex64> {
     roots
         .iter()

@@ -9,7 +9,7 @@ use crate::error::Breakdown;
 use quietcut_numerics::eigenvalues::EigenvalueError;
 use quietcut_numerics::quadrature::Gauss;
 
-/// Reason why no orbit was found.
+/// Reason why no forced periodic orbit was found.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum OrbitError {
     /// Newton's method did not converge.
@@ -18,13 +18,13 @@ pub enum OrbitError {
         /// Axial depth, mm.
         depth_mm: f64,
     },
-    /// The branch turns back (fold) before the depth is reached.
+    /// The branch of orbits turns back in depth (fold) before the requested depth is reached.
     #[error("the forced orbit is lost in a fold at {depth_mm} mm")]
     Lost {
         /// Axial depth of the fold, mm.
         depth_mm: f64,
     },
-    /// The equations are singular, at a fold or a branch point.
+    /// The equations of the periodic orbit are singular, at a fold or a branch point.
     #[error("the equations of the periodic orbit are singular at {depth_mm} mm")]
     Singular {
         /// Axial depth, mm.
@@ -41,7 +41,7 @@ pub enum OrbitError {
 }
 
 impl OrbitError {
-    /// Reason why the multipliers about an orbit at a depth (mm) are missing.
+    /// Error if the multipliers about an orbit at a depth (mm) cannot be computed.
     pub(super) fn of_multipliers(cause: Breakdown, depth_mm: f64) -> Self {
         match cause {
             Breakdown::Eigenvalues(cause) => Self::Eigenvalues { depth_mm, cause },
@@ -59,25 +59,28 @@ pub struct Orbit {
     /// the displacements along the chip normals with which the preceding revolution left the surface that this one
     /// cuts.
     pub start: DVector<f64>,
-    /// States at the nodes of each subinterval, n × m.
+    /// States of the orbit at the nodes of each subinterval, n states × m nodes.
     pub(super) states: Vec<DMatrix<f64>>,
 }
 
 /// Newton step over the period from a start and a depth, with the equations linearized about the states at the nodes.
 pub(super) struct PeriodIntegration {
     pub(super) end: DVector<f64>,
-    /// Derivative ∂end/∂(start, depth); the last column is that of the depth, 1/m.
+    /// Derivative of the state at the end of the period with respect to the state at its start and the depth; the last
+    /// column is that of the depth, per meter.
     pub(super) by: DMatrix<f64>,
-    /// States at the nodes of each subinterval after the Newton step.
+    /// States at the nodes of each subinterval after the Newton step over the period.
     pub(super) states: Vec<DMatrix<f64>>,
-    /// Derivatives of the states at the nodes of each subinterval, (n m) × number of variables.
+    /// Derivatives of the states at the nodes of each subinterval with respect to start and depth, (n m) × number of
+    /// these variables.
     pub(super) values: Vec<DMatrix<f64>>,
-    /// Largest change of a state at a node by the Newton step, relative to the largest in its subinterval.
+    /// Largest change of a state at a node by the Newton step, relative to the largest state in its subinterval.
     pub(super) moved: f64,
 }
 
 impl PeriodIntegration {
-    /// Start of the integration: a state with `columns` derivatives, the first of which are those of the state itself.
+    /// Integration before the first subinterval: the state at the start of the period, with derivatives with respect to
+    /// `columns` variables, the first of which are the components of that state.
     pub(super) fn from(start: DVector<f64>, columns: usize) -> Self {
         Self {
             by: DMatrix::identity(start.len(), columns),
@@ -113,11 +116,11 @@ impl PeriodIntegration {
 pub(super) struct Tangent {
     /// Unit tangent of start and depth, each divided by its [`Scale`].
     pub(super) along: DVector<f64>,
-    /// Change of the states at the nodes of each subinterval per unit of length, n × m.
+    /// Change of the states at the nodes of each subinterval per unit of length along the branch, n states × m nodes.
     states: Vec<DMatrix<f64>>,
 }
 
-/// Subinterval of the period without entry or exit of a tooth: its times and nodes.
+/// Subinterval of the period without entry or exit of a tooth: its start, duration and Gauss nodes.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SubintervalNodes<'a> {
     pub(super) start_s: f64,
@@ -137,14 +140,14 @@ pub(super) trait PeriodMap: Sized {
     /// Forced problem of the map.
     fn problem(&self) -> &ForcedProblem;
 
-    /// Dimension of the state; the first components are the states of the structure.
+    /// Number of components of the map's state; the first ones are the states of the structure.
     fn size(&self) -> usize;
 
-    /// Subintervals of the period, in order.
+    /// Subintervals of the period on this mesh, in order of time.
     fn subinterval_nodes(&self) -> Vec<SubintervalNodes<'_>>;
 
-    /// Applies the map, with derivatives, linearized about the states at the nodes. The result is exact if `guess`
-    /// contains the states of the motion from the start. `None` if a subinterval is singular.
+    /// Applies the map over the period, with derivatives, linearized about the states `guess` at the nodes. The result
+    /// is exact if `guess` contains the states of the motion from `start`. `None` if a subinterval is singular.
     fn integrate(
         &self,
         start: &DVector<f64>,
@@ -152,7 +155,8 @@ pub(super) trait PeriodMap: Sized {
         guess: &[DMatrix<f64>],
     ) -> Option<PeriodIntegration>;
 
-    /// State of the map for a motion with given states at the start and at the nodes.
+    /// State of the map at the start of the period, for a motion with the given structural state there and the given
+    /// states at the nodes.
     fn start_of(&self, state: DVector<f64>, states: &[DMatrix<f64>]) -> DVector<f64>;
 
     /// All Floquet multipliers about an orbit, largest first.
@@ -164,7 +168,7 @@ pub(super) trait PeriodMap: Sized {
     /// Vibration frequency of a Floquet multiplier about an orbit, Hz.
     fn chatter_hz(&self, orbit: &Orbit, multiplier: Complex64) -> Option<f64>;
 
-    /// The same map on a finer mesh, for error estimates; `None` if there is no such mesh.
+    /// The same map over the period on a finer mesh, for error estimates; `None` if there is no such mesh.
     fn finer(&self) -> Option<Self>;
 }
 
@@ -211,7 +215,7 @@ impl Orbit {
         }
     }
 
-    /// Orbit of a problem with linear equations, by one solution.
+    /// Forced orbit of a problem whose equation of motion is linear, by one linear solution.
     pub(super) fn of_linear(map: &impl PeriodMap, depth_m: f64) -> Result<Self, OrbitError> {
         let depth_mm = depth_m * 1e3;
         let singular = OrbitError::Singular { depth_mm };
@@ -308,13 +312,13 @@ impl Orbit {
     }
 }
 
-/// Reshapes stacked values at the nodes to n × m.
+/// Reshapes stacked states at the nodes of a subinterval to n states × m nodes.
 fn shaped(values: DVector<f64>, order: usize) -> DMatrix<f64> {
     let nodes = values.len() / order;
     DMatrix::from_column_slice(order, nodes, values.as_slice())
 }
 
-/// Units of state and depth in which the length along a branch is measured.
+/// Units of state and depth in which the arc length along a branch is measured.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Scale {
     pub(super) state: f64,
@@ -322,7 +326,7 @@ pub(super) struct Scale {
 }
 
 impl Scale {
-    /// Converts a change of start and depth in units of this scale to one in m and the units of the state.
+    /// Converts a change of the orbit's start and depth from units of this scale to units of the state and m.
     fn unscaled(&self, step: &DVector<f64>) -> DVector<f64> {
         let mut change = step * self.state;
         change[step.len() - 1] = step[step.len() - 1] * self.depth_m;

@@ -9,17 +9,18 @@ use crate::criteria::{DISTURBANCE, DISTURBANCE_PERIODS};
 use quietcut_model::RestoringForce;
 use quietcut_model::path::{SampledMotion, restoring_along, restoring_from};
 
-/// Number of samples of the orbit in each subinterval of the mesh. The phase angle of the fastest motion over a
-/// subinterval is a few radians. A choice.
+/// Number of samples of the orbit in each subinterval of the mesh, for forces of friction, backlash and hysteresis.
+/// Over a subinterval the fastest motion rotates by a few radians. A choice.
 const PER_SUBINTERVAL: usize = 128;
 
 /// Least number of samples of the orbit in a period. A choice.
 const LEAST: usize = 1024;
 
-/// Largest number of periods for terms with internal states to reach a closed hysteresis loop. A choice.
+/// Largest number of periods in which terms with internal states must reach a closed hysteresis loop. A choice.
 const PERIODS: usize = 64;
 
-/// Relative tolerance on the force at which a hysteresis loop counts as closed.
+/// Change of an internal state over a period, relative to the largest displacement of the orbit, at which a hysteresis
+/// loop counts as closed.
 const CLOSED: f64 = 1e-8;
 
 /// Linear restoring force f_r = force + stiffness·x + damping·ẋ along one axis.
@@ -33,7 +34,7 @@ pub(super) struct Spring {
     pub(super) damping: f64,
 }
 
-/// Orbit sampled at equal time steps over a period, along the machine's axes.
+/// Displacement and velocity of an orbit, sampled at equal time steps over a period, along the machine's axes.
 pub(super) struct Samples {
     step_s: f64,
     x: [Vec<f64>; 3],
@@ -41,7 +42,8 @@ pub(super) struct Samples {
 }
 
 impl Samples {
-    /// Samples the orbit from its states at the nodes; `seen` maps states to displacement and velocity.
+    /// Samples the orbit by interpolation between the nodes; `seen` are the matrices from states to displacement and to
+    /// velocity.
     pub(super) fn new(
         subintervals: &[SubintervalNodes<'_>],
         orbit: &Orbit,
@@ -79,7 +81,8 @@ impl Samples {
         self.x.iter().flatten().fold(0.0, |most, x| x.abs().max(most))
     }
 
-    /// Motion over `periods` periods, with a disturbance added to one axis.
+    /// Sampled motion over `periods` periods of the orbit, with a disturbance of displacement and velocity added to one
+    /// axis.
     fn motion(&self, periods: usize, axis: usize, added: impl Fn(f64) -> [f64; 2]) -> SampledMotion {
         let count = self.len();
         let mut x: [Vec<f64>; 3] = std::array::from_fn(|axis| self.x[axis].repeat(periods));
@@ -90,7 +93,7 @@ impl Samples {
             v[axis][sample] += by_v;
         }
         // Speed below which friction acts with its mean over a time step: half of the largest change of velocity in a
-        // step, within which the velocity may change sign.
+        // step, since the velocity may change sign within the step.
         let rest_m_per_s = std::array::from_fn(|axis| {
             let velocity = &self.v[axis];
             let steps = (0..count).map(|n| (velocity[(n + 1) % count] - velocity[n]).abs());
@@ -105,14 +108,15 @@ impl Samples {
         }
     }
 
-    /// Force of a term over a period, once its hysteresis loop is closed.
+    /// Restoring force of a term along the orbit over one period, N, once its hysteresis loop is closed.
     ///
     /// An internal state is the fixed point of its map over a period, by the secant method.
     fn force_n(&self, term: &dyn RestoringForce) -> [Vec<f64>; 3] {
         if term.states() == 0 {
             return restoring_along(term, &self.motion(1, 0, |_| [0.0; 2]));
         }
-        // Appends the first sample of the next period, so that the internal state at the end of the period is known.
+        // The first sample of the next period is appended, so that the internal state at the end of the period is
+        // known.
         let mut period = self.motion(1, 0, |_| [0.0; 2]);
         for signal in period.x.iter_mut().chain(&mut period.v) {
             signal.push(signal[0]);
@@ -166,8 +170,8 @@ fn share(a: &[f64], b: &[f64]) -> f64 {
     if whole > 0.0 { dot(a, b) / whole } else { 0.0 }
 }
 
-/// Equivalent spring, damper and mean force of all terms along the orbit, by axis. A damper of `most_damping` means
-/// that friction sticks and holds the tool.
+/// Equivalent spring, damper and mean force, by axis, of all friction, backlash and hysteresis terms along the orbit. A
+/// damper as large as `most_damping` means that friction sticks and holds the tool.
 pub(super) fn equivalent(
     terms: &[Box<dyn RestoringForce>],
     samples: &Samples,

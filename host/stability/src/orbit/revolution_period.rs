@@ -28,17 +28,17 @@ struct Tooth {
     cutting: Vector3<f64>,
     /// Edge force per axial depth, N/m.
     edge: Vector3<f64>,
-    /// Row nᵀ C that observes the displacement along the chip normal.
+    /// Row nᵀ C, by which the states give the displacement along the chip normal of this tooth.
     seen: RowDVector<f64>,
-    /// Chip due to feed and runout, m.
+    /// Chip thickness of this tooth due to feed and runout, m.
     chip_m: f64,
 }
 
 /// Forces in a subinterval.
 struct Forces {
-    /// Cutting teeth of all nodes, node by node.
+    /// Cutting teeth at all nodes of the subinterval, node by node.
     teeth: Vec<Tooth>,
-    /// Process damping B D C A per axial depth at the nodes; empty if absent.
+    /// Process damping B D C A per axial depth at the nodes of the subinterval; empty without process damping.
     damping: Vec<DMatrix<f64>>,
 }
 
@@ -54,7 +54,8 @@ pub(super) struct RevolutionPeriod<'a> {
 }
 
 impl<'a> RevolutionPeriod<'a> {
-    /// Mesh for depths up to `depth_m`; `None` if no preceding tooth has cut the surface in front of some tooth.
+    /// Mesh of a revolution for depths up to `depth_m`; `None` if no preceding tooth has cut the surface in front of
+    /// some tooth.
     pub(super) fn new(
         problem: &'a ForcedProblem,
         uneven: &'a Uneven,
@@ -84,7 +85,8 @@ impl<'a> RevolutionPeriod<'a> {
         })
     }
 
-    /// Delayed displacement at every port of a subinterval, ports × 1, with its derivatives, ports × (size + 1).
+    /// Delayed displacement at every port (cutting tooth at a node) of a subinterval, ports × 1, with its derivatives
+    /// with respect to start and depth, ports × (size + 1).
     fn past(
         &self,
         subinterval: &Subinterval,
@@ -102,7 +104,8 @@ impl<'a> RevolutionPeriod<'a> {
                         by[(port, first + node)] += weight;
                     }
                     Source::Own(series) => {
-                        // `None` if a delay is shorter than a subinterval, so that it ends in the subinterval itself.
+                        // No value is known yet if a delay is shorter than a subinterval, so that the delayed time lies
+                        // in the subinterval itself.
                         let (values, derivatives) = seen.get(series.subinterval)?;
                         let teeth = self.mesh.subintervals[series.subinterval].cutting.len();
                         let row = node * teeth + series.tooth;
@@ -150,13 +153,13 @@ impl Forces {
         Self { teeth, damping }
     }
 
-    /// Cutting teeth at a node, each with the index of its port.
+    /// Cutting teeth at a node of the subinterval, each with the index of its port.
     fn teeth_at(&self, node: usize, nodes: usize) -> impl Iterator<Item = (usize, &Tooth)> {
         let count = self.teeth.len() / nodes;
         self.teeth.iter().enumerate().skip(node * count).take(count)
     }
 
-    /// Force per axial depth at a node, N/m.
+    /// Force per axial depth of all cutting teeth at a node, N/m, from chip thickness and edges.
     fn push(&self, node: usize, nodes: usize, past: &DVector<f64>, state: &DVector<f64>) -> Vector3<f64> {
         self.teeth_at(node, nodes)
             .map(|(port, tooth)| {
@@ -166,7 +169,7 @@ impl Forces {
             .sum()
     }
 
-    /// Time derivatives of the states at the nodes, f(t_j, Y_j).
+    /// Time derivatives f(t_j, Y_j) of the states at the nodes of a subinterval.
     fn rates(
         &self,
         problem: &ForcedProblem,
@@ -190,7 +193,7 @@ impl Forces {
         (0..nodes).map(at).collect()
     }
 
-    /// Jacobians ∂f/∂x of the equation of motion at the nodes.
+    /// Jacobians ∂f/∂x of the equation of motion at the nodes of a subinterval.
     fn jacobians(
         &self,
         problem: &ForcedProblem,
@@ -216,7 +219,8 @@ impl Forces {
         (0..nodes).map(at).collect()
     }
 
-    /// Derivatives of the rates at the nodes through the delayed displacements and the depth, n × (size + 1) each.
+    /// Derivatives of the states' time derivatives at the nodes, through the delayed displacements and the depth (not
+    /// through the states themselves), n × (size + 1) each.
     fn pushes(
         &self,
         problem: &ForcedProblem,
@@ -246,7 +250,7 @@ impl Forces {
         (0..nodes).map(at).collect()
     }
 
-    /// Displacement p of every port, with its derivatives.
+    /// Displacement p along the chip normal at every port (cutting tooth at a node), with its derivatives.
     fn seen(&self, states: &DMatrix<f64>, values: &DMatrix<f64>) -> (DVector<f64>, DMatrix<f64>) {
         let (order, nodes) = states.shape();
         let mut seen = DVector::zeros(self.teeth.len());
@@ -344,7 +348,7 @@ impl PeriodMap for RevolutionPeriod<'_> {
         let by_start = integration.by.columns(0, size);
         let vector = eigenvector(&by_start.map(Complex64::from), multiplier)?;
         let c = self.problem.linear.structure.c.map(Complex64::from);
-        // Displacement at every node, with time and quadrature weight.
+        // Tool displacement of the Floquet mode at every node, with time and quadrature weight.
         let mut motion: Vec<(f64, Vector3<Complex64>)> = Vec::new();
         for (subinterval, values) in self.mesh.subintervals.iter().zip(&integration.values) {
             let states = values.columns(0, size).map(Complex64::from) * &vector;

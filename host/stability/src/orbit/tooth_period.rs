@@ -16,7 +16,8 @@ use super::forced::ForcedProblem;
 use quietcut_model::structure::FirstOrder;
 use quietcut_numerics::quadrature::Gauss;
 
-/// Largest phase angle, rad, of the fastest pole over a subinterval.
+/// Largest phase angle, rad, of the fastest motion over a subinterval: the fastest pole plus the rotating directional
+/// coefficients.
 const SUBINTERVAL_ANGLE: f64 = 4.0;
 
 /// Gauss nodes per subinterval. Over the phase angle z = [`SUBINTERVAL_ANGLE`] the local error (m!)²
@@ -35,9 +36,9 @@ pub(super) struct Subinterval {
     pub(super) duration: f64,
     /// Number of cutting teeth.
     pub(super) teeth: usize,
-    /// Force per axial depth at the nodes, N/m.
+    /// Force per axial depth of feed and edges at the nodes of the subinterval, N/m.
     pub(super) forces: Vec<Vector3<f64>>,
-    /// Process damping B D C A per axial depth at the nodes; empty if absent.
+    /// Process damping B D C A per axial depth at the nodes of the subinterval; empty without process damping.
     pub(super) damping: Vec<DMatrix<f64>>,
 }
 
@@ -57,7 +58,7 @@ impl<'a> ToothPeriod<'a> {
         Self::with_subintervals(problem, rpm, SUBINTERVAL_ANGLE)
     }
 
-    /// The same mesh for another problem of the same cut.
+    /// The same mesh, with the forces at its nodes, for another problem of the same cut.
     pub(super) fn of<'b>(&self, problem: &'b ForcedProblem) -> ToothPeriod<'b> {
         ToothPeriod {
             problem,
@@ -124,7 +125,7 @@ impl<'a> ToothPeriod<'a> {
     }
 }
 
-/// Time derivatives of the states at the nodes of a subinterval, f(t_j, Y_j).
+/// Time derivatives f(t_j, Y_j) of the states at the nodes of a subinterval.
 pub(super) fn rates(
     problem: &ForcedProblem,
     subinterval: &Subinterval,
@@ -154,7 +155,7 @@ pub(super) fn rates(
         .collect()
 }
 
-/// Derivative of the rate at a node with respect to the axial depth, per meter.
+/// Derivative of the state's time derivative at a node with respect to the axial depth, per meter.
 pub(super) fn per_depth(
     structure: &FirstOrder,
     subinterval: &Subinterval,

@@ -78,7 +78,7 @@ fn element(
             1.0,
         );
     }
-    // Displacement along the chip normal of each port from the states at its node.
+    // Displacement along the chip normal at each port (cutting tooth at a node), from the states at its node.
     let look = |values: &DMatrix<f64>| {
         let mut looked = DMatrix::zeros(nodes * teeth, values.ncols());
         for port in 0..nodes * teeth {
