@@ -10,26 +10,26 @@ use quietcut_model::effects::EffectName;
 use quietcut_model::milling::Runout;
 use quietcut_model::structure::{Direction, Joint, Mode, Robot};
 
-/// One identified parameter with its standard deviation.
+/// One identified parameter of the equations of motion with its standard deviation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Estimate {
     /// Key of the parameter in a case: `mass_kg`, `k3_n_per_m3` …
     pub key: &'static str,
-    /// Direction of the parameter; two for an off-diagonal entry and for a coupling.
+    /// Direction of the parameter; two directions for an off-diagonal entry of a matrix and for a coupling.
     pub directions: Vec<Direction>,
     /// Value, SI.
     pub value: f64,
-    /// Standard deviation of the value, SI.
+    /// Standard deviation of the parameter, in its SI unit.
     pub deviation: f64,
 }
 
 /// Reason why an identified model does not fit into a case file.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum CaseFileError {
-    /// An entry of this name, which a case requires, was not identified.
+    /// The structure lacks a matrix that a case requires: mass, damping or stiffness.
     #[error("a case needs {0}, which this method does not give")]
     Missing(&'static str),
-    /// The same extension is needed in two directions.
+    /// Parameters of the same extension were identified in two directions, but a case holds an extension once.
     #[error(
         "[extension.{0}] is needed in two directions; a case holds one: identify the directions one by one"
     )]
@@ -44,7 +44,7 @@ pub enum CaseFileError {
     Toml(String),
 }
 
-/// The text of a case.
+/// Text of the case file in TOML.
 ///
 /// # Errors
 /// A value has no form in TOML.
@@ -52,10 +52,10 @@ fn written(case: &Table) -> Result<String, CaseFileError> {
     toml::to_string(case).map_err(|error| CaseFileError::Toml(error.to_string()))
 }
 
-/// Sections of a case that do not describe the dynamics of the machine.
+/// Sections of a case file that do not describe the structural dynamics of the machine.
 const OTHERS: [&str; 4] = ["tool", "material", "cut", "limits"];
 
-/// The case `text` with the sections tool, material, cut and limits of the case `other`.
+/// Case file `text` whose sections tool, material, cut and limits are replaced by those of the case `other`.
 ///
 /// # Errors
 /// The text is not valid TOML.
@@ -71,10 +71,10 @@ pub fn with_sections(text: &str, other: &Table) -> Result<String, CaseFileError>
     written(&case)
 }
 
-/// Text of a case with complex modes, in the directions that are both excited and measured.
+/// Text of a case file with the complex modes of `model`, in the directions that are both excited and measured.
 ///
 /// # Errors
-/// There is no such direction.
+/// No direction is both excited and measured.
 pub fn text_of_modes(name: &str, model: &ModalModel) -> Result<String, CaseFileError> {
     let directions = model.directions();
     if directions.is_empty() {
@@ -102,7 +102,7 @@ pub fn text_of_modes(name: &str, model: &ModalModel) -> Result<String, CaseFileE
     written(&modal(name, &directions, &modes))
 }
 
-/// A case with complex modes whose shapes have an entry for each of `directions`.
+/// Table of a case file with complex modes, whose left and right shapes have an entry for each of `directions`.
 pub fn modal(name: &str, directions: &[Direction], modes: &[IdentifiedMode]) -> Table {
     let pairs = |shape: &[[f64; 2]]| -> Value {
         let entry = |parts: &[f64; 2]| Value::Array(parts.map(Value::Float).into());
@@ -132,7 +132,8 @@ pub fn modal(name: &str, directions: &[Direction], modes: &[IdentifiedMode]) -> 
     case
 }
 
-/// A case of a robot at its posture; `deviations` are the standard deviations of the identified parameters.
+/// Table of a case file with a robot at its posture; `deviations` are the standard deviations of the identified joint
+/// parameters.
 pub fn robot(name: &str, robot: &Robot, deviations: &[(JointParameter, f64)]) -> Table {
     let place = |place: &Vector3<f64>| numbers(place.iter().copied());
     let joint = |joint: &Joint| {
@@ -186,7 +187,7 @@ fn numbers(values: impl Iterator<Item = f64>) -> Value {
     Value::Array(values.map(Value::Float).collect())
 }
 
-/// A case with force coefficients, number of teeth, and the runout if it was identified.
+/// Table of a case file with force coefficients, number of teeth, and the runout if it was identified.
 ///
 /// # Errors
 /// A cutting coefficient is missing.
@@ -221,7 +222,8 @@ pub fn cutting(
     Ok(case)
 }
 
-/// Name of the extension that contains the parameter `key`; `None` for a parameter of the structure.
+/// Name of the extension of a case that contains the parameter `key`; `None` for a parameter of the matrices of the
+/// structure.
 fn extension_of(key: &str) -> Option<&'static str> {
     let effect = match key {
         "k2_n_per_m2" => EffectName::QuadraticStiffness,
@@ -233,16 +235,16 @@ fn extension_of(key: &str) -> Option<&'static str> {
     Some(effect.name())
 }
 
-/// Text of a case with mass, damping, stiffness and cubic terms as matrices, and all other terms as extensions.
+/// Text of a case file with mass, damping, stiffness and cubic terms as matrices, and all other terms as extensions.
 ///
 /// # Errors
-/// No mass, damping or stiffness; or one extension in two directions.
+/// Mass, damping or stiffness was not identified; or one extension is needed in two directions.
 pub fn text(name: &str, directions: &[Direction], estimates: &[Estimate]) -> Result<String, CaseFileError> {
     let mut structure = Table::new();
     structure.insert("kind".into(), "matrices".into());
     let names = directions.iter().map(|direction| Value::from(direction.name()));
     structure.insert("directions".into(), Value::Array(names.collect()));
-    // The extension with k5 contains k3 as well.
+    // If k5 was identified, the extension softening-hardening holds both k3 and k5.
     let turned = estimates.iter().any(|estimate| estimate.key == "k5_n_per_m5");
     let matrices = [
         ("mass", "mass_kg", true),

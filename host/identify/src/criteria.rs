@@ -5,253 +5,290 @@
 
 // Modes from receptances
 
-/// Fewest frequency lines of a band. The highest model order is a third of the number of lines; with fewer than 16 lines it does not
-/// exceed `LEAST_ORDERS`.
+/// Fewest frequency lines in the band of a modal fit to receptances. The highest model order is a third of the number
+/// of lines; with fewer than 16 lines it does not exceed `LEAST_ORDERS`.
 pub(crate) const LEAST_LINES: usize = 16;
 
-/// Smallest standard deviation of a receptance relative to its RMS: −100 dB. No sensor measures better.
+/// Smallest standard deviation of a receptance value that a modal fit assumes, relative to the RMS of the receptance:
+/// −100 dB. No sensor measures better.
 pub(crate) const LEAST_RELATIVE_DEVIATION: f64 = 1e-5;
 
-/// Damping ratio from which a pole is not a mode. Beyond 1/√2 its receptance has no peak above the static compliance. Half is taken,
-/// because so broad a peak is the residual of modes outside the band. Unfounded between 0.3 and 0.7.
+/// Damping ratio from which a fitted pole does not count as a mode. Beyond 1/√2 its receptance has no peak above the
+/// static compliance. A lower limit is taken, because a peak so broad is the residual of modes outside the band.
+/// Unfounded between 0.3 and 0.7.
 pub(crate) const OVERDAMPED: f64 = 0.5;
 
-/// Norm of the residues of a mode, in standard deviations, below which the mode is rejected. A normal variable exceeds three standard
-/// deviations with a probability of 0.3 %.
+/// Norm of the residue matrix of a fitted mode, in standard deviations of the norm, below which the mode is rejected. A
+/// normal variable exceeds three standard deviations with a probability of 0.3 %.
 pub(crate) const LEAST_RESIDUE_SIGNIFICANCE: f64 = 3.0;
 
-/// NRMSE of the fitted receptances above which a warning says that the model does not fit. Unfounded.
+/// NRMSE of the fitted receptances above which a warning says that the modal model does not fit. Unfounded.
 pub(crate) const LARGEST_FIT_ERROR: f64 = 0.1;
 
-/// Fewest frequency lines within the half-power bandwidth 2ζf of a mode. With fewer its damping is extrapolated from the flanks of the
-/// peak, not measured.
+/// Fewest frequency lines of a receptance within the half-power bandwidth 2ζf of a mode without a warning. With fewer,
+/// the damping of the mode is extrapolated from the flanks of the peak, not measured.
 pub(crate) const LINES_PER_HALF_POWER_WIDTH: f64 = 3.0;
 
-/// Standard deviation of a damping ratio, relative to the ratio, above which the user is warned. Stability limits are about proportional
-/// to the damping ratio, so that their 90 % intervals are then ±16 %. Unfounded.
+/// Largest standard deviation of an identified damping ratio without a warning, relative to the ratio. Stability limits
+/// are about proportional to the damping ratio, so that their 90 % intervals are then ±16 %. Unfounded.
 pub(crate) const LARGEST_DAMPING_DEVIATION: f64 = 0.1;
 
-/// Difference of two natural frequencies, in standard deviations of the difference, below which two modes are not separable. Equal
-/// frequencies differ by more with a probability of 0.3 %.
+/// Difference of the natural frequencies of two neighbouring modes, in standard deviations of the difference, below
+/// which the modes are not separable. Equal frequencies differ by more with a probability of 0.3 %.
 pub(crate) const SEPARABLE_DEVIATIONS: f64 = 3.0;
 
-/// Relative change of the natural frequency from one model order to the next up to which a pole is stable: 1 %, the usual value of
-/// stabilization diagrams.
+/// Relative change of the natural frequency of a pole from one model order to the next up to which the pole is stable
+/// in the stabilization diagram: 1 %, the usual value.
 pub(crate) const SAME_FREQUENCY: f64 = 0.01;
 
-/// Relative change of the damping ratio from one model order to the next up to which a pole is stable. Usual values are 5 to 10 %.
+/// Relative change of the damping ratio of a pole from one model order to the next up to which the pole is stable in
+/// the stabilization diagram. Usual values are 5 to 10 %.
 pub(crate) const SAME_DAMPING: f64 = 0.1;
 
-/// Smallest modal assurance criterion between the residues of a pole and those of the previous order at which the pole is stable: the
-/// usual 0.95.
+/// Smallest modal assurance criterion between the residues of a pole and those of the pole of the previous model order
+/// at which the pole is stable in the stabilization diagram: the usual 0.95.
 pub(crate) const SAME_SHAPE: f64 = 0.95;
 
-/// Number of consecutive orders over which a pole must be stable to be a mode, relative to the number of all orders. Unfounded.
+/// Number of consecutive model orders that a stable pole must exceed to be a mode, relative to the number of all orders
+/// of the stabilization diagram. Unfounded.
 pub(crate) const ORDERS_SHARE: f64 = 0.25;
 
-/// Fewest consecutive orders over which a pole must be stable to be a mode. Unfounded.
+/// Smallest number of consecutive model orders that a stable pole must exceed to be a mode, whatever the number of all
+/// orders of the stabilization diagram. Unfounded.
 pub(crate) const LEAST_ORDERS: usize = 4;
 
-/// Distance of two stable poles, in units of `SAME_FREQUENCY` and `SAME_DAMPING`, up to which they are the same mode. Unfounded.
+/// Relative difference of frequency or damping of two stable poles up to which they are the same mode, in multiples of
+/// `SAME_FREQUENCY` and `SAME_DAMPING`. Unfounded.
 pub(crate) const SAME_POLE_DISTANCE: f64 = 3.0;
 
-/// Modal assurance criterion of two stable poles above which they are the same mode. Unfounded.
+/// Modal assurance criterion between the residues of two stable poles above which they are the same mode. Unfounded.
 pub(crate) const SAME_POLE_SHAPE: f64 = 0.9;
 
-/// Peak height of a stable pole, relative to that of the strongest pole, below which it is not a mode. Unfounded.
+/// Height of the resonance peak of a stable pole, relative to that of the strongest pole, below which the pole is not a
+/// mode. Unfounded.
 pub(crate) const LEAST_HEIGHT: f64 = 3e-3;
 
 // Modes from whole records
 
-/// Largest number of frequency lines of all records together: a fit of more takes minutes on one core.
+/// Largest number of frequency lines of all records together in a modal fit to whole records: a fit of more takes
+/// minutes on one core.
 pub(crate) const MOST_RECORD_LINES: usize = 200_000;
 
-/// Fewest frequency lines of a record in the band: the same number as `LEAST_LINES`.
+/// Fewest frequency lines in the band of each record in a modal fit to whole records: the same number as `LEAST_LINES`.
 pub(crate) const LEAST_RECORD_LINES: usize = 16;
 
-/// Smallest noise of a channel relative to its RMS: −100 dB. No sensor measures better.
+/// Smallest standard deviation of the noise of a channel that a modal fit to whole records assumes, relative to the RMS
+/// of the channel: −100 dB. No sensor measures better.
 pub(crate) const LEAST_RELATIVE_NOISE: f64 = 1e-5;
 
 // Dwells
 
-/// Level of the force in a block, relative to the quietest blocks, above which the structure is excited. Unfounded.
+/// RMS force in a block of a step-sine record above which the structure is excited, relative to the RMS of the quietest
+/// blocks. Unfounded.
 pub(crate) const FORCE_ABOVE_NOISE: f64 = 3.0;
 
-/// Smallest and largest threshold of the force level, relative to the largest block: the smallest applies to records without noise, the
-/// largest to records without a pause. Unfounded.
+/// Smallest and largest RMS force above which a block of a step-sine record is excited, relative to the RMS of the
+/// strongest block. The smallest applies to records without noise, the largest to records without a pause. Unfounded.
 pub(crate) const FORCE_BELOW_LARGEST: [f64; 2] = [0.02, 0.3];
 
-/// Change of the local frequency, relative to its scatter, above which the excitation steps to another frequency. Noise does not reach
-/// ten times its scatter.
+/// Change of the local excitation frequency above which a new frequency step begins, in multiples of the scatter of
+/// that frequency. Noise does not reach ten times its scatter.
 pub(crate) const STEP_SCATTER: f64 = 10.0;
 
-/// Relative change of the local frequency above which the excitation steps to another frequency, in records without noise. Unfounded.
+/// Relative change of the local excitation frequency above which a new frequency step begins, in records without noise.
+/// Unfounded.
 pub(crate) const STEP_SHARE: f64 = 1e-3;
 
-/// Relative difference of two frequencies up to which they belong to the same step of a step-sine test. With noise of 1 % at 20 samples
-/// per period, the frequency of a dwell of ten periods has a standard deviation of 5e-5; the steps of the thesis are 3e-3. Unfounded
-/// between.
+/// Relative difference of the excitation frequencies of two dwells up to which they belong to the same step of a
+/// step-sine test. With noise of 1 % at 20 samples per period, the frequency of a dwell of ten periods has a standard
+/// deviation of 5e-5; the steps of the thesis are 3e-3. Unfounded between.
 pub(crate) const SAME_STEP: f64 = 1e-3;
 
-/// Fewest periods of a dwell. Unfounded.
+/// Fewest excitation periods of the steady part of a dwell. Unfounded.
 pub(crate) const LEAST_DWELL_PERIODS: f64 = 10.0;
 
-/// Noise of a Fourier coefficient over the residual transient from which a dwell is settled. A bias of a fifth of the standard deviation
-/// lowers the coverage of a 90 % interval to 89.3 %.
+/// Standard deviation of a Fourier coefficient of a dwell's motion, relative to the residual transient, from which the
+/// dwell counts as settled. A bias of a fifth of the standard deviation lowers the coverage of a 90 % interval to 89.3
+/// %.
 pub(crate) const NOISE_OVER_TRANSIENT: f64 = 5.0;
 
-/// Relative change of the fundamental between the halves of a dwell up to which the motion is steady: a transient of this size biases
-/// the parameters by less than noise of 1 % scatters them.
+/// Change of the fundamental of the motion between the two halves of a dwell up to which the motion is steady, relative
+/// to the fundamental. A transient of this size biases the parameters by less than noise of 1 % scatters them.
 pub(crate) const STEADY_CHANGE: f64 = 1e-3;
 
-/// Change of the fundamental between the halves of a dwell, in standard deviations, up to which the motion is steady: chance exceeds
-/// 4 once in ten thousand dwells.
+/// Change of the fundamental of the motion between the two halves of a dwell up to which the motion is steady, in
+/// standard deviations of the change. Chance exceeds 4 once in ten thousand dwells.
 pub(crate) const STEADY_DEVIATIONS: f64 = 4.0;
 
 // Fits to dwells
 
-/// χ² per degree of freedom above which a law does not explain the data down to the noise; its covariance then comes from the scatter
-/// between dwells (sandwich). At 1.3 the intervals from the noise are too narrow by √1.3 = 1.14, and a sandwich from 30 dwells scatters
-/// by as much, 1/√58 = 13 %: below, it gains nothing. Unfounded for other numbers of dwells.
+/// χ² per degree of freedom above which an equation of motion does not explain the dwells down to the noise. The
+/// covariance of its parameters then comes from the scatter between dwells (sandwich). At 1.3 the intervals from the
+/// noise are too narrow by √1.3 = 1.14, and a sandwich from 30 dwells scatters by as much, 1/√58 = 13 %: below, it
+/// gains nothing. Unfounded for other numbers of dwells.
 pub(crate) const LARGEST_MISFIT: f64 = 1.3;
 
 /// Fewest force levels at a frequency for higher-order FRF: H₁, H₃ and H₅ are three unknowns.
 pub(crate) const LEAST_LEVELS: usize = 3;
 
-/// Fewest samples of a period of a multisine. Unfounded.
+/// Fewest samples in one period of a multisine whose periods are fitted by an equation of motion. Unfounded.
 pub(crate) const LEAST_PERIOD_SAMPLES: usize = 16;
 
-/// Fewest samples of a record per term of a restoring force. Unfounded.
+/// Fewest samples of a record for each term of a force law that is fitted to it by the restoring-force method.
+/// Unfounded.
 pub(crate) const SAMPLES_PER_TERM: usize = 20;
 
-/// Fewest samples in a slice of a restoring-force surface, to which three coefficients are fitted. Unfounded.
+/// Fewest samples in a slice through a restoring-force surface; three coefficients are fitted to it. Unfounded.
 pub(crate) const LEAST_SLICE_SAMPLES: usize = 12;
 
 // Linearity
 
-/// Scatter of the response over force, relative to the largest response, that curvature within one region may cause. Unfounded.
+/// Deviation of the response amplitude X(F) from a straight line that curvature within one linear region of the force F
+/// may cause, relative to the largest response. Unfounded.
 pub(crate) const CURVATURE_SHARE: f64 = 2e-3;
 
-/// Reduction of χ² above which the response over force is two lines instead of one. Chance reaches 25 with a probability of 6e-7; twice
-/// that accounts for the choice of the break.
+/// Reduction of χ² above which the response amplitude X(F) over the force F is fitted by two lines instead of one.
+/// Chance reaches 25 with a probability of 6e-7; twice that accounts for the choice of the break.
 pub(crate) const REGION_EVIDENCE: f64 = 50.0;
 
-/// Fewest points of a region of the response over force: a line has two parameters. Unfounded.
+/// Fewest measured points of a linear region of the response amplitude over the force: a line has two parameters.
+/// Unfounded.
 pub(crate) const LEAST_REGION_POINTS: usize = 6;
 
-/// Difference of two neighbouring lines of the response over force, in standard deviations of the noise, above which the response jumps.
-/// A normal variable exceeds six with a probability of 2e-9.
+/// Difference between two neighbouring lines of the response amplitude X(F), at the force F where they meet, above
+/// which the response jumps; in standard deviations of the noise of X. A normal variable exceeds six with a probability
+/// of 2e-9.
 pub(crate) const JUMP_DEVIATIONS: f64 = 6.0;
 
-/// Difference of two neighbouring lines, relative to the response, above which the response jumps. The curvature of a smooth response
-/// gives less between two windows. Unfounded.
+/// Difference between two neighbouring lines of the response amplitude X(F), at the force F where they meet, above
+/// which the response jumps; relative to X there. The curvature of a smooth response gives less between two windows.
+/// Unfounded.
 pub(crate) const JUMP_SHARE: f64 = 0.05;
 
-/// Relative difference of two amplitudes at one frequency from which they count as two force levels. Unfounded.
+/// Relative difference of two motion amplitudes at one frequency from which they count as two excitation levels.
+/// Unfounded.
 pub(crate) const DIFFERENT_LEVELS: f64 = 0.05;
 
-/// χ² of a linear structure above its mean, in standard deviations of χ², up to which a structure is linear. A normal variable exceeds
-/// four with a probability of 3e-5.
+/// Excess of the χ² of a linear model over its degrees of freedom up to which a structure counts as linear, in standard
+/// deviations of χ². A normal variable exceeds four with a probability of 3e-5.
 pub(crate) const LINEAR_DEVIATIONS: f64 = 4.0;
 
-/// χ² of the harmonics above its mean, in standard deviations of χ², above which harmonics are significant. A normal variable exceeds
-/// five with a probability of 3e-7.
+/// Excess of the χ² of a harmonic of the motion over its mean above which the harmonic is significant, in standard
+/// deviations of χ². A normal variable exceeds five with a probability of 3e-7.
 pub(crate) const HARMONIC_DEVIATIONS: f64 = 5.0;
 
-/// Harmonic of the force, in standard deviations of its noise, that is not counted as a cause of motion. A normal variable exceeds three
-/// with a probability of 0.1 %.
+/// Part of the amplitude of a harmonic of the force that counts as noise and not as a cause of motion, in standard
+/// deviations of the force noise. A normal variable exceeds three with a probability of 0.1 %.
 pub(crate) const FORCE_HARMONIC_DEVIATIONS: f64 = 3.0;
 
-/// Change of stiffness with the level over −k·(X₂/X)², at which a quadratic spring causes the change. Harmonic balance gives 30; half of
-/// it either way allows for damping, other modes and the next order of the balance. Unfounded.
+/// Range of the ratio of the change of stiffness with the excitation level to −k·(X₂/X)² at which a quadratic spring
+/// causes the change; X₂/X is the second harmonic of the motion over its fundamental. Harmonic balance gives 30; half
+/// of it either way allows for damping, other modes and the next order of the balance. Unfounded.
 pub(crate) const QUADRATIC_STIFFNESS_RATIO: [f64; 2] = [15.0, 45.0];
 
-/// Reduction of χ² per parameter above which a kind of nonlinearity is named. Chance reaches 25 with a probability of 6e-7.
+/// Reduction of χ² per parameter of a describing function above which its kind of nonlinearity is named. Chance reaches
+/// 25 with a probability of 6e-7.
 pub(crate) const KIND_EVIDENCE: f64 = 25.0;
 
-/// Residual χ² of a kind of nonlinearity, relative to that of a linear structure, below which the kind explains the level dependence. A
-/// describing function omits higher harmonics, an error of up to a tenth of its effect, which is 1 % in squares.
+/// Residual χ² of a kind of nonlinearity, relative to that of a linear structure, below which the kind explains the
+/// dependence of stiffness on the level. A describing function omits higher harmonics, an error of up to a tenth of its
+/// effect, which is 1 % in squares.
 pub(crate) const EXPLAINED_SHARE: f64 = 0.01;
 
-/// Fewest independent estimates in the common band of two sweeps. Unfounded.
+/// Fewest independent receptance estimates in the common band of two sweeps that are compared. Unfounded.
 pub(crate) const LEAST_SWEEP_ESTIMATES: f64 = 10.0;
 
-/// Misfit of two sweeps above which they are not of one linear structure. The misfit of a linear structure reaches about 5, because the
-/// variances have nine degrees of freedom per line and omit the noise of the force.
+/// Misfit between the receptances of two sweeps, their mean squared difference over its variance, from which they are
+/// not of one linear structure. The misfit of a linear structure reaches about 5, because the variances have nine
+/// degrees of freedom per line and omit the noise of the force.
 pub(crate) const SWEEP_MISFIT: f64 = 20.0;
 
-/// Largest difference of the receptances of two sweeps, relative to the peak, below which it is not significant. Unfounded.
+/// Largest difference between the receptances of two sweeps, relative to the peak receptance, below which the
+/// difference is not significant. Unfounded.
 pub(crate) const LEAST_SWEEP_CHANGE: f64 = 0.005;
 
-/// Misfit of two cross receptances above 1, in standard deviations of the mean of exponential variables, up to which the structure is
-/// reciprocal. A normal variable exceeds five with a probability of 3e-7.
+/// Excess over 1 of the misfit between the cross receptances H_ij and H_ji up to which a structure is reciprocal, in
+/// standard deviations of a mean of exponential variables. A normal variable exceeds five with a probability of 3e-7.
 pub(crate) const RECIPROCAL_DEVIATIONS: f64 = 5.0;
 
-/// Largest difference of two cross receptances, relative to the peak, up to which the structure is reciprocal. The position of a shaker
-/// and its direction are not more accurate. Unfounded.
+/// Largest difference between the cross receptances H_ij and H_ji, relative to the peak, up to which a structure is
+/// reciprocal. The position of a shaker and its direction are not more accurate. Unfounded.
 pub(crate) const LEAST_RECIPROCITY_CHANGE: f64 = 0.01;
 
-/// Signal power over noise power from which a frequency belongs to the band of a restoring force. Unfounded.
+/// Ratio of signal power to noise power of the motion from which a frequency belongs to the band of a restoring-force
+/// fit. Unfounded.
 pub(crate) const BAND_SIGNAL_TO_NOISE: f64 = 1e3;
 
 // Cutting tests
 
-/// Fewest revolutions of full engagement; intervals come from the scatter between revolutions. With four, Student's quantile exceeds the
-/// normal one by a factor of 1.4, with two by 3.8. Unfounded.
+/// Fewest revolutions of full engagement in a cutting test with measured forces; the intervals of the force
+/// coefficients come from the scatter between revolutions. With four, Student's quantile exceeds the normal one by a
+/// factor of 1.4, with two by 3.8. Unfounded.
 pub(crate) const LEAST_REVOLUTIONS: usize = 4;
 
-/// Mean force of a revolution, relative to that of full engagement, above which the tool is engaged. Unfounded.
+/// Mean force of a revolution, relative to the mean force in full engagement, above which the tool is fully engaged.
+/// Unfounded.
 pub(crate) const ENGAGED_SHARE: f64 = 0.9;
 
-/// Relative difference of two feeds per tooth up to which they count as one feed. Unfounded.
+/// Relative difference of the feeds per tooth of two cutting tests up to which they count as one feed. Unfounded.
 pub(crate) const SAME_FEED: f64 = 0.02;
 
-/// Difference between coefficients of two methods, relative to the largest coefficient, that is reported. Unfounded.
+/// Smallest reported difference between a force coefficient from mean forces and from instantaneous forces, beyond both
+/// 90 % half-widths, relative to the largest coefficient of its kind. Unfounded.
 pub(crate) const LEAST_METHOD_DIFFERENCE: f64 = 0.05;
 
-/// Growth rate ln |μ| of a trial cut, in relative errors of the depth, beyond which its outcome is certain. ln |μ| changes by about as
-/// much as the relative depth, at most by a few times as much.
+/// Predicted growth rate ln |μ| of a trial cut, as a multiple of the relative standard deviation of its depth, beyond
+/// which its predicted outcome is certain. ln |μ| changes by about as much as the relative depth, at most by a few
+/// times as much.
 pub(crate) const CERTAIN_DEVIATIONS: f64 = 12.0;
 
-/// Probability that the recorded outcome of a trial cut is wrong for reasons outside the model. Unfounded.
+/// Probability that the observed outcome of a trial cut, chatter or stable, is wrong for reasons outside the model.
+/// Unfounded.
 pub(crate) const MISJUDGED_SHARE: f64 = 1e-3;
 
-/// Distance of a trial cut from the predicted limit on the wrong side, in standard deviations of the depth, beyond which it counts as
-/// misjudged. A normal variable exceeds three with a probability of 0.1 %.
+/// Distance of a trial cut from the predicted stability limit, on the side that contradicts its outcome, beyond which
+/// the structure misjudges it; in standard deviations of the depth. A normal variable exceeds three with a probability
+/// of 0.1 %.
 pub(crate) const WRONG_DEPTH_DEVIATIONS: f64 = 3.0;
 
-/// Difference of measured and predicted chatter frequency, in standard deviations, beyond which a cut counts as misjudged. A normal
-/// variable exceeds four in magnitude with a probability of 6e-5.
+/// Difference of measured and predicted chatter frequency of a trial cut, in standard deviations of the measured one,
+/// beyond which the structure misjudges the cut. A normal variable exceeds four in magnitude with a probability of
+/// 6e-5.
 pub(crate) const WRONG_FREQUENCY_DEVIATIONS: f64 = 4.0;
 
-/// Number of trial cuts per cut that the best structure may misjudge. Unfounded.
+/// Number of trial cuts among which the best structure of the posterior may misjudge one; with more misjudged cuts the
+/// result is refused. Unfounded.
 pub(crate) const CUTS_PER_MISJUDGED: usize = 20;
 
-/// Width of a posterior interval, relative to that of the prior on a logarithmic scale, above which the cuts do not identify a parameter.
-/// At half the width of a uniform prior the cuts give one bit of information.
+/// Width of the posterior 90 % interval of a modal parameter, relative to that of its prior on a logarithmic scale,
+/// above which the trial cuts do not identify the parameter. At half the width of a uniform prior the cuts give one bit
+/// of information.
 pub(crate) const VAGUE_SHARE: f64 = 0.5;
 
 // Robots
 
-/// Smallest relative error of a receptance of a robot. The noise of the force in H1, and errors of sensors, windows and sample rates are
-/// common to all lines, so that no scatter shows them. Unfounded.
+/// Smallest relative error of a measured receptance of a robot. The noise of the force in H1, and errors of sensors,
+/// windows and sample rates are common to all lines, so that no scatter shows them. Unfounded.
 pub(crate) const LEAST_RELATIVE_ERROR: f64 = 3e-3;
 
-/// Frequency relative to that of the highest peak, r, below which a receptance counts as static in the first guess. The receptance of the
-/// mode of that peak differs from the static one by r²/(1 − r²) = 19 % at most.
+/// Frequency up to which a receptance of a robot counts as static in the first guess of joint stiffnesses, as a ratio r
+/// to the frequency of the highest peak. The receptance of the mode of that peak differs from the static one by r²/(1 −
+/// r²) = 19 % at most.
 pub(crate) const NEARLY_STATIC: f64 = 0.4;
 
-/// Smallest and largest ratio of a fitted static stiffness of a joint to that of the given robot at which the fitted one is the first
-/// guess. Unfounded.
+/// Smallest and largest ratio of the joint stiffness from static receptances to that of the given robot with which the
+/// fit of a robot's joints starts from the former. Unfounded.
 pub(crate) const GUESSED_STIFFNESS_RATIO: [f64; 2] = [0.1, 10.0];
 
-/// Relative error of the equivalent linearization, which omits higher harmonics. Unfounded.
+/// Relative error of the displacement at the tool that the equivalent linearization of cubic joints predicts; it omits
+/// higher harmonics. Unfounded.
 pub(crate) const LINEARIZATION_ERROR: f64 = 0.1;
 
 // Ambient tests
 
-/// Change of the frequency of a mode to a higher model order up to which the mode is stable: relative change, the usual 1 % of
-/// stabilization diagrams; and in standard deviations, which chance exceeds in 0.3 % of cases.
+/// Change of the natural frequency of an ambient mode to a higher model order up to which the mode is stable. First
+/// value: relative change, the usual 1 % of stabilization diagrams. Second value: in standard deviations, which chance
+/// exceeds in 0.3 % of cases.
 pub(crate) const SAME_MODE: (f64, f64) = (0.01, 3.0);
 
 /// Largest damping ratio of a mode from ambient vibration: a pole that decays faster describes the spectrum of the excitation.
@@ -260,15 +297,15 @@ pub(crate) const LARGEST_AMBIENT_DAMPING: f64 = 0.3;
 
 // Test plans
 
-/// Largest number of tests of a plan. Unfounded.
+/// Largest number of tests in a plan of experiments. Unfounded.
 pub(crate) const MOST_TESTS: usize = 30;
 
-/// Smallest relative reduction of the excess width by a test that is added to a plan: `MOST_TESTS` tests with less reduce it by less
-/// than 3 % together.
+/// Smallest reduction, by one more test of a plan, of the excess of the limits' intervals over the wanted width,
+/// relative to that excess. `MOST_TESTS` tests with less reduce it by less than 3 % together.
 pub(crate) const LEAST_GAIN: f64 = 1e-3;
 
-/// Distance of a lobe above the lowest lobe, in standard deviations of the difference, beyond which it is never the lowest: the
-/// probability is 3e-5.
+/// Distance of a stability lobe above the lowest lobe at a speed, in standard deviations of the difference of their
+/// depths, beyond which it is never the lowest: the probability is 3e-5.
 pub(crate) const NEVER_LOWEST: f64 = 4.0;
 
 #[cfg(test)]

@@ -1,4 +1,5 @@
-//! Weighted least squares on steady motions; the weights depend on the parameters.
+//! Weighted least-squares fit of an equation of motion to dwells of steady motion; the weights depend on the
+//! parameters.
 
 use crate::criteria::LARGEST_MISFIT;
 use nalgebra::{DMatrix, DVector};
@@ -7,10 +8,10 @@ use quietcut_numerics::least_squares::{
     Damping, Idle, LevenbergMarquardt, Minimum, NormalSums, Objective, invert_normal_equations,
 };
 
-/// Reason why a law cannot be fitted to dwells.
+/// Reason why an equation of motion cannot be fitted to dwells of steady motion.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum FitError {
-    /// There are too few dwells for the number of parameters.
+    /// There are too few dwells for the number of parameters of the equation of motion.
     #[error(
         "{found} dwells with motion in every direction are too few for {parameters} parameters; at least {needed} are needed"
     )]
@@ -22,17 +23,17 @@ pub enum FitError {
         /// Number of dwells needed.
         needed: usize,
     },
-    /// The data do not determine the parameters.
+    /// The dwells do not determine the parameters of the equation of motion.
     #[error(
         "the data do not determine all parameters; more force levels, or frequencies on both sides of the resonance, are needed"
     )]
     Undetermined,
-    /// The law has no periodic motion near the measured one at some dwells.
+    /// The equation of motion has no periodic solution near the measured motion at some dwells.
     #[error(
         "the law has no periodic motion near the measured one at {failed} of {all} dwells; another law is needed, or steadier data"
     )]
     NoMotion {
-        /// Number of dwells without a predicted motion.
+        /// Number of dwells at which the equation of motion has no periodic solution near the measured motion.
         failed: usize,
         /// Number of all dwells.
         all: usize,
@@ -51,18 +52,19 @@ pub(super) struct Normal {
     /// Σ rᵀr.
     sum: f64,
     rows: usize,
-    /// Number of dwells at which the law has no motion near the measured one.
+    /// Number of dwells at which the equation of motion has no periodic solution near the measured motion.
     failed: usize,
     dwells: usize,
 }
 
-/// Covariance and misfit of a fit.
+/// Covariance of the parameters of an equation of motion, and misfit of its fit to dwells.
 pub(super) struct Spread {
     /// Covariance of the parameters.
     pub(super) covariance: DMatrix<f64>,
-    /// χ² per degree of freedom: near 1 if the law explains the data.
+    /// χ² per degree of freedom: near 1 if the equation of motion explains the dwells within their noise.
     pub(super) misfit: f64,
-    /// True if the covariance is the sandwich covariance, from the scatter between dwells.
+    /// True if the covariance is the sandwich covariance, from the scatter of the gradient between dwells; false if it
+    /// follows from the noise alone.
     pub(super) robust: bool,
 }
 
@@ -82,8 +84,8 @@ impl Normal {
         }
     }
 
-    /// Adds the whitened residual (measured − predicted) of a dwell and the derivative of the whitened prediction; `None` counts
-    /// the dwell as one without a predicted motion.
+    /// Adds the whitened residual (measured − predicted motion) of a dwell and the derivative of the whitened
+    /// prediction by the parameters; `None` counts the dwell as one without a predicted motion.
     pub(super) fn add(&mut self, dwell: Option<(DVector<f64>, DMatrix<f64>)>) {
         self.dwells += 1;
         let Some((residual, slope)) = dwell else {
@@ -109,10 +111,10 @@ impl Normal {
         self.sum / self.rows.saturating_sub(self.sums.gradient.len()).max(1) as f64
     }
 
-    /// Covariance and misfit of the parameters.
+    /// Covariance of the parameters, and misfit of the fit to the dwells.
     ///
     /// # Errors
-    /// The law has no motion at a dwell, or the data do not determine the parameters.
+    /// The equation of motion has no periodic solution at a dwell, or the dwells do not determine the parameters.
     pub(super) fn spread(&self) -> Result<Spread, FitError> {
         if self.failed > 0 {
             return Err(self.failure());
@@ -133,17 +135,19 @@ impl Normal {
     }
 }
 
-/// The sum of squares over dwells as a function of the parameters.
+/// Sum of squared whitened residuals over all dwells as a function of the parameters of the equation of motion.
 struct DwellFit<F>(F);
 
-/// Step, in standard deviations of the parameters, that ends a fit: far below the width of any interval.
+/// Length of the step, in standard deviations of the parameters, below which a fit to dwells has converged: far below
+/// the width of any interval.
 const LAST_STEP: f64 = 1e-3;
 
-/// χ² per degree of freedom below which a fit is exact: residuals are below a thousandth of the noise, so that rounding of the predicted
-/// motion moves every step.
+/// χ² per degree of freedom below which a fit to dwells is exact: residuals are below a thousandth of the noise, so
+/// that rounding of the predicted motion moves every step.
 const EXACT_MISFIT: f64 = 1e-6;
 
-/// Relative increase of the sum of squares that still counts as no worse: weights change with the parameters.
+/// Relative increase of the sum of squares of a fit to dwells that still counts as no worse: the weights change with
+/// the parameters, and the sum with them.
 const NO_WORSE: f64 = 1e-6;
 
 impl<F: Fn(&DVector<f64>) -> Normal> Objective for DwellFit<F> {
@@ -170,14 +174,15 @@ impl<F: Fn(&DVector<f64>) -> Normal> Objective for DwellFit<F> {
         length < LAST_STEP && next.failed == now.failed
     }
 
-    /// A dwell or two without a motion near the measured one may be found once the parameters are better; half of them are too many.
+    /// A periodic solution that is missing at a few dwells may appear once the parameters are better; if it is missing
+    /// at more than half of the dwells, the fit is given up.
     fn gives_up(&self, _: usize, value: &Normal, _: Option<&Normal>) -> bool {
         value.failed * 2 > value.dwells
     }
 }
 
-/// Parameters with the smallest sum of squares, by Levenberg–Marquardt steps from `start`. The first step adds the fraction
-/// `damping` to the diagonal of the normal matrix; 0 for a start near the minimum.
+/// Parameters with the smallest sum of squares over the dwells, by Levenberg–Marquardt steps from `start`. The first
+/// step adds the fraction `damping` to the diagonal of the normal matrix; 0 for a start near the minimum.
 ///
 /// # Errors
 /// See [`FitError`].
@@ -194,7 +199,8 @@ pub(super) fn minimum(
     }
 }
 
-/// Parameters nearer to the minimum: as [`minimum`], but few steps suffice.
+/// Parameters after at most 25 Levenberg–Marquardt steps towards the smallest sum of squares, without the requirement
+/// that they converge.
 ///
 /// # Errors
 /// The data do not determine the parameters, or too many dwells have no motion.
@@ -215,7 +221,8 @@ fn descend(
     let iteration = LevenbergMarquardt {
         damping: Damping::tenfold(damping),
         iterations_max,
-        // λ = 0, then from 1e-3 to 1e8: the last steps are shorter than [`LAST_STEP`] even where rounding hides the minimum.
+        // The damping λ is tried at 0, then from 1e-3 to 1e8: with the largest, steps are shorter than [`LAST_STEP`]
+        // even where rounding hides the minimum.
         trials_max: 13,
         ridge: 0.0,
         idle: Idle::Refuse,

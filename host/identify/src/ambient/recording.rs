@@ -20,26 +20,28 @@ pub struct Ambient {
     pub turn_hz: Option<f64>,
     /// Reason why a recorded tachometer does not give the spindle angle; the stated speed is used instead, if there is one.
     pub tachometer_fault: Option<String>,
-    /// True if the spindle harmonics are still in the record, because it is too short to separate them from each other.
+    /// True if the spindle harmonics are still in the samples, because the record is too short to separate them from
+    /// each other.
     pub harmonics_remain: bool,
 }
 
-/// Result of the removal of the spindle harmonics.
+/// Result of the removal of the spindle harmonics from a record of ambient vibration.
 struct Removal {
     /// Spindle frequency, Hz; `None` if no speed is known.
     turn_hz: Option<f64>,
     /// Reason why a recorded tachometer does not give the spindle angle.
     tachometer_fault: Option<String>,
-    /// True if the harmonics could not be separated and remain.
+    /// True if the record is too short to separate the spindle harmonics, so that they are still in the samples.
     harmonics_remain: bool,
 }
 
-/// Smallest number of samples per period of the highest frequency after decimation.
+/// Smallest number of samples per period of the highest frequency of the band after the decimation of an ambient
+/// record.
 const PER_PERIOD: f64 = 3.0;
 
 impl Ambient {
-    /// All motion channels of one quantity of a recording up to `high_hz`: accelerations if there are any, else velocities, else
-    /// displacements.
+    /// Motion channels of a recording, band-limited to `high_hz`: all accelerations if there are any, else all
+    /// velocities, else all displacements.
     ///
     /// `None` if the recording has no motion channel.
     pub fn new(recording: &Recording, high_hz: f64) -> Option<Self> {
@@ -140,8 +142,8 @@ fn without_harmonics(recording: &Recording, samples: &mut [Vec<f64>], high_hz: f
     }
 }
 
-/// Decimates by the factor `every`, after a low-pass filter (windowed sinc, Hann) that passes up to a third of the new sample rate
-/// and blocks from two thirds on. Aliases fall above a third of the new rate.
+/// Decimates samples by the factor `every`, after a low-pass filter (windowed sinc, Hann) that passes frequencies up to
+/// a third of the new sample rate and blocks those from two thirds on. Aliases fall above a third of the new rate.
 fn thinned(samples: &[f64], every: usize) -> Vec<f64> {
     if every == 1 {
         return samples.to_vec();

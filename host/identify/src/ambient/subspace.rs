@@ -1,11 +1,12 @@
 //! Output-only modes: covariance-driven stochastic subspace identification (SSI-cov) with intervals.
 //!
-//! The covariances R_k = E[y(t + k) y(t)ᵀ] = C A^(k−1) G of a structure under white noise are those of a free decay. Their block
-//! Hankel matrix is the product of an observability matrix O and a controllability matrix; its left singular vectors are O in some
-//! basis, and A follows from the shift of O (Peeters and De Roeck 1999). White sensor noise affects R₀ alone, which is not used.
-//! The covariance of the result comes from the blocks of the record: the poles are differentiated along the deviation of the Hankel
-//! matrix of each block from the mean (Döhler and Mevel 2013 do the same by perturbation theory). Modal masses are not identified,
-//! because the force is not measured.
+//! The covariances R_k = E[y(t + k) y(t)ᵀ] = C A^(k−1) G of a structure under white noise are those of a free decay.
+//! Their block Hankel matrix is the product of an observability matrix O and a controllability matrix. Its left
+//! singular vectors are O in some basis, and the state matrix A follows from the shift of O by one block row (Peeters
+//! and De Roeck 1999). White sensor noise affects R₀ alone, which is not used. The covariance of the modes comes from
+//! the scatter between blocks of the record: the poles are differentiated along the deviation of the Hankel matrix of
+//! each block from the mean (Döhler and Mevel 2013 do the same by perturbation theory). Modal masses are not
+//! identified, because the force is not measured.
 
 use std::f64::consts::TAU;
 
@@ -20,7 +21,8 @@ use crate::criteria::{LARGEST_AMBIENT_DAMPING, SAME_MODE};
 use crate::student::NINETY_PERCENT;
 use crate::student::ninety_percent;
 
-/// A mode with standard deviations; the half-width of the 90 % interval is 1.645 standard deviations.
+/// A mode from ambient vibration with standard deviations; the half-width of its 90 % intervals is 1.645 standard
+/// deviations.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AmbientMode {
     /// Natural frequency |λ|/2π, Hz.
@@ -36,18 +38,19 @@ pub struct AmbientMode {
 /// Modes identified from a record.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AmbientModes {
-    /// The modes within the band that are stable over the model order, by ascending frequency.
+    /// The modes within the band that keep their frequency at a higher model order, by ascending frequency.
     pub modes: Vec<AmbientMode>,
-    /// Number of states whose singular values exceed the scatter of the blocks.
+    /// Order of the state-space model: the number of singular values of the Hankel matrix that exceed the scatter
+    /// between blocks.
     pub order: usize,
-    /// Number of blocks of the record.
+    /// Number of blocks into which the record was divided; the scatter between them gives the standard deviations.
     pub blocks: usize,
 }
 
-/// Reason why a record gives no modes.
+/// Reason why a record of ambient vibration gives no modes.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum AmbientError {
-    /// The record is too short for the band.
+    /// The record is too short for modes from the lower end of the band on.
     #[error(
         "{seconds:.1} s are too short to identify modes above {low_hz} Hz with intervals; at least {needed_s:.1} s are needed"
     )]
@@ -70,20 +73,23 @@ pub enum AmbientError {
     Poles(#[from] EigenvalueError),
 }
 
-/// Smallest and largest number of blocks of a record. A choice: the smallest number gives the covariance eleven degrees of freedom.
+/// Smallest and largest number of blocks into which an ambient record is divided. A choice: the smallest number gives
+/// the covariance of the modes eleven degrees of freedom.
 const BLOCKS: [usize; 2] = [12, 40];
 
-/// Ratio of block length to longest lag. At this ratio the correlation between neighbouring blocks is negligible.
+/// Ratio of the length of a block of an ambient record to the longest lag of its covariances. At this ratio the
+/// correlation between neighbouring blocks is negligible.
 const BLOCK_LENGTH: usize = 6;
 
-/// Number of periods of the lowest frequency that the lags span. A choice.
+/// Range of lags of the covariances, in periods of the lowest frequency of the band, that a block column of the Hankel
+/// matrix spans. A choice.
 const PERIODS: f64 = 1.5;
 
-/// Step of the numerical derivative along the deviation of a block, relative to that deviation. A choice: far below the scatter of
-/// the mean, far above rounding.
+/// Step of the numerical derivative of the poles along the deviation of a block's Hankel matrix from the mean matrix,
+/// relative to that deviation. A choice: far below the scatter of the mean, far above rounding.
 const STEP: f64 = 1e-3;
 
-/// Identifies the modes of a record in a frequency band, Hz.
+/// Identifies the modes of a record of ambient vibration in the frequency band from `low_hz` to `high_hz`.
 ///
 /// # Errors
 /// The record is too short, or no mode exceeds the noise.
@@ -172,10 +178,12 @@ fn hankel(channels: &[Vec<f64>], range: std::ops::Range<usize>, rows: usize) -> 
 }
 
 impl Record {
-    /// Number of singular values that exceed the noise level; even, since poles come in conjugate pairs.
+    /// Model order: the number of singular values of the Hankel matrix that exceed the noise level. It is even, since
+    /// poles come in conjugate pairs.
     fn order(&self) -> Result<usize, AmbientError> {
         let values = singular_values(self.mean.clone())?;
-        // Difference of the means of the even and of the odd blocks, halved: pure noise of the size of the noise of the mean.
+        // Half the difference between the mean Hankel matrices of the even and of the odd blocks: pure noise, as large
+        // as the noise of the mean of all blocks.
         let count = self.of_blocks.len() as f64;
         let mut noise = DMatrix::zeros(self.mean.nrows(), self.mean.ncols());
         for (index, block) in self.of_blocks.iter().enumerate() {
@@ -183,11 +191,12 @@ impl Record {
         }
         let level = singular_values(noise)?.max();
         let above = values.iter().filter(|value| **value > level).count();
-        // The shift requires fewer states than rows.
+        // The shift of the observability matrix requires fewer states than rows.
         Ok((above.div_ceil(2) * 2).min(self.mean.nrows() - self.channels - 4) & !1)
     }
 
-    /// Poles of a Hankel matrix in the upper half-plane, rad/s; `None` if the model of this order does not exist.
+    /// Poles with positive imaginary part of the state-space model that follows from a Hankel matrix, rad/s; `None` if
+    /// no model of this order exists.
     fn poles(&self, hankel: &DMatrix<f64>, order: usize) -> Result<Option<Vec<Complex64>>, AmbientError> {
         let Some(u) = decompose(hankel.clone(), Vectors::Left)?.u else {
             return Ok(None);
@@ -213,7 +222,8 @@ impl Record {
         ))
     }
 
-    /// Modes within the band, with standard deviations from the deviations of the blocks.
+    /// Modes of the mean Hankel matrix within the band; their standard deviations come from the deviations of the
+    /// blocks.
     fn modes(&self, order: usize) -> Result<Vec<AmbientMode>, AmbientError> {
         let [low_hz, high_hz] = self.band_hz;
         let is_mode = |pole: &Complex64| {

@@ -1,9 +1,9 @@
-//! Chip thickness of every tooth in a recorded cut, from the surface that earlier tooth passings left.
+//! Chip thickness of every tooth in a recorded cut, measured from the surface that earlier tooth passings left.
 
 use crate::cutting::force_test::CuttingTest;
 use quietcut_model::milling::Immersion;
 
-/// Chip of one tooth at one sample.
+/// Chip that one tooth cuts at one sample of a recorded cut.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Chip {
     /// Immersion angle, rad.
@@ -12,12 +12,12 @@ pub struct Chip {
     pub thickness_m: f64,
     /// Index of the tooth that cuts the chip, from 0.
     pub tooth: usize,
-    /// Index of the tooth that left the surface which the chip is cut from.
+    /// Index of the earlier tooth that left the surface from which the chip is cut.
     pub ahead: usize,
 }
 
-/// A point of the surface. `reach_m` is its height along the chip thickness direction, relative to a tooth without runout, in the
-/// feed position of the current tooth passing.
+/// A point of the surface that the teeth have left. `reach_m` is its height along the chip thickness direction, m,
+/// relative to a tooth without runout, in the feed position of the current tooth passing.
 #[derive(Clone, Copy)]
 struct SurfacePoint {
     phi: f64,
@@ -25,11 +25,12 @@ struct SurfacePoint {
     owner: usize,
 }
 
-/// The chips cut at every sample; `runout_m` is the radial offset r of each tooth.
+/// The chips cut at every sample of a cutting test; `runout_m` is the radial offset r of each tooth, m.
 ///
-/// In tooth passing k the tooth (−k mod N) moves over the arc of engagement. Without feed its edge stands at p(φ) = (sin φ, cos φ,
-/// 0)·u sin γ − z cos γ + r sin γ (thesis eq. 3.1). The surface is S_k = max(p_k, S_(k−1) − f sin φ sin γ), and the chip thickness
-/// p_k − S_(k−1) + f sin φ sin γ where that is positive.
+/// In tooth passing k the tooth (−k mod N) moves over the arc of engagement. Without feed, and with the tool displaced
+/// by u, its edge stands at p(φ) = (sin φ, cos φ, 0)·u sin γ − z cos γ + r sin γ, with the edge angle γ (thesis eq.
+/// 3.1). With the feed per tooth f, the surface is S_k = max(p_k, S_(k−1) − f sin φ sin γ), and the chip thickness p_k
+/// − S_(k−1) + f sin φ sin γ where that is positive.
 pub fn chips(test: &CuttingTest, runout_m: &[f64]) -> Vec<Vec<Chip>> {
     let mut chips = vec![Vec::new(); test.angle.len()];
     let (Some(&first), Some(&last)) = (test.angle.first(), test.angle.last()) else {
@@ -84,8 +85,8 @@ pub fn chips(test: &CuttingTest, runout_m: &[f64]) -> Vec<Vec<Chip>> {
     chips
 }
 
-/// The surface at the angle `phi`: by the cubic through four neighbouring points that one tooth left, else by a straight line.
-/// `place` is the index of the last point before `phi` and only grows.
+/// The machined surface at the immersion angle `phi`: by the cubic through four neighbouring points that one tooth
+/// left, else by a straight line. `place` is the index of the last point before `phi` and only grows.
 fn surface_at(surface: &[SurfacePoint], phi: f64, place: &mut usize) -> Option<SurfacePoint> {
     while *place + 1 < surface.len() && surface[*place + 1].phi <= phi {
         *place += 1;

@@ -1,10 +1,11 @@
 //! Force coefficients from cutting tests.
 //!
-//! At every instant F = Σ a {(K_tc e_t + K_rc e_r + K_ac e_a)(φ) h + (K_te e_t + K_re e_r + K_ae e_a)(φ)/sin γ}, summed over the
-//! engaged teeth (thesis eqs 3.2 to 3.4). The chip thickness h comes from [`chips`] and contains the runout of each tooth. Least
-//! squares over all samples, each channel weighted with its residual variance. For comparison the mean-force method (Altintas):
-//! forces averaged over a revolution, regressed on the feed. Runout and stable vibration do not affect it as long as every tooth
-//! stays in contact. Intervals come from the scatter between revolutions.
+//! At every instant F = Σ a {(K_tc e_t + K_rc e_r + K_ac e_a)(φ) h + (K_te e_t + K_re e_r + K_ae e_a)(φ)/sin γ}, summed
+//! over the engaged teeth, with the axial depth a and the edge angle γ (thesis eqs 3.2 to 3.4). The chip thickness h
+//! comes from [`chips`] and contains the runout of each tooth. The coefficients minimize the squared residual of the
+//! force over all samples; each channel is weighted with its residual variance. The mean-force method (Altintas) serves
+//! for comparison: forces averaged over a revolution are regressed on the feed. Runout and stable vibration do not
+//! affect it as long as every tooth stays in contact. Intervals come from the scatter between revolutions.
 
 use std::f64::consts::TAU;
 
@@ -22,7 +23,7 @@ use crate::student::NINETY_PERCENT;
 use crate::student::ninety_percent;
 use quietcut_model::milling::Runout;
 
-/// Keys of the coefficients in a case: three cutting coefficients in MPa, three edge coefficients in N/mm.
+/// Keys of the force coefficients in a case: three cutting coefficients in MPa, three edge coefficients in N/mm.
 pub const KEYS: [&str; 6] = [
     "ktc_mpa",
     "krc_mpa",
@@ -32,7 +33,8 @@ pub const KEYS: [&str; 6] = [
     "kae_n_per_mm",
 ];
 
-/// A value with its standard deviation; the half-width of the 90 % interval is 1.645 standard deviations.
+/// A force coefficient or radial tooth offset with its standard deviation; the half-width of the 90 % interval is 1.645
+/// standard deviations.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Value {
     /// The estimated value.
@@ -41,33 +43,36 @@ pub struct Value {
     pub deviation: f64,
 }
 
-/// Length of the last step below which the fit has converged, in standard deviations. A choice.
+/// Length of a Gauss–Newton step below which the fit of force coefficients has converged, in standard deviations of the
+/// parameters. A choice.
 const SETTLED: f64 = 1e-2;
 
-/// Length of the last step, in standard deviations, up to which a fit is accepted if chips at the edge of contact change with every
-/// step. A choice.
+/// Largest length of the last Gauss–Newton step with which the fit of force coefficients is accepted, in standard
+/// deviations of the parameters. Chips at the edge of contact may change with every step. A choice.
 const SETTLED_ENOUGH: f64 = 0.3;
 
 /// Result of the fit: force coefficients from a set of cutting tests.
 #[derive(Clone, Debug)]
 pub struct Fit {
-    /// The coefficients in the order of [`KEYS`]; `None` for the axial ones if no axial force was measured.
+    /// Force coefficients from instantaneous forces, in the order of [`KEYS`]; `None` for the axial ones if no axial
+    /// force was measured.
     pub coefficients: [Option<Value>; 6],
-    /// The coefficients from forces averaged over revolutions; `None` if all feeds are equal.
+    /// Force coefficients from forces averaged over revolutions, in the order of [`KEYS`]; `None` if all feeds are
+    /// equal.
     pub averaged: Option<[Option<Value>; 6]>,
-    /// Radial offset of each tooth from the mean of all teeth, m.
+    /// Radial offset of the edge of each tooth from the mean of all teeth, m.
     pub runout_m: Vec<Value>,
     /// NRMSE of the force.
     pub relative_error: f64,
     /// Number of revolutions used.
     pub revolutions: usize,
-    /// Number of different feeds per tooth.
+    /// Number of different feeds per tooth among the tests.
     pub feeds: usize,
     /// Mean feed per tooth of the tests, m.
     pub feed_per_tooth_m: f64,
 }
 
-/// Reason why the fit gives no result.
+/// Reason why the fit of force coefficients gives no result.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ForceCoefficientError {
     /// The tests have different numbers of teeth.
@@ -78,7 +83,7 @@ pub enum ForceCoefficientError {
         "no fz was measured, and with an edge angle of {0:.1} degrees radial and axial forces act in one direction in the plane of the tool; fz, or a square end mill (90 degrees), is needed"
     )]
     NoAxialForce(f64),
-    /// The data do not determine the coefficients.
+    /// The cutting tests do not determine the force coefficients.
     #[error(
         "the tests do not determine the coefficients; cuts at two or more feeds, in which teeth cut air now and then, are needed"
     )]
@@ -88,21 +93,22 @@ pub enum ForceCoefficientError {
     NotConverged,
 }
 
-/// Parameters of the fit: coefficients, and radial offsets of the teeth.
+/// Parameters of the fit: force coefficients, and radial offsets of the teeth.
 #[derive(Clone)]
 struct State {
-    /// Coefficients in the order of [`KEYS`].
+    /// Force coefficients in the order of [`KEYS`].
     coefficients: [f64; 6],
     runout_m: Vec<f64>,
 }
 
-/// Normal equations and residuals, summed over samples.
+/// Normal equations and squared force residuals of a cutting test, summed over its samples.
 struct Sums {
     matrix: DMatrix<f64>,
     gradient: DVector<f64>,
-    /// Σ g gᵀ over revolutions, with g the gradient of one revolution.
+    /// Σ g gᵀ over revolutions, with g the gradient of one revolution's half sum of squares by the parameters; the
+    /// sandwich covariance uses it.
     scatter: DMatrix<f64>,
-    /// Sum of squared residuals in each direction, N².
+    /// Sum of squared force residuals in feed, normal and axial direction, N².
     left: Vector3<f64>,
     all: f64,
     samples: usize,
@@ -158,11 +164,11 @@ pub fn fit(tests: &[CuttingTest]) -> Result<Fit, ForceCoefficientError> {
         coefficients: [0.0; 6],
         runout_m: vec![0.0; first.teeth],
     };
-    // With zero coefficients runout has no effect, so the first step fits the coefficients alone.
+    // With all force coefficients zero the runout has no effect, so the first step fits the coefficients alone.
     let linear = fitter.step(&start, &fitter.sums(&start))?.0;
     fitter.weigh(&linear);
     let state = fitter.settle(linear)?;
-    // The residual variances of the converged fit give better weights.
+    // The residual variances of the converged fit are better weights than those of the first step.
     fitter.weigh(&state);
     let state = fitter.settle(state)?;
     Ok(fitter.finish(&state))
@@ -180,7 +186,7 @@ impl Fitter<'_> {
         (0..6).filter(|index| self.has_axial || index % 3 != 2).collect()
     }
 
-    /// Number of parameters: coefficients, then the radial offset of every tooth but the last.
+    /// Number of fitted parameters: force coefficients, then the radial offset of every tooth but the last.
     fn size(&self) -> usize {
         self.active().len() + self.teeth - 1
     }
@@ -265,10 +271,10 @@ impl Fitter<'_> {
         sums
     }
 
-    /// The parameters after a Gauss–Newton step, and the length of the step in standard deviations.
+    /// The parameters after one Gauss–Newton step, and the length of the step in standard deviations of the parameters.
     fn step(&self, state: &State, sums: &Sums) -> Result<(State, f64), ForceCoefficientError> {
         let active = self.active();
-        // With zero coefficients the radial offsets have no effect and are not fitted.
+        // With all force coefficients zero the radial offsets have no effect and are not fitted.
         let known = if state.coefficients == [0.0; 6] {
             active.len()
         } else {
@@ -292,7 +298,8 @@ impl Fitter<'_> {
         Ok((next, step.dot(&(matrix * &step)).max(0.0).sqrt()))
     }
 
-    /// Gauss–Newton iteration without damping: the forces are linear in the coefficients, and bilinear in coefficients and runout.
+    /// Gauss–Newton iteration without damping: the forces are linear in the force coefficients, and bilinear in
+    /// coefficients and runout.
     fn settle(&self, mut state: State) -> Result<State, ForceCoefficientError> {
         let mut length = f64::INFINITY;
         for _ in 0..30 {
@@ -308,14 +315,14 @@ impl Fitter<'_> {
         }
     }
 
-    /// Sets the weight of each direction of each test to the inverse of its residual variance.
+    /// Sets the weight of each force direction of each test to the inverse of its residual variance.
     fn weigh(&mut self, state: &State) {
         let variances: Vec<Vector3<f64>> = self
             .tests
             .iter()
             .map(|prepared| {
                 let sums = self.sums_of(prepared, state);
-                // An exact fit would give an infinite weight; the variance is at least that of rounding.
+                // An exact fit would give an infinite weight; the residual variance is at least that of rounding.
                 let least = 1e-20 * sums.all / sums.samples.max(1) as f64;
                 (sums.left / sums.samples.max(1) as f64).map(|variance| variance.max(least))
             })
@@ -388,8 +395,8 @@ impl Fitter<'_> {
         feeds.len()
     }
 
-    /// The coefficients from mean forces, by least squares on two or three equations per revolution; `None` if the tests do not
-    /// determine them.
+    /// Force coefficients from mean forces, by least squares on two or three equations per revolution; `None` if the
+    /// tests do not determine them.
     fn averaged(&self) -> Option<[Option<Value>; 6]> {
         let active = self.active();
         let directions = if self.has_axial { 3 } else { 2 };
@@ -432,8 +439,8 @@ impl Fitter<'_> {
 }
 
 impl Fit {
-    /// Keys of the coefficients whose values from mean forces and from instantaneous forces differ by more than the sum of both
-    /// half-widths and by more than 1/20 of the largest coefficient of their kind.
+    /// Keys of the force coefficients whose values from mean forces and from instantaneous forces differ by more than
+    /// the sum of both 90 % half-widths plus 1/20 of the largest coefficient of their kind (cutting or edge).
     pub fn apart(&self) -> Vec<&'static str> {
         let averaged = self.averaged.unwrap_or_default();
         let largest = |values: &[Option<Value>]| {
@@ -441,7 +448,8 @@ impl Fit {
             sizes.fold(0.0, f64::max)
         };
         let cutting = largest(&self.coefficients[..3]);
-        // Largest edge coefficient or chip force per depth, N/mm: MPa times m gives 10³ N/mm.
+        // Base for differences of edge coefficients: the largest edge coefficient, or the force of the mean feed per
+        // tooth by the largest cutting coefficient, N per mm of depth; MPa times m gives 10³ N/mm.
         let edge = largest(&self.coefficients[3..]).max(1e3 * self.feed_per_tooth_m * cutting);
         let differs = |&(index, _): &(usize, &'static str)| {
             let (Some(one), Some(other)) = (self.coefficients[index], averaged[index]) else {
@@ -484,8 +492,8 @@ pub fn runout(fit: &Fit) -> Option<Runout> {
     })
 }
 
-/// Factor on standard deviations for few revolutions: ratio of Student's 90 % quantile to the normal one, times the correction for
-/// the number of fitted parameters.
+/// Factor by which standard deviations are enlarged for few revolutions: the ratio of Student's 90 % quantile to the
+/// normal one, times √(n/(n − p)) for n revolutions and p fitted parameters.
 fn few(revolutions: usize, parameters: usize) -> f64 {
     let count = revolutions as f64;
     let taken = count / (count - parameters as f64).max(1.0);

@@ -9,7 +9,8 @@ use quietcut_model::milling::EdgeAngle;
 use quietcut_model::structure::feed_axes;
 use quietcut_recording::{Quantity, Recording, RecordingError, SpindleAngle};
 
-/// A recorded cut in feed, normal and axial direction, in SI units. Sample 0 is the first sample with a spindle angle.
+/// A recorded cut with forces in feed, normal and axial direction, in SI units. Sample 0 is the first sample with a
+/// spindle angle.
 #[derive(Clone, Debug)]
 pub struct CuttingTest {
     /// Axial depth, m.
@@ -30,28 +31,29 @@ pub struct CuttingTest {
     pub force: Vec<Vector3<f64>>,
     /// False if the axial force was not measured; its entries are 0.
     pub has_axial_force: bool,
-    /// Displacement of the tool, m; `None` where none was measured.
+    /// Displacement of the tool at each sample in feed, normal and axial direction, m; `None` where none was measured.
     pub displacement: Option<Vec<Vector3<f64>>>,
-    /// First sample and end sample of full engagement; whole revolutions.
+    /// First sample of full engagement, and the sample after its last one; both bound whole revolutions.
     pub full_cut: [usize; 2],
 }
 
-/// Tool and feed settings that the recording does not contain.
+/// Tool and feed settings of a cutting test that the recording does not contain.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Setup {
     /// Edge angle γ, degrees.
     pub edge_angle_deg: f64,
-    /// Angle from the machine's x to the feed, degrees.
+    /// Angle from the machine's x axis to the feed direction, degrees.
     pub feed_direction_deg: f64,
     /// Start and end of full engagement, s; `None` derives them from the force.
     pub full_cut_s: Option<[f64; 2]>,
 }
 
 impl CuttingTest {
-    /// The cutting test in a recording.
+    /// The cutting test in a recording with forces and a tachometer.
     ///
     /// # Errors
-    /// No tachometer, no fx or fy, a cut that the sidecar does not describe completely, or too few revolutions of full engagement.
+    /// No tachometer, no fx or fy, a cut that the sidecar does not describe completely, or too few revolutions of full
+    /// engagement.
     pub fn new(recording: &Recording, setup: Setup) -> Result<Self, RecordingError> {
         let cut = recording.sidecar.cut.unwrap_or_default();
         let said = |value: Option<f64>, key: &str| {
@@ -120,7 +122,7 @@ impl CuttingTest {
         TAU / self.teeth as f64
     }
 
-    /// Index of the first sample at or beyond a spindle angle.
+    /// Index of the first sample whose spindle angle is at or beyond `angle`, rad.
     pub fn sample_at(&self, angle: f64) -> usize {
         self.angle.partition_point(|&known| known < angle)
     }
@@ -140,7 +142,8 @@ impl CuttingTest {
             .collect()
     }
 
-    /// Finds the revolutions of full engagement; within `window` if it is given. `None` if there are too few.
+    /// Finds the revolutions of full engagement, within the samples of `window` if it is given. `None` if there are too
+    /// few.
     fn find_full_cut(&mut self, window: Option<[usize; 2]>) -> Option<()> {
         let (first, last) = (*self.angle.first()?, *self.angle.last()?);
         // The first revolution generates the surface that the second one cuts.
@@ -157,13 +160,15 @@ impl CuttingTest {
             let sizes: Vec<f64> = revolutions.iter().map(size).collect();
             let mut sorted = sizes.clone();
             sorted.sort_by(f64::total_cmp);
-            // More than a quarter of the revolutions are in full engagement, so the upper quartile of the forces belongs to it.
+            // At least a quarter of the revolutions are assumed to be in full engagement, so that the upper quartile of
+            // their mean forces is that of full engagement.
             let full = *sorted.get(3 * sorted.len() / 4)?;
             let above = |share: f64| sizes.iter().position(|size| *size > share * full);
             let below = |share: f64| sizes.iter().rposition(|size| *size > share * full);
             let (rise, fall) = (above(ENGAGED_SHARE)?, below(ENGAGED_SHARE)?);
-            // Revolutions from a tenth to nine tenths of the full force. Half as many more are left out after them: with a linear
-            // rise, the last tenth would take an eighth as many.
+            // Revolutions of the entry, in which the mean force grows from a tenth to nine tenths of that in full
+            // engagement. Half as many more are left out after them: with a linear rise, the last tenth would take an
+            // eighth as many.
             let way_in = rise - above(1.0 - ENGAGED_SHARE)?;
             let way_out = below(1.0 - ENGAGED_SHARE)? - fall;
             let beyond = |way: usize| if way > 0 { way / 2 + 2 } else { 0 };

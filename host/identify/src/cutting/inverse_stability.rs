@@ -1,10 +1,12 @@
 //! Modes from trial cuts that chattered or stayed stable (inverse stability), without a force sensor.
 //!
-//! The mode shapes are those of a first guess; natural frequencies, damping ratios and stiffnesses are unknown. At every cut the
-//! structure has a dominant Floquet multiplier μ (characteristic multiplier): the cut chatters if |μ| > 1, at the frequency given
-//! by μ. With the errors of the set depth and the measured frequency every structure has a likelihood. The posterior distribution,
-//! with a log-uniform prior within [`PriorFactors`], is sampled by sequential Monte Carlo (Del Moral, Doucet and Jasra 2006). With few
-//! cuts the intervals are wide. If several separate regions explain the cuts, the sample contains all of them.
+//! The mode shapes are those of a first guess; natural frequencies, damping ratios and stiffnesses are unknown. At
+//! every cut the structure has a dominant Floquet multiplier μ (characteristic multiplier): the cut chatters if |μ| >
+//! 1, at the frequency given by μ. With the errors of the set depth and the measured chatter frequency, every structure
+//! has a likelihood of the observed outcomes. The posterior distribution, with a log-uniform prior within
+//! [`PriorFactors`], is sampled by sequential Monte Carlo (Del Moral, Doucet and Jasra 2006). With few cuts the
+//! intervals are wide. If structures in several separate regions of the parameters explain the cuts, the sample
+//! contains all of these regions.
 
 use std::f64::consts::TAU;
 
@@ -28,7 +30,8 @@ use crate::student::NINETY_PERCENT;
 use quietcut_model::structure::{Direction, FirstOrder, Mode};
 use quietcut_stability::{Problem, StabilityError, point};
 
-/// Width of the prior: largest factor, up or down, between a parameter and its first guess.
+/// Width of the prior distribution of the modal parameters: for each kind, the largest factor, up or down, from the
+/// first guess.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PriorFactors {
     /// Largest factor of natural frequencies.
@@ -49,7 +52,7 @@ impl Default for PriorFactors {
     }
 }
 
-/// Measurement errors of the trial cuts.
+/// Relative standard deviations of the measured quantities of the trial cuts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CutErrors {
     /// Relative standard deviation of depths.
@@ -58,32 +61,33 @@ pub struct CutErrors {
     pub frequency: f64,
 }
 
-/// Prior and posterior distribution of a modal parameter.
+/// Prior and posterior distribution of a modal parameter, in the unit of the parameter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Posterior {
     /// Median of the posterior.
     pub value: f64,
-    /// 5 % and 95 % quantiles of the posterior.
+    /// 5 % and 95 % quantiles of the posterior distribution of the parameter.
     pub ci90: [f64; 2],
-    /// 5 % and 95 % quantiles of the prior.
+    /// 5 % and 95 % quantiles of the prior distribution of the parameter.
     pub prior: [f64; 2],
 }
 
 impl Posterior {
-    /// Standard deviation of the logarithm, from the posterior interval of a normal distribution.
+    /// Standard deviation of the logarithm of the parameter, as if its posterior distribution were log-normal with the
+    /// same 90 % interval.
     pub fn deviation(&self) -> f64 {
         (self.ci90[1] / self.ci90[0]).ln() / (2.0 * NINETY_PERCENT)
     }
 
-    /// True if the posterior interval is wider than half of the prior interval on a logarithmic scale: the cuts do not identify the
-    /// parameter.
+    /// True if the posterior interval of the parameter is wider than half of the prior interval on a logarithmic scale:
+    /// the cuts do not identify it.
     pub fn is_vague(&self) -> bool {
         let width = |[low, high]: [f64; 2]| (high / low).ln();
         width(self.ci90) > VAGUE_SHARE * width(self.prior)
     }
 }
 
-/// Posterior distribution of the parameters of one mode.
+/// Posterior distribution of frequency, damping ratio and stiffness of one mode.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InverseMode {
     /// Natural frequency, Hz.
@@ -102,7 +106,7 @@ pub enum InverseError {
     /// The first guess has no oscillating mode.
     #[error("the first guess has no oscillating mode with a mode shape")]
     NoModes,
-    /// No structure within the prior explains the cuts.
+    /// No structure within the prior agrees with the observed outcomes of the trial cuts.
     #[error(
         "no structure within the prior explains the cuts: the best one misjudges {0} of {1}; another first guess, or other force coefficients, are needed"
     )]
@@ -112,25 +116,29 @@ pub enum InverseError {
     Stability(#[from] StabilityError),
 }
 
-/// Number of particles, each of which is one structure. A choice.
+/// Number of particles of the sequential Monte Carlo sampler, each of which is one structure. A choice.
 const PARTICLES: usize = 192;
 
-/// Effective sample size that a tempering step keeps, as a fraction of the particles. A choice.
+/// Effective sample size that one tempering step of the sequential Monte Carlo sampler keeps, as a fraction of the
+/// number of particles. A choice.
 const EFFECTIVE: f64 = 0.5;
 
-/// Number of Metropolis moves of every particle after a tempering step, and after the last step. A choice.
+/// Number of Metropolis moves of every particle of the sequential Monte Carlo sampler: after each tempering step but
+/// the last, and after the last. A choice.
 const MOVES: [usize; 2] = [2, 4];
 
-/// Family of structures over the vector θ: logarithms of factors on frequency, damping and stiffness of each mode of the first
-/// guess.
+/// Family of structures with the parameters θ: logarithms of the factors by which frequency, damping and stiffness of
+/// each mode differ from the first guess.
 struct Family<'a> {
     start: &'a Problem,
-    /// Pole and projector of each mode.
+    /// For each mode of the first guess, its pole λ, rad/s, and its projector P in the first-order form.
     modes: Vec<(Complex64, DMatrix<Complex64>)>,
-    /// The trial cuts, those with a chatter frequency first: they restrict the structure most.
+    /// The trial cuts, those with a measured chatter frequency first: they restrict the parameters of the structure
+    /// most.
     cuts: Vec<ObservedCut>,
     errors: CutErrors,
-    /// Logarithms of the prior factors of [`PriorFactors`]: frequency, damping and stiffness for each mode.
+    /// Largest magnitude of each component of θ: the logarithms of the prior factors for frequency, damping and
+    /// stiffness of each mode.
     half_widths: Vec<f64>,
 }
 
@@ -151,7 +159,8 @@ pub fn modes(
         .iter()
         .map(|part| {
             let (real, turned) = (part.moved(Complex64::ONE), part.moved(Complex64::I));
-            // 2 Re P and 2 Re(iP) = −2 Im P give the projector P.
+            // P is the projector of the mode. 2 Re P and 2 Re(iP) = −2 Im P, computed from the first-order form, give
+            // it.
             let projector = real.zip_map(&turned, |re, im| Complex64::new(0.5 * re, -0.5 * im));
             (part.pole, projector)
         })
@@ -178,11 +187,12 @@ pub fn modes(
     Ok(family.posteriors(&particles))
 }
 
-/// The modes of `start` in the directions of the machine, with the posterior medians `found`, for a case file.
+/// The modes of `start` in the directions of the machine, with the posterior medians `found` of their parameters, for a
+/// case file.
 ///
-/// Shapes are those of the first guess. Left shapes carry the residue, about ω/2ik, and its standard deviation. Standard deviations
-/// are those of the logarithms; the posterior correlation between parameters is lost. Two modes with one pole, as of a round tool,
-/// become two modes of equal frequency.
+/// Shapes are those of the first guess. Left shapes carry the residue, about ω/2ik, and its standard deviation. The
+/// standard deviation of a parameter is that of its logarithm times the median; the posterior correlation between
+/// parameters is lost. Two modes with one pole, as of a round tool, become two modes of equal frequency.
 pub fn identified_modes(start: &FirstOrder, found: &[InverseMode]) -> (Vec<Direction>, Vec<IdentifiedMode>) {
     let axes: Vec<usize> = (0..3)
         .filter(|&axis| start.c.row(axis).amax() > 0.0 && start.b.column(axis).amax() > 0.0)
@@ -203,7 +213,7 @@ pub fn identified_modes(start: &FirstOrder, found: &[InverseMode]) -> (Vec<Direc
         let all = rest.norm();
         while let Some((mut right, mut left, _)) = rank_one(&rest) {
             let taken = DMatrix::from_fn(axes.len(), axes.len(), |i, j| right[i] * left[j]);
-            // The residue is used up: the rest is rounding.
+            // All rank-one parts of the residue have been extracted: the remainder is rounding.
             if taken.norm() <= 1e-9 * all {
                 break;
             }
@@ -230,7 +240,7 @@ pub fn identified_modes(start: &FirstOrder, found: &[InverseMode]) -> (Vec<Direc
 }
 
 impl Family<'_> {
-    /// The stability problem of the structure θ.
+    /// The stability problem of the structure with the parameters θ.
     fn problem(&self, theta: &[f64]) -> Problem {
         let mut problem = self.start.clone();
         for ((pole, projector), factors) in self.modes.iter().zip(theta.chunks_exact(3)) {
@@ -241,7 +251,7 @@ impl Family<'_> {
             );
             let moved = Complex64::new(-zeta, (1.0 - zeta * zeta).sqrt()) * omega;
             problem.structure.a += projector.map(|entry| 2.0 * ((moved - pole) * entry).re);
-            // The residue of a mode is about ω/2ik, so it scales with frequency over stiffness.
+            // The residue of a mode is about ω/2ik with the stiffness k, so it scales with frequency over stiffness.
             let residue = frequency / stiffness;
             let part = projector.map(|entry| 2.0 * entry.re) * &self.start.structure.b;
             problem.structure.b += part * (residue - 1.0);
@@ -249,9 +259,10 @@ impl Family<'_> {
         problem
     }
 
-    /// Log-likelihood of the structure θ, and the number of cuts that it misjudges.
+    /// Log-likelihood of the observed outcomes for the structure θ, and the number of trial cuts that the structure
+    /// misjudges.
     ///
-    /// Every cut lowers the sum. Once the sum has fallen to `least`, the evaluation stops and returns −∞.
+    /// Every cut lowers the log-likelihood. Once it has fallen to `least`, the evaluation stops and returns −∞.
     fn likelihood(&self, theta: &[f64], least: f64) -> (f64, usize) {
         let problem = self.problem(theta);
         let mut sum = 0.0;
@@ -271,7 +282,8 @@ impl Family<'_> {
                 let Ok(low) = point(&problem, cut.rpm, cut.depth_mm / step) else {
                     return (f64::NEG_INFINITY, self.cuts.len());
                 };
-                // Growth rate ln |μ| is interpolated linearly in depth; the bound on its slope keeps the deviation finite.
+                // The growth rate ln |μ| is interpolated linearly over the logarithm of the depth. A least slope keeps
+                // the distance to the limit, in standard deviations of the depth, finite.
                 let low_growth = low.multiplier_abs.ln();
                 let slope = (0.5 * (high_growth - low_growth)).abs().max(1e-4);
                 0.5 * (low_growth + high_growth) / slope
@@ -340,7 +352,7 @@ impl Family<'_> {
         particles
     }
 
-    /// Metropolis moves of a particle with alternating step lengths.
+    /// Metropolis moves of a particle with alternating step lengths; returns the moved particle and its log-likelihood.
     fn walk(
         &self,
         (mut theta, mut sum): (Vec<f64>, f64),
@@ -392,7 +404,7 @@ impl Family<'_> {
             .iter()
             .enumerate()
             .map(|(mode, (pole, projector))| {
-                // Static compliance of this mode: −2 Re(C P B/λ).
+                // Static compliance matrix of this mode alone, m/N: −2 Re(C P B/λ).
                 let at_rest = projector.map(|entry| -2.0 * (entry / pole).re);
                 let compliance = &structure.c * at_rest * &structure.b;
                 let stiffness = 1.0 / (0..3).map(|axis| compliance[(axis, axis)]).fold(0.0, f64::max);
@@ -427,7 +439,8 @@ fn normal_share(deviations: f64) -> f64 {
     0.5 * libm::erfc(-deviations * std::f64::consts::FRAC_1_SQRT_2)
 }
 
-/// Normalized particle weights after an increment `step` of the likelihood exponent.
+/// Normalized particle weights after the likelihood exponent of the tempering grows by `step`; `sums` are the
+/// log-likelihoods.
 fn weights(sums: &[f64], step: f64) -> Vec<f64> {
     let best = sums.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let raw: Vec<f64> = sums.iter().map(|sum| (step * (sum - best)).exp()).collect();
@@ -435,7 +448,8 @@ fn weights(sums: &[f64], step: f64) -> Vec<f64> {
     raw.iter().map(|weight| weight / total).collect()
 }
 
-/// Next increment of the likelihood exponent (tempering): the largest one that keeps the effective sample size.
+/// Next increment of the likelihood exponent of the tempering: the largest one that keeps the effective sample size of
+/// the particles.
 fn next_step(sums: &[f64], share: f64) -> f64 {
     let effective = |step: f64| 1.0 / weights(sums, step).iter().map(|w| w * w).sum::<f64>();
     let enough = EFFECTIVE * sums.len() as f64;
@@ -443,7 +457,7 @@ fn next_step(sums: &[f64], share: f64) -> f64 {
     if effective(high) >= enough {
         return high;
     }
-    // To 1e-12 of the step: far below the scatter of the particles.
+    // The bisection stops at 1e-12 of the range of increments: far below the scatter of the particles.
     let [low, _] = bisection([0.0, high], 1e-12 * high, |step| effective(step) >= enough);
     // A minimal increment guarantees that the tempering ends.
     low.max(1e-6).min(1.0 - share)
@@ -465,7 +479,7 @@ fn systematic(weights: &[f64], first: f64) -> Vec<usize> {
         .collect()
 }
 
-/// Cholesky factor of the covariance of the particles.
+/// Cholesky factor of the covariance of the particles' parameters θ.
 fn scatter_root(particles: &[Vec<f64>]) -> DMatrix<f64> {
     let size = particles.first().map_or(0, Vec::len);
     let count = particles.len() as f64;

@@ -1,8 +1,8 @@
-//! Trial cuts with the observed side of the stability limit.
+//! Trial cuts with the observed side of the stability limit: chatter or stable.
 
 use quietcut_recording::cut_table::{Outcome, TrialCut};
 
-/// A trial cut with its observed outcome.
+/// A trial cut with its observed outcome: chatter or stable.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ObservedCut {
     /// Spindle speed, rev/min.
@@ -16,7 +16,8 @@ pub struct ObservedCut {
 }
 
 impl ObservedCut {
-    /// The observation in a row of a table of trial cuts; `None` for a marginal cut, which may lie on either side of the limit.
+    /// Reads one row of a table of trial cuts; `None` for a marginal cut, which may lie on either side of the stability
+    /// limit.
     pub fn new(cut: &TrialCut) -> Option<Self> {
         Some(Self {
             rpm: cut.rpm,

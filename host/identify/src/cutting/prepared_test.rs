@@ -1,4 +1,4 @@
-//! A cutting test with the quantities that stay constant during the fit of the coefficients.
+//! A cutting test with the quantities that do not change while its force coefficients are fitted.
 
 use std::collections::BTreeSet;
 use std::f64::consts::TAU;
@@ -8,22 +8,23 @@ use nalgebra::Vector3;
 use crate::cutting::force_test::CuttingTest;
 use quietcut_model::milling::{Immersion, Material, RotatingVector, ToothForce};
 
-/// A cutting test with the quantities that stay constant during the fit.
+/// A cutting test with the quantities that do not change while its force coefficients are fitted.
 pub(super) struct Prepared<'a> {
     pub(super) test: &'a CuttingTest,
-    /// Force vectors over the angle. `cutting`: N per unit of each cutting coefficient and per meter of chip thickness. `edge`: N
-    /// per unit of each edge coefficient.
+    /// Derivatives of the tooth force by the coefficients, as vectors over the immersion angle. `cutting`: N per unit
+    /// of each cutting coefficient and per meter of chip thickness. `edge`: N per unit of each edge coefficient.
     pub(super) cutting: [RotatingVector; 3],
     pub(super) edge: [RotatingVector; 3],
-    /// Samples next to a tooth entry or exit: part of their sampling interval has another number of engaged teeth, so they are left
-    /// out.
+    /// Indices of the samples next to a tooth entry or exit. Part of their sampling interval has another number of
+    /// engaged teeth, so the fit leaves them out.
     pub(super) switching: BTreeSet<usize>,
     pub(super) revolutions: Vec<[usize; 2]>,
-    /// Weight 1/σ² of each direction, 1/N².
+    /// Weight 1/σ² of the force residual in each direction, with its standard deviation σ; 1/N².
     pub(super) weights: [f64; 3],
 }
 
-/// Force per unit of each of the three coefficient pairs, for an axial depth of 1 m.
+/// Tooth force per unit of each pair of cutting and edge coefficient (tangential, radial, axial), for an axial depth of
+/// 1 m.
 fn vectors(test: &CuttingTest) -> [ToothForce; 3] {
     std::array::from_fn(|index| {
         let unit = |place: usize| f64::from(u8::from(place == index));
@@ -61,9 +62,10 @@ pub(super) fn prepared(test: &CuttingTest) -> Prepared<'_> {
 }
 
 impl Prepared<'_> {
-    /// Mean force of a revolution without runout and vibration, N per unit of each coefficient; and the measured mean force, N.
+    /// Mean force of a revolution without runout and vibration, N per unit of each force coefficient; and the measured
+    /// mean force, N.
     ///
-    /// Both means are over the same samples, so that the sampling of entry and exit biases neither.
+    /// Both means are over the same samples, so that the sampling of tooth entry and exit biases neither.
     pub(super) fn mean_forces(&self, [from, to]: [usize; 2]) -> ([Vector3<f64>; 6], Vector3<f64>) {
         let test = self.test;
         let mut sums = [Vector3::zeros(); 6];

@@ -1,10 +1,11 @@
-//! Derivatives and integrals of Fourier coefficients 1, cos, sin, cos 2 …
+//! Derivatives and integrals over time of a Fourier series with the coefficients of 1, cos, sin, cos 2 …
 
 use nalgebra::DVector;
 
 use quietcut_recording::Quantity;
 
-/// Order of differentiation of a channel with respect to displacement.
+/// Order of the time derivative of displacement that a motion channel measures: 1 for velocity, 2 for acceleration,
+/// else 0.
 pub(crate) fn derivative(quantity: Quantity) -> u8 {
     match quantity {
         Quantity::Velocity => 1,
@@ -13,7 +14,7 @@ pub(crate) fn derivative(quantity: Quantity) -> u8 {
     }
 }
 
-/// Fourier coefficients of the `order`-fold integral.
+/// Fourier coefficients of the `order`-fold time integral of a series with the coefficients `x`; the mean is dropped.
 pub(crate) fn undo(x: &DVector<f64>, order: u8, omega: f64) -> DVector<f64> {
     let mut integral = x.clone();
     for _ in 0..order {

@@ -1,5 +1,5 @@
-//! Steady harmonic motion in a recording: segments of constant excitation frequency, and their Fourier coefficients with noise
-//! variance.
+//! Steady harmonic motion in a recording: segments of constant excitation frequency, and the Fourier coefficients of
+//! all channels with the variance of their noise.
 
 use std::f64::consts::TAU;
 
@@ -17,29 +17,31 @@ pub struct DwellSegment {
     pub from: usize,
     /// Index after the last sample.
     pub to: usize,
-    /// First estimate of the frequency, Hz.
+    /// First estimate of the excitation frequency, Hz.
     pub frequency_hz: f64,
 }
 
-/// A measured steady periodic motion: Fourier coefficients of all channels over one segment.
+/// A measured steady periodic motion: Fourier coefficients of all channels over one segment of constant excitation
+/// frequency.
 #[derive(Clone, Debug)]
 pub struct Dwell {
     /// Fundamental frequency, rad/s.
     pub omega: f64,
-    /// Variance of the fundamental frequency, (rad/s)².
+    /// Variance of the estimated fundamental frequency, (rad/s)².
     pub omega_variance: f64,
-    /// Number of samples of the segment.
+    /// Number of samples of the segment with the steady motion.
     pub samples: usize,
     /// (AᵀA)⁻¹ of the harmonic regression with design matrix A. Multiplied by the noise variance of a channel it is the covariance
     /// of the coefficients of that channel.
     pub gram_inverse: DMatrix<f64>,
-    /// Fourier coefficients of the force channels.
+    /// Fourier series of each force channel.
     pub forces: Vec<FourierSeries>,
-    /// Fourier coefficients of the motion channels.
+    /// Fourier series of each motion channel.
     pub motions: Vec<FourierSeries>,
 }
 
-/// Fourier coefficients of one channel: 1, cos, sin, cos 2 …, with the phase zero at the middle of the segment.
+/// Fourier series of one channel over a dwell: coefficients of 1, cos, sin, cos 2 …, with the phase zero at the middle
+/// of the segment.
 #[derive(Clone, Debug)]
 pub struct FourierSeries {
     /// The direction of the channel.
@@ -53,12 +55,12 @@ pub struct FourierSeries {
 }
 
 impl FourierSeries {
-    /// Amplitude of harmonic h, in the unit of the channel.
+    /// Amplitude of harmonic h of the excitation frequency, in the unit of the channel.
     pub fn amplitude(&self, h: usize) -> f64 {
         self.coefficients[2 * h - 1].hypot(self.coefficients[2 * h])
     }
 
-    /// Complex amplitude of harmonic h: the harmonic is the real part of it times e^{ihωt}.
+    /// Complex amplitude A_h of harmonic h of the excitation frequency: the harmonic is Re(A_h e^{ihωt}).
     pub fn phasor(&self, h: usize) -> num_complex::Complex64 {
         num_complex::Complex64::new(self.coefficients[2 * h - 1], -self.coefficients[2 * h])
     }
@@ -74,7 +76,7 @@ pub(crate) fn direction_of(channel: &Channel) -> Option<Direction> {
     direction.parse().ok()
 }
 
-/// Length of the blocks in which the force level is evaluated, s.
+/// Length of the blocks of a step-sine record whose RMS force is compared to find pauses, s.
 const BLOCK_S: f64 = 0.1;
 
 /// The segments of `recording` with a constant excitation frequency, found from the force alone.
@@ -102,7 +104,7 @@ pub fn dwell_segments(recording: &Recording) -> Vec<DwellSegment> {
     let (Some(&quietest), Some(&strongest)) = (sorted.get(sorted.len() / 50), sorted.last()) else {
         return Vec::new();
     };
-    // The threshold of the block level lies between the noise and the lowest force level.
+    // The threshold of the RMS force of a block lies between the noise and the lowest excitation level.
     let threshold = (FORCE_ABOVE_NOISE * quietest)
         .min(FORCE_BELOW_LARGEST[1] * strongest)
         .max(FORCE_BELOW_LARGEST[0] * strongest);
@@ -113,7 +115,7 @@ pub fn dwell_segments(recording: &Recording) -> Vec<DwellSegment> {
         match (loud, start) {
             (true, None) => start = Some(index),
             (false, Some(first)) => {
-                // The first and last block of a segment may contain a pause and are left out.
+                // The first and last block of an excited segment may contain a part of the pause and are left out.
                 let (from, to) = ((first + 1) * block, (index - 1).max(first + 1) * block);
                 split(
                     &force.samples[..to.min(force.samples.len())],
@@ -133,10 +135,10 @@ fn energy(samples: &[f64]) -> f64 {
     samples.iter().map(|x| x * x).sum()
 }
 
-/// Periods over which the frequency is estimated in the search for steps.
+/// Number of excitation periods over which the local frequency is estimated in the search for frequency steps.
 const PERIODS: usize = 8;
 
-/// Splits `samples[from..]` into segments of constant frequency.
+/// Splits the force samples from `from` on into segments of constant frequency and appends them to `found`.
 fn split(samples: &[f64], from: usize, rate_hz: f64, found: &mut Vec<DwellSegment>) {
     let crossings = rising_crossings(samples, from);
     if crossings.len() <= 2 * PERIODS {
@@ -155,8 +157,8 @@ fn split(samples: &[f64], from: usize, rate_hz: f64, found: &mut Vec<DwellSegmen
             begin,
             (begin + (end - begin).max(PERIODS)).min(crossings.len() - 1),
         );
-        // A step exceeds ten times the scatter of the local frequency, and a thousandth of the frequency, which is less than the
-        // step of any test.
+        // A frequency step exceeds ten times the scatter of the local frequency, and a thousandth of the frequency,
+        // which is less than the step of any test.
         let stepped =
             end < local.len() && (local[end] - held).abs() > (STEP_SCATTER * scatter).max(STEP_SHARE * held);
         if stepped || end == local.len() {
@@ -168,7 +170,7 @@ fn split(samples: &[f64], from: usize, rate_hz: f64, found: &mut Vec<DwellSegmen
                     frequency_hz: frequency(begin, last),
                 });
             }
-            // The window in which the step was found contains both frequencies and is skipped.
+            // The periods in which the frequency step was found contain both frequencies and are skipped.
             begin = if stepped && last > begin + 2 * PERIODS {
                 end + PERIODS
             } else {
@@ -178,7 +180,8 @@ fn split(samples: &[f64], from: usize, rate_hz: f64, found: &mut Vec<DwellSegmen
     }
 }
 
-/// Fractional sample indices of the rising zero crossings, with hysteresis, so that noise gives no second crossing.
+/// Fractional sample indices of the rising zero crossings of the force, with hysteresis, so that noise gives no second
+/// crossing.
 fn rising_crossings(samples: &[f64], from: usize) -> Vec<f64> {
     let size = (energy(&samples[from.min(samples.len())..]) / samples.len().max(1) as f64).sqrt();
     let mut crossings = Vec::new();
@@ -213,7 +216,8 @@ impl Dwell {
         let mut omega_variance = f64::INFINITY;
         let mut lines = Vec::new();
         let mut gram_inverse = DMatrix::zeros(0, 0);
-        // Gauss–Newton steps in the frequency. The start is within half a line width, where each step squares the error.
+        // Gauss–Newton steps in the excitation frequency. The start is within half the width of a spectral line, where
+        // each step squares the error.
         for round in 0..5 {
             let design = design(count, omega / rate, harmonics);
             gram_inverse = invert_normal_equations(&design.tr_mul(&design))?;
@@ -263,7 +267,7 @@ impl Dwell {
         (!dwell.forces.is_empty()).then_some(dwell)
     }
 
-    /// The force channel with the largest fundamental.
+    /// Fourier series of the force channel with the largest fundamental.
     pub fn force(&self) -> Option<&FourierSeries> {
         self.forces
             .iter()
@@ -271,7 +275,8 @@ impl Dwell {
     }
 }
 
-/// Design matrix of a harmonic regression: columns 1, cos, sin, cos 2 … of the phase, which is zero at the middle.
+/// Design matrix of a harmonic regression: columns 1, cos, sin, cos 2 … of the phase, which is zero at the middle of
+/// the `count` samples.
 fn design(count: usize, radians_per_sample: f64, harmonics: usize) -> DMatrix<f64> {
     let middle = 0.5 * (count as f64 - 1.0);
     let mut design = DMatrix::zeros(count, 2 * harmonics + 1);
@@ -288,7 +293,7 @@ fn design(count: usize, radians_per_sample: f64, harmonics: usize) -> DMatrix<f6
     design
 }
 
-/// Derivative of the fitted signal by ω, at every sample.
+/// Derivative of the fitted Fourier series by the fundamental frequency ω, at every sample.
 fn slope_by_omega(coefficients: &DVector<f64>, design: &DMatrix<f64>, rate_hz: f64) -> DVector<f64> {
     let middle = 0.5 * (design.nrows() as f64 - 1.0);
     DVector::from_fn(design.nrows(), |row, _| {

@@ -1,4 +1,4 @@
-//! Steady motion under harmonic excitation of constant frequency (dwells), extracted from recordings.
+//! Dwells: steady motion under harmonic excitation of constant frequency, extracted from recordings.
 
 pub(crate) mod differentiation;
 pub mod dwell;

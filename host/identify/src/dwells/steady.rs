@@ -10,18 +10,18 @@ use crate::criteria::{LEAST_DWELL_PERIODS, NOISE_OVER_TRANSIENT, STEADY_CHANGE, 
 use crate::dwells::dwell::{Dwell, DwellSegment, direction_of, dwell_segments, pool_variances};
 use quietcut_recording::Recording;
 
-/// Length of the transient that is skipped at the start of each dwell.
+/// Length of the transient that is left out at the start of each dwell.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Settling {
-    /// A length set by the user, s.
+    /// A length of the transient set by the user, s.
     Seconds(f64),
-    /// The first half of the dwell.
+    /// The transient is the first half of the dwell.
     Half,
-    /// The time in which a decay e^{−σt} falls below the noise; σ in 1/s.
+    /// The transient ends when a decay e^{−σt} has fallen below the noise; σ is the given decay rate, 1/s.
     Decay(f64),
 }
 
-/// Steady motions found in recordings, and warnings about skipped dwells.
+/// Dwells with steady motion found in recordings, and warnings about skipped dwells.
 #[derive(Clone, Debug, Default)]
 pub struct Steady {
     /// The dwells with steady motion.
@@ -84,17 +84,17 @@ pub fn steady(recordings: &[Recording], harmonics: usize, settling: Settling) ->
     steady
 }
 
-/// The steady part of a dwell.
+/// Steady part of a dwell, after its transient.
 struct Settled {
     dwell: Dwell,
-    /// True if the transient has decayed according to the damping of the structure.
+    /// True if the dwell is long enough for the transient to decay below the noise, given the damping of the structure.
     whole: bool,
-    /// True if the fundamental is the same in both halves.
+    /// True if the fundamental of every motion channel is the same in both halves of the steady part.
     still: bool,
 }
 
-/// The part of a segment after its transient. If its motion still changes, its last half or quarter is taken, provided that it
-/// contains at least [`LEAST_DWELL_PERIODS`] periods.
+/// The part of a dwell after its transient. If its motion still changes, its last half or quarter is taken, provided
+/// that it contains at least [`LEAST_DWELL_PERIODS`] periods.
 fn settled(
     recording: &Recording,
     stretch: DwellSegment,
@@ -135,7 +135,8 @@ fn settled(
     }
 }
 
-/// True if no motion channel changes between the first and the second half of a dwell by more than its noise.
+/// True if the fundamental of no motion channel changes between the first and the second half of a dwell by more than
+/// its noise.
 fn is_still(recording: &Recording, part: DwellSegment, dwell: &Dwell) -> bool {
     let middle = (part.from + part.to) / 2;
     let halves = [part.from..middle, middle..part.to];
@@ -151,10 +152,11 @@ fn is_still(recording: &Recording, part: DwellSegment, dwell: &Dwell) -> bool {
             return true;
         };
         let change = (second - first).norm();
-        // Over half of the samples, real and imaginary part each have the variance 4σ²/n with n samples in the dwell; the
-        // difference of two halves has twice that.
+        // In half of the samples, real and imaginary part of the fundamental each have the variance 4σ²/n, with the
+        // noise variance σ² and n samples in the whole dwell; the difference of two halves has twice that.
         let noise = (8.0 * line.variance / dwell.samples as f64).sqrt();
-        // An error of the frequency changes the phase from the middle of one half to the middle of the other.
+        // An error of the estimated frequency changes the phase of the motion from the middle of one half to the middle
+        // of the other.
         let turned = line.amplitude(1)
             * dwell.omega_variance.sqrt()
             * (0.5 * dwell.samples as f64 / recording.sample_rate_hz);
@@ -162,8 +164,8 @@ fn is_still(recording: &Recording, part: DwellSegment, dwell: &Dwell) -> bool {
     })
 }
 
-/// X of the least-squares fit Re X e^{iφk} + constant to the samples in `range`; k counts from the first sample of the channel, φ
-/// is `radians_per_sample`.
+/// Complex amplitude X of the least-squares fit Re X e^{iφk} + constant to the samples in `range`; k counts from the
+/// first sample of the channel, φ is `radians_per_sample`.
 fn phasor(samples: &[f64], range: std::ops::Range<usize>, radians_per_sample: f64) -> Option<Complex64> {
     let mut normal = Matrix3::<f64>::zeros();
     let mut right = Vector3::<f64>::zeros();
@@ -180,7 +182,8 @@ fn phasor(samples: &[f64], range: std::ops::Range<usize>, radians_per_sample: f6
     Some(Complex64::new(solution[0], solution[1]))
 }
 
-/// The part of a segment after its transient, and whether the segment is long enough for the transient to decay below the noise.
+/// The part of a dwell after its transient, and whether the dwell is long enough for the transient to decay below the
+/// noise.
 fn first_settled(
     recording: &Recording,
     stretch: DwellSegment,
@@ -204,7 +207,8 @@ fn first_settled(
         Settling::Half => Some((last(half)?, true)),
         Settling::Decay(rate) => {
             let first = last(half)?;
-            // The transient starts as large as the steady motion and must decay to a fifth of the noise of a Fourier coefficient.
+            // The transient is assumed to start as large as the steady motion; it must decay to a fifth of the noise of
+            // a Fourier coefficient.
             let clearest = first
                 .motions
                 .iter()
@@ -219,7 +223,8 @@ fn first_settled(
     }
 }
 
-/// Dwells of a tone with slowly changing force: each window of `periods` periods is one dwell.
+/// Dwells of a record with constant frequency and slowly changing force: each window of `periods` excitation periods is
+/// one dwell.
 pub fn windows(recording: &Recording, harmonics: usize, periods: f64) -> Vec<Dwell> {
     let mut dwells = Vec::new();
     for stretch in dwell_segments(recording) {
@@ -238,7 +243,8 @@ pub fn windows(recording: &Recording, harmonics: usize, periods: f64) -> Vec<Dwe
     dwells
 }
 
-/// The smallest decay rate c/(2m) of the given masses, kg, and dampings, N s/m, in 1/s: that of a mode below critical damping.
+/// Smallest decay rate c/(2m) of modes with the given masses, kg, and dampings, N s/m; 1/s. It holds for modes below
+/// critical damping and is bounded to the range from 1e-3 to 2000π.
 pub fn slowest_decay(masses: &[f64], dampings: &[f64]) -> f64 {
     masses
         .iter()

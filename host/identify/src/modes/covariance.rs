@@ -1,8 +1,8 @@
-//! Covariance of the parameters of a modal fit.
+//! Covariance of the parameters of a modal fit to receptances.
 //!
-//! Sandwich covariance N⁻¹ M N⁻¹. M contains the correlation of the residual between receptances of one line, which share the noise
-//! of a response, and between neighbouring lines, which the window causes (thesis chapter 7 uses Welch's method). Correlations are
-//! averaged over all lines.
+//! It is the sandwich covariance N⁻¹ M N⁻¹ with the normal matrix N. M contains the correlation of the residual between
+//! receptances of one line, which share the noise of a response, and between neighbouring lines, which the window
+//! causes (thesis chapter 7 uses Welch's method). Correlations are averaged over all lines.
 
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
@@ -12,10 +12,11 @@ use super::pole_residue::{PoleResidue, shared};
 use super::receptances::Receptances;
 use super::weights::Weights;
 
-/// Number of neighbouring lines on each side with which the residual is correlated: a Hann window couples two.
+/// Number of neighbouring frequency lines on each side with which the residual of a receptance is correlated: a Hann
+/// window couples two.
 const LAGS: usize = 2;
 
-/// Covariance of the parameters under the constraints of [`shape::normalize`].
+/// Covariance of the parameters of a modal fit under the constraints of [`shape::normalize`] on the mode shapes.
 pub(super) fn covariance(data: &Receptances, fit: &PoleResidue, weights: &Weights) -> Option<DMatrix<f64>> {
     let jacobian = jacobian(data, fit, weights);
     let normal = normal(&jacobian);
@@ -23,7 +24,8 @@ pub(super) fn covariance(data: &Receptances, fit: &PoleResidue, weights: &Weight
     let left = weights.left(fit, data);
     let same_line = &bread * meat(&jacobian, &left, 0) * &bread;
     let all = &bread * meat(&jacobian, &left, LAGS) * &bread;
-    // Correlations estimated from few lines may make a variance too small; it is at least that without correlation between lines.
+    // Correlations between lines, estimated from few lines, may make the variance of a parameter too small; it is kept
+    // at least as large as without correlation between lines.
     let is_more = |i: usize| all[(i, i)] >= same_line[(i, i)];
     let scale = DVector::from_fn(all.nrows(), |i, _| {
         if is_more(i) || all[(i, i)] <= 0.0 {
@@ -42,7 +44,8 @@ pub(super) fn covariance(data: &Receptances, fit: &PoleResidue, weights: &Weight
     Some(scaled)
 }
 
-/// ½ Σ Re(J(f)ᴴ C_l J(f + l)) over lines f and lags −`lags` … `lags`, with C_l the mean of left(f) left(f + l)ᴴ over all lines f.
+/// Middle matrix M of the sandwich covariance: ½ Σ Re(J(f)ᴴ C_l J(f + l)) over lines f and lags −`lags` … `lags`, with
+/// the Jacobian J, and with C_l the mean of left(f) left(f + l)ᴴ over all lines f, where left is the whitened residual.
 fn meat(jacobian: &[DMatrix<Complex64>], left: &[DVector<Complex64>], lags: usize) -> DMatrix<f64> {
     let size = jacobian.first().map_or(0, DMatrix::nrows);
     let lines = left.first().map_or(0, |left| left.len());
@@ -50,7 +53,7 @@ fn meat(jacobian: &[DMatrix<Complex64>], left: &[DVector<Complex64>], lags: usiz
     for lag in 0..=lags.min(lines.saturating_sub(1)) {
         let count = lines - lag;
         for (k, first) in left.iter().enumerate() {
-            // Σ_k' C_l[k, k'] J_k'(f + l); its product with the conjugate of J_k(f) follows.
+            // Σ_k' C_l[k, k'] J_k'(f + l) over the receptances k'; it is then multiplied by the conjugate of J_k(f).
             let mut other = DMatrix::<Complex64>::zeros(size, count);
             for (j, second) in left.iter().enumerate() {
                 let sum: Complex64 = (0..count)
@@ -61,7 +64,7 @@ fn meat(jacobian: &[DMatrix<Complex64>], left: &[DVector<Complex64>], lags: usiz
             let own = jacobian[k].columns(0, count);
             let (a, b) = (own.map(|z| z.re), own.map(|z| z.im));
             let product = &a * other.map(|z| z.re).transpose() + &b * other.map(|z| z.im).transpose();
-            // The terms of the lags l and −l are transposes of each other.
+            // The summands of the lags l and −l are transposes of each other.
             let part = if lag == 0 {
                 0.5 * (&product + product.transpose())
             } else {
@@ -73,8 +76,8 @@ fn meat(jacobian: &[DMatrix<Complex64>], left: &[DVector<Complex64>], lags: usiz
     meat
 }
 
-/// Upper left block of [N Gᵀ; G 0]⁻¹, with the gradients G of the constraints. The constraints fix the scale and phase of the
-/// shapes of each mode, which the data do not determine.
+/// Upper left block of [N Gᵀ; G 0]⁻¹, with the normal matrix N and the gradients G of the constraints. The constraints
+/// fix the scale and phase of the left and right shape of each mode, which the data do not determine.
 pub(super) fn constrained_inverse(
     fit: &PoleResidue,
     shared: &[(usize, usize)],
@@ -120,7 +123,7 @@ fn constraints(fit: &PoleResidue, both: &[(usize, usize)], size: usize) -> Vec<D
         if both.is_empty() {
             (0..rights).for_each(|p| of_norm(right_at(p), mode.right[p], 1.0));
             (0..mode.left.len()).for_each(|q| of_norm(left_at(q), mode.left[q], -1.0));
-            // Without a shared entry the phase of the largest entry of the right shape is fixed.
+            // If no direction is both excited and measured, the phase of the largest entry of the right shape is fixed.
             let p = (0..rights)
                 .max_by(|&a, &b| mode.right[a].norm().total_cmp(&mode.right[b].norm()))
                 .unwrap_or(0);
@@ -131,7 +134,8 @@ fn constraints(fit: &PoleResidue, both: &[(usize, usize)], size: usize) -> Vec<D
             let (right, left) = (mode.right[p], mode.left[q]);
             of_norm(right_at(p), right, 1.0);
             of_norm(left_at(q), left, -1.0);
-            // Phase constraint: Σ Im(right·conj(left)) = 0.
+            // Constraint on the phase of the shapes: Σ Im(right·conj(left)) = 0 over the directions that are both
+            // excited and measured.
             phase[right_at(p)] = -left.im;
             phase[right_at(p) + 1] = left.re;
             phase[left_at(q)] = right.im;

@@ -1,8 +1,9 @@
 //! Poles of every model order by the least-squares complex frequency-domain method (LSCF) with a common denominator.
 //!
-//! H_k(f) = B_k(z)/A(z) with z = exp(i2π(f − f₁)T) and complex coefficients (Guillaume, Verboven and Vanlanduit 1998). The band
-//! covers nearly the whole unit circle. With A(0) = 1 the spurious poles that fit noise lie outside the unit circle, that is, they
-//! have negative damping (Cauberghe, Guillaume, Verboven, Parloo and Vanlanduit 2004).
+//! H_k(f) = B_k(z)/A(z) with z = exp(i2π(f − f₁)T), f₁ the lower end of the band, and complex coefficients (Guillaume,
+//! Verboven and Vanlanduit 1998). T is chosen so that the band covers nearly the whole unit circle. With A(0) = 1 the
+//! spurious poles that fit noise lie outside the unit circle, that is, they have negative damping (Cauberghe,
+//! Guillaume, Verboven, Parloo and Vanlanduit 2004).
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 use num_complex::Complex64;
@@ -11,24 +12,28 @@ use std::f64::consts::TAU;
 use super::receptances::Receptances;
 use quietcut_numerics::eigenvalues::{EigenvalueError, polynomial_roots};
 
-/// Fraction of the unit circle that the band covers. A choice: the gap lets receptances differ between the two ends of the band.
+/// Fraction of the unit circle in the z plane that the frequency band covers. A choice: the gap lets receptances differ
+/// between the two ends of the band.
 const ARC: f64 = 0.9;
 
-/// Ridge on the diagonal of the normal equations, relative to its mean: powers of z on an arc are nearly dependent. A choice, near
-/// the rounding error. The columns have nearly equal lengths, since |z| = 1, and are not scaled.
+/// Ridge on the diagonal of the normal equations of the polynomial coefficients, relative to the mean of the diagonal:
+/// powers of z on an arc are nearly dependent. A choice, near the rounding error. The columns have nearly equal
+/// lengths, since |z| = 1, and are not scaled.
 const RIDGE: f64 = 1e-13;
 
-/// Sums Σ_f w² conj(z)^i z^j of one receptance, weighted with w = 1/σ. They depend on m = j − i alone.
+/// Sums over the frequency lines of one receptance H from which the normal equations of numerator and denominator
+/// follow, weighted with w = 1/σ. The entry of row i and column j depends on m = j − i alone.
 struct Sums {
-    /// Σ w² z^m, m = 0 … n.
+    /// Entries of the numerator's block: Σ w² z^m, m = 0 … n.
     numerator: Vec<Complex64>,
-    /// Σ w² H z^m, m = −n … n.
+    /// Entries between numerator and denominator: Σ w² H z^m, m = −n … n.
     mixed: Vec<Complex64>,
-    /// Σ w² |H|² z^m, m = 0 … n.
+    /// Entries of the denominator's block: Σ w² |H|² z^m, m = 0 … n.
     denominator: Vec<Complex64>,
 }
 
-/// Poles λ in rad/s of the models of order 1 to `highest`, by order. An order with singular equations has none.
+/// Poles λ of the models of order 1 to `highest`, rad/s: one list per order. The list of an order with singular
+/// equations is empty.
 ///
 /// # Errors
 /// The eigenvalue iteration of the companion matrix exceeds its bound.
@@ -58,8 +63,8 @@ pub(super) fn poles(data: &Receptances, highest: usize) -> Result<Vec<Vec<Comple
                 .into_iter()
                 .filter(|z| z.norm() > 0.0)
                 .map(|z| {
-                    // The band covers the angles from 0 to 2π·ARC; angles beyond the middle of the remaining gap belong to
-                    // frequencies below the band.
+                    // The band covers the angles of z from 0 to 2π·ARC; angles beyond the middle of the remaining gap
+                    // belong to frequencies below the band.
                     let turn = z.arg().rem_euclid(TAU);
                     let turn = if turn > 0.5 * (1.0 + ARC) * TAU {
                         turn - TAU
@@ -130,8 +135,8 @@ fn ridge(matrix: &mut DMatrix<Complex64>) {
     }
 }
 
-/// Roots of a₀ + a₁z + … + a_n zⁿ with a₀ = 1, without those beyond 1e12. They are the inverses of the roots of the reversed polynomial,
-/// whose leading coefficient is a₀.
+/// Roots of a₀ + a₁z + … + a_n zⁿ with a₀ = 1, without those beyond 1e12. They are computed as inverses of the roots of
+/// the reversed polynomial, whose leading coefficient is a₀.
 fn roots(a: &[Complex64]) -> Result<Vec<Complex64>, EigenvalueError> {
     let reversed: Vec<Complex64> = a.iter().rev().copied().collect();
     let inverses = polynomial_roots(&reversed)?;

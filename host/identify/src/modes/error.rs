@@ -1,15 +1,15 @@
-//! Reasons why no modes are identified.
+//! Reasons why no modes are identified from receptances.
 
 use quietcut_frf::rational_fit::RationalFitError;
 use quietcut_numerics::eigenvalues::EigenvalueError;
 
-/// Reason why no modes are identified.
+/// Reason why no modes are identified from receptances or records.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ModesError {
-    /// The data cannot be fitted, for the stated reason.
+    /// No modal model can be fitted to the data; the text states the reason.
     #[error("{0}")]
     Data(String),
-    /// No pole is stable over the model order.
+    /// No pole of the band is stable over the model orders.
     #[error(
         "no pole is stable over the model order from {from_hz:.2} to {to_hz:.2} Hz ({rejected} poles were rejected); a band with a resonance, or better receptances, are needed"
     )]
@@ -21,7 +21,7 @@ pub enum ModesError {
         /// Number of rejected poles.
         rejected: usize,
     },
-    /// Fewer stable poles than requested modes.
+    /// There are fewer stable poles than modes requested by the user.
     #[error("{found} poles are stable over the model order, but {wanted} modes are requested")]
     Fewer {
         /// Number of stable poles.
@@ -29,13 +29,13 @@ pub enum ModesError {
         /// Number of requested modes.
         wanted: usize,
     },
-    /// The fit of this number of modes does not converge.
+    /// The modal fit with this number of modes does not converge.
     #[error("the fit of {0} modes does not converge; fewer modes or another band are needed")]
     NotConverged(usize),
-    /// The poles of the common denominator cannot be computed.
+    /// The poles of the LSCF model with a common denominator cannot be computed.
     #[error(transparent)]
     Poles(#[from] EigenvalueError),
-    /// The residues of the poles cannot be computed.
+    /// The residues of the receptances at the given poles cannot be computed.
     #[error(transparent)]
     Residues(#[from] RationalFitError),
 }

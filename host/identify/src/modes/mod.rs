@@ -46,7 +46,7 @@ use crate::criteria::{LEAST_RESIDUE_SIGNIFICANCE, OVERDAMPED};
 pub struct Options {
     /// Highest model order of the stabilization diagram.
     pub highest_order: usize,
-    /// Number of modes if it is given: the strongest stable poles are taken.
+    /// Number of modes to identify: the strongest stable poles are taken; `None` takes all stable poles.
     pub modes: Option<usize>,
 }
 
@@ -59,7 +59,7 @@ impl Default for Options {
     }
 }
 
-/// Identifies the modes of measured receptances.
+/// Identifies the modes of measured receptances: poles, stabilization over the model order, and refinement.
 ///
 /// # Errors
 /// Too few lines, no stable pole or fewer than wanted, a fit that does not converge.
@@ -98,7 +98,7 @@ pub fn identify(data: &Receptances, options: &Options) -> Result<ModalModel, Mod
     }
 }
 
-/// Index of a spurious mode of the refined fit and the reason; `None` if all modes are sound.
+/// Index of the first spurious mode of the refined fit, and the reason; `None` if no mode is spurious.
 fn spurious(refined: &Refined, [from_hz, to_hz]: [f64; 2]) -> Option<(usize, String)> {
     refined.fit.modes.iter().enumerate().find_map(|(index, mode)| {
         let (pole, hertz) = (mode.pole, mode.pole.norm() / std::f64::consts::TAU);

@@ -14,22 +14,23 @@ use quietcut_model::structure::Direction;
 /// Result of the modal identification.
 #[derive(Clone, Debug)]
 pub struct ModalModel {
-    /// Directions of the entries of the left shapes.
+    /// Directions of the forces, to which the entries of the left shapes belong.
     pub forces: Vec<Direction>,
-    /// Directions of the entries of the right shapes.
+    /// Directions of the responses, to which the entries of the right shapes belong.
     pub responses: Vec<Direction>,
     /// The modes, sorted by frequency.
     pub modes: Vec<IdentifiedMode>,
     /// For each pair of response and force direction: the compliance of the modes above the band, m/N, and the inertia term of the
     /// modes below it, the coefficient of 1/s², in 1/kg.
     pub outside: Vec<(Direction, Direction, [f64; 2])>,
-    /// NRMSE of the receptances, each receptance with equal weight.
+    /// NRMSE of the fitted receptances; each receptance has equal weight.
     pub fit_error: f64,
-    /// χ² per degree of freedom of the residual: near 1 if the residual is noise. `None` if the data state no variance.
+    /// χ² per degree of freedom of the residual of the fitted receptances: near 1 if the residual is noise. `None` if
+    /// the data state no variance.
     pub misfit: Option<f64>,
     /// Poles of every model order.
     pub stabilization: Stabilization,
-    /// Poles that were rejected, with reasons.
+    /// Poles that were rejected as modes, with the reasons.
     pub rejected: Vec<Rejected>,
     /// Warnings for the user.
     pub warnings: Vec<String>,
@@ -74,7 +75,7 @@ pub(super) fn warnings(spacing_hz: f64, model: &ModalModel) -> Vec<String> {
 }
 
 impl ModalModel {
-    /// Directions that are both excited and measured; a case uses them.
+    /// Directions that are both excited and measured; a case file has its modes in these directions.
     pub fn directions(&self) -> Vec<Direction> {
         let both = self.responses.iter().copied();
         both.filter(|direction| self.forces.contains(direction)).collect()
