@@ -54,6 +54,6 @@ pub fn peaks(recordings: &[PathBuf]) -> Result<String, Box<dyn Error>> {
             frequency_hz[peak],
         )?;
     }
-    // `measurement.table.write(path)` keeps it as CSV; `quietcut identify --method modes` reads that.
+    // `measurement.table.write(path)` writes the FRF table as CSV; `quietcut identify --method modes` reads that.
     Ok(text)
 }

@@ -1,8 +1,9 @@
-//! How long a long record takes: 60 s of three forces and three accelerations at 10 240 Hz, as CSV, to a 3 × 3 FRF.
+//! Computing time and memory for the FRF of a long recording: 60 s of three forces and three accelerations at 10 240 Hz, read as CSV, to a
+//! 3 × 3 FRF.
 //!
-//! `cargo run --release -p quietcut --example frf_speed` prints the best of ten rounds on one thread, as processor time
-//! where the system tells it (then a busy machine does not matter), and how much memory reading takes, as a part of the
-//! file's size. The file is written to a temporary folder.
+//! `cargo run --release -p quietcut --example frf_speed` prints the best of ten rounds on one thread. The time is processor time where the
+//! system reports it, so that other load on the machine does not matter. The memory for reading is printed as a multiple of the file's
+//! size. The file is written to a temporary folder.
 
 use std::error::Error;
 use std::io::Write;
@@ -74,14 +75,14 @@ fn write_record(path: &std::path::Path) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Processor time of this thread, s; the time since `origin` where the system does not tell.
+/// Processor time of this thread, s; where the system does not report it, the time since `origin`.
 fn clock_s(origin: &Instant) -> f64 {
     let told = std::fs::read_to_string("/proc/thread-self/schedstat").ok();
     let nanoseconds = told.and_then(|text| text.split_whitespace().next()?.parse::<f64>().ok());
     nanoseconds.map_or_else(|| origin.elapsed().as_secs_f64(), |ns| 1e-9 * ns)
 }
 
-/// The most memory that this process has held so far, where the system tells.
+/// Largest memory that this process has used so far, MB; `None` where the system does not report it.
 fn peak_megabytes() -> Option<f64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find(|line| line.starts_with("VmHWM:"))?;

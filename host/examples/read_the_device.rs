@@ -20,7 +20,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 pub fn reports(port: &str, time: Duration) -> Result<String, Box<dyn Error>> {
     let (mut client, info) = Client::connect(device::open(port, None)?)?;
     let mut text = format!("{} with firmware {}\n", info.board, info.firmware);
-    // A report for every change of the verdict, its reason or the advice.
+    // Asks the device for a report at every change of the verdict, its reason or the advice.
     client.subscribe(Subscription {
         reports: Reports::Changes,
         ..Subscription::default()

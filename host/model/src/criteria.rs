@@ -8,8 +8,8 @@
 /// with an error of 5e-7 in each of n products.
 pub(crate) const VELOCITY_JUMP: f64 = 1e-6;
 
-/// Magnitude of a negative eigenvalue of a mass, damping or stiffness matrix, relative to the largest one, up to which it counts as zero, as
-/// that of a free body. Entries with ten digits shift it by 5e-10 for each degree of freedom: two of them.
+/// Magnitude of a negative eigenvalue of a mass, damping or stiffness matrix, relative to the largest eigenvalue, up to which it counts as
+/// zero, as for a free body. Matrix entries with ten digits shift an eigenvalue by 5e-10 per degree of freedom; the number allows for two.
 pub(crate) const ZERO_EIGENVALUE: f64 = 1e-9;
 
 /// Relative distance below which two poles form one mode, because the mode shapes of (nearly) repeated poles are not defined individually. It
@@ -17,8 +17,8 @@ pub(crate) const ZERO_EIGENVALUE: f64 = 1e-9;
 /// unfounded.
 pub(crate) const SAME_POLE: f64 = 1e-6;
 
-/// Largest relative residual of A P = λ P for a pole with as many mode shapes as its multiplicity. Poles that form one mode differ by
-/// [`SAME_POLE`]; ten is room. Unfounded.
+/// Largest relative residual ‖A P − λ P‖/(|λ|·‖P‖) for a pole λ with as many mode shapes as its multiplicity, P being the projector on its
+/// modes. Poles that form one mode differ by [`SAME_POLE`]; the factor of ten is margin. Unfounded.
 pub(crate) const DEFECTIVE: f64 = 10.0 * SAME_POLE;
 
 /// Difference of a pitch angle from that of equal pitch, degrees, above which a tool has variable pitch. Case files give angles with a few

@@ -21,7 +21,7 @@ pub struct Cutter {
     pub exit_rad: f64,
     /// Axial depth of cut, m.
     pub depth_m: f64,
-    /// Feed per tooth, mean over the teeth, m.
+    /// Feed per tooth as the mean over the teeth, m; single teeth differ with variable pitch.
     pub feed_per_tooth_m: f64,
     /// Radius of the tool, m; `None` if the case has no diameter.
     pub radius_m: Option<f64>,
@@ -46,7 +46,7 @@ pub struct Tooth {
     pub behind: usize,
     /// Pitch angle to the tooth that passes before this one, rad.
     pub pitch_rad: f64,
-    /// Feed during a rotation of the tool by the pitch angle of this tooth, m.
+    /// Feed of the tool while it rotates by the pitch angle of this tooth, m.
     pub feed_m: f64,
 }
 
@@ -76,7 +76,7 @@ impl Cutter {
         Ok(cutter)
     }
 
-    /// This tool with another mean feed per tooth, m.
+    /// This cutter with another feed per tooth (mean over the teeth), m.
     pub fn with_feed_per_tooth_m(mut self, feed_per_tooth_m: f64) -> Self {
         let count = self.teeth.len() as f64;
         for tooth in &mut self.teeth {
@@ -94,12 +94,13 @@ impl Cutter {
         }
     }
 
-    /// Sine and radial direction at the immersion angle `phi_rad`, rad.
+    /// sin φ and the outward radial unit vector at the immersion angle φ = `phi_rad`, rad.
     pub fn immersion(&self, phi_rad: f64) -> Immersion {
         Immersion::new(phi_rad).in_machine(self.feed_direction)
     }
 
-    /// Position of the edge of a tooth along the chip thickness, m, at the displacement `x` of the tool, m: thesis eq. 3.1 without feed.
+    /// Position of the edge of a tooth along the chip-thickness direction, m, at the displacement `x` of the tool, m: thesis eq. 3.1
+    /// without feed.
     pub fn reach_m(&self, tooth: &Tooth, at: Immersion, x: [f64; 3]) -> f64 {
         self.edge.reach_m(at, tooth.radial_m, x)
     }
@@ -130,7 +131,7 @@ fn teeth(tool: &Tool, feed_per_tooth_m: f64) -> Result<Vec<Tooth>, ModelError> {
     }
     let mut angle_rad = 0.0;
     let teeth = (0..count).map(|index| {
-        // Angle of the tooth at equal pitch, free of accumulated rounding.
+        // With equal pitch the angle of a tooth follows from its index, so that rounding does not accumulate.
         let equal = TAU * index as f64 / count as f64;
         if index > 0 {
             angle_rad += tool.pitch_deg[index].to_radians();

@@ -50,7 +50,8 @@ impl Dynamics {
             }
             _ => None,
         };
-        // State for a tool displacement of 1 m: 1/|C| for modes and joints; the states of matrices are displacements in m.
+        // Magnitude of a state at a tool displacement of 1 m: 1/|C| for modes and joints; 1 for matrices, whose states are displacements in
+        // m.
         let size = |state: usize| {
             let moved = c.column(state).amax();
             match &structure.form {
@@ -92,7 +93,7 @@ impl Dynamics {
         for (new, old) in a.chunks_exact_mut(wider).zip(self.a.chunks_exact(order)) {
             new[..order].copy_from_slice(old);
         }
-        // The two new states are η and η̇/ω.
+        // The two new states are the modal displacement η and its scaled velocity η̇/ω.
         a[order * wider + order + 1] = omega;
         a[(order + 1) * wider + order] = -omega;
         a[(order + 1) * wider + order + 1] = -2.0 * damping_ratio * omega;
@@ -110,7 +111,8 @@ impl Dynamics {
         self.note_products();
     }
 
-    /// These equations with the motion of a sensor away from the tool as output, see [`FirstOrder::at_sensor`]. Forces still act on the tool.
+    /// These equations of motion, but with the motion at a sensor away from the tool as output; see [`FirstOrder::at_sensor`]. Forces still
+    /// act on the tool.
     #[must_use]
     pub fn at_sensor(&self, modes: &[f64]) -> Self {
         let FirstOrder { a, c, .. } = self.first_order().at_sensor(modes);
@@ -153,7 +155,8 @@ impl Dynamics {
         std::array::from_fn(|axis| dot(&self.c[axis], x))
     }
 
-    /// Displacement of the tool, m, as a polynomial of the time, from the dense output of the states.
+    /// Displacement of the tool within an integration step, m: for each axis a quartic polynomial of the time, from the quartics `x` of the
+    /// states.
     pub fn displacement_quartics(&self, x: &[Quartic]) -> [Quartic; 3] {
         std::array::from_fn(|axis| {
             let mut sum = [0.0; 5];
@@ -213,7 +216,7 @@ impl Dynamics {
         }
     }
 
-    /// Writes ẋ under the `force`, N, on the tool.
+    /// Writes the time derivative ẋ of the states `x` under the `force`, N, on the tool.
     pub fn rate(&self, x: &[f64], force: [f64; 3], rate: &mut [f64]) {
         for ((rate, a), b) in rate.iter_mut().zip(self.a.chunks_exact(self.order)).zip(&self.b) {
             *rate = dot(a, x) + b[0] * force[0] + b[1] * force[1] + b[2] * force[2];

@@ -28,7 +28,7 @@ pub struct ForceLaw {
 pub struct ChipLaw {
     /// Exponent p, positive.
     pub exponent: f64,
-    /// Reference chip thickness h₀, m, positive: there the power law equals the linear law.
+    /// Relative rate r of the force growth by wear, 1/s: all forces are multiplied by 1 + r·t.
     pub reference_m: f64,
 }
 

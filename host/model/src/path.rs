@@ -151,7 +151,7 @@ fn regime_at(
     own: &[f64],
 ) -> Regime {
     let mut now = regime.unwrap_or_else(|| restoring_force.next(None, at, own, 0.0));
-    // Between two samples a motion may pass through several regimes. Four changes bound the loop.
+    // Between two samples the motion may pass through several regimes of the restoring force; the loop follows at most four changes.
     for _ in 0..4 {
         if restoring_force.margin(now, at, own, 0.0) >= 0.0 {
             break;

@@ -127,8 +127,8 @@ pub fn rate(
     };
     let mut left = minus(force, restoring(restoring_forces, regimes, &at, own_y));
     if dynamics.velocity_jumps() {
-        // Here the velocity depends on the force, and the force on the velocity. A fixed-point iteration solves for both; it
-        // converges where damping forces are small compared with inertial forces.
+        // For a structure whose velocity depends on the force, and with a restoring force that depends on the velocity, a fixed-point
+        // iteration solves for both. It converges if damping forces are small compared with inertial forces.
         for _ in 0..40 {
             let before = at.v;
             at.v = dynamics.velocity_under(&y[..order], left);

@@ -37,7 +37,8 @@ impl LinearSweep {
 
     fn angle_rad(self, t: f64) -> f64 {
         let within = t.clamp(0.0, self.seconds);
-        // Angle from the mean speed within the sweep, plus that from the constant speed before or after the sweep.
+        // Spindle angle within the sweep at the mean of its first and present speed, plus the angle at the constant speed before or after
+        // the sweep.
         0.5 * (self.speeds[0] + self.speed(within)) * within + self.speed(t) * (t - within)
     }
 
@@ -68,7 +69,7 @@ pub struct Fluctuation {
 }
 
 impl Fluctuation {
-    /// Lead of the spindle over its mean rotation, s: δ·∫ sin(2πf_m s + ψ) ds from 0 to `t`.
+    /// Lead of the modulated spindle over its mean rotation, as a time in s: δ·∫ sin(2πf_m s + ψ) ds from 0 to `t`.
     fn ahead_s(self, t: f64) -> f64 {
         let omega = TAU * self.frequency_hz;
         self.delta / omega * (self.phase_rad.cos() - (omega * t + self.phase_rad).cos())

@@ -2,11 +2,12 @@
 
 use std::f64::consts::{PI, TAU};
 
-/// Half the length of the filter, in output samples. With this length the Hann-windowed sinc attenuates by 40 dB from half the output
-/// sampling rate on; the test of this file checks that.
+/// Half the length of the anti-aliasing filter, in output samples. With this length the Hann-windowed sinc attenuates by 40 dB from half
+/// the output sampling rate on; the test of this file checks that.
 const HALF: usize = 12;
 
-/// The −6 dB frequency of the filter as a fraction of the output sampling rate: the middle of the transition band from 0.35 to 0.5.
+/// The −6 dB frequency of the anti-aliasing filter as a fraction of the output sampling rate: the middle of the transition band from 0.35
+/// to 0.5.
 const CORNER: f64 = 0.425;
 
 /// Every `factor`-th sample of `samples` after a linear-phase low pass without delay and with unit gain at 0 Hz (Hann-windowed sinc). The
@@ -30,7 +31,7 @@ pub(super) fn decimated(samples: Vec<f64>, factor: usize) -> Vec<f64> {
         .collect()
 }
 
-/// Weight of the filter at a distance of `u` output samples from its centre.
+/// Weight of the anti-aliasing filter for an input sample at a distance of `u` output samples from the filter's centre.
 fn weight(u: f64) -> f64 {
     let angle = TAU * CORNER * u;
     let sinc = if u == 0.0 { 1.0 } else { angle.sin() / angle };

@@ -11,8 +11,8 @@ use quietcut_model::cutter::{Immersion, Tooth};
 use quietcut_numerics::crossing::first_below_zero;
 use quietcut_numerics::dormand_prince::{Quartic, at};
 
-/// Least order of the discontinuous derivative of a surface at which an integration step need not end: it does not lower the order of an
-/// integrator of order 5.
+/// Order of the discontinuous derivative of a machined surface from which on an integration step need not end there: the discontinuity does
+/// not lower the order of an integrator of order 5.
 const SMOOTH_FROM: u8 = 5;
 
 /// Two instants closer than this fraction of the shortest tooth-passing period count as equal. Rounding of the time, 2.2e-16 of it, stays
@@ -24,12 +24,11 @@ const SAME_TIME: f64 = 1e-9;
 pub(super) struct Contact<'a> {
     cutting: &'a Cutting,
     teeth: Vec<ToothState>,
-    /// Start and end of the evaluated step, s, moved inwards by a rounding margin: see [`Surface::height_m`].
+    /// Start and end of the integration step that is evaluated, s, moved inwards by a rounding margin: see [`Surface::height_m`].
     within: [f64; 2],
     same_time_s: f64,
     longest_delay_s: f64,
-    /// Orders of derivative by which a discontinuity of the displacement is higher than that of the force: 2, or 1 if the velocity jumps with
-    /// the force.
+    /// Order of the displacement's discontinuous derivative minus that of the force's: 2, or 1 if the velocity jumps with the force.
     gain_of_order: u8,
 }
 
@@ -40,16 +39,17 @@ struct ToothState {
     in_arc: bool,
     /// Time of the next entry into, or exit from, the engagement arc, s.
     next_switch_s: f64,
-    /// Number of the tooth passing, from the spindle angle.
+    /// Number of the tooth's present passing through the engagement arc, counted by the spindle angle.
     pass: f64,
     windows: MaterialWindows,
     in_material: bool,
     /// True while the edge cuts or touches the surface; otherwise the surface of the earlier passing persists.
     at_surface: bool,
-    /// Time of the last change of contact, s; two changes at the same time are an error.
+    /// Time of the tooth's last change of contact, s; a second change at the same time shows that it can neither keep nor lose contact.
     changed_s: f64,
     surface: Surface,
-    /// Kinks of the surface in front: time at which the tooth meets each, s, and order of the discontinuous derivative.
+    /// Kinks of the surface in front of the tooth: time at which the tooth meets each kink, s, and order of the derivative that is
+    /// discontinuous there.
     kinks: VecDeque<(f64, u8)>,
 }
 
@@ -66,7 +66,7 @@ pub(super) struct Chip {
 pub(super) struct Change {
     /// Index of the tooth.
     pub(super) tooth: usize,
-    /// Time of the change as a fraction of the step.
+    /// Time of the change of contact as a fraction of the integration step.
     pub(super) u: f64,
 }
 
@@ -316,7 +316,7 @@ impl<'a> Contact<'a> {
         if self.cutting.regeneration != Regeneration::AllPasses {
             return;
         }
-        // Long enough to resolve the growth of the chip from zero, short enough for linear extrapolation of the motion.
+        // The time after entry must resolve the growth of the chip from zero and be short enough for linear extrapolation of the motion.
         let soon_s = CONTACT_DECIDED * self.shortest_delay_s();
         let then = std::array::from_fn(|axis| x[axis] + soon_s * v[axis]);
         self.set_step(t, t + soon_s);

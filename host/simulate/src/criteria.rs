@@ -30,8 +30,9 @@ pub(crate) const REGIME_CHANGES_MAX: u32 = 10 * REPEATED_CONTACT_CHANGES_MAX;
 
 // Motion
 
-/// Error of a step over its tolerance below which the tool counts as at rest, so that the excitation limits the next step. It lies between the
-/// error by rounding alone, 2e-16/1e-8 = 2e-8, and the error at which step control aims, 0.9⁵ = 0.6; the value between is unfounded.
+/// Local error of an integration step over its tolerance below which the tool counts as at rest, so that the excitation limits the next
+/// step. The number lies between the error by rounding alone, 2e-16/1e-8 = 2e-8, and the 0.9⁵ = 0.6 to which the step control adjusts the
+/// error; the value between is unfounded.
 pub(crate) const AT_REST: f64 = 1e-6;
 
 /// Displacement of the tool beyond which the motion counts as diverged, m. Cuts lose contact at amplitudes of about the feed, some 0.1 mm, so

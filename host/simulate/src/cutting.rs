@@ -13,7 +13,7 @@ pub struct Cutting {
     pub spindle: Spindle,
     /// Entry into the workpiece, full engagement and exit.
     pub traverse: WorkpieceTraverse,
-    /// Earlier tooth passings that determine the chip thickness.
+    /// Earlier vibration of the tool that the chip thickness contains: that of all tooth passings, of the last one, or none.
     pub regeneration: Regeneration,
     /// Pores of the workpiece material; `None` for solid material.
     pub pores: Option<Pores>,

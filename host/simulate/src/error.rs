@@ -30,7 +30,7 @@ pub enum SimulateError {
     TooManySteps {
         /// Simulated time at which the run stopped, s.
         time_s: f64,
-        /// Number of accepted and rejected steps.
+        /// Number of accepted and rejected integration steps when the run stopped.
         steps: u64,
     },
     /// A tooth that can neither keep nor lose contact (chattering events).

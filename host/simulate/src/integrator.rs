@@ -33,13 +33,13 @@ pub(super) struct Integrator<'a> {
     y: Vec<f64>,
     quartics: Vec<Quartic>,
     displacement: [Quartic; 3],
-    /// Length of the next step, s, unless an event shortens it.
+    /// Length of the next integration step, s, unless an event shortens it.
     next_h: f64,
     statistics: Statistics,
     workspace: Workspace,
     /// The regime of each restoring force of the model, such as stick or slip.
     regimes: Vec<Regime>,
-    /// Start and end of the evaluated step, s, moved inwards by a rounding margin.
+    /// Start and end of the integration step that is evaluated, s, moved inwards by a rounding margin.
     within: [f64; 2],
 }
 
@@ -53,7 +53,7 @@ enum Event {
 }
 
 impl Event {
-    /// Time of the event as a fraction of the step.
+    /// Time of the event as a fraction of the integration step, 0 to 1.
     fn u(self) -> f64 {
         match self {
             Self::Contact(change) => change.u,
@@ -91,7 +91,7 @@ impl<'a> Integrator<'a> {
         end_s: f64,
         mut observe: impl FnMut(&DenseStep<'_>),
     ) -> Result<Statistics, SimulateError> {
-        // A safely small first step; error control enlarges it within a few steps.
+        // The first integration step is much shorter than allowed; error control enlarges it within a few steps.
         self.next_h = 1e-3 * self.longest_step(end_s);
         for index in 0..self.regimes.len() {
             self.regimes[index] = self.next_regime(index, None);
@@ -144,8 +144,8 @@ impl<'a> Integrator<'a> {
             Event::RegimeEnd { index, .. } => {
                 self.statistics.regime_changes += 1;
                 self.regimes[index] = self.next_regime(index, Some(self.regimes[index]));
-                // A restoring force that has just changed counts as within its regime (see `first_below_zero`): many
-                // changes without a step between them mean that no regime is consistent with the motion.
+                // Just after a change a restoring force counts as within its new regime (see `first_below_zero`), so it should not change
+                // again at once. More changes than allowed without a step between them mean that no regime is consistent with the motion.
                 *stuck += 1;
                 if *stuck > REGIME_CHANGES_MAX {
                     return Err(SimulateError::RegimeUndecided { time_s: self.t });
@@ -178,7 +178,7 @@ impl<'a> Integrator<'a> {
         }
     }
 
-    /// Range of the internal states of a restoring force in y.
+    /// Index range, in the state vector y, of the internal states of restoring force number `index`.
     fn state_range(&self, index: usize) -> std::ops::Range<usize> {
         let restoring_forces = &self.model.restoring_forces;
         let from = self.model.dynamics.order() + restoring_force::states(&restoring_forces[..index]);
@@ -213,7 +213,8 @@ impl<'a> Integrator<'a> {
         if model.restoring_forces[index].locked(self.regimes[index]) {
             return held[axis];
         }
-        // `rate` already contains the friction force of slip: the holding force is that force plus the remaining unbalanced force.
+        // The state derivative `rate` was computed with the friction force of slip. The holding force is that force plus the one that makes
+        // the axis's acceleration zero.
         let at = self.at(t, y);
         let sliding =
             model.restoring_forces[index].restoring_n(self.regimes[index], &at, &y[self.state_range(index)]);
@@ -230,7 +231,7 @@ impl<'a> Integrator<'a> {
         }
     }
 
-    /// Evaluates ẏ at the start of a step after a discontinuity.
+    /// Restarts the integration after a discontinuity: evaluates the state derivative ẏ at the start of the next step.
     fn start(&mut self) {
         self.set_step(self.next_h);
         let model = self.model;
@@ -266,7 +267,8 @@ impl<'a> Integrator<'a> {
             let error = self.attempt(h);
             if error <= 1.0 {
                 let grown = h * (0.9 * error.max(1e-8).powf(-0.2)).clamp(0.2, 5.0);
-                // A step shortened by a stop does not shorten the next one.
+                // If a step was shortened only to end at a stop (a time at which the right-hand side is not smooth), the next step keeps
+                // the length planned before.
                 self.next_h = if h < self.next_h {
                     grown.max(self.next_h)
                 } else {
@@ -298,7 +300,7 @@ impl<'a> Integrator<'a> {
         if shorter <= self.rounding_s() {
             return Ok((0.0, Some(event)));
         }
-        // A step shorter than an acceptable one has at most the same error.
+        // The error of the shortened step needs no test: it is at most that of the longer step, which was acceptable.
         self.attempt(shorter);
         Ok((shorter, Some(event)))
     }
@@ -365,7 +367,7 @@ impl<'a> Integrator<'a> {
         })
     }
 
-    /// Largest state at the two ends of the last attempted step, as a displacement of the tool, m.
+    /// Largest state at the two ends of the last attempted integration step, converted into a displacement of the tool, m.
     fn amplitude_m(&self) -> f64 {
         let ends = self.y.iter().zip(self.step.end());
         ends.zip(self.model.dynamics.sizes())
@@ -458,7 +460,7 @@ impl<'a> Integrator<'a> {
         }
     }
 
-    /// Rounding of the time, s: two times closer than this count as equal.
+    /// Rounding error of the simulated time, s: two times closer than this count as equal.
     fn rounding_s(&self) -> f64 {
         8.0 * f64::EPSILON * self.t
     }

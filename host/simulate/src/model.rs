@@ -69,7 +69,8 @@ impl Model {
         let jump = self.dynamics.velocity_per_force();
         let jump = Matrix3::from_fn(|i, j| jump[i][j]);
         let free = Vector3::from(force) - damping * v;
-        // D C B is small compared with 1, so that the matrix I + D C B is regular.
+        // D C B, by which the damping force reacts on the velocity that the force causes, is small compared with 1: the matrix I + D C B is
+        // regular.
         (Matrix3::identity() + damping * jump)
             .lu()
             .solve(&free)

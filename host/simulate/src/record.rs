@@ -35,7 +35,8 @@ pub enum Recorder {
     Filtered {
         /// Sampling rate, Hz.
         rate_hz: f64,
-        /// Ratio of the rate at which the motion is evaluated to the sampling rate.
+        /// Factor by which the rate at which the simulated motion is evaluated, before the filter, exceeds the sampling rate of the
+        /// recording.
         oversampling: usize,
     },
 }
@@ -226,7 +227,7 @@ impl VirtualCut {
 /// The accelerometers of a recording: one for each combination of delay and sensor location.
 struct Sensors {
     accelerometer: Option<(Accelerometer, u64)>,
-    /// Each sampler with the pickup of one of the channels that it serves.
+    /// Each simulated accelerometer, with the pickup of one of the channels that read it.
     samplers: Vec<(Pickup, Sampler)>,
 }
 
@@ -261,7 +262,7 @@ impl Sensors {
         }
     }
 
-    /// Time that the simulation must continue beyond the last sample, s.
+    /// Time that the simulation must continue after the last sample of the recording, s, because the filters need later motion.
     fn tail_s(&self) -> f64 {
         self.samplers
             .iter()

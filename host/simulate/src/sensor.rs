@@ -13,8 +13,8 @@ use super::{DenseStep, Model, Spindle, Workspace};
 
 /// Standard gravity, m/s².
 pub const STANDARD_GRAVITY: f64 = 9.806_65;
-/// Ratio of the rate at which the motion is evaluated to the sampling rate of the sensor. A choice: the difference of the velocity over a
-/// quarter of the sampling interval then lowers the gain by 0.5 % at the upper end of the pass band (sinc of 0.23/4).
+/// Ratio of the rate at which the motion is evaluated to the sampling rate of the sensor. The number is a choice: the difference of the
+/// velocity over a quarter of the sampling interval lowers the gain by 0.5 % at the upper end of the pass band (sinc of 0.23/4).
 const OVERSAMPLING: usize = 4;
 /// Number of taps of the anti-aliasing filter on each side of its centre tap, at the oversampled rate. From Kaiser's formula
 /// N = (A − 7.95)/(2.285 Δω) with a stop band of A = 70 dB and a transition band Δω = 2π·0.27/[`OVERSAMPLING`]: N = 64 = 2·32.
@@ -88,10 +88,10 @@ pub struct Sampler {
     delay_s: f64,
     filter: [f64; 2 * TAPS_PER_SIDE + 1],
     workspace: Workspace,
-    /// Number of velocities evaluated so far; velocity k belongs to the time (k − ½) oversampled steps.
+    /// Number of tool velocities evaluated so far. Velocity k belongs to the time (k − ½) intervals of the oversampled rate.
     taken: usize,
     velocity: [f64; 3],
-    /// Ring buffer of the newest accelerations, m/s².
+    /// Ring buffer of the newest accelerations at the oversampled rate, m/s², for the anti-aliasing filter.
     ring: Vec<[f64; 3]>,
     samples: Vec<[f64; 3]>,
 }
@@ -127,7 +127,8 @@ impl Sampler {
         Self { delay_s, ..self }
     }
 
-    /// Time that the simulation must continue beyond the last sample, s, without the delay: half the filter length.
+    /// Time that the simulation must continue after the last sample, s, apart from the sensor's delay: half the length of the anti-aliasing
+    /// filter.
     pub fn tail_s(&self) -> f64 {
         (TAPS_PER_SIDE + 1) as f64 * self.step_s
     }
@@ -151,14 +152,14 @@ impl Sampler {
     fn take(&mut self, velocity: [f64; 3]) {
         let length = self.ring.len();
         if self.taken > 0 {
-            // The acceleration between the last two velocities belongs to the oversampled step `taken − 1`.
+            // The difference of the last two velocities gives the acceleration of the oversampled interval with the number `taken − 1`.
             let index = self.taken - 1;
             self.ring[index % length] =
                 std::array::from_fn(|axis| (velocity[axis] - self.velocity[axis]) / self.step_s);
             if index >= TAPS_PER_SIDE && (index - TAPS_PER_SIDE).is_multiple_of(OVERSAMPLING) {
                 let mut sum = [0.0; 3];
                 for (offset, weight) in self.filter.iter().enumerate() {
-                    // Before t = 0 the ring holds zeros, as the tool is at rest.
+                    // For times before t = 0 the ring buffer of accelerations holds zeros, because the tool is at rest.
                     let acceleration = self.ring[(index + 1 + offset) % length];
                     for (sum, acceleration) in sum.iter_mut().zip(acceleration) {
                         *sum += weight * acceleration;
@@ -204,7 +205,7 @@ impl Sampler {
                     (measured / count).round() as i16
                 });
                 block.clipped += u16::from(is_clipped(counts));
-                // A chunk has at most as many samples as a block has room for.
+                // The push cannot fail: a chunk has at most as many samples as a block can hold.
                 let _ = block.counts.push(counts);
             }
             blocks.push(block);
@@ -272,7 +273,7 @@ fn normal(source: &mut ChaCha8Rng) -> f64 {
 }
 
 fn nanoseconds(t: f64) -> Nanoseconds {
-    // The conversion clips times before the start of the clock to 0.
+    // The conversion to unsigned nanoseconds sets times before the start of the clock to 0.
     Nanoseconds((t * 1e9).round() as u64)
 }
 

@@ -40,11 +40,11 @@ pub struct VirtualCut {
 /// Entry of the tool into the workpiece, and its exit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Entry {
-    /// Full engagement from start to end.
+    /// The virtual cut is in full engagement from its start to its end: no entry and no exit.
     None,
     /// The axial depth grows linearly at the start, and decreases linearly at the end.
     Ramp {
-        /// Duration of the growth, and of the decrease, s.
+        /// Duration of the growth of the axial depth at the start, and of its decrease at the end, s.
         seconds: f64,
     },
     /// Through the faces of the workpiece: the immersion grows as the tool feeds in, and decreases as it feeds out.

@@ -16,7 +16,7 @@ pub enum WorkpieceTraverse {
     Ramp {
         /// First contact with the workpiece, s.
         start_s: f64,
-        /// Duration of the growth of the depth, and of its decrease, s.
+        /// Duration of the growth of the axial depth, and of its decrease, s.
         ramp_s: f64,
         /// Last contact with the workpiece, s.
         end_s: f64,
@@ -63,7 +63,8 @@ impl WorkpieceTraverse {
     /// The tool has no diameter.
     pub fn entry_duration_s(cutter: &Cutter, spindle: &Spindle) -> Result<f64, SimulateError> {
         let radius_m = cutter.radius_m.ok_or(SimulateError::NoDiameter)?;
-        // Of all points of the engagement arc, one of its two ends reaches a face of the workpiece last.
+        // The tool is fully engaged when the last point of its engagement arc has passed the workpiece face: always one of the two ends of
+        // the arc.
         let last = cutter.start_rad.sin().min(cutter.exit_rad.sin());
         Ok(radius_m * (1.0 - last) / feed_speed(cutter, spindle))
     }
@@ -122,7 +123,7 @@ impl WorkpieceTraverse {
             Self::Ramp { end_s, .. } => t >= end_s,
             Self::Feed { end_s, .. } => {
                 let radius_m = cutter.radius_m.unwrap_or(0.0);
-                // Feed of one further revolution, in which every tooth ends its last passing.
+                // Feed during one further revolution, m, in which every tooth completes its last passing.
                 let revolution_feed_m = cutter.feed_per_tooth_m * cutter.teeth.len() as f64;
                 (t - end_s) * feed_speed(cutter, spindle) > radius_m + revolution_feed_m
             }
@@ -190,7 +191,8 @@ fn positive(f: impl Fn(f64) -> f64, [from, to]: [f64; 2]) -> Option<[f64; 2]> {
     if f(top) <= 0.0 {
         return None;
     }
-    // The positive end of the last bit.
+    // The bound of the bisection at which the concave function `f` is positive, so that the window does not exceed the range of positive
+    // values.
     let root = |negative: f64| {
         let [_, positive] = bisection([negative, top], 0.0, |x| {
             let is_positive = f(x) > 0.0;

@@ -20,11 +20,13 @@ use crate::signal::noise::{BANDS, floor_between_impacts, rms, white_floor};
 use quietcut_recording::{Quantity, Recording, TestKind};
 use quietcut_simulate::path::SampledMotion;
 
-/// Least oversampling of a cut's record: its force jumps when teeth enter and leave.
+/// Smallest oversampling factor of the grid on which a cut's force and motion are computed, because the force jumps when teeth enter and
+/// leave.
 const FINER_IN_CUTS: usize = 8;
 
-/// A recording with the prediction of the baseline, ready for comparison.
+/// Prepares a recording for comparison: a record with the prediction of the baseline.
 ///
+/// # Errors
 /// The recording cannot be compared: too short, clipped, without a required channel, or of a kind without a known excitation.
 pub(super) fn prepare(
     baseline: &Baseline<'_>,
@@ -55,7 +57,7 @@ fn is_cut(recording: &Recording) -> bool {
 fn opened(baseline: &Baseline<'_>, recording: &Recording, known: Known) -> Result<Record, DiagnoseError> {
     let domain = Domain::of(baseline, recording)?;
     let is_cut = recording.sidecar.kind == Some(TestKind::Cutting);
-    // The model predicts the force of a cut; measured forces are compared with it.
+    // In a cut the baseline predicts the force; a measured force is compared with it and is no input.
     let force_n = if is_cut {
         std::array::from_fn(|_| Vec::new())
     } else {
@@ -65,12 +67,13 @@ fn opened(baseline: &Baseline<'_>, recording: &Recording, known: Known) -> Resul
     checks::record(baseline, recording, &channels)?;
     let highest_hz = highest_hz(recording);
     let rate_hz = recording.sample_rate_hz;
-    // Harmonics of nonlinear restoring forces up to the sixteenth of `highest_hz` stay below half the upsampled rate.
+    // The upsampled grid must represent harmonics of nonlinear restoring forces up to the sixteenth of `highest_hz`, the end of the
+    // measured motion's band: they lie below half the upsampled rate. At most 8 samples per sample are used.
     let finer = ((32.0 * highest_hz / rate_hz).ceil() as usize)
         .clamp(if is_cut { FINER_IN_CUTS } else { 1 }, 8)
         .next_power_of_two();
-    // Padding in longest time constants. In a cut it may be shorter: the circular convolution wraps its end around to its beginning, where
-    // it is a free decay, which is subtracted.
+    // Duration of the zero padding of a record, in longest time constants of the structure. In a cut it may be shorter: the circular
+    // convolution wraps its end around to its beginning, where it is a free decay, which is subtracted.
     let decays = if is_cut { 2.0 } else { 8.0 };
     let room_s = decays * baseline.slowest_decay_s();
     let grid = Grid::new(recording.len(), rate_hz, room_s, finer);
@@ -133,7 +136,7 @@ fn opened(baseline: &Baseline<'_>, recording: &Recording, known: Known) -> Resul
 fn checked(record: Record) -> Result<Record, DiagnoseError> {
     let is_cut = record.kind == Some(TestKind::Cutting);
     let checked = |(index, channel): (usize, &Observed)| {
-        // Along an axis without force, a small cross-axis sensitivity of a sensor exceeds the prediction.
+        // A channel along an axis without force is not checked: a small cross-axis sensitivity of its sensor exceeds the predicted motion.
         let axis = main_axis(channel)?;
         if record.force_n[axis].is_empty() || is_cut && channel.pickup.quantity == Quantity::Force {
             return None;
@@ -214,7 +217,8 @@ fn channels(baseline: &Baseline<'_>, recording: &Recording, domain: Domain) -> V
             let pickup = baseline.pickup(&channel.name)?;
             let axes_known = (0..3).all(|axis| pickup.weights[axis] == 0.0 || baseline.axes.contains(&axis));
             let is_force = pickup.quantity == Quantity::Force;
-            // In a cut the force is an output too, and is compared.
+            // Channels of force are compared in the force domain and in cuts, where the force is an output too; all others in the response
+            // domain.
             let compared =
                 is_force == (domain == Domain::Force) || recording.sidecar.kind == Some(TestKind::Cutting);
             let is_mean = baseline.velocity_jumps && pickup.quantity == Quantity::Acceleration;

@@ -19,15 +19,16 @@ use crate::signal::noise::{BANDS, floor_between_lines, rms, white_floor_beside};
 use quietcut_recording::{Quantity, TestKind};
 use quietcut_simulate::path::{SampledMotion, restoring_along};
 
-/// By axis of the force: response of a channel per newton at the bins of the upsampled spectrum; empty for an axis without response.
+/// For each axis of the force: response of one channel per newton at the bins of the upsampled spectrum; empty for an axis to which the
+/// channel does not respond.
 pub(crate) type Responses = [Vec<Complex64>; 3];
 
-/// Noise-free samples of the channels, which an extended case predicts.
+/// Noise-free samples of a record's channels, as an extended case predicts them.
 #[derive(Clone, Debug)]
 pub(crate) struct Clean {
     /// Noise-free samples, by channel.
     readings: Vec<Vec<f64>>,
-    /// Standard deviation of each channel's measurement noise.
+    /// Standard deviation of each channel's measurement noise, in the SI unit of the channel.
     deviations: Vec<f64>,
 }
 
@@ -49,12 +50,12 @@ pub(crate) struct Record {
     pub force_n: [Vec<f64>; 3],
     /// Noise floor of each force as a standard deviation of white noise, N: sensor noise and aliased force.
     pub force_deviation_n: [f64; 3],
-    /// Estimated motion: at each frequency the measured one or the predicted one, whichever is more certain.
+    /// Estimated motion of the tool: at each frequency the measured or the predicted displacement, whichever is more certain.
     pub motion: SampledMotion,
     /// Spectra of the estimated displacement at the samples of the record, m, continued smoothly beyond both ends. The continuation adds
     /// only free decays.
     pub displacement: [Vec<Complex64>; 3],
-    /// By channel, in a cut: samples of the estimated motion, with aliasing, in the unit of the channel.
+    /// For each channel, in a cut: the estimated motion as this channel reads it, with aliasing, in the unit of the channel.
     pub readings: Vec<Vec<f64>>,
     /// Frequency below which 99.5 % of the power of each channel of motion lies, Hz.
     pub highest_hz: f64,
@@ -65,12 +66,12 @@ pub(crate) struct Record {
     /// Receptance H(iω) of the baseline, m/N, at the bins of the upsampled spectrum. In the force domain: dynamic stiffness, N/m, at the
     /// bins of the samples.
     pub transfer: Vec<Matrix3<Complex64>>,
-    /// By channel: frequency response per newton of force, at the bins of the upsampled spectrum.
+    /// For each channel: its frequency response per newton of force, at the bins of the upsampled spectrum.
     pub(super) responses: Vec<Responses>,
-    /// Range of the samples that are compared. Samples before it only determine later chips. Near the end of a cut the motion is less
-    /// certain if its sensors measure velocity or acceleration.
+    /// Range of the samples of the record that are compared with the prediction. Samples before it only determine later chips. Near the end
+    /// of a cut the motion is less certain if its sensors measure velocity or acceleration.
     pub compared: Range<usize>,
-    /// By channel: indices of samples that are not compared.
+    /// For each channel: indices of samples that are not compared, such as those beside a jump of the cutting force.
     pub skipped: Vec<Vec<usize>>,
     /// Free decays of the baseline in each channel.
     pub decays: Decays,
@@ -86,12 +87,12 @@ pub(crate) struct Record {
     pub(crate) measured_share: [Vec<f64>; 3],
 }
 
-/// Information on a record from an earlier prediction.
+/// Results of an earlier prediction of the same record that a new prediction starts from.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Known {
     /// Noise-free samples of the channels.
     pub(crate) clean: Option<Clean>,
-    /// True if the cut is near chatter; `None` if the record must show it.
+    /// True if the cut is known to be near chatter, false if it is known not to be; `None` if the record itself decides.
     pub(crate) amplifies: Option<bool>,
 }
 
@@ -156,8 +157,8 @@ impl Record {
         }
     }
 
-    /// Delay, s, of a channel of acceleration in a cut, which reads steps. It is applied in the time domain, and the channel's `responses`
-    /// do not contain it. Zero for other channels.
+    /// Delay of an acceleration channel in a cut, s. Its reading has steps, so the delay is applied in the time domain, and the channel's
+    /// `responses` do not contain it. Zero for other channels.
     fn step_delay_s(&self, channel: &Observed) -> f64 {
         let reads_steps =
             self.kind == Some(TestKind::Cutting) && channel.pickup.quantity == Quantity::Acceleration;
@@ -201,7 +202,8 @@ impl Record {
         channel.seen.as_deref().unwrap_or(&self.transfer)
     }
 
-    /// [`Observed::factor`] at a bin. It is zero at the last bin of the upsampled spectrum, where it would not be real.
+    /// Transfer function [`Observed::factor`] from displacement to the channel's reading, at a frequency bin. It is zero at the last bin of
+    /// the upsampled spectrum, where it would not be real.
     pub(crate) fn factor(&self, channel: &Observed, bin: usize) -> Complex64 {
         if bin + 1 == self.grid.fine_bins() {
             Complex64::ZERO
@@ -304,8 +306,8 @@ impl Record {
         }
     }
 
-    /// Difference by which the motion corrects a channel's prediction: measured samples, or noise-free ones if known, minus predicted
-    /// samples.
+    /// Error of a channel's prediction by which the motion is corrected: measured samples, or noise-free ones of an extended case if known,
+    /// minus predicted samples.
     pub(crate) fn to_correct(&self, channel: usize) -> Vec<f64> {
         let observed = &self.channels[channel];
         match &self.clean {

@@ -20,6 +20,7 @@ pub(crate) struct Study<'a> {
 impl<'a> Study<'a> {
     /// Compares recordings with the baseline of a case.
     ///
+    /// # Errors
     /// The case cannot be simulated, or a recording cannot be compared.
     pub(crate) fn new(case: &'a Case, recordings: &[Recording]) -> Result<Self, DiagnoseError> {
         Self::with(case, recordings, |_| Known::default())
@@ -31,6 +32,7 @@ impl<'a> Study<'a> {
     /// about (noise/signal)², relative, which exceeds their standard deviation if (noise/signal)·√(number of samples) > 1. Along the motion
     /// of a candidate model there is no such bias.
     ///
+    /// # Errors
     /// The case cannot be simulated, or a recording cannot be compared.
     pub(crate) fn with(
         case: &'a Case,
@@ -64,7 +66,8 @@ impl<'a> Study<'a> {
         self.records.iter().all(|record| record.domain == domain)
     }
 
-    /// True if a sidecar places the sensor of `channel` away from the tool tip. Without a name, true if that holds for any channel.
+    /// True if a sidecar places the sensor of `channel` away from the tool tip. With `None` as `channel`, true if that holds for any
+    /// channel.
     pub(crate) fn sits_elsewhere(&self, channel: Option<&str>) -> bool {
         self.records
             .iter()

@@ -88,7 +88,7 @@ impl Library {
     }
 }
 
-/// True for equal locations and for locations with a common axis.
+/// True if two locations of causes are equal or have a common axis.
 fn meet(one: &Location, other: &Location) -> bool {
     match (one, other) {
         (Location::EachOf(axes), Location::Axis(axis)) | (Location::Axis(axis), Location::EachOf(axes)) => {

@@ -20,16 +20,17 @@ use quietcut_recording::Recording;
 
 /// Largest number of causes that act together.
 const CAUSES: usize = 3;
-/// Number of candidate models, the best ones of the regression, that are simulated: for one, two and three causes.
+/// Number of candidate models with the largest gain in the regression that are simulated: among models of one, of two and of three causes.
 const SIMULATED: [usize; CAUSES] = [9, 5, 3];
 
 /// The selected candidate model, and those that are equivalent to it.
 pub(crate) struct Selection {
     pub(crate) best: Option<CandidateModel>,
     pub(crate) others: Vec<CandidateModel>,
-    /// Gain of the best model minus the gain of its best rival.
+    /// Lead of the selected candidate model: its gain (decrease of χ² minus the price of its parameters) minus that of its best rival.
     pub(crate) ahead: f64,
-    /// Gain of the best model minus the gain of the best model with fewer causes.
+    /// Gain of the selected candidate model (decrease of χ² minus the price of its parameters) minus that of the best model with fewer
+    /// causes.
     pub(crate) gained: f64,
 }
 
@@ -42,9 +43,10 @@ pub(crate) struct SelectionCriteria<'a> {
     /// χ² per degree of freedom that a fit of all columns of the library leaves along the measured motion, including the interpolation
     /// error; at least 1.
     inflation: f64,
-    /// χ² of the baseline, simulated if candidate models are.
+    /// χ² of the baseline, with which the χ² of candidate models is compared; from a simulation if these are simulated.
     pub(crate) reference: f64,
-    /// Largest χ² that errors of the computation cause or that a cause gains from them. They are proportional to the signal.
+    /// χ² by errors of the computation of a cut, which are proportional to the signal: the square of `RELATIVE_ERROR_OF_CUTS` times the
+    /// signal energy. A wrong cause can gain this much. Zero for tests of the structure.
     pub(crate) coherent: f64,
 }
 
@@ -79,7 +81,8 @@ impl<'a> SelectionCriteria<'a> {
         }
     }
 
-    /// χ² per degree of freedom that `best` leaves, if it is simulated; otherwise that of the whole library.
+    /// χ² per degree of freedom of the simulated candidate model `best`, at least 0.5; without a simulated one, that of a fit of the whole
+    /// library.
     pub(crate) fn inflation(&self, regression: &Regression, best: Option<&CandidateModel>) -> f64 {
         match best {
             Some(best) if best.simulated.is_some() => {
@@ -93,7 +96,8 @@ impl<'a> SelectionCriteria<'a> {
         }
     }
 
-    /// Least gain of a further cause, including what errors of the computation may gain.
+    /// Smallest gain (decrease of χ² minus the price of the parameters) that a further cause must have, including what errors of the
+    /// computation may gain.
     pub(crate) fn least_gain(&self, regression: &Regression, fewer_are_enough: bool) -> f64 {
         let noise = regression.count(Subset::Whole) as f64;
         let share = if self.coherent > 0.0 && fewer_are_enough {
@@ -122,8 +126,8 @@ impl<'a> SelectionCriteria<'a> {
         });
     }
 
-    /// Residual energy above the noise that `best` leaves: as a share of the noise, and as a share of the baseline's residual energy above
-    /// the noise.
+    /// Residual energy of `best` above the noise and the errors of the computation: as a share of the noise, and as a share of the
+    /// baseline's residual energy above the noise. Without `best`, that of the baseline.
     pub(crate) fn excess(&self, regression: &Regression, best: Option<&CandidateModel>) -> (f64, f64) {
         let noise = regression.count(Subset::Whole) as f64;
         let left = best.map_or(self.reference, |best| best.fit.left);
@@ -133,7 +137,7 @@ impl<'a> SelectionCriteria<'a> {
         (beyond / noise, beyond / there)
     }
 
-    /// True if the residual of `best` is noise, or as small as the error by sampling.
+    /// True if no further cause is needed: the residual of `best` is noise, or as small as the error that sampling causes.
     fn is_enough(&self, regression: &Regression, best: Option<&CandidateModel>) -> bool {
         let (of_noise, of_excess) = self.excess(regression, best);
         let count = regression.count(Subset::Whole) as f64;
@@ -176,7 +180,8 @@ impl<'a> SelectionCriteria<'a> {
             .is_some_and(|more| cost(best) - cost(more) > self.least_gain(regression, true))
     }
 
-    /// True if `more` explains enough of the residual energy of `fewer` above the noise, or has fewer parameters.
+    /// True if the candidate model `more` explains at least `LEAST_SHARE` of the residual energy that `fewer` (or the baseline) has above
+    /// the noise, or if it has fewer parameters than `fewer`.
     fn explains_enough(
         &self,
         regression: &Regression,
@@ -237,7 +242,7 @@ pub(crate) fn select(
     let mut fewer: Vec<CandidateModel> = Vec::new();
     for (index, most) in SIMULATED.into_iter().enumerate() {
         let size = index + 1;
-        // A residual below half of the noise floor contains nothing to explain.
+        // A baseline residual with less than half the energy of the assumed noise contains nothing to explain.
         let is_noise =
             regression.residual(Subset::Whole) < NOTHING_TO_EXPLAIN * regression.count(Subset::Whole) as f64;
         if is_noise {
@@ -262,7 +267,7 @@ pub(crate) fn select(
             2 => best_pairs(library, study, regression),
             _ => triples(library, study, regression, &pairs),
         };
-        // If candidate models are simulated, several causes start from the nonlinear parameters that each single cause has.
+        // If candidate models are simulated, pairs and triples keep the nonlinear parameters that were refined for each single cause.
         if size == 1 || criteria.closed.is_none() {
             refine(study, library, regression, &mut found);
         }
@@ -275,12 +280,13 @@ pub(crate) fn select(
         }
         let extended = if imitated.is_some() { &[] } else { &fewer[..] };
         let mut found = criteria.simulated(library, regression, found, extended, most, imitated.as_ref());
-        // If fewer causes are sufficient, a further small effect counts only if it is simulated.
+        // If fewer causes are already sufficient, a model with one more cause counts only if it was simulated.
         found.retain(|model| !enough || model.simulated.is_some());
         found.sort_by(|a, b| a.fit.left.total_cmp(&b.fit.left));
         let inflation = criteria.inflation(regression, found.first());
         criteria.sort(regression, &mut found, inflation);
-        // If fewer causes are sufficient, a better linearization must not let more causes win by errors of the computation.
+        // If fewer causes are already sufficient, the fit of more causes is not improved by a new linearization: it could win by errors of
+        // the computation.
         if !enough {
             criteria.polish(library, regression, &mut found, inflation);
         }
@@ -296,11 +302,11 @@ pub(crate) fn select(
             .as_ref()
             .map_or(0.0, |best| criteria.gain(regression, best, inflation));
         let held_out = criteria.left_held_out(library, regression, best);
-        // Held-out segments may contain nothing of an effect, as the end of a free decay does not. But the model must not increase their
-        // χ².
+        // The held-out segments may contain no trace of an effect, as the end of a free decay does, so their χ² need not decrease. But the
+        // candidate model must not increase it beyond chance.
         let chance = CHANCE * (2.0 * regression.count(Subset::HeldOut) as f64).sqrt();
         let explains_enough = criteria.explains_enough(regression, selection.best.as_ref(), best);
-        // If the second of two causes explains little, a third would compensate for errors of the other two.
+        // If the second of two causes explains little, the search ends: a third cause would only compensate for errors of the other two.
         if size > 1 && !explains_enough {
             break;
         }
@@ -333,8 +339,8 @@ pub(crate) fn select(
     selection
 }
 
-/// True for a candidate model of other causes with no more parameters than `best`, and for one of the same causes at other locations with
-/// as many parameters.
+/// True for a rival of `best`: a candidate model of other causes with no more parameters, or of the same causes at other locations with as
+/// many parameters.
 fn is_rival(library: &Library, best: &CandidateModel, other: &CandidateModel) -> bool {
     if names(library, other) != names(library, best) {
         return other.parameter_count <= best.parameter_count;
@@ -374,7 +380,7 @@ fn log_best(
 }
 
 /// The candidate model with fewer parameters than `best` that is as good along the measured motion, otherwise `best`: further parameters
-/// may only compensate for aliasing. Simulated models have no aliasing and stay.
+/// may only compensate for aliasing. Simulated models do not contain aliasing and are not taken as the simpler one.
 fn simplest(
     criteria: &SelectionCriteria<'_>,
     regression: &Regression,

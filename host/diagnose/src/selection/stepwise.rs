@@ -80,7 +80,7 @@ fn with(
     of(1.0).or_else(|| of(0.0))
 }
 
-/// The candidate model without the cause at `position`.
+/// The candidate model without the cause at index `position`.
 pub(crate) fn without(library: &Library, model: &CandidateModel, position: usize) -> CandidateModel {
     let mut coefficients = Vec::new();
     for other in (0..model.choices.len()).filter(|other| *other != position) {
@@ -100,7 +100,7 @@ pub(crate) fn without(library: &Library, model: &CandidateModel, position: usize
     }
 }
 
-/// Candidate models in which a simpler cause at the same location replaces the cause at `position`, such as a cubic spring for
+/// Candidate models in which a simpler cause at the same location replaces the cause at index `position`, such as a cubic spring for
 /// softening-hardening. The parameters of the simpler cause are some of those of the replaced one, with the same values.
 pub(crate) fn nested(
     study: &Study<'_>,
@@ -126,7 +126,8 @@ pub(crate) fn nested(
         {
             return None;
         }
-        // A simpler cause qualifies if its coefficients are its reported parameters.
+        // A simpler cause can replace this one only if its coefficients are reported parameters, with values that the replaced cause has
+        // too.
         let cause = library.cause(choice.candidate);
         let own: Vec<f64> = values
             .iter()

@@ -23,8 +23,8 @@ pub(crate) struct Grid {
 }
 
 impl Grid {
-    /// Plans the transforms of `count` samples at `rate_hz` with at least `room_s` seconds of padding, and of signals upsampled by the
-    /// factor `finer`.
+    /// Plans the transforms of `count` samples at `rate_hz`, padded with zeros for about `room_s` seconds (at most three times the record),
+    /// and of signals upsampled by the factor `finer`.
     pub(crate) fn new(count: usize, rate_hz: f64, room_s: f64, finer: usize) -> Self {
         let room = ((room_s * rate_hz) as usize).clamp(count.min(4096), 3 * count.max(1));
         let length = smooth_even(count + room);
@@ -46,7 +46,7 @@ impl Grid {
         self.count
     }
 
-    /// Number of samples including the padding.
+    /// Number of samples of a transform: those of the record and its zero padding.
     pub(crate) fn length(&self) -> usize {
         self.length
     }

@@ -1,7 +1,7 @@
 //! Noise floors: the noise variance of a channel, estimated from its residual.
 //!
-//! Sensor noise is assumed white over the band of the record. Anything else in a residual rises above the noise floor in some bands and
-//! leaves it visible in others.
+//! Sensor noise is assumed white over the band of the record. Any other part of a residual lies above the noise floor in some frequency
+//! bands only, so the other bands show the floor.
 
 use crate::criteria::{LEAST_RELATIVE_NOISE, LEAST_WHITE_SHARE};
 use crate::signal::grid::SegmentTransform;
@@ -81,8 +81,8 @@ fn floor(
         if near.is_empty() {
             break;
         }
-        // The standard deviation of a band's noise variance is proportional to that variance. A band with much other noise therefore has
-        // little weight.
+        // The standard deviation of a frequency band's noise variance is proportional to that variance. A band with much noise of other
+        // origin therefore gets little weight.
         let weight = |other: f64| (level / (level + other)).powi(2);
         let whole: f64 = near.iter().map(|(_, other)| weight(*other)).sum();
         let mean = |of: fn(&(f64, f64)) -> f64| {
@@ -127,7 +127,7 @@ fn band_means(residual: &[f64], of_band: fn(&mut [f64]) -> f64) -> Vec<f64> {
         .collect()
 }
 
-/// Number of samples of a window in which [`floor_between_impacts`] takes a variance.
+/// Number of samples of each window over which [`floor_between_impacts`] computes the variance.
 const WINDOW: usize = 256;
 
 /// Standard deviation of the noise of a channel that is zero most of the time, such as the force of a hammer: from the lower quartile of

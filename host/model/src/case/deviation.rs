@@ -36,11 +36,11 @@ pub enum Parameter {
     JointStiffness(usize),
     /// Damping of a robot joint.
     JointDamping(usize),
-    /// Cubic stiffness of a robot joint, which multiplies the cube of the joint angle.
+    /// Cubic stiffness of a robot joint, which multiplies the cube of the joint angle: index of the joint.
     JointCubicStiffness(usize),
-    /// Cubic damping of a robot joint, which multiplies the cube of the angular velocity.
+    /// Cubic damping of a robot joint, which multiplies the cube of the angular velocity: index of the joint.
     JointCubicDamping(usize),
-    /// Mass of the link that a robot joint carries.
+    /// Mass of the link that a robot joint carries: index of the joint.
     LinkMass(usize),
     /// Edge angle of the tool.
     EdgeAngle,

@@ -17,7 +17,7 @@ pub enum CaseError {
     Syntax {
         /// The file.
         path: PathBuf,
-        /// Number of the line, from 1.
+        /// Number of the line of the case file, from 1.
         line: usize,
         /// Text of the line.
         source_line: String,
@@ -33,7 +33,7 @@ pub enum CaseError {
         line: usize,
         /// The key, with its table: `tool.teeth`.
         key: String,
-        /// The value that the file has.
+        /// The refused value, as the case file has it.
         found: String,
         /// The expected value.
         expected: String,
@@ -55,7 +55,7 @@ pub enum CaseError {
         path: PathBuf,
         /// Name of the missing section: structure, tool, material or cut.
         section: &'static str,
-        /// The reason why the section is needed.
+        /// The task that needs the missing section, in words.
         what_for: &'static str,
     },
     /// An extension of the case that the requested computation cannot treat.
@@ -65,7 +65,7 @@ pub enum CaseError {
         path: PathBuf,
         /// Name of the extension.
         name: String,
-        /// The reason why it cannot be treated, and a remedy.
+        /// The reason why the computation cannot treat the extension, and a remedy.
         reason: String,
     },
 }

@@ -31,8 +31,8 @@ pub struct Case {
     pub path: PathBuf,
     /// Name of the case: key `name`, otherwise the file name without extension.
     pub name: String,
-    /// Structure of the machine; `None` without this section. Its values are finite and of the right shape. [`Structure::check`] tests
-    /// whether the matrices are definite.
+    /// Structure of the machine; `None` if the case has no section `[structure]`. Its values are finite and its matrices and mode shapes
+    /// have consistent sizes. [`Structure::check`] tests whether the matrices are definite.
     pub structure: Option<Structure>,
     /// The tool.
     pub tool: Option<Tool>,

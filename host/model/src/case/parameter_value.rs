@@ -7,9 +7,9 @@ use super::deviation::Parameter;
 use crate::structure::{Form, Joint, Matrices, Mode};
 
 impl Parameter {
-    /// Value of the parameter in a case; `None` if the case has no such parameter.
+    /// Value of this parameter in a case, in the unit of its key; `None` if the case has no such parameter.
     pub fn value(self, case: &Case) -> Option<f64> {
-        // The table `slot` gives mutable access; reading uses it on a copy of the case.
+        // The function `slot` gives mutable access to the value, so reading works on a copy of the case.
         self.slot(&mut case.clone()).map(|value| *value)
     }
 

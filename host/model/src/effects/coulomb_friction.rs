@@ -139,7 +139,7 @@ const STICK: Regime = 0;
 const SLIP_FORWARD: Regime = 1;
 const SLIP_BACKWARD: Regime = 2;
 
-/// Slider of the friction, which the tool moves while their distance is `reach_m`.
+/// Slider on which the dry friction acts: the tool moves it while their distance is `reach_m`, m.
 #[derive(Debug)]
 struct Slider {
     axis: usize,
@@ -157,7 +157,8 @@ struct FrictionBehindBacklash {
 #[derive(Debug)]
 struct FrictionBehindClearance {
     friction: Friction,
-    /// Its `reach_m` is half the clearance plus the depth to which the friction force can indent the contact.
+    /// Slider of the friction. Its `reach_m` is half the clearance plus the largest depth to which the friction force indents the contact,
+    /// m.
     slider: Slider,
     contact_m: f64,
 }
@@ -212,7 +213,7 @@ impl RestoringForce for Friction {
         self.sliding(regime)
     }
 
-    /// If the friction force differs between the two directions of motion, the fundamental is that of their mean.
+    /// If the friction force differs between the two directions of motion, the fundamental of the force is that of the mean friction force.
     fn describing_function(&self, amplitude_m: f64, _: f64) -> Option<Complex64> {
         Some(0.5 * (self.plus_n + self.minus_n) * describing_function(amplitude_m))
     }
@@ -255,7 +256,7 @@ impl RestoringForce for Friction {
 }
 
 impl Slider {
-    /// Displacement of the tool minus that of the slider, m.
+    /// Displacement of the tool minus that of the friction's slider, m.
     fn lead_m(&self, at: &MotionState, own: &[f64]) -> f64 {
         at.x[self.axis] - own[0]
     }
@@ -288,7 +289,7 @@ impl Slider {
         }
     }
 
-    /// Regime in which the tool moves the slider, if their distance is `reach_m`; `None` within the backlash.
+    /// Slip regime in which the tool moves the friction's slider, if their distance has reached `reach_m`; `None` within the backlash.
     fn dragged(&self, at: &MotionState, own: &[f64]) -> Option<Regime> {
         let lead_m = self.lead_m(at, own);
         let is_at_end = lead_m.abs() >= self.reach_m * (1.0 - 1e-9);

@@ -52,7 +52,7 @@ impl Effect for CrossAxis {
     fn alter_channel(&self, channel: &mut Pickup) {
         if let Some(axis) = self.direction.axis()
             && acts_on(self.channel.as_deref(), channel)
-            // Without a named channel, the channels of that direction itself are left as they are.
+            // If the effect names no channel, channels that already read its source direction are not changed.
             && (self.channel.is_some() || channel.weights[axis] == 0.0)
         {
             channel.weights[axis] += self.fraction;

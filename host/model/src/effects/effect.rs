@@ -12,7 +12,7 @@ pub trait Effect: Debug + Send + Sync {
     /// Entry of the effect in the list of all effects.
     fn id(&self) -> EffectName;
 
-    /// Name of the effect in cases, in answers and on the command line.
+    /// Name of the effect in cases, in answers and on the command line, such as `cubic-stiffness`.
     fn name(&self) -> &'static str {
         self.id().name()
     }

@@ -11,7 +11,7 @@ pub enum EffectError {
     /// An unknown name.
     #[error("effect `{0}` is not known; {names} is needed", names = nearest::expected(.0, EffectName::ALL.into_iter().map(EffectName::name)))]
     Unknown(String),
-    /// A key that the effect does not have.
+    /// A key that the effect with this name does not have.
     #[error("effect `{name}` has no key `{key}`; it has {known}", name = .effect.name(), known = .effect.spec().keys_in_words())]
     Key {
         /// The effect.
@@ -19,7 +19,7 @@ pub enum EffectError {
         /// The key.
         key: String,
     },
-    /// A required key that is missing.
+    /// A missing key that the effect with this name requires.
     #[error("effect `{name}` needs {key}")]
     Missing {
         /// The effect.
@@ -27,7 +27,7 @@ pub enum EffectError {
         /// The key.
         key: &'static str,
     },
-    /// A change per recording, for a recording of unknown length.
+    /// Drift or wear given as change over the whole recording, for a recording of unknown length.
     #[error("effect `{name}`: the length of the record is not known here; give {name}.{key} instead")]
     NoDuration {
         /// The effect.
@@ -40,7 +40,7 @@ pub enum EffectError {
     Value {
         /// The effect.
         name: &'static str,
-        /// The key; empty for the VALUE of `--effect NAME=VALUE`.
+        /// The key of the refused value; empty for the VALUE of `--effect NAME=VALUE`.
         key: String,
         /// The value as given.
         found: String,

@@ -47,9 +47,9 @@ pub(super) const FORCE_COEFFICIENTS: EffectSpec = EffectSpec {
 
 #[derive(Clone, Copy, Debug)]
 struct ForceCoefficients {
-    /// Factor of the coefficients of the case that `mpa` does not replace.
+    /// Factor on those cutting coefficients of the case that `mpa` does not replace.
     factor: f64,
-    /// Tangential, radial and axial cutting coefficient, MPa; `None` leaves that of the case times `factor`.
+    /// Tangential, radial and axial cutting coefficient, MPa; `None` means the coefficient of the case times `factor`.
     mpa: [Option<f64>; 3],
 }
 

@@ -113,9 +113,9 @@ struct BoucWen {
     axis: usize,
 }
 
-/// Bit of a regime that is set for negative velocity.
+/// Bit of a Bouc–Wen regime number that is set for negative velocity.
 const BACKWARD: Regime = 1;
-/// Bit of a regime that is set for negative z.
+/// Bit of a Bouc–Wen regime number that is set for a negative hysteretic displacement z.
 const NEGATIVE: Regime = 2;
 
 impl Effect for Hysteresis {
@@ -158,8 +158,8 @@ impl RestoringForce for BoucWen {
             gamma,
             ..
         } = self.effect;
-        // Within a regime the sign of z is constant. The signed power continues the law smoothly for a stage of the integrator beyond
-        // the end of the regime.
+        // Within a regime of the Bouc–Wen law the sign of z is constant. The signed power |z/z_y|ⁿ·sgn continues the law smoothly if a
+        // stage of the integrator lies beyond the end of the regime.
         let share = of_z * own[0] / yield_m;
         let power = share.signum() * share.abs().powf(exponent);
         let shape = gamma * of_velocity * of_z + (1.0 - gamma);
@@ -173,7 +173,7 @@ impl RestoringForce for BoucWen {
 
     fn margin(&self, regime: Regime, at: &MotionState, own: &[f64], _: f64) -> f64 {
         let (of_velocity, of_z) = Self::signs(regime);
-        // Velocity and z have different units, but only the sign of the margin is used.
+        // The smaller of two quantities of different units, velocity and hysteretic displacement: only the sign of this margin is used.
         (of_velocity * at.v[self.axis]).min(of_z * own[0])
     }
 
@@ -186,7 +186,7 @@ impl RestoringForce for BoucWen {
             regime |= NEGATIVE;
         }
         let Some(before) = before else { return regime };
-        // A regime ends where velocity or z becomes zero; that quantity changes its sign.
+        // A Bouc–Wen regime ends where velocity or z becomes zero; in the next regime the smaller of the two has changed its sign.
         let (of_velocity, of_z) = Self::signs(before);
         let (v, z) = (of_velocity * at.v[self.axis], of_z * own[0]);
         if v * self.effect.yield_m.recip() < z * self.effect.yield_m.recip() {

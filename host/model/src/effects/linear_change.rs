@@ -31,9 +31,9 @@ pub(super) enum Matrix {
 #[derive(Clone, Copy, Debug)]
 enum Change {
     Relative(f64),
-    /// Absolute value of a diagonal entry of the matrix, in SI units.
+    /// New value of one diagonal entry of the mass, stiffness or damping matrix, in SI units.
     DiagonalEntry(f64),
-    /// Absolute value of the natural frequency, Hz, or of the damping ratio of the only mode.
+    /// New natural frequency, Hz, or new damping ratio of the only mode of a structure.
     ModeValue(f64),
 }
 

@@ -1,4 +1,4 @@
-//! The type that the list of all effects makes.
+//! Macro that makes the type [`EffectName`] and the list of all effects from one table.
 
 use std::str::FromStr;
 

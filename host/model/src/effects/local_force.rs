@@ -18,16 +18,16 @@ pub(super) type DescribingFunction = fn([f64; 2], f64, f64) -> Complex64;
 pub(super) struct LocalForce {
     /// The effect.
     pub(super) id: EffectName,
-    /// The coefficients of the force law; the second is 0 if the law has only one.
+    /// The coefficients of the force law along one direction, such as k3; the second is 0 if the law has only one.
     pub(super) coefficients: [f64; 2],
     pub(super) law: Law,
     /// Derivatives ∂f_r/∂x, N/m, and ∂f_r/∂v, N s/m, of the force law.
     pub(super) slopes: fn([f64; 2], f64, f64) -> [f64; 2],
     /// Describing function N(X, ω) of the force law: see [`RestoringForce::describing_function`].
     pub(super) describing_function: DescribingFunction,
-    /// True if a derivative of the force law jumps where the velocity is 0.
+    /// True if a derivative of the force law jumps where the velocity is zero.
     pub(super) bends_at_rest: bool,
-    /// Direction of the force; `None` for the only direction of a structure.
+    /// Direction of the force; `None` if the structure has only one direction.
     pub(super) direction: Option<Direction>,
 }
 
@@ -41,7 +41,7 @@ struct ForceAlongAxis {
     axis: usize,
 }
 
-/// The regime of motion towards positive displacement. A law without a bend has no other.
+/// Regime of motion towards positive displacement; also the only regime of a force law without a jump in its derivatives.
 const FORWARD: Regime = 0;
 const BACKWARD: Regime = 1;
 
@@ -80,7 +80,8 @@ impl RestoringForce for ForceAlongAxis {
         Some((self.describing_function)(self.coefficients, amplitude_m, omega))
     }
 
-    /// An integration step over a bend of the law has an error that the error estimate of the step does not cover.
+    /// Ends a regime where the velocity changes its sign, if a derivative of the force law jumps there: an integration step over that jump
+    /// has an error that the step's error estimate does not contain.
     fn margin(&self, regime: Regime, at: &MotionState, _: &[f64], _: f64) -> f64 {
         match regime {
             _ if !self.bends_at_rest => f64::INFINITY,

@@ -46,7 +46,7 @@ impl Parameter {
         Self { linear: true, ..self }
     }
 
-    /// This parameter, marked as the one that VALUE sets in `--effect NAME=VALUE`.
+    /// This parameter, marked as the one whose value `--effect NAME=VALUE` sets.
     pub(super) const fn main(self) -> Self {
         Self { main: true, ..self }
     }
@@ -65,9 +65,9 @@ impl Parameter {
 /// The type of a value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ValueKind {
-    /// A number; a list of numbers if the effect acts at several locations.
+    /// The value is one number; a list of numbers if the effect acts at several locations.
     Number,
-    /// One number for all modes of the structure, or one for each mode.
+    /// The value is one number for all modes of the structure, or a list with one number for each mode.
     NumberPerMode,
     /// A word.
     Word,
@@ -82,9 +82,9 @@ pub struct Prior {
     pub low: f64,
     /// Upper bound of the interval.
     pub high: f64,
-    /// True if the lower bound itself is possible, and true if the upper one is.
+    /// For the lower and the upper bound of a parameter: true if the bound itself is a possible value.
     pub closed: [bool; 2],
-    /// The possible values in words, for messages.
+    /// The possible values of the parameter in words, for messages.
     pub words: &'static str,
 }
 

@@ -43,7 +43,7 @@ pub(super) const SENSOR_OFFSET_FROM_TOOL_TIP: EffectSpec = EffectSpec {
 
 #[derive(Clone, Debug)]
 struct SensorOffset {
-    /// One ratio for all modes, or one for each mode.
+    /// Ratios of the motion at the sensor to that at the tool tip: one for all modes, or one for each mode.
     ratios: Vec<f64>,
     channel: Option<String>,
 }

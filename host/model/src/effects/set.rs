@@ -154,7 +154,7 @@ impl Effects {
         spindle
     }
 
-    /// The reading of a channel with the changes of these effects.
+    /// The pickup (weights, gain, delay) of a channel with the changes of these effects.
     pub fn pickup(&self, mut channel: Pickup) -> Pickup {
         for effect in &self.0 {
             effect.alter_channel(&mut channel);

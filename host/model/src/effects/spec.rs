@@ -37,7 +37,7 @@ pub struct EffectSpec {
     pub source: &'static str,
     /// Example: the lines of a table `[extension.NAME]` of a case.
     pub example: &'static str,
-    /// Builds the effect from the given values and removes those that it uses; a key that remains is unknown.
+    /// Builds the effect from the given values and removes from them those that it uses; a key left over is unknown to the effect.
     pub(super) build: fn(&mut Values) -> Result<Arc<dyn Effect>, EffectError>,
 }
 
@@ -115,9 +115,9 @@ pub enum Locations {
     TwoDirections,
     /// On the cut.
     Cut,
-    /// In the named channels of a recording; without a name, in every channel of motion.
+    /// Location of a sensor effect: the named channels of a recording; without a name, every channel of motion.
     Channels,
-    /// In the named channels of a recording, which read the motion of another direction.
+    /// Location of a cross-axis effect: the named channels of a recording, which also read the motion of another direction.
     ChannelsFromDirection,
 }
 
@@ -145,9 +145,10 @@ pub enum Treatment {
     Smooth,
     /// A power law of the chip thickness or process damping: the cutting force is linearized about the forced chip thickness.
     ChipLaw,
-    /// A restoring force that is not smooth: replaced by its equivalent stiffness and damping at the amplitude of the forced periodic orbit.
+    /// A restoring force that is not smooth. Stability computations replace it by its equivalent stiffness and damping at the amplitude of
+    /// the forced periodic orbit.
     Equivalent,
-    /// The effect changes with time, so that limits hold for one moment only. The text names what to give instead.
+    /// The effect changes with time, so that stability limits hold for one moment only. The text names what to give instead.
     OfMoment(&'static str),
     /// No stability limits are computed with this effect. The text states the reason.
     Refused(&'static str),

@@ -9,7 +9,7 @@ use crate::structure::Direction;
 /// A value of a parameter as given in the case or on the command line.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Value {
-    /// A number, or a switch: true is 1 and false is 0.
+    /// A number; a switch is stored as 1 (true) or 0 (false).
     Number(f64),
     /// A word.
     Text(String),
@@ -76,7 +76,7 @@ impl Value {
 #[derive(Clone, Debug)]
 pub struct Values {
     effect: EffectName,
-    /// Values by key; the VALUE of the command line has the empty key.
+    /// Values by the key of the parameter; the VALUE of the command line has the empty key.
     by_key: BTreeMap<String, Value>,
     /// Length of the recording, s, over which VALUE changes drift and wear; `None` if it is not known.
     record_s: Option<f64>,
@@ -91,7 +91,7 @@ impl Values {
         }
     }
 
-    /// These values for a recording of the length `record_s`, s.
+    /// These values, for a recording of the length `record_s`, s, over which VALUE changes drift and wear.
     pub(super) fn over(mut self, record_s: Option<f64>) -> Self {
         self.record_s = record_s;
         self
@@ -105,7 +105,7 @@ impl Values {
         self.by_key.insert(key.into(), value);
     }
 
-    /// The bounds of the parameter with this key; those of the main parameter for the empty key (VALUE).
+    /// The bounds of the effect's parameter with this key; for the empty key (VALUE) those of the main parameter.
     fn prior(&self, key: &str) -> Prior {
         let parameter = if key.is_empty() {
             self.effect.spec().main()
@@ -115,7 +115,7 @@ impl Values {
         parameter.map_or(Prior::ANY, |parameter| parameter.prior)
     }
 
-    /// Removes and returns the number with this key; `None` if it is not given.
+    /// Removes the number with this key from the given values and returns it; `None` if it is not given.
     ///
     /// # Errors
     /// The value is not a finite number, or out of the bounds of its parameter.
@@ -177,7 +177,7 @@ impl Values {
         Ok(names.iter().enumerate().map(of).collect())
     }
 
-    /// Number of the main parameter, given by its key or as VALUE.
+    /// Value of the effect's main parameter, given by its key or as VALUE of `--effect NAME=VALUE`.
     pub(super) fn main(&mut self, key: &'static str) -> Result<f64, EffectError> {
         match self.number("")? {
             Some(number) => Ok(number),
@@ -185,7 +185,7 @@ impl Values {
         }
     }
 
-    /// Numbers of a main parameter that may have one for each mode, given by its key or as VALUE.
+    /// Values of a main parameter with one number for each mode or one for all, given by its key or as VALUE of `--effect NAME=VALUE`.
     pub(super) fn main_numbers(&mut self, key: &'static str) -> Result<Vec<f64>, EffectError> {
         let given = if self.by_key.contains_key("") { "" } else { key };
         match self.by_key.remove(given) {
@@ -198,7 +198,7 @@ impl Values {
         }
     }
 
-    /// A switch, by its key or as VALUE: true, false, 1 or 0.
+    /// State of an on/off parameter, given by its key or as VALUE of `--effect NAME=VALUE`: true, false, 1 or 0.
     pub(super) fn switch(&mut self, key: &'static str) -> Result<bool, EffectError> {
         let given = if self.by_key.contains_key("") { "" } else { key };
         match self.by_key.remove(given) {
@@ -208,7 +208,7 @@ impl Values {
         }
     }
 
-    /// Relative rate of change, 1/s: given by its key, or as VALUE, which is the change over the whole recording.
+    /// Relative rate of drift or wear, 1/s: given by its key, or as VALUE, which is the relative change over the whole recording.
     pub(super) fn rate(&mut self, key: &'static str) -> Result<f64, EffectError> {
         match (self.number("")?, self.record_s) {
             (Some(change), Some(record_s)) => Ok(change / record_s),
@@ -220,12 +220,12 @@ impl Values {
         }
     }
 
-    /// A number that must be given.
+    /// Removes the number with this key from the given values and returns it; an error if it is missing.
     pub(super) fn needed(&mut self, key: &'static str) -> Result<f64, EffectError> {
         self.number(key)?.ok_or_else(|| self.missing(key))
     }
 
-    /// The error of a key that must be given.
+    /// The error for a required key of the effect that is missing.
     pub(super) fn missing(&self, key: &'static str) -> EffectError {
         EffectError::Missing {
             name: self.effect.name(),
@@ -264,7 +264,7 @@ impl Values {
         self.text("channel")
     }
 
-    /// The key `directions`: `["x", "y"]` or `x,y`.
+    /// Value of the key `directions`, two directions: `["x", "y"]` in a case or `x,y` on the command line.
     pub(super) fn directions(&mut self) -> Result<Option<[Direction; 2]>, EffectError> {
         let key = "directions";
         let Some(value) = self.by_key.remove(key) else {
@@ -289,10 +289,10 @@ impl Values {
         }
     }
 
-    /// Checks that the effect has used all values.
+    /// Checks that the effect has used all given values.
     ///
     /// # Errors
-    /// A key that the effect does not have.
+    /// A key is left that the effect does not have.
     pub(super) fn finish(self) -> Result<(), EffectError> {
         match self.by_key.into_keys().next() {
             None => Ok(()),

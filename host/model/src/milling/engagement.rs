@@ -4,8 +4,8 @@ use std::f64::consts::PI;
 
 use super::{Cut, Tool};
 
-/// Fraction of a pitch angle below which a subinterval is dropped: it then is rounding of angles that are given in degrees. Far above the
-/// rounding of a double, 2e-16, and far below the digits of a case file.
+/// Length of a subinterval of the tooth-passing period, as a fraction of the pitch angle, below which the subinterval is dropped: it comes
+/// from rounding of angles in degrees. The value lies far above the rounding of a double, 2e-16, and far below the digits of a case file.
 const NEGLIGIBLE: f64 = 1e-9;
 
 /// The teeth that cut during one tooth-passing period of a tool with equal pitch.
@@ -30,7 +30,7 @@ pub struct Subinterval {
     pub from: f64,
     /// Phase of the tooth-passing period at the end of the subinterval, rad.
     pub to: f64,
-    /// Number of teeth in cut; 0 means free vibration.
+    /// Number of teeth in cut during the subinterval; 0 means free vibration.
     pub teeth: usize,
 }
 

@@ -16,7 +16,7 @@ pub struct RotatingVector {
 }
 
 impl RotatingVector {
-    /// The vector of a function that is linear in the radial direction (sin φ, cos φ), with a constant.
+    /// The coefficients of a vector function of the immersion angle φ that is linear in (sin φ, cos φ) with a constant, from its values.
     fn of(of: impl Fn(Immersion) -> [f64; 3]) -> Self {
         let at = |sin: f64, cos: f64| {
             Vector3::from(of(Immersion {

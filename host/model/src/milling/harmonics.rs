@@ -48,13 +48,14 @@ fn exponentials(vector: &RotatingVector) -> [Vector3<Complex64>; 3] {
     [half(1.0), vector.constant.map(Complex64::from), half(-1.0)]
 }
 
-/// (1/θ) ∫ e^{imφ} e^{−ikN(φ − start)} dφ from start to exit, with N = 2π/θ.
+/// (1/θ) ∫ e^{imφ} e^{−ikN(φ − start)} dφ over the immersion angle φ from the start to the exit angle, with the pitch angle θ and N = 2π/θ
+/// teeth.
 fn integral(engagement: &Engagement, m: i32, k: i32) -> Complex64 {
     let Engagement { start, exit, pitch } = *engagement;
     let (m, harmonic_rate) = (f64::from(m), f64::from(k) * std::f64::consts::TAU / pitch);
     let rate = m - harmonic_rate;
     let sum = if rate.abs() < 1e-9 {
-        // N is an integer, so that the rate is zero or at least one in magnitude.
+        // The exponent m − kN is an integer, so that it is zero or at least one in magnitude: the threshold 1e-9 decides safely.
         Complex64::cis(harmonic_rate * start) * (exit - start)
     } else {
         let at_exit = Complex64::cis(m * exit - harmonic_rate * (exit - start));

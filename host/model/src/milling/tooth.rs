@@ -28,7 +28,7 @@ impl Immersion {
         }
     }
 
-    /// The same tooth in the machine's x and y, for the unit vector of the feed in them.
+    /// The radial direction of the same immersion in the machine's x and y; `[a, b]` is the unit vector of the feed in these axes.
     pub(crate) fn in_machine(self, [a, b]: [f64; 2]) -> Self {
         let [sin, cos] = self.outward;
         Self {
@@ -119,7 +119,7 @@ pub struct EdgeForce {
 }
 
 impl EdgeForce {
-    /// Force vector at an immersion, in the axes of its radial direction.
+    /// Force vector on the tool, N, at an immersion: in feed, normal and axial direction, or in the machine's x, y, z, as `at` is given.
     pub fn at(self, at: Immersion) -> [f64; 3] {
         let [x, y] = at.outward;
         [
@@ -129,7 +129,7 @@ impl EdgeForce {
         ]
     }
 
-    /// True if all components are zero.
+    /// True if tangential, radial and axial component of the edge's force are all zero.
     pub fn is_zero(self) -> bool {
         self.tangential == 0.0 && self.inward == 0.0 && self.axial == 0.0
     }

@@ -9,7 +9,7 @@ use super::{Matrices, Structure, StructureError};
 pub struct CubicForce {
     /// Number of displacements q.
     size: usize,
-    /// C₃ and K₃, row by row.
+    /// Matrices of cubic damping C₃ and cubic stiffness K₃, row by row.
     damping: Vec<f64>,
     stiffness: Vec<f64>,
 }
@@ -70,7 +70,7 @@ impl CubicForce {
         self.size
     }
 
-    /// The elements of f₃ at displacements `q` and velocities `v`, in order.
+    /// The elements of the cubic force f₃(q, v) at displacements `q` and velocities `v`, in the order of the degrees of freedom.
     pub fn at<'a>(&'a self, q: &'a [f64], v: &'a [f64]) -> impl Iterator<Item = f64> + 'a {
         let rows = self.damping.chunks_exact(self.size);
         rows.zip(self.stiffness.chunks_exact(self.size))

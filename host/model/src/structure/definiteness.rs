@@ -23,7 +23,7 @@ pub struct Indefinite {
 /// A change of one entry that, alone or together with another, makes the matrix definite.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Remedy {
-    /// The off-diagonal entries (row, column) and (column, row) have the wrong sign.
+    /// The off-diagonal entries (row, column) and (column, row) of the matrix have the wrong sign.
     Sign {
         /// Row, from 1.
         row: usize,
@@ -31,18 +31,18 @@ pub enum Remedy {
         column: usize,
         /// The entry as it is.
         value: f64,
-        /// Names of the two degrees of freedom.
+        /// Names of the two degrees of freedom that the off-diagonal entry couples.
         directions: (Direction, Direction),
     },
-    /// The diagonal entry is too small.
+    /// A diagonal entry of the matrix is too small.
     Diagonal {
         /// Row and column, from 1.
         row: usize,
         /// The entry as it is.
         value: f64,
-        /// Lower bound, in the unit of the matrix, that the entry must exceed.
+        /// Lower bound that the diagonal entry must exceed for a definite matrix, in the unit of the matrix.
         above: f64,
-        /// Name of the degree of freedom.
+        /// Name of the degree of freedom to which the diagonal entry belongs.
         direction: Direction,
     },
 }

@@ -16,9 +16,9 @@ use quietcut_numerics::eigenvalues::{EigenvalueError, of_real};
 pub struct FirstOrder {
     /// A, n × n, 1/s.
     pub a: DMatrix<f64>,
-    /// B, n × 3: force in x, y, z, N.
+    /// Input matrix B, n × 3: effect of a force of 1 N along x, y, z on the state derivatives.
     pub b: MatrixXx3<f64>,
-    /// C, 3 × n: displacement in x, y, z, m.
+    /// Output matrix C, 3 × n: displacement of the tool along x, y, z, m, per state.
     pub c: Matrix3xX<f64>,
 }
 
@@ -124,7 +124,8 @@ fn from_second_order(matrices: &Matrices, jacobian: &Matrix3xX<f64>) -> Result<F
         .ok_or(StructureError::SingularMass)?;
     let stiffness = &inverse_mass * &matrices.stiffness;
     let damping = &inverse_mass * &matrices.damping;
-    // Scale s of the velocities, 1/s. A free mass has no natural frequency: its damping rate is the scale, or 1/s without damping.
+    // Scale s of the velocity states q̇/s, 1/s. A free mass has no natural frequency: its damping rate is the scale, or 1/s without
+    // damping.
     let scale = match stiffness.norm().sqrt().max(damping.norm()) {
         scale if scale > 0.0 => scale,
         _ => 1.0,

@@ -44,7 +44,7 @@ pub struct Robot {
     pub joints: Vec<Joint>,
     /// Position of the tool centre point with all joint angles at zero, m.
     pub tool_m: Vector3<f64>,
-    /// Joint angles, rad, one for each joint.
+    /// Joint angles of the posture, rad, one for each joint.
     pub angles_rad: Vec<f64>,
 }
 
@@ -76,7 +76,8 @@ impl Robot {
                 rotation * joint.point_m + shift,
             ));
             let rotation_of_joint = Rotation3::from_axis_angle(&joint.axis, *angle);
-            // This joint maps x to `rotation_of_joint` (x − point) + point, before the joints between it and the base act.
+            // A rotation of this joint moves a point x to `rotation_of_joint`·(x − point) + point; the joints nearer to the base act after
+            // it.
             shift += rotation * (joint.point_m - rotation_of_joint * joint.point_m);
             rotation *= rotation_of_joint;
             links.push((rotation, rotation * joint.center_m + shift));

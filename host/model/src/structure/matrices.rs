@@ -13,8 +13,8 @@ pub struct Matrices {
     pub damping: DMatrix<f64>,
     /// K, N/m.
     pub stiffness: DMatrix<f64>,
-    /// C₃, N s³/m³; `None` for linear damping.
+    /// Matrix C₃ of cubic damping, which multiplies the cubes of the velocities, N s³/m³; `None` for linear damping.
     pub cubic_damping: Option<DMatrix<f64>>,
-    /// K₃, N/m³; `None` for linear stiffness.
+    /// Matrix K₃ of cubic stiffness, which multiplies the cubes of the displacements, N/m³; `None` for linear stiffness.
     pub cubic_stiffness: Option<DMatrix<f64>>,
 }

@@ -79,7 +79,8 @@ impl FirstOrder {
         let right = invariant(&self.a, pole, group.len())?;
         let left = invariant(&self.a.transpose(), pole, group.len())?;
         let projector = &right * (left.transpose() * &right).try_inverse()? * left.transpose();
-        // P² = P by construction. A P = λ P holds only for a pole that has as many mode shapes as its multiplicity.
+        // P is a projector (P² = P) by construction. A P = λ P holds only for a pole λ that has as many mode shapes as its multiplicity;
+        // others are excluded.
         let miss = self.a.map(Complex64::from) * &projector - &projector * pole;
         (miss.norm() < DEFECTIVE * pole.norm() * projector.norm()).then_some(ModalPart { pole, projector })
     }
@@ -88,7 +89,8 @@ impl FirstOrder {
 /// Orthonormal basis of the invariant subspace of `matrix` at the eigenvalue `pole`, from inverse iteration with `count` vectors.
 fn invariant(matrix: &DMatrix<f64>, pole: Complex64, count: usize) -> Option<DMatrix<Complex64>> {
     let size = matrix.nrows();
-    // A shift of 1e-7 away from the pole keeps the matrix regular. Each of the three steps then reduces other eigenvectors by about 1e7.
+    // A shift of 1e-7 away from the pole keeps the matrix of the inverse iteration regular. Each of the three iterations then reduces the
+    // parts of other eigenvectors by about 1e7.
     let shift = pole * (1.0 + 1e-7);
     let lu = (matrix.map(Complex64::from) - DMatrix::identity(size, size) * shift).lu();
     let start =

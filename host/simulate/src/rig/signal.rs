@@ -218,7 +218,8 @@ impl Signal {
             Self::Tones { .. } | Self::Sweep { .. } => f64::INFINITY,
             Self::StepSine { dwell_s, pause_s, .. } => {
                 let index = (t / (dwell_s + pause_s)).floor();
-                // The start of this step and of the next two: rounding may place `index` on either side of a start.
+                // Starts and ends of excitation in this step of the step sine and in the next two: rounding may place `index` on either
+                // side of a step's start.
                 [0.0, 1.0, 2.0]
                     .iter()
                     .flat_map(|ahead| {

@@ -11,7 +11,7 @@ use crate::effects::nearest::expected;
 use crate::effects::{EffectName, EffectSpec, Effects, Parameter, ValueKind};
 use crate::structure::Direction;
 
-/// Endings of keys that state a unit, by which a key with another unit is recognised.
+/// Endings of parameter keys that state a unit. They recognise a key that differs from a known one in the unit only.
 const UNITS: [&str; 40] = [
     "_n_per_m",
     "_n_per_mm",
@@ -55,7 +55,7 @@ const UNITS: [&str; 40] = [
     "_percent",
 ];
 
-/// A key without the ending that states its unit.
+/// The key of a parameter without the ending that states its unit.
 fn stem(key: &str) -> &str {
     UNITS
         .iter()
@@ -64,7 +64,7 @@ fn stem(key: &str) -> &str {
         .unwrap_or(key)
 }
 
-/// The parameter whose key differs from `key` in the unit only; `None` if there is none.
+/// The parameter of the effect `spec` whose key differs from `key` in the unit only; `None` if there is none.
 fn of_other_unit(spec: &EffectSpec, key: &str) -> Option<&'static Parameter> {
     let with_key = || {
         spec.parameters

@@ -1,4 +1,4 @@
-//! The structure as a robot: joints, links, and the posture that they are at.
+//! Reads the structure of a robot from the case file: joints, links, and the joint angles of the posture.
 
 use nalgebra::{Cholesky, Matrix3, Unit, Vector3};
 use toml::Spanned;

@@ -1,4 +1,4 @@
-//! The structure: matrices or modes, and how well they are known.
+//! Reads the structure given by matrices or modes from the case file, with the standard deviations of its parameters.
 
 use nalgebra::DMatrix;
 use num_complex::Complex64;
