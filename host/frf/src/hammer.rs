@@ -1,5 +1,7 @@
 //! Impacts of a hammer test: detection, double impacts, and the windows of force and response.
 
+use quietcut_numerics::statistics::median;
+
 use super::FrfError;
 use super::criteria::{
     BOUNCE_S, LEAST_IMPACT, PULSE_ABOVE_NOISE, PULSE_END, PULSE_END_ABOVE_NOISE, SECOND_PULSE,
@@ -34,20 +36,9 @@ pub struct HammerWindows {
     pub segment_s: Option<f64>,
     /// Time constant τ of the exponential window on force and response, s; `None` for no window.
     ///
-    /// With e^{−t/τ} on both signals the FRF is exactly H(iω + 1/τ): every pole λ moves to λ − 1/τ. See [`true_damping`].
+    /// With e^{−t/τ} on both signals the FRF is exactly H(iω + 1/τ): every pole λ moves to λ − 1/τ. [`measure`](crate::measure)
+    /// takes this damping off again.
     pub exponential_s: Option<f64>,
-}
-
-/// Corrects the natural frequency and damping ratio of a mode for an exponential window of time constant τ (`exponential_s`, s).
-///
-/// The window moves the pole λ = −ζω ± iω√(1 − ζ²) by −1/τ. Its imaginary part stays, so with λ' = λ_measured + 1/τ
-/// the natural frequency is |λ'| and ζ = −Re λ'/|λ'|. Returns the natural frequency, Hz, and ζ. ζ is negative if
-/// the measured damping is less than that of the window.
-pub fn true_damping(frequency_hz: f64, damping_ratio: f64, exponential_s: f64) -> (f64, f64) {
-    let decay_hz = frequency_hz * damping_ratio - 1.0 / (std::f64::consts::TAU * exponential_s);
-    let damped_hz = frequency_hz * (1.0 - damping_ratio * damping_ratio).max(0.0).sqrt();
-    let true_hz = decay_hz.hypot(damped_hz);
-    (true_hz, decay_hz / true_hz)
 }
 
 /// Windowed segments of the impacts of one record.
@@ -202,7 +193,7 @@ fn longest_segment(impacts: &[MeasuredImpact], samples: usize) -> usize {
 
 /// Detects all impacts of a force signal; pulses within [`BOUNCE_S`] after an impact belong to it.
 fn impacts(force: &[f64], rate: f64) -> Vec<MeasuredImpact> {
-    let middle = median(force.to_vec());
+    let middle = median(&mut force.to_vec()).unwrap_or(0.0);
     let noise = noise(force, middle);
     let largest = force
         .iter()
@@ -248,7 +239,7 @@ fn impacts(force: &[f64], rate: f64) -> Vec<MeasuredImpact> {
 /// Largest second force pulse before sample `end`: delay after the peak of the impact, s, and height as a fraction of that peak. `None` if no
 /// pulse exceeds the threshold of a double impact.
 fn second_pulse(force: &[f64], impact: &MeasuredImpact, end: usize, rate: f64) -> Option<(f64, f64)> {
-    let middle = median(force.to_vec());
+    let middle = median(&mut force.to_vec()).unwrap_or(0.0);
     let width = (impact.last - impact.first).max(4);
     // One pulse width after the first pulse is skipped, since anti-aliasing filters ring there.
     let from = (impact.last + width).min(end);
@@ -263,14 +254,6 @@ fn second_pulse(force: &[f64], impact: &MeasuredImpact, end: usize, rate: f64) -
 /// Standard deviation of the force noise: 1.4826 · median absolute deviation from `middle`, which holds for Gaussian noise. Rare impacts do
 /// not affect the median.
 fn noise(force: &[f64], middle: f64) -> f64 {
-    1.4826 * median(force.iter().map(|f| (f - middle).abs()).collect())
-}
-
-/// Median of the values; 0 for an empty list.
-fn median(mut values: Vec<f64>) -> f64 {
-    if values.is_empty() {
-        return 0.0;
-    }
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+    let mut deviations: Vec<f64> = force.iter().map(|f| (f - middle).abs()).collect();
+    1.4826 * median(&mut deviations).unwrap_or(0.0)
 }

@@ -60,7 +60,7 @@ mod window;
 pub use error::FrfError;
 pub use estimate::Estimator;
 pub use excitation::Excitation;
-pub use hammer::{HammerWindows, MeasuredImpact, true_damping};
+pub use hammer::{HammerWindows, MeasuredImpact};
 pub use interpolation::Interpolation;
 pub use measurement::{Measurement, RecordingGroup, measure};
 pub use measurement_settings::MeasurementSettings;

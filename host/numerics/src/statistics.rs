@@ -102,6 +102,13 @@ pub fn binomial_interval(share: f64, hits: usize, trials: usize) -> [f64; 2] {
     [low, high]
 }
 
+/// Median of values, whose order it changes: the value in the middle of their order, for an even number the upper of the two.
+/// `None` without values.
+pub fn median(values: &mut [f64]) -> Option<f64> {
+    let middle = values.len() / 2;
+    (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
+}
+
 /// Quantile of a `sorted` sample, interpolated linearly between the order statistics at (i + 1/2)/n (Hazen); `None` for an empty sample.
 pub fn sample_quantile(sorted: &[f64], share: f64) -> Option<f64> {
     let position = (share * sorted.len() as f64 - 0.5).max(0.0);
@@ -233,6 +240,13 @@ mod tests {
     use rand::{RngExt, SeedableRng};
 
     use super::*;
+
+    #[test]
+    fn the_median_is_in_the_middle_of_the_order() {
+        assert_eq!(median(&mut [3.0, -1.0, 2.0]), Some(2.0));
+        assert_eq!(median(&mut [4.0, 1.0, 3.0, 2.0]), Some(3.0));
+        assert_eq!(median(&mut []), None);
+    }
 
     #[test]
     fn normal_quantiles_are_those_of_the_tables() {

@@ -1,5 +1,6 @@
 //! Summary of one channel: peak, root mean square, mean, clipping, dropouts, and an envelope for a small picture.
 
+use quietcut_numerics::statistics::median;
 use serde::Serialize;
 
 use super::criteria::{AT_REST, CLIPPED_RUN, DROPOUT_RUN, FAR_FROM_REST};
@@ -45,7 +46,7 @@ impl ChannelSummary {
         let constant = minimum == maximum;
         let runs = runs(samples);
         let is_extreme = |value: f64| value == minimum || value == maximum;
-        let rest = median(samples);
+        let rest = median(&mut samples.to_vec()).unwrap_or(0.0);
         // The force of an impact test rests at its smallest value; a tachometer has two levels.
         let is_clipping =
             |value: f64| is_extreme(value) && (value - rest).abs() > FAR_FROM_REST * (maximum - minimum);
@@ -79,16 +80,6 @@ impl ChannelSummary {
             dropouts_s,
         }
     }
-}
-
-/// Median of the samples; 0 without samples.
-fn median(samples: &[f64]) -> f64 {
-    let mut sorted = samples.to_vec();
-    let middle = sorted.len() / 2;
-    if sorted.is_empty() {
-        return 0.0;
-    }
-    *sorted.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
 /// Runs of equal samples: index of the first sample and length.

@@ -3,6 +3,7 @@
 use std::f64::consts::TAU;
 
 use quietcut_core::tachometer::Wheel;
+use quietcut_numerics::statistics::median;
 
 use super::{Recording, blocks};
 use crate::criteria::STEADY_MIDDLE;
@@ -21,8 +22,9 @@ pub struct TachometerEdges {
 impl TachometerEdges {
     /// The edges of a recording; `None` without a channel `tacho`.
     ///
-    /// The device's detector finds each pulse, whose base line may wander. The edge is where the level crosses the middle between the level
-    /// before the pulse and that of the pulse, each a median, by linear interpolation.
+    /// The device's detector finds each pulse, whose base line may wander. The edge is where the level crosses, by
+    /// linear interpolation, the middle of its range; where the base line wanders, or the pulse stays below, the middle between the
+    /// level before the pulse and that of the pulse, each a median.
     pub fn new(recording: &Recording) -> Option<Self> {
         let (wheel, level) = (blocks::wheel(recording)?, recording.channel("tacho")?);
         let level = level.samples.as_slice();
@@ -32,21 +34,20 @@ impl TachometerEdges {
             lower_plateau(&level[from..=found.get(edge).map_or(level.len() - 1, |sample| *sample)])
         };
         // One middle for all edges where the base line is steady: a middle of each pulse would depend on how few samples show it.
-        let steady = middle_of_range(level);
-        let swing = level.iter().copied().fold(f64::NEG_INFINITY, f64::max)
-            - level.iter().copied().fold(f64::INFINITY, f64::min);
-        let valleys = (1..found.len()).map(valley);
-        let (least, largest) = valleys.fold((f64::INFINITY, f64::NEG_INFINITY), |(least, largest), value| {
-            (least.min(value), largest.max(value))
-        });
-        let wanders = largest - least > STEADY_MIDDLE * swing;
+        let (least, largest) = range_of(level.iter().copied());
+        let (lowest, highest) = range_of((1..found.len()).map(valley));
+        let is_steady = highest - lowest <= STEADY_MIDDLE * (largest - least);
         let mut times_s = Vec::with_capacity(found.len());
         for (edge, sample) in found.iter().enumerate() {
             let end = found.get(edge + 1).map_or(level.len(), |next| *next);
+            let to_end = &level[..end];
             // A record may begin within the first rise: its foot is the valley after the pulse then.
-            let (low, high) = (valley(edge.max(1)), upper_plateau(&level[*sample..end]));
-            let middle = if wanders { 0.5 * (low + high) } else { steady };
-            if let Some(at) = crossing(level, *sample, middle) {
+            let own = || 0.5 * (valley(edge.max(1)) + upper_plateau(&level[*sample..end]));
+            let common = is_steady
+                .then(|| crossing(to_end, *sample, 0.5 * (least + largest)))
+                .flatten();
+            // A pulse that few samples show may stay below the common middle.
+            if let Some(at) = common.or_else(|| crossing(to_end, *sample, own())) {
                 times_s.push(at / recording.sample_rate_hz);
             }
         }
@@ -80,28 +81,34 @@ impl TachometerEdges {
 /// Median of the samples below the middle of their range: the level between two pulses. Extremes of a noisy level would move
 /// the middle from pulse to pulse, and by more samples on the longer side.
 fn lower_plateau(level: &[f64]) -> f64 {
-    let middle = middle_of_range(level);
-    median(level.iter().copied().filter(|value| *value <= middle).collect())
+    plateau(level, |value, middle| value <= middle)
 }
 
 /// Median of the samples above the middle of their range: the level of a pulse.
 fn upper_plateau(level: &[f64]) -> f64 {
-    let middle = middle_of_range(level);
-    median(level.iter().copied().filter(|value| *value >= middle).collect())
+    plateau(level, |value, middle| value >= middle)
 }
 
-fn middle_of_range(level: &[f64]) -> f64 {
-    let least = level.iter().copied().fold(f64::INFINITY, f64::min);
-    let largest = level.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    0.5 * (least + largest)
+/// Median of the samples on one side of the middle of their range. There is at least one sample.
+fn plateau(level: &[f64], is_of: fn(f64, f64) -> bool) -> f64 {
+    let (least, largest) = range_of(level.iter().copied());
+    let middle = 0.5 * (least + largest);
+    let mut side: Vec<f64> = level
+        .iter()
+        .copied()
+        .filter(|value| is_of(*value, middle))
+        .collect();
+    median(&mut side).unwrap_or(middle)
 }
 
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
+/// Least and largest of the values; (∞, −∞) without values.
+fn range_of(values: impl Iterator<Item = f64>) -> (f64, f64) {
+    values.fold((f64::INFINITY, f64::NEG_INFINITY), |(least, largest), value| {
+        (least.min(value), largest.max(value))
+    })
 }
 
-/// Sample index, with its fraction, at which the level rises through `middle` near sample `near`.
+/// Sample index, with its fraction, at which the level rises through `middle` near sample `near`; `None` if it does not reach it.
 fn crossing(level: &[f64], near: usize, middle: f64) -> Option<f64> {
     let mut after = near;
     while *level.get(after)? < middle {
@@ -168,4 +175,66 @@ fn angles(edges_s: &[f64], wheel: Wheel) -> Result<Vec<f64>, String> {
         angles.push(TAU * position / positions);
     }
     Ok(angles)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Channel, Quantity, Sidecar};
+
+    /// A recording of a tachometer alone, 1000 samples per second.
+    fn recording(level: impl Fn(f64) -> f64) -> Recording {
+        Recording {
+            path: "cut.csv".into(),
+            sample_rate_hz: 1000.0,
+            start_s: 0.0,
+            since_s: 0.0,
+            channels: vec![Channel {
+                name: "tacho".into(),
+                quantity: Quantity::Level,
+                samples: (0..2000).map(|sample| level(f64::from(sample) * 1e-3)).collect(),
+            }],
+            sidecar: Sidecar::default(),
+        }
+    }
+
+    #[test]
+    fn every_pulse_has_an_edge_of_its_own_even_if_few_samples_show_it() {
+        // Triangles 1.7 samples wide at 41 rev/s: their largest sample lies between 0.41 and 1.
+        let level = |t: f64| {
+            let from_middle_s = ((41.0 * t + 0.5).fract() - 0.5).abs() / 41.0;
+            (1.0 - from_middle_s / 0.85e-3).max(0.0)
+        };
+        let edges = TachometerEdges::new(&recording(level)).unwrap();
+        assert!(
+            (80..=82).contains(&edges.times_s.len()),
+            "{}",
+            edges.times_s.len()
+        );
+        for pair in edges.times_s.windows(2) {
+            // The rise takes a sample.
+            assert!((pair[1] - pair[0] - 1.0 / 41.0).abs() < 1e-3, "{pair:?}");
+        }
+    }
+
+    #[test]
+    fn a_level_of_constant_pulses_has_edges_at_its_middle() {
+        // A ramp of two samples, as of a slow photocell, with 10 rev/s; the first sample lies within a rise.
+        let level = |t: f64| {
+            let since_s = (10.0 * t + 0.01).fract() / 10.0 - 1e-3;
+            if since_s < 0.03 {
+                (0.5 + since_s / 2e-3).clamp(0.0, 1.0)
+            } else {
+                0.0
+            }
+        };
+        let edges = TachometerEdges::new(&recording(level)).unwrap();
+        for (turn, time_s) in edges.times_s.iter().skip(1).enumerate() {
+            assert!(
+                (time_s - edges.times_s[1] - 0.1 * turn as f64).abs() < 1e-9,
+                "{turn} {time_s}"
+            );
+        }
+        assert!(edges.times_s.len() >= 19, "{}", edges.times_s.len());
+    }
 }

@@ -219,7 +219,7 @@ pub(crate) const BATCHES_OF_CELLS: u32 = 4;
 /// the frequency grid is refined about it. A peak of noise costs computing time only. Unfounded.
 pub(crate) const PEAK_SHARE: f64 = 0.01;
 
-/// Damping ratio of a mode below which its receptance counts as infinite, so that methods by receptances refuse the
+/// Damping ratio of a mode below which its receptance counts as infinite, so that methods from receptances refuse the
 /// case. Unfounded.
 pub(crate) const UNDAMPED: f64 = 1e-9;
 

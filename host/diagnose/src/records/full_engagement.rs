@@ -6,6 +6,7 @@
 //! baseline to the feed alone. The second condition is needed because chatter exceeds the response to the feed by far: before chatter has
 //! grown, revolutions are small against later ones without being in air.
 
+use quietcut_numerics::statistics::median;
 use std::borrow::Cow;
 use std::f64::consts::TAU;
 use std::ops::Range;
@@ -21,7 +22,7 @@ use crate::criteria::{
 use crate::error::DiagnoseError;
 use crate::motion::recorded_cut::cut_of;
 use crate::motion::spindle_motion::SpindleMotion;
-use crate::signal::noise::{floor_between_lines, median, rms};
+use crate::signal::noise::{floor_between_lines, rms};
 use quietcut_model::case::Case;
 use quietcut_recording::{Quantity, Recording, TestKind};
 use quietcut_simulate::effect::Pickup;
@@ -250,8 +251,10 @@ impl Levels {
                 })
                 .map(|[from, to]| deviation(&channel.samples[from..to], noise))
                 .collect();
-            let (median_level, feed_level) =
-                (median(&mut revolutions.clone()), forced.level(&pickup, rate_hz));
+            let (median_level, feed_level) = (
+                median(&mut revolutions.clone()).unwrap_or(0.0),
+                forced.level(&pickup, rate_hz),
+            );
             let in_cut = median_level.min(feed_level);
             if in_cut > AIR_OVER_NOISE * noise {
                 levels.chatters |= median_level > CHATTER_LEVEL * feed_level;

@@ -5,6 +5,7 @@
 
 use crate::criteria::{LEAST_RELATIVE_NOISE, LEAST_WHITE_SHARE};
 use crate::signal::grid::SegmentTransform;
+use quietcut_numerics::statistics::median;
 
 /// Number of frequency bands of equal width, up to half the sample rate, in which a noise floor is estimated.
 pub(crate) const BANDS: usize = 32;
@@ -26,7 +27,7 @@ pub(crate) fn white_floor_beside(residual: &[f64], size: f64, other: &[f64; BAND
 /// [`white_floor`] of a residual with spectral lines in every band, as in a cut. Each band uses the median of the periodogram, which few
 /// lines hardly change.
 pub(crate) fn floor_between_lines(residual: &[f64], size: f64) -> f64 {
-    let of_band = |squares: &mut [f64]| median(squares) / MEDIAN;
+    let of_band = |squares: &mut [f64]| median(squares).unwrap_or(0.0) / MEDIAN;
     floor(residual, size, of_band, MEDIAN_SPREAD, &[0.0; BANDS])
 }
 
@@ -37,15 +38,6 @@ const MEDIAN_SPREAD: f64 = 1.65;
 
 fn mean(squares: &mut [f64]) -> f64 {
     squares.iter().sum::<f64>() / squares.len().max(1) as f64
-}
-
-/// The median of `values`, whose order it changes; 0 for an empty slice.
-pub(crate) fn median(values: &mut [f64]) -> f64 {
-    let middle = values.len() / 2;
-    if values.is_empty() {
-        return 0.0;
-    }
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
 fn floor(

@@ -8,7 +8,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use super::*;
-use crate::{HammerWindows, Window, true_damping};
+use crate::{HammerWindows, Window};
 use quietcut_recording::{Channel, Quantity, Sidecar, TestKind};
 
 const RATE: f64 = 512.0;
@@ -570,11 +570,6 @@ fn the_damping_of_an_exponential_window_is_taken_off_again() {
         let truth = receptance(hertz, 1, 1);
         assert!((h - truth).norm() < 0.025 * peak, "{hertz}: {h} {truth}");
     }
-    // The measured pole, and that of the structure.
-    let own = TAU * 17.4;
-    let moved = Complex64::new(-0.02 * own - 1.0 / tau, own * (1.0 - 0.02_f64.powi(2)).sqrt());
-    let (hertz, damping) = true_damping(moved.norm() / TAU, -moved.re / moved.norm(), tau);
-    assert!((hertz - 17.4).abs() < 1e-12 && (damping - 0.02).abs() < 1e-12);
     // A window that makes nearly all of the decay leaves nothing to be told.
     let short = MeasurementSettings {
         hammer: HammerWindows {

@@ -7,7 +7,7 @@
 //! | complex, the largest only | [`dominant`] | Arnoldi, then as above |
 //! | real symmetric, Hermitian | [`of_symmetric`] | tridiagonal form, implicit QR with Wilkinson's shift |
 //! | symmetric pencil K v = λ M v | [`of_symmetric_pencil`] | Cholesky factor of M, then as above |
-//! | one eigenvector, a vector of the null space | [`eigenvector`], [`null_vector`] | inverse iteration |
+//! | one eigenvector, a vector of the null space | [`eigenvector`], [`null_vector`]; [`inverse_iteration`] with a solver of one's own | inverse iteration |
 //! | polynomial | [`polynomial_roots`] | companion matrix |
 //!
 //! A matrix with an entry that is not finite, or on which an iteration exceeds its bound, yields an [`EigenvalueError`] that
@@ -25,7 +25,7 @@ pub use error::EigenvalueError;
 pub use polynomial::polynomial_roots;
 pub use real::of_real;
 pub use symmetric::{of_symmetric, of_symmetric_pencil};
-pub use vector::{eigenvector, null_vector};
+pub use vector::{eigenvector, inverse_iteration, null_vector};
 
 #[cfg(test)]
 mod tests;

@@ -25,11 +25,21 @@ pub fn eigenvector(matrix: &DMatrix<Complex64>, eigenvalue: Complex64) -> Option
 pub fn null_vector(matrix: DMatrix<Complex64>) -> Option<DVector<Complex64>> {
     let order = matrix.nrows();
     let lu = matrix.lu();
-    let mut vector = DVector::from_fn(order, |i, _| Complex64::new(1.0, 0.3 * i as f64));
+    let start = DVector::from_fn(order, |i, _| Complex64::new(1.0, 0.3 * i as f64));
+    inverse_iteration(start, |vector| lu.solve_mut(vector))
+}
+
+/// Inverse iteration: `solve` replaces v by (A − σI)⁻¹ v, and v is scaled to length 1 after each of three steps. `None` if a step has
+/// no solution or leaves the range of numbers.
+pub fn inverse_iteration(
+    start: DVector<Complex64>,
+    mut solve: impl FnMut(&mut DVector<Complex64>) -> bool,
+) -> Option<DVector<Complex64>> {
+    let mut vector = start;
     for _ in 0..STEPS {
-        vector = lu.solve(&vector)?;
+        let is_solved = solve(&mut vector);
         let norm = vector.norm();
-        if !(norm.is_finite() && norm > 0.0) {
+        if !(is_solved && norm.is_finite() && norm > 0.0) {
             return None;
         }
         vector.unscale_mut(norm);

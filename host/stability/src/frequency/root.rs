@@ -14,7 +14,7 @@ use crate::limits::point::CutStability;
 use crate::spectrum::stability_loss::StabilityLoss;
 
 /// Text for a dominant multiplier that is not found from receptances.
-pub(crate) const NO_ROOT: &str = "the rightmost root cannot be found by receptances; limits can";
+pub(crate) const NO_ROOT: &str = "the rightmost root cannot be found from receptances; limits can";
 
 /// Rightmost root s, 1/s, with Im s ≥ 0, at an axial depth, m.
 ///

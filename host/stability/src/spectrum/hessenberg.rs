@@ -2,6 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
+use quietcut_numerics::eigenvalues::inverse_iteration;
 
 /// Triangular factors of H − s I, with the shift s slightly off an eigenvalue of the real n × n matrix H.
 ///
@@ -145,18 +146,13 @@ impl Shifted {
     }
 
     fn iterate(&self, solve: fn(&Self, &mut DVector<Complex64>)) -> Option<DVector<Complex64>> {
-        let mut vector = DVector::from_fn(self.size, |i, _| {
+        let start = DVector::from_fn(self.size, |i, _| {
             Complex64::new(1.0, (i as f64 * 0.618).fract() - 0.3)
         });
-        for _ in 0..3 {
-            solve(self, &mut vector);
-            let norm = vector.norm();
-            if !(norm.is_finite() && norm > 0.0) {
-                return None;
-            }
-            vector.unscale_mut(norm);
-        }
-        Some(vector)
+        inverse_iteration(start, |vector| {
+            solve(self, vector);
+            true
+        })
     }
 }
 
