@@ -41,13 +41,17 @@ impl TachometerEdges {
         for (edge, sample) in found.iter().enumerate() {
             let end = found.get(edge + 1).map_or(level.len(), |next| *next);
             let to_end = &level[..end];
-            // A record may begin within the first rise: its foot is the valley after the pulse then.
-            let own = || 0.5 * (valley(edge.max(1)) + upper_plateau(&level[*sample..end]));
+            let pulse = &level[*sample..end];
+            // A record may begin within the first rise: its foot is the valley after the pulse then. It may end within the last rise,
+            // whose top it does not show.
+            let own = || 0.5 * (valley(edge.max(1)) + upper_plateau(pulse));
+            let shows_top = end < level.len() || pulse.last() < pulse.iter().max_by(|a, b| a.total_cmp(b));
             let common = is_steady
                 .then(|| crossing(to_end, *sample, 0.5 * (least + largest)))
                 .flatten();
             // A pulse that few samples show may stay below the common middle.
-            if let Some(at) = common.or_else(|| crossing(to_end, *sample, own())) {
+            let at = common.or_else(|| shows_top.then(|| crossing(to_end, *sample, own())).flatten());
+            if let Some(at) = at {
                 times_s.push(at / recording.sample_rate_hz);
             }
         }
@@ -236,5 +240,22 @@ mod tests {
             );
         }
         assert!(edges.times_s.len() >= 19, "{}", edges.times_s.len());
+    }
+
+    #[test]
+    fn a_pulse_whose_top_the_record_does_not_show_has_no_edge() {
+        // The rise takes two samples. The last sample of the record, at 1.999 s, lies within it.
+        let level = |t: f64| match (t * 1e3 + 1.0).round() as u64 % 100 {
+            0 => 0.5 - 1e-9,
+            1..30 => 1.0,
+            _ => 0.0,
+        };
+        let edges = TachometerEdges::new(&recording(level)).unwrap();
+        assert!(
+            edges.times_s.iter().all(|time_s| *time_s < 1.95),
+            "{:?}",
+            edges.times_s
+        );
+        assert!(edges.times_s.len() >= 18, "{}", edges.times_s.len());
     }
 }
