@@ -9,8 +9,8 @@ use crate::limits::speed_line::SpeedLine;
 
 pub use quietcut_recording::cut_table::{Outcome, TrialCut, read};
 
-/// Number of steps in depth at which Floquet multipliers are computed. A choice: half more than the least number of a
-/// chart, 40.
+/// Number of steps in axial depth at which Floquet multipliers are computed up to the depth of a trial cut. A choice:
+/// half more than the least number of a chart, 40.
 const SAMPLES: usize = 60;
 
 /// Number of correct and wrong predictions of a method over trial cuts.
@@ -24,7 +24,8 @@ pub struct Calls {
     pub missed_chatter: usize,
     /// Number of cuts predicted unstable that were stable.
     pub false_alarms: usize,
-    /// Number of cuts with marginal outcome, or at depths where two stable orbits exist; they do not count as wrong.
+    /// Number of trial cuts with marginal outcome, or at depths where two stable orbits exist; they do not count as
+    /// wrong.
     pub undecided: usize,
 }
 
@@ -55,7 +56,7 @@ impl Calls {
         Ok(Self::of(&calls(method, cuts)?))
     }
 
-    /// Counts the results of single cuts.
+    /// Counts correct and wrong predictions over the results of single trial cuts.
     pub fn of(calls: &[Call]) -> Self {
         let count = |call: Call| calls.iter().filter(|other| **other == call).count();
         let (missed_chatter, false_alarms) = (count(Call::MissedChatter), count(Call::FalseAlarm));
@@ -78,12 +79,12 @@ pub enum Call {
     MissedChatter,
     /// The cut was predicted unstable, and was stable.
     FalseAlarm,
-    /// The outcome is marginal, or two stable orbits exist at the depth of the cut.
+    /// The outcome of the cut is marginal, or two stable orbits exist at its depth.
     Undecided,
 }
 
 impl Call {
-    /// True if the outcome contradicts the prediction.
+    /// True if the outcome of the cut contradicts the prediction.
     pub fn is_wrong(self) -> bool {
         matches!(self, Self::MissedChatter | Self::FalseAlarm)
     }

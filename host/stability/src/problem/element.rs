@@ -1,4 +1,4 @@
-//! One element of the tooth period: the four matrices of its collocation.
+//! One element of the tooth period: the four matrices of its collocated delay equation.
 
 use nalgebra::{DMatrix, Matrix3xX, MatrixXx3, Vector3};
 
@@ -19,13 +19,14 @@ pub(crate) struct Element {
     pub(crate) kernel: DMatrix<f64>,
     /// Response T of the state at the end to the regenerative chips p − p_τ, n × ports, per meter of axial depth.
     pub(crate) drive: DMatrix<f64>,
-    /// Time, weight and force of each port, in the order of the rows of E.
+    /// Time, weight and force of each port (cutting tooth at a node), in the order of the rows of E.
     pub(crate) ports: Vec<Port>,
-    /// The axial displacement; `Some` where edge and feed forces depend on it (axial-depth modulation).
+    /// Axial displacement of the tool at the nodes; `Some` where edge and feed forces depend on it (axial-depth
+    /// modulation).
     pub(crate) axial: Option<Axial>,
 }
 
-/// Axial displacement at the nodes, z = E_z x + Q_z f, and the edge and feed force that it causes.
+/// Axial displacement of the tool at the nodes, z = E_z x + Q_z f, and the edge and feed force that it causes.
 #[derive(Clone, Debug)]
 pub(crate) struct Axial {
     /// Matrix E_z, nodes × n: axial displacement due to the state at the start of the element.
@@ -33,14 +34,14 @@ pub(crate) struct Axial {
     /// Response Q_z of the axial displacement to the regenerative chips p − p_τ, nodes × ports, per meter of axial
     /// depth.
     pub(crate) kernel: DMatrix<f64>,
-    /// Force per axial displacement at each node, N/m.
+    /// Edge and feed force per axial displacement at each node, N/m.
     pub(crate) ports: Vec<Port>,
 }
 
 /// One cutting tooth at one collocation node.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Port {
-    /// Time from the start of the period, s.
+    /// Time of the node from the start of the period, s.
     pub(crate) time_s: f64,
     /// Quadrature weight, s.
     pub(crate) weight_s: f64,
@@ -52,7 +53,7 @@ pub(crate) struct Port {
 /// One tooth that cuts during the whole element.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct CuttingTooth {
-    /// Immersion angle of the tooth at phase 0 of the period, rad.
+    /// Immersion angle of this tooth at phase 0 of the period, rad.
     pub(crate) immersion: f64,
     /// Feed of the tool between the preceding tooth and this one, m.
     pub(crate) feed_m: f64,
@@ -62,13 +63,13 @@ pub(crate) struct CuttingTooth {
 pub(crate) struct Step<'a> {
     gauss: &'a Gauss,
     duration: f64,
-    /// State transition e^{A h} of the free structure over the duration h, n × n.
+    /// State transition e^{A h} of the free structure over the duration h of an element, n × n.
     flow: DMatrix<f64>,
-    /// Displacement response C e^{A t_i} at each node, 3 × n.
+    /// Displacement response C e^{A t_i} at each node to the state at the start of the element, 3 × n.
     observe: Vec<Matrix3xX<f64>>,
-    /// Backward response e^{−A t_j} B to a force at each node, n × 3.
+    /// Response e^{−A t_j} B to a force at each node, carried back to the start of the element, n × 3.
     backward: Vec<MatrixXx3<f64>>,
-    /// Response e^{A (h − t_j)} B of the state at the end to a force at each node, n × 3.
+    /// Response e^{A (h − t_j)} B of the state at the end of the element to a force at each node, n × 3.
     drive: Vec<MatrixXx3<f64>>,
 }
 
@@ -82,7 +83,7 @@ impl<'a> Step<'a> {
             .collect();
         // Gauss nodes are symmetric: h − t_j is the time of the node with the mirrored index.
         let drive: Vec<MatrixXx3<f64>> = forward.iter().rev().map(|flow| flow * &structure.b).collect();
-        // Backward responses from the forward ones: e^{−A t} = e^{−A h} e^{A (h − t)}.
+        // Responses carried back to the start follow from the forward ones: e^{−A t} = e^{−A h} e^{A (h − t)}.
         let back = exponential.at(-duration);
         Self {
             gauss,
@@ -107,7 +108,8 @@ impl<'a> Step<'a> {
         self.element_of(problem, &cutting, phase, turn)
     }
 
-    /// Element from the phase `phase`, over the rotation `turn` of the tool, both rad, with these cutting teeth.
+    /// Element of a period from the phase `phase`, over the rotation `turn` of the tool, both rad, with these cutting
+    /// teeth.
     pub(crate) fn element_of(
         &self,
         problem: &Problem,
@@ -173,9 +175,9 @@ impl<'a> Step<'a> {
 /// modulation, the axial displacement.
 struct Ports {
     per_node: usize,
-    /// Unit vector along which each port observes the displacement.
+    /// Unit vector along which each port observes the tool displacement.
     seen: Vec<Vector3<f64>>,
-    /// Force of each port per observed displacement; for teeth also per axial depth.
+    /// Force of each port per observed displacement; for cutting teeth also per axial depth.
     force: Vec<Vector3<f64>>,
 }
 
@@ -223,7 +225,7 @@ fn without_modulation(whole: &Element, nodes: usize, per_node: usize) -> Element
         implicit.set_column(column, &change);
     }
     let lu = implicit.lu();
-    // The matrix is the identity plus a Volterra kernel over a short element, hence regular.
+    // The matrix I − Q_z is the identity plus a Volterra kernel over a short element, hence regular.
     let solve = |right: &DMatrix<f64>| lu.solve(right).unwrap_or_else(|| right.clone());
     let observe = solve(&whole.observe);
     let kernel = solve(&whole.kernel.select_columns(&teeth));

@@ -13,7 +13,7 @@ const RADIUS: f64 = 0.5;
 #[derive(Clone, Debug)]
 pub(crate) struct Exponential {
     matrix: DMatrix<f64>,
-    /// Norm ‖A‖: the largest column sum.
+    /// Norm ‖A‖ of the matrix: its largest column sum.
     norm: f64,
 }
 

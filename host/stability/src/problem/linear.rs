@@ -16,7 +16,7 @@ use quietcut_model::structure::FirstOrder;
 /// tooth period earlier. Signs of α and symbols are those of the page of the crate.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Problem {
-    /// Structure in first-order form, rotated into the feed direction.
+    /// Structure in first-order form (matrices A, B and C), rotated into the feed direction.
     pub structure: FirstOrder,
     /// The cutting process.
     pub process: Process,
@@ -81,7 +81,7 @@ impl Problem {
         })
     }
 
-    /// Tooth period τ at a spindle speed in rev/min, s.
+    /// Tooth-passing period τ at a spindle speed in rev/min, s.
     pub fn tooth_period_s(&self, rpm: f64) -> f64 {
         60.0 / (rpm * self.teeth as f64)
     }

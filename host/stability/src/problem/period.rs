@@ -27,9 +27,9 @@ pub(crate) use crate::problem::element::{Element, Port};
 /// Resolution of the mesh over a tooth period: length of its elements and error of collocation in each.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Resolution {
-    /// Largest phase angle, rad, of the fastest motion over one element.
+    /// Largest phase angle, rad, by which the fastest motion may rotate over one element.
     pub(crate) angle: f64,
-    /// Target for the relative collocation error of one element.
+    /// Target for the relative error of collocation in one element.
     pub(crate) tolerance: f64,
 }
 
@@ -106,14 +106,14 @@ impl Period {
                 flight = exponential.at(duration);
                 continue;
             }
-            // Directional coefficients are products of two sines of the immersion angle and oscillate at twice the
-            // rotation of the tool.
+            // The directional coefficients of the cut are products of two sines of the immersion angle and oscillate at
+            // twice the rotation of the tool.
             let angle = rate * duration + 2.0 * length;
             let decay = problem.fastest_decay() * duration;
             let count = (angle / resolution.angle).max(decay / DECAY_MAX).ceil().max(1.0);
             let gauss = Gauss::shared(degree(angle / count, resolution.tolerance));
             let step = Step::new(problem, &exponential, gauss, duration / count);
-            // The conversion is exact: the count is a few elements for each vibration in the period.
+            // The conversion to an integer is exact: the count is a few elements for each vibration in the period.
             for index in 0..count as usize {
                 let phase = interval.from + length * index as f64 / count;
                 elements.push(step.element(problem, interval.teeth, phase, length / count));
@@ -122,7 +122,7 @@ impl Period {
         Self { elements, flight }
     }
 
-    /// Number of ports (cutting tooth at a node) of all elements.
+    /// Number of ports (a port is a cutting tooth at a node) of all elements.
     pub(crate) fn ports(&self) -> usize {
         self.elements.iter().map(|element| element.kernel.nrows()).sum()
     }
@@ -137,13 +137,16 @@ impl Period {
 pub(crate) struct Rates {
     /// Largest magnitude of a pole of the free structure, rad/s.
     poles: f64,
-    /// Velocity along the chip normal that the cutting force causes immediately, nᵀ C B D, 1/s per meter of axial
-    /// depth.
+    /// Velocity along the chip normal that the cutting force causes immediately, per displacement along the chip
+    /// normal: nᵀ C B D, 1/s per meter of axial depth. The largest value over the immersion, times the number of
+    /// cutting teeth.
     direct: f64,
-    /// Acceleration along the chip normal that the cutting force causes immediately, nᵀ C A B D, 1/s² per meter of
-    /// axial depth.
+    /// Acceleration along the chip normal that the cutting force causes immediately, per displacement along the chip
+    /// normal: nᵀ C A B D, 1/s² per meter of axial depth. The largest value over the immersion, times the number of
+    /// cutting teeth.
     inertial: f64,
-    /// Axial depth, m, at which the cutting force is as large as edge and feed forces.
+    /// Axial depth, m, at which the cutting force per displacement is as large as the edge and feed force per axial
+    /// displacement; 0 without axial-depth modulation.
     modulation_m: f64,
 }
 
@@ -155,7 +158,7 @@ impl Rates {
         let response = &structure.c * &structure.b;
         let response_rate = &structure.c * &structure.a * &structure.b;
         let (mut direct, mut inertial, mut force, mut forced) = (0.0_f64, 0.0_f64, 0.0_f64, 0.0_f64);
-        // The coefficients vary slowly with the immersion angle: seventeen angles find the maximum to about one
+        // The cutting force varies slowly with the immersion angle: seventeen angles find its maximum to about one
         // percent.
         for i in 0..=16 {
             let share = f64::from(i) / 16.0;
@@ -193,7 +196,7 @@ impl Rates {
 /// Fewest Gauss nodes, from 4 to 40, for which a step over the phase angle `angle` has a relative error below
 /// `tolerance`. The error is that of the Padé approximant to e^{iz}: (m!)² z^{2m+1} / ((2m)! (2m+1)!).
 pub(crate) fn degree(angle: f64, tolerance: f64) -> usize {
-    // For m = 0 the error expression is z; each further node multiplies it by z² m² / ((2m)² (4m² − 1)).
+    // For m = 0 Gauss nodes the error expression is z; each further node multiplies it by z² m² / ((2m)² (4m² − 1)).
     let mut error = angle;
     for m in 1..=NODES_MAX {
         let m_f = f64::from(m);

@@ -21,7 +21,7 @@ pub struct Pitched {
 }
 
 impl Pitched {
-    /// Builds the problem of a case.
+    /// Builds the linear delay problem of a case whose teeth may have unequal pitch.
     ///
     /// # Errors
     /// As [`Problem::new`], but variable pitch is accepted.
@@ -39,7 +39,7 @@ impl Pitched {
         &self.problem
     }
 
-    /// The same problem with the revolution as its period, for equal pitch too.
+    /// The same delay problem with the revolution as its period, for equal pitch too.
     #[must_use]
     pub(crate) fn over_revolution(mut self) -> Self {
         let problem = &self.problem;
@@ -48,7 +48,7 @@ impl Pitched {
         self
     }
 
-    /// True if pitches are unequal, so that there are several delays.
+    /// True if the pitches of the teeth are unequal, so that there are several delays.
     pub fn has_variable_pitch(&self) -> bool {
         self.pitch_rad.is_some()
     }

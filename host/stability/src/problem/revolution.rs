@@ -26,7 +26,7 @@ impl<'a> Revolution<'a> {
         let mesh = RevolutionMesh::new(pitched, rpm, depth_m, fineness, Flight::Whole)?;
         let exponential = Exponential::new(&pitched.problem.structure.a);
         let mut elements: Vec<Element> = Vec::with_capacity(mesh.subintervals.len());
-        // Subintervals between the same two kinks have equal lengths and share a step.
+        // Subintervals between the same two kinks have equal lengths and share the response of the free structure.
         let mut step: Option<(usize, f64, Step<'_>)> = None;
         for subinterval in &mesh.subintervals {
             if subinterval.cutting.is_empty() {

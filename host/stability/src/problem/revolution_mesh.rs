@@ -20,18 +20,20 @@ pub(crate) struct Fineness {
     pub(crate) angle: f64,
     /// Target for the interpolation error within a subinterval, relative to the motion at the fastest rate.
     pub(crate) tolerance: f64,
-    /// Number of generations of kinks at which subintervals end.
+    /// Number of generations of displacement kinks (at entries and exits, one delay later, and so on) at which
+    /// subintervals end.
     pub(crate) generations: u32,
 }
 
 impl Fineness {
-    /// Working mesh, on which multipliers and limits are computed.
+    /// Working mesh of the revolution, on which Floquet multipliers and limits are computed.
     pub(crate) const WORKING: Self = Self {
         angle: 5.0,
         tolerance: 1e-9,
         generations: 3,
     };
-    /// Finer mesh: the change of a result from the working mesh to this one estimates the error of the working mesh.
+    /// Finer mesh of the revolution: the change of a result from the working mesh to this one estimates the error of
+    /// the working mesh.
     pub(crate) const FINE: Self = Self {
         angle: 4.0,
         tolerance: 1e-11,
@@ -53,16 +55,17 @@ pub(crate) enum Flight {
 pub(crate) struct Series {
     /// Index of the subinterval.
     pub(crate) subinterval: usize,
-    /// Index of the tooth among those that cut in the subinterval.
+    /// Index of the tooth among those that cut in its subinterval.
     pub(crate) tooth: usize,
 }
 
 /// Location of the delayed displacements p_τ that the preceding tooth left on the surface.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Source {
-    /// In a subinterval of the present revolution.
+    /// The preceding tooth cut this surface in a subinterval of the present revolution.
     Own(Series),
-    /// In the preceding revolution: in the state vector of the map, from this row on.
+    /// The preceding tooth cut this surface in the preceding revolution: its displacements are in the state vector of
+    /// the map, from this row on.
     Earlier(usize),
 }
 
@@ -71,7 +74,7 @@ pub(crate) enum Source {
 #[derive(Clone, Debug)]
 pub(crate) struct DelayedDisplacement {
     pub(crate) source: Source,
-    /// Values of the Lagrange polynomials of those nodes at the delayed time.
+    /// Weights of those nodes: values of their Lagrange polynomials at the delayed time.
     pub(crate) weights: Vec<f64>,
 }
 
@@ -83,9 +86,9 @@ pub(crate) struct Subinterval {
     /// Duration of the subinterval, s.
     pub(crate) duration_s: f64,
     pub(crate) gauss: &'static Gauss,
-    /// Cutting teeth, in the order of the ports of a node.
+    /// Passages of the teeth that cut in this subinterval, in the order of the ports of a node.
     pub(crate) cutting: Vec<ToothPassage>,
-    /// Delayed displacement at each port, node by node.
+    /// Delayed displacement at each port (cutting tooth at a node), node by node.
     pub(crate) pasts: Vec<DelayedDisplacement>,
 }
 
@@ -96,7 +99,7 @@ pub(crate) struct RevolutionMesh {
     pub(crate) subintervals: Vec<Subinterval>,
     /// Displacements of the preceding revolution that act in this one, with their first row in the state.
     pub(crate) kept: Vec<(Series, usize)>,
-    /// Number of rows of the state: the states of the structure, then the `kept` displacements.
+    /// Number of rows of the map's state vector: the states of the structure, then the `kept` displacements.
     pub(crate) size: usize,
 }
 
@@ -111,7 +114,8 @@ impl RevolutionMesh {
         flight: Flight,
     ) -> Option<Self> {
         let passages = ToothPassages::new(pitched, rpm);
-        // At the unit circle |w (1 − 1/μ)| ≤ 2 w. Directional coefficients oscillate at twice the rotation of the tool.
+        // The mesh resolves complex depths up to 2 w, since |w (1 − 1/μ)| ≤ 2 w on the unit circle. Directional
+        // coefficients oscillate at twice the rotation of the tool.
         let rate = Rates::new(&pitched.problem).at(2.0 * depth_m) + 2.0 * passages.rad_per_s;
         let decay = pitched.problem.fastest_decay();
         let mut subintervals = Vec::new();
@@ -130,7 +134,8 @@ impl RevolutionMesh {
                 (count, nodes_for(angle / count, fineness.tolerance))
             };
             let duration_s = length_s / count;
-            // The conversion is exact: the count is a few subintervals for each vibration in the revolution.
+            // The conversion to an integer is exact: the count is a few subintervals for each vibration in the
+            // revolution.
             subintervals.extend((0..count as usize).map(|index| Subinterval {
                 start_s: ends[0] + duration_s * index as f64,
                 duration_s,
@@ -199,7 +204,8 @@ impl RevolutionMesh {
     }
 }
 
-/// All times at which the displacement may have a kink, s, ascending, with both ends of the period.
+/// All times at which the displacement may have a kink (at an entry or exit, or up to `generations` delays later), s,
+/// ascending, with both ends of the period.
 fn kinks(passages: &ToothPassages, generations: u32) -> Vec<f64> {
     let mut all = passages.switches_s();
     let mut youngest = all.clone();

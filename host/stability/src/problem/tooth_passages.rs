@@ -9,15 +9,15 @@ use super::pitched::Pitched;
 /// Passage of one tooth through the cut.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct ToothPassage {
-    /// Time of entry, s; may lie before the start of the period.
+    /// Time at which the tooth enters the cut, s from the start of the period; may lie before it.
     pub(crate) entry_s: f64,
-    /// Time of exit, s; may lie after the end of the period.
+    /// Time at which the tooth leaves the cut, s from the start of the period; may lie after its end.
     pub(crate) exit_s: f64,
     /// Regenerative delay τ, s: the time since the preceding tooth had the same immersion angle.
     pub(crate) delay_s: f64,
-    /// Feed of the tool during the delay, m.
+    /// Feed of the tool during the regenerative delay of this tooth, m.
     pub(crate) feed_m: f64,
-    /// Index of the tooth; 0 if all teeth are alike.
+    /// Index of the tooth on the tool; 0 if all teeth are alike.
     pub(crate) tooth: usize,
     /// Index of the tooth that cut the surface in front of this one; 0 if all teeth are alike.
     pub(crate) before: usize,
@@ -32,12 +32,12 @@ pub(crate) struct ToothPassages {
     pub(crate) period_s: f64,
     /// Spindle speed, rad/s.
     pub(crate) rad_per_s: f64,
-    /// Passages by time of entry, latest first.
+    /// Passages of the teeth by time of entry, latest first.
     pub(crate) list: Vec<ToothPassage>,
 }
 
 impl ToothPassages {
-    /// Passages of a problem at a spindle speed in rev/min.
+    /// Passages of all teeth through the cut at a spindle speed in rev/min.
     pub(crate) fn new(pitched: &Pitched, rpm: f64) -> Self {
         let rad_per_s = rpm * TAU / 60.0;
         match &pitched.pitch_rad {
@@ -117,20 +117,20 @@ impl ToothPassages {
         distinct(ends.chain([0.0, self.period_s]).collect(), self.period_s)
     }
 
-    /// Passages in the cut at a time, s; the time must not be an entry or exit.
+    /// Passages of the teeth that cut at a time, s; the time must not be an entry or exit.
     pub(crate) fn cutting_at(&self, time_s: f64) -> impl Iterator<Item = &ToothPassage> {
         self.list
             .iter()
             .filter(move |passage| passage.entry_s < time_s && time_s < passage.exit_s)
     }
 
-    /// Immersion angle of a passage at a time (s), rad.
+    /// Immersion angle of the tooth of a passage at a time (s), rad.
     pub(crate) fn angle(&self, pitched: &Pitched, passage: &ToothPassage, time_s: f64) -> f64 {
         pitched.problem.process.engagement.start + (time_s - passage.entry_s) * self.rad_per_s
     }
 }
 
-/// Times within [0, period], s, ascending; times closer than rounding are merged.
+/// Sorts times and drops those outside [0, period], s; times closer than rounding are merged.
 pub(crate) fn distinct(mut times_s: Vec<f64>, period_s: f64) -> Vec<f64> {
     // Angles are given in degrees with a few digits: times closer than 1e-9 of the period belong to the same angle.
     let least = 1e-9 * period_s;
@@ -150,14 +150,16 @@ pub(crate) fn distinct(mut times_s: Vec<f64>, period_s: f64) -> Vec<f64> {
 /// Force coefficients of the displacement at one time, or averaged over an interval of time.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Coefficients {
-    /// For each delay: the delay, s, and the sum Σ K α over the teeth with that delay, Pa.
+    /// For each regenerative delay: the delay, s, and the sum Σ K α of cutting coefficient times directional
+    /// coefficients over the teeth with that delay, Pa.
     pub(crate) regenerative: Vec<(f64, Matrix3<f64>)>,
-    /// Coefficient β_e + β_f of edge and feed forces −β u, N/m² (eq. 3.7); only the axial displacement contributes.
+    /// Coefficient β_e + β_f of edge and feed forces −β u, N/m (eq. 3.7); only the axial displacement contributes.
     pub(crate) modulation: Matrix3<f64>,
 }
 
 impl Coefficients {
-    /// Mean over nodes (time in s, weight) of the coefficients of those passages that cut at the time `inside_s`.
+    /// Weighted mean of the force coefficients over `nodes` (time in s, weight), of those passages that cut at the time
+    /// `inside_s`.
     pub(crate) fn mean(
         pitched: &Pitched,
         passages: &ToothPassages,
@@ -193,8 +195,8 @@ impl Coefficients {
         coefficients
     }
 
-    /// Force per present displacement, w Σ K α − β, N/m, at an axial depth w, m; the part of the delayed displacement
-    /// is excluded.
+    /// Force per present displacement, w Σ K α − β, N/m, at an axial depth w, m; the force per delayed displacement is
+    /// excluded.
     pub(crate) fn present(&self, depth_m: f64) -> Matrix3<f64> {
         let regenerative: Matrix3<f64> = self.regenerative.iter().map(|(_, directional)| directional).sum();
         regenerative * depth_m - self.modulation

@@ -9,7 +9,7 @@ use quietcut_model::milling::Material;
 use quietcut_model::structure::FirstOrder;
 use quietcut_model::{Cutter, Effects, ForceLaw, ModelError, RestoringForce};
 
-/// Effects of a case whose specification fulfils `wanted`.
+/// Effects of the extensions of a case whose specification fulfils `wanted`.
 fn effects(case: &Case, wanted: impl Fn(&EffectSpec) -> bool) -> Result<Effects, StabilityError> {
     let all = Effects::of_case(case).map_err(|cause| wrong(case, cause.into()))?;
     Ok(Effects(
@@ -64,7 +64,7 @@ fn law(case: &Case, wanted: impl Fn(&EffectSpec) -> bool) -> Result<ForceLaw, St
 
 /// Cutter geometry of a case with the extensions that fulfil `wanted`.
 fn cutter(case: &Case, wanted: impl Fn(&EffectSpec) -> bool) -> Result<Cutter, StabilityError> {
-    // The geometry does not depend on the axial depth, which is set to an arbitrary value.
+    // The cutter geometry does not depend on the axial depth, which is set to an arbitrary value.
     let cutter = Cutter::new(case.tool()?, case.material()?, case.cut()?, 1e-3);
     let effects = effects(case, wanted)?;
     let cutter = cutter.and_then(|cutter| effects.cutter(cutter));

@@ -35,7 +35,7 @@ pub(crate) fn is_not_smooth(case: &Case) -> bool {
     case.effects().any(|spec| spec.treatment == Treatment::Equivalent)
 }
 
-/// Refuses a case with extensions that a method does not treat.
+/// Refuses a case with extensions that a stability method does not treat.
 ///
 /// # Errors
 /// The first such extension, with the reason.
@@ -43,7 +43,7 @@ pub(crate) fn refuse_others(case: &Case, treated: Treated) -> Result<(), Stabili
     Ok(case.refuse_extensions(|spec| reason(spec, treated))?)
 }
 
-/// Reason why an extension is refused; `None` if it is treated.
+/// Reason why a stability method refuses an extension; `None` if it treats the extension.
 fn reason(spec: &EffectSpec, treated: Treated) -> Option<&'static str> {
     let (is_treated, reason) = match spec.treatment {
         Treatment::Sensor | Treatment::LinearProcess => return None,

@@ -17,7 +17,7 @@ pub fn after(case: &Case, after_s: f64) -> Result<Case, StabilityError> {
         path: case.path.clone(),
         what,
     };
-    // Checks keys and values of the extensions; the effects themselves are not needed.
+    // Building the effects checks keys and values of the extensions; the effects themselves are not needed.
     Effects::of_case(case).map_err(|cause| wrong(case, cause.into()))?;
     let number = |table: &toml::Table, key: &str| {
         let value = table.get(key)?;

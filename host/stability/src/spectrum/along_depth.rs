@@ -15,15 +15,15 @@ pub(crate) trait Spectrum {
     /// The equations have no finite solution, or the eigenvalues cannot be computed.
     fn multipliers(&mut self, depth_m: f64) -> Result<Vec<Complex64>, Breakdown>;
 
-    /// The multiplier near a guess, to rounding; a real guess gives a real multiplier.
+    /// Floquet multiplier near a guess, to rounding; a real guess gives a real multiplier.
     ///
     /// `None` if no multiplier lies within the distance `reach`.
     fn multiplier_near(&mut self, guess: Complex64, depth_m: f64, reach: f64) -> Option<Complex64>;
 
-    /// Derivative dμ/dw, 1/m, along the branch of multipliers through (μ, w).
+    /// Derivative dμ/dw of a Floquet multiplier μ over the axial depth w, 1/m, along its branch through (μ, w).
     fn sensitivity(&mut self, multiplier: Complex64, depth_m: f64) -> Option<Complex64>;
 
-    /// The multiplier near a guess, with its derivative dμ/dw; a real guess gives a real multiplier.
+    /// Floquet multiplier near a guess, with its derivative dμ/dw; a real guess gives a real multiplier.
     ///
     /// The guess must be correct to about 1e-4. The error of the result is about the square of that, plus the error of
     /// the discretized equations. `None` if no multiplier is found.

@@ -16,8 +16,8 @@ use super::crossing::Crossing;
 use super::root::Root;
 use crate::problem::period::{Element, Period};
 
-/// Share of the largest coefficient below which a term of the polynomial in κ, and all higher ones, are dropped: below
-/// rounding.
+/// Share of the largest coefficient of an element's polynomial in κ below which a term, and all higher ones, are
+/// dropped: below rounding.
 const TERM: f64 = 1e-17;
 
 /// Largest |κ|, in units of the depth by which the polynomials are scaled, at which they are evaluated. The 20th power
@@ -40,7 +40,7 @@ pub(crate) struct Characteristic {
     flight: Vec<f64>,
 }
 
-/// Buffers for evaluating Φ and its derivative, reused between evaluations.
+/// Buffers for evaluating the transition matrix Φ and its derivative, reused between evaluations.
 #[derive(Clone, Debug)]
 pub(crate) struct Workspace {
     value: Vec<Complex64>,
@@ -62,7 +62,7 @@ pub(crate) struct Logarithmic {
 impl Characteristic {
     /// Transition matrix Φ of a tooth period, valid for |κ| up to about `depth_m`.
     pub(crate) fn new(period: &Period, depth_m: f64) -> Self {
-        // The floor is below every real depth; with a scale of 0 the polynomials would be constant.
+        // This floor is below every real depth; with a scale of 0 the polynomials in κ/scale would be constant.
         let depth_m = depth_m.max(1e-12);
         Self {
             order: period.order(),
@@ -81,7 +81,7 @@ impl Characteristic {
         self.order
     }
 
-    /// Approximate number of floating-point operations of one evaluation.
+    /// Approximate number of floating-point operations of one evaluation of Φ and dΦ/dκ.
     pub(crate) fn operations(&self) -> f64 {
         let n = self.order as f64;
         let entries: usize = self.elements.iter().map(Vec::len).sum();
@@ -100,7 +100,7 @@ impl Characteristic {
         }
     }
 
-    /// Writes Φ and dΦ/dκ to `work.value` and `work.slope`.
+    /// Writes the transition matrix Φ(κ) and its derivative dΦ/dκ to `work.value` and `work.slope`.
     fn evaluate(&self, kappa: Complex64, work: &mut Workspace) {
         let n = self.order;
         let xi = kappa / self.scale;
@@ -131,7 +131,8 @@ impl Characteristic {
         }
     }
 
-    /// Logarithmic derivatives of F at (μ, w); `None` if F vanishes to rounding or a result is not finite.
+    /// Logarithmic derivatives of the characteristic function F = det(Φ − μI) at (μ, w); `None` if F vanishes to
+    /// rounding or a result is not finite.
     pub(crate) fn logarithmic(
         &self,
         multiplier: Complex64,
@@ -141,7 +142,7 @@ impl Characteristic {
         let n = self.order;
         let inverse = inverse(multiplier);
         self.evaluate((Complex64::ONE - inverse) * depth_m, work);
-        // Φ − μI is divided by a unit, since squares of large multipliers would overflow.
+        // The matrix Φ − μI is divided by about |μ|, since squares of large multipliers would overflow.
         let unit = multiplier.l1_norm().max(1.0);
         for i in 0..n {
             work.value[i * n + i] -= multiplier;
@@ -158,7 +159,8 @@ impl Characteristic {
         (logarithmic.by_multiplier.is_finite() && logarithmic.by_depth.is_finite()).then_some(logarithmic)
     }
 
-    /// The multiplier at a depth near a guess, by Newton's method; a real guess gives a real multiplier.
+    /// Floquet multiplier at a depth near a guess, by Newton's method on the characteristic function; a real guess
+    /// gives a real multiplier.
     ///
     /// `None` if the iteration moves from the guess by more than `reach` or does not converge.
     pub(crate) fn multiplier_near(
@@ -173,7 +175,8 @@ impl Characteristic {
             if !is_near(multiplier) {
                 return Err(Stop::LeftDomain);
             }
-            // Without a logarithm F is exactly zero, so that this is the multiplier, or the numbers are out of range.
+            // Without a logarithmic derivative F is exactly zero, so that this is the multiplier, or the numbers are
+            // out of range.
             let logarithmic = self.logarithmic(multiplier, depth_m, work);
             Ok(logarithmic.map_or(Complex64::ZERO, |logarithmic| inverse(logarithmic.by_multiplier)))
         });
@@ -182,7 +185,7 @@ impl Characteristic {
             .filter(|multiplier| multiplier.is_finite() && is_near(*multiplier))
     }
 
-    /// The multiplier near a guess, with its derivative dμ/dw, by one Newton step; a real guess gives a real
+    /// Floquet multiplier near a guess, with its derivative dμ/dw, by one Newton step; a real guess gives a real
     /// multiplier.
     ///
     /// Its error is about the square of that of the guess. `None` if the relative step exceeds 0.01, or if κ is too
@@ -206,7 +209,7 @@ impl Characteristic {
         (step < 0.01 * guess.norm() && slope.is_finite()).then_some(Root { multiplier, slope })
     }
 
-    /// Derivative dμ/dw, 1/m, along the branch of multipliers through (μ, w).
+    /// Derivative dμ/dw of a Floquet multiplier μ over the axial depth w, 1/m, along its branch through (μ, w).
     pub(crate) fn sensitivity(
         &self,
         multiplier: Complex64,
@@ -221,8 +224,8 @@ impl Characteristic {
         ratio.is_finite().then_some(ratio)
     }
 
-    /// The crossing of the unit circle near a guess, at a depth between `low_m` and `high_m`, by Newton's method in
-    /// depth and angle of μ. Each of both unknowns has a tolerance of its own.
+    /// Crossing of the unit circle near a guess, at a depth between `low_m` and `high_m`, by Newton's method in depth
+    /// and angle of the multiplier. Both unknowns have a tolerance of their own.
     pub(crate) fn crossing_near(
         &self,
         guess: Crossing,
@@ -313,7 +316,7 @@ fn by_rows(matrix: &nalgebra::DMatrix<f64>) -> Vec<f64> {
     matrix.transpose().as_slice().to_vec()
 }
 
-/// Value and derivative of a matrix polynomial in ξ = κ/scale.
+/// Value and derivative, at ξ = κ/scale, of the matrix polynomial of an element's transition matrix.
 fn polynomial_at(
     coefficients: &[f64],
     n: usize,
@@ -323,7 +326,8 @@ fn polynomial_at(
 ) {
     value.fill(Complex64::ZERO);
     slope.fill(Complex64::ZERO);
-    // Evaluation by powers of ξ: coefficients are real, so that each entry needs products with a real number only.
+    // Powers of ξ are summed, not nested products: the coefficients are real, so that each entry needs products with a
+    // real number only.
     let (mut power, mut power_slope) = (Complex64::ONE, Complex64::ZERO);
     for (j, term) in coefficients.chunks_exact(n * n).enumerate() {
         for ((value, slope), coefficient) in value.iter_mut().zip(slope.iter_mut()).zip(term) {

@@ -71,7 +71,8 @@ pub(crate) fn dominant_frequency_hz(
     mut size: impl FnMut(Complex64) -> Option<f64>,
 ) -> Option<f64> {
     let growth = multiplier.ln();
-    // The cut stiffens modes. Above the fastest rate harmonics only decrease, and one further harmonic suffices.
+    // The cut stiffens modes. Above the fastest rate of the structure with cut the harmonics only decrease, and one
+    // further harmonic suffices.
     let kappa_m = (Complex64::ONE - multiplier.inv()).norm() * depth_m;
     let highest = (Rates::new(problem).at(kappa_m) * period_s / TAU).ceil() as i32 + 1;
     (-highest..=highest)
@@ -92,7 +93,7 @@ fn eigenfunction_forces(
     let kappa = (Complex64::ONE - multiplier.inv()) * depth_m;
     let complex = |matrix: &DMatrix<f64>| matrix.map(Complex64::from);
     // Divides the period into parts, each starting from its own state, and expresses the displacements in each element
-    // by the state of its part.
+    // by the state at the start of its part.
     let identity = DMatrix::<Complex64>::identity(period.order(), period.order());
     let mut parts = Vec::new();
     let mut part = identity.clone();
@@ -139,7 +140,8 @@ fn eigenfunction_forces(
     Some(forces)
 }
 
-/// Solves for the states x_g at the start of each part: T_g x_g = x_{g+1}, and μ x_0 after the last part.
+/// Solves for the states x_g of a Floquet mode at the start of each part of the period: T_g x_g = x_{g+1}, and μ x_0
+/// after the last part, with the transition matrices T_g of the parts.
 ///
 /// All states are solved for at once. Integration from a start that is exact to rounding would fail if the parts
 /// together grow by far more than μ.

@@ -29,7 +29,7 @@ pub(crate) struct Collocated<'a> {
 }
 
 impl<'a> Collocated<'a> {
-    /// Meshes and matrices for axial depths up to `deepest_m`.
+    /// Multipliers of a problem at one spindle speed, on meshes for axial depths up to `deepest_m`.
     pub(crate) fn new(problem: &'a Problem, rpm: f64, deepest_m: f64) -> Self {
         // The mesh must resolve the complex depth, which is |w (1 − 1/μ)| ≤ 2 w on the unit circle.
         let period = Period::new(problem, rpm, 2.0 * deepest_m, Resolution::WORKING);
@@ -76,7 +76,8 @@ impl Spectrum for Collocated<'_> {
         chatter_hz(self.problem, self.rpm, &self.period, multiplier, depth_m)
     }
 
-    /// Error from the change between the working and the finer mesh, times a safety factor, as for a single cut.
+    /// Error of a multiplier at a crossing: its change between the working and the finer mesh, times a safety factor,
+    /// as for a single cut.
     fn error(&mut self, crossing: &Crossing) -> Option<f64> {
         let Crossing { multiplier, depth_m } = *crossing;
         let (problem, rpm, deepest_m) = (self.problem, self.rpm, self.deepest_m);

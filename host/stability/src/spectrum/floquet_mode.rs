@@ -35,7 +35,7 @@ pub(crate) struct Node {
     /// Quadrature weight, s; 0 for the two instants at which a tooth enters or leaves, which are no nodes of the
     /// quadrature.
     pub(crate) weight_s: f64,
-    /// Phase of the tooth period, rad.
+    /// Phase of the tooth period at this node, rad.
     pub(crate) phase: f64,
     /// Number of cutting teeth.
     pub(crate) teeth: usize,
@@ -48,7 +48,7 @@ pub(crate) struct Node {
 /// Floquet mode and its adjoint over a tooth period.
 #[derive(Clone, Debug)]
 pub(crate) struct FloquetMode {
-    /// Nodes of the quadrature, in order of time.
+    /// Nodes of the quadrature over the tooth period, in order of time.
     pub(crate) nodes: Vec<Node>,
     /// Mode and adjoint at the entry of a tooth, which is the start of the period.
     pub(crate) entry: Node,
@@ -66,7 +66,7 @@ struct Subinterval {
     turn: f64,
 }
 
-/// Matrix exponentials shared by subintervals of one duration.
+/// Matrix exponentials of the free structure that all subintervals of one duration share.
 struct Basis {
     gauss: Gauss,
     duration: f64,
@@ -253,7 +253,7 @@ impl Basis {
         }
     }
 
-    /// The same basis for the transposed matrix Aᵀ.
+    /// Matrix exponentials of the transposed structure Aᵀ for the same duration.
     fn transposed(&self) -> Self {
         let transpose = |all: &[DMatrix<f64>]| all.iter().map(DMatrix::transpose).collect();
         Self {
@@ -268,9 +268,9 @@ impl Basis {
 
 /// Transition of the state from the start of a subinterval to its nodes and to its end.
 struct MapFactor {
-    /// Transition matrix to the end of the subinterval, n × n.
+    /// Transition matrix from the start to the end of the subinterval, n × n.
     transition: Matrix,
-    /// Transition matrix to each node, n × n.
+    /// Transition matrix from the start of the subinterval to each node, n × n.
     states: Vec<Matrix>,
 }
 
@@ -306,7 +306,8 @@ impl MapFactor {
         } else {
             implicit.lu().solve(&rows)?
         };
-        // x_i = e^{A t_i} (1 + Σ_j S_ij h column_j seen_j)
+        // States at the nodes from the start state, x_i = e^{A t_i} (1 + Σ_j S_ij h column_j seen_j) x₀, with the Gauss
+        // integrals S_ij and the duration h.
         let pushes: Vec<Matrix> = (0..nodes)
             .map(|j| {
                 let ports = j * per_node;

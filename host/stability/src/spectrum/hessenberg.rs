@@ -11,11 +11,11 @@ use quietcut_numerics::eigenvalues::inverse_iteration;
 pub(crate) struct Shifted {
     size: usize,
     band: usize,
-    /// Upper factor U, row by row.
+    /// Upper triangular factor U of H − s I, row by row.
     upper: Vec<Complex64>,
-    /// For each column the elimination factors of the `band` rows below the diagonal.
+    /// Elimination factors of the `band` rows below the diagonal, for each column.
     factors: Vec<Complex64>,
-    /// For each elimination step the index of the row exchanged with the pivot row.
+    /// Index of the row exchanged with the pivot row, for each elimination step.
     pivots: Vec<usize>,
 }
 
@@ -24,7 +24,7 @@ pub(crate) struct Shifted {
 const SHIFT: f64 = 1e-8;
 
 impl Shifted {
-    /// Factors H − s I for an eigenvalue of a matrix that is zero below its `band`-th lower diagonal.
+    /// Factors H − s I for an eigenvalue of a matrix H that is zero below its `band`-th lower diagonal.
     pub(crate) fn new(matrix: &DMatrix<f64>, band: usize, eigenvalue: Complex64) -> Self {
         let size = matrix.nrows();
         let shift = if eigenvalue == Complex64::ZERO {
@@ -39,7 +39,7 @@ impl Shifted {
             }
             upper[j * size + j] -= shift;
         }
-        // Value that replaces a vanishing pivot.
+        // Value that replaces a vanishing pivot, so that the shifted matrix stays regular.
         let least = (f64::EPSILON * matrix.amax()).max(f64::MIN_POSITIVE);
         let mut factors = vec![Complex64::ZERO; size * band];
         let mut pivots = Vec::with_capacity(size);
@@ -127,7 +127,7 @@ impl Shifted {
         }
     }
 
-    /// Right eigenvector of length 1; `None` if the result is not finite.
+    /// Right eigenvector x of length 1, H x = μ x; `None` if the result is not finite.
     pub(crate) fn right(&self) -> Option<DVector<Complex64>> {
         self.iterate(Self::solve)
     }

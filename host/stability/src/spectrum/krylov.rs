@@ -60,14 +60,14 @@ pub(crate) trait LinearMap {
 pub(crate) struct Dominant {
     /// Eigenvalues; complex ones in exact conjugate pairs.
     pub(crate) eigenvalues: Vec<Complex64>,
-    /// Orthonormal basis of the subspace by columns; `None` for the whole space.
+    /// Orthonormal basis of the subspace, by columns; `None` for the whole space.
     basis: Option<DMatrix<f64>>,
-    /// Matrix of the map projected on the subspace.
+    /// Matrix of the linear map projected on the subspace.
     projected: DMatrix<f64>,
 }
 
 impl Dominant {
-    /// All eigenvalues larger than `least`.
+    /// All eigenvalues of a linear map with |μ| larger than `least`.
     ///
     /// # Errors
     /// A result is not finite, or the map is large and block Arnoldi does not converge.
@@ -75,8 +75,8 @@ impl Dominant {
         Self::kept(map, &|values| values.retain(|value| value.norm() > least))
     }
 
-    /// All eigenvalues larger than 0.25. If there is none, those of at least half the size of the largest, at most
-    /// [`CROWD`] of them.
+    /// All eigenvalues of a linear map with |μ| larger than [`KRYLOV_ANY`]. If there is none, those of at least half
+    /// the size of the largest, at most [`CROWD`] of them.
     ///
     /// # Errors
     /// As [`of`](Self::of).
@@ -116,7 +116,7 @@ impl Dominant {
         })
     }
 
-    /// Right eigenvector of one of the eigenvalues, of length 1.
+    /// Right eigenvector, of length 1, that belongs to one of the eigenvalues.
     pub(crate) fn vector(&self, eigenvalue: Complex64) -> Option<DVector<Complex64>> {
         let within = eigenvector(&self.projected.map(Complex64::from), eigenvalue)?;
         Some(match &self.basis {
@@ -126,10 +126,10 @@ impl Dominant {
     }
 }
 
-/// Approximate largest eigenvalues, largest first, as starting values of Newton's method.
+/// Approximate largest eigenvalues of a linear map, largest first, as starting values of Newton's method.
 #[derive(Clone, Debug)]
 pub(crate) struct Largest {
-    /// Eigenvalues, with a residual of about 1e-7 if they have converged.
+    /// Eigenvalues of the map, with a residual of about 1e-7 if they have converged.
     pub(crate) eigenvalues: Vec<Complex64>,
     /// False if block Arnoldi did not converge.
     pub(crate) is_settled: bool,
@@ -137,7 +137,7 @@ pub(crate) struct Largest {
     pub(crate) norm: f64,
 }
 
-/// Eigenvalues larger than `share` of the largest, at most [`CROWD`].
+/// Eigenvalues of a linear map larger than `share` times the largest, at most [`CROWD`] of them.
 ///
 /// # Errors
 /// A result is not finite.
@@ -155,8 +155,8 @@ pub(crate) fn largest(map: &impl LinearMap, share: f64) -> Result<Largest, Break
     })
 }
 
-/// Eigenvalues larger than `least`, or larger than `share` of the largest if that is less; largest first, with a
-/// relative residual of about 1e-7.
+/// Eigenvalues of a linear map larger than `least`, or larger than `share` times the largest if that is less; largest
+/// first, with a relative residual of about 1e-7.
 ///
 /// `None` if block Arnoldi does not converge in a space of half the dimension, or if a result is not finite.
 pub(crate) fn larger_than(map: &impl LinearMap, least: f64, share: f64) -> Option<Vec<Complex64>> {
@@ -199,8 +199,8 @@ fn arnoldi(
     let mut next_eigenvalues = BLOCKS_BEFORE_EIGENVALUES;
     for count in 1.. {
         if done + width > room {
-            // Storage grows by doubling. Filling the largest storage at once would take longer than most maps need in
-            // all.
+            // Storage of the Krylov space grows by doubling. Filling the largest storage at once would take longer than
+            // most maps need in all.
             room = most.min(2 * room);
             basis = basis.resize_horizontally(room + BLOCK, 0.0);
             projected = projected.resize(room + BLOCK, room, 0.0);
@@ -210,7 +210,7 @@ fn arnoldi(
             .ok_or(Breakdown::NoSolution)?;
         let scale = image.norm();
         let known = basis.columns(0, done + width);
-        // Two passes suffice: the first leaves in the space only the rounding of the image.
+        // Two passes of orthogonalization suffice: after the first only rounding of the image lies in the space.
         for _ in 0..2 {
             let part = known.tr_mul(&image);
             image -= known * &part;
@@ -270,7 +270,7 @@ fn are_settled(
     })
 }
 
-/// Eigenvalues of a matrix larger than `least`, largest first; of a conjugate pair the upper one first.
+/// Eigenvalues of a matrix with absolute value above `least`, largest first; of a conjugate pair the upper one first.
 fn larger(matrix: &DMatrix<f64>, least: f64) -> Result<Vec<Complex64>, EigenvalueError> {
     let mut values = eigenvalues::of_real(matrix.clone())?;
     values.retain(|value| value.norm() > least);
@@ -278,9 +278,9 @@ fn larger(matrix: &DMatrix<f64>, least: f64) -> Result<Vec<Complex64>, Eigenvalu
     Ok(values)
 }
 
-/// Starting block: the same at every call, with components along all directions.
+/// Starting block of block Arnoldi: the same at every call, with components along all directions.
 fn start(size: usize) -> DMatrix<f64> {
-    // Weyl sequences: multiples of irrational numbers modulo one.
+    // Entries are Weyl sequences, multiples of irrational numbers modulo one, which are spread evenly.
     let irrational = [2.0_f64.sqrt(), 3.0_f64.sqrt(), 5.0_f64.sqrt()];
     DMatrix::from_fn(size, BLOCK, |i, j| ((i + 1) as f64 * irrational[j]).fract() - 0.5)
 }

@@ -15,15 +15,15 @@ const DIFFERENCE: f64 = 1e-6;
 
 /// Map over one period at one axial depth; its eigenvalues are the Floquet multipliers.
 pub(crate) trait PeriodMap: LinearMap {
-    /// Vibration frequency of a multiplier, Hz, from its eigenvector.
+    /// Vibration frequency of a Floquet multiplier, Hz, from its eigenvector of the map.
     fn chatter_hz(&self, multiplier: Complex64, vector: &nalgebra::DVector<Complex64>) -> Option<f64>;
 }
 
-/// All multipliers of the map at one axial depth.
+/// All Floquet multipliers of the period map at one axial depth.
 struct MultipliersAtDepth {
     depth_m: f64,
     dominant: Dominant,
-    /// Multipliers at a slightly larger depth, for the difference quotient.
+    /// Floquet multipliers at a slightly larger depth, for the difference quotient dμ/dw.
     deeper: Option<Vec<Complex64>>,
 }
 
@@ -32,13 +32,13 @@ struct MultipliersAtDepth {
 pub(crate) struct MapSpectrum<F, E> {
     map: F,
     error: E,
-    /// Step of the difference quotient, m.
+    /// Depth step of the difference quotient dμ/dw, m.
     step_m: f64,
     known: Option<MultipliersAtDepth>,
 }
 
 impl<M: PeriodMap, F: Fn(f64) -> Option<M>, E: Fn(Complex64, f64) -> Option<f64>> MapSpectrum<F, E> {
-    /// Spectrum for axial depths up to `deepest_m`.
+    /// Floquet multipliers of period maps for axial depths up to `deepest_m`.
     pub(crate) fn new(deepest_m: f64, map: F, error: E) -> Self {
         Self {
             map,
@@ -59,13 +59,13 @@ impl<M: PeriodMap, F: Fn(f64) -> Option<M>, E: Fn(Complex64, f64) -> Option<f64>
         self.known.as_mut().ok_or(Breakdown::NoSolution)
     }
 
-    /// The multiplier nearest to a guess; a real guess gives a real one.
+    /// Floquet multiplier nearest to a guess at a depth; a real guess gives a real multiplier.
     fn nearest(&mut self, guess: Complex64, depth_m: f64) -> Option<Complex64> {
         nearest(&self.at(depth_m).ok()?.dominant.eigenvalues, guess)
     }
 }
 
-/// The multiplier of a list nearest to a guess; a real guess gives a real one.
+/// Floquet multiplier of a list nearest to a guess; a real guess gives a real multiplier.
 pub(crate) fn nearest(multipliers: &[Complex64], guess: Complex64) -> Option<Complex64> {
     multipliers
         .iter()

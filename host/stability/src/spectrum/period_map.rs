@@ -11,11 +11,12 @@ use crate::error::Breakdown;
 use crate::problem::period::Period;
 use quietcut_numerics::eigenvalues;
 
-/// Largest size of a map for which all eigenvalues are computed from its matrix, which is as fast as block Arnoldi
-/// there.
+/// Largest size of a period map for which all eigenvalues are computed from its matrix, which is as fast as block
+/// Arnoldi there.
 const WHOLE: usize = 110;
 
-/// Largest size of a map for which all eigenvalues are computed if block Arnoldi does not converge: about one second.
+/// Largest size of a period map for which all eigenvalues are computed if block Arnoldi does not converge: about one
+/// second.
 const UNSETTLED_WHOLE_MAX: usize = 400;
 
 /// Matrix of the map (x, p_τ) → (x⁺, p) over one tooth period at an axial depth, m.
@@ -31,10 +32,11 @@ pub(crate) fn monodromy(period: &Period, depth_m: f64) -> Option<DMatrix<f64>> {
     let mut first = order;
     for element in &period.elements {
         let ports = element.kernel.nrows();
-        // Collocation equation p − w Q p = E x − w Q p_τ
+        // Collocation equation of the element, p − w Q p = E x − w Q p_τ, for the displacements p along the chip
+        // normals
         let weighted = &element.kernel * depth_m;
         let implicit = DMatrix::identity(ports, ports) - &weighted;
-        // Displacements of later elements do not act on this element.
+        // Displacements p_τ of later elements do not act on this element.
         let known = first + ports;
         let mut seen = &element.observe * state.columns(0, known);
         let mut past = seen.columns_mut(first, ports);
@@ -55,8 +57,8 @@ pub(crate) fn monodromy(period: &Period, depth_m: f64) -> Option<DMatrix<f64>> {
     Some(map)
 }
 
-/// All multipliers of the collocated map, largest first. Those that only represent the discretized history are near
-/// zero.
+/// All Floquet multipliers of the collocated map over a tooth period, largest first. Those that only represent the
+/// discretized history are near zero.
 ///
 /// # Errors
 /// The collocation equations are singular, or the eigenvalues cannot be computed.
@@ -74,7 +76,7 @@ pub(crate) fn of_matrix(map: DMatrix<f64>) -> Result<Vec<Complex64>, Breakdown> 
     Ok(multipliers)
 }
 
-/// Approximate largest multipliers, as starting values of Newton's method.
+/// Approximate largest Floquet multipliers of a period map, as starting values of Newton's method.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Candidates {
     /// Multipliers, largest first.
@@ -84,7 +86,7 @@ pub(crate) struct Candidates {
     pub(crate) is_certain: bool,
 }
 
-/// Multipliers larger than `share` of the largest.
+/// Floquet multipliers of the collocated map larger than `share` times the largest.
 ///
 /// Large maps are treated by block Arnoldi.
 ///
@@ -128,8 +130,8 @@ pub(crate) fn largest(period: &Period, depth_m: f64, share: f64) -> Result<Candi
     Ok(of(of_matrix(map)?, norm, true))
 }
 
-/// Multipliers larger than `least`, or larger than `share` of the largest if that is less, largest first. Small maps
-/// return smaller multipliers too.
+/// Floquet multipliers of the collocated map larger than `least`, or larger than `share` times the largest if that is
+/// less, largest first. Small maps return smaller multipliers too.
 ///
 /// Large maps are treated by block Arnoldi, accurate enough to start Newton's method.
 ///
@@ -155,7 +157,8 @@ pub(crate) fn larger_than(
     multipliers(period, depth_m)
 }
 
-/// Map (x, p_τ) → (x⁺, p), applied element by element without forming its matrix.
+/// Map (x, p_τ) → (x⁺, p) of state and displacements along the chip normals over a tooth period, applied element by
+/// element without forming its matrix.
 struct Map<'a> {
     period: &'a Period,
     depth_m: f64,

@@ -12,7 +12,7 @@ use super::map_spectrum::PeriodMap;
 use crate::problem::revolution::Revolution;
 use crate::problem::revolution_mesh::{Series, Source};
 
-/// Map over one revolution at one axial depth.
+/// Map of the delayed state over one revolution at one axial depth.
 pub(crate) struct RevolutionMap<'a> {
     revolution: Rc<Revolution<'a>>,
     depth_m: f64,
@@ -23,7 +23,7 @@ pub(crate) struct RevolutionMap<'a> {
 
 /// Motion over a revolution, for several initial states (columns) at once.
 struct Trace {
-    /// State x at the end, n × columns.
+    /// State x of the structure at the end of the revolution, n × columns.
     state: DMatrix<f64>,
     /// Displacements p along the chip normals in each element, columns × ports.
     seen: Vec<DMatrix<f64>>,
@@ -69,8 +69,8 @@ impl<'a> RevolutionMap<'a> {
                     let seen = match of.source {
                         Source::Earlier(first) => before.column(first + node),
                         Source::Own(Series { subinterval, tooth }) => {
-                            // `None` if a delay is shorter than a subinterval, so that it ends in the subinterval
-                            // itself.
+                            // No value is known yet if a delay is shorter than a subinterval, so that the delayed time
+                            // lies in the subinterval itself.
                             let values = trace.seen.get(subinterval)?;
                             values.column(node * subintervals[subinterval].cutting.len() + tooth)
                         }
@@ -78,7 +78,8 @@ impl<'a> RevolutionMap<'a> {
                     sum.axpy(*weight, &seen, 1.0);
                 }
             }
-            // Collocation equation p − w Q p = E x − w Q p_τ
+            // Collocation equation of the element, p − w Q p = E x − w Q p_τ, for the displacements p along the chip
+            // normals
             let past = past.transpose();
             let mut seen = &element.observe * &trace.state;
             seen.gemm(-self.depth_m, &element.kernel, &past, 1.0);

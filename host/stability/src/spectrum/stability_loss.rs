@@ -17,8 +17,8 @@ pub enum StabilityLoss {
 }
 
 impl StabilityLoss {
-    /// Kind of a multiplier from its sign and imaginary part. A real multiplier must have an imaginary part of exactly
-    /// 0.
+    /// Kind of stability loss from sign and imaginary part of a multiplier. A real multiplier must have an imaginary
+    /// part of exactly 0.
     pub fn of(multiplier: Complex64) -> Self {
         if multiplier.im != 0.0 {
             Self::Hopf

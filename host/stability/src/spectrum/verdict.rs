@@ -15,7 +15,7 @@ pub enum Verdict {
 }
 
 impl Verdict {
-    /// Verdict for a multiplier of this absolute value and error.
+    /// Verdict on a cut whose dominant multiplier has this absolute value and error.
     pub fn of(multiplier_abs: f64, error: f64) -> Self {
         if multiplier_abs + error < 1.0 {
             Self::Stable

@@ -17,13 +17,14 @@ use quietcut_numerics::newton::Newton;
 use super::characteristic::{Characteristic, Workspace};
 use crate::criteria::{FINE_MARGINS, MARGINS, WINDING_ERRORS, WOUND};
 
-/// Largest number of floating-point operations of all evaluations together: a few seconds. A choice.
+/// Largest number of floating-point operations of all evaluations of the characteristic function in one search: a few
+/// seconds. A choice.
 const OPERATIONS_MAX: f64 = 3e9;
 
-/// Largest number of evaluation points on half of a circle: a limit on computing time.
+/// Largest number of points on half of a circle for a winding number: a limit on computing time.
 const POINTS_MAX: usize = 8192;
 
-/// Largest number of candidates from which Newton's method starts: a limit on computing time.
+/// Largest number of candidate multipliers from which Newton's method starts: a limit on computing time.
 const CANDIDATES_MAX: usize = 6;
 
 /// Largest number of multipliers that are searched one by one: a limit on computing time.
@@ -32,13 +33,13 @@ const ROOTS_MAX: usize = 12;
 /// Largest multiplier found, and the radius beyond which the winding number counts none.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LargestMultiplier {
-    /// Largest multiplier found, if larger than [`WOUND`]; of a conjugate pair the upper one.
+    /// Largest Floquet multiplier found, if larger than [`WOUND`]; of a conjugate pair the upper one.
     pub(crate) multiplier: Option<Complex64>,
     /// Radius beyond which the winding number counts no multiplier; infinite if no count converged.
     pub(crate) radius: f64,
 }
 
-/// Search for the largest multiplier with a limited number of evaluations of the characteristic function.
+/// Search for the largest Floquet multiplier with a limited number of evaluations of the characteristic function.
 pub(crate) struct Search<'a> {
     characteristic: &'a Characteristic,
     depth_m: f64,
@@ -47,7 +48,8 @@ pub(crate) struct Search<'a> {
 }
 
 impl<'a> Search<'a> {
-    /// Search at an axial depth, m; the characteristic matrix must be valid for five times that depth.
+    /// Search for the largest multiplier at an axial depth, m; the characteristic matrix must be valid for five times
+    /// that depth.
     pub(crate) fn new(characteristic: &'a Characteristic, depth_m: f64) -> Self {
         Self {
             characteristic,
@@ -57,8 +59,8 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Logarithmic derivative z G'/G at z; `None` at a zero, if the result is not finite, or if no evaluations are
-    /// left.
+    /// Logarithmic derivative z G'/G of the characteristic function at z; `None` at a zero, if the result is not
+    /// finite, or if no evaluations are left.
     fn slope(&mut self, z: Complex64) -> Option<Complex64> {
         self.evaluations_left = self.evaluations_left.checked_sub(1)?;
         let multiplier = z.inv();
@@ -70,12 +72,12 @@ impl<'a> Search<'a> {
         slope.is_finite().then_some(slope)
     }
 
-    /// Number of multipliers with |μ| larger than a radius; `None` if one lies so close to the circle that the allowed
-    /// points do not resolve it.
+    /// Number of Floquet multipliers with |μ| larger than a radius; `None` if one lies so close to that circle that the
+    /// largest number of points does not resolve it.
     pub(crate) fn count_beyond(&mut self, radius: f64) -> Option<usize> {
         use std::f64::consts::PI;
         let at = |angle: f64| Complex64::from_polar(radius.recip(), angle);
-        // Values at conjugate points are conjugate, so that half of the circle suffices.
+        // The logarithmic derivative is conjugate at conjugate points, so that half of the circle suffices.
         let mut points = 8;
         let mut sum = 0.5 * (self.slope(at(0.0))?.re + self.slope(at(PI))?.re);
         for i in 1..points {
@@ -104,7 +106,8 @@ impl<'a> Search<'a> {
         None
     }
 
-    /// A multiplier beyond a radius that is not among the known ones, by Newton's method with the known ones deflated.
+    /// Floquet multiplier beyond a radius that is not among the known ones, by Newton's method with the known ones
+    /// deflated.
     fn another_beyond(&mut self, radius: f64, known: &[Complex64]) -> Option<Complex64> {
         const ANGLES: usize = 6;
         for share in [0.95, 0.7, 0.3] {
@@ -121,9 +124,9 @@ impl<'a> Search<'a> {
         None
     }
 
-    /// The multiplier to which Newton's method converges from z = `start`.
+    /// Floquet multiplier μ = 1/z to which Newton's method converges from z = `start`.
     fn newton(&mut self, start: Complex64, known: &[Complex64]) -> Option<Complex64> {
-        // The polynomials of the elements are not valid for larger |z|.
+        // The polynomials of the elements in the complex depth w (1 − z) are not valid for larger |z|.
         let is_valid = |z: Complex64| z.is_finite() && z.norm() <= WOUND.recip();
         let found = Newton::new(15, 1e-9).solve(start, |&z: &Complex64| {
             if z != start && !is_valid(z) {
@@ -145,8 +148,8 @@ impl<'a> Search<'a> {
         Some(Complex64::new(multiplier.re, im))
     }
 
-    /// Largest multiplier found, and the radius beyond which the winding number counts none; `candidates` are starting
-    /// values of Newton's method.
+    /// Largest Floquet multiplier found, and the radius beyond which the winding number counts none; `candidates` are
+    /// starting values of Newton's method.
     pub(crate) fn largest(&mut self, candidates: &[Complex64]) -> LargestMultiplier {
         let mut known: Vec<Complex64> = Vec::new();
         let mut best: Option<Complex64> = None;
@@ -160,7 +163,8 @@ impl<'a> Search<'a> {
         }
         let mut radius = f64::INFINITY;
         for margin in MARGINS.into_iter().chain(FINE_MARGINS) {
-            // A verdict follows from a multiplier outside the unit circle, or from a bound inside it.
+            // The verdict on the cut follows from a multiplier outside the unit circle, or from a bound on all
+            // multipliers inside it.
             let is_decided = radius < 1.0 || best.is_some_and(|best| best.norm() > 1.0);
             if FINE_MARGINS.contains(&margin) && is_decided {
                 break;
