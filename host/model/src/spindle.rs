@@ -90,8 +90,8 @@ impl Spindle {
         }
     }
 
-    /// A spindle whose speed changes linearly from `first_rpm` to `last_rpm`, rev/min, in `seconds`; all positive. Its mean speed is the
-    /// arithmetic mean of both.
+    /// A spindle whose speed changes linearly from `first_rpm` to `last_rpm`, rev/min, within `seconds`, s; all positive. Its mean speed is
+    /// the arithmetic mean of both.
     pub fn sweeping(first_rpm: f64, last_rpm: f64, seconds: f64) -> Self {
         let speeds = [first_rpm, last_rpm].map(|rpm| rpm * TAU / 60.0);
         Self {

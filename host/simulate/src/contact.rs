@@ -61,7 +61,7 @@ pub(super) struct Chip {
     immersion: Immersion,
 }
 
-/// The first change of contact in a step.
+/// The first loss or regain of contact by a tooth in an integration step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Change {
     /// Index of the tooth.
@@ -172,7 +172,7 @@ impl<'a> Contact<'a> {
         }
     }
 
-    /// The teeth in contact with material.
+    /// The teeth that are in contact with material and cut.
     fn cutting_teeth(&self) -> impl Iterator<Item = &Tooth> {
         let teeth = self.cutting.cutter.teeth.iter().zip(&self.teeth);
         teeth
@@ -428,7 +428,7 @@ impl<'a> Contact<'a> {
         }
     }
 
-    /// Applies the kinks of the surface that tooth `index` meets up to the time `now`, s.
+    /// Applies the kinks in the surface in front of tooth `index` that the tooth meets up to the time `now`, s.
     fn pass_kinks(&mut self, index: usize, now: f64) {
         while let Some((when, order)) = self.teeth[index]
             .kinks

@@ -15,7 +15,7 @@ use quietcut_numerics::dormand_prince::{DormandPrince, Quartic, at};
 pub struct Statistics {
     /// Accepted steps.
     pub steps: u64,
-    /// Steps rejected because their error exceeded the tolerance.
+    /// Number of integration steps rejected because their error exceeded the tolerance.
     pub rejected: u64,
     /// Number of times that a tooth lost or regained contact.
     pub contact_changes: u64,
@@ -43,7 +43,7 @@ pub(super) struct Integrator<'a> {
     within: [f64; 2],
 }
 
-/// An event that shortens a step.
+/// An event that ends an integration step early.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Event {
     /// A tooth loses or regains contact.
@@ -245,7 +245,7 @@ impl<'a> Integrator<'a> {
         });
     }
 
-    /// Sets the step of length `h`, s, from the current time as the one to evaluate.
+    /// Sets the integration step of length `h`, s, from the current time as the one to evaluate.
     fn set_step(&mut self, h: f64) {
         let inset = 1e-9 * h;
         self.within = [self.t + inset, self.t + h - inset];
@@ -346,7 +346,7 @@ impl<'a> Integrator<'a> {
         first_below_zero(margin).map(|u| Event::RegimeEnd { index, u })
     }
 
-    /// Attempts one step of length `h`, s, and its dense output; returns the error divided by the tolerance.
+    /// Attempts one integration step of length `h`, s, and its dense output; returns the step's local error divided by the tolerance.
     fn attempt(&mut self, h: f64) -> f64 {
         self.set_step(h);
         let model = self.model;

@@ -33,8 +33,8 @@ impl Reading {
         }
     }
 
-    /// Takes the samples that lie in the newest integration step. A delay of the sensor places the first samples before t = 0, where the tool
-    /// is at rest at its initial displacement.
+    /// Takes the samples of the channel that lie in the newest integration step. A delay of the sensor places the first samples before t =
+    /// 0, where the tool is at rest at its initial displacement.
     pub fn observe(&mut self, step: &DenseStep<'_>) {
         let (early, count) = if self.is_mean {
             (0.5, self.count + 1)

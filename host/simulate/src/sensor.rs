@@ -237,7 +237,7 @@ impl TachometerModel {
         edges
     }
 
-    /// True times of the edges from t = 0 to `end_s`, s, without jitter.
+    /// True times of the tachometer edges from t = 0 to `end_s`, s, without jitter.
     pub fn true_edges_s(&self, spindle: &Spindle, end_s: f64) -> impl Iterator<Item = f64> {
         let positions = u64::from(self.wheel.positions);
         let present = positions - u64::from(self.wheel.missing);

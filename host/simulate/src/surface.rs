@@ -28,10 +28,11 @@ struct SurfaceArc {
 #[derive(Clone, Copy, Debug)]
 /// Height of a piece of the machined surface as a function of the time at which the tooth passed.
 enum Profile {
-    /// Cut by the tooth: the surface is the path of its edge, which follows from the displacement of the tool (dense output, m).
+    /// Part of the surface that the tooth cuts: it is the path of the edge, which follows from the displacement of the tool (dense output,
+    /// m).
     Cut([Quartic; 3]),
-    /// Not reached by the edge: the surface of an earlier tooth passing persists; its heights as Newton's divided differences at
-    /// [`SURFACE_NODES`].
+    /// Part of the surface that the edge does not reach: the surface of an earlier tooth passing persists; its heights as Newton's divided
+    /// differences at [`SURFACE_NODES`].
     Uncut([f64; 6]),
 }
 

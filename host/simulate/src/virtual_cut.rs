@@ -97,7 +97,7 @@ pub enum VirtualCutError {
     TooShort {
         /// Duration of the cut, s.
         seconds: f64,
-        /// Time without contact before and after the cut, s.
+        /// Duration of air cutting before and after the cut, s.
         air_s: f64,
         /// Shortest possible duration, s.
         needed_s: f64,

@@ -31,7 +31,7 @@ pub enum WorkpieceTraverse {
     },
 }
 
-/// The times at which a tooth has material in front of it during one passing: at most two windows, s.
+/// The windows of time, at most two, in which a tooth has material in front of it during one passing, s.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct MaterialWindows {
     windows: [Option<[f64; 2]>; 2],
@@ -174,7 +174,7 @@ fn intersection(a: Option<[f64; 2]>, b: Option<[f64; 2]>) -> Option<[f64; 2]> {
     (both[0] < both[1]).then_some(both)
 }
 
-/// The two subintervals of `window` before and after `excluded`.
+/// The two subintervals of `window` that lie before and after the subinterval `excluded`.
 fn complement(excluded: Option<[f64; 2]>, window: [f64; 2]) -> [Option<[f64; 2]>; 2] {
     match excluded {
         None => [Some(window), None],

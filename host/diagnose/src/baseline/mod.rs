@@ -89,7 +89,7 @@ impl<'a> Baseline<'a> {
             .fold(0.0, f64::max)
     }
 
-    /// The lowest natural frequency, Hz; `None` without oscillating modes.
+    /// The lowest natural frequency of the baseline structure, Hz; `None` without oscillating modes.
     pub(crate) fn lowest_hz(&self) -> Option<f64> {
         self.first_order
             .poles()

@@ -88,8 +88,8 @@ impl fmt::Display for Location {
 /// Contribution of a candidate cause to the residual of a record, per unit of one coefficient of the cause.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Regressor {
-    /// Restoring force f_r along the machine's axes, N, upsampled. A record in the response domain compares −H·f_r with the residual, a
-    /// record in the force domain f_r itself.
+    /// Restoring force f_r of the cause per unit of its coefficient, along the machine's axes, N, upsampled. A record in the response
+    /// domain compares −H·f_r with the residual, a record in the force domain f_r itself.
     pub restoring_n: [Vec<f64>; 3],
     /// Contribution of a sensor error to the reading of each channel, at the samples of the record; empty for channels without one.
     pub observed: Vec<Vec<f64>>,
@@ -98,7 +98,7 @@ pub(crate) struct Regressor {
 }
 
 impl Regressor {
-    /// A regressor that is a restoring force.
+    /// Regressor of a cause that is a restoring force.
     pub(crate) fn of_force(restoring_n: [Vec<f64>; 3]) -> Self {
         Self {
             restoring_n,
@@ -106,7 +106,7 @@ impl Regressor {
         }
     }
 
-    /// A regressor that acts directly on the readings of channels.
+    /// Regressor of a sensor error, which acts directly on the readings of channels.
     pub(crate) fn of_channels(observed: Vec<Vec<f64>>) -> Self {
         Self {
             observed,
@@ -114,7 +114,7 @@ impl Regressor {
         }
     }
 
-    /// A regressor that is a change of the cutting force.
+    /// Regressor of a cause that changes the cutting force.
     pub(crate) fn of_cut(force: CutForce) -> Self {
         Self {
             cut: Some(force),
@@ -208,7 +208,7 @@ pub(crate) struct LocatedEffect {
 /// It is linear in its coefficients once its nonlinear parameters (gap, yield displacement, time constant …) are given: residual = Σ
 /// coefficient · regressor(nonlinear parameters, measured motion) + free decays + noise.
 pub(crate) trait Cause: Send + Sync {
-    /// The effect that the cause represents.
+    /// The effect of the model that this cause represents.
     fn effect(&self) -> EffectName;
 
     /// The effect's name, as in `[extension.NAME]`.
@@ -244,7 +244,7 @@ pub(crate) trait Cause: Send + Sync {
         Vec::new()
     }
 
-    /// Regressors of the cause in a record.
+    /// Regressors of the cause along the motion of a record, one for each coefficient of the cause.
     fn regressors(
         &self,
         study: &Study<'_>,

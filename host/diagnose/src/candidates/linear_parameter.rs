@@ -25,7 +25,8 @@ use quietcut_model::structure::Form;
 use quietcut_recording::Quantity;
 use quietcut_simulate::Effects;
 
-/// Relative step of the central differences. Their relative error is about its square, 1e-8; rounding contributes 1e-12/`STEP`.
+/// Relative change of mass, damping or stiffness in the central differences that give the derivative of the receptance. Their relative
+/// error is about its square, 1e-8; rounding contributes 1e-12/`STEP`.
 const STEP: f64 = 1e-4;
 /// |H| over the root sum of squares of its modal contributions below which H is regularized as nearly vanishing: ε in the head of this
 /// file.

@@ -23,7 +23,7 @@ use quietcut_model::effects::EffectName;
 
 pub(super) struct MissingMode;
 
-/// Damping ratios of a missing mode at which its search starts.
+/// Damping ratios at which the search for a missing mode starts.
 const DAMPING: [f64; 3] = [0.008, 0.025, 0.08];
 /// Number of candidate modes (frequency, damping ratio) that are kept as start values of a missing mode: those with the largest reduction
 /// of χ².

@@ -65,7 +65,7 @@ pub(super) fn with(record: &Record, cut: &Cutting, change: impl Fn(&mut Cutter))
     cut.force_of(&cutter, &record.motion)
 }
 
-/// `size` as a step of a finite difference, or `least` if its magnitude is smaller.
+/// Step of a finite difference: `size`, or `least` if the magnitude of `size` is smaller.
 pub(super) fn step(size: f64, least: f64) -> f64 {
     if size.abs() < least { least } else { size }
 }

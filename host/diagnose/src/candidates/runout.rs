@@ -16,9 +16,9 @@ use quietcut_simulate::Cutter;
 
 pub(super) struct RunoutCause;
 
-/// Offsets e of the start values, as shares of the feed per tooth.
+/// Offsets e of a runout at which its fit starts, as shares of the feed per tooth.
 const SHARES_OF_FEED: [f64; 2] = [0.1, 0.25];
-/// Smallest step of the finite differences in e cos ψ and −e sin ψ, µm.
+/// Smallest step of the finite differences with respect to the runout components e cos ψ and −e sin ψ, µm.
 const LEAST_UM: f64 = 0.01;
 
 fn teeth(study: &Study<'_>) -> usize {

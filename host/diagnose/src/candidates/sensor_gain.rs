@@ -15,13 +15,13 @@ use quietcut_model::effects::EffectName;
 
 pub(super) struct SensorGainCause;
 
-/// Largest share 1 − 1/g: a gain of 50. Beyond it the reading would hardly contain the true value.
+/// Largest accepted share 1 − 1/g of a sensor gain g, which is a gain of 50. Beyond it the reading would hardly contain the true value.
 const LARGEST_SHARE: f64 = 0.98;
 
-/// Share 1 − 1/g of the finite difference from which the change of the chip, and so of the cutting force, is computed.
+/// Share 1 − 1/g of a sensor gain g at which the finite difference of the change of chip thickness, and so of cutting force, is taken.
 const SMALL_SHARE: f64 = 0.05;
 
-/// The gain g from the fitted share 1 − 1/g; `None` if the share is too large.
+/// The sensor gain g from the fitted share 1 − 1/g; `None` if the share exceeds [`LARGEST_SHARE`].
 pub(super) fn factor(coefficients: &[f64]) -> Option<f64> {
     let share = *coefficients.first()?;
     (share < LARGEST_SHARE).then(|| 1.0 / (1.0 - share))

@@ -136,7 +136,7 @@ impl Gain {
 pub struct Unexplained {
     /// Share of the baseline's residual energy above the noise that no candidate model explains.
     pub fraction: f64,
-    /// Channel, frequency and time at which the residual is largest.
+    /// Channel, frequency and time at which the unexplained residual is largest, in words.
     #[serde(rename = "where")]
     pub location: String,
     /// A formula that may describe the residual: a guess.

@@ -16,10 +16,10 @@ use crate::records::study::Study;
 use quietcut_simulate::Effects;
 use quietcut_simulate::path::{SampledMotion, restoring_along};
 
-/// Largest number of terms of a formula.
+/// Largest number of terms of the formula that is guessed for an unexplained restoring force.
 const MOST: usize = 4;
 
-/// Exponents (i, j) of the terms x^i·v^j of a formula.
+/// Exponents (i, j) of the terms x^i·v^j that a guessed restoring force may contain.
 const POWERS: [(i32, i32); 16] = [
     (1, 0),
     (0, 1),
@@ -39,10 +39,11 @@ const POWERS: [(i32, i32); 16] = [
     (0, 5),
 ];
 
-/// Yield displacements of the Bouc–Wen loops, as shares of the largest displacement along the axis.
+/// Yield displacements of the Bouc–Wen loops that a guessed restoring force may contain, as shares of the largest displacement along the
+/// axis.
 const YIELDS: [f64; 4] = [0.05, 0.15, 0.4, 0.8];
 
-/// One term φ(x, v) of the formula, along one axis.
+/// One term φ(x, v) of a guessed restoring force along one axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum FormulaTerm {
     Power(i32, i32),
@@ -130,8 +131,8 @@ fn terms(study: &Study<'_>, axis: usize) -> Vec<FormulaTerm> {
     powers.chain(others).chain(loops).collect()
 }
 
-/// Contribution of a term to the residual per unit of its coefficient, by record, channel and sample; `None` if the structure cannot have
-/// the term.
+/// Contribution of a term of the guessed restoring force to the residual, per unit of its coefficient, by record, channel and sample;
+/// `None` if the structure cannot have the term.
 fn column(study: &Study<'_>, axis: usize, term: FormulaTerm) -> Option<Vec<Vec<Vec<f64>>>> {
     let columns: Vec<Vec<Vec<f64>>> = study
         .records
@@ -177,7 +178,7 @@ fn along(study: &Study<'_>, motion: &SampledMotion, axis: usize, term: FormulaTe
                 .first()?
                 .restoring_forces(study.baseline.structure)
                 .ok()?;
-            // The effect's restoring force is z − x; adding x gives z.
+            // The restoring force of a Bouc–Wen effect with unit stiffness is z − x; adding the displacement x gives the state z.
             let difference = restoring_along(&**terms.first()?, motion).into_iter().nth(axis)?;
             difference
                 .iter()

@@ -14,18 +14,18 @@ use quietcut_stability::{
     default_speeds, needs_orbit, spaced,
 };
 
-/// Number of speeds of a chart, unless each limit takes seconds to compute.
+/// Number of spindle speeds of a stability chart, unless each limit takes seconds to compute.
 const SPEEDS: usize = 41;
 
-/// Number of speeds of a chart whose limits take seconds each, as limits about forced orbits over a revolution do.
+/// Number of spindle speeds of a stability chart whose limits take seconds each, as limits about forced orbits over a revolution do.
 const FEW_SPEEDS: usize = 2;
 
-/// Number of speeds at which [`depth_mm`] searches the lowest limit.
+/// Number of spindle speeds at which [`depth_mm`] searches the lowest stability limit.
 const COARSE: usize = 12;
 
-/// First axial depth at which [`depth_mm`] searches the lowest limit, mm.
+/// First axial depth of the search for the lowest stability limit in [`depth_mm`], mm.
 const SHALLOWEST_MM: f64 = 0.01;
-/// Largest axial depth to which [`depth_mm`] searches the lowest limit, mm.
+/// Largest axial depth of the search for the lowest stability limit in [`depth_mm`], mm.
 const DEEPEST_MM: f64 = 200.0;
 
 /// Largest axial depth of a stability chart without cuts, as a multiple of the lowest stability limit in the speed range.
@@ -60,7 +60,7 @@ pub struct Change {
 /// Counts of right and wrong predictions of trial cuts and recorded cuts, before and after the extension.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct CallsChange {
-    /// Predictions of the case without the extension.
+    /// Right and wrong stability predictions for trial and recorded cuts by the case without the extension.
     pub before: Calls,
     /// Predictions of the extended case.
     pub after: Calls,
@@ -96,7 +96,7 @@ pub struct Lobes {
     pub method_after: &'static str,
     /// Stability limits before and after the extension, at every speed of the chart.
     pub speeds: Vec<Change>,
-    /// Predictions of trial cuts and recorded cuts, if there are any.
+    /// Right and wrong predictions for trial and recorded cuts before and after the extension; `None` without such cuts.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub calls: Option<CallsChange>,
     /// Charts of the case and of the extended case.

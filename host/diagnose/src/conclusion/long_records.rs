@@ -18,15 +18,15 @@ use quietcut_recording::{Recording, TestKind};
 
 /// Number of samples of all records together in which causes are searched.
 const SEARCHED: usize = 32_768;
-/// Least length of the first part of a record, in periods of the lowest natural frequency.
+/// Smallest length of the first part of a record, in which causes are searched, in periods of the lowest natural frequency.
 const PERIODS: f64 = 60.0;
-/// Least length of the first part of a cut, in revolutions.
+/// Smallest length of the first part of a recorded cut, in which causes are searched, in revolutions.
 const REVOLUTIONS: f64 = 24.0;
 
 /// The first part and the rest of each record, if all records are of random forces, of impacts or of cuts at one speed; `None` if the
 /// records are too short to be divided.
 fn beginnings(case: &Case, recordings: &[Recording]) -> Option<[Vec<Recording>; 2]> {
-    // A case without baseline model is refused when the whole records are prepared.
+    // A case without baseline model is not reported here: it is refused when the whole records are prepared.
     let lowest_hz = Baseline::new(case).ok()?.lowest_hz()?;
     let all: usize = recordings.iter().map(Recording::len).sum();
     let (shortened, rest): (Vec<Recording>, Vec<Recording>) = recordings
@@ -34,8 +34,8 @@ fn beginnings(case: &Case, recordings: &[Recording]) -> Option<[Vec<Recording>; 
         .map(|recording| {
             let revolutions_s = revolutions_s(recording)?;
             let samples = |seconds: f64| (seconds * recording.sample_rate_hz).ceil() as usize;
-            // The first part begins after the transient of the tool's entry, which takes as many revolutions as the first part has at
-            // least.
+            // The first part of a cut begins after the transient of the tool's entry. The time left out is the smallest length of a first
+            // part.
             let from = samples(revolutions_s);
             let least = samples((PERIODS / lowest_hz).max(revolutions_s));
             let count = (SEARCHED / recordings.len()).max(least);

@@ -15,7 +15,8 @@ use quietcut_recording::Quantity;
 /// Number of bins over which the power of a residual is averaged before it is compared with the noise.
 const SMOOTHED: usize = 9;
 
-/// Duration of a segment in periods of the lowest natural frequency. One amplitude is assigned to each segment.
+/// Duration of the segments over which stiffness and damping of the missing force are fitted, in periods of the lowest natural frequency.
+/// Each segment has one amplitude.
 const PERIODS: f64 = 2.0;
 
 /// Restoring force along one axis that the baseline lacks, with the displacement and velocity on which it depends.
@@ -36,7 +37,7 @@ pub struct MissingForce {
 /// Stiffness and damping of the missing force in a segment, at its amplitude.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AtAmplitude {
-    /// Largest displacement from the segment's mean, m.
+    /// Displacement amplitude of the segment: largest distance from its mean, m.
     pub amplitude_m: f64,
     /// Stiffness that the missing force adds: the least-squares slope of force over displacement, N/m.
     pub stiffness: f64,

@@ -102,7 +102,8 @@ pub(crate) fn by_common_factor(
     if !of_reading.contains(&library.cause(choice.candidate).effect()) {
         return Vec::new();
     }
-    // χ² of the gain by linear regression along the measured motion, as for the common factor.
+    // For a fair comparison with the common factor on mass, damping and stiffness, χ² of the sensor gain comes from the linear regression
+    // along the measured motion too.
     let along = match regression.fit(Subset::Whole, &library.columns_of(best)) {
         Some(fit) => fit.left,
         None => best.fit.left,
@@ -119,7 +120,7 @@ pub(crate) fn by_common_factor(
         if (left - along) / inflation > EQUIVALENT {
             continue;
         }
-        // The common factor has the same relative standard deviation as the gain.
+        // The common factor on mass, damping and stiffness has the same relative standard deviation as the equivalent sensor gain.
         let deviation = best.fit.covariance[(0, 0)].max(0.0).sqrt() * inflation.sqrt();
         return library
             .candidates

@@ -49,9 +49,9 @@ pub struct SpindleMotionView {
     pub rpm: f64,
     /// Number of teeth of the tool.
     pub teeth: usize,
-    /// Number of each passing of a tooth through the angle 0, and the measured value there.
+    /// For each tooth passing through the spindle angle 0: its number, and the measured value of the channel at that instant.
     pub measured: Vec<(u32, f64)>,
-    /// Number of each passing of a tooth through the angle 0, and the residual there.
+    /// For each tooth passing through the spindle angle 0: its number, and the residual of the channel at that instant.
     pub residual: Vec<(u32, f64)>,
 }
 
@@ -148,7 +148,7 @@ fn left_by(study: &Study<'_>, library: &Library, record: &Record, best: &Candida
         .collect()
 }
 
-/// Tooth passings through the angle 0: number, and time in samples.
+/// Instants at which a tooth passes through the angle 0: number of the passing, and time in samples of the record.
 fn passes(record: &Record, cut: &RecordedCut) -> Vec<(u32, f64)> {
     let pitch = TAU / cut.cutter.teeth.len().max(1) as f64;
     let rate_hz = record.grid.rate_hz();

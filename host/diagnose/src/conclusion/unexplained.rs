@@ -59,7 +59,8 @@ fn of_channel(view: &ResidualView) -> String {
     )
 }
 
-/// Frequency of the largest spectral line, Hz, and the share of the energy near it; `None` without energy.
+/// Frequency of the largest spectral line of a residual, Hz, and the share of the residual's energy in the lines near it; `None` for a zero
+/// residual.
 fn peak(view: &ResidualView, samples: &[f64]) -> Option<(f64, f64)> {
     if samples.is_empty() {
         return None;
@@ -88,8 +89,8 @@ fn segment_energies(samples: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-/// Share of `energy` in the quarter of the segments with the largest measured energy: about a quarter if the residual does not depend on
-/// the amplitude, more if it grows with the amplitude.
+/// Share of the residual energy in those segments of a record (a quarter of them) that have the largest measured energy: about a quarter if
+/// the residual does not depend on the amplitude, more if it grows with the amplitude.
 fn share_at_large_amplitude(energy: &[f64], measured: &[f64]) -> f64 {
     let mut order: Vec<usize> = (0..measured.len().min(energy.len())).collect();
     order.sort_by(|a, b| measured[*b].total_cmp(&measured[*a]));

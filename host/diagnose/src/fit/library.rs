@@ -121,8 +121,8 @@ impl Library {
         }
     }
 
-    /// Columns of a cause that acts along each of several axes, from those of the single axes; `None` if the columns of one axis are
-    /// missing.
+    /// Regression columns of a cause that acts along each of several axes with separate coefficients, from the columns of the single axes;
+    /// `None` if those of one axis are missing.
     fn columns_along_each(
         &self,
         cause: usize,
@@ -409,7 +409,8 @@ impl Library {
         }
     }
 
-    /// Adds a set of nonlinear parameters to a candidate; `None` if its regressors cannot be computed.
+    /// Adds a further set of values of a candidate's nonlinear parameters, with its regression columns; `None` if its regressors cannot be
+    /// computed.
     pub(crate) fn add_variant(
         &mut self,
         study: &Study<'_>,

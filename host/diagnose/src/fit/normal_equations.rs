@@ -8,7 +8,8 @@ const BLOCK: usize = 1024;
 /// Inner products of the regression columns, over one subset of the records' segments.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Products {
-    /// Lower triangle of the Gram matrix, row by row, of the columns up to the last call of [`Self::complete`].
+    /// Lower triangle, row by row, of the Gram matrix: inner products between those regression columns that the last call of
+    /// [`Self::complete`] has included.
     gram: Vec<Vec<f64>>,
     /// Squared length of every column.
     squares: Vec<f64>,

@@ -61,8 +61,8 @@ fn one(
 /// teeth lose contact.
 const FIXED_POINT_ITERATIONS: usize = 12;
 
-/// Iterates nonlinear parameters that follow from the coefficients to their fixed point. Where a whole step increases χ², half a step is
-/// tried.
+/// Iterates to their fixed point those nonlinear parameters that follow from the fitted coefficients. Where a whole step increases χ², half
+/// a step is tried.
 fn settle(
     study: &Study<'_>,
     library: &mut Library,

@@ -20,7 +20,7 @@ const SOFTENED: f64 = 1e-9;
 /// less accurate, the square of their relative error replaces it.
 const ROUNDING: f64 = 1e-13;
 
-/// Result of a linear fit of some columns to the residual.
+/// Result of a linear fit of some regression columns to the residual of the baseline.
 #[derive(Clone, Debug)]
 pub(crate) struct Fit {
     /// The coefficients.
@@ -31,7 +31,7 @@ pub(crate) struct Fit {
     pub left: f64,
 }
 
-/// Result of a linear fit of some columns to the residual of a candidate model.
+/// Result of a linear fit of some regression columns to the residual of a candidate model.
 #[derive(Clone, Debug)]
 pub(crate) struct Refit {
     /// Change of the columns' coefficients.
@@ -197,7 +197,7 @@ impl Regression {
         self.columns.len() - 1
     }
 
-    /// Computes all missing inner products at once. It is called before many sets of columns are fitted.
+    /// Computes all missing inner products of the regression columns at once. It is called before many sets of columns are fitted.
     pub(crate) fn complete(&mut self) {
         let (first, size) = (self.complete, self.columns.len());
         if first == size {
@@ -328,7 +328,7 @@ impl Regression {
         })
     }
 
-    /// χ² of `residuals`, given by record and channel, after subtracting `columns` with these `coefficients`.
+    /// χ² of `residuals`, given by record and channel, after subtracting the regression columns `columns` times these `coefficients`.
     pub(crate) fn left_with(
         &self,
         subset: Subset,
@@ -451,7 +451,7 @@ impl Regression {
         Some(((0..size).map(|i| solution[i] / scale[i]).collect(), covariance))
     }
 
-    /// χ² of the baseline's residual on a subset after subtracting `columns` with these `coefficients`.
+    /// χ² of the baseline's residual on a subset of segments after subtracting the regression columns `columns` times these `coefficients`.
     pub(crate) fn left(&self, subset: Subset, columns: &[usize], coefficients: &[f64]) -> f64 {
         let products = self.products(subset);
         let mut left = products.residual;

@@ -68,8 +68,8 @@ impl OutputError<'_> {
         again.filter(|again| again.left < ended.left).unwrap_or(ended)
     }
 
-    /// The best of searches from other amplitudes. In a free decay of a nonlinear structure the phase depends on them, and χ² has several
-    /// minima.
+    /// The best result of searches that start at multiples of the parameters' start values. In a free decay of a nonlinear structure the
+    /// phase depends on the parameters, and χ² has several minima.
     fn restarted_elsewhere(
         &self,
         problem: &mut FitProblem<'_>,

@@ -23,7 +23,8 @@ const DAMPING: Damping = Damping {
     least_retried: 1e-3,
 };
 
-/// Largest number of steps that are tried from one point: the last one has a damping of 10 or more. A limit on computing time.
+/// Largest number of Levenberg–Marquardt steps, with increasing damping, that are tried from one point: the last one has a damping of 10 or
+/// more. It limits the computing time.
 const TRIALS: usize = 6;
 
 /// Residuals of a simulated candidate model with given parameter values, and their energy χ².

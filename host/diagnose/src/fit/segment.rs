@@ -24,9 +24,9 @@ pub(crate) struct Segment {
     bins: usize,
     transform: SegmentTransform,
     whitening: Whitening,
-    /// By channel: indices of samples that are not compared, from the start of the segment.
+    /// For each channel: indices, from the start of the segment, of samples that are not compared.
     skipped: Vec<Vec<usize>>,
-    /// Orthonormal basis of the whitened free decays and offsets.
+    /// Orthonormal basis of the unknown contributions that are projected out: whitened free decays and sensor offsets.
     nuisance: Vec<Vec<f64>>,
 }
 

@@ -70,7 +70,8 @@ impl Whitening {
         whitening
     }
 
-    /// Multiplies the values of all channels by L⁻¹. `column` holds them channel after channel.
+    /// Whitens the values of all channels: multiplies them by L⁻¹, the inverse Cholesky factor of the noise covariance. `column` holds them
+    /// channel after channel.
     pub(crate) fn apply(&self, column: &mut [f64]) {
         let per_channel = column.len() / self.channels.max(1);
         let rows = if self.common.is_empty() {
@@ -119,7 +120,8 @@ fn read_of_noise(record: &Record, omega: f64, forces: &[(usize, f64)], read: &mu
     }
 }
 
-/// Writes L of S = diag(σ²) + R Rᴴ into `rows`, by Cholesky. `deviations` is σ, `read` is R with one row per channel.
+/// Writes the Cholesky factor L of the channels' noise covariance S = diag(σ²) + R Rᴴ into `rows`. `deviations` is σ, `read` is R with one
+/// row per channel.
 fn factorize(deviations: &[f64], read: &[Complex64], rows: &mut [Complex64]) {
     let (channels, forces) = (deviations.len(), read.len() / deviations.len().max(1));
     for i in 0..channels {

@@ -13,9 +13,9 @@ use quietcut_simulate::effect::Pickup;
 /// Free decays of the baseline in each channel of a record, and the initial state.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Decays {
-    /// Responses to a unit initial value of one state variable, by channel, state variable and sample.
+    /// Free decays of the baseline in each channel for a unit initial value of one state variable: by channel, state variable and sample.
     columns: Vec<Vec<Vec<f64>>>,
-    /// By channel: indices of samples that are not compared.
+    /// For each channel: indices of samples that are not compared and that the fit of the free decay leaves out.
     skipped: Vec<Vec<usize>>,
     /// Fitted initial state of the structure at the first sample of the record.
     pub start: Vec<f64>,

@@ -14,7 +14,7 @@ use quietcut_simulate::{Fluctuation, Spindle};
 pub(crate) struct SpindleMotion {
     spindle: Spindle,
     rpm: f64,
-    /// Angle at the beginning of the whole recording, rad. The phase of a speed modulation also starts there.
+    /// Spindle angle at the beginning of the whole recording, rad. The phase of a speed modulation also starts there.
     start_rad: f64,
     fluctuation: Option<Fluctuation>,
     /// Time from the beginning of the whole recording to the first sample, s: see [`Recording::since_s`].
@@ -77,7 +77,7 @@ impl SpindleMotion {
     fn fitted(mut self) -> Self {
         let count = self.edges_s.len() as f64;
         for _ in 0..3 {
-            // At edge k the angle is 2πk. Minus the modulation, the angle is linear in time.
+            // At tachometer edge k the spindle angle is 2πk. Minus the speed modulation, the angle is linear in time.
             let modulation_s = |t: f64| self.modulation_s(t);
             let times: Vec<f64> = self.edges_s.iter().map(|t| t + modulation_s(*t)).collect();
             let mean_t = times.iter().sum::<f64>() / count;
@@ -176,7 +176,7 @@ pub(crate) fn speed_modulation(spindle_motions: &[&SpindleMotion]) -> Option<Spe
         .map(|index| low_hz + step_hz * index as f64)
         .map(|hertz| (fit_modulation(spindle_motions, hertz).left, hertz))
         .min_by(|a, b| a.0.total_cmp(&b.0))?;
-    // Golden-section search about the best frequency of the grid.
+    // Golden-section search for the modulation frequency near the best frequency of the grid.
     let (mut from, mut to) = (best_hz - step_hz, best_hz + step_hz);
     for _ in 0..40 {
         let third = 0.381_966 * (to - from);
@@ -203,7 +203,7 @@ pub(crate) fn speed_modulation(spindle_motions: &[&SpindleMotion]) -> Option<Spe
     })
 }
 
-/// Standard deviations of δ, f_m in Hz and ψ in rad, if the edge times have this variance, s².
+/// Standard deviations of the speed modulation's δ, f_m in Hz and ψ in rad, if the tachometer edge times scatter with this variance, s².
 fn deviation(
     spindle_motions: &[&SpindleMotion],
     frequency_hz: f64,
@@ -243,19 +243,20 @@ fn deviation(
         .map(|gradient| (gradient.transpose() * covariance * gradient)[0].max(0.0).sqrt())
 }
 
-/// Result of a least-squares fit of a modulation with given frequency.
+/// Result of a least-squares fit of a speed modulation of given frequency to the tachometer edges.
 struct ModulationFit {
     /// Components of the relative speed amplitude δ in cosine and sine phase: δ cos ψ (`along`) and δ sin ψ (`across`).
     along: f64,
     across: f64,
-    /// Residual sum of squares of the edge times, s², with the modulation (`left`) and without it (`without`).
+    /// Residual sum of squares of the tachometer edge times, s², with the speed modulation (`left`) and without it (`without`).
     left: f64,
     without: f64,
 }
 
 fn fit_modulation(spindle_motions: &[&SpindleMotion], frequency_hz: f64) -> ModulationFit {
     let omega = TAU * frequency_hz;
-    // Inner products of (1 − cos ωt)/ω, sin(ωt)/ω and t at the edges, each without its linear trend in every record.
+    // Inner products of the functions (1 − cos ωt)/ω, sin(ωt)/ω and t at the tachometer edges, each without its linear trend in every
+    // record.
     let mut products = [[0.0; 3]; 3];
     for spindle_motion in spindle_motions {
         let columns = [

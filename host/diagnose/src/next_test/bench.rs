@@ -56,7 +56,7 @@ pub(super) struct Bench<'a> {
     /// Peak force of proposed tests of the structure, N: the largest force in records of such tests. Without such records, the force that
     /// causes the displacement `largest_m` at the lowest natural frequency.
     pub(super) force_n: f64,
-    /// Largest displacement in the records, m.
+    /// Largest displacement of the tool in the records, m.
     pub(super) largest_m: f64,
     /// Standard duration of a proposed test, s.
     pub(super) seconds: f64,

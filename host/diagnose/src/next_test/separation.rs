@@ -183,7 +183,7 @@ fn difference(bench: &Bench<'_>, truth: &Predicted, model: &Predicted, sensors: 
     }
 }
 
-/// Residual of `apart` − Jδ at the minimum of ‖apart − Jδ‖² + Σ (step δ)², and that minimum. `columns` are those of J.
+/// Difference `apart` − Jδ at the δ that minimizes ‖apart − Jδ‖² + Σ (step·δ)², and that minimum. `columns` are the columns of J.
 pub(super) fn least(apart: &DVector<f64>, columns: &[DVector<f64>], steps: &[f64]) -> (DVector<f64>, f64) {
     if columns.is_empty() {
         return (apart.clone(), apart.norm_squared());

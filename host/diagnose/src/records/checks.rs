@@ -249,7 +249,8 @@ fn has_cliff(samples: &[f64], at: impl Fn(&f64) -> bool, end: f64, resolution: f
         && steepest > CLIPPED_IMPACT_STEP * written_resolution(samples, end)
 }
 
-/// The value of the last digit of `end`, if all samples have as many digits as the longest one.
+/// Resolution of a channel of decimal numbers: the value of the last digit of `end`, if all samples were written with as many digits as the
+/// longest one.
 fn written_resolution(samples: &[f64], end: f64) -> f64 {
     let digits = |x: &f64| {
         let text = format!("{x:e}");

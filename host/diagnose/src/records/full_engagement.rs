@@ -113,7 +113,8 @@ fn engaged(baseline: &Baseline<'_>, recording: &Recording) -> Option<Engaged> {
         0 => 0.0,
         start => start as f64 + (ENTRY_MARGIN * way).max(engaged_after) + 1.0,
     };
-    // A recording may end with the cut, before the vibration has decayed. Chatter stays large until the tool has left.
+    // The recording may end with the cut, before the vibration has decayed; then nothing is cut off at its end. Chatter stays large until
+    // the tool has left the workpiece.
     let to = if cut.end == levels.count && cut.end - last <= LEAST_AIR_AT_ENDS {
         f64::INFINITY
     } else {
@@ -189,7 +190,7 @@ impl Forced {
     }
 }
 
-/// Cutting force of a rigid tool without runout at a spindle angle, N.
+/// Cutting force on a rigid tool without runout at one spindle angle, N.
 fn force_n(cutter: &Cutter, angle_rad: f64) -> Vector3<f64> {
     let arc = cutter.exit_rad - cutter.start_rad;
     cutter
@@ -223,7 +224,8 @@ struct Levels {
 }
 
 impl Levels {
-    /// Computes the levels from a recording; `None` if no channel exceeds its noise enough to show air.
+    /// Computes the vibration level of each channel in each revolution of a recording; `None` if no channel exceeds its noise enough to
+    /// distinguish air from cutting.
     fn of(
         baseline: &Baseline<'_>,
         recording: &Recording,
@@ -274,7 +276,7 @@ impl Levels {
             .fold(f64::INFINITY, f64::min)
     }
 
-    /// Ranges of successive revolutions in air.
+    /// Ranges of successive revolutions in which the tool is in air.
     fn in_air(&self) -> Vec<Range<usize>> {
         let mut in_air = Vec::new();
         let mut revolution = 0;
@@ -316,7 +318,7 @@ fn deviation(samples: &[f64], noise: f64) -> f64 {
     (square - noise * noise).max(0.0).sqrt()
 }
 
-/// The longest range of revolutions between the given ranges in air, of `count` revolutions; `None` if none is in air.
+/// The longest range of revolutions that is not in air, of `count` revolutions, given the ranges in air; `None` if no revolution is in air.
 fn longest_gap(in_air: &[Range<usize>], count: usize) -> Option<Range<usize>> {
     if in_air.is_empty() {
         return None;

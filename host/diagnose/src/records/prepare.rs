@@ -53,7 +53,7 @@ fn is_cut(recording: &Recording) -> bool {
     recording.sidecar.kind == Some(TestKind::Cutting)
 }
 
-/// A record before its prediction: channels, transforms and transfer functions.
+/// Starts a record: channels, transforms and transfer functions, still without the prediction of the baseline.
 fn opened(baseline: &Baseline<'_>, recording: &Recording, known: Known) -> Result<Record, DiagnoseError> {
     let domain = Domain::of(baseline, recording)?;
     let is_cut = recording.sidecar.kind == Some(TestKind::Cutting);

@@ -61,7 +61,7 @@ pub(crate) struct Record {
     pub highest_hz: f64,
     /// Lowest natural frequency of the baseline, Hz; 0 without oscillating modes.
     pub lowest_hz: f64,
-    /// Highest frequency at which the record is compared, Hz.
+    /// Highest frequency at which the record is compared with the prediction, Hz.
     pub band_hz: f64,
     /// Receptance H(iω) of the baseline, m/N, at the bins of the upsampled spectrum. In the force domain: dynamic stiffness, N/m, at the
     /// bins of the samples.
@@ -236,8 +236,8 @@ impl Record {
         self.decays = Decays::of(baseline, &self.grid, pickups, &self.skipped);
     }
 
-    /// Accepts `predicted`, samples without free decay: sets samples that are not compared to the measured value, adds the best-fitting
-    /// free decay, and estimates the noise from the residual.
+    /// Accepts the samples `predicted`, which contain no free decay, as prediction of the record: sets samples that are not compared to the
+    /// measured value, adds the best-fitting free decay, and estimates the noise from the residual.
     pub(crate) fn accept(&mut self, predicted: Vec<Vec<f64>>) {
         for ((channel, mut predicted), skipped) in self.channels.iter_mut().zip(predicted).zip(&self.skipped)
         {
@@ -269,8 +269,8 @@ impl Record {
         }
     }
 
-    /// Stores the prediction in closed loop. Samples that are not compared take the predicted value. If an extended case supplied the
-    /// motion, this prediction becomes the motion.
+    /// Stores the closed-loop prediction, in which the predicted motion determines the chips. Samples that are not compared take the
+    /// predicted value. If an extended case supplied the motion, this prediction becomes the motion.
     pub(crate) fn close(&mut self, mut closed: Vec<Vec<f64>>) {
         for ((closed, channel), skipped) in closed.iter_mut().zip(&self.channels).zip(&self.skipped) {
             for &sample in skipped {

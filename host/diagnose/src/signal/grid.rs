@@ -216,8 +216,8 @@ impl SegmentTransform {
         }
     }
 
-    /// Appends real and imaginary parts of bins 0 … `bins` − 1 to `into`, scaled so that unit-variance noise has unit variance in each
-    /// part.
+    /// Appends to `into` real and imaginary parts of the segment's spectrum at bins 0 … `bins` − 1, scaled so that unit-variance noise has
+    /// unit variance in each part.
     pub(crate) fn bins(&self, samples: &[f64], bins: usize, into: &mut Vec<f64>) {
         let length = samples.len();
         let mut buffer = samples.to_vec();

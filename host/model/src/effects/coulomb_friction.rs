@@ -146,7 +146,7 @@ struct Slider {
     reach_m: f64,
 }
 
-/// Friction in series with a backlash: no force within the backlash; stick is possible at either of its ends.
+/// Friction in series with a backlash: no friction force within the backlash; stick is possible at either of its ends.
 #[derive(Debug)]
 struct FrictionBehindBacklash {
     friction: Friction,

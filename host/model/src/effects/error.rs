@@ -35,7 +35,7 @@ pub enum EffectError {
         /// The key to give instead.
         key: &'static str,
     },
-    /// A value that is not possible for its parameter.
+    /// A value that is not possible for its parameter, such as a negative damping ratio.
     #[error("effect `{name}{dot}{key}`: `{found}` is not possible; {needed} is needed", dot = if .key.is_empty() { "" } else { "." })]
     Value {
         /// The effect.

@@ -58,7 +58,8 @@ pub use set::Effects;
 pub use spec::{Argument, Class, EffectSpec, Locations, Treatment};
 pub use values::{Value, Values};
 
-/// Describing functions of laws with a coefficient of 1: see [`RestoringForce::describing_function`](crate::RestoringForce::describing_function).
+/// Describing functions of the nonlinear forces with a coefficient of 1: see
+/// [`RestoringForce::describing_function`](crate::RestoringForce::describing_function).
 pub mod describing_functions {
     pub use super::backlash::describing_function as backlash;
     pub use super::coulomb_friction::describing_function as coulomb_friction;

@@ -13,13 +13,13 @@ pub struct EffectSpec {
     pub id: EffectName,
     /// Name of the effect in cases, in answers and on the command line.
     pub name: &'static str,
-    /// Part of the model that the effect changes.
+    /// Part of the model that the effect changes, such as mass, restoring force or sensor.
     pub class: Class,
     /// Locations at which the effect can act.
     pub locations: Locations,
     /// Parameters of the effect. The keys that set its location are not among them: see [`Locations::keys`].
     pub parameters: &'static [Parameter],
-    /// Treatment of the effect in stability computations.
+    /// Treatment of the effect in stability computations, such as linearization about the forced orbit.
     pub treatment: Treatment,
     /// Forms of the effect, such as different friction laws, that compete as candidate models in a diagnosis.
     pub candidates: &'static [&'static str],

@@ -10,11 +10,11 @@ use rand_chacha::ChaCha8Rng;
 pub enum Signal {
     /// Multisine a(t)·Σ cos(2πft + φ); the amplitude a changes linearly from `first_n` to `last_n`.
     Tones {
-        /// Frequency f, Hz, and phase φ, rad, of each tone.
+        /// Frequency f, Hz, and phase φ, rad, of each tone of the multisine.
         tones: Vec<(f64, f64)>,
-        /// Amplitude of every tone at the start, N.
+        /// Force amplitude of every tone at the start, N.
         first_n: f64,
-        /// Amplitude of every tone at the end, N.
+        /// Force amplitude of every tone at the end, N.
         last_n: f64,
         /// Duration of the multisine, s.
         seconds: f64,
@@ -23,7 +23,7 @@ pub enum Signal {
     StepSine {
         /// The steps in the order of excitation.
         steps: Vec<Step>,
-        /// Excitation time of each step, s.
+        /// Duration of the excitation in each step of the step sine, s.
         dwell_s: f64,
         /// Pause without force after each step, s.
         pause_s: f64,
@@ -32,7 +32,7 @@ pub enum Signal {
     Sweep {
         /// Frequency at the start, Hz.
         first_hz: f64,
-        /// Frequency at the end, Hz; below `first_hz` in a backward sweep.
+        /// Frequency at the end of the sweep, Hz; below `first_hz` in a backward sweep.
         last_hz: f64,
         /// Force amplitude, N.
         amplitude_n: f64,
