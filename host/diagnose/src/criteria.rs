@@ -164,12 +164,12 @@ pub(crate) const SEARCH_SETTLED: f64 = 0.1;
 /// selected if its χ² is 16 (`EQUIVALENT`) larger; the linear prediction of a search errs by a multiple of that. Unfounded.
 pub(crate) const HOPELESS_LAG: f64 = 300.0;
 
-/// χ² of a simulated candidate model at the start of its search, over the χ² of its linear regression, above which the search first fits
-/// the beginning of each record alone. Unfounded.
+/// χ² of a simulated candidate model at the start of its search, over the χ² of its linear regression plus the number of compared values,
+/// above which the search first fits the beginning of each record alone. Unfounded.
 pub(crate) const FAR_START: f64 = 2.0;
 
-/// χ² of a candidate model's regression over the smallest χ² of all candidate models above which the start of its search is not improved by
-/// a fit of the beginning of each record. Unfounded.
+/// χ² of a candidate model's regression, over the smallest χ² of all candidate models (at least the number of compared values), above which
+/// the start of its search is not improved by a fit of the beginning of each record. Unfounded.
 pub(crate) const FAR_BEHIND: f64 = 4.0;
 
 /// χ² per compared value (1 for noise alone) above which a prediction-error search counts as stuck. A stuck search with friction is

@@ -120,7 +120,7 @@ impl<'a> Contact<'a> {
         self.same_time_s / SAME_TIME
     }
 
-    /// Sets the step, from `from_s` to `to_s`, that is evaluated next.
+    /// Sets the integration step, from `from_s` to `to_s`, that is evaluated next.
     pub(super) fn set_step(&mut self, from_s: f64, to_s: f64) {
         let inset = self.same_time_s.min(0.25 * (to_s - from_s));
         self.within = [from_s + inset, to_s - inset];

@@ -24,7 +24,7 @@ pub struct Model {
 #[derive(Clone, Copy)]
 pub(super) struct StepContext<'a> {
     pub(super) contact: Option<&'a Contact<'a>>,
-    /// Start and end of the step, s, moved inwards by a rounding margin: the excitation force may jump at either.
+    /// Start and end of the integration step, s, moved inwards by a rounding margin: the excitation force may jump at either.
     pub(super) within: [f64; 2],
     pub(super) regimes: Regimes<'a>,
 }

@@ -136,7 +136,7 @@ impl VirtualCut {
         Ok((recording, statistics))
     }
 
-    /// The response channels by quantity and direction.
+    /// The pickups of a virtual cut's response channels, ordered by quantity and direction.
     fn pickups(&self, case: &Case) -> Result<Vec<Pickup>, VirtualCutError> {
         let directions = &case.structure()?.directions;
         let effects = Effects::of_case(case)?.and(&self.effects);

@@ -22,7 +22,7 @@ pub(crate) struct Baseline<'a> {
     pub effects: Effects,
     /// Structure with the mass, damping and stiffness that the extensions change.
     pub altered: Structure,
-    /// Restoring forces that the linear structure does not contain.
+    /// Restoring forces f_r of the extensions and of the structure's cubic matrices, which the linear structure does not contain.
     pub terms: Vec<Box<dyn RestoringForce>>,
     /// The linear structure with all linear extensions, in first-order form.
     pub first_order: FirstOrder,

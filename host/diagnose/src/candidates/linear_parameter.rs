@@ -28,8 +28,8 @@ use quietcut_simulate::Effects;
 /// Relative change of mass, damping or stiffness in the central differences that give the derivative of the receptance. Their relative
 /// error is about its square, 1e-8; rounding contributes 1e-12/`STEP`.
 const STEP: f64 = 1e-4;
-/// |H| over the root sum of squares of its modal contributions below which H is regularized as nearly vanishing: ε in the head of this
-/// file.
+/// Smallest |H| that is not regularized as nearly vanishing, over the root sum of squares of its modal contributions: ε of this file's head
+/// is this number times that root.
 const VANISHING: f64 = 0.05;
 
 #[derive(Clone, Copy)]

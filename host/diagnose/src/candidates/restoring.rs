@@ -34,7 +34,7 @@ pub(super) struct Restoring {
     pub(super) physical: fn(coefficients: &[f64]) -> bool,
 }
 
-/// A force along one axis that is linear in its coefficients, whose signs are free.
+/// Description of a restoring force along one axis that is linear in its coefficients; the coefficients may have either sign.
 pub(super) const fn plain(effect: EffectName, linear: &'static [&'static str]) -> Restoring {
     Restoring {
         effect,

@@ -232,7 +232,7 @@ pub struct Diagnosis {
     pub gain: Option<Gain>,
     /// The unexplained residual.
     pub unexplained: Unexplained,
-    /// Effect on the stability limits; `None` without an extension, or if limits cannot be computed.
+    /// Effect of the extension on the stability limits; `None` without an extension, or if limits cannot be computed.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lobes: Option<Lobes>,
     /// Stability lobes of the case with the recorded cuts, if there is no extension.

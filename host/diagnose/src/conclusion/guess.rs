@@ -59,7 +59,8 @@ enum FormulaTerm {
     Loop(f64),
 }
 
-/// The formula with the share of the held-out residual energy that it explains; `None` if that is less than `LEAST_EXPLAINED_BY_GUESS`.
+/// A guessed formula for the unexplained restoring force, with the share of the held-out residual energy that it explains; `None` if that
+/// is less than `LEAST_EXPLAINED_BY_GUESS`.
 pub(crate) fn guess(study: &Study<'_>, regression: &mut Regression) -> Option<String> {
     let mut all: Vec<(usize, FormulaTerm, usize)> = Vec::new();
     for axis in study.driven_axes() {

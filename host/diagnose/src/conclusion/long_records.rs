@@ -48,7 +48,8 @@ fn beginnings(case: &Case, recordings: &[Recording]) -> Option<[Vec<Recording>; 
     ((left as f64) < SHORTENED_SHARE * all as f64).then_some([shortened, rest])
 }
 
-/// Least duration of the first part of a cut, s; zero for shaker and hammer; `None` for tests that are not shortened.
+/// Smallest duration of the first part of a recorded cut, in which causes are searched, s; zero for shaker and hammer; `None` for tests
+/// whose recordings are not divided.
 fn revolutions_s(recording: &Recording) -> Option<f64> {
     match (recording.sidecar.kind, &recording.sidecar.cut) {
         (Some(TestKind::Shaker | TestKind::Hammer), _) => Some(0.0),

@@ -12,7 +12,7 @@ use crate::records::domain::Domain;
 use crate::records::record::Record;
 use quietcut_recording::Quantity;
 
-/// Number of bins over which the power of a residual is averaged before it is compared with the noise.
+/// Number of frequency bins over which the power of a residual is averaged before it is compared with the noise.
 const SMOOTHED: usize = 9;
 
 /// Duration of the segments over which stiffness and damping of the missing force are fitted, in periods of the lowest natural frequency.
@@ -30,7 +30,7 @@ pub struct MissingForce {
     pub force_n: Vec<f64>,
     /// Static stiffness of the baseline along the axis, N/m; 0 without stiffness.
     pub stiffness: f64,
-    /// Number of samples in a segment over which stiffness and damping are fitted.
+    /// Number of samples in each segment over which stiffness and damping of the missing force are fitted.
     segment: usize,
 }
 

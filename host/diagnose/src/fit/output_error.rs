@@ -184,7 +184,8 @@ impl<'a> OutputError<'a> {
             .collect()
     }
 
-    /// Computes Jᵀ J and Jᵀ r, and adapts the steps of the finite differences so that each changes χ² by about one.
+    /// Computes Jᵀ J and Jᵀ r of the simulated candidate model from the Jacobian's `columns`, and adapts the steps of the finite
+    /// differences so that each step changes χ² by about one.
     pub(crate) fn normal(
         &self,
         problem: &mut FitProblem<'_>,

@@ -111,7 +111,7 @@ fn settle(
     model
 }
 
-/// Largest number of Gauss–Newton steps in the nonlinear parameters, after the search.
+/// Largest number of Gauss–Newton steps by which a cause's nonlinear parameters are refined after the search by decreasing steps.
 const GAUSS_NEWTON_STEPS: usize = 3;
 
 /// Searches each nonlinear parameter in turn with decreasing steps, then takes Gauss–Newton steps.

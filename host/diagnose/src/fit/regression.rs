@@ -57,7 +57,7 @@ pub(crate) struct Regression {
 }
 
 impl Regression {
-    /// The whitened residuals of a study, without columns.
+    /// The whitened residuals of a study, still without regression columns.
     pub(crate) fn new(study: &Study<'_>) -> Self {
         let segments = split(study, |_| Nuisance::StartAndOffsets);
         let residuals: Vec<Vec<f64>> = segments
@@ -184,8 +184,8 @@ impl Regression {
         whole.map(of_segment).sum()
     }
 
-    /// Adds a regressor, given as samples by record and channel, and returns its column. Its products with other columns are computed on
-    /// demand until [`Self::complete`].
+    /// Adds a regressor, given as samples by record and channel, as a regression column and returns the index of that column. Its inner
+    /// products with other columns are computed on demand until [`Self::complete`].
     pub(crate) fn add(&mut self, samples: &[Vec<Vec<f64>>]) -> usize {
         let column: Vec<Vec<f64>> = self
             .segments
@@ -275,7 +275,8 @@ impl Regression {
         self.columns.len()
     }
 
-    /// Linear fit of some columns to the baseline's residual on a subset; `None` if the columns are dependent or zero.
+    /// Linear fit of the regression columns `columns` to the baseline's residual on a subset of segments; `None` if the columns are
+    /// dependent or zero.
     pub(crate) fn fit(&self, subset: Subset, columns: &[usize]) -> Option<Fit> {
         self.solve(subset, columns, self.ridge)
     }
@@ -297,8 +298,8 @@ impl Regression {
         Some((solution, taken))
     }
 
-    /// The change of the coefficients of `columns` that fits `residuals`, given by record and channel; `None` if the columns are dependent
-    /// or zero.
+    /// The change of the coefficients of the regression columns `columns` that fits `residuals`, given by record and channel; `None` if the
+    /// columns are dependent or zero.
     pub(crate) fn refit(
         &self,
         subset: Subset,
@@ -412,11 +413,12 @@ impl Regression {
         })
     }
 
-    /// Solution and inverse of the normal equations, with `right` in the order of the columns; `None` if the columns are dependent or zero.
+    /// Solution and inverse of the normal equations of the regression columns `columns`, with the right side `right` in the same order;
+    /// `None` if the columns are dependent or zero.
     ///
-    /// The equations are scaled and solved here, not in `quietcut-numerics`: a search starts from the solution, and another rounding of
-    /// the start shifts its end by 3e-5 of the half-width, as a change of the last digit of one sample does. The recorded answers
-    /// hold the result to 1e-6.
+    /// The equations are scaled and solved here, not in `quietcut-numerics`: a search starts from the solution, and another rounding of the
+    /// start shifts its end by 3e-5 of the half-width, as a change of the last digit of one sample does. The recorded answers hold the
+    /// result to 1e-6.
     fn normal(
         &self,
         subset: Subset,

@@ -1,4 +1,4 @@
-//! Restarts a search that is stuck: near its end, and from other amplitudes.
+//! Restarts a prediction-error search that is stuck: near the point where it ended, and from multiples of the start values.
 
 use crate::criteria::{SEARCH_SETTLED, STUCK};
 use crate::fit::output_error::{LEAST_STEP, OutputError};

@@ -97,7 +97,7 @@ pub(crate) fn energy(residuals: &[Vec<f64>]) -> f64 {
     residuals.iter().map(|residual| dot(residual, residual)).sum()
 }
 
-/// The point after a step of the free parameters, within their bounds.
+/// The parameter values after a step of the free parameters from `point`, limited to their bounds.
 pub(crate) fn stepped(
     problem: &FitProblem<'_>,
     point: &ParameterPoint,

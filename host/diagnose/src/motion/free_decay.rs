@@ -67,7 +67,7 @@ impl Decays {
         self.start.len()
     }
 
-    /// Response of a channel to the unit initial state of one state variable.
+    /// Free decay of the baseline in a channel from the unit initial value of one state variable.
     pub(crate) fn column(&self, channel: usize, state: usize) -> &[f64] {
         &self.columns[channel][state]
     }
@@ -107,7 +107,7 @@ impl Decays {
             .collect();
     }
 
-    /// Unit responses of a channel, set to zero at the samples that are not compared.
+    /// Free decays of a channel from unit initial states, set to zero at the samples that are not compared.
     fn compared(&self, channel: usize) -> Cow<'_, [Vec<f64>]> {
         let mut columns = Cow::Borrowed(&self.columns[channel][..]);
         if !self.skipped[channel].is_empty() {

@@ -288,7 +288,7 @@ fn fit_modulation(spindle_motions: &[&SpindleMotion], frequency_hz: f64) -> Modu
     }
 }
 
-/// Values of the function `of` at the edge times, without their linear trend in the number of the edge.
+/// Values of the function `of` at the tachometer edge times, without their linear trend in the number of the edge.
 fn without_line(edges_s: &[f64], of: impl Fn(f64) -> f64) -> Vec<f64> {
     let values: Vec<f64> = edges_s.iter().map(|t| of(*t)).collect();
     let count = values.len() as f64;

@@ -65,7 +65,7 @@ pub(super) struct Bench<'a> {
 }
 
 impl<'a> Bench<'a> {
-    /// Prepares the simulation of tests.
+    /// Prepares the simulation of tests that may be proposed.
     ///
     /// # Errors
     /// The case cannot be simulated, has no oscillating mode, or the records contain no channel of motion; the error is a sentence.
@@ -140,7 +140,7 @@ impl<'a> Bench<'a> {
         readings.iter().map(of).collect()
     }
 
-    /// Duration of the simulated transient before a cut is compared, s.
+    /// Duration of the transient that is simulated before a proposed cut is compared, s.
     pub(super) fn settled_s(&self) -> f64 {
         (SETTLED * self.baseline.slowest_decay_s()).min(WAITED * self.seconds)
     }

@@ -130,7 +130,8 @@ impl Record {
         self.read_by(force, &self.responses[channel], channel)
     }
 
-    /// [`Self::read_response`] with the given `responses` instead of those of the channel.
+    /// Samples of a channel's response to forces along the machine's axes, for the given `responses` per newton instead of the channel's
+    /// own; otherwise as [`Self::read_response`].
     pub(crate) fn read_by(
         &self,
         force: &[Option<Vec<Complex64>>; 3],

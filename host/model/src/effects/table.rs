@@ -12,7 +12,7 @@ fn key_in_words(parameter: &Parameter) -> String {
     }
 }
 
-/// A table in Markdown: name, equation, keys with units, example.
+/// The table of all effects in Markdown: name, equation, keys with units, example.
 pub fn markdown() -> String {
     let mut table = String::from("| name | equation | keys | example |\n|---|---|---|---|\n");
     for spec in ALL {
@@ -35,7 +35,7 @@ pub fn markdown() -> String {
     table
 }
 
-/// A list for the help: name, equation, keys.
+/// The list of all effects for the help: name, equation, keys.
 pub fn help() -> String {
     let mut text = String::from("Effects (NAME=VALUE sets the first quantity, NAME.KEY=VALUE any other):\n");
     for spec in ALL {

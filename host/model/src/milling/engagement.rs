@@ -35,7 +35,7 @@ pub struct Subinterval {
 }
 
 impl Engagement {
-    /// The engagement of a tool with equal pitch.
+    /// The engagement of a tool with equal pitch in a cut: start, exit and pitch angle.
     pub fn new(tool: &Tool, cut: &Cut) -> Self {
         Self {
             start: cut.start_deg.to_radians(),

@@ -13,7 +13,7 @@ pub struct Tool {
     /// Edge angle γ between the cutting edge and the normal plane of the tool axis, degrees, in (0, 90], at the midpoint of the engaged
     /// length; 90 is a square end mill.
     pub edge_angle_deg: f64,
-    /// Diameter, mm; `None` if the case does not give it.
+    /// Diameter of the tool, mm; `None` if the case does not give it.
     pub diameter_mm: Option<f64>,
     /// Pitch angles between successive teeth, degrees; `teeth` values with the sum 360.
     pub pitch_deg: Vec<f64>,
