@@ -2,11 +2,11 @@
 
 pub use quietcut_numerics::statistics::NINETY_PERCENT;
 
-/// 90 % quantile of Student's distribution: 90 % of it lies within this number of standard deviations for `freedoms` degrees of
-/// freedom.
+/// 90 % quantile of Student's distribution with `freedoms` degrees of freedom: 90 % of the distribution lies within
+/// this number of standard deviations of zero.
 ///
-/// From three degrees of freedom on, the first five terms of the expansion about the normal distribution (Abramowitz and Stegun
-/// 26.7.5), accurate to 0.5 %; exact values for one and two.
+/// From three degrees of freedom on, the first five terms of the expansion about the normal distribution (Abramowitz
+/// and Stegun 26.7.5), accurate to 0.5 %; exact values for one and two.
 pub fn ninety_percent(freedoms: usize) -> f64 {
     match freedoms {
         0 => f64::INFINITY,

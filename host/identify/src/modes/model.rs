@@ -36,7 +36,8 @@ pub struct ModalModel {
     pub warnings: Vec<String>,
 }
 
-/// Warnings about a poor fit, and about quantities that receptances with this line spacing determine poorly.
+/// Warnings about a poor modal fit, and about modal parameters that receptances with the line spacing `spacing_hz`
+/// determine poorly.
 pub(super) fn warnings(spacing_hz: f64, model: &ModalModel) -> Vec<String> {
     let mut warnings = Vec::new();
     if model.fit_error > LARGEST_FIT_ERROR {

@@ -13,7 +13,7 @@ use super::shape;
 use super::stabilization::matrix_of;
 use quietcut_frf::rational_fit::residues;
 
-/// A pole with its right and left shape.
+/// A pole λ, rad/s, with the right and left shape of its mode.
 #[derive(Clone, Debug)]
 pub(super) struct ShapedPole {
     pub(super) pole: Complex64,
@@ -22,22 +22,23 @@ pub(super) struct ShapedPole {
 }
 
 impl ShapedPole {
-    /// Number of real parameters of the mode: pole, right and left shape.
+    /// Number of real parameters of the mode in the fit: pole, right and left shape.
     pub(super) fn width(&self) -> usize {
         2 + 2 * (self.right.len() + self.left.len())
     }
 }
 
-/// Parameters of the modal fit: modes, and terms of the modes outside the band.
+/// Parameters of a modal fit: poles and shapes of the modes, and terms of the modes outside the band.
 #[derive(Clone, Debug)]
 pub(super) struct PoleResidue {
     pub(super) modes: Vec<ShapedPole>,
-    /// U and L of each receptance: compliance, m/N, and inertia term, 1/kg.
+    /// Terms U and L of the modes outside the band for each receptance: compliance U, m/N, and inertia term L, 1/kg.
     pub(super) outside: Vec<[f64; 2]>,
 }
 
 impl PoleResidue {
-    /// Start of the fit: residues of the poles by linear least squares, each reduced to rank one.
+    /// Start of the modal fit: residues at the given poles by linear least squares, each residue matrix reduced to rank
+    /// one.
     ///
     /// # Errors
     /// The residues cannot be computed, or have no rank-one part.
@@ -62,7 +63,8 @@ impl PoleResidue {
         Ok(start)
     }
 
-    /// Fits U and L to the residual of the modes by linear least squares.
+    /// Fits the terms U and L of the modes outside the band to the receptances minus the modes, by linear least
+    /// squares.
     fn fit_outside(&mut self, data: &Receptances) {
         for k in 0..data.values.len() {
             let (mut gram, mut right) = ([[0.0; 2]; 2], [0.0; 2]);
@@ -100,8 +102,8 @@ impl PoleResidue {
         self.of_modes(place, s) + above + below / (s * s)
     }
 
-    /// Parameters as a vector: for each mode Re λ, Im λ, right shape (real and imaginary parts in turn), left shape; then U and L
-    /// of each receptance.
+    /// Parameters of the fit as a vector: for each mode Re λ, Im λ, right shape (real and imaginary parts in turn),
+    /// left shape; then the terms U and L of the modes outside the band for each receptance.
     pub(super) fn parameters(&self) -> DVector<f64> {
         let modes = self.modes.iter().flat_map(|mode| {
             let numbers = std::iter::once(&mode.pole).chain(&mode.right).chain(&mode.left);
@@ -111,7 +113,7 @@ impl PoleResidue {
         DVector::from_vec(all)
     }
 
-    /// The parameters plus `step`, in the order of [`Self::parameters`].
+    /// These modes with their parameters changed by `step`, in the order of [`Self::parameters`].
     pub(super) fn moved(&self, step: &[f64]) -> Self {
         let mut moved = self.clone();
         let mut values = step.iter();
@@ -130,7 +132,7 @@ impl PoleResidue {
         moved
     }
 
-    /// Residual of receptance `k` at every line, divided by its standard deviation.
+    /// Measured minus fitted receptance `k` at every line, divided by the standard deviation of the measured one.
     pub(super) fn left_of(&self, data: &Receptances, deviation: &[Vec<f64>], k: usize) -> Vec<Complex64> {
         data.frequency_hz
             .iter()
@@ -142,7 +144,8 @@ impl PoleResidue {
             .collect()
     }
 
-    /// Writes ∂H_k/∂parameters at one line, divided by the standard deviation there, into `row`.
+    /// Writes the derivatives of the fitted receptance H_k by all parameters at one line, divided by its standard
+    /// deviation there, into `row`.
     pub(super) fn derivatives(
         &self,
         data: &Receptances,

@@ -7,7 +7,7 @@ use crate::criteria::{LEAST_LINES, LEAST_RELATIVE_DEVIATION};
 use quietcut_frf::FrfTable;
 use quietcut_model::structure::Direction;
 
-/// Receptances in a band, at common frequencies.
+/// Measured receptances in a band, at common frequencies, with their standard deviations.
 #[derive(Clone, Debug)]
 pub struct Receptances {
     /// Frequencies, Hz, ascending.
@@ -16,27 +16,27 @@ pub struct Receptances {
     pub responses: Vec<Direction>,
     /// Directions of the forces.
     pub forces: Vec<Direction>,
-    /// Index of response and force of each receptance.
+    /// For each receptance, the index of its response direction and the index of its force direction.
     pub places: Vec<(usize, usize)>,
     /// The receptances, m/N.
     pub values: Vec<Vec<Complex64>>,
-    /// Standard deviation of the real and of the imaginary part of every receptance at every frequency, m/N. If only coherence is
-    /// measured, it is correct up to a common factor.
+    /// Standard deviation of the real part, equal to that of the imaginary part, of every receptance at every
+    /// frequency, m/N. If only coherence is measured, it is correct up to a common factor.
     pub deviation: Vec<Vec<f64>>,
-    /// True if the data state standard deviations; false if coherence gives only relative ones.
+    /// True if the data state standard deviations of the receptances; false if coherence gives only relative ones.
     pub has_deviation: bool,
 }
 
-/// Number of lines on each side over which variances are averaged: a variance from a handful of averages scatters by half of
-/// itself.
+/// Number of frequency lines on each side over which the variance of a receptance is averaged: a variance from a
+/// handful of averages scatters by half of itself.
 const NEIGHBOURS: usize = 4;
 
 impl Receptances {
-    /// The receptances of a table between `band_hz[0]` and `band_hz[1]`.
+    /// The receptances of a table between `band_hz[0]` and `band_hz[1]`, Hz.
     ///
-    /// `deviation` holds the standard deviation of |H| of every value, as [`quietcut_frf::Measurement`] states it. Without it, the
-    /// coherence of each response gives the relative standard deviation over the lines, and the residual of the fit gives its
-    /// scale.
+    /// `deviation` holds the standard deviation of |H| of every value, as [`quietcut_frf::Measurement`] states it.
+    /// Without it, the coherence of each response gives the relative standard deviation over the lines, and the
+    /// residual of the fit gives its scale.
     ///
     /// # Errors
     /// Too few lines in the band, a receptance that is zero throughout or that is missing.
@@ -98,7 +98,7 @@ impl Receptances {
 
     /// Lowest and highest frequency of the band, Hz.
     pub fn band_hz(&self) -> [f64; 2] {
-        // The band contains at least LEAST_LINES lines.
+        // The first and last line exist, since the band contains at least LEAST_LINES lines.
         [
             self.frequency_hz[0],
             self.frequency_hz[self.frequency_hz.len() - 1],
@@ -111,7 +111,7 @@ impl Receptances {
         (to_hz - from_hz) / (self.frequency_hz.len() - 1) as f64
     }
 
-    /// Checks that every response has its receptance from every force: rank-one residues require it.
+    /// Checks that every response has a receptance for every force: residue matrices of rank one require it.
     fn is_whole(&self) -> Result<(), ModesError> {
         for (p, response) in self.responses.iter().enumerate() {
             for (q, force) in self.forces.iter().enumerate() {
@@ -145,8 +145,9 @@ impl Receptances {
         (self.responses, self.forces) = (responses, forces);
     }
 
-    /// Standard deviation √((1 − γ²)/γ²·P), with γ² the coherence and P the response power under equal independent forces. For one
-    /// force this is the error of Bendat and Piersol up to the number of averages.
+    /// Standard deviation of a receptance from its coherence: √((1 − γ²)/γ²·P), with the coherence γ² and the power P
+    /// of the response to equal independent forces. For one force this is the error of Bendat and Piersol up to the
+    /// number of averages.
     fn by_coherence(&self, index: usize, lines: &[usize], coherence: &[f64]) -> Vec<f64> {
         let response = self.places[index].0;
         let row = || (0..self.values.len()).filter(|&other| self.places[other].0 == response);

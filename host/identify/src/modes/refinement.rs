@@ -15,7 +15,7 @@ use super::shape;
 use super::weights::{Weights, root_mean_square};
 use quietcut_model::structure::Mode;
 
-/// A refined modal fit with covariance and residual.
+/// Result of a refined modal fit: modes, covariance of the parameters, and size of the residual.
 pub(super) struct Refined {
     pub(super) fit: PoleResidue,
     /// Covariance of the parameters in the order of [`PoleResidue::parameters`].
@@ -24,16 +24,18 @@ pub(super) struct Refined {
     pub(super) misfit: f64,
 }
 
-/// Number of Levenberg–Marquardt steps after which the fit counts as not converged. A choice.
+/// Number of Levenberg–Marquardt steps after which a modal fit to receptances counts as not converged. A choice.
 const STEPS_MAX: usize = 200;
 
-/// Relative decrease of the sum of squares below which the iteration has converged. A choice.
+/// Relative decrease of the sum of squares in a Levenberg–Marquardt step below which a modal fit to receptances has
+/// converged. A choice.
 const SETTLED: f64 = 1e-10;
 
-/// Number of times that the weights are updated from the residual. A choice.
+/// Number of times that the weights of the receptances are updated from the residual of the modal fit. A choice.
 const ROUNDS: usize = 3;
 
-/// Weighted least-squares fit from `start`, with updated weights; `None` if it does not converge.
+/// Weighted least-squares fit of modes to receptances from `start`, with weights updated from the residual; `None` if
+/// it does not converge.
 pub(super) fn refine(data: &Receptances, start: PoleResidue) -> Option<Refined> {
     let mut weights = Weights::of(&data.deviation);
     let mut fit = least_squares(data, &weights, start)?;
@@ -68,7 +70,7 @@ fn relative_error(data: &Receptances, fit: &PoleResidue) -> f64 {
     (Weights::of(&plain).squares(fit, data) / values as f64).sqrt()
 }
 
-/// Weighted sum of squares of the receptances as a function of the modes.
+/// Weighted sum of squared residuals of the receptances as a function of the modes.
 struct ReceptanceFit<'a> {
     data: &'a Receptances,
     weights: &'a Weights,
@@ -111,9 +113,10 @@ fn least_squares(data: &Receptances, weights: &Weights, start: PoleResidue) -> O
     (found.stop != Stop::Iterations).then_some(found.point)
 }
 
-/// The iteration of a fit of modes, with a bound of the linearizations.
+/// Levenberg–Marquardt settings of a fit of modes, with at most `iterations_max` linearizations.
 ///
-/// Damping never falls to zero: scale and phase of the shapes are free, so that N is singular.
+/// The damping of the steps never falls to zero: scale and phase of the shapes are free, so that the normal matrix is
+/// singular.
 pub(super) fn search(iterations_max: usize) -> LevenbergMarquardt {
     LevenbergMarquardt {
         damping: Damping {
@@ -132,7 +135,7 @@ pub(super) fn search(iterations_max: usize) -> LevenbergMarquardt {
 }
 
 impl Refined {
-    /// Norm of the residue matrix of a mode divided by its standard deviation.
+    /// Norm of the residue matrix of a mode divided by the standard deviation of the residue matrix.
     pub(super) fn significance(&self, index: usize) -> f64 {
         let mode = &self.fit.modes[index];
         let width = 2 + 2 * (mode.right.len() + mode.left.len());
@@ -146,7 +149,8 @@ impl Refined {
         let (right, left) = (norm(&mode.right), norm(&mode.left));
         let of_right = variance(at, mode.right.len());
         let of_left = variance(at + 2 * mode.right.len(), mode.left.len());
-        // Variance of the residue matrix: |right|²·var(left) + |left|²·var(right).
+        // Standard deviation of the residue matrix right·leftᵀ; its variance is |right|²·var(left) +
+        // |left|²·var(right).
         let deviation = (right * of_left + left * of_right).sqrt();
         if deviation > 0.0 {
             (right * left).sqrt() / deviation

@@ -2,7 +2,7 @@
 
 use num_complex::Complex64;
 
-/// A pole that was not accepted as a mode.
+/// A pole of the modal identification that was not accepted as a mode.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Rejected {
     /// Frequency |λ|/2π of the pole, Hz.

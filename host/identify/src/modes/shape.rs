@@ -1,4 +1,4 @@
-//! Rank-one residues, and their left and right shapes.
+//! Residue matrices of rank one, and the left and right shapes that they consist of.
 
 use nalgebra::DMatrix;
 use num_complex::Complex64;
@@ -28,9 +28,10 @@ pub(crate) fn rank_one(residues: &DMatrix<Complex64>) -> Option<(Vec<Complex64>,
     Some((right, left, if all > 0.0 { rest.sqrt() / all } else { 0.0 }))
 }
 
-/// Scales right by c and left by 1/c, so that the two shapes have equal norm over the `shared` entries (index in right, index in
-/// left) and differ as little as possible: the shapes of a reciprocal structure become equal. Without a shared entry the norms of
-/// the whole shapes become equal. The largest entry of the right shape gets a positive real part.
+/// Scales the right shape of a mode by a complex factor c and the left one by 1/c. Then both have equal norm over the
+/// `shared` entries (index in right, index in left) and differ as little as possible: the shapes of a reciprocal
+/// structure become equal. Without a shared entry the norms of the whole shapes become equal. The largest entry of the
+/// right shape gets a positive real part.
 pub(crate) fn normalize(right: &mut [Complex64], left: &mut [Complex64], shared: &[(usize, usize)]) {
     let norm = |shape: &[Complex64]| shape.iter().map(|entry| entry.norm_sqr()).sum::<f64>().sqrt();
     let pick = |shape: &[Complex64], of: &dyn Fn(&(usize, usize)) -> usize| -> Vec<Complex64> {
@@ -44,7 +45,7 @@ pub(crate) fn normalize(right: &mut [Complex64], left: &mut [Complex64], shared:
     if !(norms.0 > 0.0 && norms.1 > 0.0) {
         return;
     }
-    // ‖c·right − left/c‖ is smallest if c²·Σ right·conj(left) is real and positive.
+    // The difference ‖c·right − left/c‖ is smallest if c²·Σ right·conj(left) is real and positive.
     let inner: Complex64 = at_right.iter().zip(&at_left).map(|(r, l)| r * l.conj()).sum();
     let phase = if inner.norm() > 0.0 {
         -0.5 * inner.arg()

@@ -14,21 +14,22 @@ use crate::criteria::{
 };
 use quietcut_frf::rational_fit::{RationalFitError, residues};
 
-/// A pole of the model of one order.
+/// A pole of the model of one order in the stabilization diagram.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Candidate {
     /// Order of the model that the pole belongs to.
     pub order: usize,
     /// The pole λ, rad/s.
     pub pole: Complex64,
-    /// Contribution of the pole at its resonance: norm of its residues, with each receptance normalized by its RMS, divided by −Re
-    /// λ.
+    /// Height of the pole's resonance peak: norm of its residues, with each receptance normalized by its RMS, divided
+    /// by the decay rate −Re λ; s.
     pub height: f64,
-    /// True if frequency, damping and shape agree with those of a pole of the previous order.
+    /// True if frequency, damping and shape agree with those of a pole of the previous model order.
     pub is_stable: bool,
-    /// Index of the line of poles over the order that the pole continues.
+    /// Index of the chain of stable poles over the model orders that the pole continues or starts.
     line: usize,
-    /// Distance to the previous pole of the line, in units of the stability criteria.
+    /// Distance to the pole of the previous order in the chain, the larger one of the relative changes of frequency and
+    /// damping, in multiples of `SAME_FREQUENCY` and `SAME_DAMPING`.
     change: f64,
     /// Residues of the pole in all receptances as a vector of norm 1.
     shape: Vec<Complex64>,
@@ -46,7 +47,7 @@ impl Candidate {
     }
 }
 
-/// Poles of all model orders, and those that are modes.
+/// Stabilization diagram: poles of all model orders, and the poles that are modes.
 #[derive(Clone, Debug)]
 pub struct Stabilization {
     /// Poles in the band with positive damping, by model order.
@@ -55,9 +56,9 @@ pub struct Stabilization {
     pub highest_order: usize,
     /// Poles selected as modes, strongest first, rad/s.
     pub selected: Vec<Complex64>,
-    /// Poles of the highest order in the band whose damping is not positive, rad/s.
+    /// Poles of the highest model order in the band whose damping is not positive, rad/s.
     unstable: Vec<Complex64>,
-    /// Lines of poles that are too short or too weak: their pole, rad/s, and the reason.
+    /// Chains of stable poles that are too short or too weak for a mode: the pole of each, rad/s, and the reason.
     discarded: Vec<(Complex64, String)>,
 }
 
@@ -158,14 +159,15 @@ fn candidates(
     Ok(found)
 }
 
-/// Distance of two poles in units of the stability criteria: they count as the same pole up to 1.
+/// Distance of two poles: the larger one of the relative differences of frequency and damping ratio, in multiples of
+/// `SAME_FREQUENCY` and `SAME_DAMPING`. Up to 1 the poles count as the same.
 fn distance(a: &Candidate, b: &Candidate) -> f64 {
     let frequency = (a.frequency_hz() / b.frequency_hz() - 1.0).abs() / SAME_FREQUENCY;
     let damping = (a.damping_ratio() / b.damping_ratio() - 1.0).abs() / SAME_DAMPING;
     frequency.max(damping)
 }
 
-/// Modal assurance criterion of two vectors of norm 1.
+/// Modal assurance criterion |aᴴb|² of two shapes of norm 1.
 fn assurance(a: &[Complex64], b: &[Complex64]) -> f64 {
     a.iter()
         .zip(b)
@@ -174,7 +176,8 @@ fn assurance(a: &[Complex64], b: &[Complex64]) -> f64 {
         .norm_sqr()
 }
 
-/// Continues the lines of the previous order by their nearest pole; a pole without a previous one starts a new line.
+/// Continues each chain of poles of the previous model order by the nearest stable pole of this order; a pole without a
+/// predecessor starts a new chain.
 fn connect(now: &mut [Candidate], before: &[Candidate], lines: &mut usize) {
     let mut pairs: Vec<(f64, usize, usize)> = Vec::new();
     for (i, a) in now.iter().enumerate() {
@@ -201,7 +204,8 @@ fn connect(now: &mut [Candidate], before: &[Candidate], lines: &mut usize) {
     }
 }
 
-/// Selects the lines of poles that are long and strong enough; each is represented by the pole that changed least.
+/// Selects the chains of poles that extend over enough model orders and are strong enough. Each is represented by the
+/// pole that changed least from the previous order.
 fn select(found: &mut Stabilization, lines: usize) {
     let needed = ((ORDERS_SHARE * found.highest_order as f64).ceil() as usize).max(LEAST_ORDERS);
     let mut of_line: Vec<Vec<&Candidate>> = vec![Vec::new(); lines];
@@ -229,7 +233,8 @@ fn select(found: &mut Stabilization, lines: usize) {
             ));
         }
     }
-    // Two lines of one pole, one interrupted and continued later, are one mode, which the longer line represents.
+    // Two chains of the same pole, of which one is interrupted and continued later, are one mode, which the longer
+    // chain represents.
     long.sort_by_key(|(_, length)| std::cmp::Reverse(*length));
     let mut kept: Vec<&Candidate> = Vec::new();
     for (candidate, _) in long {
@@ -260,7 +265,7 @@ fn select(found: &mut Stabilization, lines: usize) {
     found.discarded = discarded;
 }
 
-/// Residues of one pole as a matrix, responses by forces.
+/// Residues of one pole in all receptances as a matrix, responses by forces.
 pub(super) fn matrix_of(data: &Receptances, residues: &[Vec<Complex64>], mode: usize) -> DMatrix<Complex64> {
     let mut matrix = DMatrix::zeros(data.responses.len(), data.forces.len());
     for (&place, row) in data.places.iter().zip(residues) {

@@ -1,7 +1,7 @@
-//! Weights of the receptances in a fit.
+//! Weights of the receptances in a modal fit.
 //!
-//! Receptances from nearly dependent forces have large common errors. The residual of a first fit gives the correlation between the
-//! receptances of a line, and the next fit is weighted with it (feasible GLS).
+//! Receptances from nearly dependent forces have large common errors. The residual of a first fit gives the correlation
+//! between the receptances of a line, and the next fit is weighted with it (feasible GLS).
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 use num_complex::Complex64;
@@ -9,24 +9,24 @@ use num_complex::Complex64;
 use super::pole_residue::PoleResidue;
 use super::receptances::Receptances;
 
-/// Number of lines per receptance from which the correlation between receptances is estimated. A choice: with fewer, its estimate
-/// is too inaccurate for weights.
+/// Fewest frequency lines per receptance from which the correlation between the residuals of receptances is estimated.
+/// A choice: with fewer, the estimate is too inaccurate for weights.
 const LINES_PER_RECEPTANCE: usize = 6;
 
-/// Ridge on the diagonal of the correlation matrix. A choice: it bounds the weight of combinations of receptances with almost no
-/// residual.
+/// Ridge on the unit diagonal of the correlation matrix between the residuals of receptances. A choice: it bounds the
+/// weight of combinations of receptances with almost no residual.
 const CORRELATION_RIDGE: f64 = 1e-5;
 
-/// Lower bound of the residual of a receptance, relative to its RMS, which bounds the weight of an exact fit. A choice, above the
-/// rounding error.
+/// Lower bound of the RMS residual of a receptance in the weights of a modal fit, relative to the RMS of the
+/// receptance; it bounds the weight of an exact fit. A choice, above the rounding error.
 const LEAST_LEFT: f64 = 1e-6;
 
-/// Weights of the residual in a modal fit.
+/// Weights of the residual between measured and fitted receptances.
 #[derive(Clone)]
 pub(super) struct Weights {
     /// Standard deviation of every receptance at every line, m/N.
     pub(super) deviation: Vec<Vec<f64>>,
-    /// Whitening matrix between the receptances of one line; `None` without correlation.
+    /// Whitening matrix between the residuals of the receptances of one line; `None` if they are taken as uncorrelated.
     whitening: Option<DMatrix<Complex64>>,
 }
 
@@ -39,7 +39,7 @@ impl Weights {
         self.mixed(plain)
     }
 
-    /// Weighted sum of squares of the residual.
+    /// Sum of squares of the weighted residuals of all receptances.
     pub(super) fn squares(&self, fit: &PoleResidue, data: &Receptances) -> f64 {
         self.left(fit, data).iter().map(DVector::norm_squared).sum()
     }
@@ -51,7 +51,8 @@ impl Weights {
         }
     }
 
-    /// Multiplies by the whitening matrix, which is lower triangular, across the receptances of every line.
+    /// Multiplies residuals or derivatives of all receptances by the whitening matrix, which is lower triangular, at
+    /// every line.
     pub(super) fn mixed<C: nalgebra::Dim>(
         &self,
         plain: Vec<nalgebra::OMatrix<Complex64, nalgebra::Dyn, C>>,
@@ -73,13 +74,14 @@ impl Weights {
             .collect()
     }
 
-    /// Updates the standard deviations and the whitening matrix from the residual of a fit.
+    /// Updates the standard deviations and the whitening matrix from the residual of a modal fit.
     pub(super) fn update(&mut self, data: &Receptances, fit: &PoleResidue) {
         let mut left = Vec::with_capacity(data.values.len());
         for k in 0..data.values.len() {
             let values = fit.left_of(data, &self.deviation, k);
             let least = LEAST_LEFT * root_mean_square(&data.values[k]) / mean(&self.deviation[k]);
-            // The standard deviation is that of the real and of the imaginary part, each half of the variance of the complex value.
+            // The standard deviation is that of the real and of the imaginary part of a receptance; each has half of
+            // the variance of the complex value.
             let scale = (root_mean_square(&values) / 2.0_f64.sqrt()).max(least);
             for value in &mut self.deviation[k] {
                 *value *= scale;
@@ -99,8 +101,8 @@ fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len().max(1) as f64
 }
 
-/// Inverse L⁻¹ of the Cholesky factor of the correlation L Lᴴ between receptances, with unit variance of real and of imaginary
-/// part; `None` with too few lines.
+/// Whitening matrix L⁻¹ from the Cholesky factor of the correlation L Lᴴ between the residuals of the receptances, with
+/// unit variance of real and of imaginary part; `None` with too few lines.
 fn whitening(left: &[DVector<Complex64>]) -> Option<DMatrix<Complex64>> {
     let (count, lines) = (left.len(), left.first().map_or(0, |left| left.len()));
     if lines < LINES_PER_RECEPTANCE * count {

@@ -13,22 +13,22 @@ pub use quietcut_model::effects::describing_functions::*;
 pub enum Nonlinearity {
     /// Cubic spring k3·x³.
     CubicStiffness,
-    /// Quadratic spring k2·x²; it responds at twice the frequency.
+    /// Quadratic spring k2·x²; its force appears at twice the excitation frequency and as an offset.
     QuadraticStiffness,
     /// Cubic damping c3·v³.
     CubicDamping,
-    /// Springs k3·x³ + k5·x⁵ with coefficients of opposite sign.
+    /// Springs k3·x³ + k5·x⁵ with coefficients of opposite sign: softening turns into hardening, or the reverse.
     SofteningHardening,
     /// Coulomb friction fc·sign(v).
     CoulombFriction,
-    /// Backlash: a spring with a gap.
+    /// Backlash: a spring that exerts no force within a gap.
     Backlash,
     /// Hysteresis of Bouc and Wen.
     Hysteresis,
 }
 
 impl Nonlinearity {
-    /// Name of the effect, as in a case file.
+    /// Name of the nonlinear effect, as in a case file.
     pub fn name(self) -> &'static str {
         match self {
             Self::CubicStiffness => EffectName::CubicStiffness.name(),

@@ -1,8 +1,9 @@
 //! Periodic motion under a periodic force by harmonic balance, with its exact derivatives.
 //!
-//! q(t) = a₀ + Σ_h (a_h cos hωt + b_h sin hωt). The residual of the [`Law`] is evaluated at N instants of a period and projected
-//! onto the harmonics. With N > (p + 1)·H, p the degree of the law, products of p series of H harmonics alias onto none of the
-//! first H harmonics, so residual and Jacobian are those of the exact (Galerkin) balance.
+//! q(t) = a₀ + Σ_h (a_h cos hωt + b_h sin hωt). The residual of the equation of motion ([`Law`]) is evaluated at N
+//! instants of a period and projected onto the H harmonics. With N > (p + 1)·H, where p is the polynomial degree of the
+//! equation, products of p series of H harmonics alias onto none of the first H harmonics, so residual and Jacobian are
+//! those of the exact (Galerkin) balance.
 
 use std::f64::consts::TAU;
 
@@ -12,21 +13,21 @@ use quietcut_numerics::newton::Newton;
 
 use crate::nonlinear::law::Law;
 
-/// Collocation instants of a period, and the values of the harmonics at them.
+/// Collocation instants of a period, and the values of the harmonic functions at them.
 #[derive(Clone, Debug)]
 pub struct Grid {
     harmonics: usize,
-    /// Values of 1, cos, sin, cos 2 … at the instants: N × (2H + 1).
+    /// Values of the functions 1, cos, sin, cos 2 … up to harmonic H at the N instants: N × (2H + 1).
     value: DMatrix<f64>,
-    /// Derivatives of the harmonics by the phase ωt.
+    /// First derivatives of the harmonic functions by the phase ωt at the instants.
     rate: DMatrix<f64>,
-    /// Second derivatives of the harmonics by the phase ωt.
+    /// Second derivatives of the harmonic functions by the phase ωt at the instants.
     second: DMatrix<f64>,
-    /// Projection from values at the instants to Fourier coefficients: (2H + 1) × N.
+    /// Projection from values at the N instants to Fourier coefficients up to harmonic H: (2H + 1) × N.
     project: DMatrix<f64>,
 }
 
-/// A harmonic-balance problem: law, parameters, frequency and force.
+/// A harmonic-balance problem: equation of motion, its parameters, frequency and force.
 #[derive(Clone, Copy, Debug)]
 pub struct Problem<'a> {
     /// The equation of motion.
@@ -39,7 +40,7 @@ pub struct Problem<'a> {
     pub force: &'a DVector<f64>,
 }
 
-/// A periodic motion that satisfies the balance.
+/// A periodic motion that satisfies the harmonic balance.
 pub struct Solution {
     /// Fourier coefficients of the motion, one degree of freedom after the other.
     pub x: DVector<f64>,
@@ -48,7 +49,7 @@ pub struct Solution {
     by_omega: DVector<f64>,
 }
 
-/// Newton's method did not converge from the start.
+/// Newton's method for the harmonic balance did not converge from the start.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error("harmonic balance at {frequency_hz:.4} Hz does not converge")]
 pub struct NotConverged {
@@ -57,7 +58,7 @@ pub struct NotConverged {
 }
 
 impl Grid {
-    /// Grid for `harmonics` harmonics and laws up to the polynomial degree `degree`.
+    /// Grid for `harmonics` harmonics and equations of motion up to the polynomial degree `degree`.
     pub fn new(harmonics: usize, degree: usize) -> Self {
         let samples = (degree + 1) * harmonics + 2;
         let width = 2 * harmonics + 1;
@@ -103,7 +104,8 @@ impl Grid {
         self.value.nrows()
     }
 
-    /// u = (q, q̇, q̈) at every instant: 3n × N for n degrees of freedom.
+    /// Displacement, velocity and acceleration u = (q, q̇, q̈) at every instant: 3n × N for n degrees of freedom and N
+    /// instants.
     fn motion(&self, dofs: usize, omega: f64, x: &DVector<f64>) -> DMatrix<f64> {
         let width = self.width();
         let mut u = DMatrix::zeros(3 * dofs, self.samples());
@@ -122,7 +124,8 @@ impl Grid {
         u
     }
 
-    /// Fourier coefficients of the regressors φ_p: one column per parameter, one degree of freedom after the other.
+    /// Fourier coefficients of the regressors φ_p of the equation of motion at the motion `x`: one column per
+    /// parameter, one degree of freedom after the other.
     pub fn features(&self, law: &Law, omega: f64, x: &DVector<f64>) -> DMatrix<f64> {
         let u = self.motion(law.dofs, omega, x);
         let width = self.width();
@@ -140,7 +143,8 @@ impl Grid {
         features
     }
 
-    /// Derivatives of the residual by the Fourier coefficients x and by ω.
+    /// Derivatives of the harmonic balance's residual by the Fourier coefficients x of the motion and by the frequency
+    /// ω.
     fn jacobian(&self, problem: Problem<'_>, x: &DVector<f64>) -> (DMatrix<f64>, DVector<f64>) {
         let Problem {
             law, theta, omega, ..
@@ -151,7 +155,7 @@ impl Grid {
         let mut by_omega = DVector::zeros(law.dofs * width);
         let mut weighted = DMatrix::zeros(samples, width);
         for row in 0..law.dofs {
-            // Derivative of one row of the law by u, at every instant.
+            // Derivatives of one row of the equation of motion by u = (q, q̇, q̈), at every instant.
             let mut partials = DMatrix::zeros(size, samples);
             for (parameter, &theta) in law.parameters.iter().zip(theta) {
                 for term in parameter.terms.iter().filter(|term| term.row == row) {
@@ -192,7 +196,8 @@ impl Grid {
         (jacobian, by_omega)
     }
 
-    /// The periodic motion, by Newton's method from `start`.
+    /// The periodic motion that satisfies the harmonic balance, by Newton's method from the Fourier coefficients
+    /// `start`.
     ///
     /// # Errors
     /// Newton does not converge.
@@ -202,7 +207,7 @@ impl Grid {
         };
         let theta = DVector::from_column_slice(problem.theta);
         let mut linearized = None;
-        // Quadratic convergence: after a step of 1e-8 the next one is rounding.
+        // Newton's method converges quadratically: after a relative step of 1e-8 the next one is rounding.
         let newton = Newton::new(30, 1e-8).with_growth(2.0);
         let found = newton.solve(start.clone(), |x: &DVector<f64>| {
             let features = self.features(problem.law, problem.omega, x);
@@ -225,7 +230,8 @@ impl Grid {
 }
 
 impl Solution {
-    /// Derivatives of the motion by θ, by the force coefficients in `of_force`, and by ω.
+    /// Derivatives of the Fourier coefficients of the motion by the parameters θ, by the force coefficients in
+    /// `of_force`, and by the frequency ω.
     pub fn sensitivities(
         &self,
         of_force: std::ops::Range<usize>,

@@ -1,4 +1,5 @@
-//! Higher-order FRF by thesis eqs 5.15 to 5.17: exact as F → 0 and biased at finite force.
+//! Higher-order FRF of a structure with cubic terms by thesis eqs 5.15 to 5.17: exact as the force F → 0 and biased at
+//! finite force.
 
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
@@ -18,29 +19,32 @@ pub struct HigherOrder {
     pub h: [Complex64; 3],
 }
 
-/// Responses at one frequency under several force amplitudes.
+/// Responses of a structure at one frequency under several force amplitudes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Response {
     /// Angular frequency, rad/s.
     pub omega: f64,
-    /// Pairs (F_n, Q_n): force amplitude, N, and displacement phasor relative to the force, m.
+    /// Pairs (F_n, Q_n) of the levels: force amplitude, N, and displacement phasor with the phase relative to the
+    /// force, m.
     pub levels: Vec<(f64, Complex64)>,
 }
 
-/// Parameters by thesis eqs 5.16 and 5.17, with the standard deviations of the linear regressions.
+/// Parameters of a single-degree-of-freedom equation of motion by thesis eqs 5.16 and 5.17, with the standard
+/// deviations of the linear regressions.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HfrfFit {
-    /// The law with the parameters m, c, k, k3, c3.
+    /// The equation of motion with the parameters m, c, k, k3, c3.
     pub law: Law,
     /// Values θ of the parameters.
     pub theta: DVector<f64>,
-    /// Standard deviations from the scatter over frequency. They do not include the bias of the method.
+    /// Standard deviations of the parameters from the scatter over frequency. They do not include the bias of the
+    /// method.
     pub deviations: DVector<f64>,
     /// The higher-order FRF at each frequency.
     pub estimates: Vec<HigherOrder>,
 }
 
-/// Reason why the method gives no result.
+/// Reason why the method of higher-order FRF gives no result.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum HfrfError {
     /// Fewer than two frequencies have three or more force levels.
@@ -56,7 +60,7 @@ pub enum HfrfError {
     Undetermined,
 }
 
-/// Groups dwells by frequency: those within `tolerance` (relative) of each other are one step of the test.
+/// Groups dwells by frequency: dwells within the relative difference `tolerance` belong to one step of the test.
 pub fn responses(dwells: &[Dwell], tolerance: f64) -> Vec<Response> {
     let mut points: Vec<(f64, f64, Complex64)> = dwells
         .iter()
@@ -107,7 +111,7 @@ pub fn higher_order(response: &Response) -> Option<HigherOrder> {
     })
 }
 
-/// Parameters from thesis eqs 5.16 and 5.17 over all frequencies.
+/// Parameters m, c, k, k3, c3 from thesis eqs 5.16 and 5.17 over all frequencies.
 ///
 /// # Errors
 /// Too few levels or frequencies.
@@ -123,11 +127,11 @@ pub fn fit(responses: &[Response]) -> Result<HfrfFit, HfrfError> {
     let (mut linear_right, mut cubic_right) = (DVector::zeros(rows), DVector::zeros(rows));
     for (index, HigherOrder { omega, h }) in estimates.iter().enumerate() {
         let (re, im) = (2 * index, 2 * index + 1);
-        // Columns of the linear regression: m, k1, c1.
+        // Columns of the regression of 1/H₁, in this order: m, k, c.
         (linear[(re, 0)], linear[(re, 1)], linear[(im, 2)]) = (-omega * omega, 1.0, *omega);
         let inverse = h[0].inv();
         (linear_right[re], linear_right[im]) = (inverse.re, inverse.im);
-        // Columns of the cubic regression: c3, k3.
+        // Columns of the regression of H₃/(H₁³H₁*), in this order: c3, k3.
         (cubic[(re, 1)], cubic[(im, 0)]) = (-1.0, -omega.powi(3));
         let ratio = h[1] / (h[0].powi(3) * h[0].conj());
         (cubic_right[re], cubic_right[im]) = (ratio.re, ratio.im);
@@ -157,7 +161,7 @@ pub fn fit(responses: &[Response]) -> Result<HfrfFit, HfrfError> {
     })
 }
 
-/// Least-squares solution with standard deviations from the residual.
+/// Solution of a linear least-squares problem, with standard deviations from its residual.
 fn regression(
     matrix: &DMatrix<f64>,
     right: &DVector<f64>,

@@ -2,26 +2,28 @@
 
 use crate::criteria::{CURVATURE_SHARE, JUMP_DEVIATIONS, JUMP_SHARE, LEAST_REGION_POINTS, REGION_EVIDENCE};
 
-/// A range of force in which the response is a linear function of the force.
+/// A range of force at constant frequency in which the response amplitude is a linear function of the force amplitude.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Region {
     /// Smallest force, N.
     pub from_n: f64,
     /// Largest force, N.
     pub to_n: f64,
-    /// Slope dX/dF of the response in this range, m/N.
+    /// Slope dX/dF of the response amplitude X over the force amplitude F in this range, m/N.
     pub slope: f64,
 }
 
-/// Regions in which the response amplitude X(F) is linear, at constant frequency under a slowly changing force F, and the forces at
-/// which X jumps (thesis Fig. 4.8).
+/// Regions in which the response amplitude X(F) is linear, at constant frequency under a slowly changing force
+/// amplitude F, and the forces at which X jumps (thesis Fig. 4.8).
 ///
-/// `points` are (F, X) in the order of measurement. A region is split in two where two lines reduce the sum of squares by much more
-/// than noise does. A jump is where two neighbouring lines differ by more than their scatter.
+/// `points` are (F, X) in the order of measurement. A region is split in two if two lines reduce the sum of squared
+/// residuals by much more than noise does. The response jumps where two neighbouring lines differ by more than the
+/// noise and a share of X.
 pub fn regions(points: &[(f64, f64)]) -> (Vec<Region>, Vec<f64>) {
     let mut sorted = points.to_vec();
     sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
-    // The second differences of white noise with the standard deviation σ have the standard deviation √6·σ.
+    // Second differences of X estimate the noise: for white noise with the standard deviation σ their standard
+    // deviation is √6·σ.
     let mut bends: Vec<f64> = sorted
         .windows(3)
         .map(|w| (w[2].1 - 2.0 * w[1].1 + w[0].1).abs())
@@ -54,7 +56,8 @@ pub fn regions(points: &[(f64, f64)]) -> (Vec<Region>, Vec<f64>) {
             let at = 0.5 * (sorted[pair[0].1 - 1].0 + sorted[pair[1].0].0);
             let value = |[level, slope]: [f64; 2]| level + slope * at;
             let miss = (value(pair[1].2) - value(pair[0].2)).abs();
-            // A jump exceeds the noise, and 5 % of the response, which is more than a smooth curve changes between two windows.
+            // A jump exceeds the noise of X, and 5 % of X, which is more than a smooth curve changes between two
+            // windows.
             (miss > JUMP_DEVIATIONS * noise && miss > JUMP_SHARE * value(pair[0].2).abs()).then_some(at)
         })
         .collect();
@@ -78,8 +81,8 @@ fn split_line(points: &[(f64, f64)], from: usize, to: usize, noise: f64, cuts: &
     }
 }
 
-/// Removes breaks that do not reduce the sum of squares significantly: the first break found in data of three lines may lie within
-/// one of them.
+/// Removes breaks between regions that do not reduce the sum of squared residuals significantly: the first break found
+/// in data of three lines may lie within one of them.
 fn join_lines(points: &[(f64, f64)], noise: f64, cuts: &mut Vec<usize>) {
     let mut index = 1;
     while index + 1 < cuts.len() {

@@ -1,24 +1,25 @@
 //! Equations of motion that are linear in their unknown parameters.
 
-/// Equation of motion Σ_p θ_p φ_p(q, q̇, q̈) = F, with one row per degree of freedom.
+/// Equation of motion Σ_p θ_p φ_p(q, q̇, q̈) = F with parameters θ_p and regressors φ_p, and one row per degree of
+/// freedom.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Law {
-    /// Number of degrees of freedom n.
+    /// Number n of degrees of freedom of the equation of motion.
     pub dofs: usize,
-    /// The parameters in the order of θ.
+    /// The parameters of the equation of motion in the order of θ.
     pub parameters: Vec<Parameter>,
 }
 
-/// One parameter of a law and its regressor.
+/// One parameter of an equation of motion and its regressor.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Parameter {
     /// Meaning of the parameter.
     pub role: Role,
-    /// Regressor φ_p, a sum of monomials.
+    /// Regressor φ_p of the parameter, a sum of monomials.
     pub terms: Vec<Monomial>,
 }
 
-/// Meaning of a parameter. Indices are degrees of freedom.
+/// Meaning of a parameter of an equation of motion. Indices are degrees of freedom.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Role {
     /// M_ij, kg.
@@ -42,12 +43,12 @@ pub enum Role {
 }
 
 impl Role {
-    /// True for entries of mass, damping and stiffness.
+    /// True for parameters of the linear terms: entries of the mass, damping and stiffness matrix.
     pub fn is_linear(self) -> bool {
         matches!(self, Self::Mass(..) | Self::Damping(..) | Self::Stiffness(..))
     }
 
-    /// Key of the parameter in answers and cases.
+    /// Key of the parameter in JSON answers and case files.
     pub fn key(self) -> &'static str {
         match self {
             Self::Mass(..) => "mass_kg",
@@ -62,7 +63,7 @@ impl Role {
         }
     }
 
-    /// Degrees of freedom of the parameter.
+    /// Degrees of freedom that the parameter acts on.
     pub fn dofs(self) -> Vec<usize> {
         match self {
             Self::Mass(i, j)
@@ -84,25 +85,25 @@ impl Role {
     }
 }
 
-/// Term factor · Π u_k in one row of the equation, with u = (q, q̇, q̈), n entries each.
+/// Term factor · Π u_k in one row of the equation of motion, with u = (q, q̇, q̈), n entries each.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Monomial {
-    /// Row of the equation of motion.
+    /// Row of the equation of motion that contains the term.
     pub row: usize,
     /// Constant factor.
     pub factor: f64,
-    /// Indices into u of the factors; an index may occur several times.
+    /// Indices into u = (q, q̇, q̈) of the factors of the monomial; an index may occur several times.
     pub factors: Vec<usize>,
 }
 
-/// Nonlinear terms that a law may contain in addition to mass, damping and stiffness.
+/// Nonlinear terms that an equation of motion may contain in addition to mass, damping and stiffness.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, clap::ValueEnum)]
 pub enum NonlinearTerm {
     /// k2·x² in every direction.
     QuadraticStiffness,
     /// k3·x³ in every direction.
     CubicStiffness,
-    /// k3·x³ + k5·x⁵ in every direction.
+    /// Spring force k3·x³ + k5·x⁵ in every direction.
     SofteningHardening,
     /// c3·v³ in every direction.
     CubicDamping,
@@ -111,7 +112,8 @@ pub enum NonlinearTerm {
 }
 
 impl Law {
-    /// Full symmetric M, C, K of `dofs` degrees of freedom and the nonlinear terms of `extras`.
+    /// Equation of motion with full symmetric matrices M, C, K of `dofs` degrees of freedom and the nonlinear terms of
+    /// `extras`.
     pub fn new(dofs: usize, extras: &[NonlinearTerm]) -> Self {
         let mut parameters = Vec::new();
         type Make = fn(usize, usize) -> Role;
@@ -168,7 +170,7 @@ impl Law {
         Self { dofs, parameters }
     }
 
-    /// Largest polynomial degree of the terms of the law.
+    /// Largest polynomial degree of the terms of the equation of motion.
     pub fn degree(&self) -> usize {
         let monomials = self.parameters.iter().flat_map(|parameter| &parameter.terms);
         monomials
@@ -177,7 +179,7 @@ impl Law {
             .unwrap_or(1)
     }
 
-    /// Index in θ of the parameter with this role; `None` if the law does not have it.
+    /// Index in θ of the parameter with this role; `None` if the equation of motion does not have it.
     pub fn index(&self, role: Role) -> Option<usize> {
         self.parameters
             .iter()
@@ -204,14 +206,14 @@ fn couplings(i: usize, j: usize) -> [Parameter; 3] {
 }
 
 impl Monomial {
-    /// Value of the monomial at u.
+    /// Value of the monomial at u = (q, q̇, q̈).
     pub fn value(&self, u: &[f64]) -> f64 {
         self.factors
             .iter()
             .fold(self.factor, |product, &k| product * u[k])
     }
 
-    /// Adds `weight` times the derivatives of the monomial by u to `partials`.
+    /// Adds `weight` times the derivatives of the monomial by the entries of u = (q, q̇, q̈) to `partials`.
     pub fn add_partials(&self, weight: f64, u: &[f64], partials: &mut [f64]) {
         for (place, &k) in self.factors.iter().enumerate() {
             let others = self

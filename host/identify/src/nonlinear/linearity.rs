@@ -23,20 +23,21 @@ use crate::nonlinear::homogeneity::line;
 pub struct Verdict {
     /// True if the data are consistent with a linear structure.
     pub linear: bool,
-    /// The kinds of nonlinearity that explain the level dependence, strongest first. Empty for a linear structure, and if no kind
-    /// explains it.
+    /// The kinds of nonlinearity that explain the dependence of the stiffness F/X on the force level, strongest first.
+    /// Empty for a linear structure, and if no kind explains it.
     pub kinds: Vec<Nonlinearity>,
-    /// χ² per degree of freedom of a linear model: near 1 if the structure is linear.
+    /// χ² per degree of freedom of a linear structure's fit to the stiffnesses F/X of all dwells: near 1 if the
+    /// structure is linear.
     pub linear_misfit: f64,
-    /// χ² per degree of freedom of the model with the named kinds.
+    /// χ² per degree of freedom of the fit with the named kinds of nonlinearity.
     pub explained_misfit: f64,
-    /// Largest relative change of |X/F| with the force level at one frequency.
+    /// Largest relative change of the stiffness |F/X| with the force level at one frequency.
     pub level_dependence: f64,
     /// Second and third harmonics of the response at each force level, as in figures 5.4 (b) and (c) of the thesis.
     pub harmonics: Vec<Harmonics>,
 }
 
-/// Second and third harmonics of the response at one force level, relative to the fundamental.
+/// Amplitudes of the second and third harmonic of the response at one force level, relative to the fundamental.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Harmonics {
     /// Excitation frequency, Hz.
@@ -47,7 +48,7 @@ pub struct Harmonics {
     pub second: f64,
     /// |X(3ω)|/|X(ω)|.
     pub third: f64,
-    /// Standard deviation of the noise at 2ω, relative to the fundamental.
+    /// Standard deviation of the noise of the response's amplitude at 2ω, relative to the fundamental.
     pub noise: f64,
 }
 
@@ -64,18 +65,18 @@ pub enum LinearityError {
     },
 }
 
-/// Dynamic stiffness F/X measured in one dwell.
+/// Dynamic stiffness F/X measured in one dwell: force phasor over displacement phasor.
 #[derive(Clone, Copy, Debug)]
 struct DwellStiffness {
     group: usize,
     omega: f64,
     amplitude: f64,
     stiffness: Complex64,
-    /// Variance of the real part of the stiffness, equal to that of the imaginary part, (N/m)².
+    /// Variance of the real part of the dynamic stiffness, equal to that of the imaginary part, (N/m)².
     variance: f64,
 }
 
-/// Tests the linearity of a structure from dwells with force and motion in one direction.
+/// Tests whether a structure is linear, from dwells with force and motion in one direction.
 ///
 /// # Errors
 /// No frequency at two levels.
@@ -95,7 +96,8 @@ pub fn verdict(dwells: &[Dwell]) -> Result<Verdict, LinearityError> {
         parameters: 0,
         sum: alone,
     };
-    // χ² of a linear structure exceeds its degrees of freedom by more than this only by a rare chance.
+    // Largest χ² of a linear structure: it exceeds the degrees of freedom by four standard deviations, which chance
+    // rarely does.
     let chance = free + LINEAR_DEVIATIONS * (2.0 * free).sqrt();
     let (second, third) = (harmonic(dwells, 2), harmonic(dwells, 3));
     if alone > chance {
@@ -162,7 +164,7 @@ fn points(dwells: &[Dwell]) -> Vec<DwellStiffness> {
     points.sort_by(|a, b| a.omega.total_cmp(&b.omega));
     let mut group = 0;
     for index in 1..points.len() {
-        // Dwells within 0.1 % in frequency are repetitions of one frequency step.
+        // Dwells within 0.1 % in excitation frequency are repetitions of one frequency step.
         if points[index].omega > points[index - 1].omega * (1.0 + SAME_STEP) {
             group += 1;
         }
@@ -171,8 +173,8 @@ fn points(dwells: &[Dwell]) -> Vec<DwellStiffness> {
     points
 }
 
-/// Linear model of the test: one free complex stiffness per frequency. The candidate kinds explain the change of stiffness with the
-/// level.
+/// Linear model of the linearity test: one free complex stiffness F/X per frequency. Describing functions of the
+/// candidate kinds are added to it for the change of stiffness with the level.
 struct LinearModel<'a> {
     points: &'a [DwellStiffness],
     groups: usize,
@@ -190,7 +192,8 @@ impl<'a> LinearModel<'a> {
         2.0 * (self.points.len() - self.groups) as f64
     }
 
-    /// χ² of the residual after a fit of `features` and a free complex stiffness per frequency.
+    /// χ² of the residual stiffnesses after a fit of the describing functions `features` and a free complex stiffness
+    /// per frequency.
     fn sum_of_squares(&self, features: &[Vec<Complex64>]) -> f64 {
         let rows = 2 * self.points.len();
         let mut matrix = DMatrix::zeros(rows, features.len().max(1));
@@ -217,7 +220,8 @@ impl<'a> LinearModel<'a> {
         }
     }
 
-    /// Values minus their weighted mean at the same frequency, divided by their standard deviation.
+    /// Values of all dwells minus their weighted mean over the dwells of the same frequency, divided by the standard
+    /// deviation of the stiffness.
     fn centered(&self, value: &dyn Fn(usize) -> f64) -> Vec<f64> {
         let mut sums = vec![(0.0, 0.0); self.groups];
         for (i, point) in self.points.iter().enumerate() {
@@ -240,7 +244,8 @@ struct KindSet {
     sum: f64,
 }
 
-/// The set of one or two kinds with the fewest parameters that explains the level dependence; `nothing` if no kind is significant.
+/// The set of one or two kinds of nonlinearity with the fewest parameters that explains the dependence of stiffness on
+/// the level; `nothing` if no kind is significant.
 fn choose(base: &LinearModel<'_>, points: &[DwellStiffness], nothing: KindSet) -> KindSet {
     let candidates = candidates(base, points);
     let mut all: Vec<KindSet> = candidates
@@ -272,8 +277,8 @@ fn choose(base: &LinearModel<'_>, points: &[DwellStiffness], nothing: KindSet) -
     let Some(least) = all.first().cloned() else {
         return nothing;
     };
-    // Sufficient are sets that leave at most a small share of χ², or not much more than the best set. The set with the fewest
-    // parameters is chosen; among equals the one with the best fit.
+    // A set of kinds is sufficient if its χ² is a small share of that of a linear structure, or not much larger than
+    // that of the best set. The set with the fewest parameters is chosen; among equals the one with the best fit.
     let enough = (least.sum + KIND_EVIDENCE).max(EXPLAINED_SHARE * nothing.sum);
     all.into_iter()
         .filter(|choice| choice.sum <= enough)
@@ -282,7 +287,8 @@ fn choose(base: &LinearModel<'_>, points: &[DwellStiffness], nothing: KindSet) -
 }
 
 impl Candidate {
-    /// True if two kinds may act together: a nonlinear spring and a nonlinear damping. Hysteresis contains both already.
+    /// True if two kinds of nonlinearity may act together: one is a nonlinear spring and the other a nonlinear damping.
+    /// Hysteresis contains both already.
     fn can_act_with(&self, other: &Self) -> bool {
         self.spring != other.spring
             && self.kind != Nonlinearity::Hysteresis
@@ -308,7 +314,8 @@ fn candidates(base: &LinearModel<'_>, points: &[DwellStiffness]) -> Vec<Candidat
         parameters,
         features,
     };
-    // Gap and yield displacement are searched from far below the smallest to just above the largest measured amplitude.
+    // The gap of backlash and the yield displacement of hysteresis are searched from far below the smallest to just
+    // above the largest measured amplitude.
     let sizes = points.iter().map(|point| point.amplitude);
     let (least, largest) = sizes.fold((f64::INFINITY, 0.0_f64), |(a, b), x| (a.min(x), b.max(x)));
     let scan = |of: &dyn Fn(&DwellStiffness, f64) -> Complex64| {
@@ -322,7 +329,7 @@ fn candidates(base: &LinearModel<'_>, points: &[DwellStiffness]) -> Vec<Candidat
         };
         let sum = |size: f64| base.sum_of_squares(&features(size));
         let (mut from, mut to) = ((0.05 * least).ln(), (1.5 * largest).ln());
-        // A coarse grid is refined three times around the best value.
+        // The coarse grid of gaps or yield displacements is refined three times around the best value.
         for _ in 0..4 {
             let step = (to - from) / 40.0;
             let mut best = (f64::INFINITY, from);
@@ -367,16 +374,18 @@ fn candidates(base: &LinearModel<'_>, points: &[DwellStiffness]) -> Vec<Candidat
     ]
 }
 
-/// True if the change of stiffness with the level is that of a quadratic spring alone.
+/// True if the change of the stiffness F/X with the level is that of a quadratic spring alone.
 ///
-/// Harmonic balance of k₂x² near resonance: a₀ = −k₂X²/2k, X₂ = k₂X²/6k. The stiffness changes by k₂(2a₀ + X₂) = −(5/6)k₂²X²/k =
-/// −30·k·(X₂/X)². k follows from the change of F/X with frequency at the lowest level.
+/// Harmonic balance of k₂x² near resonance: a₀ = −k₂X²/2k, X₂ = k₂X²/6k, with the offset a₀, the amplitude X at ω and
+/// X₂ at 2ω. The stiffness changes by k₂(2a₀ + X₂) = −(5/6)k₂²X²/k = −30·k·(X₂/X)². k follows from the change of F/X
+/// with frequency at the lowest level.
 fn is_due_to_quadratic_spring(points: &[DwellStiffness], dwells: &[Dwell]) -> bool {
     let shares: Vec<(f64, f64, f64)> = dwells
         .iter()
         .filter_map(|dwell| {
             let (_, motion) = pair(dwell)?;
-            // Ratio X₂/X of the displacement: each differentiation multiplies the second harmonic by another factor of 2.
+            // Ratio X₂/X of the second harmonic of the displacement to its fundamental: each differentiation in the
+            // measured quantity has multiplied it by 2.
             let larger = f64::from(1 << derivative(motion.quantity));
             let share = at_harmonic(motion, dwell, 2)?.0 / motion.amplitude(1) / larger;
             let size = motion.amplitude(1) / dwell.omega.powi(i32::from(derivative(motion.quantity)));
@@ -405,7 +414,8 @@ fn is_due_to_quadratic_spring(points: &[DwellStiffness], dwells: &[Dwell]) -> bo
         .map(|p| (p.omega * p.omega, p.stiffness.re))
         .collect();
     let [stiffness, _] = line(&by_frequency);
-    // Regression of the change of stiffness on the change of (X₂/X)² against the lowest level of the same frequency.
+    // Regression of the change of stiffness on the change of (X₂/X)², both against the lowest level of the same
+    // frequency; X₂/X is the second harmonic over the fundamental.
     let (mut above, mut below) = (0.0, 0.0);
     for point in points {
         let Some(base) = lowest.iter().find(|base| base.group == point.group) else {
@@ -416,7 +426,8 @@ fn is_due_to_quadratic_spring(points: &[DwellStiffness], dwells: &[Dwell]) -> bo
             below += (share - at_base) * (share - at_base);
         }
     }
-    // The ratio is −30 for a quadratic spring; ±50 % allow for damping, other modes and the next order of the balance.
+    // The ratio of the change of stiffness to k·(X₂/X)² is −30 for a quadratic spring; ±50 % allow for damping, other
+    // modes and the next order of the balance.
     let ratio = above / (below * stiffness);
     let [least, most] = QUADRATIC_STIFFNESS_RATIO;
     (-most..-least).contains(&ratio)
@@ -432,7 +443,8 @@ fn level_dependence(points: &[DwellStiffness]) -> f64 {
     largest
 }
 
-/// Amplitude |X(hω)| of harmonic h, and its standard deviation from noise.
+/// Amplitude of harmonic h of a force or motion channel in a dwell, and the standard deviation of its noise, in the
+/// unit of the channel.
 fn at_harmonic(line: &FourierSeries, dwell: &Dwell, h: usize) -> Option<(f64, f64)> {
     let place = 2 * h - 1;
     if line.coefficients.len() <= place + 1 {
@@ -442,7 +454,8 @@ fn at_harmonic(line: &FourierSeries, dwell: &Dwell, h: usize) -> Option<(f64, f6
     Some((line.amplitude(h), variance.sqrt()))
 }
 
-/// True if harmonic h of the motion exceeds both the noise and the response to harmonic h of the force.
+/// True if harmonic h of the motion, over all dwells, exceeds both the noise and the response to harmonic h of the
+/// force.
 fn harmonic(dwells: &[Dwell], h: usize) -> bool {
     let (mut sum, mut count) = (0.0, 0.0);
     for dwell in dwells {
@@ -454,13 +467,15 @@ fn harmonic(dwells: &[Dwell], h: usize) -> bool {
         else {
             continue;
         };
-        // The receptance at hω, above resonance, is at most the receptance at ω near resonance.
+        // The receptance at hω, above resonance, is at most the receptance at ω near resonance, so that this bounds the
+        // response to harmonic h of the force.
         let caused =
             (f - FORCE_HARMONIC_DEVIATIONS * force_noise).max(0.0) * motion.amplitude(1) / force.amplitude(1);
         sum += ((x - caused).max(0.0) / noise).powi(2);
         count += 2.0;
     }
-    // Significant if χ² exceeds the mean of its distribution by more than five of its standard deviations.
+    // The harmonic is significant if its χ² exceeds the mean of the χ² distribution by more than five standard
+    // deviations.
     count > 0.0 && sum > count + HARMONIC_DEVIATIONS * (2.0_f64 * count).sqrt()
 }
 

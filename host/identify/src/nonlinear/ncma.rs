@@ -1,11 +1,12 @@
-//! Nonlinear complex mode analysis: natural frequency and loss factor over force and receptance (thesis eqs 4.5 to 4.9).
+//! Nonlinear complex mode analysis: natural frequency and loss factor of a mode as functions of force and receptance
+//! (thesis eqs 4.5 to 4.9).
 
 use nalgebra::{DMatrix, DVector, Matrix4, Vector4};
 use num_complex::Complex64;
 use quietcut_numerics::least_squares::LinearProblem;
 use quietcut_numerics::roots::bisection;
 
-/// A receptance at constant force over frequency.
+/// A measured receptance at constant force amplitude over frequency.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Curve {
     /// Amplitude of the force, N.
@@ -14,7 +15,7 @@ pub struct Curve {
     pub points: Vec<(f64, Complex64)>,
 }
 
-/// Mode linearized at one vibration amplitude.
+/// Mode linearized at one vibration amplitude, from two points of a receptance with equal magnitude.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Linearized {
     /// Amplitude of the force, N.
@@ -25,27 +26,29 @@ pub struct Linearized {
     pub omega: f64,
     /// Loss factor η_r.
     pub loss_factor: f64,
-    /// Complex modal constant A_r + iB_r.
+    /// Complex modal constant A_r + iB_r of the mode, numerator of its receptance.
     pub modal_constant: Complex64,
 }
 
-/// Empirical map value(F, X/F) = a(F)·(X/F)² + b(F)·(X/F) + c(F). The polynomials a, b, c in F have degree 1 as in thesis eqs 4.8
-/// and 4.9, or degree 2, which a cubic mode requires (its a is proportional to F²).
+/// Empirical map of a modal parameter over the force amplitude F and the receptance X/F: value = a(F)·(X/F)² +
+/// b(F)·(X/F) + c(F). The polynomials a, b, c in F have degree 1 as in thesis eqs 4.8 and 4.9, or degree 2, which a
+/// cubic mode requires (its a is proportional to F²).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Map {
-    /// Coefficients of a from the highest power of F down, then those of b, then those of c.
+    /// Coefficients of the polynomial a from the highest power of F down, then those of b, then those of c.
     pub coefficients: Vec<f64>,
     /// Standard deviations of the coefficients.
     pub deviations: Vec<f64>,
-    /// NRMSE of the map: RMS of the residual over RMS of the values.
+    /// NRMSE of the map: RMS of the residual over RMS of the mapped values.
     pub relative_error: f64,
-    /// Smallest and largest force, N, and smallest and largest receptance, m/N, of the data.
+    /// Smallest and largest force, N, and smallest and largest receptance, m/N, of the fitted points.
     pub range: [[f64; 2]; 2],
 }
 
-/// Coefficients of thesis eq. 4.8 as printed: ω_r of the first mode in y, in Hz as in Fig. 4.10.
+/// Coefficients of the map of thesis eq. 4.8 as printed: natural frequency ω_r of the first mode in y, in Hz as in Fig.
+/// 4.10.
 pub const THESIS_FREQUENCY_HZ: [f64; 6] = [-3.7e8, 1.3e9, 5.6e3, -6.3, -0.036, 8.7];
-/// Coefficients of thesis eq. 4.9 as printed: loss factor η_r of the first mode in y.
+/// Coefficients of the map of thesis eq. 4.9 as printed: loss factor η_r of the first mode in y.
 pub const THESIS_LOSS_FACTOR: [f64; 6] = [6.1e7, -2.4e8, -1.1e3, 2.1e3, 0.005, 0.039];
 
 /// The value of a map with these coefficients: three polynomials in F of equal degree, see [`Map`].
@@ -58,13 +61,13 @@ pub fn evaluate(coefficients: &[f64], force_n: f64, receptance: f64) -> f64 {
 }
 
 impl Map {
-    /// Value of the map at force F, N, and receptance X/F, m/N.
+    /// Value of the mapped modal parameter at force F, N, and receptance X/F, m/N.
     pub fn at(&self, force_n: f64, receptance: f64) -> f64 {
         evaluate(&self.coefficients, force_n, receptance)
     }
 
-    /// Fits thesis eq. 4.7 to all forces together by least squares. `None` if there are fewer points than coefficients, or no more
-    /// distinct forces than the degree.
+    /// Fits the map of thesis eq. 4.7 to the points of all forces together by least squares. `None` if there are fewer
+    /// points than coefficients, or no more distinct forces than the degree in F.
     pub fn fit(points: &[Linearized], degree: usize, value: impl Fn(&Linearized) -> f64) -> Option<Self> {
         let size = degree + 1;
         let matrix = DMatrix::from_fn(points.len(), 3 * size, |row, column| {
@@ -97,10 +100,11 @@ impl Map {
 }
 
 impl Curve {
-    /// Linearized modes from pairs of points with equal |H| on both sides of the peak, down to `share` of the peak.
+    /// Linearized modes from pairs of points with equal |H| on both sides of the resonance peak, down to the fraction
+    /// `share` of the peak.
     ///
-    /// Each measured point on one side is paired with an interpolated point on the other. Between points H is a cubic through four
-    /// of them, in real and imaginary part.
+    /// Each measured point on one side is paired with an interpolated point on the other. Between points, real and
+    /// imaginary part of H are cubics through four of them.
     pub fn linearized(&self, share: f64) -> Vec<Linearized> {
         let Some(peak) = self.peak() else {
             return Vec::new();
@@ -144,7 +148,8 @@ impl Curve {
         (peak > 0 && peak + 1 < self.points.len()).then_some(peak)
     }
 
-    /// First crossing of |H| with `level` in the intervals that begin at `starts`: its ω and H.
+    /// First crossing of |H| with `level` in the frequency intervals that begin at the points `starts`: its ω, rad/s,
+    /// and H.
     fn crossing(&self, level: f64, starts: Vec<usize>) -> Option<(f64, Complex64)> {
         let start = starts.into_iter().find(|&i| {
             let (a, b) = (
@@ -161,7 +166,8 @@ impl Curve {
         Some((low, self.between(start, low)))
     }
 
-    /// H at `omega` from the cubic through the four points around the interval that begins at `start`.
+    /// Receptance at `omega`, rad/s, from the cubic through the four points around the interval that begins at the
+    /// point `start`.
     fn between(&self, start: usize, omega: f64) -> Complex64 {
         let first = start.saturating_sub(1).min(self.points.len().saturating_sub(4));
         let around = &self.points[first..(first + 4).min(self.points.len())];
@@ -179,7 +185,8 @@ impl Curve {
     }
 }
 
-/// Mode through two receptances (thesis eqs 4.5 and 4.6): natural frequency ω_r, loss factor η_r, modal constant A_r + iB_r.
+/// Mode through two points (ω_j, H_j) of a receptance (thesis eqs 4.5 and 4.6): natural frequency ω_r, rad/s, loss
+/// factor η_r, modal constant A_r + iB_r.
 ///
 /// With p = ω_r² and g = η_r ω_r² the two complex equations H_j·(p − ω_j² + i·g) = A + iB are linear in p, g, A, B.
 pub fn two_points(points: [(f64, Complex64); 2]) -> Option<(f64, f64, Complex64)> {

@@ -1,8 +1,10 @@
-//! Coefficients of a law from whole periods of a periodic test (a multisine), by harmonic balance with every line of the period.
+//! Coefficients of a nonlinear equation of motion from whole periods of a periodic test (a multisine), by harmonic
+//! balance with every line of the period.
 //!
-//! The balance Σ θ φ(x) = F is solved for the periodic x at the samples of a period, at twice the measured sample rate, so that
-//! cubes of the measured band do not alias into it. Newton's method solves its linear systems iteratively (GMRES, preconditioned by
-//! the linear part). The predicted motion is fitted to the measured one with exact derivatives.
+//! The balance Σ θ φ(x) = F, with the coefficients θ of the terms φ, is solved for the periodic displacement x at the
+//! samples of a period, at twice the measured sample rate, so that cubes of the measured band do not alias into it.
+//! Newton's method solves its linear systems iteratively (GMRES, preconditioned by the linear part). The predicted
+//! motion is fitted to the measured one with exact derivatives.
 
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -17,19 +19,19 @@ use rustfft::{Fft, FftPlanner};
 
 use crate::nonlinear::restoring_force::{ForceTerm, deviations};
 
-/// One period of a periodic test.
+/// Force and displacement in one period of a periodic test.
 #[derive(Clone, Copy, Debug)]
 pub struct Period<'a> {
     /// Force, N.
     pub force: &'a [f64],
-    /// Displacement, m; its mean is subtracted.
+    /// Measured displacement, m; its mean is subtracted before the fit.
     pub displacement: &'a [f64],
 }
 
-/// A law fitted to the periods of a test.
+/// An equation of motion fitted to the periods of a periodic test.
 #[derive(Clone, Debug)]
 pub struct PeriodicFit {
-    /// The terms of the law with their coefficients, SI.
+    /// The terms of the equation of motion with their coefficients, SI units.
     pub law: Vec<(ForceTerm, f64)>,
     /// Standard deviations of the coefficients.
     pub deviations: Vec<f64>,
@@ -37,29 +39,29 @@ pub struct PeriodicFit {
     pub relative_error: f64,
 }
 
-/// Reason why the fit gives no result.
+/// Reason why the fit of an equation of motion to periods gives no result.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PeriodicError {
-    /// A term of the law is not smooth.
+    /// A term of the equation of motion is not smooth in displacement or velocity, such as Coulomb friction.
     #[error(
         "{0} is not smooth: harmonic balance of a multisine takes springs and dampers; use restoring-force"
     )]
     NotSmooth(&'static str),
-    /// The periods differ in length, or are too short.
+    /// The periods differ in their number of samples, or are too short.
     #[error("periods of one length, at least 16 samples, are needed")]
     Length,
-    /// The terms lack mass, damping or stiffness, without which the law has no periodic motion.
+    /// The terms lack mass, damping or stiffness, without which the equation of motion has no periodic solution.
     #[error("mass, damping and stiffness are needed among the terms")]
     NoOscillator,
-    /// The harmonic balance or the fit does not converge.
+    /// The harmonic balance or the fit of its coefficients does not converge.
     #[error("the balance does not converge: the law has no periodic motion near the measured one")]
     NotConverged,
-    /// The periods do not determine all terms.
+    /// The measured periods do not determine the coefficients of all terms.
     #[error("the periods do not determine all terms")]
     Undetermined,
 }
 
-/// Ratio of the sample rate of the balance to that of the record.
+/// Ratio of the sample rate at which the harmonic balance is solved to that of the record.
 const DENSER: usize = 2;
 
 struct Balance {
@@ -94,7 +96,7 @@ impl Balance {
         }
     }
 
-    /// Real samples of a period, filtered with the frequency response `filter`(ω).
+    /// Real samples of a period, filtered with the frequency response `filter`(ω), ω in rad/s.
     fn filtered(&self, samples: &[f64], filter: impl Fn(f64) -> Complex64) -> Vec<f64> {
         let mut line: Vec<Complex64> = samples.iter().map(|x| Complex64::new(*x, 0.0)).collect();
         self.forward.process(&mut line);
@@ -113,7 +115,7 @@ impl Balance {
         line.into_iter().map(|x| x.re * scale).collect()
     }
 
-    /// The samples of a period interpolated to the sample rate of the balance, with unchanged spectrum.
+    /// The samples of a period interpolated to the sample rate of the harmonic balance, with unchanged spectrum.
     fn dense(&self, samples: &[f64]) -> Vec<f64> {
         let count = samples.len();
         let mut planner = FftPlanner::new();
@@ -132,7 +134,7 @@ impl Balance {
         self.filtered(x, |omega| Complex64::new(0.0, omega).powi(order))
     }
 
-    /// Regressor φ of every term at every sample, for the displacement x.
+    /// Regressor φ of every term of the equation of motion at every sample, for the periodic displacement x.
     fn features(&self, x: &[f64]) -> Vec<Vec<f64>> {
         let (v, a) = (self.derivative(x, 1), self.derivative(x, 2));
         self.terms
@@ -146,7 +148,7 @@ impl Balance {
         place.map_or(0.0, |index| theta[index])
     }
 
-    /// Derivatives of the nonlinear restoring force by x and by v at every sample.
+    /// Derivatives of the nonlinear restoring force by displacement x and velocity v at every sample.
     fn slopes(&self, theta: &DVector<f64>, x: &[f64]) -> [Vec<f64>; 2] {
         let v = self.derivative(x, 1);
         let (k2, k3) = (
@@ -173,7 +175,8 @@ impl Balance {
         move |omega: f64| Complex64::new(k + more[0] - m * omega * omega, (c + more[1]) * omega)
     }
 
-    /// Solves J δ = `right`, with J the derivative of the balance by the displacement.
+    /// Solves J δ = `right` for the change δ of the displacement, with J the derivative of the harmonic balance by the
+    /// displacement.
     fn solve_linear(&self, theta: &DVector<f64>, slopes: &[Vec<f64>; 2], right: &[f64]) -> Option<Vec<f64>> {
         let mean = |values: &Vec<f64>| values.iter().sum::<f64>() / values.len() as f64;
         let near = self.linear(theta, [mean(&slopes[0]), mean(&slopes[1])]);
@@ -191,9 +194,10 @@ impl Balance {
         gmres(apply, right).map(|y| precondition(&y))
     }
 
-    /// Periodic motion under `force`, by Newton's method from `x`; `None` without convergence.
+    /// Periodic displacement under `force`, by Newton's method from `start`; `None` without convergence.
     fn solve(&self, theta: &DVector<f64>, force: &[f64], start: Vec<f64>) -> Option<Vec<f64>> {
-        // GMRES leaves an error of 1e-9 of each step: after a step of 1e-9 of the motion, both are rounding.
+        // GMRES leaves a relative error of 1e-9 in each Newton step: after a step of 1e-9 of the motion, both are
+        // rounding.
         let newton = Newton::new(25, 1e-9);
         let found = newton.solve(start, |x: &Vec<f64>| {
             let mut residual: Vec<f64> = force.iter().map(|f| -f).collect();
@@ -217,7 +221,7 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-/// Solves A y = b by GMRES without restart; `None` if a hundred iterations do not reduce the residual to 1e-9.
+/// Solves A y = b by GMRES without restart; `None` if a hundred iterations do not reduce the residual to 1e-9 of b.
 fn gmres(apply: impl Fn(&[f64]) -> Vec<f64>, right: &[f64]) -> Option<Vec<f64>> {
     let size = norm(right);
     if size == 0.0 {
@@ -258,7 +262,7 @@ fn gmres(apply: impl Fn(&[f64]) -> Vec<f64>, right: &[f64]) -> Option<Vec<f64>> 
     None
 }
 
-/// Fits the coefficients of the given terms to the periods of a test.
+/// Fits the coefficients of the given terms of an equation of motion to the periods of a periodic test.
 ///
 /// # Errors
 /// See [`PeriodicError`].
@@ -299,7 +303,7 @@ pub fn fit(periods: &[Period<'_>], rate_hz: f64, terms: &[ForceTerm]) -> Result<
             .map_err(|_| PeriodicError::Undetermined)?;
         theta += &fit.parameters;
         let moved = fit.parameters.component_div(&theta).amax();
-        // The relative change of every coefficient is below a millionth: far below any interval.
+        // The fit has converged: the relative change of every coefficient is below a millionth, far below any interval.
         if moved < 1e-6 {
             let (slope, left) = balance.linearized(&theta, &forces, &measured, &mut motions)?;
             let all: f64 = measured.iter().map(|y| dot(y, y)).sum();
@@ -314,9 +318,10 @@ pub fn fit(periods: &[Period<'_>], rate_hz: f64, terms: &[ForceTerm]) -> Result<
     Err(PeriodicError::NotConverged)
 }
 
-/// Coefficients by linear least squares on the balance of the measured motion, within the band of the force.
+/// First guess of the coefficients, by linear least squares on the balance Σ θ φ(x) = F of the measured motion, within
+/// the frequency band of the force.
 fn first_guess(balance: &Balance, forces: &[Vec<f64>], motions: &[Vec<f64>]) -> Option<DVector<f64>> {
-    // Above the band of the force the derivatives of the measured motion consist of noise.
+    // Above the frequency band of the force the derivatives of the measured motion consist of noise.
     let limit = force_band(balance, forces);
     let keep = |x: &[f64]| {
         balance.filtered(x, |omega| {
@@ -359,8 +364,8 @@ fn force_band(balance: &Balance, forces: &[Vec<f64>]) -> f64 {
 }
 
 impl Balance {
-    /// Derivative of the motion by θ at the measured samples of all periods, and measured minus predicted motion. Replaces
-    /// `motions` by the predicted motion.
+    /// Derivative of the predicted motion by the coefficients θ at the measured samples of all periods, and measured
+    /// minus predicted motion. Replaces `motions` by the predicted motion.
     fn linearized(
         &self,
         theta: &DVector<f64>,

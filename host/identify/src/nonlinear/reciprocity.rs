@@ -12,7 +12,7 @@ use quietcut_model::structure::Direction;
 pub struct Reciprocity {
     /// The directions i and j.
     pub directions: [&'static str; 2],
-    /// Mean square of H_ij − H_ji over its variance: near 1 for a reciprocal structure.
+    /// Mean over the frequencies of |H_ij − H_ji|² divided by its variance: near 1 for a reciprocal structure.
     pub misfit: f64,
     /// Largest difference of H_ij and H_ji, relative to the largest |H_ij|.
     pub largest_change: f64,
@@ -20,7 +20,8 @@ pub struct Reciprocity {
     pub reciprocal: bool,
 }
 
-/// Receptance in direction `to` under a force in direction `from`, m/N, its variance, and the force amplitude, N.
+/// Receptance in direction `to` under a force in direction `from` in one dwell, m/N, its variance, and the force
+/// amplitude, N.
 fn receptance(dwell: &Dwell, from: Direction, to: Direction) -> Option<(Complex64, f64, f64)> {
     let force = dwell.force().filter(|line| line.direction == from)?;
     let motion = dwell.motions.iter().find(|line| line.direction == to)?;
@@ -30,7 +31,7 @@ fn receptance(dwell: &Dwell, from: Direction, to: Direction) -> Option<(Complex6
     let h = y / order / f;
     let own = motion.variance / (order * f).norm_sqr();
     let of_force = h.norm_sqr() * force.variance / f.norm_sqr();
-    // The variance is that of real and imaginary part together.
+    // The variance of the receptance is that of real and imaginary part together.
     Some((h, 2.0 * per_unit * (own + of_force), f.norm()))
 }
 
@@ -82,8 +83,8 @@ pub fn compare(dwells: &[Dwell], [i, j]: [Direction; 2]) -> Option<Reciprocity> 
         directions: [i.name(), j.name()],
         misfit,
         largest_change,
-        // The mean of `count` exponential variables of mean 1 rarely exceeds 1 by five standard deviations; 1 % is the accuracy of
-        // the position of a shaker.
+        // The misfit is a mean of `count` exponential variables of mean 1, which rarely exceeds 1 by five standard
+        // deviations. A difference of 1 % is within the accuracy of the position of a shaker.
         reciprocal: misfit < 1.0 + RECIPROCAL_DEVIATIONS / f64::sqrt(count)
             || largest_change < LEAST_RECIPROCITY_CHANGE,
     })

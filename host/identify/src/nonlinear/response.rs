@@ -1,14 +1,15 @@
-//! Motion that an identified law predicts under a recorded force.
+//! Motion that an identified equation of motion predicts under a recorded force.
 
 use num_complex::Complex64;
 use rustfft::FftPlanner;
 
 use crate::nonlinear::restoring_force::ForceTerm;
 
-/// Number of instants per sample at which the force is interpolated; a Runge–Kutta step uses two of them, so it must be even.
+/// Number of instants per sample at which the force is interpolated for the Runge–Kutta integration; one step spans two
+/// of them, so the number must be even.
 const FINER: usize = 8;
 
-/// Reason why a law gives no prediction.
+/// Reason why an equation of motion gives no prediction of the motion.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum ResponseError {
     /// The law has no mass.
@@ -19,15 +20,16 @@ pub enum ResponseError {
         "the motion of the law grows without bound after {time_s:.3} s: the law does not hold at this force"
     )]
     Diverged {
-        /// Time at which the displacement is no longer finite, s.
+        /// Time of the first sample after which the predicted displacement is no longer finite, s.
         time_s: f64,
     },
 }
 
-/// Displacement, m, that the law Σ θ φ = F predicts from rest, at the samples of `force` (N, at `rate_hz`).
+/// Displacement, m, that the equation of motion Σ θ φ = F predicts from rest, at the samples of `force` (N, at
+/// `rate_hz`); `law` holds the terms φ with their coefficients θ.
 ///
-/// Between samples the force is interpolated without a change of its spectrum, as for a signal that passed an anti-aliasing filter.
-/// The classical Runge–Kutta method takes four steps per sample.
+/// Between samples the force is interpolated without a change of its spectrum, as for a signal that passed an
+/// anti-aliasing filter. The classical Runge–Kutta method takes four steps per sample.
 ///
 /// # Errors
 /// No mass, or a motion without bound.
@@ -83,7 +85,7 @@ pub fn displacement(
     Ok(found)
 }
 
-/// The samples interpolated to [`FINER`] times their rate, with unchanged spectrum.
+/// Samples of the force interpolated to [`FINER`] times their rate, with unchanged spectrum.
 fn finer(samples: &[f64]) -> Vec<f64> {
     let count = samples.len();
     let mut planner = FftPlanner::new();

@@ -1,9 +1,11 @@
-//! The restoring-force surface f_r(q̇, q) = f − m q̈ (thesis eq. 5.4), its slices, and the law fitted to it.
+//! The restoring-force surface f_r(q̇, q) = f − m q̈ (thesis eq. 5.4), its slices, and the force law fitted to it.
 //!
-//! The law is fitted by least squares between force and motion *within a band*. Force and every term of the law, nonlinear terms
-//! included, pass the same filter: the filtered signals satisfy the same equation, and noise of derivatives outside the band has no
-//! effect. If the law has a spring, the equation error is weighted by its receptance and becomes an error of the *motion*, which
-//! carries the noise (Sanathanan–Koerner weighting). One motion channel is sufficient; the others are its derivatives or integrals.
+//! The force law is fitted by least squares between force and motion *within a band* of frequencies. Force and every
+//! term of the law, nonlinear terms included, pass the same filter: the filtered signals satisfy the same equation, and
+//! noise of derivatives outside the band has no effect. If the law has a spring, the error of the force is weighted by
+//! the receptance of the law and becomes an error of the *motion*, which carries the noise (Sanathanan–Koerner
+//! weighting). One motion channel is sufficient; displacement, velocity and acceleration follow from it by
+//! differentiation or integration.
 
 use std::f64::consts::TAU;
 
@@ -15,7 +17,7 @@ use crate::nonlinear::spectrum::{Spectral, band_of, dominant_frequency_hz};
 use crate::student::NINETY_PERCENT;
 use quietcut_recording::Quantity;
 
-/// A term of a force law along one direction q.
+/// A term of a force law f(q, q̇, q̈) along one direction q.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum ForceTerm {
     /// m q̈.
@@ -39,7 +41,7 @@ pub enum ForceTerm {
 }
 
 impl ForceTerm {
-    /// Key of the term in answers and cases.
+    /// Key of the term in JSON answers and case files.
     pub fn key(self) -> &'static str {
         match self {
             Self::Mass => "mass_kg",
@@ -54,7 +56,7 @@ impl ForceTerm {
         }
     }
 
-    /// Regressor of the term at the displacement x, velocity v and acceleration a.
+    /// Regressor of the term (its force per unit coefficient) at the displacement x, velocity v and acceleration a.
     pub fn value(self, x: f64, v: f64, a: f64) -> f64 {
         match self {
             Self::Mass => a,
@@ -81,9 +83,9 @@ impl ForceTerm {
 pub struct Record<'a> {
     /// Force on the structure, N.
     pub force: &'a [f64],
-    /// The measured motion, SI; its quantity is `quantity`.
+    /// The measured motion, SI units; `quantity` states whether it is displacement, velocity or acceleration.
     pub motion: &'a [f64],
-    /// Quantity of the motion: displacement, velocity or acceleration.
+    /// Quantity of the measured motion: displacement, velocity or acceleration.
     pub quantity: Quantity,
     /// Samples per second.
     pub rate_hz: f64,
@@ -94,11 +96,11 @@ pub struct Record<'a> {
 pub struct Options {
     /// The terms of the law.
     pub terms: Vec<ForceTerm>,
-    /// The mass if it is given, kg. Required for a record without force.
+    /// Given moving mass, kg; `None` if the fit determines it. Required for a record without force.
     pub mass_kg: Option<f64>,
-    /// Frequency band of the fit, Hz; `None` takes the band in which the motion exceeds its noise.
+    /// Frequency band of the fit, Hz; `None` takes the band in which the measured motion exceeds its noise.
     pub band_hz: Option<[f64; 2]>,
-    /// Duration that is left out at both ends of the record, s.
+    /// Duration that is left out of the fit at each end of the record, s.
     pub trim_s: f64,
 }
 
@@ -113,26 +115,27 @@ pub struct Motion {
     pub a: Vec<f64>,
 }
 
-/// Result of the fit: the force law of a record, and its restoring-force surface.
+/// Result of the fit to a record: the force law, and the restoring-force surface.
 #[derive(Clone, Debug)]
 pub struct Surface {
     /// The fitted terms.
     pub terms: Vec<ForceTerm>,
     /// Coefficients of the terms, SI.
     pub theta: DVector<f64>,
-    /// Standard deviations of the coefficients, from the residual and its correlation in time.
+    /// Standard deviations of the coefficients of the force law, from the residual and its correlation in time.
     pub deviations: DVector<f64>,
-    /// NRMSE of the force within the band; without a force, of m q̈.
+    /// NRMSE of the force within the band: RMS of the residual over RMS of the force, or of m q̈ in a record without
+    /// force.
     pub force_error: f64,
     /// Frequency band of the fit, Hz.
     pub band_hz: [f64; 2],
     /// Motion at the samples used.
     pub motion: Motion,
-    /// Restoring force f_r = f − m q̈ at the samples used, N.
+    /// Restoring force f_r = f − m q̈ at the samples of the surface, N.
     pub restoring_n: Vec<f64>,
 }
 
-/// Reason why the fit gives no result.
+/// Reason why the fit of a force law to a record gives no result.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SurfaceError {
     /// The record has no force and the mass is not given.
@@ -140,7 +143,7 @@ pub enum SurfaceError {
         "no force acts in the record, so that only ratios to the mass can be found; give the mass (--mass-kg)"
     )]
     NoForce,
-    /// The record is too short for the number of terms.
+    /// The record has too few samples for the number of terms of the force law.
     #[error("{samples} samples are too few for {terms} terms; at least {needed} are needed")]
     TooShort {
         /// Number of samples after trimming.
@@ -150,16 +153,17 @@ pub enum SurfaceError {
         /// Number of samples needed.
         needed: usize,
     },
-    /// The data do not determine all terms.
+    /// The record does not determine the coefficients of all terms.
     #[error("the record does not determine all terms; leave some out, or excite more strongly")]
     Undetermined,
 }
 
-/// Number of rounds of Sanathanan–Koerner weighting. A choice: the last round changes nothing noticeable.
+/// Number of rounds of Sanathanan–Koerner weighting in the fit of a force law. A choice: the last round changes nothing
+/// noticeable.
 const REWEIGHTINGS: usize = 4;
 
 impl Record<'_> {
-    /// Displacement, velocity and acceleration within `band_hz`.
+    /// Displacement, velocity and acceleration of the record within `band_hz`, from its measured motion.
     pub fn motion(&self, band_hz: [f64; 2]) -> Motion {
         let spectral = Spectral::new(self.motion.len(), self.rate_hz);
         let measured = match self.quantity {
@@ -192,10 +196,11 @@ impl Record<'_> {
         if !driven && options.mass_kg.is_none() {
             return Err(SurfaceError::NoForce);
         }
-        // Nonlinear terms produce harmonics above the band of the fit; they belong to the surface, so the motion keeps them.
+        // Nonlinear terms produce harmonics of the motion above the band of the fit; they belong to the restoring-force
+        // surface, so the motion keeps them.
         let highest_hz = (1.5 * band_hz[1]).max(3.5 * dominant_hz).min(0.5 * self.rate_hz);
         let motion = self.motion([lowest_hz, highest_hz]);
-        // With a given mass the left side of the equation is f − m q̈, and mass is not a term of the law.
+        // With a given mass m the fitted force is f − m q̈, and mass is not a term of the law.
         let mass = options.mass_kg.unwrap_or(0.0);
         let known: Vec<f64> = self
             .force
@@ -289,8 +294,8 @@ impl Record<'_> {
         })
     }
 
-    /// Relative residual force of a given law, ‖f − Σ θ·term‖/‖f‖ within `band_hz`: [`Surface::force_error`] of a law that was
-    /// fitted elsewhere.
+    /// Residual force of a law that was fitted elsewhere, relative to the force within `band_hz`: ‖f − Σ θ·term‖/‖f‖,
+    /// as [`Surface::force_error`].
     pub fn force_error(&self, law: &[(ForceTerm, f64)], band_hz: [f64; 2], trim_s: f64) -> f64 {
         let motion = self.motion([0.0, 0.5 * self.rate_hz]);
         let left: Vec<f64> = (0..self.motion.len())
@@ -317,7 +322,8 @@ impl Record<'_> {
     }
 }
 
-/// Magnitude of the receptance of the linear terms over frequency in Hz, relative to the static compliance.
+/// Magnitude of the receptance of the force law's linear terms, relative to the static compliance; the returned
+/// function takes the frequency in Hz.
 fn receptance(terms: &[ForceTerm], theta: &DVector<f64>, mass: f64) -> impl Fn(f64) -> f64 + use<> {
     let of = |term: ForceTerm| {
         let place = terms.iter().position(|known| *known == term);
@@ -328,14 +334,15 @@ fn receptance(terms: &[ForceTerm], theta: &DVector<f64>, mass: f64) -> impl Fn(f
     move |frequency: f64| {
         let omega = TAU * frequency;
         let stiff = stiffness - mass * omega * omega;
-        // The damping has a lower bound, since a mode without damping would put all weight on one line.
+        // The damping force per displacement has the lower bound 1e-3 of the stiffness, since a mode without damping
+        // would put all weight on one line.
         let lossy = (damping * omega).abs().max(1e-3 * stiffness.abs());
         stiffness.abs() / stiff.hypot(lossy)
     }
 }
 
-/// Standard deviations of a least-squares solution whose residual is correlated in time: sandwich covariance with sums over blocks
-/// (the block form of Newey and West).
+/// Standard deviations of a least-squares solution whose residual is correlated in time: sandwich covariance from sums
+/// over blocks of samples (the block form of Newey and West).
 pub(crate) fn deviations(matrix: &DMatrix<f64>, left: &DVector<f64>) -> Option<DVector<f64>> {
     let inverse = invert_normal_equations(&matrix.tr_mul(matrix))?;
     let blocks = 40.min(matrix.nrows() / (2 * matrix.ncols()).max(1)).max(1);
@@ -350,31 +357,32 @@ pub(crate) fn deviations(matrix: &DMatrix<f64>, left: &DVector<f64>) -> Option<D
     Some(covariance.diagonal().map(|variance| variance.max(0.0).sqrt()))
 }
 
-/// A polynomial in displacement or velocity, fitted along a slice of the surface.
+/// Slice through a restoring-force surface along displacement or velocity, with a polynomial of first and third power
+/// fitted to it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Slice {
-    /// Samples of the slice: (x or v, f_r).
+    /// Samples of the slice: displacement x, m, or velocity v, m/s, and restoring force f_r, N.
     pub points: Vec<(f64, f64)>,
-    /// Coefficient of the first power and its standard deviation.
+    /// Coefficient of the first power of x or v, and its standard deviation.
     pub linear: (f64, f64),
-    /// Coefficient of the third power and its standard deviation.
+    /// Coefficient of the third power of x or v, and its standard deviation.
     pub cubic: (f64, f64),
 }
 
 impl Surface {
-    /// The stiffness slice: f_r over x for |v| below `share` of its maximum. A linear term in v accounts for the remaining
-    /// velocity.
+    /// Stiffness slice of the surface: restoring force f_r over displacement x at the samples with |v| below the
+    /// fraction `share` of its maximum. A linear term in v accounts for the remaining velocity.
     pub fn stiffness_slice(&self, share: f64) -> Option<Slice> {
         slice(&self.motion.x, &self.motion.v, &self.restoring_n, share)
     }
 
-    /// The damping slice: f_r over v for |x| below `share` of its maximum. A linear term in x accounts for the remaining
-    /// displacement.
+    /// Damping slice of the surface: restoring force f_r over velocity v at the samples with |x| below the fraction
+    /// `share` of its maximum. A linear term in x accounts for the remaining displacement.
     pub fn damping_slice(&self, share: f64) -> Option<Slice> {
         slice(&self.motion.v, &self.motion.x, &self.restoring_n, share)
     }
 
-    /// Half-width of the 90 % interval of the term with this index.
+    /// Half-width of the 90 % interval of the coefficient of the term with this index.
     pub fn half_width(&self, index: usize) -> f64 {
         NINETY_PERCENT * self.deviations[index]
     }

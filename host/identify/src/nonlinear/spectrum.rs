@@ -1,8 +1,8 @@
-//! Derivatives, integrals and weights of whole records by the discrete Fourier transform.
+//! Derivatives, integrals and filters of whole records by the discrete Fourier transform.
 //!
-//! A record is not periodic. The straight line through its ends is subtracted, and the remaining signal is continued by point
-//! reflection about its end, so that value and slope are continuous. An error of the length of about one period of the lowest
-//! frequency remains at both ends; callers leave it out.
+//! A record is not periodic. The straight line through its ends is subtracted, and the remaining signal is continued by
+//! point reflection about its end, so that value and slope are continuous. At both ends of the result an error remains,
+//! over about one period of the lowest frequency; callers leave these ends out.
 
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -18,21 +18,23 @@ pub struct Spectral {
     rate_hz: f64,
     /// Number of samples of a record.
     length: usize,
-    /// Number of samples that are transformed: the record forwards and backwards, with each end once.
+    /// Number of samples that are transformed: the record forwards and backwards, with each end sample once.
     period: usize,
 }
 
-/// Continuation of a record beyond its ends.
+/// Continuation of a record beyond its ends before its Fourier transform.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Continuation {
-    /// Point reflection about its ends, after the straight line through them is subtracted: value and slope are continuous.
+    /// Point reflection of the record about its ends, after the straight line through them is subtracted: value and
+    /// slope are continuous.
     Points,
-    /// Mirror reflection: the value is continuous. The integral of such a record does not drift.
+    /// Mirror reflection of the record at its ends: the value is continuous. The integral of such a record does not
+    /// drift.
     Mirror,
 }
 
 impl Spectral {
-    /// Plans the transforms of records of `length` samples at `rate_hz`; at least two samples.
+    /// Plans the Fourier transforms of records of `length` samples (at least two) at the sample rate `rate_hz`.
     pub fn new(length: usize, rate_hz: f64) -> Self {
         let period = (2 * length).saturating_sub(2).max(2);
         let mut planner = FftPlanner::new();
@@ -45,7 +47,7 @@ impl Spectral {
         }
     }
 
-    /// Frequency of a line of the transform, Hz; negative in the upper half.
+    /// Frequency of a line of the transform, Hz; negative in the upper half of the lines.
     fn frequency_hz(&self, line: usize) -> f64 {
         let signed = if 2 * line > self.period {
             line as f64 - self.period as f64
@@ -96,9 +98,9 @@ impl Spectral {
             .collect()
     }
 
-    /// The record within `band_hz`, differentiated `order` times, or integrated for a negative order. With a band from 0 the level
-    /// and slope of the record stay. With a band from above 0 the lower band edge is gradual, and the record is mirrored at its
-    /// ends.
+    /// The record within `band_hz`, differentiated `order` times over time, or integrated for a negative order. With a
+    /// band from 0 Hz the level and slope of the record are kept. With a band from above 0 Hz the lower band edge is
+    /// gradual, and the record is mirrored at its ends.
     pub fn derivative(&self, samples: &[f64], order: i32, band_hz: [f64; 2]) -> Vec<f64> {
         let nyquist = 0.5 * self.rate_hz;
         let filter = |frequency: f64| {
@@ -107,7 +109,7 @@ impl Spectral {
             } else {
                 0.0
             };
-            // At half the sample rate an odd derivative of real samples is zero.
+            // At half the sample rate an odd derivative of a real record is zero.
             let edge = order % 2 != 0 && frequency.abs() >= nyquist * (1.0 - 1e-12);
             if within == 0.0 || edge || (frequency == 0.0 && order < 0) {
                 Complex64::ZERO
@@ -127,7 +129,7 @@ impl Spectral {
         })
     }
 
-    /// The record with its spectrum multiplied by a real `weight` of the frequency in Hz: without a phase shift.
+    /// The record with its spectrum multiplied by a real `weight` of the frequency in Hz, so that no phase shifts.
     pub fn weighted(&self, samples: &[f64], weight: impl Fn(f64) -> f64) -> Vec<f64> {
         let still = weight(0.0);
         self.through(
@@ -139,8 +141,8 @@ impl Spectral {
     }
 }
 
-/// Gradual lower edge of a band: 1 above `low`, 0 below half of it, half a cosine between. A sharp edge would ring through the
-/// whole record.
+/// Gain of a gradual lower band edge: 1 above `low`, 0 below half of it, half a cosine between. A sharp edge would ring
+/// through the whole record.
 fn above(frequency: f64, low: f64) -> f64 {
     if frequency >= low {
         1.0
@@ -150,7 +152,8 @@ fn above(frequency: f64, low: f64) -> f64 {
     }
 }
 
-/// Power spectrum averaged over intervals of 1/400 of the sample rate, and the width of these intervals, Hz.
+/// Power spectrum of a record averaged over frequency intervals of 1/400 of the sample rate, and the width of these
+/// intervals, Hz.
 fn smooth_power(samples: &[f64], rate_hz: f64) -> (Vec<f64>, f64) {
     let length = samples.len();
     // A Hann window reduces the leakage from the ends of the record.

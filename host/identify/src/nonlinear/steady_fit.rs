@@ -1,9 +1,9 @@
-//! Parameters of a law from measured periodic motions, by harmonic balance.
+//! Parameters of a nonlinear equation of motion from measured periodic motions, by harmonic balance.
 //!
-//! The motion that the law predicts under the *measured* force is fitted to the measured motion. The residual is weighted with its
-//! covariance: noise of the motion, and noise of force and frequency propagated through the exact derivatives of the law. Intervals
-//! are those of the normal distribution. If the residual exceeds the noise, intervals come from the scatter between dwells
-//! (sandwich covariance).
+//! The motion that the equation predicts under the *measured* force is fitted to the measured motion. The residual is
+//! weighted with its covariance: noise of the motion, and noise of force and frequency propagated through the exact
+//! derivatives of the prediction. Intervals are those of the normal distribution. If the residual exceeds the noise,
+//! intervals come from the scatter between dwells (sandwich covariance).
 
 use nalgebra::{DMatrix, DVector};
 use quietcut_numerics::least_squares::LinearProblem;
@@ -18,29 +18,29 @@ use crate::nonlinear::whitening::OutputMap;
 use crate::student::NINETY_PERCENT;
 use quietcut_model::structure::Direction;
 
-/// Result of a fit of a law to steady motions.
+/// Result of a fit of an equation of motion to dwells of steady motion.
 #[derive(Clone, Debug)]
 pub struct Fit {
-    /// The parameters θ of the law.
+    /// The fitted parameters θ of the equation of motion.
     pub theta: DVector<f64>,
     /// Covariance of the parameters.
     pub covariance: DMatrix<f64>,
-    /// χ² per degree of freedom: near 1 if the law explains the data.
+    /// χ² per degree of freedom: near 1 if the equation of motion explains the dwells within their noise.
     pub misfit: f64,
-    /// NRMSE of the fundamental of the predicted motion.
+    /// NRMSE of the fundamental of the predicted motion over all dwells.
     pub relative_error: f64,
-    /// True if the covariance is the sandwich covariance, from the scatter between dwells.
+    /// True if the covariance of the parameters is the sandwich covariance, from the scatter between dwells.
     pub robust: bool,
 }
 
-/// Data of a fit: dwells and the directions that are the degrees of freedom of the law.
+/// Data of a fit: dwells, and the equation of motion whose degrees of freedom are displacements in given directions.
 #[derive(Clone, Copy)]
 pub struct Data<'a> {
-    /// The law whose parameters are fitted.
+    /// The equation of motion whose parameters are fitted.
     pub law: &'a Law,
-    /// Direction of each degree of freedom.
+    /// Direction of the displacement that is each degree of freedom.
     pub directions: &'a [Direction],
-    /// The dwells; every channel has the number of harmonics of the grid.
+    /// The dwells of steady motion; the Fourier series of every channel has as many harmonics as the grid.
     pub dwells: &'a [Dwell],
     /// The harmonic-balance grid.
     pub grid: &'a Grid,
@@ -53,7 +53,8 @@ impl Data<'_> {
             .position(|direction| *direction == line.direction)
     }
 
-    /// Output matrix S of [`OutputMap`]: every degree of freedom is the displacement in one direction.
+    /// Output matrix S of [`OutputMap`], here the identity: every degree of freedom is the displacement in one
+    /// direction.
     fn unit(&self) -> DMatrix<f64> {
         DMatrix::identity(self.law.dofs, self.law.dofs)
     }
@@ -69,7 +70,8 @@ impl Data<'_> {
         self.output_map(&self.unit()).force(dwell, self.grid.width())
     }
 
-    /// Fourier coefficients of the measured displacement of every degree of freedom; `None` if one of them is not measured.
+    /// Fourier coefficients of the displacement measured in a dwell, one degree of freedom after the other; `None` if
+    /// one of them is not measured.
     fn displacement(&self, dwell: &Dwell) -> Option<DVector<f64>> {
         let width = self.grid.width();
         let mut x = DVector::zeros(self.law.dofs * width);
@@ -85,10 +87,11 @@ impl Data<'_> {
         Some(x)
     }
 
-    /// First guess of the parameters: linear least squares on the harmonic balance of the measured motion at the fundamental.
+    /// First guess of the parameters: linear least squares on the harmonic balance of the measured motion at the
+    /// fundamental.
     ///
     /// # Errors
-    /// Too few dwells, or data that do not determine them.
+    /// Too few dwells, or dwells that do not determine the parameters.
     pub fn first_guess(&self) -> Result<DVector<f64>, FitError> {
         let parameters = self.law.parameters.len();
         let width = self.grid.width();
@@ -123,7 +126,8 @@ impl Data<'_> {
         fit.map(|fit| fit.parameters).map_err(|_| FitError::Undetermined)
     }
 
-    /// Whitened residual of a dwell, and its derivative by θ; `None` if the law has no motion near the measured one.
+    /// Whitened residual (measured − predicted motion) of a dwell, and the derivative of the whitened prediction by θ;
+    /// `None` if the equation of motion has no periodic solution near the measured motion.
     fn whitened(&self, dwell: &Dwell, theta: &DVector<f64>) -> Option<(DVector<f64>, DMatrix<f64>)> {
         let solution = self.solve(dwell, theta, &self.displacement(dwell)?)?;
         self.output_map(&self.unit())
@@ -141,8 +145,8 @@ impl Data<'_> {
         self.grid.solve(problem, start).ok()
     }
 
-    /// Fourier coefficients of the displacement predicted by the law near the measured motion of a dwell, one degree of freedom
-    /// after the other.
+    /// Fourier coefficients of the displacement that the equation of motion predicts near the measured motion of a
+    /// dwell, one degree of freedom after the other.
     pub fn predicted(&self, dwell: &Dwell, theta: &DVector<f64>) -> Option<DVector<f64>> {
         let start = self.displacement(dwell)?;
         Some(self.solve(dwell, theta, &start)?.x)
@@ -158,7 +162,8 @@ impl Data<'_> {
             let predicted = self.predicted(dwell, theta);
             for dof in 0..self.law.dofs {
                 for place in [1, 2].map(|part| dof * self.grid.width() + part) {
-                    // If the law has no periodic motion near the measured one, the prediction counts as zero.
+                    // If the equation of motion has no periodic solution near the measured motion, the prediction
+                    // counts as zero.
                     let found = predicted.as_ref().map_or(0.0, |x| x[place]);
                     left += (found - measured[place]).powi(2);
                     all += measured[place].powi(2);
@@ -168,7 +173,7 @@ impl Data<'_> {
         if all > 0.0 { (left / all).sqrt() } else { 0.0 }
     }
 
-    /// Fits the parameters, from a first guess, by nonlinear least squares.
+    /// Fits the parameters of the equation of motion, from the first guess `start`, by nonlinear least squares.
     ///
     /// # Errors
     /// See [`FitError`].

@@ -12,9 +12,10 @@ use rustfft::FftPlanner;
 
 use crate::criteria::{LEAST_SWEEP_CHANGE, LEAST_SWEEP_ESTIMATES, SWEEP_MISFIT};
 
-/// Number of lines on each side of a local estimate.
+/// Number R of frequency lines on each side of the middle line that a local estimate of the receptance uses.
 const R: i64 = 7;
-/// Number of complex unknowns of a local estimate: three coefficients of H and three of T.
+/// Number of complex unknowns of a local estimate: three polynomial coefficients of the receptance H and three of the
+/// transient T.
 const UNKNOWNS: usize = 6;
 
 /// The spectra of force and motion of one record.
@@ -28,25 +29,26 @@ pub struct Spectra {
 /// Comparison of the receptances of two records.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Comparison {
-    /// Mean square of the difference of the two receptances over its variance: 1 to 3 for a linear structure.
+    /// Mean over the estimates of the squared difference of the two receptances divided by its variance: usually 1 to 3
+    /// for a linear structure.
     pub misfit: f64,
     /// Largest difference of the receptances, relative to the largest receptance of the first record.
     pub largest_change: f64,
-    /// True if both records are consistent with one linear structure.
+    /// True if the receptances of both records agree with one linear structure.
     pub same: bool,
 }
 
-/// Local estimate of the receptance at one frequency.
+/// Local polynomial estimate of the receptance of one record at one frequency.
 struct Local {
     h: Complex64,
-    /// Noise variance of one line of the motion.
+    /// Variance of the noise of one line of the motion's spectrum around this frequency.
     noise: f64,
-    /// Variance of H divided by the noise variance of a line.
+    /// Variance of the estimated receptance divided by the noise variance of a line.
     gain: f64,
 }
 
 impl Spectra {
-    /// Spectra of a force, N, and a displacement, velocity or acceleration, sampled at `rate_hz`.
+    /// Spectra of a record of force, N, and displacement, velocity or acceleration, sampled at `rate_hz`.
     pub fn new(force: &[f64], motion: &[f64], rate_hz: f64) -> Self {
         let mut planner = FftPlanner::new();
         let plan = planner.plan_fft_forward(force.len());
@@ -63,7 +65,7 @@ impl Spectra {
         }
     }
 
-    /// Lowest and highest frequency at which the smoothed force power exceeds a tenth of its maximum, Hz.
+    /// Lowest and highest frequency at which the smoothed power of the force exceeds a tenth of its maximum, Hz.
     fn band_hz(&self) -> Option<[f64; 2]> {
         let width = (2 * R + 1) as usize;
         let power: Vec<f64> = self
@@ -115,8 +117,8 @@ impl Spectra {
     }
 }
 
-/// Compares two records with the same direction of force and the same motion; `None` if their common band has too few independent
-/// estimates.
+/// Compares the receptances of two records with the same direction of force and the same motion; `None` if their common
+/// band has too few independent estimates.
 pub fn compare(a: &Spectra, b: &Spectra) -> Option<Comparison> {
     let (of_a, of_b) = (a.band_hz()?, b.band_hz()?);
     let (low, high) = (of_a[0].max(of_b[0]), of_a[1].min(of_b[1]));
@@ -131,8 +133,8 @@ pub fn compare(a: &Spectra, b: &Spectra) -> Option<Comparison> {
             Some((a.local(frequency)?, b.local(frequency)?))
         })
         .collect();
-    // Sensor noise is equal at all lines. The residual of a nonlinear structure near resonance is not noise, so the median over the
-    // lines is used.
+    // Noise of the sensor is equal at all lines. The residual of a nonlinear structure near resonance is not noise, so
+    // the noise is the median over the estimates.
     let median = |of: &dyn Fn(&(Local, Local)) -> f64| {
         let mut values: Vec<f64> = pairs.iter().map(of).collect();
         values.sort_by(f64::total_cmp);

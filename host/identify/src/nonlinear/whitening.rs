@@ -1,4 +1,5 @@
-//! Whitened residuals: measured minus predicted steady motion, divided by the root of its covariance.
+//! Whitened residuals of steady motions: measured minus predicted Fourier coefficients, multiplied by the inverse root
+//! of their covariance.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
@@ -7,12 +8,13 @@ use crate::dwells::dwell::{Dwell, FourierSeries};
 use crate::nonlinear::harmonic_balance::Solution;
 use quietcut_model::structure::Direction;
 
-/// Measured directions u = S q and generalized forces Sᵀ F of a structure with the degrees of freedom q.
+/// Map from the degrees of freedom q of a structure to its measured directions, u = S q, and from forces F in these
+/// directions to generalized forces Sᵀ F.
 #[derive(Clone, Copy)]
 pub(crate) struct OutputMap<'a> {
-    /// The directions of the entries of u and F.
+    /// The directions of the entries of the displacement u and the force F.
     pub(crate) directions: &'a [Direction],
-    /// The matrix S: a row for each direction, a column for each degree of freedom.
+    /// The matrix S of the map u = S q: a row for each direction, a column for each degree of freedom.
     pub(crate) shape: &'a DMatrix<f64>,
 }
 
@@ -23,8 +25,8 @@ impl OutputMap<'_> {
             .position(|direction| *direction == line.direction)
     }
 
-    /// Fourier coefficients of the generalized force on every degree of freedom, without the mean, which dynamic load cells do not
-    /// measure.
+    /// Fourier coefficients of the generalized force of a dwell on every degree of freedom, without the mean, which
+    /// dynamic load cells do not measure.
     pub(crate) fn force(&self, dwell: &Dwell, width: usize) -> DVector<f64> {
         let dofs = self.shape.ncols();
         let mut force = DVector::zeros(dofs * width);
@@ -41,7 +43,7 @@ impl OutputMap<'_> {
         force
     }
 
-    /// Fourier coefficients of the motion in one direction, from those of all degrees of freedom.
+    /// Fourier coefficients of the motion in the direction `row`, from those of all degrees of freedom.
     fn moved(&self, row: usize, q: &DMatrix<f64>, width: usize) -> DMatrix<f64> {
         let mut moved = DMatrix::zeros(width, q.ncols());
         for (dof, share) in self.shape.row(row).iter().enumerate() {
@@ -52,10 +54,11 @@ impl OutputMap<'_> {
         moved
     }
 
-    /// The whitened residual, measured − predicted, and the Jacobian of the prediction with respect to θ.
+    /// The whitened residual of a dwell, measured − predicted motion, and the Jacobian of the whitened prediction with
+    /// respect to θ.
     ///
-    /// The covariance comprises the noise of the motion, and the noise of force and frequency propagated through the derivatives of
-    /// the law. `None` if the balance or the covariance is singular.
+    /// The covariance comprises the noise of the motion, and the noise of force and frequency propagated through the
+    /// derivatives of the equation of motion. `None` if the harmonic balance or the covariance is singular.
     pub(crate) fn whitened(
         &self,
         dwell: &Dwell,

@@ -16,13 +16,16 @@ use quietcut_model::structure::{Direction, FirstOrder, Structure, StructureError
 use quietcut_simulate::STANDARD_GRAVITY;
 use quietcut_stability::{CubicTerms, Problem, Variable};
 
-/// Step of the central differences of responses, in standard deviations of the parameter. A choice.
+/// Step of the central differences of a test's response by an unknown parameter, in prior standard deviations of the
+/// parameter. A choice.
 const STEP: f64 = 0.05;
 
-/// Number of phases at which the cutting force is evaluated in each interval of the tooth period with the same teeth in cut. A choice.
+/// Number of angles at which the cutting force is evaluated in each subinterval of the tooth-passing period with the
+/// same number of engaged teeth. A choice.
 const PHASES: usize = 90;
 
-/// Largest number of speeds at which the stability limit may be bracketed. A choice that bounds the computing time.
+/// Largest number of spindle speeds at which candidate tests of a plan bracket the stability limit. A choice that
+/// bounds the computing time.
 const BRACKETS: usize = 40;
 
 /// A test at the machine that a plan may contain.
@@ -36,7 +39,7 @@ pub enum Test {
         /// Number of impacts.
         blows: usize,
     },
-    /// A stable cut on a dynamometer.
+    /// A stable cut on a dynamometer, which records the cutting force.
     Force {
         /// Spindle speed, rev/min.
         rpm: f64,
@@ -45,14 +48,14 @@ pub enum Test {
         /// Duration of the force recording, s.
         seconds: f64,
     },
-    /// Cuts at one speed that bracket the limit, each halving the interval; the chatter frequency is read from those that
-    /// chatter.
+    /// A series of cuts at one speed that bracket the stability limit in depth, each halving the interval. The chatter
+    /// frequency is measured in those that chatter.
     Cuts {
         /// Spindle speed, rev/min.
         rpm: f64,
         /// Expected depth of the stability limit, mm.
         about_mm: f64,
-        /// Final width of the bracket, mm.
+        /// Final width of the interval of depth that contains the stability limit, mm.
         bracket_mm: f64,
     },
 }
@@ -61,19 +64,20 @@ pub enum Test {
 #[derive(Clone, Debug)]
 pub(super) struct Candidate {
     pub(super) test: Test,
-    /// Fisher information matrix J; parameters in units of their prior standard deviations.
+    /// Fisher information matrix J of the test about the unknown parameters, each in units of its prior standard
+    /// deviation.
     pub(super) information: DMatrix<f64>,
     /// Index of the chart's stability limit that the test brackets; `None` for other tests.
     pub(super) limit: Option<usize>,
 }
 
-/// Reason why the information of a test cannot be computed.
+/// Reason why the Fisher information of a test cannot be computed.
 #[derive(Debug, thiserror::Error)]
 pub(super) enum CandidateError {
     /// The nominal structure has no equation of motion.
     #[error("{0}")]
     Structure(#[from] StructureError),
-    /// The case is invalid when an unknown changes by one step.
+    /// The case is invalid after a change of an unknown parameter by one step of the central differences.
     #[error("a change of an unknown ({unknown}) by a twentieth of its standard deviation gives {what}")]
     Invalid {
         /// Name of the unknown.
@@ -83,7 +87,7 @@ pub(super) enum CandidateError {
     },
 }
 
-/// All candidate tests of a plan: hammer tests, force tests and brackets of limits.
+/// All candidate tests of a plan: hammer tests, a force test, and cuts that bracket stability limits.
 ///
 /// # Errors
 /// A structure or a cut cannot be computed, for the nominal parameters or after one step of an unknown.
@@ -109,8 +113,8 @@ pub(super) fn candidates(
     Ok(candidates)
 }
 
-/// Candidate that brackets a stability limit by cuts. It measures the limit depth, uniform within the bracket width w (variance
-/// w²/12), and the chatter frequency.
+/// Candidate test that brackets a stability limit by cuts. It measures the depth of the limit, uniformly distributed
+/// within the final bracket width w (variance w²/12), and the chatter frequency.
 fn cuts(index: usize, limit: &KnownLimit, means: &Means) -> Candidate {
     let plane = &limit.planes[0];
     let bracket_mm = means.bracket * plane.depth_mm;
@@ -131,10 +135,11 @@ fn cuts(index: usize, limit: &KnownLimit, means: &Means) -> Candidate {
     }
 }
 
-/// A quantity of the case with each of `variables` one step below and above its value; `names` are those of the unknowns.
+/// A quantity `of` the case after a change of each of `variables` by one step downwards and upwards; `names` are those
+/// of the unknowns.
 ///
 /// # Errors
-/// One of the cases is invalid, or has no such quantity.
+/// One of the changed cases is invalid, or has no such quantity.
 fn shifted<'a, T, E: Display>(
     case: &Case,
     variables: impl Iterator<Item = &'a Variable>,
@@ -163,8 +168,8 @@ fn shifted<'a, T, E: Display>(
 
 /// Candidate hammer tests, one for each direction of the machine.
 ///
-/// A response a = −ω²H(ω)F(ω) in white noise of one-sided density S holds the information
-/// J_ij = 4/S ∫₀^∞ Re(∂_i a* ∂_j a) dω/2π per impact, with F the transform of a half sine.
+/// An acceleration a = −ω²H(ω)F(ω), measured in white noise of one-sided density S, holds the Fisher information J_ij =
+/// 4/S ∫₀^∞ Re(∂_i a* ∂_j a) dω/2π per impact, with F the transform of a half-sine force.
 fn hammers(case: &Case, unknowns: &Unknowns, means: &Means) -> Result<Vec<Candidate>, CandidateError> {
     let Some(structure) = &case.structure else {
         return Ok(Vec::new());
@@ -174,7 +179,8 @@ fn hammers(case: &Case, unknowns: &Unknowns, means: &Means) -> Result<Vec<Candid
     let Some(&(highest_hz, _)) = grid.last() else {
         return Ok(Vec::new());
     };
-    // The spectrum of a half sine has its first zero at 1.5/pulse length, so this pulse excites all modes.
+    // The spectrum of a half-sine pulse has its first zero at 1.5/pulse length, here twice the highest frequency of the
+    // grid, so that the pulse excites all modes.
     let pulse_s = 0.75 / highest_hz;
     let structures = shifted(
         case,
@@ -242,7 +248,8 @@ fn hammers(case: &Case, unknowns: &Unknowns, means: &Means) -> Result<Vec<Candid
         .collect())
 }
 
-/// Quadrature nodes and weights in frequency, Hz: from half the lowest to twice the highest natural frequency, dense at resonances.
+/// Quadrature nodes and weights for integrals over frequency, Hz: from half the lowest to twice the highest natural
+/// frequency, dense at resonances.
 fn frequency_grid(structure: &FirstOrder) -> Vec<(f64, f64)> {
     let modes: Vec<(f64, f64)> = structure
         .poles()
@@ -257,7 +264,7 @@ fn frequency_grid(structure: &FirstOrder) -> Vec<(f64, f64)> {
         return Vec::new();
     };
     let coarse = (0..=200).map(|i| lowest * 0.5 * (4.0 * highest / lowest).powf(f64::from(i) / 200.0));
-    // The tangent spaces the nodes uniformly in the phase of a resonance.
+    // The tangent places the nodes at equal steps of the phase of a resonance.
     let fine = modes.iter().flat_map(|&(hz, half_width_hz)| {
         (-60..=60).map(move |i| hz + half_width_hz * (PI / 2.0 * f64::from(i) / 61.0).tan())
     });
@@ -280,15 +287,18 @@ fn half_sine(peak_n: f64, pulse_s: f64, hz: f64) -> f64 {
     let turns = hz * pulse_s;
     let from_pole = 1.0 - 4.0 * turns * turns;
     if from_pole.abs() < 1e-6 {
-        // At this frequency numerator and denominator vanish; this is the limit of the ratio.
+        // At half the inverse pulse length numerator and denominator of the transform vanish; this is the limit of
+        // their ratio.
         return peak_n * pulse_s * 0.5;
     }
     peak_n * pulse_s * FRAC_2_PI * ((PI * turns).cos() / from_pole).abs()
 }
 
-/// Candidate cut on a dynamometer at half the lowest stability limit of the chart: stable, so that the feed alone sets the chip thickness.
+/// Candidate cut on a dynamometer at half the lowest stability limit of the chart: it is stable, so that the feed alone
+/// sets the chip thickness.
 ///
-/// J_ij = 2T/S · mean over the period of ∂_i F · ∂_j F.
+/// The force F measured over the time T in noise of one-sided density S holds the Fisher information J_ij = 2T/S · mean
+/// over the tooth-passing period of ∂_i F · ∂_j F.
 fn force(
     case: &Case,
     problem: &Problem,

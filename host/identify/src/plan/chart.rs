@@ -1,4 +1,4 @@
-//! Uncertainty of the limits of a chart, from that of the parameters.
+//! Uncertainty of the stability limits of a chart that follows from that of the unknown parameters.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use quietcut_numerics::statistics::sample_quantile;
@@ -8,25 +8,28 @@ use crate::student::NINETY_PERCENT;
 use quietcut_stability::Basis;
 use quietcut_stability::{Linearized, Plane, SpeedLine};
 
-/// Number of lobes, from the lowest on, that are considered at each speed.
+/// Number of stability lobes, from the lowest on, that are considered at each spindle speed of a chart.
 const LOBES: usize = 4;
 
-/// Number of quasi-random points that represent the distribution of the lowest of several lobes: a power of 2.
+/// Number of quasi-random points that represent the distribution of the depth of the lowest of several lobes: a power
+/// of 2.
 const POINTS: u32 = 256;
 
-/// The first stability limit at a speed as the lowest of several lobes, each linearized in the unknowns.
+/// The first stability limit at a spindle speed as the lowest of several lobes, each linearized in the unknown
+/// parameters.
 #[derive(Clone, Debug)]
 pub(super) struct KnownLimit {
     /// Spindle speed, rev/min.
     pub(super) rpm: f64,
-    /// Linearized lobes, lowest first; at least one.
+    /// Depth of each lobe at this speed, linearized in the unknown parameters; lowest first, at least one.
     pub(super) planes: Vec<Plane>,
 }
 
 impl KnownLimit {
-    /// The limit at a speed; `None` if there is no limit, or if it has no derivative with respect to the unknowns.
+    /// The stability limit at a spindle speed; `None` if there is no limit, or if it has no derivative with respect to
+    /// the unknowns.
     ///
-    /// The gradient has `size` entries; those of unknowns that affect only tests are zero.
+    /// The gradient of the limit has `size` entries; those of unknowns that affect only tests are zero.
     pub(super) fn new(line: &SpeedLine, linearized: &Linearized, size: usize) -> Option<Self> {
         let first_mm = line.first_limit?.depth_mm;
         let planes = linearized.planes(line).into_iter();
@@ -45,12 +48,13 @@ impl KnownLimit {
         })
     }
 
-    /// The limit of the case as given, mm.
+    /// The stability limit of the nominal case, mm.
     pub(super) fn depth_mm(&self) -> f64 {
         self.planes[0].depth_mm
     }
 
-    /// Indices of the lobes that may be the lowest when the unknowns deviate.
+    /// Indices of the lobes that may be the lowest when the unknown parameters deviate; `roots` are their gradients in
+    /// standard coordinates.
     fn rivals(&self, roots: &[DVector<f64>]) -> Vec<usize> {
         let is_near = |index: &usize| {
             let apart = self.planes[*index].depth_mm - self.depth_mm();
@@ -62,7 +66,7 @@ impl KnownLimit {
     }
 }
 
-/// The linearized limits of a chart.
+/// The linearized stability limits of a chart.
 #[derive(Clone, Debug)]
 pub(super) struct KnownChart {
     pub(super) limits: Vec<KnownLimit>,
@@ -79,9 +83,10 @@ impl KnownChart {
         }
     }
 
-    /// The 90 % interval of every limit, mm, if the unknowns have the inverse covariance `information`.
+    /// The 90 % interval of every stability limit, mm, if the unknowns have the inverse covariance `information`.
     pub(super) fn intervals(&self, information: &DMatrix<f64>) -> Vec<[f64; 2]> {
-        // Λ starts as the identity and information is only added, so it is positive definite unless a number overflows.
+        // The inverse covariance starts as the identity and information is only added, so it is positive definite
+        // unless a number overflows.
         let Some(root) = Cholesky::new(information.clone()) else {
             return vec![[f64::NEG_INFINITY, f64::INFINITY]; self.limits.len()];
         };
@@ -91,7 +96,8 @@ impl KnownChart {
             .collect()
     }
 
-    /// Width of the 90 % interval of every limit, relative to the limit.
+    /// Width of the 90 % interval of every stability limit, relative to the limit, if the unknowns have the inverse
+    /// covariance `information`.
     pub(super) fn widths(&self, information: &DMatrix<f64>) -> Vec<f64> {
         let intervals = self.intervals(information);
         let pairs = intervals.iter().zip(&self.limits);
@@ -101,7 +107,7 @@ impl KnownChart {
     }
 
     fn interval(&self, limit: &KnownLimit, root: &Cholesky<f64, Dyn>) -> [f64; 2] {
-        // With Λ = L Lᵀ a limit with the gradient g has the variance |L⁻¹g|².
+        // With the inverse covariance Λ = L Lᵀ of the unknowns, a limit with the gradient g has the variance |L⁻¹g|².
         let roots: Vec<DVector<f64>> = limit
             .planes
             .iter()
@@ -112,8 +118,8 @@ impl KnownChart {
             let half = NINETY_PERCENT * roots[0].norm();
             return [limit.depth_mm() - half, limit.depth_mm() + half];
         }
-        // The distribution of the lowest rival depends on the rivals alone: the number of coordinates equals the number of rivals,
-        // and the first axis lies along the lowest.
+        // The distribution of the depth of the lowest lobe depends only on the lobes that may be the lowest: the number
+        // of coordinates equals their number, and the first axis lies along the gradient of the lowest.
         let vectors: Vec<DVector<f64>> = rivals.iter().map(|&index| roots[index].clone()).collect();
         let coordinates = triangular(&vectors);
         let mut lowest: Vec<f64> = self.points[rivals.len() - 1]
@@ -137,7 +143,8 @@ fn solved(root: &Cholesky<f64, Dyn>, gradient: &DVector<f64>) -> DVector<f64> {
         .unwrap_or_else(|| gradient.clone())
 }
 
-/// Coordinates of the vectors in an orthonormal basis of their span whose first axis lies along the first vector.
+/// Coordinates of the vectors in an orthonormal basis of their span; the first axis of the basis lies along the first
+/// vector.
 fn triangular(vectors: &[DVector<f64>]) -> Vec<DVector<f64>> {
     let size = vectors.len();
     let mut basis: Vec<DVector<f64>> = Vec::with_capacity(size);

@@ -1,27 +1,29 @@
-//! Properties of the tests of a plan.
+//! Properties of the tests that a plan may contain: sensors, hammer, brackets and recordings.
 
-/// Means: properties of the possible tests.
+/// Means: properties of the tests that a plan may contain.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Means {
-    /// Width of the interval to which cuts bracket a limit, relative to the limit.
+    /// Final width of the interval of depth to which cuts bracket a stability limit, relative to the limit.
     pub bracket: f64,
     /// Standard deviation of a measured chatter frequency, relative to the frequency.
     pub chatter_frequency: f64,
-    /// Number of impacts of a hammer test.
+    /// Number of impacts of a hammer test in one direction.
     pub blows: usize,
     /// Peak force of an impact, N.
     pub peak_n: f64,
-    /// Noise density of the accelerometer, g/√Hz.
+    /// Noise density of the accelerometer of a hammer test, g/√Hz.
     pub accelerometer_g_per_root_hertz: f64,
-    /// Relative standard deviation of the gain of hammer and accelerometer, and of the gain of the dynamometer.
+    /// Relative standard deviation of the common gain of hammer and accelerometer, and of the gain of the dynamometer.
     pub calibration: f64,
-    /// Noise density of the dynamometer, N/√Hz.
+    /// Noise density of the force of the dynamometer, N/√Hz.
     pub dynamometer_n_per_root_hertz: f64,
     /// Duration of the force recording of a cut, s.
     pub seconds: f64,
-    /// Relative standard deviation of the difference of a natural frequency between standstill and cutting.
+    /// Standard deviation of the difference between a natural frequency at standstill and during cutting, relative to
+    /// the frequency.
     pub standstill_frequency: f64,
-    /// Relative standard deviation of the difference of a damping ratio between standstill and cutting.
+    /// Standard deviation of the difference between a damping ratio at standstill and during cutting, relative to the
+    /// ratio.
     pub standstill_damping: f64,
 }
 

@@ -1,9 +1,9 @@
-//! The fewest tests that narrow the limits of a lobe chart to a given width.
+//! The fewest tests that narrow the stability limits of a lobe chart to a given width.
 //!
-//! The uncertain parameters of a machine have a normal distribution (`unknowns`). Exact derivatives propagate it to every limit
-//! (`chart`) and give the Fisher information of every test (`candidate`). After a set of tests Λ = I + Σ J_t is the inverse
-//! covariance, in units of the prior standard deviations. `selection` searches for the cheapest set of tests after which all limits
-//! are narrow enough.
+//! The uncertain parameters of a machine have a normal distribution (`unknowns`). Exact derivatives propagate it to
+//! every limit (`chart`) and give the Fisher information of every test (`candidate`). After a set of tests with the
+//! Fisher information J_t each, Λ = I + Σ J_t is the inverse covariance of the parameters, in units of the prior
+//! standard deviations. `selection` searches for the cheapest set of tests after which all limits are narrow enough.
 
 mod candidate;
 mod chart;
@@ -29,18 +29,19 @@ use quietcut_stability::{CubicTerms, Linearized, Problem, SpeedLine, StabilityEr
 use selection::{Chosen, Selection};
 use unknowns::Unknowns;
 
-/// Request of a plan: chart, required width, prior, and properties of the tests.
+/// Request of a plan: chart, required width of the limits' intervals, prior of the parameters, and properties of the
+/// tests.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Request {
     /// Spindle speeds of the chart, rev/min.
     pub speeds_rpm: Vec<f64>,
-    /// The largest axial depth of interest, mm.
+    /// Largest axial depth up to which stability limits are searched, mm.
     pub depth_mm: f64,
-    /// Number of steps in depth at which Floquet multipliers are followed.
+    /// Number of steps in axial depth at which Floquet multipliers are followed.
     pub samples: usize,
-    /// Required width of the 90 % interval of every limit, relative to the limit.
+    /// Required width of the 90 % interval of every stability limit, relative to the limit.
     pub width: f64,
-    /// Prior of the parameters, for a case that states no standard deviations.
+    /// Relative standard deviations of the uncertain parameters, for a case that states none.
     pub prior: Prior,
     /// Properties of the possible tests.
     pub means: Means,
@@ -48,13 +49,13 @@ pub struct Request {
     pub linear: bool,
 }
 
-/// Reason why there is no plan.
+/// Reason why a plan of tests cannot be computed.
 #[derive(Debug, thiserror::Error)]
 pub enum PlanError {
     /// The case or a speed of the chart cannot be computed.
     #[error(transparent)]
     Stability(#[from] StabilityError),
-    /// No speed of the chart has a stability limit up to the largest depth.
+    /// No speed of the chart has a stability limit that counts, up to the largest depth.
     #[error(
         "{case}: at none of the {speeds} speeds is stability lost up to {depth_mm} mm; ask for a greater --depth-mm"
     )]
@@ -66,108 +67,112 @@ pub enum PlanError {
         /// Largest depth of the chart, mm.
         depth_mm: f64,
     },
-    /// The limits of the case have no derivatives by the unknowns.
+    /// The stability limits of the case have no derivatives by the unknown parameters.
     #[error("{case}: limits have no derivatives with respect to the unknowns: {what}")]
     NoDerivatives {
         /// Path of the case file.
         case: String,
-        /// Reason why there are no derivatives.
+        /// Reason why the limits have no derivatives by the unknown parameters.
         what: String,
     },
 }
 
-/// Width of the 90 % intervals over the chart, in percent of the limits.
+/// Width of the 90 % intervals of the stability limits over the speeds of the chart, in percent of the limits.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Width {
-    /// The widest 90 % interval of the chart, percent of its limit.
+    /// Width of the widest 90 % interval of a stability limit in the chart, percent of that limit.
     pub widest_percent: f64,
-    /// Spindle speed of the widest interval, rev/min.
+    /// Spindle speed with the widest interval of the stability limit, rev/min.
     pub at_rpm: f64,
-    /// Median of the widths over the speeds, percent.
+    /// Median over the speeds of the widths of the limits' 90 % intervals, percent of the limits.
     pub median_percent: f64,
 }
 
-/// A speed of the chart with its limit and intervals.
+/// A spindle speed of the chart with its stability limit and the 90 % intervals of the limit.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Speed {
     /// Spindle speed, rev/min.
     pub rpm: f64,
-    /// First stability limit of the case as given, mm.
+    /// First stability limit of the nominal case, mm.
     pub limit_mm: f64,
-    /// 90 % interval before any test, mm.
+    /// 90 % interval of the stability limit before any test, mm.
     pub before_mm: [f64; 2],
-    /// 90 % interval after all tests, mm, if the tests confirm the case as given.
+    /// 90 % interval of the stability limit after all tests of the plan, mm, if the tests confirm the nominal case.
     pub after_mm: [f64; 2],
 }
 
-/// A test of the plan with its cost and its effect.
+/// A test of the plan with its cost and its effect on the limits' intervals.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Step {
     /// The test.
     #[serde(flatten)]
     pub test: Test,
-    /// Number of cuts of a bracket; 1 for every other test.
+    /// Number of cuts of a test that brackets a limit; 1 for every other test.
     pub cuts_or_tests: usize,
-    /// Width of the intervals after this test and all before it.
+    /// Width of the limits' 90 % intervals after this test and all before it.
     pub after: Width,
 }
 
-/// Reason why the required width is not reached.
+/// Reason why no set of tests reaches the required width of the limits' intervals.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Obstacle {
-    /// Width of the intervals if every candidate test is repeated a thousand times.
+    /// Width of the limits' 90 % intervals if every candidate test is repeated a thousand times.
     pub at_best: Width,
-    /// The unknowns whose exact values would narrow the widest interval most. Empty if a thousand repetitions reach the width.
+    /// The unknown parameters whose exact values would narrow the widest interval of a limit most. Empty if a thousand
+    /// repetitions of every test reach the required width.
     pub if_known: Vec<IfKnown>,
 }
 
-/// An unknown, and the width of the widest interval if its value were exact.
+/// An unknown parameter, and the width of the widest interval of a limit if its value were exact.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct IfKnown {
     /// Name of the unknown.
     pub name: String,
-    /// The widest 90 % interval if the unknown were exact, percent of its limit.
+    /// Width of the widest 90 % interval of a limit if the unknown parameter were exact, percent of that limit.
     pub widest_percent: f64,
 }
 
-/// The fewest tests that narrow the limits of a chart, and their effect.
+/// The fewest tests that narrow the stability limits of a chart to the required width, and their effect.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Plan {
     /// The required width, percent.
     pub wanted_percent: f64,
-    /// True if the tests reach the required width.
+    /// True if the tests reach the required width of every limit's interval.
     pub reached: bool,
-    /// Total number of cuts and other tests.
+    /// Total number of cuts and other tests in the plan.
     pub cuts_and_tests: usize,
-    /// Names of the unknowns, with standard deviations in percent if they are assumed.
+    /// Names of the unknown parameters, with their standard deviations in percent if these are assumed.
     pub unknowns: Vec<String>,
     /// True if the case states standard deviations of its parameters; otherwise defaults are assumed.
     pub stated: bool,
-    /// Width of the intervals before any test.
+    /// Width of the limits' 90 % intervals before any test.
     pub before: Width,
     /// The tests in the order in which to carry them out.
     pub tests: Vec<Step>,
-    /// Width of the intervals after all tests.
+    /// Width of the limits' 90 % intervals after all tests of the plan.
     pub after: Width,
-    /// Reason why the width is not reached; `None` if it is.
+    /// Reason why the required width is not reached; `None` if it is.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub obstacle: Option<Obstacle>,
-    /// Speeds that do not count, rev/min: without a stability limit up to the largest depth, or with a limit without derivatives.
+    /// Spindle speeds that the plan leaves out, rev/min: without a stability limit up to the largest depth, or with a
+    /// limit without derivatives.
     pub without_limit_rpm: Vec<f64>,
-    /// Speeds whose limit has no derivatives by the unknowns, rev/min; they are among [`Plan::without_limit_rpm`].
+    /// Spindle speeds whose stability limit has no derivatives by the unknown parameters, rev/min; they are among
+    /// [`Plan::without_limit_rpm`].
     #[serde(skip)]
     pub without_derivative_rpm: Vec<f64>,
-    /// All speeds with a stability limit.
+    /// All spindle speeds of the chart whose stability limit counts in the plan.
     pub chart: Vec<Speed>,
 }
 
-/// Number of repetitions of every test that stands for unlimited repetition.
+/// Number of repetitions of every candidate test that stands for unlimited repetition. A choice.
 const AT_BEST: f64 = 1000.0;
 
-/// The fewest tests after which every limit of the chart has the required width; calls `progress` after each speed.
+/// The fewest tests after which the 90 % interval of every stability limit of the chart has the required width; calls
+/// `progress` after each speed.
 ///
-/// Intervals follow from linearized limits: they hold for machines whose parameters lie within a few standard deviations of the
-/// case. At each speed the lowest of several lobes counts.
+/// Intervals follow from limits that are linearized in the unknown parameters: they hold for machines whose parameters
+/// lie within a few standard deviations of the case. At each speed the lowest of several lobes counts.
 ///
 /// # Errors
 /// The chart cannot be computed, has no limits, or its limits no derivatives.
@@ -295,7 +300,8 @@ impl Basis {
         }
     }
 
-    /// Width with every test repeated [`AT_BEST`] times, and the unknowns whose exact values would narrow the intervals most then.
+    /// Width of the limits' intervals with every candidate test repeated [`AT_BEST`] times, and the unknown parameters
+    /// whose exact values would narrow the intervals most then.
     fn obstacle(&self, selection: &Selection<'_>) -> Obstacle {
         let size = self.unknowns.len();
         let mut information = DMatrix::identity(size, size);
@@ -305,7 +311,8 @@ impl Basis {
         let mut if_known: Vec<IfKnown> = (0..size)
             .map(|index| {
                 let mut known = information.clone();
-                // A thousand billion times the prior information: the deviation becomes a millionth of the prior one.
+                // An exact value is modelled by 1e12 times the prior information: the standard deviation becomes a
+                // millionth of the prior one.
                 known[(index, index)] += 1e12;
                 IfKnown {
                     name: self.unknowns.names[index].clone(),

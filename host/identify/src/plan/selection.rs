@@ -1,8 +1,9 @@
-//! The cheapest set of tests that narrows every limit to the required width.
+//! The cheapest set of tests that narrows the 90 % interval of every stability limit to the required width.
 //!
-//! Tests are added one by one, each the one that reduces the excess Σ max(0, (width/required width)² − 1) most per unit of cost.
-//! Then tests are dropped, or exchanged for cheaper ones, as long as the width stays reached. Cuts that bracket a limit cost as
-//! many bisections as the interval of the limit requires before them.
+//! Tests are added one by one, each the one that most reduces the excess Σ max(0, (width/required width)² − 1) over the
+//! limits per unit of cost. Then tests are dropped, or exchanged for cheaper ones, as long as the required width stays
+//! reached. A test that brackets a limit costs as many cuts as bisections are needed from the limit's interval before
+//! the test down to the bracket width.
 
 use nalgebra::DMatrix;
 use rayon::prelude::*;
@@ -16,11 +17,11 @@ use crate::criteria::{LEAST_GAIN, MOST_TESTS};
 pub(super) struct Chosen {
     /// Index of the test among the candidates.
     pub(super) candidate: usize,
-    /// Number of cuts of a bracket; 1 for every other test.
+    /// Number of cuts of a test that brackets a limit; 1 for every other test.
     pub(super) cost: usize,
 }
 
-/// Search for the cheapest sufficient set of candidate tests.
+/// Search for the cheapest set of candidate tests that reaches the required width of all limits' intervals.
 pub(super) struct Selection<'a> {
     chart: &'a KnownChart,
     candidates: &'a [Candidate],
@@ -42,19 +43,21 @@ impl<'a> Selection<'a> {
         }
     }
 
-    /// Inverse covariance Λ of the unknowns after these tests.
+    /// Inverse covariance Λ of the unknown parameters after the tests `chosen`.
     pub(super) fn information(&self, chosen: &[Chosen]) -> DMatrix<f64> {
         chosen.iter().fold(self.nothing.clone(), |sum, one| {
             sum + &self.candidates[one.candidate].information
         })
     }
 
-    /// True if every limit has the required width.
+    /// True if the interval of every limit has at most the required width when the unknowns have the inverse covariance
+    /// `information`.
     pub(super) fn is_reached(&self, information: &DMatrix<f64>) -> bool {
         self.excess(information) == 0.0
     }
 
-    /// The cheapest set found that reaches the width, or the greedy set if no set reaches it.
+    /// The cheapest set of tests found that reaches the required width. If no set reaches it, the set of the tests that
+    /// were added one by one.
     pub(super) fn fewest(&self) -> Vec<Chosen> {
         let mut chosen = self.greedy();
         if self.is_reached(&self.information(&chosen)) {
@@ -73,12 +76,13 @@ impl<'a> Selection<'a> {
             .sum()
     }
 
-    /// True if the candidate is a series of cuts that brackets a limit.
+    /// True if the candidate test is a series of cuts that brackets a stability limit.
     pub(super) fn is_bracket(&self, candidate: usize) -> bool {
         self.candidates[candidate].limit.is_some()
     }
 
-    /// Cost of a candidate when the unknowns have the inverse covariance `information`: the number of cuts, or 1 for other tests.
+    /// Cost of a candidate test when the unknowns have the inverse covariance `information`: the number of cuts, or 1
+    /// for other tests.
     fn cost(&self, candidate: usize, information: &DMatrix<f64>) -> usize {
         let Candidate {
             limit: Some(limit),
@@ -89,7 +93,7 @@ impl<'a> Selection<'a> {
             return 1;
         };
         let [from, to] = self.chart.intervals(information)[*limit];
-        // Each cut halves the interval; at least one stable and one unstable cut are necessary.
+        // Each cut halves the interval of the limit's depth; at least one stable and one unstable cut are necessary.
         let halvings = ((to - from) / bracket_mm).log2().ceil();
         if halvings.is_finite() {
             (halvings as usize).max(2)
@@ -98,7 +102,7 @@ impl<'a> Selection<'a> {
         }
     }
 
-    /// The candidates with their costs when they are carried out in this order.
+    /// The candidate tests with their costs when they are carried out in this order.
     pub(super) fn priced(&self, order: impl IntoIterator<Item = usize>) -> Vec<Chosen> {
         let mut information = self.nothing.clone();
         order
@@ -121,7 +125,8 @@ impl<'a> Selection<'a> {
                 .map(|candidate| {
                     let after = self.excess(&(&information + &self.candidates[candidate].information));
                     let cost = self.cost(candidate, &information) as f64;
-                    // Candidates that reach the width have the same gain and are compared by cost alone.
+                    // Candidate tests that reach the required width reduce the excess equally and are compared by cost
+                    // alone.
                     ((excess - after) / cost, after)
                 })
                 .collect();
@@ -140,13 +145,15 @@ impl<'a> Selection<'a> {
         chosen.iter().map(|one| one.cost).sum()
     }
 
-    /// The tests with their costs if they reach the width and cost less than `than`.
+    /// The tests in the given order with their costs, if they reach the required width and their total cost is below
+    /// `than`.
     fn if_cheaper(&self, order: Vec<usize>, than: usize) -> Option<Vec<Chosen>> {
         let priced = self.priced(order);
         (Self::total(&priced) < than && self.is_reached(&self.information(&priced))).then_some(priced)
     }
 
-    /// The set without the most expensive test that is not necessary; `None` if all tests are necessary.
+    /// The set without the most expensive test that is not necessary for the required width; `None` if all tests are
+    /// necessary.
     fn without_one(&self, chosen: &[Chosen]) -> Option<Vec<Chosen>> {
         let mut dearest: Vec<usize> = (0..chosen.len()).collect();
         dearest.sort_by_key(|&index| std::cmp::Reverse(chosen[index].cost));
@@ -160,7 +167,8 @@ impl<'a> Selection<'a> {
         })
     }
 
-    /// A cheaper set in which one or two tests are exchanged for one other; `None` if there is none.
+    /// A cheaper set that reaches the required width, in which one or two tests are exchanged for one other; `None` if
+    /// there is none.
     fn with_another(&self, chosen: &[Chosen]) -> Option<Vec<Chosen>> {
         let total = Self::total(chosen);
         let count = chosen.len();
@@ -173,8 +181,8 @@ impl<'a> Selection<'a> {
                         let kept = (0..count)
                             .filter(|&index| index != a && index != b)
                             .map(|index| chosen[index].candidate);
-                        // Tests that inform about all limits come before brackets: then the intervals are narrower and the brackets
-                        // need fewer cuts.
+                        // Tests that inform about all limits come before tests that bracket one limit: then the
+                        // intervals are narrower and the brackets need fewer cuts.
                         let mut order: Vec<usize> = kept.chain([other]).collect();
                         order.sort_by_key(|&candidate| self.is_bracket(candidate));
                         self.if_cheaper(order, total)

@@ -10,7 +10,7 @@ use quietcut_model::case::{Case, Deviation, Parameter};
 use quietcut_model::structure::{Form, Joint, Matrices, Mode};
 use quietcut_stability::Variable;
 
-/// Relative standard deviations assumed for a case that states none.
+/// Relative standard deviations of the uncertain parameters that a plan assumes for a case that states none.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Prior {
     /// Relative standard deviation of natural frequencies.
@@ -24,8 +24,8 @@ pub struct Prior {
 }
 
 impl Default for Prior {
-    /// The uncertainty of a model from data sheets and material tables: 1 % of frequency, 20 % of damping, 15 % of stiffness and of
-    /// cutting force.
+    /// The uncertainty of a model from data sheets and material tables: relative standard deviations of 1 % of
+    /// frequencies, 20 % of damping ratios, 15 % of stiffnesses and of cutting coefficients.
     fn default() -> Self {
         Self {
             frequency: 0.01,
@@ -36,13 +36,14 @@ impl Default for Prior {
     }
 }
 
-/// All unknowns of a plan. A vector of unknowns holds first the variables that the limits depend on, then the differences between
-/// standstill and cutting, then the gain of the hammer test and the gain of the dynamometer.
+/// All unknowns of a plan. A vector of unknowns holds first the variables that the stability limits depend on, then the
+/// differences of the structure between standstill and cutting, then the gain of the hammer test and the gain of the
+/// dynamometer.
 #[derive(Clone, Debug)]
 pub(super) struct Unknowns {
     /// Variables that the stability limits depend on.
     pub(super) variables: Vec<Variable>,
-    /// Differences of the structure at standstill from the structure during cutting.
+    /// Differences of natural frequencies and damping ratios at standstill from those during cutting.
     pub(super) standstill: Vec<Variable>,
     /// Names of all unknowns, in the order of a vector of unknowns.
     pub(super) names: Vec<String>,
@@ -53,17 +54,18 @@ pub(super) struct Unknowns {
 /// The case parameter of an entry (row, column) of a mass, damping or stiffness matrix.
 type Entry = fn(usize, usize) -> Parameter;
 
-/// Name of a mode, and the changes of the case for a relative change of one in its frequency, damping ratio and stiffness.
+/// Name of a mode, and the changes of the case's parameters for a relative change of one in its frequency, in its
+/// damping ratio, and in its stiffness or compliance.
 type ModeChanges = (String, [Vec<Deviation>; 3]);
 
-/// A variable with its name for the user.
+/// An unknown variable of the plan with its name for the user.
 struct Named {
     variable: Variable,
     name: String,
 }
 
 impl Unknowns {
-    /// The unknowns that the case states (keys that end in `_std`), or else those of `prior`.
+    /// The unknowns whose standard deviations the case states (keys that end in `_std`), or else those of `prior`.
     ///
     /// # Errors
     /// There are none, or the modes of the matrices cannot be computed; the text gives the reason.
@@ -95,7 +97,7 @@ impl Unknowns {
         })
     }
 
-    /// Number of unknowns, including those of standstill and the two gains.
+    /// Number of unknowns, including the differences at standstill and the two gains.
     pub(super) fn len(&self) -> usize {
         self.names.len()
     }
@@ -139,8 +141,8 @@ fn of_forces(case: &Case, relative: f64) -> Vec<Named> {
         .collect()
 }
 
-/// Variables for frequency, damping ratio and stiffness of each mode with these relative deviations; a deviation of 0 gives no
-/// variable.
+/// Unknowns for frequency, damping ratio and stiffness of each mode with the relative standard deviations `relative`; a
+/// deviation of 0 gives no unknown.
 ///
 /// # Errors
 /// The modes of the matrices cannot be computed.
@@ -176,7 +178,8 @@ fn of_modes(case: &Case, relative: [f64; 3], suffix: &str) -> Result<Vec<Named>,
     Ok(named)
 }
 
-/// Name of a mode, and the changes of its parameters for a relative change of one in frequency, damping ratio and compliance.
+/// Name of a mode, and the changes of its parameters in the case for a relative change of one in frequency, in damping
+/// ratio, and in compliance.
 fn of_mode((index, mode): (usize, &Mode)) -> ModeChanges {
     let one = |parameter, std| vec![Deviation { parameter, std }];
     let shape = mode.left.iter().enumerate().flat_map(|(entry, value)| {
@@ -199,8 +202,8 @@ fn the_mode(frequency_hz: f64) -> String {
     format!("the mode at {frequency_hz:.2} Hz")
 }
 
-/// Name of a joint, and the changes of its parameters for a relative change of one in frequency, damping ratio and stiffness of the
-/// joint with its link alone.
+/// Name of a robot joint, and the changes of its parameters in the case for a relative change of one in frequency,
+/// damping ratio and stiffness of the joint with its link alone.
 fn of_joint((index, joint): (usize, &Joint)) -> ModeChanges {
     let part = |parameter, std| Deviation { parameter, std };
     let stiffness = |factor: f64| {
@@ -213,8 +216,8 @@ fn of_joint((index, joint): (usize, &Joint)) -> ModeChanges {
     (
         format!("joint {}", index + 1),
         [
-            // A frequency scales with √k at constant inertia: stiffness changes by twice the relative change, damping c = 2ζ√(km)
-            // once.
+            // The frequency of the joint scales with √k at constant inertia: stiffness changes by twice the relative
+            // change of frequency, damping c = 2ζ√(km) once.
             vec![stiffness(2.0), damping],
             vec![damping],
             vec![
@@ -279,7 +282,7 @@ fn of_matrices(matrices: &Matrices) -> Result<Vec<ModeChanges>, String> {
         Some((
             the_mode(squared.sqrt() / TAU),
             [
-                // Frequency: ω² changes twice as much, and 2ζω once.
+                // A relative change of the frequency ω of the mode: ω² changes twice as much, and 2ζω once.
                 parts(0.0, modal_damping, 2.0 * squared),
                 parts(0.0, modal_damping, 0.0),
                 parts(1.0, modal_damping, squared),

@@ -34,25 +34,26 @@ pub struct PostureDwells {
     pub dwells: Vec<Dwell>,
 }
 
-/// Result of a fit: a robot with identified stiffness, damping and cubic terms of its joints.
+/// Result of a fit to steady tones: a robot with identified stiffness, damping and cubic terms of its joints.
 #[derive(Clone, Debug)]
 pub struct CubicJointFit {
-    /// The robot with the fitted parameters, at the posture of the first guess.
+    /// The robot with the fitted joint parameters, at the posture of the first guess.
     pub robot: Robot,
     /// The fitted parameters.
     pub parameters: Vec<JointParameter>,
     /// Covariance of the fitted parameters.
     pub covariance: DMatrix<f64>,
-    /// χ² per degree of freedom of the residual over its noise.
+    /// χ² per degree of freedom of the tool's predicted motion: near 1 if the residual is within the noise.
     pub misfit: f64,
-    /// NRMSE of the fundamental of the predicted motion.
+    /// NRMSE of the fundamental of the tool's predicted motion over all tones.
     pub relative_error: f64,
-    /// True if the covariance comes from the scatter between dwells.
+    /// True if the covariance of the parameters comes from the scatter between tones (sandwich covariance), not from
+    /// the noise.
     pub robust: bool,
     harmonics: usize,
 }
 
-/// Fits a robot, whose joints are a first guess, to steady tones at several postures.
+/// Fits the joints of a robot, with `start` as the first guess, to steady tones at several postures.
 ///
 /// `terms` are cubic stiffness, cubic damping or both; all dwells have `harmonics` harmonics.
 ///
@@ -82,7 +83,8 @@ pub fn fit(
         parameters.len(),
         parameters.iter().map(|parameter| parameter.value(&start)),
     );
-    // In the first fit stiffness, damping and payload are replaced by their logarithms, which keeps them positive.
+    // In the fit of the equivalent linearization, stiffness, damping and payload are replaced by their logarithms,
+    // which keeps them positive.
     let values_of = |sought: &DVector<f64>| {
         DVector::from_fn(sought.len(), |index, _| {
             if parameters[index].is_cubic() {
@@ -124,7 +126,7 @@ pub fn fit(
     } = normal.spread()?;
     let mut robot = start;
     for (parameter, value) in parameters.iter().zip(values.iter()) {
-        // A stiffness, damping or payload fitted below zero is not significant: the data do not determine it.
+        // A stiffness, damping or payload that is fitted below zero is not significant: the tones do not determine it.
         if *value <= 0.0 && !parameter.is_cubic() {
             return Err(JointFitError::Undetermined(parameter.name()));
         }
@@ -181,7 +183,7 @@ fn first_guess(start: &Robot, postures: &[PostureDwells], payload: bool) -> Resu
     Ok(joints::fit(start, &tables, payload)?.robot)
 }
 
-/// The receptances under force in direction `force`; at each frequency from the dwell with the smallest force.
+/// Receptances of the tool under force in direction `force`; at each frequency from the dwell with the smallest force.
 fn lowest(posture: &PostureDwells, force: Direction) -> Option<PostureFrf> {
     let mut dwells: Vec<&Dwell> = posture
         .dwells
@@ -211,7 +213,8 @@ fn lowest(posture: &PostureDwells, force: Direction) -> Option<PostureFrf> {
                 * dwell.force()?.phasor(1);
             let noise = (line.variance * dwell.gram_inverse[(1, 1)]).sqrt() / per_force.norm();
             let receptance = line.phasor(1) / per_force;
-            // Even at the smallest force the cubic terms change the receptance; the error of the linearization accounts for that.
+            // Even at the smallest force the cubic terms of the joints change the receptance; the error of the
+            // linearization is added to its noise.
             Some((receptance, noise.hypot(LINEARIZATION_ERROR * receptance.norm())))
         };
         if let Some(found) = kept.iter().map(of_dwell).collect::<Option<Vec<_>>>() {
@@ -234,15 +237,16 @@ fn lowest(posture: &PostureDwells, force: Direction) -> Option<PostureFrf> {
     })
 }
 
-/// Number of equal force steps in which the predicted motion is continued from small force to the given force.
+/// Number of equal force steps in which the predicted motion of the tool is continued from a small force to the given
+/// force. A choice.
 const RISES: u32 = 8;
 
 impl CubicJointFit {
-    /// Predicted motion of the tool at a posture under the force F cos ωt, F in N: its fundamental, m, and the standard deviation
-    /// of its magnitude in every direction.
+    /// Predicted motion of the tool at a posture under the force F cos ωt, F in N: its fundamental, m, and the standard
+    /// deviation of the magnitude of the fundamental in every direction, m.
     ///
-    /// The motion is the one reached when the force rises slowly from zero. `None` if that branch ends in a jump before the given
-    /// force.
+    /// The motion is the one reached when the force rises slowly from zero. `None` if that branch ends in a jump before
+    /// the given force.
     pub fn response(
         &self,
         angles_rad: &[f64],
@@ -291,7 +295,7 @@ impl CubicJointFit {
         let by_values = solution.sensitivities(0..0)?.0 * model.chain(&placed);
         let mut deviation = Vector3::zeros();
         for axis in 0..3 {
-            // Derivative of a magnitude: d|u| = Re(u* du)/|u|.
+            // The magnitude of the tool's displacement u has the derivative d|u| = Re(u* du)/|u|.
             let gradient = DVector::from_iterator(
                 values.len(),
                 by_values.column_iter().map(|column| {

@@ -14,16 +14,16 @@ use quietcut_model::structure::{Direction, Robot};
 
 pub(super) const AXES: [Direction; 3] = [Direction::X, Direction::Y, Direction::Z];
 
-/// Equation of motion of the robot, the fitted joint parameters, and the harmonic-balance grid.
+/// Equation of motion of a robot, the fitted joint parameters, and the harmonic-balance grid.
 pub(super) struct Model<'a> {
     pub(super) parameters: &'a [JointParameter],
     pub(super) law: Law,
     pub(super) grid: Grid,
 }
 
-/// A posture with the matrices that do not depend on the parameters.
+/// Matrices of a robot at one posture that do not depend on the fitted parameters.
 pub(super) struct PostureMatrices {
-    /// Jacobian of the tool center point: 3 rows (x, y, z), a column per joint.
+    /// Jacobian of the tool center point by the joint angles, m/rad: 3 rows (x, y, z), a column per joint.
     pub(super) jacobian: DMatrix<f64>,
     /// Mass matrix without the fitted payload, kg m², and mass matrix per kilogram of payload, m².
     pub(super) mass: [DMatrix<f64>; 2],
@@ -56,7 +56,8 @@ fn dynamic(matrix: &Matrix3xX<f64>) -> DMatrix<f64> {
     DMatrix::from_fn(3, matrix.ncols(), |i, j| matrix[(i, j)])
 }
 
-/// For every motion channel: its axis, the fundamental of its displacement, m, and the standard deviation of that, m.
+/// For every motion channel of a dwell: its axis, the fundamental of its displacement, m, and the standard deviation of
+/// this fundamental, m.
 pub(super) fn displacements(dwell: &Dwell) -> Vec<(usize, Complex64, f64)> {
     let of = |line: &FourierSeries| {
         let order = i32::from(derivative(line.quantity));
@@ -79,7 +80,8 @@ impl<'a> Model<'a> {
         harmonics: usize,
     ) -> Self {
         let mut law = Law::new(joints, terms);
-        // A joint has its own stiffness and damping, without coupling to other joints.
+        // Each joint has its own stiffness and damping, without coupling to other joints, so that off-diagonal entries
+        // are removed.
         law.parameters.retain(|parameter| match parameter.role {
             Role::Damping(i, j) | Role::Stiffness(i, j) => i == j,
             _ => true,
@@ -103,7 +105,7 @@ impl<'a> Model<'a> {
         theta
     }
 
-    /// Derivative of θ by the joint parameters; θ is linear in them.
+    /// Derivative of the coefficients θ of the equation of motion by the joint parameters; θ is linear in them.
     pub(super) fn chain(&self, placed: &PostureMatrices) -> DMatrix<f64> {
         DMatrix::from_fn(
             self.law.parameters.len(),
@@ -121,7 +123,8 @@ impl<'a> Model<'a> {
         )
     }
 
-    /// Joint angles per unit force on the tool in x, y and z, without the cubic terms: Z⁻¹ Jᵀ, rad/N.
+    /// Joint angles per unit force on the tool in x, y and z, without the cubic terms: Z⁻¹ Jᵀ, rad/N, with the dynamic
+    /// stiffness Z of the joints and the Jacobian J of the tool.
     pub(super) fn linear(
         &self,
         placed: &PostureMatrices,
@@ -148,7 +151,7 @@ impl<'a> Model<'a> {
             .solve(&placed.jacobian.transpose().map(Complex64::from))
     }
 
-    /// Fourier coefficients of a motion that consists of the fundamental `q` alone.
+    /// Fourier coefficients of joint angles that consist of the fundamental `q` alone.
     pub(super) fn fundamental(&self, q: &DVector<Complex64>) -> DVector<f64> {
         let width = self.grid.width();
         let mut x = DVector::zeros(q.len() * width);
@@ -158,8 +161,9 @@ impl<'a> Model<'a> {
         x
     }
 
-    /// Joint angles of the measured motion u of the tool, if it is due to a force on the tool: Z⁻¹Jᵀ(J Z⁻¹Jᵀ)⁻¹ u, in the
-    /// directions that were measured.
+    /// Joint angles that belong to the measured motion u of the tool, if it is due to a force on the tool: Z⁻¹Jᵀ(J
+    /// Z⁻¹Jᵀ)⁻¹ u in the measured directions, with the dynamic stiffness Z of the joints and the Jacobian J of the
+    /// tool.
     pub(super) fn measured(
         &self,
         placed: &PostureMatrices,
@@ -167,7 +171,7 @@ impl<'a> Model<'a> {
         linear: &DMatrix<Complex64>,
     ) -> Option<DVector<Complex64>> {
         let mut seen = displacements(dwell);
-        // Of several channels in one direction only the first is used.
+        // Of several motion channels in one direction only the first is used.
         seen.sort_by_key(|(axis, ..)| *axis);
         seen.dedup_by_key(|(axis, ..)| *axis);
         let by_force = DMatrix::from_fn(linear.nrows(), seen.len(), |i, j| linear[(i, seen[j].0)]);
@@ -178,7 +182,8 @@ impl<'a> Model<'a> {
         Some(&by_force * (rows * &by_force).lu().solve(&moved)?)
     }
 
-    /// Periodic motion under the measured force, found by Newton's method from the measured motion; `None` if there is none nearby.
+    /// Periodic joint angles under the measured force, found by Newton's method from those of the measured motion;
+    /// `None` if there is no solution nearby.
     pub(super) fn solve(
         &self,
         placed: &PostureMatrices,
@@ -197,8 +202,9 @@ impl<'a> Model<'a> {
         self.grid.solve(problem, &self.fundamental(&start)).ok()
     }
 
-    /// Residual and Jacobian of the equivalent linearization at the measured amplitudes, weighted with its approximation error.
-    /// That error is relative, so off-resonance lines weigh as much as peaks, and the fit converges from a distant start.
+    /// Residual of the tool's motion in a dwell, predicted by the equivalent linearization of the joints at the
+    /// measured amplitudes, and its Jacobian, both weighted with the error of this linearization. That error is
+    /// relative, so off-resonance lines weigh as much as peaks, and the fit converges from a distant start.
     pub(super) fn linearized(
         &self,
         placed: &PostureMatrices,
@@ -240,7 +246,8 @@ impl<'a> Model<'a> {
             let left = (measured - moved) * weight;
             (residual[2 * row], residual[2 * row + 1]) = (left.re, left.im);
             for (column, parameter) in self.law.parameters.iter().enumerate() {
-                // Derivative of the tool displacement: du = −(Z⁻¹Jᵀ)ᵀ dZ q.
+                // Derivative of the tool's displacement u by the dynamic stiffness Z of the joints: du = −(Z⁻¹Jᵀ)ᵀ dZ
+                // q, with the joint angles q.
                 let at = |i: usize, j: usize| -linear[(i, axis)] * q[j];
                 let by = match parameter.role {
                     Role::Mass(i, j) if i == j => -at(i, i) * (omega * omega),

@@ -1,4 +1,4 @@
-//! The parameters of the joints of a robot.
+//! The parameters of a robot's joints that a fit may determine.
 
 use quietcut_model::structure::Robot;
 
@@ -40,7 +40,7 @@ impl JointParameter {
         }
     }
 
-    /// True for the cubic terms: they have no effect at vanishing force and may be negative.
+    /// True for the cubic terms of a joint: they have no effect at vanishing force and may be negative.
     pub fn is_cubic(self) -> bool {
         matches!(self, Self::CubicStiffness(_) | Self::CubicDamping(_))
     }

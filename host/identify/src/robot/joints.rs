@@ -31,18 +31,19 @@ pub struct PostureFrf {
     pub angles_rad: Vec<f64>,
     /// The receptances measured at the posture.
     pub table: FrfTable,
-    /// Standard deviation of each entry at each frequency, m/N.
+    /// Standard deviation of the magnitude of each entry of the table at each frequency, m/N.
     pub deviation: Vec<Vec<f64>>,
 }
 
-/// Result of a fit: a robot with identified stiffness and damping of its joints.
+/// Result of a fit to receptances: a robot with identified stiffness and damping of its joints.
 #[derive(Clone, Debug)]
 pub struct JointFit {
-    /// The robot with the fitted parameters, at the posture of the first guess.
+    /// The robot with the fitted joint parameters, at the posture of the first guess.
     pub robot: Robot,
     /// The fitted parameters.
     pub parameters: Vec<JointParameter>,
-    /// Covariance of the logarithms of the parameters, from the scatter between receptances and their least error.
+    /// Covariance of the logarithms of the joint parameters, from the scatter between receptances and the smallest
+    /// assumed relative error of receptances.
     pub covariance: DMatrix<f64>,
     /// χ² per degree of freedom: near 1 if the residual is within the standard deviations of the receptances.
     pub misfit: f64,
@@ -61,12 +62,12 @@ pub enum JointFitError {
         /// Number of joints of the robot.
         joints: usize,
     },
-    /// The receptances do not depend on this parameter.
+    /// The measurements do not determine this joint parameter.
     #[error(
         "the receptances do not determine {0}; postures in which that joint moves the tool, and frequencies up to the modes that it has a part in, are needed"
     )]
     Undetermined(String),
-    /// The iteration found no minimum of the sum of squares.
+    /// The iteration found no minimum of the weighted sum of squared residuals of the receptances.
     #[error(
         "the fit does not converge; its sum of squares over degrees of freedom is {0:.3e}: geometry or inertia of the links may be wrong"
     )]
@@ -76,12 +77,12 @@ pub enum JointFitError {
     Tones(#[from] FitError),
 }
 
-/// A posture with the matrices that do not depend on the parameters.
+/// Matrices of a robot at one posture that do not depend on the joint parameters, with the receptances measured there.
 struct PostureMatrices<'a> {
     frf: &'a PostureFrf,
     jacobian: Matrix3xX<f64>,
     payload: Matrix3xX<f64>,
-    /// Mass matrix of the links without the mass of the payload.
+    /// Mass matrix of the links without the payload, by the joint angles, kg m².
     mass: DMatrix<f64>,
     /// Inverse of the standard deviation of each receptance at each frequency, N/m.
     weights: Vec<Vec<f64>>,
@@ -89,8 +90,9 @@ struct PostureMatrices<'a> {
 
 struct Normal {
     sums: NormalSums,
-    /// Σ g gᵀ over the receptances of all postures, with g the gradient of one receptance. The errors of one receptance at
-    /// different lines are correlated; those of different receptances are not.
+    /// Σ g gᵀ over the receptances of all postures, with g the gradient that one receptance contributes; the sandwich
+    /// covariance uses it. The errors of one receptance at different lines are correlated; those of different
+    /// receptances are not.
     scatter: DMatrix<f64>,
     entries: usize,
     sum: f64,
@@ -99,8 +101,8 @@ struct Normal {
     rows: usize,
 }
 
-/// Fits a robot, whose stiffness and damping are a first guess, to receptances at several postures. With `payload` the mass of the
-/// last link is a parameter, too.
+/// Fits the joints of a robot, with stiffness and damping of `start` as a first guess, to receptances at several
+/// postures. With `payload` the mass of the last link is a parameter, too.
 ///
 /// # Errors
 /// See [`JointFitError`].
@@ -133,7 +135,8 @@ pub fn fit(start: &Robot, postures: &[PostureFrf], payload: bool) -> Result<Join
     let undetermined = || JointFitError::Undetermined("all parameters".into());
     let found = SEARCH.minimize(&mut fit, robot).ok_or_else(undetermined)?;
     match found.stop {
-        // Where no step is better any more, the steps are shorter than the last one may be.
+        // If no shorter step reduces the sum of squares any more, the steps are below the length that counts as
+        // converged.
         Stop::Converged | Stop::Stagnated => finish(found.point, parameters, &found.value),
         Stop::Singular => Err(undetermined()),
         _ => Err(JointFitError::NotConverged(
@@ -142,8 +145,8 @@ pub fn fit(start: &Robot, postures: &[PostureFrf], payload: bool) -> Result<Join
     }
 }
 
-/// The iteration. The start may be far away; damping falls slowly, and never to zero, since damping ratios of single joints are hardly
-/// determined.
+/// Levenberg–Marquardt settings of the fit of joints. The start may be far away; the damping of the steps falls slowly,
+/// and never to zero, since damping ratios of single joints are hardly determined.
 const SEARCH: LevenbergMarquardt = LevenbergMarquardt {
     damping: Damping {
         first: 1e-2,
@@ -159,13 +162,14 @@ const SEARCH: LevenbergMarquardt = LevenbergMarquardt {
     idle: Idle::Refuse,
 };
 
-/// Step, in standard deviations of the parameters, that ends the fit: far below the width of any interval.
+/// Length of the step, in standard deviations of the parameters, below which the fit of joints has converged: far below
+/// the width of any interval.
 const LAST_STEP: f64 = 1e-3;
 
-/// Largest change of the logarithm of a parameter in one step: none more than doubles.
+/// Largest change of the logarithm of a joint parameter in one step of the fit: no parameter more than doubles.
 const LARGEST_STEP: f64 = 0.7;
 
-/// The sum of squares over all receptances as a function of the robot.
+/// Weighted sum of squared residuals of all receptances as a function of the robot's joint parameters.
 struct ReceptanceFit<'a> {
     placed: &'a [PostureMatrices<'a>],
     parameters: &'a [JointParameter],
@@ -203,9 +207,10 @@ impl Objective for ReceptanceFit<'_> {
 }
 
 impl JointFit {
-    /// The receptance at a posture and frequency, and the standard deviation of the magnitude of each entry, m/N.
+    /// Predicted receptance of the tool at a posture and frequency, and the standard deviation of the magnitude of each
+    /// entry, m/N.
     ///
-    /// `None` where an undamped robot is at resonance and Z is singular.
+    /// `None` where an undamped robot is at resonance and its dynamic stiffness Z is singular.
     pub fn receptance(
         &self,
         angles_rad: &[f64],
@@ -221,7 +226,7 @@ impl JointFit {
             .collect();
         let deviation = Matrix3::from_fn(|i, j| {
             let h = model.receptance[(i, j)];
-            // Derivative of a magnitude: d|H| = Re(H* dH)/|H|.
+            // The magnitude of an entry H of the receptance has the derivative d|H| = Re(H* dH)/|H|.
             let gradient = DVector::from_iterator(
                 slopes.len(),
                 slopes
@@ -254,8 +259,8 @@ fn place<'a>(robot: &Robot, frf: &'a PostureFrf) -> PostureMatrices<'a> {
     }
 }
 
-/// Weights 1/σ of the lines of one receptance. A variance estimated from few averages is inaccurate but smooth over frequency, so
-/// it is averaged over neighbouring lines.
+/// Weights 1/σ of the lines of one receptance, with its standard deviation σ. A variance estimated from few averages is
+/// inaccurate but smooth over frequency, so it is averaged over neighbouring lines.
 fn weights(receptance: &[Complex64], deviation: &[f64]) -> Vec<f64> {
     const NEIGHBOURS: usize = 8;
     (0..deviation.len())
@@ -271,7 +276,7 @@ fn weights(receptance: &[Complex64], deviation: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-/// Sets the stiffnesses of the first guess from nearly static receptances. Damping stays that of `robot`.
+/// Sets the joint stiffnesses of the first guess from nearly static receptances. Joint dampings stay those of `robot`.
 fn first_guess(robot: &mut Robot, placed: &[PostureMatrices<'_>]) {
     let joints = robot.joints.len();
     let (mut rows, mut right) = (Vec::new(), Vec::new());
@@ -290,7 +295,8 @@ fn first_guess(robot: &mut Robot, placed: &[PostureMatrices<'_>]) {
             continue;
         };
         for (line, frequency) in frequencies.iter().enumerate().filter(|(_, f)| **f <= last) {
-            // Below a resonance a receptance exceeds the static one by the factor 1/(1 − r²).
+            // Below a resonance a receptance exceeds the static one by the factor 1/(1 − r²), with the ratio r of the
+            // frequency to the resonance.
             let grown = 1.0 / (1.0 - (NEARLY_STATIC * frequency / last).powi(2));
             for (entry, deviation) in table.entries().iter().zip(&posture.frf.deviation) {
                 let (Some(i), Some(j)) = (entry.response.axis(), entry.force.axis()) else {
@@ -314,7 +320,8 @@ fn first_guess(robot: &mut Robot, placed: &[PostureMatrices<'_>]) {
     if let Ok(fit) = LinearProblem::new(&matrix, &DVector::from_vec(right)).solve() {
         for (joint, compliance) in robot.joints.iter_mut().zip(fit.parameters.iter()) {
             let guess = 1.0 / compliance;
-            // A compliance with little effect on the receptances may come out negative or far off; then the first guess stays.
+            // The compliance of a joint with little effect on the receptances may come out negative or far off; then
+            // the given stiffness stays.
             let known = joint.stiffness_nm_per_rad;
             let [least, most] = GUESSED_STIFFNESS_RATIO;
             if guess > least * known && guess < most * known {
@@ -344,7 +351,8 @@ fn finish(robot: Robot, parameters: Vec<JointParameter>, normal: &Normal) -> Res
     let scatter = &inverse * &normal.scatter * &inverse * (taken * few * few);
     Ok(JointFit {
         robot,
-        // A calibration error common to all receptances changes all parameters by the same factor.
+        // A calibration error common to all receptances changes all joint parameters by the same factor; its variance
+        // is added to every entry.
         covariance: scatter.add_scalar(LEAST_RELATIVE_ERROR * LEAST_RELATIVE_ERROR),
         parameters,
         misfit,
@@ -352,10 +360,11 @@ fn finish(robot: Robot, parameters: Vec<JointParameter>, normal: &Normal) -> Res
     })
 }
 
-/// The robot at one posture and frequency: joint angles per force, and receptance.
+/// A robot at one posture and frequency: joint angles per force on the tool, and receptance of the tool.
 struct Model {
     omega: f64,
-    /// Joint angles per force on the tool, Z⁻¹Jᵀ: joints by directions, rad/N.
+    /// Joint angles per force on the tool, Z⁻¹Jᵀ, with the dynamic stiffness Z of the joints and the Jacobian J of the
+    /// tool: joints by directions, rad/N.
     angles: DMatrix<Complex64>,
     receptance: Matrix3<Complex64>,
 }
@@ -382,7 +391,8 @@ impl Model {
         })
     }
 
-    /// Derivative of the receptance by the logarithm of a parameter: dH = −(Z⁻¹Jᵀ)ᵀ dZ (Z⁻¹Jᵀ).
+    /// Derivative of the receptance by the logarithm of a joint parameter: dH = −(Z⁻¹Jᵀ)ᵀ dZ (Z⁻¹Jᵀ), with the dynamic
+    /// stiffness Z of the joints and the Jacobian J of the tool.
     fn slope(
         &self,
         parameter: JointParameter,
@@ -396,7 +406,7 @@ impl Model {
         match parameter {
             JointParameter::Stiffness(joint) => of_joint(joint, Complex64::from(-value)),
             JointParameter::Damping(joint) => of_joint(joint, Complex64::new(0.0, -self.omega * value)),
-            // The receptance is that at vanishing force, which cubic terms do not affect.
+            // The predicted receptance is that at vanishing force, which cubic terms of the joints do not affect.
             JointParameter::CubicStiffness(_) | JointParameter::CubicDamping(_) => Matrix3::zeros(),
             JointParameter::Payload => {
                 let moved = payload.map(Complex64::from) * &self.angles;

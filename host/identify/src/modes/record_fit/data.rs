@@ -11,14 +11,17 @@ use crate::modes::pole_residue::{PoleResidue, ShapedPole};
 use quietcut_frf::{ChannelLines, RecordSpectra};
 use quietcut_model::structure::Direction;
 
-/// Spectra of the records, and the assignment of their channels to directions.
+/// Fourier transforms of the records of a modal fit, and the assignment of their channels to entries of the mode
+/// shapes.
 pub(super) struct Data<'a> {
     pub(super) records: &'a [RecordSpectra],
-    /// Response and force index of each term for modes outside the band.
+    /// For each pair of compliance and inertia terms of the modes outside the band, the index of its response and of
+    /// its force direction.
     pub(super) places: Vec<(usize, usize)>,
-    /// For each record: index in the right shape of each response, and index in the left shape of each force.
+    /// For each record: the index in the right shape of each response channel, and the index in the left shape of each
+    /// force channel.
     pub(super) axes: Vec<(Vec<usize>, Vec<usize>)>,
-    /// Angular frequency at the middle of the band, rad/s: the scale of s in the polynomials.
+    /// Angular frequency at the middle of the band, rad/s, by which s is divided in the polynomials of the transients.
     pub(super) omega: f64,
 }
 
@@ -110,7 +113,7 @@ impl<'a> Data<'a> {
 }
 
 impl Data<'_> {
-    /// Mean square over the lines of each response of a record.
+    /// Mean square of the transform of each response of a record over the lines of the band.
     pub(super) fn sizes(&self, record: usize) -> Vec<f64> {
         let of = |channel: &ChannelLines| {
             let power: f64 = channel.lines.iter().map(|line| line.norm_sqr()).sum();

@@ -1,4 +1,5 @@
-//! Normal equations of one record for the parameters of the structure, with the transient of the record eliminated.
+//! Normal equations of one record for the parameters of the structure (modes and terms outside the band), with the
+//! transient of the record eliminated.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Matrix3, Vector3};
 use num_complex::Complex64;
@@ -9,31 +10,34 @@ use super::line::{Line, of_forces, powers};
 use super::unknowns::{SMOOTH, Unknowns};
 use super::variances::Variances;
 
-/// Number of frequency lines per block of the Jacobian products. A choice that keeps a block in the cache.
+/// Number of frequency lines per block of the matrix products of the Jacobian. A choice that keeps a block in the
+/// cache.
 const BLOCK: usize = 64;
 
-/// Relative ridge on the diagonal of the transient's normal equations, which regularizes terms without data. A choice, near the rounding error.
+/// Ridge on the diagonal of the normal equations of a record's transient, relative to each diagonal entry; it
+/// regularizes terms that the data do not determine. A choice, near the rounding error.
 const RIDGE: f64 = 1e-12;
 
-/// Normal equations of the structure from one record.
+/// Normal equations that one record contributes for the parameters of the structure.
 pub(super) struct Equations {
-    /// Schur complement of Re(Jᴴ J) for the structure after elimination of the transient.
+    /// Normal matrix for the structure after elimination of the transient: the Schur complement of Re(Jᴴ J), with the
+    /// Jacobian J of the weighted residual by structure and transient.
     pub(super) normal: DMatrix<f64>,
     pub(super) gradient: DVector<f64>,
     transients: NormalEquations,
-    /// Coupling between transient and structure; rows transient, columns structure.
+    /// Block of Re(Jᴴ J) that couples transient and structure; rows transient, columns structure.
     mixed: DMatrix<f64>,
     of_transient: DVector<f64>,
 }
 
 impl Equations {
-    /// Step of the transient parameters for a given step of the structure parameters.
+    /// Step of the record's transient parameters for a given step of the structure parameters.
     pub(super) fn transient(&self, step: &DVector<f64>) -> DVector<f64> {
         self.transients.solve(&(&self.of_transient - &self.mixed * step))
     }
 }
 
-/// Normal equations of a record; `None` if they are singular.
+/// Normal equations of a record for the structure and its own transient; `None` if they are singular.
 pub(super) fn equations(
     data: &Data<'_>,
     record: usize,
@@ -94,8 +98,8 @@ fn eliminated(gram: &DMatrix<f64>, structure: usize, transient: usize) -> Option
     })
 }
 
-/// Contribution of the uncertainty of the estimated forces to Re(Jᴴ J), for forces with the covariance
-/// P = V_f − V_f Hᴴ C⁻¹ H V_f.
+/// Contribution of the uncertainty of the estimated forces to the normal matrix Re(Jᴴ J), for forces with the
+/// covariance P = V_f − V_f Hᴴ C⁻¹ H V_f.
 pub(super) fn of_force_noise(
     data: &Data<'_>,
     record: usize,
@@ -142,7 +146,8 @@ pub(super) fn of_force_noise(
     Some(gram)
 }
 
-/// Derivatives of sⁿ H F + T with respect to the parameters of the structure; T is included only for the forces of the line itself.
+/// Derivatives of the predicted response sⁿ H F + T, with the force F and the transient T, by the parameters of the
+/// structure. T is included only if F is the force of the line itself.
 fn of_structure(
     data: &Data<'_>,
     record: usize,
@@ -210,7 +215,8 @@ fn of_structure(
     }
 }
 
-/// Derivatives with respect to the transient parameters; their columns follow those of the structure.
+/// Derivatives of the predicted response by the transient parameters; their entries in `row` follow those of the
+/// structure.
 fn of_transient(
     data: &Data<'_>,
     record: usize,

@@ -1,4 +1,5 @@
-//! One frequency line of a record: residual, covariance, and maximum likelihood estimate of the forces.
+//! One frequency line of a record: residual of the responses, its covariance, and the maximum likelihood estimate of
+//! the forces.
 
 use nalgebra::{Cholesky, Matrix3, Vector3};
 use num_complex::Complex64;
@@ -8,25 +9,27 @@ use super::unknowns::{SMOOTH, Unknowns};
 use super::variances::Variances;
 use crate::modes::shape;
 
-/// Residual and forces of one frequency line. Unused responses and forces are zero with unit variance.
+/// Residual of the responses and estimated forces of a record at one frequency line. Directions without a channel are
+/// zero with unit variance.
 pub(super) struct Line {
     pub(super) s: Complex64,
     /// FRF matrix sⁿ H; rows responses, columns forces of the record.
     pub(super) gain: Matrix3<Complex64>,
-    /// Residual e = X − sⁿ H F − T.
+    /// Residual e = X − sⁿ H F − T of the measured responses X under the measured forces F, with the transient T.
     pub(super) left: Vector3<Complex64>,
     /// Weighted residual C⁻¹ e.
     pub(super) weighted: Vector3<Complex64>,
     /// Weighted square of the residual, eᴴ C⁻¹ e.
     pub(super) square: f64,
-    /// Whitening matrix L⁻¹ of the covariance C = L Lᴴ.
+    /// Whitening matrix L⁻¹ of the residual, from its covariance C = L Lᴴ.
     pub(super) whitening: Matrix3<Complex64>,
-    /// Maximum likelihood forces F + V_f Hᴴ s̄ⁿ C⁻¹ e; the gradient of the cost equals that of a fit with these forces.
+    /// Maximum likelihood estimate of the forces, F + V_f Hᴴ s̄ⁿ C⁻¹ e; the gradient of the cost equals that of a fit
+    /// with these forces.
     pub(super) force: Vector3<Complex64>,
 }
 
 impl Line {
-    /// Evaluates the residual at line `k` of a record; `None` if the covariance is not positive definite.
+    /// Evaluates the residual of a record at line `k`; `None` if its covariance is not positive definite.
     pub(super) fn of(
         data: &Data<'_>,
         record: usize,
@@ -69,12 +72,13 @@ impl Line {
     }
 }
 
-/// Variances V_f of the force noise as complex numbers; zero for unused forces.
+/// Variances V_f of the measurement noise of the forces as complex numbers; zero for directions without a force
+/// channel.
 pub(super) fn of_forces(variances: &Variances) -> Vector3<Complex64> {
     Vector3::from_fn(|q, _| Complex64::from(variances.measured.get(q).copied().unwrap_or(0.0)))
 }
 
-/// FRF matrix sⁿ H of the measured responses at s.
+/// FRF matrix sⁿ H of the measured responses at s, with their number n of time derivatives.
 pub(super) fn gain(data: &Data<'_>, record: usize, unknowns: &Unknowns, s: Complex64) -> Matrix3<Complex64> {
     let (responses, forces) = &data.axes[record];
     let mut gain = Matrix3::zeros();

@@ -44,14 +44,17 @@ use quietcut_frf::RecordSpectra;
 use unknowns::{Transient, Unknowns};
 use variances::Variances;
 
-/// Largest number of rounds that alternate between parameters and noise variances. A choice.
+/// Largest number of rounds of a modal fit to whole records that alternate between the parameters and the noise
+/// variances. A choice.
 const ROUNDS: usize = 30;
-/// Relative change of the noise variances below which the rounds have converged. A choice.
+/// Relative change of the residual's covariance, from one round of noise variances to the next, below which the rounds
+/// have converged. A choice.
 const SAME_NOISE: f64 = 1e-3;
 
 const STEPS_MAX: usize = 100;
 
-/// Relative decrease of the cost below which the iteration has converged. A choice.
+/// Relative decrease of the cost Σ eᴴ C⁻¹ e in a Levenberg–Marquardt step below which the fit to whole records has
+/// converged. A choice.
 const SETTLED: f64 = 1e-9;
 
 /// Refines the modes of `model`, estimated from averaged receptances, by a maximum likelihood fit to the records.
@@ -83,7 +86,7 @@ pub fn refine_by_records(
     Ok((updated(&data, model, &refined), data.found(&variances)))
 }
 
-/// Cost Σ eᴴ C⁻¹ e over all lines and records.
+/// Cost Σ eᴴ C⁻¹ e over all lines and records, with the residual e of the responses and its covariance C.
 fn squares(data: &Data<'_>, variances: &[Variances], unknowns: &Unknowns) -> f64 {
     let of_record = |record: usize| -> f64 {
         (0..data.records[record].frequency_hz.len())
@@ -96,11 +99,12 @@ fn squares(data: &Data<'_>, variances: &[Variances], unknowns: &Unknowns) -> f64
     (0..data.records.len()).map(of_record).sum()
 }
 
-/// The cost as a function of the unknowns. The transient of each record is eliminated from the normal equations.
+/// The cost Σ eᴴ C⁻¹ e as a function of modes and transients. The transient of each record is eliminated from the
+/// normal equations.
 struct RecordFit<'a> {
     data: &'a Data<'a>,
     variances: &'a [Variances],
-    /// Equations of each record at the last linearization, from which the steps of the transients follow.
+    /// Normal equations of each record at the last linearization, from which the steps of the transients follow.
     equations: Vec<Equations>,
 }
 
@@ -144,7 +148,7 @@ impl Objective for RecordFit<'_> {
     }
 }
 
-/// Levenberg–Marquardt iteration with given variances; `None` if it does not converge.
+/// Levenberg–Marquardt iteration for modes and transients with given noise variances; `None` if it does not converge.
 fn least_squares(data: &Data<'_>, variances: &[Variances], unknowns: Unknowns) -> Option<Unknowns> {
     let mut fit = RecordFit {
         data,
@@ -156,8 +160,8 @@ fn least_squares(data: &Data<'_>, variances: &[Variances], unknowns: Unknowns) -
     is_found.then_some(found.point)
 }
 
-/// Fit with its covariance B⁻¹ M B⁻¹. M is the covariance of the gradient and B the curvature of half the cost; the uncertainty of the
-/// estimated forces makes M larger than B.
+/// Result of the fit with its covariance B⁻¹ M B⁻¹. M is the covariance of the gradient of half the cost and B its
+/// curvature; the uncertainty of the estimated forces makes M larger than B.
 fn finished(data: &Data<'_>, variances: &[Variances], mut unknowns: Unknowns) -> Option<Refined> {
     let directions = unknowns
         .structure

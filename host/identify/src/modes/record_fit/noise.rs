@@ -15,25 +15,29 @@ use quietcut_frf::ChannelLines;
 use quietcut_numerics::eigenvalues::of_symmetric;
 use quietcut_numerics::least_squares::{Idle, NormalEquations};
 
-/// Number of Fisher scoring steps per round. A choice; later rounds continue the iteration.
+/// Number of Fisher scoring steps for the noise variances in each round of a modal fit to whole records. A choice;
+/// later rounds continue the iteration.
 const STEPS: usize = 10;
 
-/// Smallest factor by which one step may reduce a variance. A choice that damps the iteration.
+/// Smallest factor by which one scoring step may multiply a noise variance. A choice that damps the iteration.
 const SHRINK: f64 = 0.1;
 
-/// Number of lines per band in which the force spectral matrix is averaged. With this number the smallest eigenvalue of the sample covariance
-/// of three noise channels is rarely below [`EIGENVALUE`] times the variance (Marchenko and Pastur: (1 − √(3/64))² = 0.61).
+/// Number of frequency lines in each band over which the spectral matrix of the forces is averaged. With this number
+/// the smallest eigenvalue of the sample covariance of three noise channels is rarely below [`EIGENVALUE`] times the
+/// variance (Marchenko and Pastur: (1 − √(3/64))² = 0.61).
 const BAND: usize = 64;
-/// Lower bound of the smallest eigenvalue of a sample noise covariance over [`BAND`] lines, relative to the variance; below the expected 0.61.
+/// Lower bound of the smallest eigenvalue of a sample covariance of noise over [`BAND`] lines, relative to the noise
+/// variance; below the expected 0.61.
 const EIGENVALUE: f64 = 0.5;
 
-/// Ridge on the diagonal of the scoring matrix, relative to its trace. A choice, near the rounding error.
+/// Ridge on the diagonal of the Fisher scoring matrix for the noise variances, relative to its trace. A choice, near
+/// the rounding error.
 const RIDGE: f64 = 1e-12;
 
-/// Start value of the force noise variance, relative to the power of the force in the band. A choice.
+/// Start value of the noise variance of a force, relative to the mean square of its transform in the band. A choice.
 const FORCE_START: f64 = 1e-6;
 
-/// Start values of the noise variances: the whole residual is attributed to response noise.
+/// Start values of the noise variances of a record: the whole residual is attributed to noise of the responses.
 pub(super) fn start(data: &Data<'_>, record: usize, unknowns: &Unknowns) -> Variances {
     let spectra = &data.records[record];
     let mut variances = Variances {
@@ -65,7 +69,8 @@ fn least(channel: &ChannelLines) -> f64 {
     (LEAST_RELATIVE_NOISE * channel.root_mean_square).powi(2)
 }
 
-/// Lower bound of the noise variance of a force channel: the plateau of its spectrum, or 0 without a plateau.
+/// Lower bound of the noise variance of a force channel: the larger one of the noise plateau of its spectrum, if it has
+/// one, and the smallest assumed noise of a channel.
 fn lowest(channel: &ChannelLines) -> f64 {
     channel.plateau.unwrap_or(0.0).max(least(channel))
 }
@@ -80,7 +85,8 @@ pub(super) fn update(data: &Data<'_>, record: usize, unknowns: &Unknowns, varian
     let responses = variances.responses.len();
     let spectra = &data.records[record];
     let values = 2.0 * (spectra.frequency_hz.len() * responses) as f64;
-    // Number of parameters of transient and structure per record: they reduce the degrees of freedom of the residual.
+    // Number of parameters of transients and structure, divided by the number of records: they reduce the degrees of
+    // freedom of the residual.
     let unknown = unknowns.transients.iter().map(Transient::width).sum::<usize>() / data.records.len()
         + unknowns.structure.parameters().len() / data.records.len();
     let unbiased = values / (values - unknown as f64).max(1.0);
@@ -115,14 +121,16 @@ pub(super) fn update(data: &Data<'_>, record: usize, unknowns: &Unknowns, varian
         }
         divide(data, record, unknowns, variances);
     }
-    // A single variance may be poorly determined; convergence is judged by the total covariance of each line.
+    // The variance of a single channel may be poorly determined; convergence is judged by the covariance of the
+    // residual at every 16th line.
     for k in (0..spectra.frequency_hz.len()).step_by(16) {
         let pair = (
             Line::of(data, record, unknowns, &before, k),
             Line::of(data, record, unknowns, variances, k),
         );
         if let (Some(old), Some(new)) = pair {
-            // tr(C_old C_new⁻¹) from the two whitening matrices.
+            // tr(C_old C_new⁻¹) of the residual's covariances before and after the update, from their whitening
+            // matrices.
             let mixed = new.whitening * old.whitening.try_inverse().unwrap_or_else(Matrix3::identity);
             let part = mixed.norm_squared() / 3.0;
             change = f64::max(change, (part - 1.0).abs());
@@ -131,12 +139,13 @@ pub(super) fn update(data: &Data<'_>, record: usize, unknowns: &Unknowns, varian
     change
 }
 
-/// Solution of A v = b with lower bounds: variances at a bound are fixed there and the others are solved again.
+/// Solution of the scoring equations A v = b for the noise variances v with lower bounds: variances at a bound are
+/// fixed there and the others are solved again.
 fn scored(normal: &DMatrix<f64>, right: &DVector<f64>, current: &[f64], bounds: &[f64]) -> Option<Vec<f64>> {
     let mut next = current.to_vec();
     let mut free: Vec<usize> = (0..current.len()).collect();
     loop {
-        // The equations are scaled by the current variances, so that their unknowns are ratios near 1.
+        // The scoring equations are scaled by the current variances, so that their unknowns are ratios near 1.
         let size = free.len();
         let mut scaled = DMatrix::from_fn(size, size, |i, j| {
             normal[(free[i], free[j])] * current[free[i]] * current[free[j]]
@@ -165,8 +174,10 @@ fn scored(normal: &DMatrix<f64>, right: &DVector<f64>, current: &[f64], bounds: 
     }
 }
 
-/// Divides the force noise into measurement noise and unmeasured forces. Measurement noise is the plateau of the force spectrum, or else the
-/// largest V_f for which S_ff − V_f is positive definite. The rest is unmeasured force that acts on the structure.
+/// Divides the apparent noise of each force into measurement noise and unmeasured forces. The variance V_f of the
+/// measurement noise is the noise plateau of the force spectrum, or else the largest one for which S_ff − V_f is
+/// positive definite, with the spectral matrix S_ff of the forces. The rest is unmeasured force that acts on the
+/// structure.
 fn divide(data: &Data<'_>, record: usize, unknowns: &Unknowns, variances: &mut Variances) {
     let spectra = &data.records[record];
     let count = spectra.frequency_hz.len();
@@ -179,7 +190,7 @@ fn divide(data: &Data<'_>, record: usize, unknowns: &Unknowns, variances: &mut V
             let sum: Complex64 = lines.clone().map(|k| a[k] * b[k].conj()).sum();
             sum / (lines.len() as f64 * (variances.forces[i] * variances.forces[j]).sqrt())
         });
-        // A spectral matrix with non-finite entries bounds the measurement noise at zero.
+        // A spectral matrix of the forces with non-finite entries gives no measurement noise.
         of_symmetric(power).map_or(0.0, |eigen| eigen.eigenvalues.min())
     };
     let least = (0..bands).map(eigenvalue).fold(f64::INFINITY, f64::min);
@@ -198,7 +209,8 @@ fn divide(data: &Data<'_>, record: usize, unknowns: &Unknowns, variances: &mut V
     }
 }
 
-/// Fisher scoring matrix A and right-hand side b (module documentation).
+/// Fisher scoring matrix A_cd = Σ tr(C⁻¹B_cC⁻¹B_d) and right-hand side b_c = Σ eᴴC⁻¹B_cC⁻¹e for the noise variances of
+/// the channels c.
 fn scores(
     data: &Data<'_>,
     record: usize,
@@ -210,7 +222,8 @@ fn scores(
     let (mut normal, mut right) = (DMatrix::zeros(size, size), DVector::zeros(size));
     for k in 0..data.records[record].frequency_hz.len() {
         let line = Line::of(data, record, unknowns, variances, k)?;
-        // Every matrix B_c of the likelihood is the product of a column and its adjoint.
+        // Every matrix B_c, by which the noise of channel c enters the covariance of the residual, is the product of a
+        // column and its adjoint.
         let column = |c: usize| -> Vector3<Complex64> {
             if c < responses {
                 Vector3::from_fn(|p, _| if p == c { Complex64::ONE } else { Complex64::ZERO })

@@ -1,33 +1,33 @@
-//! Unknowns of a modal fit to whole records.
+//! Unknown parameters of a modal fit to whole records.
 
 use nalgebra::DVector;
 use num_complex::Complex64;
 
 use crate::modes::pole_residue::PoleResidue;
 
-/// Number of coefficients of the polynomial part of a transient.
+/// Number of coefficients, per response, of the polynomial part of a record's transient.
 pub(super) const SMOOTH: usize = 3;
 
-/// The unknowns: parameters of the structure, and the transient of each record.
+/// The unknown parameters: modes of the structure with the terms outside the band, and the transient of each record.
 #[derive(Clone)]
 pub(super) struct Unknowns {
     pub(super) structure: PoleResidue,
     pub(super) transients: Vec<Transient>,
 }
 
-/// Transient of one record at the response p: T_p(s) = Σ_r c_pr/(s − λ_r) + conjugate at the conjugate pole + Σ_j a_pj (s/i s₀)ʲ
-/// iʲ.
+/// Transient of one record in each of its responses p: T_p(s) = Σ_r c_pr/(s − λ_r) + conjugate at the conjugate pole +
+/// Σ_j a_pj (s/i s₀)ʲ iʲ. The poles λ_r are those of the structure, s₀ is the middle of the band.
 #[derive(Clone)]
 pub(super) struct Transient {
-    /// Residues c_pr, by response and mode.
+    /// Residues c_pr of the transient, by response and mode.
     pub(super) residues: Vec<Vec<Complex64>>,
     /// Polynomial coefficients a_pj, by response.
     pub(super) smooth: Vec<[f64; SMOOTH]>,
 }
 
 impl Unknowns {
-    /// The unknowns after a step of the structure and of each transient. The step of a transient lists its residues by response and
-    /// mode, then its polynomial coefficients.
+    /// The unknown parameters after a step of the structure and of each transient. The step of a transient lists its
+    /// residues by response and mode, then its polynomial coefficients.
     pub(super) fn moved(&self, structure: &DVector<f64>, transients: &[DVector<f64>]) -> Self {
         let mut moved = self.clone();
         moved.structure = self.structure.moved(structure.as_slice());
@@ -46,7 +46,7 @@ impl Unknowns {
 }
 
 impl Transient {
-    /// Number of real parameters of the transient.
+    /// Number of real parameters of the transient of one record.
     pub(super) fn width(&self) -> usize {
         self.residues.iter().map(|row| 2 * row.len() + SMOOTH).sum()
     }

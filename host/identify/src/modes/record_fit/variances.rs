@@ -11,21 +11,24 @@ pub struct ChannelNoise {
     pub recording: String,
     /// Name of the channel.
     pub channel: String,
-    /// Standard deviation of the noise of a sample, SI, if the noise is white up to half the sample rate.
+    /// Standard deviation of the channel's noise in one sample, SI unit, if the noise is white up to half the sample
+    /// rate.
     pub deviation: f64,
     /// Standard deviation of the noise in percent of the RMS of the channel.
     pub percent: f64,
 }
 
-/// Noise variances of one record, per frequency line.
+/// Noise variances of the channels of one record, per frequency line.
 #[derive(Clone, Debug)]
 pub(super) struct Variances {
     /// Noise variances of the responses.
     pub(super) responses: Vec<f64>,
-    /// Apparent noise variances of the forces, V_f + V_d: measurement noise and unmeasured forces.
+    /// Apparent noise variances of the forces, V_f + V_d: V_f of measurement noise and V_d of unmeasured forces.
     pub(super) forces: Vec<f64>,
-    /// Noise variances V_f of the measured forces; the rest of the apparent noise is V_d.
+    /// Variances V_f of the measurement noise of the forces; the rest of the apparent noise is V_d of unmeasured
+    /// forces.
     pub(super) measured: Vec<f64>,
-    /// Covariance sⁿ H V_d Hᴴ s̄ⁿ of the response to unmeasured forces at each line, from the structure of the previous round.
+    /// Covariance sⁿ H V_d Hᴴ s̄ⁿ of the responses to unmeasured forces at each line, with the structure's FRF H of the
+    /// previous round.
     pub(super) disturbance: Vec<Matrix3<Complex64>>,
 }
