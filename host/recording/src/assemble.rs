@@ -10,7 +10,7 @@ use super::understand::understand;
 use super::understood::{Understood, UnderstoodColumn};
 use super::{Channel, Recording, RecordingError, Sidecar};
 
-/// A recording, and how its file was understood.
+/// A recording in SI units, and the report of how its file was understood.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Imported {
     /// The recording.
@@ -19,8 +19,8 @@ pub struct Imported {
     pub understood: Understood,
 }
 
-/// Builds the recording: applies names, units and sensitivities, and determines the sample rate. `known` are the names of the columns of all
-/// records of the file, which sidecar and map may state.
+/// Builds a recording from the columns of one record of a file: applies names, units and sensitivities, and determines
+/// the sample rate. `known` are the column names of all records of the file; sidecar and map may name only these.
 pub(super) fn recording(
     path: &Path,
     raw: Raw,
@@ -221,7 +221,7 @@ fn even_rate(path: &Path, time: &[f64]) -> Result<(f64, f64), RecordingError> {
     Ok((1.0 / step, *first))
 }
 
-/// Description of unevenly spaced times: the largest step, and the usual one.
+/// Error text for time stamps that are not evenly spaced: the largest step, and the median step.
 fn uneven(time: &[f64]) -> String {
     let mut steps: Vec<f64> = time.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let largest = (0..steps.len())

@@ -31,7 +31,7 @@ pub struct Sensed {
     pub blocks: Vec<Block>,
     /// Rising tachometer edges, in order.
     pub edges: Vec<Edge>,
-    /// False if the unit of the channels is unknown; amplitudes are then relative, not in m/s².
+    /// False if no unit of the acceleration channels is known; amplitudes are then relative, not in m/s².
     pub is_calibrated: bool,
 }
 
@@ -61,7 +61,8 @@ impl Sensed {
             .fold(0.0_f64, |largest, sample| largest.max(sample.abs()));
         let count = count(largest, is_calibrated);
         let teeth = teeth(recording, speed)?;
-        // A given speed replaces the tachometer, so that recordings with a faulty tachometer can be replayed.
+        // A spindle speed that the user gives replaces the recorded tachometer, so that recordings with a faulty
+        // tachometer can be replayed.
         let wheel = wheel(recording).filter(|_| speed.rpm.is_none());
         let cut = recording.sidecar.cut.unwrap_or_default();
         let rpm = speed.rpm.or(cut.spindle_rpm.filter(|_| cut.last_rpm.is_none()));
@@ -75,7 +76,8 @@ impl Sensed {
             sensor: Sensor {
                 nominal_rate: Hertz(rate as f32),
                 meters_per_second2_per_count: count as f32,
-                // Without a unit the only known noise is that of quantization: variance count²/12, spread over 0 to rate/2.
+                // For acceleration of unknown unit only the quantization noise is known: variance count²/12, spread
+                // over 0 to half the sample rate.
                 noise_meters_per_second2_per_root_hertz: if is_calibrated {
                     Sensor::IIS3DWB_16G.noise_meters_per_second2_per_root_hertz
                 } else {
@@ -144,14 +146,15 @@ fn axes(recording: &Recording) -> Result<([Option<&Channel>; 3], bool), Recordin
     }
 }
 
-/// Acceleration per count, m/s² (in the unit of the recording if that is unknown), for the largest absolute sample `largest`.
+/// Acceleration per sensor count, m/s² (or unit of the recording if that is unknown), such that the largest absolute
+/// sample `largest` fits into the 16 bits of the device.
 fn count(largest: f64, is_calibrated: bool) -> f64 {
     let needed = largest / FULL_SCALE;
     if needed <= 0.0 {
         return COUNT[0];
     }
     if is_calibrated {
-        // Beyond ±16 g the scale follows the largest sample.
+        // For acceleration beyond ±16 g, the largest range of the sensor, the scale follows the largest sample.
         COUNT.into_iter().find(|&count| count >= needed).unwrap_or(needed)
     } else {
         needed
@@ -171,7 +174,8 @@ fn teeth(recording: &Recording, speed: SpindleSettings) -> Result<u8, RecordingE
     }
 }
 
-/// Tachometer wheel from the sidecar, one mark by default; `None` if the recording has no channel `tacho`.
+/// Tachometer wheel (mark positions and missing marks) from the sidecar, one mark by default; `None` if the recording
+/// has no channel `tacho`.
 pub(super) fn wheel(recording: &Recording) -> Option<Wheel> {
     recording.channel("tacho")?;
     let said = recording
@@ -186,7 +190,8 @@ pub(super) fn wheel(recording: &Recording) -> Option<Wheel> {
     })
 }
 
-/// Working point from the sidecar; `None` if a parameter of the cut is missing.
+/// Working point (axial depth, immersion angles, feed) from the sidecar; `None` if one of these parameters of the cut
+/// is missing.
 fn working_point(recording: &Recording) -> Option<WorkingPoint> {
     let cut = recording.sidecar.cut?;
     Some(WorkingPoint {
@@ -214,7 +219,7 @@ fn blocks(axes: &[Option<&Channel>; 3], count: f64, rate: f64) -> Vec<Block> {
     let sample = |index: usize| -> Counts {
         axes.map(|channel| {
             let value = channel.map_or(0.0, |channel| channel.samples[index]);
-            // The cast saturates at ±full scale, as the sensor does.
+            // The cast to 16 bits saturates at ±full scale, as the sensor does.
             (value / count).round() as i16
         })
     };
@@ -249,15 +254,15 @@ fn edges(recording: &Recording) -> Vec<Edge> {
         .collect()
 }
 
-/// A rising edge of a level.
+/// A rising edge of the tachometer level, as the device detects it.
 pub(super) struct Rise {
-    /// Sample at which the detector of the device finds it.
+    /// Index of the sample at which the edge detector of the device reports the rising edge.
     pub(super) sample: usize,
-    /// Time from the edge to that sample, in sample intervals.
+    /// Time from the rising edge to the sample at which it is reported, in sample intervals.
     before: f32,
 }
 
-/// Rising edges of a level as the device finds them, in order.
+/// Rising edges of a tachometer level, sampled as `level`, in order, as the edge detector of the device finds them.
 pub(super) fn rises(level: &[f64]) -> impl Iterator<Item = Rise> {
     let (low, high) = level
         .iter()

@@ -25,7 +25,8 @@ pub(crate) const FAR_FROM_REST: f64 = 0.1;
 /// Duration of equal samples, in samples, that counts as a dropout of a channel that otherwise changes. Unfounded.
 pub(crate) const DROPOUT_RUN: usize = 32;
 
-/// Fraction of unchanged steps above which a channel is at rest or coarsely quantized, so that equal samples are no dropout. Unfounded.
+/// Share of sample-to-sample steps without any change above which a channel is at rest or coarsely quantized, so that a
+/// run of equal samples is no dropout. Unfounded.
 pub(crate) const AT_REST: f64 = 0.2;
 
 /// Largest correlation error, 1 − r, at which acceleration from one channel and acceleration from another channel are the same motion. With

@@ -64,7 +64,7 @@ pub(super) fn titles(path: &Path) -> Result<Vec<String>, RecordingError> {
         .collect())
 }
 
-/// Reads until `buffer` is full or the text ends; returns the number of bytes.
+/// Reads from `text` until `buffer` is full or the text ends; returns the number of bytes read.
 fn fill(text: &mut impl Read, buffer: &mut [u8]) -> std::io::Result<usize> {
     let mut filled = 0;
     while filled < buffer.len() {
@@ -78,7 +78,7 @@ fn fill(text: &mut impl Read, buffer: &mut [u8]) -> std::io::Result<usize> {
     Ok(filled)
 }
 
-/// Reads a table of `length` bytes, in chunks of `chunk` bytes after the head.
+/// Reads a text table of `length` bytes: first its head, then the rest in chunks of `chunk` bytes.
 fn table(
     path: &Path,
     mut text: impl Read,
@@ -131,18 +131,18 @@ fn table(
     }
 }
 
-/// Columns of a text table while its lines are read.
+/// Columns of a text table, filled while its lines are read.
 struct Table<'a> {
     path: &'a Path,
-    /// Number of lines read so far.
+    /// Number of lines of the text table that are read so far, those of the head included.
     line: u64,
     columns: Vec<RawColumn>,
     /// Empty fields of each column.
     gaps: Vec<Gaps>,
     dialect: Dialect,
-    /// Length of the whole file, bytes.
+    /// Length of the whole file of the text table, bytes.
     bytes: u64,
-    /// True if NaN and infinite values are errors.
+    /// True if a NaN or infinite value in the text table is an error.
     finite: bool,
 }
 
@@ -150,15 +150,16 @@ struct Table<'a> {
 #[derive(Clone, Copy, Default)]
 struct Gaps {
     count: usize,
-    /// Line of the first empty field.
+    /// Number of the line with the first empty field of a column, from 1.
     line: u64,
 }
 
-/// Message part: remedy for a row with NaN or infinity.
+/// End of an error message about a row of a text table with text, NaN or infinity: what the user can do.
 const LEAVE_OUT: &str = "a number is needed; repair the row, or leave it out with --from-s or --until-s";
 
 impl<'a> Table<'a> {
-    /// An empty table with the columns of the head; columns without a name are called by their number.
+    /// A table without samples yet, with the columns that the head of the text file names; unnamed columns are called
+    /// by their number.
     fn new(path: &'a Path, head: &Head, bytes: u64, finite: bool) -> Self {
         let unnamed = || {
             vec![
@@ -193,7 +194,7 @@ impl<'a> Table<'a> {
         }
     }
 
-    /// Parses complete lines; only the last line of a file may lack its line end.
+    /// Parses the complete lines of a text table in `text`; only the last line of a file may lack its line end.
     fn lines(&mut self, text: &[u8]) -> Result<(), RecordingError> {
         let is_plain = self.dialect == Dialect::PLAIN && !self.columns.is_empty();
         let mut rest = text;
@@ -227,7 +228,8 @@ impl<'a> Table<'a> {
                 (value.is_finite() || !self.finite) && end == if is_last { End::Line } else { End::Field }
             });
             let Some((value, length, _)) = parsed else {
-                // The line may have empty fields; the values that are already stored are taken back.
+                // The line may have empty fields, which this fast path does not parse: the values that it has already
+                // stored are removed, and the general parser reads the line.
                 for column in &mut self.columns[..index] {
                     column.samples.pop();
                 }
@@ -246,7 +248,7 @@ impl<'a> Table<'a> {
         Ok(rest)
     }
 
-    /// Parses a line in any dialect; empty fields are marked as gaps.
+    /// Parses a line of numbers in any separator and decimal mark; an empty field is counted in the gaps of its column.
     fn general_row(&mut self, line: &[u8]) -> Result<(), RecordingError> {
         let text = String::from_utf8_lossy(line);
         let fields = self.dialect.fields(text.trim_matches(['\n', '\r']));
@@ -278,7 +280,8 @@ impl<'a> Table<'a> {
         Ok(())
     }
 
-    /// Reserves memory for all samples after the first row of `line` bytes. Growth by doubling could take twice the memory.
+    /// Reserves memory for the samples of the whole file, estimated from the length of the first row, `line` bytes.
+    /// Growth by doubling could take twice the memory.
     fn make_room_after_first(&mut self, line: usize) {
         if self
             .columns
@@ -288,13 +291,15 @@ impl<'a> Table<'a> {
             return;
         }
         let lines = usize::try_from(self.bytes).unwrap_or(0) / line.max(1);
-        // Later rows are often longer, since time gets more digits. The surplus is small, and unused memory is not committed.
+        // The estimate of the number of rows is mostly too high, since later rows are longer (time gets more digits).
+        // The surplus is small, and unused memory is not committed.
         for column in &mut self.columns {
             column.samples.reserve_exact(lines);
         }
     }
 
-    /// The columns with values; a column with some empty fields is an error.
+    /// The columns of the text table that have values. A column with values in some rows and empty fields in others is
+    /// an error.
     fn raw(self, head: Head) -> Result<Raw, RecordingError> {
         let mut notes = head.notes;
         let is_unnamed = |name: &str, index: usize| {
@@ -335,7 +340,7 @@ impl<'a> Table<'a> {
         })
     }
 
-    /// Error that describes the fault in a line with these fields.
+    /// Error that names the fault in a row of a text table whose fields are `fields`.
     fn row_error(&self, fields: &[&str]) -> RecordingError {
         if fields.len() != self.columns.len() {
             return self.wrong(format!(
@@ -352,7 +357,8 @@ impl<'a> Table<'a> {
             .find(|(field, _)| !field.is_empty() && !is_number(field));
         self.wrong(match wrong {
             Some((field, column)) => {
-                // At most 40 characters: a damaged file may have a very long field.
+                // The message shows at most 40 characters of the field, because a damaged file may have a very long
+                // one.
                 let shown: String = field.chars().take(40).collect();
                 let needed = if parsed(field).is_some() {
                     LEAVE_OUT

@@ -9,8 +9,8 @@ pub(super) enum End {
     Line,
 }
 
-/// Parses the number at the start of `text`, with optional blanks and quotes. Returns its value, the number of bytes up to and including the
-/// separator, and the separator.
+/// Parses the number at the start of `text`, a part of a CSV line, with optional blanks and quotes. Returns its value,
+/// the number of bytes up to and including the separator, and the separator.
 #[inline]
 pub(super) fn number(text: &[u8]) -> Option<(f64, usize, End)> {
     // Fast path: a number without blanks and quotes.

@@ -8,7 +8,8 @@ use crate::file::Prepared;
 /// Significant digits of written samples: nine digits represent every 32-bit float exactly.
 const DIGITS: usize = 9;
 
-/// A recording as a CSV file that is written but not yet published: time in seconds, then one column per channel.
+/// Writes a recording to a temporary CSV file, not yet under its final name: time in seconds, then one column per
+/// channel.
 pub(super) fn prepared(path: &Path, recording: &Recording) -> Result<Prepared, RecordingError> {
     Ok(crate::file::prepare(path, |writer| {
         let mut writer = csv::Writer::from_writer(writer);

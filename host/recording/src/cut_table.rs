@@ -1,7 +1,8 @@
-//! Tables of cuts that were tried: CSV with spindle speed, axial depth, outcome, and where it was measured the chatter frequency.
+//! Tables of trial cuts: CSV with spindle speed, axial depth, outcome, and the chatter frequency of cuts where it was
+//! measured.
 //!
-//! Two heads mean the same: `rpm [rev/min],depth [mm],outcome` and `rpm,depth_mm,chatter_hz,verdict`. Columns may stand in any
-//! order and mix both heads. Lines that start with `#` are remarks.
+//! Two heads mean the same: `rpm [rev/min],depth [mm],outcome` and `rpm,depth_mm,chatter_hz,verdict`. Columns may stand
+//! in any order and mix both heads. Lines that start with `#` are remarks.
 
 use std::path::{Path, PathBuf};
 
@@ -30,7 +31,8 @@ pub struct TrialCut {
     pub depth_mm: f64,
     /// Observed outcome.
     pub outcome: Outcome,
-    /// Chatter frequency, Hz; `None` for a stable cut, or if it was not measured. Outputs leave it out.
+    /// Measured chatter frequency of the trial cut, Hz; `None` for a stable cut, or if it was not measured. JSON and
+    /// CSV outputs omit this field.
     #[serde(skip)]
     pub chatter_hz: Option<f64>,
 }
@@ -51,12 +53,13 @@ pub enum CutTableError {
         path: PathBuf,
         /// The line, from 1.
         line: u64,
-        /// What was found, and what would be right.
+        /// The faulty text in the line of the table of cuts, and the form that is needed.
         what: String,
     },
 }
 
-/// Words for an outcome. The table of a chart may name the kind of stability loss.
+/// Words for the outcome of a trial cut in a table of cuts. A kind of stability loss (`hopf`, `period-doubling`) also
+/// means chatter.
 const OUTCOMES: [(&str, Outcome); 6] = [
     ("stable", Outcome::Stable),
     ("chatter", Outcome::Chatter),
@@ -66,7 +69,7 @@ const OUTCOMES: [(&str, Outcome); 6] = [
     ("marginal", Outcome::Marginal),
 ];
 
-/// The columns, each with both of its titles, in the order of [`Places`].
+/// Titles of the columns of a table of cuts, two for each column, in the order of [`Places`].
 const TITLES: [[&str; 2]; 4] = [
     ["rpm [rev/min]", "rpm"],
     ["depth [mm]", "depth_mm"],
@@ -74,10 +77,11 @@ const TITLES: [[&str; 2]; 4] = [
     ["chatter [Hz]", "chatter_hz"],
 ];
 
-/// Reads a table of cuts; one without rows is empty.
+/// Reads a table of trial cuts; a table without rows gives an empty list.
 ///
 /// # Errors
-/// The file cannot be read, has other columns, or a speed, depth, frequency or outcome that cannot be.
+/// The file cannot be read, lacks a column or has an unknown one, or a speed, depth, frequency or outcome is not
+/// possible.
 pub fn read(path: &Path) -> Result<Vec<TrialCut>, CutTableError> {
     parse(path, &read_text(path)?)
 }
@@ -114,7 +118,8 @@ pub fn parse(path: &Path, text: &str) -> Result<Vec<TrialCut>, CutTableError> {
         .collect()
 }
 
-/// The line of a row: its position is that of the remarks and empty lines before it.
+/// Number of the line in the file, from 1, that holds a row of a table of cuts. The position that the CSV parser gives
+/// is before the remarks and empty lines ahead of the row, so these are counted.
 fn line_of(text: &str, position: &csv::Position) -> u64 {
     let at = usize::try_from(position.byte()).unwrap_or(usize::MAX);
     let rest = text.get(at..).unwrap_or_default();

@@ -1,21 +1,22 @@
-//! A column in doubt, and the message that names what the user can state about it.
+//! A column of a recorded file whose meaning is in doubt, and the message that names what the user can state about it.
 
-/// A column whose meaning is not certain, and what the user can state about it.
+/// A column of a recorded file whose meaning is not certain, and a proposal of what the user can state about it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Doubt {
-    /// Description: column and what is not stated.
+    /// Sentence part: the column in doubt and what the file does not state about it.
     pub what: String,
     /// Name of the column in the file.
     pub column: String,
     /// Channel name that is possible.
     pub name: String,
-    /// Unit that is possible; `None` if the file states it.
+    /// Proposed unit of the column in doubt; `None` if the file states the unit.
     pub unit: Option<&'static str>,
-    /// Sensitivity that is possible, if the column is a voltage.
+    /// Proposed sensitivity of the sensor, if the column in doubt is a voltage; `None` otherwise.
     pub sensitivity: Option<&'static str>,
 }
 
-/// Joins doubts: what is not stated, the option and the lines of the sidecar that state it.
+/// Message about columns in doubt: what the file does not state, and the option `--map` and the lines of the sidecar
+/// that would state it.
 pub(super) fn doubts_text(doubts: &[Doubt], sidecar: &std::path::Path) -> String {
     let what: Vec<&str> = doubts.iter().map(|doubt| doubt.what.as_str()).collect();
     let map: Vec<String> = doubts
@@ -36,7 +37,8 @@ pub(super) fn doubts_text(doubts: &[Doubt], sidecar: &std::path::Path) -> String
         )
         .collect();
     let map = map.join(",");
-    // A shell splits words at blanks and reads brackets.
+    // The proposed option is quoted unless all its characters are plain, since a shell splits words at blanks and
+    // interprets brackets.
     let is_plain = map
         .chars()
         .all(|letter| letter.is_alphanumeric() || "=,:-_./^".contains(letter));

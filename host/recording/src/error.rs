@@ -33,15 +33,15 @@ pub enum RecordingError {
     Content {
         /// The file.
         path: PathBuf,
-        /// Fault, its location in the file, and the expected content.
+        /// Fault in the content of the file, its location, and the expected content.
         what: String,
     },
-    /// A line of a text file is malformed.
+    /// One line of a text file is malformed.
     #[error("{}, line {line}: {what}", path.display())]
     Line {
         /// The file.
         path: PathBuf,
-        /// Number of the line, from 1.
+        /// Number of the malformed line, from 1.
         line: u64,
         /// Fault and the expected content.
         what: String,
@@ -70,10 +70,10 @@ pub enum RecordingError {
         column: String,
         /// Quantity of the stated unit.
         found: Quantity,
-        /// Quantity that the channel name requires.
+        /// Quantity that a channel of this name must measure.
         expected: Quantity,
     },
-    /// A sample is NaN or infinite.
+    /// A sample of a channel is NaN or infinite.
     #[error(
         "{}, channel \"{channel}\": sample {sample} at {time_s} s is {value} ({count} such samples, the last at {last_s} s); a number is needed: \
          repair the channel, or use the segment before or after it with --until-s or --from-s",
@@ -84,25 +84,25 @@ pub enum RecordingError {
         path: PathBuf,
         /// Name of the channel.
         channel: String,
-        /// Number of the first such sample, from 1.
+        /// Number of the first NaN or infinite sample of the channel, from 1.
         sample: usize,
-        /// Time of the first such sample, s.
+        /// Time of the first NaN or infinite sample of the channel, s.
         time_s: f64,
-        /// Value of the first such sample: NaN or ±∞.
+        /// Value of the first NaN or infinite sample of the channel: NaN, ∞ or −∞.
         value: f64,
-        /// Number of NaN or infinite samples.
+        /// Number of samples of the channel that are NaN or infinite.
         count: usize,
-        /// Time of the last such sample, s.
+        /// Time of the last NaN or infinite sample of the channel, s.
         last_s: f64,
     },
-    /// The meaning of columns is in doubt: direction, unit or sensitivity is not stated.
+    /// The meaning of columns is in doubt: their direction, unit or sensitivity is not stated.
     #[error("{}: {}", path.display(), doubts_text(doubts, sidecar))]
     Doubt {
         /// The file.
         path: PathBuf,
-        /// Sidecar file that could state the meaning.
+        /// Sidecar file in which the user could state the meaning of the columns.
         sidecar: PathBuf,
-        /// The columns, each with what could be stated about it.
+        /// The columns in doubt, each with a proposal of what the user could state about it.
         doubts: Vec<Doubt>,
     },
     /// Neither file nor sidecar states the sample rate.
@@ -122,14 +122,15 @@ pub enum RecordingError {
     NoChannel {
         /// The file.
         path: PathBuf,
-        /// Description of the required channel or setting.
+        /// Description of the channel or setting that the recording lacks.
         needed: String,
         /// Names and units of the channels of the recording.
         found: Vec<String>,
     },
 }
 
-/// Message part for channels whose unit is unknown, such as `fx [unknown]`: the option that states it.
+/// Part of an error message about channels whose unit is unknown, such as `fx [unknown]`: the option that states the
+/// unit.
 fn without_unit(found: &[String]) -> String {
     let names: Vec<String> = found
         .iter()

@@ -22,7 +22,7 @@ pub enum FileError {
     NotText {
         /// The file.
         path: PathBuf,
-        /// Offset of the first byte that is not UTF-8, from 0.
+        /// Offset of the first byte that is not UTF-8, counted from the start of the file, from 0.
         offset: usize,
     },
     /// The file cannot be written: missing folder, no permission, disk full.
@@ -64,15 +64,16 @@ fn being_written() -> MutexGuard<'static, Vec<PathBuf>> {
     ASIDE.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Removes all temporary files and blocks every later write, so that an interrupt leaves no half-written file. Only for a process that is about
-/// to exit.
+/// Removes the temporary files of all writes in progress and blocks every later write, so that an interrupt leaves no
+/// half-written file. Only for a process that is about to exit.
 pub fn abandon_writing() {
     let mut aside = being_written();
     for path in aside.drain(..) {
-        // A file that cannot be removed is left; the process exits anyway.
+        // A temporary file that cannot be removed stays on the disk; the process is about to exit.
         let _ = std::fs::remove_file(path);
     }
-    // The lock is never released: a write in progress waits for it until the process exits.
+    // The lock on the list of temporary files is never released: a write in progress waits for it until the process
+    // exits.
     std::mem::forget(aside);
 }
 
@@ -81,11 +82,12 @@ pub fn write_with(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<(
     publish([prepare(path, fill)?])
 }
 
-/// A file that is complete on the disk under a temporary name; dropped without [`publish`] it is removed.
+/// A file that is complete on the disk under a temporary name. [`publish`] gives it its final name; without that it is
+/// removed when dropped.
 #[derive(Debug)]
 pub struct Prepared {
     path: PathBuf,
-    /// The temporary file; `None` after it got its name.
+    /// The temporary file; `None` after it was renamed to its final name.
     aside: Option<NamedTempFile>,
 }
 
@@ -99,7 +101,7 @@ impl Drop for Prepared {
     }
 }
 
-/// Writes a file that is to become `path` under a temporary name in the same folder, with the content that `fill` writes.
+/// Writes the content of the later file `path` under a temporary name in the same folder; `fill` writes the content.
 ///
 /// # Errors
 /// The file cannot be written.
@@ -130,10 +132,11 @@ pub fn prepare(
     }
 }
 
-/// Gives files their names, one after the other; an interrupt by Ctrl-C waits until all have them.
+/// Renames prepared files to their final names, one after the other; an interrupt by Ctrl-C waits until all are
+/// renamed.
 ///
 /// # Errors
-/// A file cannot get its name: it and those after it are removed, and the previous files stay.
+/// A file cannot be renamed: it and those after it are removed, and the previous files of those names stay.
 pub fn publish<const N: usize>(files: [Prepared; N]) -> Result<(), FileError> {
     let mut known = being_written();
     let mut outcome = Ok(());
@@ -153,7 +156,8 @@ pub fn publish<const N: usize>(files: [Prepared; N]) -> Result<(), FileError> {
     outcome
 }
 
-/// Writes the content of `fill` to the temporary file and syncs it to the disk; on an error the temporary file is removed.
+/// Writes the content that `fill` writes to the temporary file and syncs it to the disk; on an error the temporary file
+/// is removed.
 fn filled(
     aside: NamedTempFile,
     fill: impl FnOnce(&mut dyn Write) -> io::Result<()>,
@@ -173,7 +177,7 @@ pub fn ending(path: &Path) -> String {
         .to_lowercase()
 }
 
-/// Creates a temporary file in the folder of `path`: on one file system the later rename is atomic.
+/// Creates a temporary file in the folder of `path`: a rename within one file system is atomic.
 fn aside(path: &Path) -> io::Result<NamedTempFile> {
     let folder = match path.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
@@ -181,7 +185,8 @@ fn aside(path: &Path) -> io::Result<NamedTempFile> {
     };
     let mut builder = tempfile::Builder::new();
     builder.prefix(".quietcut-");
-    // Temporary files are readable by their owner only; results get the usual permissions.
+    // A temporary file is readable by its owner only unless another mode is set; with this mode the finished file has
+    // the permissions of any new file.
     #[cfg(unix)]
     {
         use std::os::unix::fs::PermissionsExt;

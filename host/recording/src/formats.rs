@@ -28,7 +28,7 @@ impl Recording {
     /// Reads a segment of a recording and its sidecar. Samples outside the segment may be NaN or infinite.
     ///
     /// # Errors
-    /// As [`Recording::read`]; also if the segment lies outside the recording.
+    /// An error of [`Recording::read`], or a segment that lies outside the recording.
     pub fn read_segment(path: impl AsRef<Path>, segment: Segment) -> Result<Self, RecordingError> {
         let import = Import {
             segment,
@@ -37,10 +37,11 @@ impl Recording {
         Self::import(path, &import).map(|imported| imported.recording)
     }
 
-    /// Reads the only record of a file with its sidecar and what the user states about the file; also says how it was understood.
+    /// Reads the only record of a file with its sidecar and what the user states about the file; also says how it was
+    /// understood.
     ///
     /// # Errors
-    /// As [`Recording::read`]; also if the file has several records and `import` does not choose one.
+    /// An error of [`Recording::read`], or a file with several records of which `import` does not choose one.
     pub fn import(path: impl AsRef<Path>, import: &Import) -> Result<Imported, RecordingError> {
         let path = path.as_ref();
         let mut records = Self::import_all(path, import)?;
@@ -58,7 +59,7 @@ impl Recording {
     /// Reads all records of a file, or the one that `import` chooses, each as a recording of its own.
     ///
     /// # Errors
-    /// As [`Recording::read`]; also if the chosen record or column does not exist.
+    /// An error of [`Recording::read`], or a record or column that `import` names and the file does not have.
     pub fn import_all(path: impl AsRef<Path>, import: &Import) -> Result<Vec<Imported>, RecordingError> {
         let path = path.as_ref();
         let ending = crate::file::ending(path);
@@ -114,8 +115,9 @@ impl Recording {
 
     /// Writes the recording and its sidecar to `path` in the format of the file extension.
     ///
-    /// Both files are complete on the disk before the first of them gets its name, the sidecar first. On an error the previous recording
-    /// stays. Only a machine that fails between the two renames leaves a sidecar whose recording is missing or older.
+    /// Both files are complete under temporary names before they are renamed, the sidecar first. On an error the
+    /// previous recording stays. Only a machine that fails between the two renames leaves a sidecar whose recording is
+    /// missing or older.
     ///
     /// # Errors
     /// The extension is not one of [`WRITTEN`], or a file cannot be written.
@@ -131,7 +133,8 @@ impl Recording {
         }
     }
 
-    /// Writes the recording to `path` as UFF 58, with its sidecar; both files as in [`Recording::write`].
+    /// Writes the recording to `path` as UFF 58, with its sidecar. Both files are replaced together, in the way of
+    /// [`Recording::write`].
     ///
     /// # Errors
     /// A file cannot be written.
@@ -139,7 +142,7 @@ impl Recording {
         self.publish(path, uff::prepared(path, self, form)?)
     }
 
-    /// Gives the sidecar of `path` and then the recording their names.
+    /// Renames the prepared sidecar of `path` and then the prepared recording to their final names.
     fn publish(&self, path: &Path, recording: Prepared) -> Result<(), RecordingError> {
         let sidecar = self.sidecar.prepared_beside(path)?;
         Ok(crate::file::publish([sidecar, recording])?)

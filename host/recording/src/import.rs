@@ -6,7 +6,7 @@ use super::unit::{Sensitivity, Unit};
 /// What the user states about the files of a command; it takes precedence over the files and their sidecars.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Import {
-    /// Segment of the recording that is used.
+    /// Segment of the recording that is read, by start and end time.
     pub segment: Segment,
     /// Columns that the user names (`--map`).
     pub map: Vec<ColumnMap>,
@@ -19,22 +19,23 @@ pub struct Import {
 /// Name and unit of one column, as in `acc=ax:g`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ColumnMap {
-    /// Name of the column in the file, or its number from 1.
+    /// Name of the column in the file, or its number in the file from 1.
     pub column: String,
-    /// Name of the channel; a name of its own makes it an auxiliary channel.
+    /// Name of the channel that the column becomes; any other name than those of force, motion, time and tachometer
+    /// makes it an auxiliary channel.
     pub name: String,
     /// True if the channel points against its axis (`acc=-ax`): samples change their sign.
     pub is_negative: bool,
-    /// Unit of the samples; `None` if the file states it.
+    /// Unit of the samples in the column, or sensitivity of its sensor; `None` if the file states the unit.
     pub scale: Option<Scale>,
 }
 
 /// Unit of the samples of a column, or sensitivity of its sensor.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Scale {
-    /// Unit, also with a factor: `g`, `98.1 m/s^2`.
+    /// Unit of the samples, which may have a factor: `g`, `98.1 m/s^2`.
     Unit(Unit),
-    /// Sensitivity of a voltage: `10.2 mV/g`.
+    /// Sensitivity of the sensor, for samples in volts: `10.2 mV/g`.
     Sensitivity(Sensitivity),
     /// Unit of a frequency response function, response per force: `um/N`, `(m/s^2)/N`, `deg`, `dB`.
     Ratio(String),
@@ -84,7 +85,8 @@ impl ColumnMap {
         })
     }
 
-    /// True if this entry is about the column with this name, or with this number (from 1) where no column has the number as its name.
+    /// True if this option is about the column called `name`: its text is this name (capitals do not matter), or the
+    /// number `number` (from 1) of the column if no column in `names` is called so.
     pub fn is_about(&self, name: &str, number: usize, names: &[String]) -> bool {
         if names.contains(&self.column) {
             return self.column == name;
@@ -96,7 +98,7 @@ impl ColumnMap {
     }
 }
 
-/// True for a unit of response per force, and for decibels.
+/// True if the text is a unit of response per force, such as `um/N`, or decibels.
 fn is_ratio(text: &str) -> bool {
     let of_force = text.rsplit_once('/').is_some_and(|(response, force)| {
         let is_unit = |text: &str| text.parse::<Unit>().is_ok();

@@ -10,13 +10,13 @@ use super::raw::{FoundUnit, Raw, RawColumn};
 use super::text_dialect::{Dialect, Separator};
 use super::text_head::latin;
 
-/// Last line of the header of the file and of a block.
+/// Line that ends the header of an `.lvm` file and the header of each of its blocks.
 const END: &str = "***End_of_Header***";
 
-/// A line with its number in the file, from 1.
+/// Text of a line, with the number of the line in the file, from 1.
 type Line<'a> = (u64, &'a str);
 
-/// Reads the blocks of a file, each as a record.
+/// Reads the blocks of a LabVIEW measurement file, each as a record of its own.
 pub(super) fn read(path: &Path) -> Result<Vec<Raw>, RecordingError> {
     let bytes = crate::file::read(path)?;
     let text = String::from_utf8(bytes).unwrap_or_else(|error| latin(error.as_bytes()));
@@ -71,12 +71,12 @@ pub(super) fn read(path: &Path) -> Result<Vec<Raw>, RecordingError> {
     Ok(blocks)
 }
 
-/// True for a line without anything but separators.
+/// True for a line with nothing but separators.
 fn is_blank(line: &str) -> bool {
     line.chars().all(|letter| letter.is_whitespace() || letter == ',')
 }
 
-/// Separator and decimal mark that the header of the file states.
+/// Separator and decimal mark that the header of a LabVIEW measurement file states.
 fn dialect(lines: &[Line<'_>]) -> Dialect {
     let value = |key: &str| {
         lines
@@ -89,7 +89,8 @@ fn dialect(lines: &[Line<'_>]) -> Dialect {
         Some(text) if text.to_lowercase().contains("comma") => Separator::Comma,
         _ => Separator::Tab,
     };
-    // The value stands behind the separator, so a decimal comma is the second comma of a line with commas.
+    // The stated decimal mark follows the separator in its line. In a file separated by commas, a decimal comma is
+    // therefore the second comma of that line.
     let decimal_comma = value("Decimal_Separator").is_some_and(|text| {
         let commas = text.matches(',').count();
         commas > usize::from(separator == Separator::Comma)
@@ -100,14 +101,15 @@ fn dialect(lines: &[Line<'_>]) -> Dialect {
     }
 }
 
-/// Header of a block: rows of a key and one value for each channel.
+/// Header of a block of a LabVIEW measurement file: in each row a key and one value for each channel.
 #[derive(Default)]
 struct BlockHeader<'a> {
     rows: Vec<(&'a str, Vec<&'a str>)>,
 }
 
 impl<'a> BlockHeader<'a> {
-    /// Value number `index` of `key`, under the title of the next column; if there are fewer values, the first.
+    /// Value of `key` for channel number `index`, from 0, in the header of a block; the first value if there are fewer
+    /// values than channels.
     fn value(&self, key: &str, index: usize) -> Option<&'a str> {
         let (_, values) = self.rows.iter().find(|(name, _)| *name == key)?;
         values
@@ -118,11 +120,11 @@ impl<'a> BlockHeader<'a> {
     }
 }
 
-/// Reads one block from its first line; returns the lines after it.
+/// Reads one block of a LabVIEW measurement file from its first line; returns the block and the lines after it.
 fn block<'l, 'a>(lines: &'l [Line<'a>], dialect: Dialect) -> Result<(Raw, &'l [Line<'a>]), (u64, String)> {
     let mut at = 0;
     let mut header = BlockHeader::default();
-    // A block without a header of its own begins with its row of names.
+    // A block that has no header of its own begins with the row of channel names.
     let has_header = lines
         .iter()
         .take_while(|(_, line)| !is_blank(line))
@@ -198,7 +200,8 @@ fn block<'l, 'a>(lines: &'l [Line<'a>], dialect: Dialect) -> Result<(Raw, &'l [L
     Ok((record(x, columns, &header, dialect), after))
 }
 
-/// Record of a block: its rate is the stated interval if the X values agree with it, else they are a time column.
+/// Record of a block of samples. The sample rate follows from the interval that the header states if the X values agree
+/// with it; otherwise the X values are a time column.
 fn record(
     x: Option<Vec<f64>>,
     mut columns: Vec<RawColumn>,
@@ -228,7 +231,8 @@ fn record(
         .as_ref()
         .filter(|x| x.len() == longest && longest > 1)
         .map(|x| (x[longest - 1] - x[0]) / (longest - 1) as f64);
-    // X values are printed with few digits, the interval with all: both agree if the stamps do not drift by one sample.
+    // X values are printed with few digits, the stated interval with all. The two agree if they differ by at most one
+    // sample interval at the end of the block.
     let agrees = match (interval_s, stepped_s) {
         (Some(interval), Some(stepped)) => (interval - stepped).abs() * longest as f64 <= interval,
         _ => true,

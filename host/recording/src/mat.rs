@@ -53,7 +53,7 @@ const DEPTH_MAX: usize = 6;
 /// Largest number of elements of all structures and cells of a file. A choice; a record of a structure array takes a few.
 const ELEMENTS_MAX: usize = 100_000;
 
-/// Reads the records of a MAT-file: its vectors and matrices, or those of its structures.
+/// Reads the records of a MAT-file: one from its vectors and matrices, or one from each of its structures.
 pub(super) fn read(path: &Path) -> Result<Vec<Raw>, RecordingError> {
     let unreadable = |cause| FileError::Read {
         path: path.into(),
@@ -69,7 +69,7 @@ pub(super) fn read(path: &Path) -> Result<Vec<Raw>, RecordingError> {
     records::records(items).map_err(content)
 }
 
-/// Reads all variables of a file of `length` bytes.
+/// Reads all variables of a MAT-file of `length` bytes.
 fn items(reader: &mut dyn BufRead, length: u64) -> Result<Vec<Item>, String> {
     let mut header = Vec::with_capacity(HEADER);
     reader
@@ -117,18 +117,19 @@ fn items(reader: &mut dyn BufRead, length: u64) -> Result<Vec<Item>, String> {
     Ok(items)
 }
 
-/// Remaining memory for the values of one file.
+/// Memory that the values of one MAT-file may still take: a bound against false sizes in its headers.
 struct ValueMemory {
     /// Length of the file, bytes.
     file: u64,
-    /// Memory still available for values, bytes.
+    /// Memory that values of the MAT-file may still take, bytes.
     bytes: u64,
-    /// Elements of structures and cells that may still be read.
+    /// Number of elements of structures and cells of the MAT-file that may still be read.
     elements: usize,
 }
 
 impl ValueMemory {
-    /// Reserves the memory of `count` values of variable `name`; an error if it exceeds the budget.
+    /// Reserves memory for `count` values of variable `name`; an error if the remaining memory of the MAT-file does not
+    /// suffice.
     fn take(&mut self, name: &str, count: u64) -> Result<(), String> {
         let needed = count.saturating_mul(size_of::<f64>() as u64);
         self.bytes = self.bytes.checked_sub(needed).ok_or_else(|| {
@@ -141,7 +142,8 @@ impl ValueMemory {
         Ok(())
     }
 
-    /// Counts `count` elements of structure or cell `name`; an error if the file has too many.
+    /// Counts `count` more elements of structure or cell `name`; an error if the MAT-file has more than
+    /// [`ELEMENTS_MAX`].
     fn take_elements(&mut self, name: &str, count: usize) -> Result<(), String> {
         self.elements = self.elements.checked_sub(count).ok_or_else(|| {
             format!("structure \"{name}\" has more than {ELEMENTS_MAX} elements; save the records as vectors")
@@ -149,13 +151,15 @@ impl ValueMemory {
         Ok(())
     }
 
-    /// Number of values per channel for which memory is reserved before reading a variable with `channels` channels.
+    /// Number of samples per channel for which memory is reserved before the samples of a variable with `channels`
+    /// channels are read.
     fn trusted(&self, channels: usize) -> usize {
         usize::try_from(self.file.max(TRUSTED) / channels.max(1) as u64 + 1).unwrap_or(usize::MAX)
     }
 }
 
-/// Decompresses an element of `length` bytes and reads the matrix in it; `None` if it holds no value that is read.
+/// Decompresses an element of `length` bytes and reads the matrix in it; `None` if it holds no matrix of a supported
+/// class.
 fn inflated(source: &mut Source<'_>, length: u64, memory: &mut ValueMemory) -> Result<Option<Item>, String> {
     if length > source.available {
         return Err(source.cut_off(length));
@@ -182,10 +186,10 @@ fn inflated(source: &mut Source<'_>, length: u64, memory: &mut ValueMemory) -> R
     Ok(found)
 }
 
-/// Reads the data of a matrix element `depth` levels inside others; `None` if it holds no real numbers in two dimensions, text, structure
-/// or cell.
+/// Reads the data of a matrix element `depth` levels inside others; `None` unless it holds a real matrix of two
+/// dimensions, text, a structure or a cell.
 fn matrix(source: &mut Source<'_>, memory: &mut ValueMemory, depth: usize) -> Result<Option<Item>, String> {
-    // An empty field of a structure has no content at all.
+    // An empty field of a MAT structure is stored as an element without any content.
     if source.available == 0 {
         return Ok(None);
     }
@@ -195,7 +199,7 @@ fn matrix(source: &mut Source<'_>, memory: &mut ValueMemory, depth: usize) -> Re
     };
     let flags = word(flags, source.big_endian);
     let (class, complex, logical) = (flags & 0xff, flags & 0x800 != 0, flags & 0x200 != 0);
-    // Array classes: 1 cell, 2 structure, 4 text, 6 to 15 double, single and the integer types.
+    // Codes of array classes in a MAT-file: 1 cell, 2 structure, 4 text, 6 to 15 double, single and the integer types.
     if !matches!(class, 1 | 2 | 4 | 6..=15) || complex || logical {
         return Ok(None);
     }
@@ -253,7 +257,7 @@ fn matrix(source: &mut Source<'_>, memory: &mut ValueMemory, depth: usize) -> Re
     let (samples, channels) = (rows.max(columns), rows.min(columns));
     let trusted = samples.min(memory.trusted(channels));
     let mut values: Vec<Vec<f64>> = Vec::new();
-    // Values are stored in column-major order.
+    // A MAT-file stores a matrix in column-major order.
     let in_rows = rows < columns;
     let mut index = 0;
     source.numbers(&tag, |value| {

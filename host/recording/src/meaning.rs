@@ -1,21 +1,21 @@
-//! Meaning of a column: the channel that it becomes.
+//! Meaning of a column of a recorded file: the channel that it becomes.
 
 use super::Quantity;
 use super::understood::Basis;
 
-/// Meaning of one column: the channel that it becomes.
+/// Meaning of one column of a recorded file: the channel that it becomes.
 #[derive(Clone, Debug)]
 pub(super) struct Meaning {
     /// Name of the channel.
     pub(super) name: String,
     pub(super) quantity: Quantity,
-    /// Factor from the samples in the file to SI.
+    /// Factor from the samples in the file to the SI unit of the channel.
     pub(super) factor: f64,
-    /// True if the channel points against its axis.
+    /// True if the sensor points against its axis, so that the samples change their sign.
     pub(super) is_negative: bool,
     pub(super) from: Basis,
-    /// Unit as it is stated, for the report.
+    /// Unit of the column as the file or the user states it, shown in the report of the import.
     pub(super) unit: Option<String>,
-    /// Sensitivity as it is stated, for the report.
+    /// Sensitivity of the sensor as the user states it, shown in the report of the import.
     pub(super) sensitivity: Option<String>,
 }

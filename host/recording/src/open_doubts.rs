@@ -1,4 +1,4 @@
-//! Columns of a file that are in doubt, and the names and units that are possible for them.
+//! Columns of a recorded file whose meaning is in doubt, and the channel names and units that are proposed for them.
 
 use super::Quantity;
 use super::doubt::Doubt;
@@ -6,7 +6,8 @@ use super::meaning::Meaning;
 use super::raw::RawColumn;
 use super::understood::Basis;
 
-/// Start of the channel names of a quantity: `f`, none, `v` or `a`.
+/// First letter of the standard names of channels of a quantity: `f` force, `v` velocity, `a` acceleration, none for
+/// displacement.
 pub(super) fn prefix(quantity: Quantity) -> &'static str {
     match quantity {
         Quantity::Force => "f",
@@ -16,7 +17,7 @@ pub(super) fn prefix(quantity: Quantity) -> &'static str {
     }
 }
 
-/// A column whose direction, unit or sensitivity is not stated.
+/// A column of a recorded file whose direction, unit or sensitivity the file does not state.
 pub(super) struct Open {
     pub(super) column: String,
     pub(super) quantity: Quantity,
@@ -24,7 +25,7 @@ pub(super) struct Open {
     pub(super) is_negative: bool,
     /// Quantity of the stated unit.
     pub(super) stated: Quantity,
-    /// True if another column has been understood as the same channel.
+    /// True if the words of another column name the same channel.
     pub(super) is_twice: bool,
 }
 
@@ -35,7 +36,7 @@ pub(super) struct Doubts {
 }
 
 impl Doubts {
-    /// Adds columns that were understood as a channel that another column already is.
+    /// Adds each column whose words name a channel that an earlier column already is.
     pub(super) fn twice(&mut self, columns: &[RawColumn], meanings: &[Meaning]) {
         for (index, meaning) in meanings.iter().enumerate() {
             let is_open = self.open.iter().any(|open| open.column == columns[index].name);
@@ -53,7 +54,7 @@ impl Doubts {
         }
     }
 
-    /// The doubts with the names and units that are possible: each direction is proposed once.
+    /// The columns in doubt, each with a proposed channel name and unit; each direction is proposed only once.
     pub(super) fn suggested(&self, meanings: &[Meaning]) -> Vec<Doubt> {
         let mut taken: Vec<String> = meanings.iter().map(|meaning| meaning.name.clone()).collect();
         let mut doubts = Vec::new();
@@ -96,7 +97,7 @@ impl Doubts {
 }
 
 impl Open {
-    /// Sentence part: which column is what, and what is not stated.
+    /// Sentence part about a column in doubt: what it measures, and what the file does not state about it.
     fn what(&self) -> String {
         let mut lacks = Vec::new();
         if self.is_twice {

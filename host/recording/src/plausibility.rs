@@ -1,4 +1,5 @@
-//! Plausibility of units: peak values that no sensor measures, and motions of one direction that contradict each other by a factor of units.
+//! Plausibility of units: peak values that no sensor measures, and displacement, velocity and acceleration of one
+//! direction that contradict each other by a unit factor such as 1000.
 
 use super::criteria::{SAME_MOTION, UNIT_FACTOR, plausible_peak};
 use super::{Channel, Quantity, Recording};
@@ -6,7 +7,7 @@ use super::{Channel, Quantity, Recording};
 /// Factors by which a unit is usually wrong: g instead of m/s², milli, micro.
 const FACTORS: [(f64, &str); 3] = [(9.806_65, "9.81 (g and m/s²)"), (1e3, "1000"), (1e6, "a million")];
 
-/// Warnings about units that are probably wrong; empty if nothing is wrong.
+/// Warnings about channels whose unit is probably wrong; empty if all units are plausible.
 pub(super) fn warnings(recording: &Recording) -> Vec<String> {
     let mut warnings: Vec<String> = recording.channels.iter().filter_map(peak).collect();
     for axis in ["x", "y", "z"] {
@@ -31,7 +32,7 @@ pub(super) fn warnings(recording: &Recording) -> Vec<String> {
     warnings
 }
 
-/// Warning for a channel whose peak lies outside the range of sensors.
+/// Warning for a channel whose peak value lies outside the range that sensors measure.
 fn peak(channel: &Channel) -> Option<String> {
     let (low, high) = plausible_peak(channel.quantity)?;
     let peak = channel
@@ -52,10 +53,12 @@ fn peak(channel: &Channel) -> Option<String> {
     ))
 }
 
-/// Warning if the derivative of order `order` of `lower` is `upper` times a factor of units.
+/// Warning if the time derivative of order `order` of motion `lower` agrees with motion `upper` except for a unit
+/// factor such as 9.81 or 1000.
 ///
 /// Differences over 2m samples of `lower` equal weighted sums of `upper` exactly, whatever the signal: for order 2,
-/// x(t+T) − 2x(t) + x(t−T) = ∫ (T − |s|) a(t+s) ds. The longer T, the less noise is amplified; the T with the best correlation counts.
+/// x(t+T) − 2x(t) + x(t−T) = ∫ (T − |s|) a(t+s) ds. The longer T, the less the noise of `lower` is amplified; the T
+/// with the best correlation counts.
 fn contradiction(lower: &Channel, order: u32, upper: &Channel, rate_hz: f64) -> Option<String> {
     let mut best: Option<(f64, f64)> = None;
     let mut half = 1;
@@ -87,18 +90,19 @@ fn contradiction(lower: &Channel, order: u32, upper: &Channel, rate_hz: f64) -> 
     })
 }
 
-/// Correlation and amplitude ratio of the differences of `lower` over `half` samples and the weighted sums of `upper`.
+/// Correlation and amplitude ratio between differences of `lower` over 2·`half` samples and the weighted sums of
+/// `upper` that equal them.
 fn compared(lower: &[f64], order: u32, upper: &[f64], half: usize, rate_hz: f64) -> Option<(f64, f64)> {
     let count = lower.len().min(upper.len());
     let step = 1.0 / rate_hz;
-    // Cumulated sums make each weighted sum two subtractions.
+    // With cumulated sums of `upper`, each of its partial sums is one subtraction.
     let mut first = vec![0.0; count + 1];
     for (index, value) in upper.iter().take(count).enumerate() {
         first[index + 1] = first[index] + value;
     }
     let sum = |from: usize, to: usize| first[to] - first[from];
     let mut pairs = Vec::with_capacity(count);
-    // Every `half` samples is enough: neighbouring differences are nearly the same.
+    // One difference every `half` samples suffices: neighbouring differences are nearly equal.
     for center in (half..count.saturating_sub(half)).step_by(half) {
         let (difference, integral) = if order == 2 {
             let difference = lower[center + half] - 2.0 * lower[center] + lower[center - half];

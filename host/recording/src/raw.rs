@@ -6,19 +6,23 @@ use super::unit::Unit;
 #[derive(Debug, Default)]
 pub(super) struct Raw {
     pub(super) columns: Vec<RawColumn>,
-    /// Sample rate, samples per second; `None` if the format does not state it.
+    /// Sample rate that the format of the file states, samples per second; `None` if it states none.
     pub(super) sample_rate_hz: Option<f64>,
-    /// Sample rate that a word states, such as `Fs = 25600` in a line of text; the sidecar takes precedence.
+    /// Sample rate, samples per second, that a text or a variable of the file states, such as `Fs = 25600`; the sidecar
+    /// takes precedence.
     pub(super) worded_rate_hz: Option<f64>,
-    /// Time of the first sample, s; a time column replaces it.
+    /// Time of the first sample of the record, s; a time column replaces it.
     pub(super) start_s: f64,
-    /// Group, structure element or block that holds the record; `None` if the file has only one record.
+    /// Name of the group, structure element or block of the file that holds the record; `None` if the file has only one
+    /// record.
     pub(super) label: Option<String>,
-    /// Number of the first line of numbers, if no row of names stands before it; the columns are then called by their numbers.
+    /// Number of the first line with numbers in a text file without a row of names; `None` if there are names. Columns
+    /// without names are called by their numbers.
     pub(super) unnamed_line: Option<u64>,
-    /// True if the columns are those of one matrix, so that their names say nothing.
+    /// True if all columns come from one matrix of the file, so that the file has no names for them and the user must
+    /// give them.
     pub(super) asks_names: bool,
-    /// Facts about the reading that the user should see: separator, encoding, what was left out.
+    /// Facts about the reading of the file that the user should see: separator, encoding, omitted columns.
     pub(super) notes: Vec<String>,
 }
 
@@ -26,7 +30,7 @@ pub(super) struct Raw {
 #[derive(Debug)]
 pub(super) struct RawColumn {
     pub(super) name: String,
-    /// Unit of the samples as the file states it.
+    /// Unit of the column's samples as the file states it.
     pub(super) unit: FoundUnit,
     pub(super) samples: Vec<f64>,
 }
@@ -34,11 +38,11 @@ pub(super) struct RawColumn {
 /// Unit of a column as a file states it.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum FoundUnit {
-    /// The file does not state it.
+    /// The file states no unit of the column.
     None,
-    /// The text in the file, which may be no known unit.
+    /// Text of the unit in the file, which may be no known unit.
     Text(String),
-    /// Quantity and factor, from a format with its own system of units.
+    /// Quantity and factor to SI of the column, from a format with its own system of units such as UFF.
     Known(Unit),
 }
 
@@ -49,7 +53,7 @@ impl From<Option<Unit>> for FoundUnit {
 }
 
 impl RawColumn {
-    /// A column whose unit the file does not state.
+    /// Makes a column whose unit the file does not state.
     pub(super) fn without_unit(name: impl Into<String>, samples: Vec<f64>) -> Self {
         Self {
             name: name.into(),

@@ -1,4 +1,4 @@
-//! A segment of a recording, selected by start and end time (options `--from-s`, `--until-s`).
+//! A segment of a recording, which the options `--from-s` and `--until-s` select by start and end time.
 
 use super::criteria::SAME_SAMPLE;
 use super::{Recording, RecordingError};
@@ -6,9 +6,9 @@ use super::{Recording, RecordingError};
 /// A segment of a recording: all samples with `from_s` ≤ t < `until_s`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Segment {
-    /// Time of the first sample, s, on the time axis of the file; `None` for the start of the recording.
+    /// Start time of the segment, s, on the time axis of the file; `None` for the start of the recording.
     pub from_s: Option<f64>,
-    /// End time, s, exclusive; `None` for the end of the recording.
+    /// End time of the segment, s, on the time axis of the file, itself excluded; `None` for the end of the recording.
     pub until_s: Option<f64>,
 }
 
@@ -18,7 +18,7 @@ impl Segment {
         self.from_s.is_none() && self.until_s.is_none()
     }
 
-    /// Cuts the segment out of `recording`; a sample of it that is NaN or infinite is an error.
+    /// Cuts the segment out of `recording`; a NaN or infinite sample in the segment is an error.
     pub(super) fn of(self, recording: Recording) -> Result<Recording, RecordingError> {
         let (count, rate) = (recording.len(), recording.sample_rate_hz);
         let content = |what: String| RecordingError::Content {

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::RecordingError;
 use crate::file::Prepared;
 
-/// TestKind of test that was recorded.
+/// Kind of the recorded test, which sets how the recording is evaluated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum TestKind {
@@ -20,7 +20,7 @@ pub enum TestKind {
     Sweep,
     /// Impact test with a hammer.
     Hammer,
-    /// Free decay after the structure is released.
+    /// Free decay after a static force on the structure is released.
     FreeDecay,
     /// Milling cut.
     Cutting,
@@ -35,7 +35,7 @@ pub struct Sidecar {
     /// TestKind of test.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub kind: Option<TestKind>,
-    /// Names of the input (excitation) channels; `None` means all force channels.
+    /// Names of the channels that hold the input force (excitation); `None` means all force channels.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub input: Option<Vec<String>>,
     /// Sample rate, samples per second; required if the file has neither a time column nor a rate of its own.
@@ -230,7 +230,7 @@ impl Sidecar {
         Ok(())
     }
 
-    /// The text of the sidecar of `recording`.
+    /// Text of the sidecar file that belongs to `recording`, with the values of this sidecar.
     ///
     /// # Errors
     /// A value cannot be written as TOML.
@@ -241,7 +241,7 @@ impl Sidecar {
         })
     }
 
-    /// Writes the sidecar of `recording`, beside it.
+    /// Writes these values as the sidecar file beside `recording`.
     ///
     /// # Errors
     /// The file cannot be written.
@@ -250,7 +250,7 @@ impl Sidecar {
         Ok(crate::file::write(&Self::path_of(recording), text.as_bytes())?)
     }
 
-    /// The sidecar of `recording` as a file that is written but not yet published.
+    /// Writes the sidecar of `recording` to a temporary file, not yet under its final name.
     ///
     /// # Errors
     /// The file cannot be written.

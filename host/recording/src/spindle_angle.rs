@@ -7,9 +7,10 @@ use super::{Recording, RecordingError, TachometerEdges};
 /// φ = 0 at immersion angle 0 of tooth 1. φ grows by 2π per revolution and is linear in time between edges.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SpindleAngle {
-    /// Index of the first sample with an angle.
+    /// Index in the recording of the first sample whose spindle angle is known.
     pub first: usize,
-    /// Spindle angle, rad, of sample `first` and of the samples after it.
+    /// Spindle angle, rad, of the sample with index `first` and of each sample after it, up to the last tachometer
+    /// edge.
     pub rad: Vec<f64>,
 }
 

@@ -6,7 +6,7 @@ use serde::Serialize;
 use super::criteria::{AT_REST, CLIPPED_RUN, DROPOUT_RUN, FAR_FROM_REST};
 use super::{Channel, Quantity};
 
-/// Figures of one channel, in the SI unit of its quantity.
+/// Key figures of one channel, in the SI unit of its quantity.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ChannelSummary {
     /// Name of the channel.
@@ -25,16 +25,16 @@ pub struct ChannelSummary {
     pub rms: f64,
     /// Mean (DC component).
     pub mean: f64,
-    /// Number of samples in runs at the largest or smallest value: clipping.
+    /// Number of clipped samples of the channel: those in runs of equal samples at its largest or smallest value.
     pub clipped: usize,
-    /// True if all samples are equal.
+    /// True if all samples of the channel are equal.
     pub constant: bool,
-    /// Dropouts: stretches of equal samples in a channel that otherwise changes, with start and end in s.
+    /// Dropouts of the channel: runs of equal samples although it changes otherwise, each with start and end in s.
     pub dropouts_s: Vec<[f64; 2]>,
 }
 
 impl ChannelSummary {
-    /// Figures of a channel sampled at `rate_hz`, whose first sample is at `start_s`.
+    /// Key figures of a channel sampled at `rate_hz`, whose first sample is at `start_s`.
     pub fn of(channel: &Channel, rate_hz: f64, start_s: f64) -> Self {
         let samples = channel.samples.as_slice();
         let count = samples.len().max(1) as f64;
@@ -47,7 +47,8 @@ impl ChannelSummary {
         let runs = runs(samples);
         let is_extreme = |value: f64| value == minimum || value == maximum;
         let rest = median(&mut samples.to_vec()).unwrap_or(0.0);
-        // The force of an impact test rests at its smallest value; a tachometer has two levels.
+        // Equal samples at an extreme value near the median are no clipping: the force of an impact test rests at its
+        // smallest value. A tachometer has two levels and is not checked at all.
         let is_clipping =
             |value: f64| is_extreme(value) && (value - rest).abs() > FAR_FROM_REST * (maximum - minimum);
         let clipped = if constant || channel.quantity == Quantity::Level {
@@ -82,7 +83,7 @@ impl ChannelSummary {
     }
 }
 
-/// Runs of equal samples: index of the first sample and length.
+/// Runs of equal consecutive samples: index of the first sample and length of each.
 fn runs(samples: &[f64]) -> Vec<(usize, usize)> {
     let mut runs: Vec<(usize, usize)> = Vec::new();
     for (index, sample) in samples.iter().enumerate() {
@@ -94,8 +95,8 @@ fn runs(samples: &[f64]) -> Vec<(usize, usize)> {
     runs
 }
 
-/// Largest absolute deviation from the mean in each of `width` equal parts of the samples, as a share of the largest of all; fewer parts if there
-/// are fewer samples.
+/// Envelope for a small picture of a channel: largest absolute deviation from the mean in each of `width` equal parts
+/// of the samples, divided by the largest of all parts. There are fewer parts if there are fewer samples.
 pub fn envelope(samples: &[f64], width: usize) -> Vec<f64> {
     let mean = samples.iter().sum::<f64>() / samples.len().max(1) as f64;
     let width = width.min(samples.len());

@@ -6,11 +6,11 @@ pub(super) enum Separator {
     Comma,
     Semicolon,
     Tab,
-    /// Any number of blanks and tabs.
+    /// The fields of a line are separated by any number of blanks and tabs.
     Blank,
 }
 
-/// Form of the numbers of a text table.
+/// Notation of the lines of a text table: separator and decimal mark.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Dialect {
     pub(super) separator: Separator,
@@ -25,7 +25,7 @@ impl Dialect {
         decimal_comma: false,
     };
 
-    /// Fields of a line, without blanks and quotes around them.
+    /// Fields of a line of a text table, without the blanks and quotes around them.
     pub(super) fn fields(self, line: &str) -> Vec<&str> {
         let separator = match self.separator {
             Separator::Blank => return blank_fields(line),
@@ -36,7 +36,8 @@ impl Dialect {
         let mut fields = Vec::new();
         let mut start = 0;
         let mut is_quoted = false;
-        // A quote that is not closed is a letter like others, so that it does not swallow the rest of the line.
+        // A quote without its partner is taken as an ordinary character, so that it does not swallow the rest of the
+        // line.
         let is_closed = line.matches('"').count().is_multiple_of(2);
         for (at, letter) in line.char_indices() {
             if letter == '"' && is_closed {
@@ -50,7 +51,7 @@ impl Dialect {
         fields
     }
 
-    /// The number of a field; `None` if it is none.
+    /// Number in a field of a text table; `None` if the field is no number.
     pub(super) fn number(self, field: &str) -> Option<f64> {
         if self.decimal_comma && field.contains(',') {
             if field.contains('.') {
@@ -61,7 +62,8 @@ impl Dialect {
         fast_float2::parse(field).ok()
     }
 
-    /// Number of fields of a line of numbers; `None` if a field is text, or no field is a number.
+    /// Number of fields in a line of a text table if all are numbers or empty; `None` if a field is text, or no field
+    /// is a number.
     pub(super) fn count_of_numbers(self, line: &str) -> Option<usize> {
         let fields = self.fields(line);
         let numbers = fields.iter().filter(|field| self.number(field).is_some()).count();
@@ -69,7 +71,7 @@ impl Dialect {
         (numbers > 0 && numbers + empty == fields.len()).then_some(fields.len())
     }
 
-    /// Description for the user; `None` for comma and point.
+    /// Description of separator and decimal mark for the user; `None` for the usual pair of comma and decimal point.
     pub(super) fn note(self) -> Option<String> {
         let separator = match self.separator {
             Separator::Comma => "comma",
@@ -85,7 +87,7 @@ impl Dialect {
     }
 }
 
-/// A field without blanks and quotes around it.
+/// Text of a field of a table, without the blanks and quotes around it.
 pub(super) fn bare(field: &str) -> &str {
     let field = field.trim();
     field
@@ -94,7 +96,7 @@ pub(super) fn bare(field: &str) -> &str {
         .map_or(field, str::trim)
 }
 
-/// Fields between blanks; a quoted field may hold blanks.
+/// Fields of a line that are separated by blanks; a quoted field may contain blanks.
 pub(super) fn blank_fields(line: &str) -> Vec<&str> {
     let mut fields = Vec::new();
     let mut rest = line.trim();

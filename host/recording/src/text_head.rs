@@ -11,7 +11,7 @@ use super::words::name_and_unit;
 /// A column of the head.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct HeadColumn {
-    /// Name; empty if the head has none.
+    /// Name of the column; empty if the head of the text table gives none.
     pub(super) name: String,
     pub(super) unit: FoundUnit,
 }
@@ -20,9 +20,9 @@ pub(super) struct HeadColumn {
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Head {
     pub(super) dialect: Dialect,
-    /// Columns with their names; `None` if the file has no row of names.
+    /// Columns of the text table with names and units; `None` if the file has no row of names.
     pub(super) columns: Option<Vec<HeadColumn>>,
-    /// Number of columns of the first line of numbers; 0 if there is none.
+    /// Number of columns in the first line of numbers of the text table; 0 if the file has no such line.
     pub(super) width: usize,
     /// Offset of the first line of numbers in the file, bytes.
     pub(super) offset: usize,
@@ -30,11 +30,11 @@ pub(super) struct Head {
     pub(super) lines: u64,
     /// Sample rate stated in a line before the numbers, samples per second.
     pub(super) rate_hz: Option<f64>,
-    /// What the user should know: separator, encoding.
+    /// Facts about the reading of the head that the user should know: separator, encoding.
     pub(super) notes: Vec<String>,
 }
 
-/// A line of the head, with its place.
+/// A line of the head of a text table, with its position in the file.
 struct Line<'a> {
     text: &'a str,
     /// Offset in the file, bytes.
@@ -55,12 +55,12 @@ pub(super) fn is_comment(line: &str) -> bool {
     line.starts_with(['#', '%']) || line.starts_with("//")
 }
 
-/// Text without the marks of a comment.
+/// Text of a comment line without the marks `#`, `%` or `//` at its start.
 fn without_marks(line: &str) -> &str {
     line.trim_start().trim_start_matches(['#', '%', '/']).trim()
 }
 
-/// Finds the head in the first bytes of a file.
+/// Finds the head of a text table (names, units, separator) in the first bytes of its file.
 ///
 /// # Errors
 /// Number of the line and description of the fault: text among numbers, or a text in UTF-16.
@@ -87,7 +87,8 @@ pub(super) fn head(bytes: &[u8]) -> Result<Head, (u64, String)> {
         notes.push("encoding Latin-1".into());
     }
     let Some((index, dialect, width)) = found else {
-        // Without numbers the first line counts as the head, and the reader names the fault in the lines after it.
+        // In a file without any line of numbers the first line counts as the head; the reader of the rows then reports
+        // the fault in the next lines.
         let first = data.first();
         let columns = first.map(|line| head_columns(&Dialect::PLAIN.fields(line.text), None));
         let after = data.get(1).or(data.first());
@@ -125,7 +126,8 @@ pub(super) fn head(bytes: &[u8]) -> Result<Head, (u64, String)> {
     })
 }
 
-/// Names and units in the lines before the numbers; the numbers of these lines go to `used`.
+/// Names and units of the columns from the lines before the first line of numbers; the line numbers of the rows that
+/// give them are added to `used`.
 fn columns_before(
     dialect: Dialect,
     width: usize,
@@ -169,7 +171,7 @@ fn columns_before(
         }
         return Ok(Some(head_columns(&fields, None)));
     }
-    // A row of names may stand in the last comment, as numpy writes it.
+    // The row of names may be the last comment before the numbers, as in files that numpy writes.
     let comment = filled
         .iter()
         .rev()
@@ -186,7 +188,7 @@ fn columns_before(
     Ok(None)
 }
 
-/// Decodes UTF-8, or Latin-1 if the bytes are no UTF-8; a letter that the end of the bytes cuts is left out.
+/// Decodes UTF-8, or Latin-1 if the bytes are no UTF-8; an incomplete UTF-8 character at the end of `bytes` is dropped.
 fn decoded(bytes: &[u8]) -> (String, bool) {
     match std::str::from_utf8(bytes) {
         Ok(text) => (text.into(), false),
@@ -223,7 +225,7 @@ fn lines<'t>(text: &'t str, bytes: &[u8]) -> Vec<Line<'t>> {
     lines
 }
 
-/// Number of lines from which the decimal mark is taken; a choice: the first samples may be whole numbers.
+/// Number of lines that are searched for a decimal comma: a choice, since the first samples may be whole numbers.
 const LINES_FOR_DECIMAL: usize = 200;
 
 /// Separator and decimal mark of a line of numbers, and of the lines after it; `None` if the line has no number.
@@ -242,7 +244,8 @@ fn dialect(line: &str, lines: &[&Line]) -> Option<Dialect> {
     } else if line.contains(',') {
         let blank = with(Separator::Blank);
         let fields = blank.fields(line);
-        // `0,001 1,25` has commas inside its fields, `0.001, 1.25` at their ends.
+        // In `0,001 1,25` commas are decimal marks inside the fields; in `0.001, 1.25` they are separators at the ends
+        // of the fields.
         let has_inner =
             |field: &&str| field.contains(',') && blank.number(field).is_some() && !field.ends_with(',');
         if fields.len() > 1 && fields.iter().any(has_inner) && blank.count_of_numbers(line).is_some() {
@@ -258,7 +261,7 @@ fn dialect(line: &str, lines: &[&Line]) -> Option<Dialect> {
     found.count_of_numbers(line).map(|_| found)
 }
 
-/// The `width` titles of a line; `None` if it has another number of fields.
+/// Titles of the columns in a line of the head, if it has `width` fields; otherwise `None`.
 fn names(dialect: Dialect, line: &str, width: usize) -> Option<Vec<&str>> {
     let fields = dialect.fields(line);
     if fields.len() == width {
@@ -267,7 +270,7 @@ fn names(dialect: Dialect, line: &str, width: usize) -> Option<Vec<&str>> {
     if dialect.separator != Separator::Blank {
         return None;
     }
-    // `Time (s)  Acc X (g)`: columns apart by two blanks or tabs.
+    // Titles with blanks in them, such as `Time (s)  Acc X (g)`, are separated by two or more blanks or by tabs.
     let wide: Vec<&str> = line
         .split('\t')
         .flat_map(|part| part.split("  "))
@@ -277,7 +280,7 @@ fn names(dialect: Dialect, line: &str, width: usize) -> Option<Vec<&str>> {
     if wide.len() == width {
         return Some(wide);
     }
-    // `Time (s) Force (N)`: a bracket belongs to the word before it.
+    // In `Time (s) Force (N)` the bracket with the unit belongs to the title before it.
     let mut joined: Vec<&str> = Vec::new();
     for field in &fields {
         match joined.last_mut() {
@@ -292,7 +295,7 @@ fn names(dialect: Dialect, line: &str, width: usize) -> Option<Vec<&str>> {
     (joined.len() == width).then_some(joined)
 }
 
-/// True for a row of units: every field is empty, in brackets, or a known unit.
+/// True if a line of the head is a row of units: every field is empty, in brackets, or a known unit.
 fn is_units(fields: &[&str]) -> bool {
     let is_bracketed = |field: &str| {
         (field.starts_with('(') && field.ends_with(')')) || (field.starts_with('[') && field.ends_with(']'))
@@ -301,7 +304,7 @@ fn is_units(fields: &[&str]) -> bool {
     fields.iter().all(is_unit) && fields.iter().any(|field| !field.is_empty())
 }
 
-/// Columns from titles, with units from a row of units if there is one.
+/// Names and units of columns from their titles, with the units from a row of units if the head has one.
 fn head_columns(titles: &[&str], units: Option<&[&str]>) -> Vec<HeadColumn> {
     titles
         .iter()

@@ -1,6 +1,6 @@
 //! Sample rate in a line of prose or comment, such as `Fs = 25600 Hz` or `dt: 0.1 ms`.
 
-/// Words for a sample rate, in lower case.
+/// Words that announce a sample rate in the head of a text file, in lower case.
 const RATE_WORDS: &[&str] = &[
     "sample rate",
     "sampling rate",
@@ -17,7 +17,7 @@ const RATE_WORDS: &[&str] = &[
     "fs",
 ];
 
-/// Words for a sample interval, in lower case.
+/// Words that announce a sample interval in the head of a text file, in lower case.
 const INTERVAL_WORDS: &[&str] = &[
     "sample interval",
     "sampling interval",
@@ -46,7 +46,8 @@ pub(super) fn rate(line: &str, decimal_comma: bool) -> Option<f64> {
     };
     let number = |rest: &str| {
         let at = rest.find(|letter: char| letter.is_ascii_digit())?;
-        // Between word and number stand signs and a unit only, no other sentence.
+        // Between the word for the rate and its number at most four letters may stand (a unit such as `Hz`), so that no
+        // other sentence is read as a rate.
         if rest[..at].chars().filter(|letter| letter.is_alphabetic()).count() > 4 {
             return None;
         }

@@ -8,18 +8,18 @@ use super::{RecordingError, csv};
 /// Columns of a text table.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TextTable {
-    /// Columns in the order of the file.
+    /// Columns of the text table in the order of the file.
     pub columns: Vec<TextColumn>,
-    /// Facts about the reading: separator, decimal mark, encoding, columns that were left out.
+    /// Facts about the reading of the text table: separator, decimal mark, encoding, omitted columns.
     pub notes: Vec<String>,
 }
 
 /// One column of a text table.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TextColumn {
-    /// Name; the number of the column if the file has no names.
+    /// Name of the column; its number if the file gives no names.
     pub name: String,
-    /// Unit, as the file states it.
+    /// Unit of the column as the file states it; `None` if it states none.
     pub unit: Option<String>,
     /// Values, without conversion.
     pub values: Vec<f64>,

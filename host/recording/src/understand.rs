@@ -15,7 +15,7 @@ use super::understood::Basis;
 use super::words::NameMeaning;
 use super::{Quantity, RecordingError, Sensitivity, Sidecar, Unit};
 
-/// What is stated about a column, whoever states it.
+/// All that file, sidecar and the option `--map` state about one column.
 #[derive(Default)]
 struct Stated {
     name: Option<String>,
@@ -26,10 +26,11 @@ struct Stated {
     from: Option<Basis>,
 }
 
-/// Meaning of every column, in the order of `columns`.
+/// Meaning of every column of a file, that is the channel that it becomes, in the order of `columns`.
 ///
 /// # Errors
-/// A unit is unknown or contradicts the name of its channel; the sidecar or the map names a column that does not exist; a meaning is in doubt.
+/// A unit is unknown or contradicts the name of its channel; the sidecar or the map names a column that does not exist;
+/// a meaning is in doubt.
 pub(super) fn understand(
     path: &Path,
     columns: &[RawColumn],
@@ -154,7 +155,8 @@ fn stated(
                 stated.unit_text = Some(unit_text(unit));
             }
             Some(Scale::Sensitivity(sensitivity)) => {
-                // A column without unit is taken in volts, as the sensitivity says.
+                // A column without a stated unit is taken in volts, because a sensitivity (voltage per measured unit)
+                // is given for it.
                 let volts = stated.unit.unwrap_or(Unit {
                     quantity: Quantity::Voltage,
                     factor: 1.0,
@@ -181,7 +183,7 @@ fn stated(
     Ok(stated)
 }
 
-/// Text of a unit for the report: the SI unit, with the factor if it is not 1.
+/// Text of a unit for the report of an import: the SI unit, with the factor if it is not 1.
 fn unit_text(unit: Unit) -> String {
     if unit.factor == 1.0 {
         unit.quantity.unit().into()
@@ -190,7 +192,8 @@ fn unit_text(unit: Unit) -> String {
     }
 }
 
-/// Meaning of one column; what is not stated goes to `doubts`.
+/// Meaning of one column, that is the channel that it becomes; a column whose direction, unit or sensitivity is not
+/// stated is added to `doubts`.
 fn meaning(
     path: &Path,
     column: &RawColumn,
@@ -238,7 +241,8 @@ fn meaning(
 /// True for the names of channels: `t`, `fx`, `x`, `vx`, `ax` …, `tacho`, and these with a suffix (`ax_2`).
 fn is_channel_name(name: &str) -> bool {
     let stem = name.split_once('_').map_or(name, |(stem, suffix)| {
-        // `a_x` and `x_value` are words; `ax_2` and `ax_7_2` are further sensors of this direction.
+        // Only a number may follow: `ax_2` and `ax_7_2` are further sensors of direction x. `a_x` and `x_value` are no
+        // standard names and are read as words.
         if suffix
             .chars()
             .all(|letter| letter.is_ascii_digit() || letter == '_')
@@ -263,7 +267,7 @@ fn motion_of_axis(name: &str, quantity: Quantity) -> Option<String> {
     is_axis.then(|| format!("{prefix}{name}"))
 }
 
-/// Checks that unit and name of a channel agree.
+/// Checks that the unit of a column measures the quantity that the name of its channel requires.
 fn checked(path: &Path, column: &RawColumn, found: Meaning) -> Result<Meaning, RecordingError> {
     let stem = found.name.split('_').next().unwrap_or_default();
     let expected = Quantity::of_name(&found.name).or_else(|| Quantity::of_name(stem));
@@ -294,7 +298,7 @@ fn unknown_unit(path: &Path, column: &RawColumn, text: &str) -> RecordingError {
     }
 }
 
-/// Meaning of a column from its words and its unit; `plain` is its meaning as an auxiliary channel.
+/// Meaning of a column from the words of its head and from its unit; `plain` is its meaning as an auxiliary channel.
 fn by_words(
     path: &Path,
     column: &RawColumn,
@@ -309,7 +313,8 @@ fn by_words(
             ..plain
         });
     }
-    // A unit of force or acceleration is enough to call for a direction; a length or speed without a word may be a position or a feed.
+    // The unit alone makes a column of force or acceleration a motion or force channel, whose direction must be known.
+    // A column in m or m/s counts as one only if its head names a direction, because it may be a position or a feed.
     let by_unit = match plain.quantity {
         Quantity::Time | Quantity::Force | Quantity::Acceleration => Some(plain.quantity),
         Quantity::Displacement | Quantity::Velocity if words.axis.is_some() => Some(plain.quantity),
@@ -373,7 +378,8 @@ fn by_words(
     Ok(found)
 }
 
-/// Of several time columns, the one whose head has the exact name is time; the others are auxiliary.
+/// Keeps one time column: of several, the one whose head has the exact name of time; the others become auxiliary
+/// channels.
 fn prefer_exact_time(meanings: &mut [Meaning]) {
     let is_exact = |meaning: &Meaning| meaning.name == "t" && meaning.from != Basis::Words;
     let has_exact = meanings.iter().any(is_exact);

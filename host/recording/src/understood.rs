@@ -1,4 +1,4 @@
-//! Report of an import: which column became which channel, and what is in doubt.
+//! Report of the import of a file: which column became which channel, and which columns are in doubt.
 
 use std::fmt;
 use std::path::PathBuf;
@@ -7,21 +7,22 @@ use serde::Serialize;
 
 use super::{RecordedChannel, Sidecar};
 
-/// Report of one record: which column became which channel, with unit and sample rate.
+/// Report of the import of one record: which column became which channel, with unit and sample rate.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Understood {
     /// The file.
     pub file: PathBuf,
-    /// Group, structure element or block of the file that holds the record.
+    /// Name of the group, structure element or block of the file that holds the record; `None` if the file has only one
+    /// record.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub record: Option<String>,
     /// Sample rate, samples per second.
     pub sample_rate_hz: f64,
     /// Source of the sample rate: `time column`, `file`, `sidecar` or `option`.
     pub rate_from: &'static str,
-    /// Columns in the order of the file, the time column included.
+    /// Columns of the record in the order of the file, the time column included.
     pub columns: Vec<UnderstoodColumn>,
-    /// Other facts about the reading: separator, encoding, columns that were left out.
+    /// Other facts about the reading of the record: separator, encoding, omitted columns.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub notes: Vec<String>,
     /// Units that are probably wrong.
@@ -34,41 +35,43 @@ pub struct Understood {
 pub struct UnderstoodColumn {
     /// Name of the column in the file.
     pub column: String,
-    /// Name of the channel; `t` is time.
+    /// Name of the channel that the column became; `t` is time.
     pub channel: String,
     /// True if the channel points against its axis, so that the samples changed their sign.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub is_negative: bool,
-    /// Unit in the file, as it stands there or in the sidecar or option; `None` if it is not stated.
+    /// Unit of the column, as the file, the sidecar or the option states it; `None` if none of them does.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unit: Option<String>,
-    /// Sensitivity that converts a voltage, as the sidecar or the option states it; `None` if there is none.
+    /// Sensitivity that converts the voltage in the column, as the sidecar or the option states it; `None` if there is
+    /// none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sensitivity: Option<String>,
-    /// Unit of the channel's samples (SI).
+    /// SI unit of the samples of the channel.
     pub si_unit: &'static str,
     /// Reason for the meaning.
     pub from: Basis,
 }
 
-/// Reason for the meaning of a column.
+/// Reason why a column of a file became this channel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Basis {
-    /// The head has the name of a channel, such as `ax`.
+    /// The head of the column is a channel name, such as `ax`.
     Head,
-    /// Words in the head, such as `Hammer` or `Acc X`.
+    /// Words in the head of the column, such as `Hammer` or `Acc X`, name the channel.
     Words,
     /// The sidecar names the channel.
     Sidecar,
     /// The option `--map` names the channel.
     Option,
-    /// No word of a quantity: an auxiliary channel.
+    /// No word in the head of the column names a quantity: it is an auxiliary channel.
     Auxiliary,
 }
 
 impl Understood {
-    /// True if the file does not say everything in the form of a recording, so that the user should see how it was understood.
+    /// True if the file did not state all meanings in the standard form, so that the user should see how it was read:
+    /// from words, from options, or with notes and warnings.
     pub fn is_interpreted(&self) -> bool {
         !self.notes.is_empty()
             || !self.warnings.is_empty()
@@ -81,8 +84,8 @@ impl Understood {
 }
 
 impl Understood {
-    /// The sidecar that states what was understood: `before` with name, unit and sensitivity of every column that is a channel, and the sample
-    /// rate if the file does not hold it.
+    /// A sidecar that states the result of the import: `before` with name, unit and sensitivity of every column that
+    /// was understood by its words or by an option, and with the sample rate if the file does not state it.
     #[must_use]
     pub fn sidecar(&self, before: &Sidecar) -> Sidecar {
         let mut sidecar = before.clone();
@@ -107,7 +110,7 @@ impl Understood {
 }
 
 impl fmt::Display for Understood {
-    /// One line: file, columns with channel and unit, sample rate, notes.
+    /// Report of an import in one line: file, columns with channel and unit, sample rate, notes.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}", self.file.display())?;
         if let Some(record) = &self.record {

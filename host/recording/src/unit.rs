@@ -32,7 +32,7 @@ pub enum Quantity {
 }
 
 impl Quantity {
-    /// SI unit of the samples, as it stands in column headers.
+    /// Text of the SI unit of a quantity, as it stands in column headers.
     pub fn unit(self) -> &'static str {
         match self {
             Self::Time => "s",
@@ -136,7 +136,7 @@ const UNITS: &[(&str, Quantity, f64)] = &[
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("unit \"{found}\"; known are {}", known())]
 pub struct UnknownUnit {
-    /// Unit as it stands in the file.
+    /// Text of the unknown unit, as the file or the user states it.
     pub found: String,
 }
 
@@ -159,7 +159,7 @@ impl FromStr for Unit {
         if let Some(unit) = plain(text) {
             return Ok(unit);
         }
-        // The factor 1 alone is the unit of a level and has been found above.
+        // The number 1 without a unit is the unit of a level; it has been found above.
         let (number, unit) = leading_number(text).ok_or_else(|| UnknownUnit { found: text.into() })?;
         match plain(unit) {
             Some(unit) if number.is_finite() && number != 0.0 && unit.quantity != Quantity::Level => {
@@ -173,7 +173,7 @@ impl FromStr for Unit {
     }
 }
 
-/// A unit without a factor, by its usual spellings.
+/// Parses a unit without a number before it, by its usual spellings.
 fn plain(text: &str) -> Option<Unit> {
     let plain = text
         .trim()
@@ -189,10 +189,10 @@ fn plain(text: &str) -> Option<Unit> {
     of(&plain).or_else(|| of(&respelled(&plain)?))
 }
 
-/// Usual spelling of a unit in the table that is written in another way; `None` for an empty text.
+/// Standard spelling of a unit that is written in another usual way; `None` for an empty text.
 fn respelled(text: &str) -> Option<String> {
     let mut plain = text.replace("⁻^2", "^-2").replace(['·', '⋅', '*'], " ");
-    // Brackets around the whole or around a part: (m/s^2), m/(s^2).
+    // Brackets around a whole unit or around a part of it are removed: (m/s^2), m/(s^2).
     plain.retain(|letter| !matches!(letter, '(' | ')'));
     let word = match plain.trim().to_lowercase().as_str() {
         "newton" | "newtons" => "N",
@@ -227,19 +227,20 @@ fn respelled(text: &str) -> Option<String> {
     }
 }
 
-/// The number at the start of a text and the text after it; `None` without a number or a text.
+/// Splits a text such as `98.1 m/s^2` into the number at its start and the text after it; `None` if one of them is
+/// missing.
 fn leading_number(text: &str) -> Option<(f64, &str)> {
     let (number, length) = fast_float2::parse_partial::<f64, _>(text.trim_start()).ok()?;
     let rest = text.trim_start().get(length..)?.trim();
     (length > 0 && !rest.is_empty()).then_some((number, rest))
 }
 
-/// Sensitivity of a sensor: voltage per measured unit, such as "10.2 mV/g".
+/// Sensitivity of a sensor: output voltage per unit of the measured quantity, such as "10.2 mV/g".
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sensitivity {
     /// Quantity measured by the sensor.
     pub quantity: Quantity,
-    /// Sensitivity, V per SI unit of `quantity`.
+    /// Sensitivity of the sensor, V per SI unit of `quantity`.
     pub volts_per_unit: f64,
 }
 

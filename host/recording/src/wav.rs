@@ -1,4 +1,5 @@
-//! Reader of WAV files. Channels are called ch1, ch2 …; the sidecar gives names and units. Full scale is 1.
+//! Reader of WAV files. Channels are called ch1, ch2 …; the sidecar gives names and units. Samples are divided by the
+//! full scale of the format.
 //!
 //! The length of the file bounds the allocated memory, whatever sizes its header states.
 
@@ -60,7 +61,8 @@ pub(super) fn read(path: &Path) -> Result<Raw, RecordingError> {
     })
 }
 
-/// De-interleaves the samples into channels, divided by `full_scale`; the length of the file allows at most `samples_max` samples in total.
+/// De-interleaves the samples into channels, each divided by `full_scale`; the length of the file allows at most
+/// `samples_max` samples in total.
 fn columns<S: hound::Sample + Into<f64>>(
     reader: &mut hound::WavReader<impl Read>,
     samples_max: u64,

@@ -2,22 +2,23 @@
 
 use super::unit::{Quantity, Unit};
 
-/// Meaning of the words of a column name.
+/// Meaning of the words in the name of a column.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct NameMeaning {
-    /// Quantity that a word names, such as force for `Hammer`.
+    /// Quantity that a word in the column name states, such as force for `Hammer`.
     pub(super) quantity: Option<Quantity>,
-    /// True if a word names the signal of a tachometer.
+    /// True if a word in the column name states the signal of a tachometer.
     pub(super) is_tacho: bool,
-    /// Direction that a word names: `x`, `y` or `z`.
+    /// Direction that a word in the column name states: `x`, `y` or `z`.
     pub(super) axis: Option<char>,
-    /// True if the direction has a minus sign, as in `Acc -Z`.
+    /// True if the direction in the column name has a minus sign, as in `Acc -Z`.
     pub(super) is_negative: bool,
-    /// Unit at the end of the name, as in `force_N`.
+    /// Unit at the end of the column name, as in `force_N`.
     pub(super) unit: Option<Unit>,
 }
 
-/// Words for each quantity, in lower case, English and German. A word of five letters or more also counts as the start of a longer word.
+/// Words in column names that state a quantity, in lower case, English and German. A word of five letters or more also
+/// counts as the start of a longer word.
 const WORDS: &[(Quantity, &[&str])] = &[
     (
         Quantity::Time,
@@ -70,14 +71,15 @@ const WORDS: &[(Quantity, &[&str])] = &[
     ),
 ];
 
-/// Words for the signal of a tachometer.
+/// Words in column names that state the signal of a tachometer.
 const TACHO: &[&str] = &["tacho", "tachometer", "drehzahlsensor", "keyphasor"];
 
-/// Length from which a word of the lists also counts as the start of a longer word. A choice: `kraft` begins `Kraftsensor`, `acc` must not
-/// begin `accuracy`.
+/// Smallest number of letters of a listed word that also counts as the start of a longer word in a column name. A
+/// choice: `kraft` begins `Kraftsensor`, `acc` must not begin `accuracy`.
 const STEM: usize = 5;
 
-/// Words that make a name another quantity: `cutting speed`, `force error`, and settings that are no signal of a sensor.
+/// Words whose presence in a column name means that its other words state no quantity: `cutting speed`, `force error`,
+/// and settings that are no signal of a sensor.
 const OTHER: &[&str] = &[
     "speed",
     "rpm",
@@ -113,9 +115,10 @@ impl NameMeaning {
             return meaning;
         }
         for (index, word) in lower.iter().enumerate() {
-            // `Channel A` is no acceleration: a letter names a quantity only at the start of a name of letters and numbers.
+            // A single letter states a quantity only at the start of a name that consists of short words: the `A` of
+            // `Channel A` is no acceleration.
             let is_letter = word.chars().count() == 1 && axis(word).is_none();
-            // `F` and `a_x` name a quantity; `a1` may be the first column of any matrix.
+            // `F` and `a_x` state a quantity. `a1` does not, since it may be the first column of any matrix.
             let others_are_short = lower.iter().all(|other| other.chars().count() <= 2)
                 && !lower
                     .get(1)
@@ -131,7 +134,8 @@ impl NameMeaning {
         meaning
     }
 
-    /// Adds the meaning of one word; the first word of each kind counts.
+    /// Adds the meaning of one word of a column name; of several words for a quantity, or for a direction, the first
+    /// counts.
     fn take(&mut self, word: &str) {
         if let Some(axis) = axis(word) {
             self.axis.get_or_insert(axis);
@@ -146,7 +150,7 @@ impl NameMeaning {
                 let Some(rest) = word.strip_prefix(known) else {
                     continue;
                 };
-                // `fx`, `accy` and `forcez` carry their direction.
+                // A word such as `fx`, `accy` or `forcez` states a quantity, and its last letter the direction.
                 let direction = axis(rest);
                 if rest.is_empty() || direction.is_some() || known.chars().count() >= STEM {
                     self.quantity.get_or_insert(*quantity);
@@ -157,7 +161,7 @@ impl NameMeaning {
                 }
             }
         }
-        // German compounds end in the quantity: `Hammerkraft`, `Schwingbeschleunigung`.
+        // A German compound ends with its quantity: `Hammerkraft` (force), `Schwingbeschleunigung` (acceleration).
         for (end, quantity) in [
             ("kraft", Quantity::Force),
             ("beschleunigung", Quantity::Acceleration),
@@ -170,7 +174,7 @@ impl NameMeaning {
     }
 }
 
-/// The direction that a whole word names.
+/// Direction that a word states if it is x, y or z alone.
 fn axis(word: &str) -> Option<char> {
     match word {
         "x" => Some('x'),
@@ -180,7 +184,8 @@ fn axis(word: &str) -> Option<char> {
     }
 }
 
-/// True if `axis` stands in `name` with a minus sign that is no hyphen: `Acc -Z`, `(-z)`.
+/// True if the direction `axis` stands in the column name with a minus sign, and not after a hyphen within a word: `Acc
+/// -Z`, `(-z)`.
 fn has_minus(name: &str, axis: char) -> bool {
     let text: Vec<char> = name.to_lowercase().chars().collect();
     (0..text.len()).any(|at| {
@@ -191,7 +196,7 @@ fn has_minus(name: &str, axis: char) -> bool {
     })
 }
 
-/// Words of a name: letters and digits apart, split also where a capital follows a small letter.
+/// Words of a column name: letters and digits are separated, and a capital after a small letter begins a new word.
 fn tokens(name: &str) -> Vec<String> {
     let mut tokens: Vec<String> = Vec::new();
     let mut previous: Option<char> = None;
@@ -214,12 +219,12 @@ fn tokens(name: &str) -> Vec<String> {
     tokens
 }
 
-/// Unit of `quantity` in the last words of a name: `force_N`, `acc_g`, `ax_m_s2`.
+/// Unit of the given quantity in the last words of a column name: `force_N`, `acc_g`, `ax_m_s2`.
 fn unit_at_end(tokens: &[String], quantity: Quantity) -> Option<Unit> {
     let [first, rest @ ..] = tokens else {
         return None;
     };
-    // The first word names the channel, so it is no unit.
+    // The first word of a column name names the channel, so it is not read as a unit.
     let _ = first;
     (0..rest.len()).find_map(|from| {
         let text = match rest[from..].join("").as_str() {
@@ -228,7 +233,7 @@ fn unit_at_end(tokens: &[String], quantity: Quantity) -> Option<Unit> {
             "mps" => "m/s".to_owned(),
             other => other.to_owned(),
         };
-        // A single word x, y or z, or a number, is no unit.
+        // A single word x, y or z, or a number, does not parse as a unit.
         let unit: Unit = text.parse().ok()?;
         (unit.quantity == quantity).then_some(unit)
     })
@@ -247,7 +252,7 @@ pub(super) fn name_and_unit(title: &str) -> (&str, Option<&str>) {
         let Some(inner) = title.strip_suffix(close) else {
             continue;
         };
-        // A unit such as (m/(s^2)) has brackets of its own.
+        // A unit such as (m/(s^2)) contains brackets, so each opening bracket may be the one before the unit.
         for (at, _) in inner.match_indices(open) {
             let (name, unit) = (&inner[..at], &inner[at + 1..]);
             if is_unit(unit) {

@@ -6,7 +6,7 @@
 use super::value::{Item, Value, Variable};
 use crate::raw::{FoundUnit, Raw, RawColumn};
 
-/// Names of a sample rate, samples per second, in lower case.
+/// Names of a variable that holds the sample rate in samples per second, in lower case.
 const RATES: &[&str] = &[
     "fs",
     "f_s",
@@ -22,7 +22,7 @@ const RATES: &[&str] = &[
     "abtastrate",
 ];
 
-/// Names of a sample interval, s, in lower case.
+/// Names of a variable that holds the sample interval in s, in lower case.
 const INTERVALS: &[&str] = &[
     "dt",
     "ts",
@@ -35,10 +35,10 @@ const INTERVALS: &[&str] = &[
     "wf_increment",
 ];
 
-/// Names of a time vector in a structure that holds one channel, in lower case.
+/// Names of the time vector in a MAT structure that holds one channel, in lower case.
 const TIMES: &[&str] = &["t", "time", "zeit", "x"];
 
-/// The records of a file; there is at least one.
+/// The records in the variables of a MAT-file; there is at least one.
 pub(super) fn records(items: Vec<Item>) -> Result<Vec<Raw>, String> {
     let rate = rate(&items);
     let mut found = Vec::new();
@@ -51,7 +51,8 @@ pub(super) fn records(items: Vec<Item>) -> Result<Vec<Raw>, String> {
     Ok(found)
 }
 
-/// Adds the records in `items`, the variables of the file or the fields of structure `label`; `outer_hz` is the rate stated around them.
+/// Adds the records in `items`, the variables of the file or the fields of structure `label`; `outer_hz` is the sample
+/// rate that the enclosing structure or the file states.
 fn collect(items: Vec<Item>, label: Option<String>, outer_hz: Option<f64>, found: &mut Vec<Raw>) {
     let rate_hz = rate(&items).or(outer_hz);
     let units = units(&items);
@@ -99,7 +100,7 @@ fn collect(items: Vec<Item>, label: Option<String>, outer_hz: Option<f64>, found
     }
 }
 
-/// One record from the variables with `longest` samples; the shorter ones are noted.
+/// One record from the variables of `longest` samples; a note names each shorter vector, which is not used.
 fn record(
     variables: Vec<(Variable, Option<String>)>,
     longest: usize,
@@ -154,7 +155,8 @@ fn rate(items: &[Item]) -> Option<f64> {
     scalar(RATES).or_else(|| scalar(INTERVALS).map(|interval| 1.0 / interval))
 }
 
-/// Units of variables, by the name of the variable in lower case: `force_unit = 'N'`, or a structure `units` with a field for each.
+/// Units of variables by the name of the variable in lower case, as text variables (`force_unit = 'N'`) or as a
+/// structure `units` with a text field for each variable.
 fn units(items: &[Item]) -> Vec<(String, String)> {
     let mut units = Vec::new();
     for item in items {
@@ -180,9 +182,10 @@ fn units(items: &[Item]) -> Vec<(String, String)> {
     units
 }
 
-/// Takes the structures that hold one channel each out of `structures`: one vector, and its unit as text.
+/// Removes from `structures` those that hold one channel each, and returns the channels: one vector, and the text of
+/// its unit.
 fn channels(structures: &mut Vec<(String, Vec<Vec<Item>>)>) -> Vec<(Variable, Option<String>)> {
-    // A single such structure is a record with one channel, and keeps its own names.
+    // If only one structure holds a single channel, it is left as a record of its own, with the names of its fields.
     let is_channel = |(_, elements): &(String, Vec<Vec<Item>>)| match elements.as_slice() {
         [fields] => fields.iter().filter(|field| is_signal(field)).count() == 1,
         _ => false,
@@ -219,7 +222,7 @@ fn channels(structures: &mut Vec<(String, Vec<Vec<Item>>)>) -> Vec<(Variable, Op
     taken
 }
 
-/// True for a field with one vector of samples that is no time.
+/// True for a field of a MAT structure with one vector of samples whose name is not that of time.
 fn is_signal(field: &Item) -> bool {
     matches!(&field.value, Value::Numbers(variable) if variable.values.len() == 1 && variable.samples() > 1)
         && !TIMES.contains(&field.name.to_lowercase().as_str())

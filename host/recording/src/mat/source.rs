@@ -5,10 +5,11 @@ use std::io::{BufRead, ErrorKind, Read, copy, sink};
 /// Chunk size of reading, bytes; a choice. It is a multiple of the size of every number type.
 pub(super) const CHUNK: usize = 1 << 16;
 
-/// Largest element with flags, dimensions or a name, bytes. Valid names have up to 63 characters; the limit is a choice above that.
+/// Largest length that is accepted for an element of a MAT-file with flags, dimensions or a name, bytes. Valid names
+/// have up to 63 characters; the limit is a choice above that.
 pub(super) const SMALL_MAX: u64 = 4096;
 
-/// Size of a stored number type, bytes; `None` if the data type is not numeric.
+/// Size of one number of MAT data type `kind`, bytes; `None` if the data type is not numeric.
 pub(super) fn size_of_kind(kind: u32) -> Option<usize> {
     Some(match kind {
         1 | 2 => 1,
@@ -36,7 +37,7 @@ fn decode(kind: u32, data: &[u8], big_endian: bool, mut take: impl FnMut(f64)) {
     }
     match kind {
         1 => decode!(i8),
-        // Text in UTF-8 (16) has single bytes.
+        // Texts in UTF-8 (data type 16) are read byte by byte.
         2 | 16 => decode!(u8),
         3 => decode!(i16),
         4 | 17 => decode!(u16),
@@ -66,7 +67,7 @@ pub(super) struct Tag {
     pub(super) kind: u32,
     /// Length of the data, bytes.
     pub(super) length: u64,
-    /// Data of a small element, which are stored inside the tag (up to four bytes).
+    /// Data of a small element, stored inside its tag instead of after it (up to four bytes).
     inside: Option<[u8; 4]>,
 }
 
@@ -75,13 +76,13 @@ pub(super) struct Source<'a> {
     pub(super) reader: &'a mut dyn BufRead,
     /// Offset of the next byte.
     pub(super) at: u64,
-    /// Upper bound of the bytes available: the length of the file or of the enclosing element.
+    /// Number of bytes that can still be read: at most the rest of the file or of the enclosing element.
     pub(super) available: u64,
     pub(super) big_endian: bool,
 }
 
 impl Source<'_> {
-    /// True if no byte is left.
+    /// True if the file or the compressed element has no more bytes.
     pub(super) fn is_at_end(&mut self) -> Result<bool, String> {
         self.reader
             .fill_buf()
@@ -101,7 +102,7 @@ impl Source<'_> {
         Ok(())
     }
 
-    /// Message for a file that ends within an element of `length` bytes.
+    /// Error message for a MAT-file that ends within an element of `length` bytes.
     pub(super) fn cut_off(&self, length: u64) -> String {
         format!(
             "it ends within an element of {length} bytes at byte {}: it is cut off",
@@ -163,13 +164,14 @@ impl Source<'_> {
         Ok(codes.into_iter().filter_map(char::from_u32).collect())
     }
 
-    /// Reads the numbers of an element and passes each to `take`.
+    /// Reads the numbers of an element with tag `tag` and passes each to `take`.
     pub(super) fn numbers(&mut self, tag: &Tag, mut take: impl FnMut(f64)) -> Result<(), String> {
         let big_endian = self.big_endian;
         self.chunks(tag, |chunk| decode(tag.kind, chunk, big_endian, &mut take))
     }
 
-    /// Reads the data of an element in chunks, and its padding to a multiple of 8 bytes.
+    /// Reads the data of an element in chunks, passes each chunk to `take`, and skips the padding to a multiple of 8
+    /// bytes.
     fn chunks(&mut self, tag: &Tag, mut take: impl FnMut(&[u8])) -> Result<(), String> {
         if let Some(inside) = &tag.inside {
             take(&inside[..tag.length as usize]);
@@ -197,7 +199,8 @@ impl Source<'_> {
         Ok(())
     }
 
-    /// Applies `read` to the data of an element, limited to that element, and skips data that `read` leaves.
+    /// Lets `read` read the data of one element, limits it to that element, and skips the data that `read` leaves
+    /// unread.
     pub(super) fn within<T>(
         &mut self,
         tag: &Tag,

@@ -2,7 +2,7 @@
 
 use crate::raw::RawColumn;
 
-/// A named value of the file, or of a structure.
+/// A named value of a MAT-file: a variable, or a field of a structure.
 #[derive(Debug)]
 pub(super) struct Item {
     pub(super) name: String,
@@ -14,7 +14,8 @@ pub(super) struct Item {
 pub(super) enum Value {
     Numbers(Variable),
     Text(String),
-    /// Elements of a structure array, each with its fields; the elements of a cell array have one field without name.
+    /// Elements of a structure array, each with its fields. Each element of a cell array is stored as an element with
+    /// one field without name.
     Elements(Vec<Vec<Item>>),
 }
 
@@ -22,17 +23,18 @@ pub(super) enum Value {
 #[derive(Debug)]
 pub(super) struct Variable {
     pub(super) name: String,
-    /// Samples of each channel; all channels have the same length.
+    /// Samples of each channel of the variable; all channels have the same length.
     pub(super) values: Vec<Vec<f64>>,
 }
 
 impl Variable {
-    /// Number of samples per channel: the longer dimension of the matrix.
+    /// Number of samples per channel of a matrix, whose longer dimension is time.
     pub(super) fn samples(&self) -> usize {
         self.values.first().map_or(0, Vec::len)
     }
 
-    /// Channels with their names: the name of the variable, numbered from 1 if there are several.
+    /// Channels of a variable with their names: the name of the variable, with a number from 1 if it has several
+    /// channels.
     pub(super) fn into_columns(self) -> Vec<RawColumn> {
         let is_one = self.values.len() == 1;
         let name = |index: usize| match is_one {
@@ -48,7 +50,8 @@ impl Variable {
 }
 
 impl Item {
-    /// The value with the name of its field; the elements of structures have no names of their own.
+    /// This value with the name of the structure field that holds it: a MAT-file stores elements of structures without
+    /// names of their own.
     pub(super) fn named(mut self, name: &str) -> Self {
         self.name = name.into();
         if let Value::Numbers(variable) = &mut self.value {

@@ -1,6 +1,6 @@
-//! Reader of numbers and texts from the bytes of a file.
+//! Reader of numbers and texts from the bytes of a TDMS file.
 
-/// Position in the bytes of a file, with their byte order.
+/// Reading position in the bytes of a TDMS file, with their byte order.
 #[derive(Clone, Copy)]
 pub(super) struct Bytes<'a> {
     pub(super) data: &'a [u8],
@@ -43,13 +43,13 @@ impl<'a> Bytes<'a> {
         Ok(number!(self, u64))
     }
 
-    /// A text with its length before it.
+    /// Reads a text of a TDMS file, whose length in bytes stands before it.
     pub(super) fn text(&mut self) -> Result<String, String> {
         let length = self.u32()? as usize;
         Ok(String::from_utf8_lossy(self.take(length)?).into_owned())
     }
 
-    /// A number of data type `kind`; `None` if the type is no number.
+    /// Reads a number of TDMS data type `kind`; `None` if the data type is not a number.
     pub(super) fn number(&mut self, kind: u32) -> Result<Option<f64>, String> {
         Ok(Some(match kind {
             1 => f64::from(number!(self, i8)),
@@ -67,7 +67,7 @@ impl<'a> Bytes<'a> {
     }
 }
 
-/// Size of a data type, bytes; `None` for text and unknown types.
+/// Size of one value of TDMS data type `kind`, bytes; `None` for text and unknown types.
 pub(super) fn size_of_kind(kind: u32) -> Option<usize> {
     Some(match kind {
         1 | 5 | 0x21 => 1,

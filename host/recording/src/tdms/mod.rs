@@ -14,7 +14,7 @@ use super::RecordingError;
 use super::raw::{FoundUnit, Raw, RawColumn};
 use segments::{Object, Property};
 
-/// Reads the groups of a file, each as a record.
+/// Reads the groups of a TDMS file, each as a record of its own.
 pub(super) fn read(path: &Path) -> Result<Vec<Raw>, RecordingError> {
     let data = crate::file::read(path)?;
     let wrong = |what: String| RecordingError::Content {
@@ -25,7 +25,7 @@ pub(super) fn read(path: &Path) -> Result<Vec<Raw>, RecordingError> {
     drop(data);
     let mut records: Vec<(String, Vec<Object>)> = Vec::new();
     for object in objects {
-        // The path of a channel is /'group'/'channel'; root and groups have no samples.
+        // An object of a TDMS file whose path is /'group'/'channel' is a channel; root and groups have no samples.
         let names = names(&object.path);
         let [group, _] = names.as_slice() else {
             continue;
@@ -48,7 +48,7 @@ pub(super) fn read(path: &Path) -> Result<Vec<Raw>, RecordingError> {
         .collect()
 }
 
-/// Names in a path such as `/'group'/'channel'`; a quote in a name is doubled.
+/// Group and channel name in a TDMS path such as `/'group'/'channel'`; a quote in a name is doubled.
 fn names(path: &str) -> Vec<String> {
     let mut names = Vec::new();
     let mut rest = path;
@@ -72,7 +72,7 @@ fn names(path: &str) -> Vec<String> {
     names
 }
 
-/// One record from the channels of a group.
+/// One record from the channels of a TDMS group.
 fn record(channels: Vec<Object>, label: Option<String>) -> Result<Raw, String> {
     let longest = channels
         .iter()
@@ -137,7 +137,7 @@ impl Object {
         }
     }
 
-    /// Samples with the scale that the properties state: value = slope · sample + intercept.
+    /// Samples of a TDMS channel after the linear scale that its properties state: value = slope · sample + intercept.
     fn scaled(self, name: &str) -> Result<Vec<f64>, String> {
         let scales = self.number("NI_Number_Of_Scales").unwrap_or(0.0);
         if scales < 1.0 || self.text("NI_Scaling_Status") == Some("scaled") {

@@ -4,10 +4,10 @@ use std::collections::BTreeMap;
 
 use super::bytes::{Bytes, size_of_kind};
 
-/// Length of the lead-in of a segment, bytes.
+/// Length of the lead-in, the fixed first part of each segment of a TDMS file, bytes.
 const LEAD_IN: usize = 28;
 
-/// Bits of the table of contents of a segment.
+/// Bits of the table of contents in the lead-in of a TDMS segment: what the segment contains.
 const HAS_METADATA: u32 = 1 << 1;
 const HAS_NEW_OBJECTS: u32 = 1 << 2;
 const HAS_SAMPLES: u32 = 1 << 3;
@@ -18,7 +18,7 @@ const IS_DAQMX: u32 = 1 << 7;
 /// Type of a text.
 const TEXT: u32 = 0x20;
 
-/// A channel, a group or the root, with its properties and all its samples.
+/// An object of a TDMS file, that is a channel, a group or the root, with its properties and all its samples.
 pub(super) struct Object {
     pub(super) path: String,
     pub(super) properties: BTreeMap<String, Property>,
@@ -32,7 +32,7 @@ pub(super) enum Property {
     Text(String),
 }
 
-/// Layout of the samples of a channel in one chunk.
+/// Layout of the samples of one channel in one chunk of a TDMS segment.
 #[derive(Clone, Copy)]
 struct Layout {
     kind: u32,
@@ -42,10 +42,10 @@ struct Layout {
     bytes: u64,
 }
 
-/// Reads all objects of a file.
+/// Reads all objects (channels, groups, root) of a TDMS file.
 pub(super) fn objects(data: &[u8]) -> Result<Vec<Object>, String> {
     let mut objects: Vec<Object> = Vec::new();
-    // Objects with samples in the segment, by their index in `objects`.
+    // Indices in `objects` of the channels that have samples in the present segment.
     let mut active: Vec<usize> = Vec::new();
     let mut at = 0;
     while at + LEAD_IN <= data.len() {
@@ -66,7 +66,8 @@ pub(super) fn objects(data: &[u8]) -> Result<Vec<Object>, String> {
         let (next, samples) = (lead.u64()?, lead.u64()?);
         let start = at + LEAD_IN;
         let rest = (data.len() - start) as u64;
-        // An offset of all ones stands in a segment that was not closed: it reaches to the end of the file.
+        // A TDMS segment that was not closed has an offset of all ones to the next segment; it reaches to the end of
+        // the file.
         let end = start + usize::try_from(next.min(rest)).unwrap_or(0);
         let first = start + usize::try_from(samples.min(rest)).unwrap_or(0);
         if contents & HAS_METADATA != 0 {
@@ -97,7 +98,7 @@ pub(super) fn objects(data: &[u8]) -> Result<Vec<Object>, String> {
     Ok(objects)
 }
 
-/// Reads the objects of a segment: properties, and layout of the samples.
+/// Reads the metadata of a TDMS segment: for each object its properties and the layout of its samples.
 fn metadata(bytes: &mut Bytes<'_>, objects: &mut Vec<Object>, active: &mut Vec<usize>) -> Result<(), String> {
     let count = bytes.u32()?;
     for _ in 0..count {
@@ -179,7 +180,8 @@ fn metadata(bytes: &mut Bytes<'_>, objects: &mut Vec<Object>, active: &mut Vec<u
     Ok(())
 }
 
-/// Reads the samples of a segment: chunk after chunk, in each the values of one channel after the other, or interleaved.
+/// Reads the samples of a TDMS segment chunk by chunk. In each chunk the values stand channel after channel, or
+/// interleaved.
 fn read_samples(
     bytes: &mut Bytes<'_>,
     objects: &mut [Object],
@@ -226,7 +228,7 @@ fn read_samples(
     Ok(())
 }
 
-/// Reads one value; times and truth values are no samples and are skipped.
+/// Reads one value of a TDMS channel; time stamps and truth values are no samples and are skipped.
 fn value(bytes: &mut Bytes<'_>, layout: Layout, samples: &mut Vec<f64>) -> Result<(), String> {
     match bytes.number(layout.kind)? {
         Some(number) => samples.push(number),

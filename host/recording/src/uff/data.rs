@@ -1,4 +1,4 @@
-//! Reader of the data of a data set 58, as text or binary.
+//! Reader of the data (values) of a UFF data set 58, as text or binary.
 
 use std::io::BufRead;
 
@@ -33,24 +33,24 @@ impl Ordinate {
         }
     }
 
-    /// True if there are no values.
+    /// True if the data set holds no values.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 }
 
-/// Data of a function: the ordinate, and the abscissa if it is unevenly spaced.
+/// Data of a UFF data set 58: the ordinate values, and the abscissa values if these are unevenly spaced.
 pub(super) struct Data {
     pub(super) uneven: Option<Vec<f64>>,
     pub(super) ordinate: Ordinate,
 }
 
-/// Assigns the sequence of numbers in the file to abscissa, real part and imaginary part.
+/// Distributes the sequence of numbers in a UFF data set to abscissa, real part and imaginary part.
 struct Sorter {
     data: Data,
-    /// Role of the next number: 0 abscissa, 1 real part, 2 imaginary part.
+    /// Role of the next number that is read from the data set: 0 abscissa, 1 real part, 2 imaginary part.
     next: u8,
-    /// Real part of a complex value whose imaginary part is still to come.
+    /// Real part of the complex value whose imaginary part is the next number in the data set.
     real: f64,
 }
 
@@ -70,7 +70,7 @@ impl Sorter {
         }
     }
 
-    /// Stores the next number in its role.
+    /// Stores the next number of the data set as abscissa, real part or imaginary part.
     fn take(&mut self, value: f64) {
         let first = u8::from(self.data.uneven.is_none());
         match (self.next, &mut self.data.ordinate, &mut self.data.uneven) {
@@ -94,12 +94,13 @@ impl Sorter {
     }
 }
 
-/// Stored numbers per function value: 1 (real), plus 1 if complex, plus 1 if the abscissa is stored.
+/// Count of stored numbers per value of a UFF function: 1 for a real ordinate, 2 for a complex one, plus 1 if the
+/// abscissa is stored.
 fn per_value(header: &Header) -> usize {
     1 + usize::from(header.ordinate_type.is_complex) + usize::from(header.even.is_none())
 }
 
-/// Reads text data up to and including the final delimiter of the data set.
+/// Reads the values of a UFF data set 58 written as text, up to and including its final delimiter, a line `-1`.
 ///
 /// A line `-1` is read as a number if values are still missing and the lines after it do not begin a data set.
 pub(super) fn read_text<R: BufRead>(source: &mut Source<R>, header: &Header) -> Result<Data, Fault> {
@@ -151,7 +152,7 @@ pub(super) fn read_text<R: BufRead>(source: &mut Source<R>, header: &Header) -> 
         }
         numbers.iter().for_each(|&value| sorter.take(value));
     }
-    // The last delimiter of a file may be missing.
+    // The last delimiter of a UFF file may be missing: a complete data set may end with the file.
     if Some(found) == expected {
         Ok(sorter.data)
     } else {
@@ -159,7 +160,8 @@ pub(super) fn read_text<R: BufRead>(source: &mut Source<R>, header: &Header) -> 
     }
 }
 
-/// True if a line `-1` is the final delimiter although numbers are missing; `is_last` if exactly one number is missing.
+/// True if a line `-1` within the values is the final delimiter of a data set that lacks numbers, and not the value −1;
+/// `is_last` says that exactly one number is missing.
 fn ends_here<R: BufRead>(source: &mut Source<R>, is_last: bool) -> Result<bool, SourceError> {
     match source.peek_filled(0)? {
         None => return Ok(true),
@@ -168,14 +170,15 @@ fn ends_here<R: BufRead>(source: &mut Source<R>, is_last: bool) -> Result<bool, 
     }
     Ok(match source.peek_filled(1)? {
         None => !is_last,
-        // A data set number ends in column six; data values are rarely written in this column.
+        // The number of a UFF data set ends in column six; values rarely have a digit in this column, so it tells the
+        // two apart.
         Some(second) => {
             second.bytes.get(5).is_some_and(u8::is_ascii_digit) && second.number_of_set().is_some()
         }
     })
 }
 
-/// Reads binary data up to and including the final delimiter of the data set.
+/// Reads the values of a binary UFF data set, up to and including its final delimiter.
 pub(super) fn read_binary<R: BufRead>(
     source: &mut Source<R>,
     header: &Header,
@@ -216,10 +219,11 @@ pub(super) fn read_binary<R: BufRead>(
     Ok(sorter.data)
 }
 
-/// Sizes, bytes, of the stored numbers of one function value, in order.
+/// Sizes, bytes, of the numbers that a binary UFF data set stores for one function value, in order: abscissa, real
+/// part, imaginary part.
 ///
-/// The standard stores the abscissa of double-precision ordinates in single precision. Some writers store it in double precision; the byte
-/// count in the header distinguishes the two.
+/// The standard stores the abscissa of double-precision ordinates in single precision. Some writers store it in double
+/// precision; the byte count in the header distinguishes the two.
 fn widths(header: &Header, binary: Binary) -> Result<Vec<usize>, String> {
     let width = if header.ordinate_type.is_double { 8 } else { 4 };
     let mut widths = vec![width; per_value(header)];
@@ -228,7 +232,7 @@ fn widths(header: &Header, binary: Binary) -> Result<Vec<usize>, String> {
         widths[0] = 4;
     }
     let needed = bytes(&widths);
-    // More bytes than needed are padding. Fewer bytes contradict the header.
+    // More bytes than the values need are padding. Fewer bytes than that contradict the number of values in the header.
     if binary.bytes != 0 && binary.bytes < needed {
         return Err(format!(
             "{} bytes of data, but {} values of this type need {needed}",
@@ -258,7 +262,7 @@ fn decode(bytes: &[u8], is_big_endian: bool) -> f64 {
     }
 }
 
-/// Reads the delimiter after binary data: on the same line or after empty lines.
+/// Reads the delimiter line `-1` that ends a binary UFF data set: on the same line as the data or after empty lines.
 fn end_of_binary<R: BufRead>(source: &mut Source<R>) -> Result<(), Fault> {
     match source.peek_filled(0)? {
         None => return Ok(()),

@@ -31,7 +31,7 @@ impl From<SourceError> for Fault {
 }
 
 impl Fault {
-    /// Adds the path of the file to the error.
+    /// Converts the error in a UFF file into one that names the path of the file.
     pub(super) fn of_file(self, path: &Path) -> RecordingError {
         match self {
             Self::Io(cause) => RecordingError::File(FileError::Read {

@@ -20,7 +20,7 @@ pub enum Function {
     FrequencyResponse,
     /// Type 6: coherence.
     Coherence,
-    /// Any other type, with its code.
+    /// A function type that has no variant here, with its code in record 6.
     Other(i64),
 }
 
@@ -51,7 +51,7 @@ impl Function {
 /// Degree of freedom of response or reference (record 6): node and direction.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct DegreeOfFreedom {
-    /// Entity name, up to ten characters; empty if there is none.
+    /// Name of the measured entity at this degree of freedom, up to ten characters; empty if there is none.
     pub entity: String,
     /// Node number.
     pub node: i64,
@@ -70,7 +70,7 @@ pub struct Axis {
     pub unit: String,
 }
 
-/// Header of a data set 58 (records 1 to 11).
+/// Header (records 1 to 11) of a UFF data set 58.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Header {
     /// Five lines of free text (records 1 to 5).
@@ -79,19 +79,19 @@ pub struct Header {
     pub function: Function,
     /// Degree of freedom of the response.
     pub response: DegreeOfFreedom,
-    /// Degree of freedom of the reference (of an FRF, the force).
+    /// Degree of freedom of the reference; in a frequency response function that of the force.
     pub reference: DegreeOfFreedom,
-    /// Precision of the values, and whether they are complex.
+    /// Precision of the ordinate values, and whether they are complex.
     pub ordinate_type: OrdinateType,
     /// Number of values.
     pub count: usize,
-    /// First value and step of an evenly spaced abscissa; `None` if it is uneven.
+    /// First value and step of an evenly spaced abscissa; `None` if the spacing is uneven.
     pub even: Option<(f64, f64)>,
     /// Abscissa: quantity and unit.
     pub abscissa: Axis,
-    /// Ordinate: quantity and unit; the numerator of a ratio.
+    /// Quantity and unit of the ordinate; of a ratio such as response per force, those of the numerator.
     pub ordinate: Axis,
-    /// Denominator of a ratio: quantity and unit.
+    /// Quantity and unit of the denominator, if the ordinate is a ratio such as response per force.
     pub denominator: Axis,
 }
 
@@ -99,7 +99,7 @@ pub struct Header {
 pub(super) const RECORDS: usize = 11;
 
 impl Header {
-    /// Parses the eleven header records.
+    /// Parses the eleven header records of a UFF data set 58.
     ///
     /// # Errors
     /// Index of the faulty record, from 0, and a description of the fault.
@@ -126,7 +126,7 @@ impl Header {
 /// Parses record 6, Fortran format `2(I5,I10), 2(1X,A10,I10,I4)`: function type, response and reference.
 fn degrees_of_freedom(record: &str) -> Result<(Function, DegreeOfFreedom, DegreeOfFreedom), String> {
     let function = match field(record, 0, 5) {
-        // Some writers ignore the column positions; then the first word is the type.
+        // Some writers ignore the column positions of record 6; the first word is then the function type.
         text if text.contains(' ') => record.split_whitespace().next().unwrap_or_default(),
         text => text,
     };
@@ -140,7 +140,7 @@ fn degrees_of_freedom(record: &str) -> Result<(Function, DegreeOfFreedom, Degree
             direction: whole(field(record, at + 21, 4), "direction")?,
         })
     };
-    // A record that ignores the column positions has ten words.
+    // A record 6 that ignores the column positions has ten words separated by blanks.
     let in_columns = dof(30).and_then(|response| Ok((response, dof(55)?)));
     let (response, reference) = match (
         in_columns,
@@ -179,7 +179,7 @@ fn data_form(record: &str) -> Result<DataForm, String> {
         field(record, 30, 13),
         field(record, 43, 13),
     ];
-    // If the columns cannot be parsed, the words of the record are.
+    // If record 7 cannot be parsed by column positions, its words separated by blanks are parsed.
     let words: Vec<&str> = record.split_whitespace().collect();
     parse_data_form(fields).or_else(|what| match words.as_slice() {
         &[a, b, c, d, e, ..] => parse_data_form([a, b, c, d, e]),
@@ -199,7 +199,7 @@ fn parse_data_form([kind, count, spacing, first, step]: [&str; 5]) -> Result<Dat
             ));
         }
     };
-    // The count is written in ten columns, so it has at most ten digits.
+    // The number of values stands in ten columns of the record, so it has at most ten digits.
     let count = match count.parse::<usize>() {
         Ok(count) if count < 10_000_000_000 => count,
         _ => {
@@ -250,9 +250,9 @@ fn axis(record: &str) -> Result<Axis, String> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Binary {
     pub(super) is_big_endian: bool,
-    /// Number of header lines that follow.
+    /// Number of header lines that follow the first line of a binary data set.
     pub(super) lines: usize,
-    /// Length of the binary data, bytes; 0 if the writer did not state it.
+    /// Length of the binary data of the data set, bytes; 0 if the writer did not state it.
     pub(super) bytes: u64,
 }
 
@@ -300,7 +300,7 @@ fn field(record: &str, from: usize, length: usize) -> &str {
     record[at(from)..at(from + length)].trim()
 }
 
-/// Trimmed text; `NONE` becomes the empty string.
+/// Trimmed text of a name in a UFF header; `NONE` means no name and becomes the empty string.
 fn named(text: &str) -> String {
     let text = text.trim();
     if text.eq_ignore_ascii_case("none") {

@@ -35,15 +35,15 @@ use crate::file::{FileError, Prepared};
 /// One data set 58: a function with its header and values.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DataSet {
-    /// Number of the line with the data set number, from 1.
+    /// Number of the line in the file, from 1, that holds the data set number 58.
     pub line: u64,
-    /// Header: the eleven records before the data.
+    /// Header of the data set: the eleven records before the data.
     pub header: Header,
-    /// Abscissa values of an unevenly spaced function; `None` if the spacing is even.
+    /// Abscissa values of a function with uneven spacing; `None` if the spacing is even.
     pub uneven: Option<Vec<f64>>,
     /// Ordinate values.
     pub ordinate: Ordinate,
-    /// Units of the file (data set 164), SI by default.
+    /// Units of the UFF file (data set 164), SI by default.
     pub units: FileUnits,
 }
 
@@ -82,7 +82,7 @@ fn parse(reader: impl BufRead) -> Result<Vec<DataSet>, Fault> {
             Some((58, rest)) => sets.push(data_set(&mut source, first.number, &rest)?),
             Some((164, _)) => {
                 let found = file_units(&mut source)?;
-                // The first data set 164 also applies to the data sets before it.
+                // The first data set 164 (units) also applies to the data sets before it in the file.
                 sets.iter_mut()
                     .filter(|_| units.is_none())
                     .for_each(|set: &mut DataSet| set.units = found);
@@ -122,7 +122,8 @@ fn parse(reader: impl BufRead) -> Result<Vec<DataSet>, Fault> {
     Ok(sets)
 }
 
-/// Skips lines up to and including the next delimiter. Returns its line number, or `None` at the end of the file.
+/// Skips lines of a UFF file up to and including the next delimiter line `-1`. Returns its line number, or `None` at
+/// the end of the file.
 fn next_delimiter<R: BufRead>(source: &mut Source<R>) -> Result<Option<u64>, Fault> {
     while let Some(line) = source.next()? {
         if line.is_delimiter() {
@@ -142,7 +143,7 @@ fn next_filled<R: BufRead>(source: &mut Source<R>) -> Result<Option<Line>, Fault
     Ok(None)
 }
 
-/// Skips the rest of a data set, including its final delimiter.
+/// Skips the rest of a UFF data set, including its final delimiter.
 fn skip<R: BufRead>(source: &mut Source<R>) -> Result<(), Fault> {
     while let Some(line) = source.next()? {
         if line.is_delimiter() {
@@ -184,7 +185,8 @@ fn data_set<R: BufRead>(source: &mut Source<R>, line: u64, rest: &str) -> Result
                 format!("the file ends within the {RECORDS} lines before the data"),
             ));
         };
-        // The five lines of text may contain -1; in the records of numbers -1 alone is a delimiter.
+        // The five lines of free text may contain −1; in the later records, which hold numbers, `-1` alone is the
+        // delimiter.
         if record.is_delimiter() && index >= 5 {
             return Err(fault(
                 record.number,
@@ -210,7 +212,8 @@ fn data_set<R: BufRead>(source: &mut Source<R>, line: u64, rest: &str) -> Result
     })
 }
 
-/// Reads the time histories of a file as columns. With `finite`, a NaN or infinite sample is an error that names the line of its data set.
+/// Reads the time histories of a UFF file as columns. With `finite`, a NaN or infinite sample is an error that names
+/// the line of its data set.
 pub(super) fn read(path: &Path, finite: bool) -> Result<Raw, RecordingError> {
     let mut sets = data_sets(path)?;
     let functions: Vec<i64> = sets.iter().map(|set| set.header.function.code()).collect();
@@ -264,7 +267,8 @@ pub(super) fn read(path: &Path, finite: bool) -> Result<Raw, RecordingError> {
                 samples[at]
             )));
         }
-        // A negative direction measures against the axis, so the sign is reversed.
+        // A negative direction in a UFF header means that the sensor measures against the axis, so the samples change
+        // their sign.
         if (-3..0).contains(&set.header.response.direction) {
             samples.iter_mut().for_each(|sample| *sample = -*sample);
         }
@@ -282,8 +286,8 @@ pub(super) fn read(path: &Path, finite: bool) -> Result<Raw, RecordingError> {
     })
 }
 
-/// Sample rate, Hz, from a time step that the format rounds to six digits: the integer rate with the same rounded step, if there is one,
-/// else 1/step.
+/// Sample rate, Hz, from a time step that UFF rounds to six digits: the integer rate with the same rounded step, if
+/// there is one, else 1/step.
 fn rate_hz(step_s: f64) -> f64 {
     let whole = (1.0 / step_s).round();
     let six_digits = |step: f64| exponential(step, 5, 0);
@@ -295,7 +299,7 @@ fn rate_hz(step_s: f64) -> f64 {
 }
 
 impl DataSet {
-    /// True for a time history: function type 1, or type 0 (general) with time as abscissa.
+    /// True if the data set is a time history: function type 1, or type 0 (general) with time as abscissa.
     fn is_over_time(&self) -> bool {
         match self.header.function {
             Function::Time => true,
@@ -304,7 +308,8 @@ impl DataSet {
         }
     }
 
-    /// Standard channel name, such as `az` for an acceleration along ±z; else the entity name, else the first line of text.
+    /// Name of the channel from the header of its data set: a standard name, such as `az` for an acceleration along ±z;
+    /// else the entity name, else the first line of text.
     fn name(&self) -> String {
         let header = &self.header;
         let axis = match header.response.direction.abs() {
@@ -328,7 +333,8 @@ impl DataSet {
         }
         let entity = &header.response.entity;
         let words = &header.words[0];
-        // An entity name of ten characters may be truncated; the first line of text then holds the full name.
+        // UFF limits entity names to ten characters, so one of ten may be truncated; the first line of text then holds
+        // the full name.
         if entity.is_empty() || (entity.len() == 10 && words.starts_with(entity.as_str())) {
             if words.is_empty() {
                 "channel".into()

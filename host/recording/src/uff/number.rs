@@ -22,7 +22,7 @@ pub(super) fn append(line: &[u8], values: &mut Vec<f64>) -> Result<(), String> {
                 .iter()
                 .position(|&byte| byte.is_ascii_whitespace() || byte == b',')
                 .unwrap_or(rest.len());
-            // At most 40 bytes: a damaged file may have a long line without blanks.
+            // The message shows at most 40 bytes, because a damaged file may have a long line without blanks.
             format!(
                 "\"{}\"; a number is needed",
                 String::from_utf8_lossy(&rest[..end.min(40)])
@@ -42,7 +42,8 @@ fn number(text: &[u8]) -> Option<(f64, usize)> {
         [] => return Some((value, length)),
         [first, ..] if first.is_ascii_whitespace() || *first == b',' => return Some((value, length)),
         [b'D' | b'd' | b'Q' | b'q', after @ ..] if !has_exponent => (after, 1),
-        // A sign and three digits, without a digit or point after them, are an exponent without its letter.
+        // A sign and exactly three digits after a number, without a digit or decimal point after them, are an exponent
+        // without its letter.
         [b'+' | b'-', ..] if !has_exponent && is_bare_exponent(rest) => (rest, 0),
         [b'+' | b'-', ..] => return Some((value, length)),
         _ => return None,
@@ -63,7 +64,7 @@ fn is_bare_exponent(text: &[u8]) -> bool {
     exponent_length(text) == 4 && text.get(4) != Some(&b'.')
 }
 
-/// Length in bytes of an optional sign and the digits after it; 0 if there are no digits.
+/// Length in bytes of the digits of an exponent with their optional sign; 0 if there are no digits.
 fn exponent_length(text: &[u8]) -> usize {
     let sign = usize::from(matches!(text, [b'+' | b'-', ..]));
     let digits = text[sign..]

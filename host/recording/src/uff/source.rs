@@ -3,17 +3,17 @@
 use std::collections::VecDeque;
 use std::io::BufRead;
 
-/// One line of the file, without its line end.
+/// One line of a UFF file, without its line end.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Line {
-    /// Line number, from 1; line feeds within binary data count, too.
+    /// Number of the line in the file, from 1; line feeds within binary data count, too.
     pub(super) number: u64,
     /// Content of the line.
     pub(super) bytes: Vec<u8>,
 }
 
 impl Line {
-    /// Content as text; bytes that are not UTF-8 become replacement characters.
+    /// Content of the line as text; bytes that are not UTF-8 become replacement characters.
     pub(super) fn text(&self) -> String {
         String::from_utf8_lossy(&self.bytes).into_owned()
     }
@@ -23,12 +23,13 @@ impl Line {
         self.bytes.iter().all(u8::is_ascii_whitespace)
     }
 
-    /// True for the delimiter that begins and ends a data set: `-1` alone.
+    /// True if the line is the delimiter that begins and ends a UFF data set: `-1` alone.
     pub(super) fn is_delimiter(&self) -> bool {
         self.bytes.trim_ascii() == b"-1"
     }
 
-    /// Data set number and the text after it; `None` if the line is not the first line of a data set.
+    /// Number of the UFF data set that the line begins, and the text after the number; `None` if the line has no such
+    /// form.
     pub(super) fn number_of_set(&self) -> Option<(u32, String)> {
         let text = self.text();
         let text = text.trim();
@@ -43,24 +44,24 @@ impl Line {
     }
 }
 
-/// Error of reading lines or bytes.
+/// Error of reading lines or bytes from a UFF file.
 #[derive(Debug)]
 pub(super) enum SourceError {
     /// Error of the operating system.
     Io(std::io::Error),
     /// The file ends before all required bytes are read.
     Ends {
-        /// Number of bytes that were read.
+        /// Number of bytes that were read before the file ended.
         found: usize,
     },
 }
 
-/// Reader of lines and bytes with look-ahead of lines.
+/// Reader of the lines and the binary data of a UFF file, which can look at lines ahead.
 pub(super) struct Source<R> {
     reader: R,
-    /// Lines that were peeked at but not yet returned.
+    /// Lines that are already read from the file for looking ahead, but not yet returned.
     ahead: VecDeque<Line>,
-    /// Number of the last line read from the file, peeked lines included.
+    /// Number of the last line read from the file, lines read ahead included.
     line: u64,
 }
 
@@ -73,12 +74,12 @@ impl<R: BufRead> Source<R> {
         }
     }
 
-    /// Number of the last line that was returned.
+    /// Number of the last line that the reader returned, from 1.
     pub(super) fn line(&self) -> u64 {
         self.ahead.front().map_or(self.line, |line| line.number - 1)
     }
 
-    /// Returns the next line; `None` at the end of the file.
+    /// Returns the next line of the UFF file; `None` at the end of the file.
     pub(super) fn next(&mut self) -> Result<Option<Line>, SourceError> {
         match self.ahead.pop_front() {
             Some(line) => Ok(Some(line)),
@@ -86,7 +87,7 @@ impl<R: BufRead> Source<R> {
         }
     }
 
-    /// Peeks at the non-blank line after `before` other non-blank lines, without consuming any line.
+    /// Looks ahead at the next non-blank line after `before` other non-blank lines, without consuming any line.
     pub(super) fn peek_filled(&mut self, before: usize) -> Result<Option<&Line>, SourceError> {
         let mut filled = self.ahead.iter().filter(|line| !line.is_blank()).count();
         while filled <= before {
@@ -99,7 +100,7 @@ impl<R: BufRead> Source<R> {
         Ok(self.ahead.iter().filter(|line| !line.is_blank()).nth(before))
     }
 
-    /// Reads the next line from the file.
+    /// Reads one more line from the UFF file into memory; `None` at its end.
     fn fetch(&mut self) -> Result<Option<Line>, SourceError> {
         let mut bytes = Vec::new();
         let read = self
@@ -122,7 +123,7 @@ impl<R: BufRead> Source<R> {
         }))
     }
 
-    /// Reads bytes until `buffer` is full. No peeked line may be pending.
+    /// Reads bytes until `buffer` is full. No line that was looked at ahead may be pending.
     pub(super) fn fill(&mut self, buffer: &mut [u8]) -> Result<(), SourceError> {
         debug_assert!(self.ahead.is_empty());
         let mut found = 0;

@@ -4,7 +4,7 @@ use super::header::Axis;
 use super::number;
 use crate::{Quantity, Unit, UnknownUnit};
 
-/// Units of a file (data set 164): value in SI units = value in the file / factor.
+/// Units of a UFF file (data set 164), as conversion factors: value in SI units = value in the file / factor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FileUnits {
     /// Units of length per metre.
@@ -73,7 +73,7 @@ const POUNDS: f64 = 1.0 / 4.448_221_615_260_5;
 /// Kilograms-force per newton (1 kgf = 9.806 65 N exactly).
 const KILOGRAMS: f64 = 1.0 / 9.806_65;
 
-/// Quantity of a specific data type; `None` for types that are not used here.
+/// Quantity that a UFF specific data type stands for; `None` for types that are not supported.
 fn quantity(kind: i64) -> Option<Quantity> {
     Some(match kind {
         8 => Quantity::Displacement,
@@ -86,7 +86,7 @@ fn quantity(kind: i64) -> Option<Quantity> {
     })
 }
 
-/// Specific data type of a quantity, as it is written.
+/// UFF specific data type that is written for a quantity.
 pub(super) fn kind(quantity: Quantity) -> i64 {
     match quantity {
         Quantity::Displacement => 8,
@@ -100,12 +100,13 @@ pub(super) fn kind(quantity: Quantity) -> i64 {
     }
 }
 
-/// Unit of an axis; `None` if the file does not state it.
+/// Unit of an axis of a UFF function; `None` if the file does not state it.
 ///
 /// The unit label of the axis takes precedence over the units of the file.
 ///
 /// # Errors
-/// The label is unknown although the specific data type is a supported quantity, or it contradicts the specific data type.
+/// The label is unknown although the specific data type is a supported quantity, or it contradicts the specific data
+/// type.
 pub fn unit(axis: &Axis, file: FileUnits) -> Result<Option<Unit>, String> {
     let stated = quantity(axis.kind);
     if axis.unit.is_empty() {
@@ -123,12 +124,14 @@ pub fn unit(axis: &Axis, file: FileUnits) -> Result<Option<Unit>, String> {
         }
         (Ok(unit), _) => Ok(Some(unit)),
         (Err(error), Some(_)) => Err(error.to_string()),
-        // Unknown label of a quantity that is not used here.
+        // The unit label is unknown, but the specific data type is not a supported quantity either, so the axis has no
+        // unit.
         (Err(_), None) => Ok(None),
     }
 }
 
-/// Conversion factor to SI from the units of the file and the exponents of the axis.
+/// Factor that converts an axis of quantity `quantity` to SI, from the units of the UFF file and the exponents of
+/// length and force of the axis.
 fn factor(axis: &Axis, quantity: Quantity, file: FileUnits) -> f64 {
     let usual = match quantity {
         Quantity::Displacement | Quantity::Velocity | Quantity::Acceleration => [1, 0],
@@ -136,7 +139,7 @@ fn factor(axis: &Axis, quantity: Quantity, file: FileUnits) -> f64 {
         Quantity::Pressure => [-2, 1],
         _ => [0, 0],
     };
-    // Many writers leave both exponents at 0; then those of the quantity apply.
+    // Many writers leave the exponents of length and force at 0; then the exponents of the quantity apply.
     let [length, force] = if axis.exponents == [0, 0] {
         usual
     } else {
@@ -146,7 +149,7 @@ fn factor(axis: &Axis, quantity: Quantity, file: FileUnits) -> f64 {
     1.0 / (power(file.length, length) * power(file.force, force))
 }
 
-/// Parses a unit label, also in capitals and with `sec` for s.
+/// Parses the unit label of a UFF axis, also in capitals and with `sec` for s.
 fn label(text: &str) -> Result<Unit, UnknownUnit> {
     let exact = text.parse::<Unit>();
     if exact.is_ok() {

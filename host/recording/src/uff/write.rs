@@ -1,4 +1,4 @@
-//! Writer of data sets 58, as text or binary, in double precision.
+//! Writer of UFF data sets 58, as text or binary, in double precision.
 
 use std::io::{self, Write};
 
@@ -36,7 +36,7 @@ impl Values<'_> {
     }
 }
 
-/// Writes data set 164: the data sets after it are in SI units.
+/// Writes UFF data set 164, which states that the file is in SI units.
 pub fn write_units(out: &mut dyn Write) -> io::Result<()> {
     writeln!(out, "    -1\n   164")?;
     writeln!(out, "{:10}{:<20}{:10}", 1, "SI: Meter (newton)", 2)?;
@@ -44,7 +44,7 @@ pub fn write_units(out: &mut dyn Write) -> io::Result<()> {
     writeln!(out, "{one}{one}{one}\n{}\n    -1", exponential(273.15, 17, 25))
 }
 
-/// Header for a channel of a recording.
+/// UFF header for one channel of a recording.
 pub(super) fn header_of(recording: &Recording, channel: &Channel) -> Header {
     let direction = match channel.name.as_bytes() {
         [.., b'x'] => 1,
@@ -52,7 +52,7 @@ pub(super) fn header_of(recording: &Recording, channel: &Channel) -> Header {
         [.., b'z'] => 3,
         _ => 0,
     };
-    // Only standard channel names define a direction: the x in "matrix" does not.
+    // Only a standard channel name, such as `ax`, defines a direction: the x at the end of "matrix" does not.
     let is_by_convention = Quantity::of_name(&channel.name) == Some(channel.quantity);
     let sensor = recording
         .sidecar
@@ -86,7 +86,7 @@ pub(super) fn header_of(recording: &Recording, channel: &Channel) -> Header {
     }
 }
 
-/// Axis of a quantity, in SI units.
+/// Header entries of an axis that holds a quantity in its SI unit.
 pub fn axis_of(quantity: Quantity) -> Axis {
     Axis {
         kind: kind(quantity),
@@ -103,7 +103,7 @@ pub fn axis_of(quantity: Quantity) -> Axis {
     }
 }
 
-/// Writes a data set 58; `uneven` is the abscissa if the header has no even spacing.
+/// Writes a UFF data set 58; `uneven` are the abscissa values if the header states no even spacing.
 pub fn write_set(
     out: &mut dyn Write,
     header: &Header,
@@ -149,7 +149,8 @@ fn write_header(out: &mut dyn Write, header: &Header, count: usize) -> io::Resul
         "\n{:10}{count:10}{:10}{}{}{}",
         if is_complex { 6 } else { 4 },
         u8::from(header.even.is_some()),
-        // The field width of 13 columns has space for one digit more than the standard format E13.5.
+        // The field of 13 columns has space for one digit more than the standard format E13.5 uses, so that the first
+        // abscissa value and the step lose less.
         exponential(first, 6, 13),
         exponential(step, 6, 13),
         exponential(0.0, 6, 13),
@@ -182,7 +183,8 @@ fn write_text(out: &mut dyn Write, uneven: Option<&[f64]>, values: Values<'_>) -
             exponential(values[index].re, 12, 20) + &exponential(values[index].im, 12, 20)
         }
     };
-    // Values per line follow the standard formats 4E20.12; 2(E13.5,E20.12); E13.5,2E20.12.
+    // The number of values per line follows the formats of the UFF standard: 4E20.12 (real), 2(E13.5,E20.12) (real with
+    // abscissa), E13.5,2E20.12 (complex with abscissa).
     let per_line = match (values, uneven) {
         (Values::Real(_), None) => 4,
         (Values::Real(_), Some(_)) | (Values::Complex(_), None) => 2,
@@ -200,7 +202,7 @@ fn write_text(out: &mut dyn Write, uneven: Option<&[f64]>, values: Values<'_>) -
     Ok(())
 }
 
-/// Writes the data as little-endian doubles.
+/// Writes the values of a UFF data set as little-endian doubles.
 fn write_binary(out: &mut dyn Write, uneven: Option<&[f64]>, values: Values<'_>) -> io::Result<()> {
     for index in 0..values.len() {
         if let Some(abscissa) = uneven {
@@ -237,7 +239,7 @@ fn none(text: &str) -> &str {
     if text.is_empty() { "NONE" } else { text }
 }
 
-/// Truncates to `length` characters; control characters become blanks.
+/// Truncates a text of a UFF header to `length` characters; control characters become blanks.
 fn cut(text: &str, length: usize) -> String {
     text.chars()
         .map(|letter| if letter.is_control() { ' ' } else { letter })
