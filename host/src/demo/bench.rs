@@ -41,7 +41,7 @@ pub struct Bench {
     serial_port: String,
     /// Sequence number of the first block of the next simulated cut; the numbering continues from cut to cut.
     next_sequence: u32,
-    /// Seed of the sensor noise of the next cut.
+    /// Seed of the simulated sensor noise of the next cut.
     seed: u64,
 }
 

@@ -93,7 +93,7 @@ fn kind(trial: &Trial) -> String {
 fn chapter(story: &Story) -> Result<Markup, PictureError> {
     let trials: Vec<&Trial> = std::iter::once(&story.first).chain(&story.advised).collect();
     let axis = dominant_axis(&story.first);
-    // Both cuts share one scale, so that their vibrations can be compared.
+    // The first and the advised cut share one scale, so that their vibrations can be compared.
     let scale = CommonScale {
         axis,
         signal: around_zero(

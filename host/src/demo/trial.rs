@@ -31,7 +31,7 @@ pub struct Trial {
     pub trace: Trace,
     /// Reports of the device, one for each block; times are counted from the start of the cut.
     pub reports: Vec<Report>,
-    /// Power spectra of the structure band.
+    /// Power spectra of the acceleration in the structure band, as the device sent them.
     pub spectra: Vec<Spectrum>,
     /// Stroboscopic samples of the structure band, one per tooth passing, each with the number of its block.
     pub strobes: Vec<(u32, Strobe)>,
@@ -96,7 +96,7 @@ impl Trial {
             .find(|spectrum| spectrum.sequence <= last)
     }
 
-    /// Appends a chunk of a spectrum; chunks arrive in order.
+    /// Appends a chunk of a power spectrum from the device; chunks arrive in order.
     pub(super) fn take_spectrum(&mut self, chunk: &SpectrumChunk) {
         if chunk.band != Band::Structure {
             return;

@@ -85,7 +85,7 @@ impl Client {
         self.port.name()
     }
 
-    /// Number of frames from the device that were lost.
+    /// Number of frames of the device that did not arrive, from the gaps in their sequence numbers.
     pub fn lost_frames(&self) -> u32 {
         self.lost_frames
     }
@@ -274,7 +274,7 @@ impl Client {
         }
     }
 
-    /// Reads the line for at most `timeout`, up to the first frame that concerns the request with this number.
+    /// Reads the serial line for at most `timeout`, up to the first frame that concerns the request with this number.
     fn receive(&mut self, timeout: Duration, number: Option<u16>) -> Result<Option<ReplyFrame>, DeviceError> {
         // A buffer avoids one system call per byte; all bytes in it are decoded before the reply is returned.
         let mut bytes = [0; 256];
@@ -298,7 +298,7 @@ impl Client {
         Ok(answer)
     }
 
-    /// Queues an event; returns a response that concerns the request with this number.
+    /// Queues an event of the device; returns a response that concerns the request with this number.
     fn sort(&mut self, sequence: u16, response: Response, number: Option<u16>) -> Option<ReplyFrame> {
         let order = self.responses.check(sequence);
         if let Err(FrameError::OutOfOrder { expected, found }) = order {
@@ -357,7 +357,7 @@ impl Client {
 /// Received frame that concerns a waiting request.
 enum ReplyFrame {
     Reply(Reply),
-    /// A frame that cannot be decoded.
+    /// The received frame cannot be decoded.
     Unreadable(FrameError),
     /// The device asks for the request again.
     Again(FrameError),

@@ -70,7 +70,7 @@ pub enum DeviceError {
         request: &'static str,
         /// Total waiting time.
         waited: Duration,
-        /// Number of transmissions of the request.
+        /// Number of times that the host sent the request.
         attempts: u32,
     },
     /// The received frames are damaged or out of order, also after repeated requests.
@@ -82,7 +82,7 @@ pub enum DeviceError {
         port: String,
         /// Name of the request.
         request: &'static str,
-        /// Number of transmissions of the request.
+        /// Number of times that the host sent the request.
         attempts: u32,
         /// Fault of the last frame.
         error: FrameError,

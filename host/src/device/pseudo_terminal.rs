@@ -24,7 +24,8 @@ impl PseudoTerminal {
     pub fn new() -> Result<Self, DeviceError> {
         let failed = |cause| DeviceError::PseudoTerminal { cause };
         let (device_end, host_end) = TTYPort::pair().map_err(failed)?;
-        // The cloned handles close in child processes; inherited originals would keep the line open there.
+        // The cloned handles of the pseudo-terminal close in child processes; inherited originals would keep the line
+        // open there.
         let device_end = device_end.try_clone_native().map_err(failed)?;
         let host_end = host_end.try_clone_native().map_err(failed)?;
         let path = host_end.name().unwrap_or_default();

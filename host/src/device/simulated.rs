@@ -25,9 +25,9 @@ use crate::simulate::SensedCut;
 /// Time scale of the virtual spindle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pace {
-    /// Samples are produced in real time.
+    /// The virtual spindle produces samples in real time.
     RealTime,
-    /// Samples are produced as fast as the host reads the events of the device.
+    /// The virtual spindle produces samples as fast as the host reads the events of the device.
     AsFastAsPossible,
 }
 
@@ -36,7 +36,7 @@ pub enum Pace {
 pub struct Setup<'a> {
     /// State file that keeps the flash memory of the simulated device; `None` keeps the flash only in memory.
     pub state: Option<&'a Path>,
-    /// Number of teeth of the tool.
+    /// Number of teeth of the tool on the virtual spindle.
     pub teeth: u8,
     /// Time scale of the virtual spindle.
     pub pace: Pace,
@@ -88,7 +88,7 @@ impl Drop for SimulatedDevice {
     fn drop(&mut self) {
         self.stop.store(true, Ordering::Relaxed);
         if let Some(thread) = self.thread.take() {
-            // The panic hook has already reported a panic of the thread.
+            // The panic hook has already reported a panic of the device's thread.
             let _ = thread.join();
         }
     }
@@ -149,7 +149,8 @@ struct Machine {
     stop: Arc<AtomicBool>,
 }
 
-/// Clock of the device: the time of its samples if they are faster than real time, else the clock of this computer.
+/// Clock of the simulated device: the time of its samples if they are faster than real time, else the clock of this
+/// computer.
 #[derive(Clone)]
 struct SharedClock(Arc<AtomicU64>);
 
@@ -159,7 +160,7 @@ impl Clock for SharedClock {
     }
 }
 
-/// Longest wait for bytes while the spindle stands still: a choice.
+/// Longest wait of the simulated device for bytes of the host while the virtual spindle stands still: a choice.
 const IDLE: Duration = Duration::from_millis(5);
 
 impl Machine {
@@ -190,7 +191,7 @@ impl Machine {
             pending.extend_from_slice(bytes.get(..count).unwrap_or_default());
             let taken = device.receive(&pending);
             pending.drain(..taken);
-            // The spindle waits while the line is full, so that no message is dropped.
+            // The virtual spindle waits while the serial line is full, so that no message of the device is dropped.
             while !device.outgoing().is_empty() && !self.stop.load(Ordering::Relaxed) {
                 match self.terminal.send(device.outgoing(), IDLE) {
                     Ok(count) => device.sent(count),

@@ -14,7 +14,7 @@ const RESTARTS: u32 = 3;
 /// Result of an upload.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Uploaded {
-    /// Identity and memory of the device after the upload.
+    /// Identity and memory slots of the device after the upload of the table.
     pub info: Info,
     /// Offset of the first byte of the lobe table that was sent; greater than 0 if an interrupted upload was resumed.
     pub resumed_at: u32,

@@ -16,7 +16,7 @@ const CLOCK_ERROR: f64 = 0.01;
 /// Time in air before and after each cut, s: a choice that lets the vibration of one cut decay before the next.
 const AIR_SECONDS: f64 = 1.0;
 
-/// Milling robot with a tool and a block of acetal.
+/// Virtual cell: a milling robot with a tool and a block of acetal.
 #[derive(Clone, Debug)]
 pub struct VirtualCell {
     case: Case,

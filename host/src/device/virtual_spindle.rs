@@ -75,7 +75,7 @@ impl VirtualSpindle {
     }
 }
 
-/// Period of the blocks, ns: the mean over all blocks, since time stamps jitter.
+/// Period of the sample blocks, ns: the mean over all blocks, since time stamps jitter.
 fn block_period(blocks: &[Block]) -> u64 {
     match (blocks.first(), blocks.last()) {
         (Some(first), Some(last)) if blocks.len() > 1 => {

@@ -9,7 +9,7 @@ use super::material_table::MaterialRange;
 pub struct Immersion {
     /// Angle at which a tooth enters, degrees, clockwise from the normal to the feed.
     pub start_deg: f64,
-    /// Angle at which a tooth leaves, degrees.
+    /// Angle at which a tooth leaves the cut, degrees, clockwise from the normal to the feed.
     pub exit_deg: f64,
 }
 
@@ -37,7 +37,7 @@ impl Immersion {
     }
 }
 
-/// Engaged angle arccos(1 − 2a_e/D), degrees.
+/// Angle over which a tooth is engaged, arccos(1 − 2a_e/D), degrees, with radial depth a_e and diameter D.
 fn engaged_deg(radial_depth_mm: f64, diameter_mm: f64) -> f64 {
     (1.0 - 2.0 * radial_depth_mm / diameter_mm)
         .clamp(-1.0, 1.0)
@@ -55,9 +55,9 @@ pub enum MaterialAnswer {
     Given {
         /// Cutting coefficients, MPa.
         cutting_mpa: [f64; 3],
-        /// Standard deviation of the tangential coefficient, MPa.
+        /// Standard deviation of the tangential specific cutting coefficient, MPa; `None` if unknown.
         ktc_std_mpa: Option<f64>,
-        /// The radial coefficient is assumed and not given.
+        /// True if the radial cutting coefficient is an assumed share of the tangential one and not given by the user.
         radial_is_assumed: bool,
     },
 }
@@ -81,7 +81,7 @@ pub struct Answers {
     pub immersion: Immersion,
     /// Feed per tooth, mm.
     pub feed_per_tooth_mm: f64,
-    /// Lowest and highest spindle speed, rev/min.
+    /// Lowest and highest speed of the spindle, rev/min.
     pub rpm: (f64, f64),
     /// Power of the spindle, W.
     pub power_w: Option<f64>,

@@ -46,7 +46,7 @@ pub enum FolderError {
 /// A file with the time of its last change.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct DatedFile {
-    /// Path, with the folder of the machine as the user gave it.
+    /// Path of the file; it begins with the folder of the machine as the user gave it.
     pub path: PathBuf,
     /// Time of the last change.
     pub changed: SystemTime,
@@ -55,7 +55,7 @@ pub struct DatedFile {
 /// Files in the folder of one machine.
 #[derive(Clone, Debug)]
 pub struct MachineFolder {
-    /// The folder as the user gave it.
+    /// Path of the machine's folder as the user gave it.
     pub path: PathBuf,
     /// `case.toml`; `None` if there is none.
     pub case: Option<(DatedFile, Case)>,

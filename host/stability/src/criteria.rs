@@ -23,7 +23,7 @@ pub(crate) const MESH_ROOM: f64 = 10.0;
 /// the stated errors hold.
 pub(crate) const STEP_ROOM: f64 = 3.0;
 
-/// Relative rounding error of a multiplier from the map of a period of some hundred steps. Unfounded: an estimate.
+/// Relative rounding error of a multiplier from the map of a period of some hundred time steps. Unfounded: an estimate.
 pub(crate) const STEP_ROUNDING: f64 = 1e-9;
 
 // Multipliers of a period map.
@@ -88,8 +88,8 @@ pub(crate) const WOUND: f64 = 0.25;
 /// search; the sequence is unfounded.
 pub(crate) const MARGINS: [f64; 5] = [2.8, 0.3, 0.05, 0.01, 2e-3];
 
-/// Relative distances that follow [`MARGINS`] while the radius lies outside the unit circle and the largest multiplier
-/// found inside, so that the verdict is open. Unfounded.
+/// Relative distances beyond the largest multiplier found that follow [`MARGINS`]. They are used while the radius lies
+/// outside the unit circle and that multiplier inside, so that the verdict is open. Unfounded.
 pub(crate) const FINE_MARGINS: [f64; 2] = [4e-4, 1e-4];
 
 /// Convergence of a winding number, which is the mean of an argument over points on a circle. It counts as converged if
@@ -237,8 +237,8 @@ pub(crate) const HARMONICS_SETTLED_LIMIT: f64 = 1e-4;
 /// change.
 pub(crate) const HARMONICS_SETTLED_MULTIPLIER: f64 = 1e-6;
 
-/// Relative difference in depth up to which a limit with twice the harmonics is the same limit as one with the single
-/// number. Unfounded.
+/// Relative difference in depth up to which a limit with twice the number of harmonics counts as the same limit as one
+/// with the single number. Unfounded.
 pub(crate) const SAME_WITH_TWICE_HARMONICS: f64 = 0.1;
 
 /// Distance from an end of the frequency range, relative to the frequency of that end, at which the imaginary parts of
@@ -276,8 +276,8 @@ pub(crate) const ROOT_LINES: [f64; 14] = [
 /// away from the line. Unfounded.
 pub(crate) const LOCUS_REACH: f64 = 0.05;
 
-/// Factor on [`LOCUS_BEND`] for the zeroth-order approximation. A tenth keeps the phase between two frequencies
-/// monotone, except where lobes touch. Unfounded.
+/// Factor on [`LOCUS_BEND`] for the zeroth-order approximation. With a tenth the phase mismatch ωτ − π + 2 arg(1/λ)
+/// changes monotonically between two frequency samples, except where lobes touch. Unfounded.
 pub(crate) const ZOA_BEND: f64 = 0.1;
 
 // Forced orbits.
@@ -310,8 +310,8 @@ pub(crate) const MULTIPLIER_MOVE_MAX: f64 = 0.12;
 /// Unfounded.
 pub(crate) const EQUIVALENT_FOLLOWED: f64 = 0.5;
 
-/// Least number of steps in depth, in cases with friction, backlash or hysteresis, at which the number of multipliers
-/// outside the unit circle is compared. Unfounded.
+/// Least number of steps in depth at which, in cases with friction, backlash or hysteresis, the number of multipliers
+/// outside the unit circle is counted. A change between two steps is a stability limit. Unfounded.
 pub(crate) const EQUIVALENT_SAMPLES_MIN: usize = 32;
 
 /// Damping constant that stands for sticking friction, in units of k/ω with the static stiffness k of the axis and the
@@ -324,8 +324,8 @@ pub(crate) const STICKING_DAMPER: f64 = 20.0;
 /// hysteresis loops close.
 pub(crate) const DISTURBANCE: f64 = 0.02;
 
-/// Number of periods of the orbit for which the force under a disturbance of another frequency is computed; the second
-/// half is averaged. Unfounded.
+/// Number of periods of the orbit over which the force of friction, backlash or hysteresis is computed for an orbit
+/// with a disturbance of another frequency; the second half is averaged. Unfounded.
 pub(crate) const DISTURBANCE_PERIODS: usize = 40;
 
 // Lobe tables.

@@ -27,7 +27,7 @@ pub enum StabilityError {
     Extension {
         /// The case file.
         path: PathBuf,
-        /// Reason from the model of the extension.
+        /// Reason, from the model of the extension's effect.
         cause: Box<ModelError>,
     },
     /// The method does not cover a feature of the case.
@@ -135,13 +135,13 @@ pub enum StabilityError {
     },
 }
 
-/// Text for equations over a period that cannot be solved.
+/// Text for the error that the equations over a period have no finite solution.
 pub(crate) const NO_SOLUTION: &str = "the equations of the period have no finite solution";
 
-/// Text for receptances that are infinite or not a number.
+/// Text for the error that receptances are infinite or not a number.
 pub(crate) const NOT_FINITE: &str = "receptances are not finite";
 
-/// Text for a dominant multiplier that no method finds.
+/// Text for the error that no method finds the dominant multiplier.
 pub(crate) const NO_DOMINANT: &str =
     "motions grow beyond the range of numbers, or multipliers of nearly one size are too many to tell apart";
 

@@ -18,21 +18,21 @@ const SAMPLES: usize = 60;
 pub struct Calls {
     /// Number of trial cuts.
     pub cuts: usize,
-    /// Number of wrong predictions: `missed_chatter` plus `false_alarms`.
+    /// Number of trial cuts with a wrong prediction: `missed_chatter` plus `false_alarms`.
     pub wrong: usize,
-    /// Number of cuts predicted stable that chattered.
+    /// Number of trial cuts that were predicted stable and chattered.
     pub missed_chatter: usize,
-    /// Number of cuts predicted unstable that were stable.
+    /// Number of trial cuts that were predicted unstable and were stable.
     pub false_alarms: usize,
     /// Number of trial cuts with marginal outcome, or at depths where two stable orbits exist; they do not count as
     /// wrong.
     pub undecided: usize,
 }
 
-/// Columns of a file of trial cuts.
+/// Head of the columns of a CSV file of trial cuts.
 const HEADER: [&str; 3] = ["rpm [rev/min]", "depth [mm]", "outcome"];
 
-/// Trial cuts as the text of a CSV file without chatter frequencies; [`read`] reads it.
+/// Text of a CSV file of trial cuts, without chatter frequencies; [`read`] reads it.
 pub fn text(cuts: &[TrialCut]) -> String {
     let lines = cuts.iter().map(|cut| {
         let outcome = match cut.outcome {
@@ -75,9 +75,9 @@ impl Calls {
 pub enum Call {
     /// Prediction and outcome agree.
     Right,
-    /// The cut was predicted stable, and chattered.
+    /// The trial cut was predicted stable, and chattered.
     MissedChatter,
-    /// The cut was predicted unstable, and was stable.
+    /// The trial cut was predicted unstable, and was stable.
     FalseAlarm,
     /// The outcome of the cut is marginal, or two stable orbits exist at its depth.
     Undecided,
@@ -98,7 +98,8 @@ pub fn calls<M: Method + ?Sized>(method: &M, cuts: &[TrialCut]) -> Result<Vec<Ca
     let mut speeds_rpm: Vec<f64> = cuts.iter().map(|cut| cut.rpm).collect();
     speeds_rpm.sort_by(f64::total_cmp);
     speeds_rpm.dedup();
-    // Each speed is searched as deep as its own cuts: a line at a low speed costs the more the deeper it goes.
+    // At each speed limits are computed only to the depth of its deepest trial cut: at low speeds computing time grows
+    // with the depth.
     let deepest_mm = |rpm: f64| {
         let depths = cuts.iter().filter(|cut| cut.rpm == rpm).map(|cut| cut.depth_mm);
         depths.fold(0.0, f64::max)

@@ -18,7 +18,7 @@ pub(crate) struct AveragedLoop<'a> {
     problem: &'a FrequencyProblem,
     /// Regenerative delay, s; `None` if the displacement one tooth period ago is neglected.
     delay_s: Option<f64>,
-    /// Averaged directional coefficients K_tc α₀, Pa.
+    /// Averaged directional coefficients K_tc α₀ of the cut, Pa.
     directional: Matrix3<f64>,
     /// Axial (z) column of β₀, the averaged coefficients of edge and feed forces, N/m; zero without axial-depth
     /// modulation.

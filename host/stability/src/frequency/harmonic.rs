@@ -28,8 +28,8 @@ pub(crate) struct HarmonicLoop<'a> {
     harmonics: usize,
     /// Fourier coefficients of the directional coefficients α and β over a tooth period, of order −(2K + 1) to 2K + 1.
     coefficients: Vec<Harmonic>,
-    /// Indices of the directions (0 feed, 1 normal, 2 axial) in which the tool moves and changes the chip thickness or
-    /// the axial depth.
+    /// Indices of the directions (0 feed, 1 normal, 2 axial) in which the tool moves and thereby changes the chip
+    /// thickness or the axial depth.
     axes: Vec<usize>,
 }
 
@@ -96,7 +96,7 @@ impl<'a> HarmonicLoop<'a> {
         2 * self.harmonics + 2
     }
 
-    /// Receptances H at all frequencies s + ipΩ, lowest first.
+    /// Receptance matrices H at all frequencies s + ipΩ of the vibration, lowest first.
     fn transfers(&self, s: Complex64) -> Option<Vec<Matrix3<Complex64>>> {
         (0..self.count())
             .map(|index| {
@@ -115,7 +115,8 @@ impl<'a> HarmonicLoop<'a> {
         &self.coefficients[p + 2 * self.harmonics + 1 - q]
     }
 
-    /// Blocks H_p α_{p−q} and H_p β_{p−q}, both restricted to `axes`.
+    /// Block matrices H_p α_{p−q} and H_p β_{p−q} over all frequencies p and q of the vibration, both restricted to
+    /// `axes`.
     fn matrices(&self, s: Complex64) -> Option<(DMatrix<Complex64>, Option<DMatrix<Complex64>>)> {
         let transfers = self.transfers(s)?;
         let (count, axes) = (self.count(), &self.axes);

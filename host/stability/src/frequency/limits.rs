@@ -1,4 +1,4 @@
-//! Crossings of the imaginary axis by roots as the depth grows, and the number of unstable roots.
+//! Crossings of the imaginary axis by roots of a loop as the axial depth grows, and the number of unstable roots.
 
 use std::f64::consts::{PI, TAU};
 
@@ -94,7 +94,7 @@ pub(crate) fn unstable_roots(open_loop: &impl OpenLoop, depth_m: f64, sigma: f64
     };
     let mut increase = argument_increase(&determinant, &grid)?;
     if open_loop.real_end().ok()?.is_none_or(|end| end.omega == 0.0) {
-        // Beyond the grid the loop gain is below one, and the determinant goes straight to 1.
+        // Beyond the grid the loop gain is below one, so that the determinant goes straight to 1 and its argument to 0.
         increase -= determinant(*grid.last()?)?.arg();
     }
     let half_turns = increase / PI;
@@ -165,7 +165,7 @@ pub(crate) fn outside_at_no_depth(open_loop: &impl OpenLoop) -> Option<i32> {
     }
 }
 
-/// Chatter frequency ω/2π of a limit, Hz.
+/// Chatter frequency ω/2π at a stability limit, Hz.
 pub(crate) fn hertz(limit: &AxisCrossing) -> Option<f64> {
     Some(limit.omega / TAU)
 }

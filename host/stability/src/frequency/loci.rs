@@ -281,8 +281,8 @@ pub(crate) fn zero(
         let (value, miss) = at(omega)?
             .into_iter()
             .min_by(|p, q| (p.0 - expected).norm().total_cmp(&(q.0 - expected).norm()))?;
-        // On an interval as narrow as rounding a residual of up to a thousand times the tolerance is accepted, since
-        // eigenvalues have rounding too.
+        // On a frequency interval as narrow as rounding a residual of up to a thousand times the tolerance is accepted,
+        // since eigenvalues have rounding errors too.
         let is_narrow = bracket.width() <= 1e-15 * high.omega;
         if miss.abs() <= tolerance || is_narrow && miss.abs() <= 1e3 * tolerance {
             return Some((omega, value));
@@ -325,8 +325,8 @@ fn argument_increase_between(
     if !(first.is_finite() && second.is_finite()) {
         return None;
     }
-    // Twenty halvings reach a millionth of the grid interval: if the argument still changes by π/5, the function has a
-    // zero on the path.
+    // Twenty halvings reach a millionth of the grid interval: if the argument of the function still changes by π/5, the
+    // function has a zero on the path.
     if first.abs().max(second.abs()) < ARGUMENT_CHANGE * PI || level == 20 {
         return Some(first + second);
     }

@@ -1,4 +1,4 @@
-//! Common interface of the loops with averaged and with periodic coefficients.
+//! Common interface of the loops with averaged and with periodic directional coefficients.
 
 use num_complex::Complex64;
 
@@ -12,9 +12,10 @@ use crate::spectrum::stability_loss::StabilityLoss;
 pub(crate) struct RealEnd {
     /// Frequency, rad/s: 0, or half the tooth-passing frequency.
     pub(crate) omega: f64,
-    /// Real loci at this end, 1/m.
+    /// Real characteristic loci at this end of the frequency range, 1/m.
     pub(crate) loci: Vec<f64>,
-    /// Kind of crossing: fold at 0, flip at half the tooth-passing frequency.
+    /// Kind of crossing of the unit circle at this end: fold at the frequency 0, flip at half the tooth-passing
+    /// frequency.
     pub(crate) kind: StabilityLoss,
 }
 
@@ -25,7 +26,8 @@ pub(crate) trait OpenLoop: Sync {
     /// Milling problem of the loop.
     fn problem(&self) -> &FrequencyProblem;
 
-    /// Factor κ/w: 1 − e^{−sτ}, or 1 if the displacement one tooth period ago is neglected.
+    /// Regeneration factor κ/w of complex depth κ and axial depth w: 1 − e^{−sτ}, or 1 if the displacement one tooth
+    /// period ago is neglected.
     fn regeneration(&self, s: Complex64) -> Complex64;
 
     /// Exponent in the frequency range of the loop that belongs to the same Floquet multiplier as s, or to its
@@ -47,10 +49,11 @@ pub(crate) trait OpenLoop: Sync {
     /// As [`eigenvalues`](Self::eigenvalues).
     fn real_end(&self) -> Result<Option<RealEnd>, Breakdown>;
 
-    /// Frequency grid from 0, rad/s, that resolves every resonance and ends where no locus reaches `floor`, 1/m.
+    /// Frequency grid from 0, rad/s, that resolves every resonance and ends where no characteristic locus reaches
+    /// `floor`, 1/m.
     ///
     /// # Errors
-    /// H is infinite.
+    /// The receptance H is infinite.
     fn grid(&self, floor: f64) -> Result<Vec<f64>, Breakdown>;
 
     /// Characteristic loci κλ/w at iω, 1/m: those of absolute value `floor` and above, and possibly smaller ones.
@@ -63,7 +66,7 @@ pub(crate) trait OpenLoop: Sync {
         let s = Complex64::new(0.0, omega);
         let regeneration = self.regeneration(s);
         let size = regeneration.norm();
-        // At integer multiples of the tooth-passing frequency the regeneration factor vanishes.
+        // At integer multiples of the tooth-passing frequency the regeneration factor 1 − e^{−sτ} vanishes.
         if size < 1e-14 {
             return Ok(Vec::new());
         }
@@ -98,7 +101,7 @@ pub(crate) fn around(resonances: &[Resonance], end: f64) -> Vec<f64> {
     ascending(grid)
 }
 
-/// Sorts a grid and merges points that differ by rounding only.
+/// Sorts a frequency grid and merges points that differ by rounding only.
 pub(crate) fn ascending(mut grid: Vec<f64>) -> Vec<f64> {
     grid.sort_by(f64::total_cmp);
     let end = grid.last().copied().unwrap_or(0.0);

@@ -12,7 +12,7 @@ use quietcut_model::case::Case;
 use quietcut_model::milling::Process;
 use quietcut_model::structure::FirstOrder;
 
-/// Receptances and cutting process, in feed, normal and axial direction.
+/// Milling problem in the frequency domain: receptances and cutting process, in feed, normal and axial direction.
 #[derive(Clone, Debug)]
 pub struct FrequencyProblem {
     receptance: Receptance,
@@ -47,7 +47,7 @@ impl FrequencyProblem {
         Self::of_model(&Problem::new(case, cubic)?)
     }
 
-    /// Builds the problem of a modelled structure.
+    /// Builds the frequency-domain problem of a modelled structure.
     ///
     /// # Errors
     /// A mode has zero or negative damping, so that its receptance is infinite or meaningless.
@@ -95,13 +95,13 @@ impl FrequencyProblem {
         }
     }
 
-    /// Number of poles of the structure with a real part above `sigma` (1/s), conjugates included; 0 for a table, whose
-    /// poles are not known.
+    /// Number of poles of the modelled structure with a real part above `sigma` (1/s), conjugates included; 0 for a
+    /// table of receptances, whose poles are not known.
     pub(crate) fn poles_right_of(&self, sigma: f64) -> i32 {
         self.poles().iter().map(|pole| i32::from(pole.re > sigma)).sum()
     }
 
-    /// Poles of the structure, 1/s; empty for a table.
+    /// Poles of the modelled structure, 1/s; empty for a table of receptances.
     pub(crate) fn poles(&self) -> &[Complex64] {
         match &self.receptance {
             Receptance::Model(_, poles) => poles,
@@ -129,7 +129,7 @@ impl FrequencyProblem {
         }
     }
 
-    /// Refuses results at frequencies outside the measured range.
+    /// Refuses a result at a frequency outside the range of the measured receptances.
     ///
     /// # Errors
     /// The vibration at that speed and depth has a frequency outside the table.
@@ -165,7 +165,7 @@ impl FrequencyProblem {
         })
     }
 
-    /// Resonances: poles of a model, peaks of a table.
+    /// Resonances: poles of a modelled structure, or peaks of a table of receptances.
     pub(crate) fn resonances(&self) -> Vec<Resonance> {
         match &self.receptance {
             Receptance::Model(_, poles) => poles
@@ -180,7 +180,7 @@ impl FrequencyProblem {
         }
     }
 
-    /// Frequencies, rad/s, that resolve H: the lines of a table; empty for a model.
+    /// Frequencies, rad/s, that resolve the receptances H: the lines of a table; empty for a modelled structure.
     pub(crate) fn lines(&self) -> Vec<f64> {
         match &self.receptance {
             Receptance::Model(..) => Vec::new(),
@@ -192,7 +192,7 @@ impl FrequencyProblem {
     }
 }
 
-/// Peaks of a table higher than [`PEAK_SHARE`] times the highest, with their half bandwidth.
+/// Peaks of a table of receptances higher than [`PEAK_SHARE`] times the highest, with their half bandwidth.
 ///
 /// Peaks due to noise are harmless and only cost computing time.
 fn peaks(interpolation: &Interpolation) -> Vec<Resonance> {

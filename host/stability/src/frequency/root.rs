@@ -13,7 +13,7 @@ use crate::error::{Breakdown, StabilityError};
 use crate::limits::point::CutStability;
 use crate::spectrum::stability_loss::StabilityLoss;
 
-/// Text for a dominant multiplier that is not found from receptances.
+/// Text for the error that the dominant multiplier is not found from receptances.
 pub(crate) const NO_ROOT: &str = "the rightmost root cannot be found from receptances; limits can";
 
 /// Rightmost root s, 1/s, with Im s ≥ 0, at an axial depth, m.
@@ -61,7 +61,8 @@ pub(crate) fn rightmost(open_loop: &impl OpenLoop, depth_m: f64) -> Result<Compl
     Err(reason)
 }
 
-/// Rightmost of the roots continued from the poles of the structure.
+/// Rightmost of the loop's roots that are continued from the poles of the structure at depth 0; `None` if there is
+/// none.
 fn from_poles(open_loop: &impl OpenLoop, depth_m: f64) -> Option<Complex64> {
     open_loop
         .problem()
@@ -73,7 +74,8 @@ fn from_poles(open_loop: &impl OpenLoop, depth_m: f64) -> Option<Complex64> {
         .map(|root| Complex64::new(root.re, root.im.abs()))
 }
 
-/// Rightmost of the roots predicted from loci along a line Re s = `sigma`; `None` if there is none.
+/// Rightmost of the loop's roots that are predicted from characteristic loci along a line Re s = `sigma`; `None` if
+/// there is none.
 fn from_line(
     open_loop: &impl OpenLoop,
     depth_m: f64,
@@ -110,13 +112,13 @@ fn from_line(
 
 /// True if the loop has no root to the right of the given one, that is with a larger real part.
 fn is_rightmost(open_loop: &impl OpenLoop, depth_m: f64, root: Complex64, decay: f64) -> bool {
-    // The roots are counted to the right of a line Re s = const slightly right of the given root.
+    // The roots are counted to the right of a line Re s = const that lies slightly right of the given root.
     let sigma = root.re + 1e-3 * (root.re.abs() + 1e-3 * decay);
     if open_loop.problem().band_hz().is_none() {
         return unstable_roots(open_loop, depth_m, sigma) == Some(0);
     }
-    // The poles of a table away from the axis are not known; only the number of roots right of the axis can be
-    // verified.
+    // The poles of a table of receptances away from the imaginary axis are not known; only whether a root lies right of
+    // that axis can be verified.
     unstable_roots(open_loop, depth_m, 0.0).is_some_and(|unstable| (unstable > 0) == (root.re > 0.0))
 }
 
@@ -138,7 +140,8 @@ fn loci_at(open_loop: &impl OpenLoop, s: Complex64, floor: f64) -> Result<Vec<Co
 /// Root s of a loop near a guess, by secant steps on w − 1/λ with the axial depth w and the characteristic locus λ(s)
 /// for which the difference is smallest. `None` if the steps do not converge.
 pub(crate) fn polish(open_loop: &impl OpenLoop, depth_m: f64, guess: Complex64) -> Option<Complex64> {
-    // Depth, m, that sets the floor of loci at depth 0: roots are then poles, where a locus is infinite.
+    // Axial depth, m, that sets the floor of loci in place of depth 0, where the roots are poles and a locus is
+    // infinite.
     const SHALLOW_M: f64 = 1e-3;
     let floor = 0.3 / depth_m.max(SHALLOW_M);
     let miss = |s: Complex64| {
@@ -168,7 +171,7 @@ pub(crate) fn polish(open_loop: &impl OpenLoop, depth_m: f64, guess: Complex64) 
         }
         miss_now = match miss(s) {
             Some(miss) => miss,
-            // A locus is infinite at a pole of the loop, which is the root at depth 0.
+            // A characteristic locus is infinite at a pole of the loop, which is the root at depth 0.
             None => return (depth_m == 0.0).then_some(s),
         };
         if step.norm() < 1e-13 * scale {
@@ -217,7 +220,7 @@ pub(crate) fn averaged_point(
     ))
 }
 
-/// Stability of a cut from its dominant multiplier and the error of that.
+/// Stability of a cut from its dominant multiplier and the error of that multiplier.
 pub(crate) fn point_of(
     rpm: f64,
     depth_mm: f64,

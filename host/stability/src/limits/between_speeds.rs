@@ -110,7 +110,7 @@ impl Chart {
         })
     }
 
-    /// All lines, requested and added, by ascending speed.
+    /// All lines of the chart, requested and added, by ascending speed.
     pub fn lines(&self) -> Vec<&SpeedLine> {
         let mut lines: Vec<&SpeedLine> = self.speeds.iter().chain(&self.refined).collect();
         lines.sort_by(|a, b| a.rpm.total_cmp(&b.rpm));
@@ -188,7 +188,7 @@ fn is_drawn(lines: &[SpeedLine], right: usize) -> bool {
     gap.is_straight() && !gap.may_hide_a_region() && !gap.may_hide_a_tongue()
 }
 
-/// Two neighbouring lines of a chart with the lines beside them.
+/// Gap between two neighbouring speeds of a chart: the lines at both ends, and the lines beside them.
 struct Gap<'a> {
     before: Option<&'a SpeedLine>,
     left: &'a SpeedLine,
@@ -197,7 +197,8 @@ struct Gap<'a> {
 }
 
 impl Gap<'_> {
-    /// True if the straight line between the ends of each stable interval is right to the accuracy of the chart.
+    /// True if the straight line over the gap between the ends of each stable interval is right to the accuracy of the
+    /// chart.
     fn is_straight(&self) -> bool {
         let count = self.left.stable_mm.len();
         if self.right.stable_mm.len() != count {
@@ -234,8 +235,8 @@ impl Gap<'_> {
         [at_right, at_left]
     }
 
-    /// True if |μ| may cross the unit circle and return within the gap, at a step in depth where both ends lie on one
-    /// side.
+    /// True if |μ| may cross the unit circle and return within the gap between two speeds, at a step in depth where
+    /// both speeds lie on one side of the circle.
     fn may_hide_a_region(&self) -> bool {
         let (left, right) = (&self.left.largest, &self.right.largest);
         let steps = left.len().min(right.len());
@@ -262,7 +263,8 @@ impl Gap<'_> {
 }
 
 impl Gap<'_> {
-    /// True if the gap is wider than [`TONGUE_GAP`] and one of its ends shows a tongue of instability beside it.
+    /// True if the gap between two speeds is wider than [`TONGUE_GAP`] and a tongue of instability shows beside one of
+    /// these speeds.
     fn may_hide_a_tongue(&self) -> bool {
         self.right.rpm > self.left.rpm * (1.0 + TONGUE_GAP)
             && [self.left, self.right]

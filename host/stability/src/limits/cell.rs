@@ -7,11 +7,11 @@ use crate::spectrum::verdict::Verdict;
 /// Dominant Floquet multiplier at one spindle speed and axial depth.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cell {
-    /// Absolute value |μ| of the multiplier.
+    /// Absolute value |μ| of the dominant multiplier of the cut.
     pub multiplier_abs: f64,
     /// Error estimate of |μ|.
     pub error: f64,
-    /// Verdict from |μ| and its error.
+    /// Verdict on the cut from |μ| and its error.
     pub verdict: Verdict,
 }
 

@@ -24,12 +24,12 @@ pub struct CellLine {
 /// Grid of cells over spindle speed and axial depth.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CellChart {
-    /// Label of the method that computed the chart.
+    /// Label of the method that computed the cell chart.
     #[serde(flatten)]
     pub label: Label,
     /// Axial depths of the cells, mm, in the requested order.
     pub depths_mm: Vec<f64>,
-    /// Cells at each spindle speed, in the requested order.
+    /// Cells of the chart at each spindle speed, in the requested order.
     pub speeds: Vec<CellLine>,
 }
 

@@ -25,8 +25,8 @@ const INTERVALS: usize = 10;
 /// twice the depth of the one before.
 const FIRST_SHARE: f64 = 0.125;
 
-/// Implements [`Method::cells`] for a method with a spectrum; `spectrum` returns the multipliers at this speed, valid
-/// for depths up to its argument, m.
+/// Implements [`Method::cells`] for a method with a spectrum. `spectrum` returns the multipliers at this spindle speed,
+/// valid up to the axial depth (m) that is its argument.
 pub(crate) fn cells_of<S: Spectrum>(
     rpm: f64,
     depths_mm: &[f64],
@@ -123,7 +123,7 @@ impl Curve {
     }
 }
 
-/// Cells at one spindle speed while they are computed, by ascending depth.
+/// Cells of a chart at one spindle speed while they are computed, by ascending depth.
 struct Column<S> {
     rpm: f64,
     spectrum: S,
@@ -267,7 +267,7 @@ impl<S: Spectrum> Column<S> {
 
 /// Result of following multipliers from one sampled depth to the next.
 enum Followed {
-    /// All multipliers were followed, and the cells are filled.
+    /// All multipliers were followed between the two depths, and the cells there are filled.
     Filled,
     /// The interpolants of the multipliers err too much; the multipliers at the middle of the depth interval are known.
     Bent(Sample),
@@ -311,8 +311,8 @@ fn curves(low: &Sample, high: &Sample) -> Option<Vec<Curve>> {
         .map(|curve| curve.at(0.5).norm())
         .fold(0.0, f64::max);
     let least = half_way.min(low.largest()).min(high.largest());
-    // A multiplier without a partner must stay smaller than the largest over the interval, even if it moves twice as
-    // fast.
+    // A multiplier without a partner at the other depth must stay smaller than the dominant one over the depth
+    // interval, even if it moves twice as fast.
     let reach = |root: &Root| root.multiplier.norm() + 2.0 * root.slope.norm() * step_m;
     strays.iter().all(|root| reach(root) < least).then_some(curves)
 }

@@ -14,13 +14,13 @@ use crate::error::StabilityError;
 /// Stability chart over spindle speed and axial depth.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Chart {
-    /// Label of the method that computed the chart.
+    /// Label of the method that computed the stability chart.
     #[serde(flatten)]
     pub label: Label,
-    /// One line per spindle speed, in the requested order.
+    /// One line of limits per spindle speed of the chart, in the requested order.
     pub speeds: Vec<SpeedLine>,
-    /// Lines at speeds between the requested ones, ascending, so that straight lines through both draw the limits; empty if
-    /// not requested or not needed.
+    /// Lines of limits at speeds between the requested ones, ascending, so that straight lines through both draw the
+    /// limits; empty if not requested or not needed.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub refined: Vec<SpeedLine>,
     /// Accuracy of the limits between the speeds of the chart; `None` if no lines were added between the requested
@@ -57,8 +57,8 @@ pub fn chart<M: Method + ?Sized>(
 /// Refinement of a chart in spindle speed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Refinement {
-    /// Largest difference between a limit and the straight line between the limits at neighbouring speeds, as a share
-    /// of the largest depth.
+    /// Largest difference between a limit and the straight line between the limits at neighbouring speeds up to which
+    /// no speed is added, as a share of the largest depth.
     pub tolerance: f64,
     /// Least distance between neighbouring speeds of the chart, relative to the speed; no speed is added between closer
     /// ones.

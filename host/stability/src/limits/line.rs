@@ -41,8 +41,8 @@ pub fn line(problem: &Problem, rpm: f64, depth_mm: f64, samples: usize) -> Resul
     })
 }
 
-/// Implements [`line()`] for a method with a spectrum; `spectrum` returns the multipliers at this speed, valid for
-/// depths up to its argument, m.
+/// Implements [`line()`] for a method with a spectrum. `spectrum` returns the multipliers at this spindle speed, valid
+/// up to the axial depth (m) that is its argument.
 pub(crate) fn line_of<S: Spectrum>(
     rpm: f64,
     depth_mm: f64,
@@ -189,8 +189,8 @@ impl<S: Spectrum> Scan<S> {
         Ok(found)
     }
 
-    /// Follows each multiplier near the circle between two samples; `None` if one cannot be followed or may touch the
-    /// circle in between.
+    /// Follows each multiplier near the unit circle between two sampled depths; `None` if one cannot be followed or may
+    /// touch the circle in between.
     fn follow(&mut self, low: &Sample, high: &Sample) -> Option<Vec<DirectedCrossing>> {
         let step_m = high.depth_m - low.depth_m;
         let mut free: Vec<Root> = high.roots.clone();
@@ -218,8 +218,8 @@ impl<S: Spectrum> Scan<S> {
             multiplier: from.multiplier + (to.multiplier - from.multiplier) * share,
         };
         let crossing = self.spectrum.crossing_near(guess, low.depth_m, high.depth_m)?;
-        // The crossing must lie on the branch of this multiplier, not on that of another which crosses at a nearby
-        // depth.
+        // The crossing of the unit circle must lie on the branch of this multiplier, not on that of another which
+        // crosses at a nearby depth.
         let distance = (crossing.multiplier - guess.multiplier).norm();
         (distance < 0.5 * (to.multiplier - from.multiplier).norm() + 1e-6).then_some(DirectedCrossing {
             crossing,
@@ -313,7 +313,7 @@ impl<S: Spectrum> Scan<S> {
     }
 }
 
-/// Change of the number of multipliers outside the unit circle over the crossings found, from small to large depth.
+/// Change of the number of multipliers outside the unit circle over the crossings `found`, from small to large depth.
 fn balance(found: &[DirectedCrossing]) -> i32 {
     found
         .iter()
@@ -324,16 +324,19 @@ fn balance(found: &[DirectedCrossing]) -> i32 {
         .sum()
 }
 
-/// True if the cubic through both ends of |μ| − 1, which lie on one side, comes near zero in between.
+/// True if a multiplier that lies on one side of the unit circle at both sampled depths may touch the circle in
+/// between: the cubic interpolant of |μ| − 1 comes near zero.
 fn may_touch(from: &Root, to: &Root, step_m: f64) -> bool {
     let (a, b) = (from.excess(), to.excess());
     let (da, db) = (from.excess_slope() * step_m, to.excess_slope() * step_m);
-    // The cubic can only touch zero if |μ| moves towards the circle at both ends.
+    // The cubic interpolant of |μ| − 1 can only touch zero if |μ| moves towards the unit circle from both ends of the
+    // depth interval.
     if a.signum() * da >= 0.0 || b.signum() * db <= 0.0 {
         return false;
     }
     let side = a.signum();
-    // Nine points of the cubic miss its extremum by a few percent of its height at most.
+    // The best of nine points of the cubic interpolant of |μ| − 1 misses its extremum by a few percent of its height at
+    // most.
     let nearest = (1..10)
         .map(|i| {
             let t = f64::from(i) * 0.1;

@@ -8,7 +8,7 @@ use super::point::CutStability;
 use super::speed_line::SpeedLine;
 use crate::error::StabilityError;
 
-/// Stability method, with its problem or its table of receptances.
+/// Stability method together with its problem: a case, or a case with a table of receptances.
 ///
 /// The constructor of a method refuses cases for which it is not defined, with the reason.
 pub trait Method: Sync {
@@ -78,7 +78,7 @@ pub trait Method: Sync {
         lines.into_iter().collect()
     }
 }
-/// Label of a result: method, settings and neglected effects.
+/// Label of a stability result: method, its settings and the effects that it neglects.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Label {
     /// [`Method::name`].

@@ -31,7 +31,7 @@ pub struct Linearized {
 /// Loss of stability as a linear function of the uncertain variables of a case.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plane {
-    /// Axial depth of the limit of the nominal machine, mm.
+    /// Axial depth at which the nominal machine loses stability, mm.
     pub depth_mm: f64,
     /// Gradient of the limiting depth over the uncertain variables, mm per standard deviation.
     pub gradient: DVector<f64>,

@@ -25,7 +25,7 @@ pub struct CutStability {
     /// Dominant Floquet multiplier over one tooth period; of a conjugate pair the one above the real axis.
     #[serde(serialize_with = "as_pair")]
     pub multiplier: Complex64,
-    /// Absolute value |μ| of the multiplier.
+    /// Absolute value |μ| of the dominant multiplier.
     pub multiplier_abs: f64,
     /// Error estimate of the multiplier, from a second, finer collocation. If the period map is not reliable, it is at
     /// least the distance from |μ| to the radius beyond which a winding number counts no multiplier, since a larger
@@ -34,14 +34,15 @@ pub struct CutStability {
     /// Verdict from |μ| and its error. It is also unstable if this multiplier certainly lies outside the unit circle,
     /// even if a larger one may exist.
     pub verdict: Verdict,
-    /// Kind of stability loss: how the dominant multiplier leaves, or would leave, the unit circle.
+    /// Kind of stability loss: how the dominant multiplier leaves the unit circle, or would leave it if it grew.
     pub kind: StabilityLoss,
-    /// Frequency of the motion that belongs to the dominant multiplier, Hz.
+    /// Frequency of the vibration that belongs to the dominant multiplier, Hz.
     pub chatter_hz: Option<f64>,
 }
 
 impl CutStability {
-    /// Stability of a cut from its dominant multiplier (either one of a pair) and the error of that.
+    /// Stability of a cut from its dominant multiplier (either one of a conjugate pair) and the error of that
+    /// multiplier.
     pub(crate) fn new(
         rpm: f64,
         depth_mm: f64,
@@ -113,7 +114,7 @@ pub fn point(problem: &Problem, rpm: f64, depth_mm: f64) -> Result<CutStability,
 struct Solution {
     multiplier: Complex64,
     error: f64,
-    /// Mesh of the tooth period at the working resolution.
+    /// Working mesh of the tooth period on which the multiplier was computed.
     period: Period,
     /// Verdict on the cut, if it is more certain than |μ| and its error show; otherwise `None`.
     verdict: Option<Verdict>,
@@ -129,8 +130,8 @@ fn error(coarse: Complex64, fine: Complex64, least: f64) -> f64 {
 struct ScannedMultipliers {
     /// Floquet multipliers on the coarse mesh; of a conjugate pair the upper one.
     multipliers: Vec<Complex64>,
-    /// Largest complex depth |w (1 − 1/μ)| of these multipliers, m, and at least 2 w, which is its bound on the unit
-    /// circle.
+    /// Largest complex depth |w (1 − 1/μ)| of these multipliers at the axial depth w, m, and at least 2 w, its largest
+    /// value on the unit circle.
     kappa_m: f64,
 }
 
@@ -220,12 +221,14 @@ fn searched(problem: &Problem, rpm: f64, depth_m: f64, candidates: &[Complex64])
         // A larger multiplier may lie between the largest one found and the radius beyond which none was counted.
         error: own.max(beyond.radius - fine.norm()),
         period: working,
-        // If this multiplier lies outside the unit circle, a larger one would lie outside as well.
+        // If this multiplier certainly lies outside the unit circle, the cut is unstable: a larger multiplier would lie
+        // outside as well.
         verdict: (fine.norm() - own > 1.0).then_some(Verdict::Unstable),
     })
 }
 
-/// Largest multiplier near any of the guesses, by Newton's method; `None` if it does not converge from one of them.
+/// Largest Floquet multiplier near any of the guesses, by Newton's method; `None` if it does not converge from one of
+/// them.
 fn dominant_of(period: &Period, kappa_m: f64, depth_m: f64, guesses: &[Complex64]) -> Option<Complex64> {
     let characteristic = Characteristic::new(period, kappa_m);
     let mut work = characteristic.workspace();

@@ -1,4 +1,4 @@
-//! Accuracy of a chart between its speeds.
+//! Accuracy of the stability limits of a chart between its speeds.
 
 use serde::Serialize;
 
@@ -7,7 +7,7 @@ use serde::Serialize;
 pub struct Resolution {
     /// Largest error of a limit on the straight line between two neighbouring speeds, relative to its depth.
     pub depth_share: f64,
-    /// Largest error of a steep limit in spindle speed, relative to the speed.
+    /// Largest error in spindle speed of a limit that is steep over the speed, relative to the speed.
     pub speed_share: f64,
     /// Width of the narrowest region of stability or of chatter in the chart that ends within the chart on both sides,
     /// rev/min; `None` if there is no such region.

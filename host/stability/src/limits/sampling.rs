@@ -40,8 +40,8 @@ impl Variable {
         variables
     }
 
-    /// Variable of parameters that vary together; a parameter with a negative standard deviation falls when the others
-    /// rise.
+    /// Uncertain variable of parameters that vary together; a parameter with a negative standard deviation falls when
+    /// the others rise.
     pub fn together(parts: Vec<Deviation>) -> Self {
         Self { parts }
     }
@@ -51,7 +51,8 @@ impl Variable {
         &self.parts
     }
 
-    /// Shifts the parameters of a case by a number of standard deviations; false if a value is then not valid.
+    /// Shifts the parameters of this variable in a case by a number of standard deviations; false if a value is then
+    /// not valid.
     pub fn shift(&self, case: &mut Case, deviations: f64) -> bool {
         self.parts
             .iter()
@@ -59,7 +60,7 @@ impl Variable {
     }
 }
 
-/// Matrix entry (j, i) for (i, j); `None` for other parameters.
+/// The mirrored entry (j, i) of a structural matrix for its entry (i, j); `None` for other parameters.
 fn mirrored(parameter: Parameter) -> Option<Parameter> {
     match parameter {
         Parameter::Mass(i, j) if i != j => Some(Parameter::Mass(j, i)),
@@ -71,7 +72,8 @@ fn mirrored(parameter: Parameter) -> Option<Parameter> {
     }
 }
 
-/// Orthonormal basis of the variables whose first vectors span the directions of largest influence on the limits.
+/// Orthonormal basis of the uncertain variables whose first vectors span the directions of largest influence on the
+/// limits.
 #[derive(Clone, Debug)]
 pub struct Basis {
     vectors: Vec<DVector<f64>>,

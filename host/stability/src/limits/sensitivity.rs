@@ -122,7 +122,7 @@ pub struct Slope {
     pub angle: f64,
 }
 
-/// Crossing of the unit circle with the quantities that its derivatives need.
+/// Crossing of the unit circle by a multiplier, with the quantities that the derivatives of its depth need.
 #[derive(Clone, Debug)]
 pub struct Sensitivity<'a> {
     problem: &'a Problem,
@@ -136,7 +136,7 @@ pub struct Sensitivity<'a> {
 }
 
 impl<'a> Sensitivity<'a> {
-    /// Sensitivity of one of the switches found by [`line`](crate::line()).
+    /// Derivatives of one of the stability switches found by [`line`](crate::line()).
     ///
     /// # Errors
     /// The switch does not belong to this problem: there is no Floquet mode for it.
@@ -235,7 +235,8 @@ impl<'a> Sensitivity<'a> {
         self.angles(node).map(|angle| force.directional(angle)).sum()
     }
 
-    /// Force per displacement of one tooth at an immersion angle: M = κ cutting·normalᵀ − β.
+    /// Force per displacement of one tooth at an immersion angle, M = κ cutting·normalᵀ − β, N/m, with the complex
+    /// depth κ.
     fn of_tooth(&self, angle: f64) -> Matrix3<Complex64> {
         let process = &self.problem.process;
         let mut coupling = process.force.directional(angle).map(|entry| self.kappa * entry);
@@ -251,8 +252,8 @@ impl<'a> Sensitivity<'a> {
     /// Coefficient lᵀΦ_p r.
     fn by_parameter(&self, tangent: &Tangent) -> Complex64 {
         let mut sum = self.along(|node| self.integrand(tangent, node));
-        // A later entry removes the force of a tooth at the start angle; a later exit adds that of a tooth at the exit
-        // angle.
+        // A later entry angle removes the force of a tooth at the start angle; a later exit angle adds that of a tooth
+        // at the exit angle.
         let engagement = &self.problem.process.engagement;
         for (node, angle, later) in [
             (&self.motion.entry, engagement.start, -tangent.start),
@@ -290,7 +291,7 @@ impl<'a> Sensitivity<'a> {
         sum
     }
 
-    /// Derivative dM of the force per displacement of one tooth, per unit of the parameter.
+    /// Derivative dM of the force per displacement M of one tooth, N/m per unit of the parameter.
     fn change_of_tooth(&self, tangent: &Tangent, angle: f64) -> Matrix3<Complex64> {
         let process = &self.problem.process;
         let (cutting, normal) = (process.force.cutting.at(angle), process.force.normal.at(angle));
@@ -318,7 +319,7 @@ impl<'a> Sensitivity<'a> {
     }
 }
 
-/// Reason why a limit has no derivative although its Floquet mode is known.
+/// Error for a limit that has no derivative although its Floquet mode is known.
 pub(crate) fn no_derivative(rpm: f64, switch: &Switch) -> StabilityError {
     StabilityError::BrokeDown {
         rpm,

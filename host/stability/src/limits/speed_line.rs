@@ -19,11 +19,11 @@ pub struct Switch {
     /// True if the multiplier moves into the unit circle with growing depth: stability is gained, provided that no
     /// other multiplier is outside.
     pub gain: bool,
-    /// Frequency of the vibration that begins or ends at this depth, Hz.
+    /// Frequency of the vibration that begins or ends at the depth of the switch, Hz.
     pub chatter_hz: Option<f64>,
 }
 
-/// Stability limit: the depth at which stability is first lost.
+/// Stability limit at one spindle speed: the axial depth at which stability is first lost.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Limit {
     /// Axial depth, mm.
@@ -45,14 +45,15 @@ pub struct SpeedLine {
     pub rpm: f64,
     /// Stable depths at this spindle speed, mm, as intervals in ascending order between 0 and the last depth.
     pub stable_mm: Vec<[f64; 2]>,
-    /// Depths, mm, whose stability is open within the error, as intervals in ascending order around the ends of the
-    /// stable intervals.
+    /// Depths at this spindle speed, mm, whose stability is open within the error, as intervals in ascending order
+    /// around the ends of the stable intervals.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub undecided_mm: Vec<[f64; 2]>,
-    /// Depths with two stable forced orbits, mm, as intervals; only nonlinear structures have them.
+    /// Depths at this spindle speed with two stable forced orbits, mm, as intervals; only nonlinear structures have
+    /// them.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub bistable_mm: Vec<[f64; 2]>,
-    /// Limit at which stability is first lost; `None` if it is not lost up to the last depth.
+    /// Limit at which stability is first lost at this spindle speed; `None` if it is not lost up to the last depth.
     pub first_limit: Option<Limit>,
     /// Every crossing of the unit circle by a multiplier, by depth, including those while another multiplier is
     /// outside.
@@ -120,7 +121,7 @@ impl From<&Switch> for Limit {
     }
 }
 
-/// Union of intervals: overlapping ones are joined, in ascending order.
+/// Union of depth intervals: overlapping ones are joined, in ascending order.
 pub(crate) fn union(mut intervals: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
     intervals.sort_by(|a, b| a[0].total_cmp(&b[0]));
     let mut joined: Vec<[f64; 2]> = Vec::with_capacity(intervals.len());

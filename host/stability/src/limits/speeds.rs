@@ -1,12 +1,12 @@
-//! Default range of spindle speeds of a case.
+//! Default range of spindle speeds for the lobes of a case.
 
 use std::f64::consts::TAU;
 
 use quietcut_model::case::Case;
 use quietcut_model::structure::FirstOrder;
 
-/// Lowest and highest spindle speed, rev/min: the limits of the machine, otherwise 1/2 to 5 teeth per vibration of the
-/// most flexible mode.
+/// Lowest and highest spindle speed, rev/min: the speed limits of the spindle if the case has them, otherwise 1/2 to 5
+/// tooth passings per vibration period of the most flexible mode.
 pub fn default_speeds(case: &Case, structure: &FirstOrder, teeth: usize) -> (f64, f64) {
     if let Some(limits) = case.limits {
         // A lowest speed of 0 is replaced by a hundredth of the highest speed, since no cut exists at 0.
@@ -16,7 +16,7 @@ pub fn default_speeds(case: &Case, structure: &FirstOrder, teeth: usize) -> (f64
     (0.5 * rpm, 5.0 * rpm)
 }
 
-/// Frequency, Hz, of the pole at which the receptance is largest.
+/// Frequency, Hz, of the structure's pole at which the receptance is largest.
 fn most_flexible_hz(structure: &FirstOrder) -> f64 {
     let size = |omega: f64| structure.receptance(omega).map_or(f64::INFINITY, |h| h.norm());
     structure

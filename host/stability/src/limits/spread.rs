@@ -1,4 +1,4 @@
-//! The spread of a limit under parameter uncertainty: percentiles with confidence intervals.
+//! The spread of a stability limit under parameter uncertainty: percentiles with confidence intervals.
 
 use serde::Serialize;
 
@@ -50,7 +50,7 @@ impl Percentile {
     }
 }
 
-/// Spread of the first limit at one spindle speed.
+/// Spread of the first stability limit over drawn machines at one spindle speed.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct LimitSpread {
     /// Percentiles of the first limit.

@@ -28,7 +28,7 @@ use crate::criteria::{BATCH, BATCHES, BATCHES_OF_CELLS, IMPOSSIBLE_MAX, PILOT};
 use crate::error::StabilityError;
 use quietcut_model::case::Case;
 
-/// Shares of the machines that define the percentiles: 5, 50 and 95 %.
+/// Shares of the drawn machines that define the percentiles of the limit: 5, 50 and 95 %.
 const SHARES: [f64; 3] = [0.05, 0.5, 0.95];
 
 /// Number of depth steps of the first search for a machine's limit, from 0 to 1.2 times the limit predicted from
@@ -144,7 +144,7 @@ impl<'a> Uncertainty<'a> {
         let mut basis = Basis::new(self.variables.len(), &gradients);
         let mut batches = Batches(Vec::new());
         for batch in 0..*BATCHES.end() {
-            // The random stream depends on the speed, so that neighbouring speeds draw different machines.
+            // The random stream depends on the spindle speed, so that neighbouring speeds draw different machines.
             let stream = nominal.rpm.to_bits().rotate_left(8) ^ u64::from(batch);
             let machines = basis.points(BATCH, self.seed, stream, batch);
             let lines: Vec<Result<Drawn, StabilityError>> = machines
@@ -207,7 +207,8 @@ impl<'a> Uncertainty<'a> {
             .iter()
             .map(|plane| plane.depth_mm + plane.gradient.dot(machine))
             .fold(f64::INFINITY, f64::min);
-        // Linearization may predict a depth below 0 for a steep limit; a quarter of the nominal limit is tried then.
+        // Linearization may predict a limit below depth 0 where a limit is steep; a quarter of the nominal limit is
+        // tried then.
         let shallowest_mm = planes.first().map_or(depth_mm, |plane| 0.25 * plane.depth_mm);
         let near_mm = 1.2 * predicted_mm.max(shallowest_mm);
         if !whole && near_mm < 0.7 * depth_mm {
@@ -238,7 +239,7 @@ impl Batches {
             .filter_map(|drawn| drawn.line.as_ref().ok())
     }
 
-    /// Reason why the first drawn machine that is not physical is impossible.
+    /// Reason why the first drawn machine that is not physical is impossible; `None` if all are physical.
     fn first_reason(&self) -> Option<&str> {
         let reasons = self
             .0

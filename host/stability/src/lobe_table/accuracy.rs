@@ -20,7 +20,8 @@ const OFFSETS: [f64; 2] = [0.38, 0.62];
 /// between those checked before: two speeds become five, eleven, 23.
 const ROUNDS: usize = 3;
 
-/// Largest disagreement between table and method, as distance of a depth from the nearest limit of the method, mm.
+/// Largest disagreement between lobe table and method: distance, mm, from a depth on whose stability they differ to the
+/// nearest limit of the method.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Disagreement {
     /// Largest distance, mm, from a depth that is stable in the table only to the nearest limit of the method (unsafe
@@ -45,7 +46,7 @@ impl Disagreement {
         let mut all = ends(truth);
         all.extend(ends(tabulated));
         all.extend([0.0, depth_mm]);
-        // The last depth of a table is rounded and may lie beyond the last depth of the method.
+        // The last depth of a lobe table is rounded and may lie beyond the last depth of the method.
         all.retain(|&end| end <= depth_mm);
         all.sort_by(f64::total_cmp);
         let is_in = |set: &[[f64; 2]], depth: f64| set.iter().any(|&[from, to]| from <= depth && depth <= to);
@@ -68,7 +69,7 @@ impl Disagreement {
 }
 
 impl Disagreement {
-    /// The larger of both disagreements, on the unsafe and on the cautious side each.
+    /// Componentwise maximum of two disagreements, of the unsafe and of the cautious side.
     fn max(self, other: Self) -> Self {
         Self {
             unsafe_mm: self.unsafe_mm.max(other.unsafe_mm),
@@ -76,7 +77,7 @@ impl Disagreement {
         }
     }
 
-    /// True if the disagreement is more than `factor` times `other`, on the unsafe or on the cautious side.
+    /// True if this disagreement is more than `factor` times `other`, on the unsafe or on the cautious side.
     fn exceeds(self, other: Self, factor: f64) -> bool {
         self.unsafe_mm > factor * other.unsafe_mm || self.cautious_mm > factor * other.cautious_mm
     }

@@ -29,7 +29,7 @@ const GUARDED: usize = 3;
 /// Lobe table as it is written to a file, with what its user should know.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct BuiltTable {
-    /// Bytes of the table, header and CRC included.
+    /// Bytes of the lobe table, header and CRC included.
     pub bytes: Vec<u8>,
     /// Limits without derivatives, one warning per layer; empty if derivatives were not requested or all exist.
     pub warnings: Vec<String>,

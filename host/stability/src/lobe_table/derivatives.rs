@@ -1,4 +1,4 @@
-//! Derivatives of the limits in the entries of a layer.
+//! Derivatives of the stability limits in the entries of a layer of a lobe table.
 
 use std::f64::consts::TAU;
 
@@ -14,12 +14,13 @@ use crate::limits::sensitivity::{Sensitivity, Tangent, no_derivative};
 use crate::limits::speed_line::{SpeedLine, Switch};
 use quietcut_model::structure::ModalPart;
 
-/// Derivatives of the limits in the entries of one layer, with respect to modes and cutting force.
+/// Derivatives of the stability limits in the entries of one layer, with respect to modes and cutting force.
 pub(super) struct Derivatives {
     /// Modes, by ascending frequency.
     pub(super) modes: Vec<LayerMode>,
     pub(super) by_speed: Vec<SlopesOfLine>,
-    /// Warning about limits without derivatives, whose entries have derivatives of 0; `None` if every limit has them.
+    /// Warning about limits for which no derivative exists, so that their entries state 0; `None` if every limit has
+    /// derivatives.
     pub(super) warning: Option<String>,
 }
 

@@ -1,4 +1,4 @@
-//! Encoding of the content of a table as bytes.
+//! Encoding of the content of a lobe table as bytes.
 
 use quietcut_core::lobes::{
     Additions, Content, InterpolationError, IntervalSlopes, Layer, LayerMode, LobeTable, encode_with,
@@ -13,7 +13,7 @@ use super::error::BuildError;
 use super::layers::TableLayer;
 use quietcut_model::case::Case;
 
-/// The table for cuts in a given feed direction; unchanged if the direction is not known.
+/// The lobe table for cuts in a given feed direction; unchanged if the direction is not known.
 pub(super) fn towards<'a>(table: &LobeTable<'a>, direction_deg: Option<f64>) -> LobeTable<'a> {
     match direction_deg {
         Some(degrees) => table.towards(Degrees(degrees as f32)),

@@ -14,7 +14,8 @@ pub(super) struct Entry {
     pub(super) to_mm: f64,
 }
 
-/// Stable depths up to `depth_mm` with a single stable orbit; with two, stability depends on how the cut began.
+/// Depths of a line up to `depth_mm` that have a single stable orbit. Where two stable orbits exist, stability depends
+/// on how the cut began.
 pub(super) fn surely_stable(line: &SpeedLine, depth_mm: f64) -> Vec<[f64; 2]> {
     // Stable depths are cut at `depth_mm`, since a branch of forced orbits may extend one step beyond.
     let mut stable: Vec<[f64; 2]> = line
@@ -43,7 +44,8 @@ pub(super) fn unstable(line: &SpeedLine, depth_mm: f64) -> Vec<Entry> {
     for [stable_from, stable_to] in ends {
         if stable_from > from_mm {
             let switch = line.switches.iter().find(|switch| switch.depth_mm == from_mm);
-            // At the depth where a second orbit begins the line has no switch: the jump to that orbit is a fold.
+            // At the depth where a second stable orbit begins the line has no switch: the jump to that orbit counts as
+            // a fold.
             let is_jump = line.bistable_mm.iter().any(|interval| interval[0] == from_mm);
             let kind = match switch {
                 Some(switch) => table_kind(switch.kind),

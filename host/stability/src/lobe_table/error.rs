@@ -18,9 +18,9 @@ pub enum BuildError {
     Teeth {
         /// The case file.
         path: std::path::PathBuf,
-        /// Number of teeth of this case.
+        /// Number of teeth of the case whose tool differs.
         found: usize,
-        /// Number of teeth of the first case.
+        /// Number of teeth of the tool of the first case.
         expected: usize,
     },
     /// The requested table does not fit a case.
@@ -28,10 +28,10 @@ pub enum BuildError {
     NotPossible {
         /// The case file.
         path: std::path::PathBuf,
-        /// Feature that does not fit, and what to do instead.
+        /// Feature of the request that does not fit the case, and what to do instead.
         what: &'static str,
     },
-    /// The table format refuses the content, such as two layers for the same cut.
+    /// The format of lobe tables refuses the content, such as two layers for the same cut.
     #[error(
         "the table cannot be written: {0}; each layer must have its own feed, feed direction, immersion or posture"
     )]

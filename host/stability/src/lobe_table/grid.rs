@@ -1,4 +1,4 @@
-//! Range of speeds and depths of a table.
+//! Spindle speeds and largest depth of a lobe table.
 
 use super::layers::TableLayer;
 use crate::error::StabilityError;

@@ -1,4 +1,4 @@
-//! Layers of a table: cases, feeds per tooth and feed directions.
+//! Layers of a lobe table: cases, feeds per tooth and feed directions.
 
 use std::path::Path;
 
@@ -21,13 +21,14 @@ use crate::problem::pitched::Pitched;
 use crate::process::treatment::needs_orbit;
 use quietcut_model::case::Case;
 
-/// Feed per tooth, mm, stated for a layer whose limits do not depend on the feed; larger than any feed.
+/// Largest feed per tooth, mm, that the table states for a layer whose limits do not depend on the feed; larger than
+/// any feed.
 const ANY_FEED_MM: f32 = 100.0;
 
-/// Seed of the draws for percentiles; fixed, so that a table can be reproduced.
+/// Seed of the random draws for percentiles of a table; fixed, so that a table can be reproduced.
 const SEED: u64 = 1;
 
-/// One layer of a table: its case, the method that computes its limits, and the cuts for which it is valid.
+/// One layer of a lobe table: its case, the method that computes its limits, and the cuts for which it is valid.
 pub(super) struct TableLayer {
     pub(super) method: Box<dyn Method>,
     /// Linear delay problem of the layer's case with the mean pitch; equal to the problem of the method if structure
@@ -257,11 +258,11 @@ fn nearest(
         .map(|(other, _)| other)
 }
 
-/// Feeds and feed directions of the layers of a case.
+/// Feeds per tooth and feed directions of the layers that one case gives to a table.
 #[derive(Clone)]
 struct Division {
     feeds_mm: Vec<f64>,
-    /// Feed directions, degrees; `None` for the direction of the case, which the table does not state.
+    /// Feed directions of the layers, degrees; `None` for the direction of the case, which the table does not state.
     directions_deg: Vec<Option<f64>>,
 }
 
@@ -384,7 +385,7 @@ pub(super) fn refined(
     divided(cases, &divisions, request)
 }
 
-/// Refinement of the layers along one axis: feed per tooth (mm) or feed direction (degrees).
+/// Refinement of the layers of a table along one axis: feed per tooth (mm) or feed direction (degrees).
 struct Axis {
     tolerance: f64,
     most: usize,

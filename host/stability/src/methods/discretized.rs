@@ -1,4 +1,4 @@
-//! Methods that divide the period into a given number of steps, with an error estimate from finer steps.
+//! Methods that divide the period into a given number of time steps, with an error estimate from finer steps.
 
 use num_complex::Complex64;
 
@@ -17,7 +17,7 @@ use crate::spectrum::map_spectrum::{MapSpectrum, PeriodMap};
 
 /// Scheme of one time step, such as semi-discretization.
 pub(crate) trait Discretization: Sync {
-    /// Name of the method in results.
+    /// Name of the method that uses this scheme, as stated in results.
     fn name(&self) -> &'static str;
 
     /// Order p of convergence: the error of multipliers falls with the p-th power of the step.
@@ -27,10 +27,10 @@ pub(crate) trait Discretization: Sync {
     fn map<'a>(&self, pitched: &'a Pitched, mesh: &'a Mesh, depth_m: f64) -> Option<Stepped<'a>>;
 }
 
-/// Time-stepping method with a given number of steps, applied to a problem.
+/// Stability method that steps through the period with a given number of time steps, applied to a problem.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Discretized<D> {
-    /// Milling problem, with equal or unequal pitch.
+    /// Milling problem of the method, with equal or unequal pitch.
     pub pitched: Pitched,
     /// Scheme of one time step.
     pub discretization: D,

@@ -66,7 +66,8 @@ impl Discretization for FullDiscretization {
         let mut steps = Vec::with_capacity(mesh.count());
         for index in 0..mesh.count() {
             let (start_s, duration_s) = mesh.step(index);
-            // Between two entries or exits all steps have equal durations except for rounding, and share their weights.
+            // Between two entries or exits of teeth all steps have equal durations except for rounding, and share their
+            // weights.
             let weights = known
                 .take()
                 .filter(|weights| (weights.duration_s - duration_s).abs() < 1e-9 * duration_s)

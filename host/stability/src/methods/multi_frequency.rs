@@ -16,7 +16,7 @@ use crate::limits::point::CutStability;
 use crate::limits::speed_line::SpeedLine;
 use crate::spectrum::stability_loss::StabilityLoss;
 
-/// Largest number K of harmonics: a limit on computing time. A choice.
+/// Largest number K of harmonics of the tooth-passing frequency: a limit on computing time. A choice.
 const HARMONICS_MAX: usize = 400;
 
 /// Multi-frequency solution on modelled or measured receptances.
@@ -27,7 +27,7 @@ const HARMONICS_MAX: usize = 400;
 pub struct MultiFrequency {
     /// Receptances and cutting process.
     pub problem: FrequencyProblem,
-    /// Number K of harmonics; `None` doubles K until the limits settle.
+    /// Number K of harmonics of the tooth-passing frequency; `None` doubles K until the limits settle.
     pub harmonics: Option<usize>,
 }
 
@@ -72,7 +72,7 @@ type Settled<'a> = (HarmonicLoop<'a>, Vec<AxisCrossing>, Vec<AxisCrossing>);
 
 /// Largest relative change in depth between two lists of limits; `None` if the lists do not contain the same limits.
 fn largest_change(coarse: &[AxisCrossing], fine: &[AxisCrossing], depth_m: f64) -> Option<f64> {
-    // A limit close to the last depth may lie beyond it in one of the lists; such limits are not compared.
+    // A limit close to the last depth may lie beyond it in one of the two lists; such limits are not compared.
     let inside = |limits: &[AxisCrossing]| -> Vec<AxisCrossing> {
         let within = limits
             .iter()
@@ -175,7 +175,8 @@ impl MultiFrequency {
             }
             None => 0.0,
         };
-        // Multipliers within the truncation error of the real axis are taken as real: a flip lies exactly on it.
+        // A multiplier within 1e-9 of the real axis, which truncation may cause, is taken as real: a flip lies exactly
+        // on the axis.
         let is_real = multiplier.im.abs() <= 1e-9 * multiplier.norm();
         let multiplier = if is_real {
             Complex64::from(multiplier.re)

@@ -25,7 +25,7 @@ use crate::limits::speed_line::SpeedLine;
 pub struct Nyquist {
     /// Receptances and cutting process.
     pub problem: FrequencyProblem,
-    /// Highest harmonic K of the coefficients; 0 uses their average.
+    /// Highest harmonic K of the directional coefficients; 0 uses their average.
     pub harmonics: usize,
 }
 
@@ -80,7 +80,7 @@ fn confirmed(
         let count = limit.kind.count();
         outside += if limit.outward { count } else { -count };
         let next_m = found.get(index + 1).map_or(depth_m, |next| next.depth_m);
-        // Limits that agree within rounding leave no interval in which roots could be counted.
+        // Two limits closer than 1e-6 of the depth leave no interval between them in which roots could be counted.
         if next_m - limit.depth_m < 1e-6 * depth_m {
             continue;
         }

@@ -24,7 +24,7 @@ use crate::spectrum::revolution_map::RevolutionMap;
 /// tooth period. Hopf, flip and fold refer to the revolution.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RevolutionCollocation {
-    /// Milling problem, with equal or unequal pitch.
+    /// Milling problem of the method, with equal or unequal pitch.
     pub pitched: Pitched,
 }
 

@@ -16,7 +16,7 @@ use super::discretized::{Discretization, Discretized};
 use super::stepped::{Mesh, Step, Stepped, moments, pushed};
 use crate::problem::pitched::Pitched;
 
-/// Polynomial that approximates the delayed displacement within a step.
+/// Polynomial that approximates the delayed displacement within a time step of semi-discretization.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum SdmOrder {
     /// Constant within the step: the displacement at the delayed time of the start of the step.
@@ -26,7 +26,7 @@ pub enum SdmOrder {
     First,
 }
 
-/// Semi-discretization of order 0 or 1.
+/// Time step of semi-discretization of order 0 or 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SemiDiscretization(pub SdmOrder);
 

@@ -26,7 +26,7 @@ const GAUSS: [(f64, f64); 3] = [
     (0.887_298_334_620_741_7, 5.0 / 18.0),
 ];
 
-/// Times of the steps of a period, including every entry and exit of a tooth.
+/// Times of the time steps of a period, including every entry and exit of a tooth.
 #[derive(Clone, Debug)]
 pub(crate) struct Mesh {
     /// Starts and ends of all time steps, from 0 to the period, s, ascending.
@@ -43,7 +43,7 @@ impl Mesh {
             .iter()
             .map(|passage| passage.delay_s)
             .fold(pitched.problem.tooth_period_s(rpm), f64::min);
-        // A delay shorter than a step would make the step implicit in the displacement at its own end.
+        // A delay shorter than a time step would make the step implicit in the displacement at its own end.
         let longest_s = (pitched.problem.tooth_period_s(rpm) / steps.max(1) as f64).min(shortest_s);
         let mut times_s = vec![0.0];
         for ends in passages.switches_s().windows(2) {
@@ -64,7 +64,7 @@ impl Mesh {
         (start_s, self.times_s[index + 1] - start_s)
     }
 
-    /// Mean of the force coefficients over a step.
+    /// Mean of the force coefficients of the cut over a time step.
     pub(crate) fn mean(&self, pitched: &Pitched, index: usize) -> Coefficients {
         let (start_s, duration_s) = self.step(index);
         let nodes = GAUSS
@@ -136,7 +136,8 @@ impl Step {
     }
 }
 
-/// Map of one period at one axial depth: it advances (x_0, y_{−1}, …, y_{−K}) by one period.
+/// Map of one period at one axial depth: it advances the state x_0 of the structure and the earlier displacements
+/// y_{−1}, …, y_{−K} by one period.
 #[derive(Clone, Debug)]
 pub(crate) struct Stepped<'a> {
     pitched: &'a Pitched,
@@ -153,7 +154,7 @@ pub(crate) struct Stepped<'a> {
 }
 
 impl<'a> Stepped<'a> {
-    /// Period map from all steps of a mesh at an axial depth, m.
+    /// Period map at an axial depth, m, from all time steps of a mesh.
     pub(crate) fn new(pitched: &'a Pitched, mesh: &'a Mesh, depth_m: f64, mut steps: Vec<Step>) -> Self {
         let structure = &pitched.problem.structure;
         let seen: Vec<usize> = (0..3)
@@ -272,7 +273,8 @@ pub(crate) fn pushed(response: &DMatrix<f64>, force: &Matrix3<f64>) -> DMatrix<f
     })
 }
 
-/// Matrix exponential e^{Ah}, and moments ∫₀^h e^{A(h−s)} (s/h)^q ds B for q = 0 … `moments` − 1, each n × 3.
+/// Matrix exponential e^{Ah} over a time step h, and moments ∫₀^h e^{A(h−s)} (s/h)^q ds B for q = 0 … `moments` − 1,
+/// each n × 3.
 pub(crate) fn moments(
     a: &DMatrix<f64>,
     b: &DMatrix<f64>,

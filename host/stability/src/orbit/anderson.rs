@@ -11,10 +11,10 @@ use quietcut_numerics::least_squares::{MinimumNorm, Tolerance};
 /// Singular values of the matrix of residuals G(z) − z below this share of the largest are dropped as rounding.
 const RANK: f64 = 1e-10;
 
-/// Last iterations of the accelerated fixed-point iteration.
+/// Last iterations of a fixed-point iteration, from which the next iterate is accelerated.
 pub(super) struct Anderson {
     depth: usize,
-    /// Residual G(z) − z and image G(z) of the last iterations.
+    /// Residual G(z) − z and image G(z) of the last iterates z.
     rounds: VecDeque<(DVector<f64>, DVector<f64>)>,
 }
 

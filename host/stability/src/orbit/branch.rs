@@ -20,7 +20,7 @@ pub struct BranchPoint {
     pub outside: i32,
 }
 
-/// Bifurcation: a Floquet multiplier of the orbit crosses the unit circle.
+/// Bifurcation of a forced orbit: one of its Floquet multipliers crosses the unit circle.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Event {
     /// Axial depth, mm.
@@ -31,12 +31,12 @@ pub struct Event {
     /// Kind of bifurcation; at a fold the branch turns back in depth. With unequal teeth the kind is that of the
     /// multiplier over the revolution.
     pub kind: StabilityLoss,
-    /// True if the number of multipliers outside the unit circle falls along the branch.
+    /// True if the number of the orbit's multipliers outside the unit circle falls along the branch.
     pub gain: bool,
     /// Multiplier at the crossing.
     #[serde(skip)]
     pub multiplier: Complex64,
-    /// Frequency of the vibration that begins or ends at this depth, Hz; `None` at a fold.
+    /// Frequency of the vibration that begins or ends at the bifurcation, Hz; `None` at a fold.
     pub chatter_hz: Option<f64>,
 }
 
@@ -45,7 +45,7 @@ pub struct Event {
 pub struct Branch {
     /// Spindle speed, rev/min.
     pub rpm: f64,
-    /// Orbits along the branch, in the order in which it is followed.
+    /// Forced orbits along the branch, in the order in which it is followed.
     pub points: Vec<BranchPoint>,
     /// Bifurcations along the branch, in the order in which it is followed.
     pub events: Vec<Event>,
@@ -61,7 +61,7 @@ pub enum Extent {
 }
 
 impl Branch {
-    /// Depths with a stable forced orbit, mm, in the order of the branch.
+    /// Depth intervals with a stable forced orbit, mm, in the order of the branch.
     pub fn stable_mm(&self) -> Vec<[f64; 2]> {
         let mut outside = self.points.first().map_or(0, |point| point.outside);
         let mut from = (outside == 0).then_some(0.0);
@@ -88,8 +88,8 @@ impl Branch {
         stable
     }
 
-    /// Depths, mm, at which the errors of the events leave the stability of the orbit open: around the ends of the
-    /// stable intervals.
+    /// Depth intervals, mm, in which the errors of the bifurcations leave the stability of the orbit open: around the
+    /// ends of the stable intervals.
     fn undecided_mm(&self) -> Vec<[f64; 2]> {
         let ends = union(self.stable_mm()).into_iter().flatten();
         let around = ends.filter_map(|end_mm| {
@@ -99,7 +99,7 @@ impl Branch {
         union(around.collect())
     }
 
-    /// Depths at which two stable forced orbits exist, mm.
+    /// Depth intervals in which two stable forced orbits exist, mm.
     pub fn bistable_mm(&self) -> Vec<[f64; 2]> {
         let stable = self.stable_mm();
         let mut both = Vec::new();

@@ -1,4 +1,5 @@
-//! Collocation of a subinterval without entry or exit of a tooth, linearized about the states at its nodes.
+//! Collocation of the orbit over a subinterval without entry or exit of a tooth, linearized about the states at its
+//! nodes.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -19,18 +20,19 @@ pub(super) struct Advanced {
     pub(super) moved: f64,
 }
 
-/// A subinterval linearized about the states at its nodes.
+/// Equation of motion collocated in a subinterval and linearized about the states at its nodes.
 pub(super) struct Linearized<'a> {
     gauss: &'a Gauss,
     duration_s: f64,
     /// Jacobian ∂ẋ/∂x of the equation of motion at each node.
     jacobians: Vec<DMatrix<f64>>,
-    /// LU factors of the matrix I − h a⊗J of the collocation equations, with the duration h and the Gauss integrals a.
+    /// LU factors of the matrix I − h a⊗J of the collocation equations, with the duration h, the Gauss integrals a and
+    /// the Jacobians J.
     factored: nalgebra::LU<f64, nalgebra::Dyn, nalgebra::Dyn>,
 }
 
 impl<'a> Linearized<'a> {
-    /// Factors the collocation equations from the Jacobians at the nodes.
+    /// Factors the matrix of the collocation equations, from the Jacobians of the equation of motion at the nodes.
     pub(super) fn new(gauss: &'a Gauss, duration_s: f64, jacobians: Vec<DMatrix<f64>>) -> Self {
         let (order, nodes) = (jacobians[0].nrows(), gauss.nodes.len());
         let mut matrix = DMatrix::identity(order * nodes, order * nodes);

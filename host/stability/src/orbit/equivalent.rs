@@ -52,10 +52,10 @@ const CROSSING: f64 = 1e-6;
 /// defined.
 const NONE_MM: f64 = 1e-4;
 
-/// Stability problem of a case with friction, backlash or hysteresis.
+/// Stability problem of a case with friction, backlash or hysteresis, which act through equivalent springs and dampers.
 #[derive(Debug)]
 pub struct EquivalentProblem {
-    /// Forced problem of the case without friction, backlash and hysteresis.
+    /// Forced problem of the case without its friction, backlash and hysteresis.
     smooth: ForcedProblem,
     terms: Vec<Box<dyn RestoringForce>>,
     feed_direction_deg: f64,
@@ -65,7 +65,7 @@ pub struct EquivalentProblem {
     velocity: DMatrix<f64>,
     /// Static stiffness of the structure along each axis, N/m; 0 for a rigid axis.
     stiffness: [f64; 3],
-    /// Damping constant along each axis that stands for sticking friction, N s/m.
+    /// Damping constant along each axis that stands for sticking friction, N s/m: see [`STICKING_DAMPER`].
     most_damping: [f64; 3],
 }
 
@@ -429,7 +429,8 @@ impl Method for EquivalentProblem {
         let follower = Follower::new(self, rpm);
         let last_m = 1e-3 * depth_mm.max(NONE_MM);
         let mut settled = follower.rest();
-        // The depth grows in a few steps, so that the orbit of lower amplitude is found if two exist.
+        // The depth grows from 0 to the requested one in a few steps, so that the orbit of lower amplitude is found if
+        // two exist.
         for share in [1e-2, 0.1, 0.3, 0.6, 0.8, 1.0] {
             settled = follower.settle((share * last_m).max(1e-3 * NONE_MM), &settled)?;
         }

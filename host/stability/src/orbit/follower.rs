@@ -50,7 +50,7 @@ pub(super) struct Dominant {
     pub(super) chatter_hz: Option<f64>,
 }
 
-/// Dominant Floquet multiplier about the orbit at a depth, from the working mesh and from one twice as fine.
+/// Dominant Floquet multiplier about the forced orbit at a depth, from the working mesh and from one twice as fine.
 pub(super) fn multiplier_at(
     problem: &ForcedProblem,
     rpm: f64,
@@ -66,7 +66,7 @@ pub(super) fn multiplier_at(
     }
 }
 
-/// Orbit at a depth, reached by continuation from depth 0.
+/// Forced orbit at a depth, reached by continuation from depth 0.
 #[cfg(test)]
 pub(super) fn orbit_at(problem: &ForcedProblem, rpm: f64, depth_mm: f64) -> Result<Orbit, OrbitError> {
     let depth_m = depth_mm * 1e-3;

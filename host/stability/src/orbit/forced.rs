@@ -38,22 +38,22 @@ pub struct ForcedProblem {
     pub(super) uneven: Option<Uneven>,
     /// Cubic stiffness and damping terms; `None` for a linear structure.
     pub(super) cubic: Option<CubicForce>,
-    /// Smooth restoring forces of extensions, with the structure in the machine's axes.
+    /// Smooth restoring forces of the case's extensions, with the structure in the machine's axes.
     smooth: Option<Smooth>,
-    /// Chip law; `None` if the cutting force is proportional to the chip thickness.
+    /// Chip law of the cutting force; `None` if the force is proportional to the chip thickness.
     chip: Option<ChipLaw>,
     /// Process damping; `None` if absent.
     flank: Option<Flank>,
     /// Input matrix B times a constant force along the machine's axes; `None` if no such force acts.
     push: Option<DVector<f64>>,
-    /// True if a force does not make the velocity jump: the structure has a mass at the tool.
+    /// True if the structure has a mass at the tool, so that a force at the tool does not make its velocity jump.
     inertial: bool,
 }
 
 /// Teeth with unequal pitch or runout.
 #[derive(Clone, Debug)]
 pub(super) struct Uneven {
-    /// Linear problem with the revolution as its period.
+    /// Linear delay problem with the revolution as its period.
     pub(super) pitched: Pitched,
     /// Increase of the chip thickness of each tooth by the radius difference to the preceding tooth (runout), m.
     pub(super) runout_m: Vec<f64>,
@@ -78,19 +78,19 @@ impl Uneven {
     }
 }
 
-/// Smooth restoring forces f_r along the machine's axes.
+/// Smooth restoring forces f_r of the case's extensions, along the machine's axes.
 #[derive(Clone, Debug)]
 struct Smooth {
     terms: Vec<Arc<dyn RestoringForce>>,
     /// Input matrix B of the structure for forces along the machine's axes.
     b: DMatrix<f64>,
-    /// Matrix C, in the machine's axes, that gives the displacement from the states.
+    /// Output matrix C that gives the displacement along the machine's axes from the states.
     displacement: DMatrix<f64>,
-    /// Matrix C A, in the machine's axes, that gives the velocity from the states.
+    /// Output matrix C A that gives the velocity along the machine's axes from the states.
     velocity: DMatrix<f64>,
 }
 
-/// Process damping by the flank of the tooth.
+/// Process damping by contact of the tooth's flank with the wavy surface.
 #[derive(Clone, Debug)]
 struct Flank {
     law: ProcessDamping,
@@ -127,7 +127,8 @@ impl Smooth {
     }
 }
 
-/// Cubic terms N(x) of a case in the lower half of the states of its linear problem; `None` for a linear structure.
+/// Cubic terms N(x) of a case, which act on the lower half of the states of its linear problem; `None` for a linear
+/// structure.
 fn cubic_force(case: &Case, linear: &Problem) -> Result<Option<CubicForce>, StabilityError> {
     let structure = case.structure()?;
     let Some(matrices) = structure.equation().filter(|_| structure.is_nonlinear()) else {
@@ -203,7 +204,7 @@ impl ForcedProblem {
             );
         }
         Ok(Self {
-            // Runout on a linear structure moves the orbit, but not the equation linearized about it.
+            // Runout on a linear structure moves the orbit, but does not change the equation linearized about it.
             uneven: uneven.filter(|_| !is_linear),
             smooth: (!about.terms.is_empty()).then(|| Smooth::new(about.terms, &machine)),
             chip: about.law.chip,
@@ -288,7 +289,7 @@ impl ForcedProblem {
         })
     }
 
-    /// Spindle speed of a tooth period `period_s`, rad/s.
+    /// Spindle speed, rad/s, at which the tooth period is `period_s`.
     pub(super) fn speed_rad_per_s(&self, period_s: f64) -> f64 {
         TAU / (period_s * self.linear.teeth as f64)
     }
@@ -298,8 +299,8 @@ impl ForcedProblem {
         self.linear.structure.order()
     }
 
-    /// Force per axial depth, N/m, of all cutting teeth on an orbit at a phase of the tooth period (rad), due to feed
-    /// and edges.
+    /// Force per axial depth, N/m, due to feed and edges, of all teeth that cut at a phase of the tooth period (rad).
+    /// The vibration does not enter.
     pub(super) fn force_per_depth(&self, teeth: usize, phase: f64) -> Vector3<f64> {
         let process = &self.linear.process;
         (0..teeth)
@@ -347,8 +348,8 @@ impl ForcedProblem {
         }
     }
 
-    /// Jacobian of the orbit equation at a state, A − ∂N/∂x − B ∂f_r/∂x − (force per depth)·∂z/∂x, without process
-    /// damping.
+    /// Jacobian of the equation of a forced orbit at a state, A − ∂N/∂x − B ∂f_r/∂x − (force per depth)·∂z/∂x, without
+    /// process damping.
     pub(super) fn jacobian(&self, state: &[f64], force_per_depth: &Vector3<f64>) -> DMatrix<f64> {
         let structure = &self.linear.structure;
         let mut jacobian = structure.a.clone();

@@ -30,7 +30,7 @@ pub enum OrbitError {
         /// Axial depth, mm.
         depth_mm: f64,
     },
-    /// The Floquet multipliers about the orbit cannot be computed.
+    /// The Floquet multipliers about a forced orbit cannot be computed.
     #[error("the Floquet multipliers about the orbit at {depth_mm} mm cannot be computed: {cause}")]
     Eigenvalues {
         /// Axial depth, mm.
@@ -50,7 +50,7 @@ impl OrbitError {
     }
 }
 
-/// Periodic orbit, by its state at the start of the period, where a tooth enters.
+/// Forced periodic orbit, given by its state at the start of the period, where a tooth enters.
 #[derive(Clone, Debug)]
 pub struct Orbit {
     /// Axial depth, m.
@@ -100,7 +100,7 @@ impl PeriodIntegration {
         self.moved = self.moved.max(subinterval.moved);
     }
 
-    /// Matrix I − ∂end/∂start of the periodicity condition.
+    /// Matrix I − ∂end/∂start of the periodicity condition, with the states at start and end of the period.
     pub(super) fn periodic(&self) -> DMatrix<f64> {
         let size = self.end.len();
         let mut periodic = -self.by.columns(0, size);
@@ -114,7 +114,7 @@ impl PeriodIntegration {
 /// Tangent of a branch of orbits over the depth, at one orbit.
 #[derive(Clone, Debug)]
 pub(super) struct Tangent {
-    /// Unit tangent of start and depth, each divided by its [`Scale`].
+    /// Unit tangent of the branch: changes of the orbit's start state and of the depth, each divided by its [`Scale`].
     pub(super) along: DVector<f64>,
     /// Change of the states at the nodes of each subinterval per unit of length along the branch, n states × m nodes.
     states: Vec<DMatrix<f64>>,
@@ -132,10 +132,10 @@ pub(super) struct SubintervalNodes<'a> {
 /// as e' = C e², so that two successive steps e and e' predict the next one: C e'² = e'³/e².
 const SETTLED: f64 = 1e-12;
 
-/// Size of a Newton step, relative to the orbit, above which the prediction of the next step is not used yet. A choice.
+/// Size of a Newton step, relative to the orbit, above which the size of the next step is not predicted yet. A choice.
 const NEAR: f64 = 1e-3;
 
-/// Map of a forced problem over a period at one speed on one mesh; orbits are its fixed points.
+/// Map of a forced problem over a period at one spindle speed on one mesh; forced orbits are its fixed points.
 pub(super) trait PeriodMap: Sized {
     /// Forced problem of the map.
     fn problem(&self) -> &ForcedProblem;
@@ -159,13 +159,13 @@ pub(super) trait PeriodMap: Sized {
     /// states at the nodes.
     fn start_of(&self, state: DVector<f64>, states: &[DMatrix<f64>]) -> DVector<f64>;
 
-    /// All Floquet multipliers about an orbit, largest first.
+    /// All Floquet multipliers about a forced orbit, largest first.
     ///
     /// # Errors
     /// The linearized equations are singular, or the eigenvalues cannot be computed.
     fn multipliers(&self, orbit: &Orbit) -> Result<Vec<Complex64>, Breakdown>;
 
-    /// Vibration frequency of a Floquet multiplier about an orbit, Hz.
+    /// Vibration frequency of a Floquet multiplier about a forced orbit, Hz.
     fn chatter_hz(&self, orbit: &Orbit, multiplier: Complex64) -> Option<f64>;
 
     /// The same map over the period on a finer mesh, for error estimates; `None` if there is no such mesh.
@@ -186,7 +186,7 @@ impl Orbit {
         }
     }
 
-    /// Transfers the orbit from the nodes of one mesh to those of another.
+    /// Interpolates the orbit from the nodes of one mesh to those of another.
     pub(super) fn onto(&self, own: &impl PeriodMap, other: &impl PeriodMap) -> Self {
         let subintervals = own.subinterval_nodes();
         let at = |time_s: f64| -> DVector<f64> {
@@ -233,7 +233,7 @@ impl Orbit {
         })
     }
 
-    /// Predicted orbit one step length further along a branch.
+    /// Predicted orbit a given arc length further along the branch.
     pub(super) fn along(&self, tangent: &Tangent, length: f64, scale: Scale) -> Self {
         let order = self.start.len();
         let states = self.states.iter().zip(&tangent.states);

@@ -13,7 +13,7 @@ use quietcut_model::path::{SampledMotion, restoring_along, restoring_from};
 /// Over a subinterval the fastest motion rotates by a few radians. A choice.
 const PER_SUBINTERVAL: usize = 128;
 
-/// Least number of samples of the orbit in a period. A choice.
+/// Least number of samples of the orbit in a period for the forces of friction, backlash and hysteresis. A choice.
 const LEAST: usize = 1024;
 
 /// Largest number of periods in which terms with internal states must reach a closed hysteresis loop. A choice.
@@ -23,7 +23,7 @@ const PERIODS: usize = 64;
 /// loop counts as closed.
 const CLOSED: f64 = 1e-8;
 
-/// Linear restoring force f_r = force + stiffness·x + damping·ẋ along one axis.
+/// Linear equivalent of the restoring forces along one axis: f_r = force + stiffness·x + damping·ẋ.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Spring {
     /// Constant force, N.
@@ -164,7 +164,7 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-/// Regression coefficient ⟨a b⟩/⟨b²⟩; 0 if b vanishes.
+/// Regression coefficient ⟨a b⟩/⟨b²⟩ of the signal a on the signal b; 0 if b vanishes.
 fn share(a: &[f64], b: &[f64]) -> f64 {
     let whole = dot(b, b);
     if whole > 0.0 { dot(a, b) / whole } else { 0.0 }

@@ -24,9 +24,9 @@ use quietcut_numerics::eigenvalues::eigenvector;
 
 /// Cutting tooth at a node.
 struct Tooth {
-    /// Cutting force per axial depth and chip, Pa.
+    /// Cutting force of this tooth per axial depth and chip thickness, Pa.
     cutting: Vector3<f64>,
-    /// Edge force per axial depth, N/m.
+    /// Edge force of this tooth per axial depth, N/m.
     edge: Vector3<f64>,
     /// Row nᵀ C, by which the states give the displacement along the chip normal of this tooth.
     seen: RowDVector<f64>,
@@ -42,7 +42,7 @@ struct Forces {
     damping: Vec<DMatrix<f64>>,
 }
 
-/// Mesh of a revolution at one spindle speed with the forces at its nodes.
+/// Mesh of one revolution of the tool at one spindle speed, with the forces at its nodes.
 pub(super) struct RevolutionPeriod<'a> {
     problem: &'a ForcedProblem,
     uneven: &'a Uneven,

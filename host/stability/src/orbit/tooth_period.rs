@@ -42,7 +42,7 @@ pub(super) struct Subinterval {
     pub(super) damping: Vec<DMatrix<f64>>,
 }
 
-/// Mesh of a tooth period at one spindle speed.
+/// Mesh of a tooth period at one spindle speed, on which forced orbits are collocated.
 #[derive(Clone, Debug)]
 pub(super) struct ToothPeriod<'a> {
     pub(super) problem: &'a ForcedProblem,
@@ -53,7 +53,7 @@ pub(super) struct ToothPeriod<'a> {
 }
 
 impl<'a> ToothPeriod<'a> {
-    /// Mesh of the tooth period of a problem at a spindle speed.
+    /// Working mesh of the tooth period of a forced problem at a spindle speed.
     pub(super) fn new(problem: &'a ForcedProblem, rpm: f64) -> Self {
         Self::with_subintervals(problem, rpm, SUBINTERVAL_ANGLE)
     }
@@ -69,7 +69,7 @@ impl<'a> ToothPeriod<'a> {
         }
     }
 
-    /// Mesh with subintervals over which no motion exceeds a phase angle, rad.
+    /// Mesh of the tooth period whose subintervals are so short that no motion rotates by more than a phase angle, rad.
     pub(super) fn with_subintervals(problem: &'a ForcedProblem, rpm: f64, subinterval_angle: f64) -> Self {
         let linear = &problem.linear;
         let engagement = &linear.process.engagement;
@@ -85,8 +85,8 @@ impl<'a> ToothPeriod<'a> {
         let mut subintervals = Vec::new();
         for interval in engagement.subintervals() {
             let length = interval.to - interval.from;
-            // Phase angle of the fastest pole, plus that of the directional coefficients, which oscillate at twice the
-            // rotation of the tool.
+            // Phase angle over the whole interval: that of the fastest pole, plus that of the directional coefficients,
+            // which oscillate at twice the rotation of the tool.
             let angle = fastest * length * seconds_per_radian + 2.0 * length;
             let count = (angle / subinterval_angle).ceil().max(1.0);
             let turn = length / count;

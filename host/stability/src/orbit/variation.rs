@@ -11,7 +11,8 @@ use super::periodic_orbit::Orbit;
 use super::tooth_period::{Subinterval, ToothPeriod};
 use crate::problem::period::{Element, Period, Port};
 
-/// Elements of the tooth period, linearized about an orbit; `None` if a subinterval is singular.
+/// Elements of the delay equation over a tooth period, linearized about a forced orbit; `None` if a subinterval is
+/// singular.
 pub(super) fn about(map: &ToothPeriod<'_>, orbit: &Orbit) -> Option<Period> {
     let order = map.problem.order();
     let mut elements = Vec::new();

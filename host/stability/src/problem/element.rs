@@ -11,13 +11,14 @@ use quietcut_numerics::quadrature::Gauss;
 /// axial depth w.
 #[derive(Clone, Debug)]
 pub(crate) struct Element {
-    /// State transition G without regenerative force, n × n.
+    /// State transition G from the start to the end of the element without regenerative force, n × n.
     pub(crate) flow: DMatrix<f64>,
     /// Matrix E, ports × n: displacements p due to the state at the start of the element.
     pub(crate) observe: DMatrix<f64>,
     /// Response Q of the displacements p to the regenerative chips p − p_τ, ports × ports, per meter of axial depth.
     pub(crate) kernel: DMatrix<f64>,
-    /// Response T of the state at the end to the regenerative chips p − p_τ, n × ports, per meter of axial depth.
+    /// Response T of the state at the end of the element to the regenerative chips p − p_τ, n × ports, per meter of
+    /// axial depth.
     pub(crate) drive: DMatrix<f64>,
     /// Time, weight and force of each port (cutting tooth at a node), in the order of the rows of E.
     pub(crate) ports: Vec<Port>,
@@ -38,7 +39,7 @@ pub(crate) struct Axial {
     pub(crate) ports: Vec<Port>,
 }
 
-/// One cutting tooth at one collocation node.
+/// Port of an element: one cutting tooth at one collocation node.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Port {
     /// Time of the node from the start of the period, s.
@@ -55,7 +56,7 @@ pub(crate) struct Port {
 pub(crate) struct CuttingTooth {
     /// Immersion angle of this tooth at phase 0 of the period, rad.
     pub(crate) immersion: f64,
-    /// Feed of the tool between the preceding tooth and this one, m.
+    /// Feed of the tool between the passages of the preceding tooth and of this one, m.
     pub(crate) feed_m: f64,
 }
 
@@ -81,7 +82,7 @@ impl<'a> Step<'a> {
             .iter()
             .map(|&node| exponential.at(duration * node))
             .collect();
-        // Gauss nodes are symmetric: h − t_j is the time of the node with the mirrored index.
+        // Gauss nodes are symmetric in the element: h − t_j is the time of the node with the mirrored index.
         let drive: Vec<MatrixXx3<f64>> = forward.iter().rev().map(|flow| flow * &structure.b).collect();
         // Responses carried back to the start follow from the forward ones: e^{−A t} = e^{−A h} e^{A (h − t)}.
         let back = exponential.at(-duration);

@@ -41,8 +41,8 @@ impl Exponential {
         multiply(&square, &x, &mut cube);
         multiply(&square, &square, &mut fourth);
         let powers = [DMatrix::identity(n, n), x, square, cube];
-        // Σ x^k/k! in blocks of four powers (Paterson & Stockmeyer), highest block first; x¹⁶/16! is the fourth power
-        // alone.
+        // Sums the Taylor series Σ x^k/k! in blocks of four powers (Paterson & Stockmeyer), highest block first;
+        // x¹⁶/16! is the fourth power alone.
         let mut inverse_factorials = [1.0; 17];
         for k in 1..inverse_factorials.len() {
             inverse_factorials[k] = inverse_factorials[k - 1] / k as f64;

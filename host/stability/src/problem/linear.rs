@@ -29,7 +29,7 @@ pub struct Problem {
 pub enum CubicTerms {
     /// Cases with cubic terms are refused, since their limits depend on the forced motion.
     Refuse,
-    /// Cubic terms are omitted: the limits are those for vanishing feed.
+    /// Cubic terms of the structure are omitted: the limits are those for vanishing feed.
     LeaveOut,
     /// Cubic terms and other smooth nonlinear effects are left to the caller, who treats them about a forced orbit; the
     /// result is the linear part.
@@ -56,7 +56,8 @@ impl Problem {
         Self::of(case, cubic, cutting(case, cubic.treated())?)
     }
 
-    /// Builds the linear problem like [`new`](Self::new), but replaces unequal pitches by their mean.
+    /// Builds the linear delay problem like [`new`](Self::new), but replaces unequal pitches of the teeth by their
+    /// mean.
     pub(crate) fn with_mean_pitch(case: &Case, cubic: CubicTerms) -> Result<Self, StabilityError> {
         Self::of(case, cubic, cutting_with_mean_pitch(case, cubic.treated())?)
     }
@@ -111,7 +112,7 @@ pub(crate) fn cutting(case: &Case, treated: Treated) -> Result<(Process, usize),
     cutting_with_mean_pitch(case, treated)
 }
 
-/// Cutting process and number of teeth of a case; unequal pitches are replaced by their mean.
+/// Cutting process and number of teeth of a case; unequal pitches of the teeth are replaced by their mean.
 fn cutting_with_mean_pitch(case: &Case, treated: Treated) -> Result<(Process, usize), StabilityError> {
     let (tool, cut) = (case.tool()?, case.cut()?);
     treatment::refuse_others(case, treated)?;

@@ -46,7 +46,8 @@ impl Resolution {
         angle: 5.0,
         tolerance: 1e-13,
     };
-    /// Finer mesh: the change of a result from the working mesh to this one estimates the error of the working mesh.
+    /// Finer mesh of the tooth period: the change of a result from the working mesh to this one estimates the error of
+    /// the working mesh.
     pub(crate) const FINE: Self = Self {
         angle: 3.0,
         tolerance: 1e-16,
@@ -81,7 +82,7 @@ pub(crate) fn check_length(problem: &Problem, rpm: f64, depth_mm: f64) -> Result
 /// Mesh of one tooth period at one spindle speed.
 #[derive(Clone, Debug)]
 pub(crate) struct Period {
-    /// Elements during which teeth cut, in order of time.
+    /// Elements of the period during which teeth cut, in order of time.
     pub(crate) elements: Vec<Element>,
     /// State transition e^{Ah} of the free flight after the elements, n × n; the identity if teeth cut until the end of
     /// the period.
@@ -133,7 +134,7 @@ impl Period {
     }
 }
 
-/// Rates of the fastest motion: poles of the free structure, and stiffening by the cut.
+/// Rates of the fastest motion of a cut: poles of the free structure, and stiffening by the cutting force.
 pub(crate) struct Rates {
     /// Largest magnitude of a pole of the free structure, rad/s.
     poles: f64,

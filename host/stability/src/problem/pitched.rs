@@ -34,7 +34,7 @@ impl Pitched {
         Ok(Self { problem, pitch_rad })
     }
 
-    /// The problem with the mean pitch; it shares structure, cutting process and number of teeth with this one.
+    /// The same delay problem with the mean pitch; it shares structure, cutting process and number of teeth.
     pub fn with_mean_pitch(&self) -> &Problem {
         &self.problem
     }

@@ -11,7 +11,7 @@ use super::exponential::Exponential;
 use super::pitched::Pitched;
 use super::revolution_mesh::{Fineness, Flight, RevolutionMesh, Subinterval};
 
-/// Collocated revolution at one spindle speed.
+/// Delay equation of one revolution at one spindle speed, collocated on its mesh.
 pub(crate) struct Revolution<'a> {
     pub(crate) pitched: &'a Pitched,
     pub(crate) mesh: RevolutionMesh,

@@ -16,7 +16,7 @@ use quietcut_numerics::quadrature::Gauss;
 /// Subinterval length, tolerance and number of kink generations of the mesh over a revolution.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Fineness {
-    /// Largest phase angle, rad, of the fastest motion over one subinterval.
+    /// Largest phase angle, rad, by which the fastest motion may rotate over one subinterval.
     pub(crate) angle: f64,
     /// Target for the interpolation error within a subinterval, relative to the motion at the fastest rate.
     pub(crate) tolerance: f64,
@@ -97,7 +97,8 @@ pub(crate) struct Subinterval {
 pub(crate) struct RevolutionMesh {
     pub(crate) passages: ToothPassages,
     pub(crate) subintervals: Vec<Subinterval>,
-    /// Displacements of the preceding revolution that act in this one, with their first row in the state.
+    /// Displacements of the preceding revolution that act in the present one, each with its first row in the state
+    /// vector of the map.
     pub(crate) kept: Vec<(Series, usize)>,
     /// Number of rows of the map's state vector: the states of the structure, then the `kept` displacements.
     pub(crate) size: usize,
@@ -154,7 +155,8 @@ impl RevolutionMesh {
         Some(mesh)
     }
 
-    /// Finds the delayed displacement of every port; `None` if the preceding tooth did not cut at that time.
+    /// Finds the delayed displacement of every port (cutting tooth at a node); `None` if the preceding tooth did not
+    /// cut at the delayed time.
     fn link(&mut self) -> Option<()> {
         let period_s = self.passages.period_s;
         let starts_s: Vec<f64> = self

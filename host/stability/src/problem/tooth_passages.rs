@@ -50,7 +50,7 @@ impl ToothPassages {
         let process = &pitched.problem.process;
         let period_s = process.engagement.pitch / rad_per_s;
         let width_s = (process.engagement.exit - process.engagement.start) / rad_per_s;
-        // A tooth that leaves within rounding of the start of the period does not cut in it.
+        // A tooth of the preceding period that leaves within rounding of the start of this period does not cut in it.
         let count = (width_s / period_s - 1e-9).ceil().max(1.0) as usize;
         let list = (0..count).map(|index| {
             let entry_s = -(index as f64) * period_s;
@@ -108,7 +108,7 @@ impl ToothPassages {
         }
     }
 
-    /// Times at which a tooth enters or leaves, s, ascending, with both ends of the period.
+    /// Times at which a tooth enters or leaves the cut, s, ascending, with both ends of the period.
     pub(crate) fn switches_s(&self) -> Vec<f64> {
         let ends = self
             .list
@@ -147,7 +147,7 @@ pub(crate) fn distinct(mut times_s: Vec<f64>, period_s: f64) -> Vec<f64> {
     times_s
 }
 
-/// Force coefficients of the displacement at one time, or averaged over an interval of time.
+/// Force per displacement of the cut (force coefficients), at one time or averaged over an interval of time.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Coefficients {
     /// For each regenerative delay: the delay, s, and the sum Σ K α of cutting coefficient times directional

@@ -1,4 +1,4 @@
-//! Extensions of a case in the stability problem: their effect on structure and cutting process.
+//! Extensions of a case in the stability problem: their effect on the structure and on the cutting process.
 
 pub(crate) mod extension;
 pub(crate) mod treatment;

@@ -4,16 +4,16 @@ use crate::error::StabilityError;
 use quietcut_model::case::Case;
 use quietcut_model::effects::{EffectSpec, Treatment};
 
-/// Set of extensions that a method treats.
+/// Set of extensions of a case that a stability method treats.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Treated {
-    /// Linear extensions of the cutting process only; measured receptances replace the structure.
+    /// The method treats linear extensions of the cutting process only; measured receptances replace the structure.
     LinearProcess,
-    /// Linear extensions of structure and cutting process.
+    /// The method treats linear extensions of structure and cutting process.
     Linear,
-    /// Linear extensions; smooth nonlinear terms are omitted, which gives the limits for vanishing feed.
+    /// The method treats linear extensions and omits smooth nonlinear terms, which gives the limits for vanishing feed.
     WithoutSmooth,
-    /// All extensions with a Jacobian or an equivalent linearization about a forced orbit.
+    /// The method treats all extensions with a Jacobian or an equivalent linearization about a forced orbit.
     AboutOrbit,
 }
 

@@ -33,10 +33,10 @@ pub(crate) trait Spectrum {
         Some(Root { multiplier, slope })
     }
 
-    /// The crossing of the unit circle near a guess, at an axial depth between `low_m` and `high_m`.
+    /// Crossing of the unit circle by a multiplier near a guess, at an axial depth between `low_m` and `high_m`.
     fn crossing_near(&mut self, guess: Crossing, low_m: f64, high_m: f64) -> Option<Crossing>;
 
-    /// Chatter frequency at a crossing of the unit circle, Hz.
+    /// Chatter frequency at a crossing of the unit circle by a multiplier, Hz.
     fn chatter_hz(&self, crossing: &Crossing) -> Option<f64>;
 
     /// Error estimate of the multiplier at a crossing, as an absolute value; `None` if the computation on a finer mesh

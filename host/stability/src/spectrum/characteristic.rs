@@ -24,8 +24,8 @@ const TERM: f64 = 1e-17;
 /// of 1.5 is 3000, so that 20 terms lose three digits to rounding.
 const RADIUS: f64 = 1.5;
 
-/// Largest number of terms of a polynomial in κ: a limit on computing time. Elements are so short that far fewer are
-/// needed.
+/// Largest number of terms of an element's polynomial in κ: a limit on computing time. Elements are so short that far
+/// fewer are needed.
 const TERMS_MAX: usize = 60;
 
 /// Transition matrix Φ(κ) over a tooth period at one spindle speed.
@@ -36,7 +36,7 @@ pub(crate) struct Characteristic {
     scale: f64,
     /// For each element the coefficients of its polynomial in κ/scale, n × n row by row.
     elements: Vec<Vec<f64>>,
-    /// Transition matrix of the free flight, n × n row by row.
+    /// Transition matrix of the structure over the free flight, in which no tooth cuts, n × n row by row.
     flight: Vec<f64>,
 }
 
@@ -191,8 +191,8 @@ impl Characteristic {
     /// Its error is about the square of that of the guess. `None` if the relative step exceeds 0.01, or if κ is too
     /// large for the polynomials.
     pub(crate) fn root_near(&self, guess: Complex64, depth_m: f64, work: &mut Workspace) -> Option<Root> {
-        // Both logarithmic derivatives of F are infinite at a root of F. Close to it their ratio is smooth, so that
-        // they are evaluated 1e-7 away.
+        // Both logarithmic derivatives of the characteristic function F are infinite at a root of F. Close to it their
+        // ratio is smooth, so that they are evaluated at a relative distance of 1e-7.
         let nearby = guess + Complex64::new(1e-7, 1e-7) * guess.norm();
         if (Complex64::ONE - nearby.inv()).norm() * depth_m > RADIUS * self.scale {
             return None;
@@ -246,7 +246,8 @@ impl Characteristic {
             let (step, turn) = if real {
                 (-by_depth.re.recip(), 0.0)
             } else {
-                // Newton step from 1 + (∂ ln F/∂w) dw + (∂ ln F/∂θ) dθ = 0, real and imaginary part.
+                // Newton step towards F(w, θ) = 0 from 1 + (∂ ln F/∂w) dw + (∂ ln F/∂θ) dθ = 0, real and imaginary
+                // part.
                 let determinant = by_depth.re * by_angle.im - by_depth.im * by_angle.re;
                 (
                     -(one.re * by_angle.im - one.im * by_angle.re) / determinant,

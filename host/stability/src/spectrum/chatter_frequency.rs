@@ -84,7 +84,8 @@ pub(crate) fn dominant_frequency_hz(
         .map(|(_, frequency_hz)| frequency_hz)
 }
 
-/// Force times quadrature weight of every port along the Floquet mode, with the time of the port.
+/// Force along the Floquet mode times quadrature weight, for every port (cutting tooth at a node), with the time of the
+/// node.
 fn eigenfunction_forces(
     period: &Period,
     multiplier: Complex64,
@@ -100,8 +101,8 @@ fn eigenfunction_forces(
     let mut seen_from = Vec::with_capacity(period.elements.len());
     let (mut length, share) = (0.0, 1.0 / period.elements.len().max(1) as f64);
     for element in &period.elements {
-        // Ends the part before some motion has grown by the factor `GROWTH` more than the Floquet mode, whose share
-        // would then be rounding.
+        // Ends the part of the period before some motion has grown by the factor `GROWTH` more than the Floquet mode,
+        // whose share of that motion would then be rounding.
         if part.norm() > GROWTH * multiplier.norm().powf(length) {
             parts.push(std::mem::replace(&mut part, identity.clone()));
             length = 0.0;
@@ -126,7 +127,7 @@ fn eigenfunction_forces(
             for (port, seen) in ports.iter().zip(seen.iter()) {
                 let force = port.force.map(Complex64::from) * (seen * factor * port.weight_s);
                 match forces.last_mut() {
-                    // Another tooth cuts at the same node: forces add up.
+                    // Another tooth cuts at the same node: the forces of both add up.
                     Some((time_s, sum)) if *time_s == port.time_s => *sum += force,
                     _ => forces.push((port.time_s, force)),
                 }

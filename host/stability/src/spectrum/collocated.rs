@@ -18,7 +18,7 @@ pub(crate) struct Collocated<'a> {
     problem: &'a Problem,
     rpm: f64,
     deepest_m: f64,
-    /// Coarse mesh of the tooth period, for all multipliers at once.
+    /// Coarse mesh of the tooth period, on which all multipliers are computed at once.
     coarse: Period,
     /// Working mesh, for limits.
     period: Period,

@@ -1,4 +1,4 @@
-//! A crossing of the unit circle along the depth.
+//! A crossing of the unit circle by a Floquet multiplier along the axial depth.
 
 use num_complex::Complex64;
 
@@ -7,6 +7,6 @@ use num_complex::Complex64;
 pub(crate) struct Crossing {
     /// Axial depth, m.
     pub(crate) depth_m: f64,
-    /// Multiplier e^{iθ} at the crossing, with θ in [0, π].
+    /// Multiplier e^{iθ} on the unit circle, with θ in [0, π].
     pub(crate) multiplier: Complex64,
 }

@@ -29,11 +29,11 @@ const TOLERANCE: f64 = 1e-16;
 
 type Matrix = DMatrix<Complex64>;
 
-/// Mode x and adjoint y at one node of the quadrature.
+/// Floquet mode x and its adjoint y at one node of the quadrature over the period.
 #[derive(Clone, Debug)]
 pub(crate) struct Node {
-    /// Quadrature weight, s; 0 for the two instants at which a tooth enters or leaves, which are no nodes of the
-    /// quadrature.
+    /// Quadrature weight of the node, s; 0 for the two instants at which a tooth enters or leaves, which are no nodes
+    /// of the quadrature.
     pub(crate) weight_s: f64,
     /// Phase of the tooth period at this node, rad.
     pub(crate) phase: f64,
@@ -50,11 +50,11 @@ pub(crate) struct Node {
 pub(crate) struct FloquetMode {
     /// Nodes of the quadrature over the tooth period, in order of time.
     pub(crate) nodes: Vec<Node>,
-    /// Mode and adjoint at the entry of a tooth, which is the start of the period.
+    /// Floquet mode and its adjoint at the entry of a tooth, which is the start of the period.
     pub(crate) entry: Node,
-    /// Mode and adjoint at the exit of a tooth.
+    /// Floquet mode and its adjoint at the exit of a tooth.
     pub(crate) exit: Node,
-    /// Inner product lᵀ r of left and right eigenvector of the transition matrix.
+    /// Inner product lᵀ r of left and right eigenvector of the transition matrix over the period.
     pub(crate) overlap: Complex64,
 }
 
@@ -266,7 +266,7 @@ impl Basis {
     }
 }
 
-/// Transition of the state from the start of a subinterval to its nodes and to its end.
+/// Transition of the Floquet mode from the start of a subinterval to its nodes and to its end.
 struct MapFactor {
     /// Transition matrix from the start to the end of the subinterval, n × n.
     transition: Matrix,
@@ -281,7 +281,8 @@ impl MapFactor {
         let nodes = basis.gauss.nodes.len();
         let per_node = ports.first().map_or(0, Vec::len);
         let complex = |matrix: &DMatrix<f64>| matrix.map(Complex64::from);
-        // Rows seenᵀ C e^{A t_i} and columns e^{−A t_j} B force, port by port within each node.
+        // Rows seenᵀ C e^{A t_i} that observe the displacement and columns e^{−A t_j} B force that act on the state,
+        // port by port within each node.
         let mut rows = Matrix::zeros(nodes * per_node, order);
         let mut columns = Matrix::zeros(order, nodes * per_node);
         for (i, ports) in ports.iter().enumerate() {

@@ -79,7 +79,7 @@ impl Shifted {
         }
     }
 
-    /// Solves (H − s I) x = b in place.
+    /// Solves (H − s I) x = b in place from the factors, with b in `vector`.
     fn solve(&self, vector: &mut DVector<Complex64>) {
         let (size, band) = (self.size, self.band);
         for column in 0..size {
@@ -101,7 +101,7 @@ impl Shifted {
         }
     }
 
-    /// Solves (H − s I)ᵀ y = b in place.
+    /// Solves the transposed system (H − s I)ᵀ y = b in place from the factors, with b in `vector`.
     #[cfg(test)]
     fn solve_transposed(&self, vector: &mut DVector<Complex64>) {
         let (size, band) = (self.size, self.band);

@@ -16,7 +16,7 @@ use quietcut_numerics::eigenvalues::{self, EigenvalueError, eigenvector};
 /// space.
 const BLOCK: usize = 3;
 
-/// Largest size of a map for which all eigenvalues are computed from its matrix, which is as fast as block Arnoldi
+/// Largest dimension of a map for which all eigenvalues are computed from its matrix, which is as fast as block Arnoldi
 /// there.
 const WHOLE: usize = 90;
 
@@ -28,7 +28,8 @@ const BLOCKS_BEFORE_EIGENVALUES: usize = 10;
 /// of some hundred steps.
 const RESIDUAL: f64 = 1e-11;
 
-/// Residual, relative to max(1, |μ|), below which an eigenvalue is accepted as a starting value of Newton's method.
+/// Residual ‖M v − μ v‖ with ‖v‖ = 1, relative to max(1, |μ|), below which an eigenvalue is accepted as a starting
+/// value of Newton's method.
 const ROUGH: f64 = 1e-7;
 
 /// Largest number of vectors of a Krylov space. One eigenvalue computation then takes one or two seconds; maps that
@@ -39,7 +40,7 @@ const SPACE_MAX: usize = 480;
 /// not converge.
 const ROUGH_SPACE_MAX: usize = 240;
 
-/// Largest map of which all eigenvalues are computed: about 10 n³ operations, some ten seconds.
+/// Largest dimension n of a map of which all eigenvalues are computed: about 10 n³ operations, some ten seconds.
 pub(crate) const WHOLE_MAX: usize = 1200;
 
 /// Norm of a vector after orthogonalization, relative to that before, below which it counts as linearly dependent:
@@ -55,10 +56,10 @@ pub(crate) trait LinearMap {
     fn apply(&self, columns: &DMatrix<f64>) -> Option<DMatrix<f64>>;
 }
 
-/// Eigenvalues above a given size, largest first, with a subspace that contains their eigenvectors.
+/// Eigenvalues of a linear map above a given size, largest first, with a subspace that contains their eigenvectors.
 #[derive(Clone, Debug)]
 pub(crate) struct Dominant {
-    /// Eigenvalues; complex ones in exact conjugate pairs.
+    /// Eigenvalues of the map; complex ones in exact conjugate pairs.
     pub(crate) eigenvalues: Vec<Complex64>,
     /// Orthonormal basis of the subspace, by columns; `None` for the whole space.
     basis: Option<DMatrix<f64>>,
@@ -93,7 +94,7 @@ impl Dominant {
     }
 
     fn kept(map: &impl LinearMap, keep: &dyn Fn(&mut Vec<Complex64>)) -> Result<Self, Breakdown> {
-        // A Krylov space of more than half the dimension costs more than the eigenvalues of the whole matrix.
+        // A Krylov space of more than half the map's dimension costs more than all eigenvalues of the map's matrix.
         let most = (map.size() / 2).min(SPACE_MAX);
         if map.size() > WHOLE
             && let Ok(found) = arnoldi(map, most, RESIDUAL, keep)
@@ -131,9 +132,9 @@ impl Dominant {
 pub(crate) struct Largest {
     /// Eigenvalues of the map, with a residual of about 1e-7 if they have converged.
     pub(crate) eigenvalues: Vec<Complex64>,
-    /// False if block Arnoldi did not converge.
+    /// False if block Arnoldi did not converge, so that larger eigenvalues may be missing.
     pub(crate) is_settled: bool,
-    /// Largest entry of the map projected on the Krylov space.
+    /// Largest entry of the map's projection on the Krylov space.
     pub(crate) norm: f64,
 }
 
@@ -169,7 +170,7 @@ pub(crate) fn larger_than(map: &impl LinearMap, least: f64, share: f64) -> Optio
     found.is_settled.then_some(found.dominant.eigenvalues)
 }
 
-/// Result of block Arnoldi; `is_settled` is false if the eigenvalues have not converged.
+/// Eigenvalues and Krylov space from block Arnoldi; `is_settled` is false if the eigenvalues have not converged.
 struct ArnoldiResult {
     dominant: Dominant,
     is_settled: bool,

@@ -81,8 +81,8 @@ pub(crate) fn of_matrix(map: DMatrix<f64>) -> Result<Vec<Complex64>, Breakdown> 
 pub(crate) struct Candidates {
     /// Multipliers, largest first.
     pub(crate) multipliers: Vec<Complex64>,
-    /// False if larger ones may be missing: block Arnoldi did not converge, or the map is so non-normal that rounding
-    /// moves its eigenvalues.
+    /// False if larger multipliers may be missing: block Arnoldi did not converge, or the map is so non-normal that
+    /// rounding moves its eigenvalues.
     pub(crate) is_certain: bool,
 }
 

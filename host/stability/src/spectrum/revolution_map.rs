@@ -21,18 +21,19 @@ pub(crate) struct RevolutionMap<'a> {
     factors: Vec<LU<f64, Dyn, Dyn>>,
 }
 
-/// Motion over a revolution, for several initial states (columns) at once.
+/// Motion of a linear cut over a revolution, for several initial states (columns) at once.
 struct Trace {
     /// State x of the structure at the end of the revolution, n × columns.
     state: DMatrix<f64>,
-    /// Displacements p along the chip normals in each element, columns × ports.
+    /// Displacements p along the chip normals in each element of the revolution, columns × ports.
     seen: Vec<DMatrix<f64>>,
-    /// Regenerative chips p − p_τ in each element, ports × columns.
+    /// Regenerative chips p − p_τ in each element of the revolution, ports × columns.
     chips: Vec<DMatrix<f64>>,
 }
 
 impl<'a> RevolutionMap<'a> {
-    /// Map over one revolution at an axial depth, m; `None` if the collocation equations are singular.
+    /// Map of the delayed state over one revolution at an axial depth, m; `None` if the collocation equations are
+    /// singular.
     pub(crate) fn new(revolution: Rc<Revolution<'a>>, depth_m: f64) -> Option<Self> {
         let factors = revolution.elements.iter().map(|element| {
             let size = element.kernel.nrows();

@@ -14,7 +14,7 @@ pub(crate) struct Root {
 }
 
 impl Root {
-    /// Distance |μ| − 1 from the unit circle, positive outside.
+    /// Distance |μ| − 1 of the multiplier from the unit circle, positive outside.
     pub(crate) fn excess(&self) -> f64 {
         self.multiplier.norm() - 1.0
     }

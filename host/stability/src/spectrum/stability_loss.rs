@@ -1,4 +1,4 @@
-//! How a Floquet multiplier leaves the unit circle.
+//! The ways in which a Floquet multiplier leaves the unit circle.
 
 use num_complex::Complex64;
 use serde::Serialize;

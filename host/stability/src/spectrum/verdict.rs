@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-/// Verdict on a cut, from |μ| and its error.
+/// Verdict on a cut, from |μ| of its dominant multiplier and the error of |μ|.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Verdict {

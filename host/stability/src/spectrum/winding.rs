@@ -27,10 +27,10 @@ const POINTS_MAX: usize = 8192;
 /// Largest number of candidate multipliers from which Newton's method starts: a limit on computing time.
 const CANDIDATES_MAX: usize = 6;
 
-/// Largest number of multipliers that are searched one by one: a limit on computing time.
+/// Largest number of multipliers beyond a radius that are searched one by one: a limit on computing time.
 const ROOTS_MAX: usize = 12;
 
-/// Largest multiplier found, and the radius beyond which the winding number counts none.
+/// Largest Floquet multiplier found, and the radius beyond which the winding number counts none.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LargestMultiplier {
     /// Largest Floquet multiplier found, if larger than [`WOUND`]; of a conjugate pair the upper one.
