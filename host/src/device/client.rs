@@ -37,7 +37,7 @@ const SEND: Duration = Duration::from_secs(2);
 // few, so that little memory is wasted.
 #[allow(clippy::large_enum_variant)]
 pub enum Event {
-    /// Report of the signal chain after a block.
+    /// Report that the signal chain of the device gives after a block of samples.
     Report(Report),
     /// Chunk of a power spectrum.
     Spectrum(SpectrumChunk),
@@ -361,6 +361,6 @@ enum ReplyFrame {
     Unreadable(FrameError),
     /// The device asks for the request again.
     Again(FrameError),
-    /// Protocol version of a device with another version.
+    /// The device uses another version of the protocol: the one stated.
     Version(u8),
 }

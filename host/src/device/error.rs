@@ -134,7 +134,7 @@ pub enum DeviceError {
 }
 
 impl DeviceError {
-    /// Converts a failure to open a port.
+    /// Converts a failure to open a port into a device error.
     pub(super) fn open(port: &str, error: &serialport::Error) -> Self {
         if error.kind() == serialport::ErrorKind::Io(io::ErrorKind::NotFound) {
             let present = match serialport::available_ports() {
@@ -155,7 +155,7 @@ impl DeviceError {
         }
     }
 
-    /// Converts a failure of a line in use.
+    /// Converts a failure of a serial line in use into a device error.
     pub(super) fn line(port: &str, error: io::Error) -> Self {
         match error.kind() {
             // Errors of an unplugged USB serial port and of a closed pseudo-terminal.

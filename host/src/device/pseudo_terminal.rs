@@ -54,7 +54,8 @@ impl PseudoTerminal {
         &self.path
     }
 
-    /// Reads available bytes, waiting at most `timeout` for the first one; returns their number, 0 if none arrived.
+    /// Reads bytes that the host has sent, waiting at most `timeout` for the first one; returns their number, 0 if none
+    /// arrived.
     pub fn receive(&mut self, into: &mut [u8], timeout: Duration) -> io::Result<usize> {
         self.device_end.set_timeout(timeout)?;
         match self.device_end.read(into) {

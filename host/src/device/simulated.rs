@@ -22,7 +22,7 @@ use super::pseudo_terminal::PseudoTerminal;
 use super::virtual_spindle::VirtualSpindle;
 use crate::simulate::SensedCut;
 
-/// Time scale of the virtual spindle.
+/// Pace at which the virtual spindle produces samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pace {
     /// The virtual spindle produces samples in real time.
@@ -38,7 +38,7 @@ pub struct Setup<'a> {
     pub state: Option<&'a Path>,
     /// Number of teeth of the tool on the virtual spindle.
     pub teeth: u8,
-    /// Time scale of the virtual spindle.
+    /// Pace at which the virtual spindle produces samples.
     pub pace: Pace,
 }
 
@@ -172,7 +172,7 @@ impl Machine {
         let clock = SharedClock(Arc::default());
         let mut state = Box::<State>::default();
         let Ok(mut device) = Device::new(identity, settings, &mut state, flash, clock.clone()) else {
-            // Unreachable: the settings were checked before the thread started.
+            // Invalid settings cannot occur here: they were checked before the thread started.
             return;
         };
         let began = Instant::now();

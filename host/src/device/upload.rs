@@ -8,7 +8,7 @@ use quietcut_core::protocol::{Info, Refusal, Reply, Request, Upload};
 use super::DeviceError;
 use super::client::{Client, REPLY_AFTER_ERASE};
 
-/// Number of new attempts after a restart of the device during an upload: a choice.
+/// Number of new attempts to upload a lobe table after a restart of the device during the upload: a choice.
 const RESTARTS: u32 = 3;
 
 /// Result of an upload.
@@ -85,7 +85,7 @@ impl Client {
         self.command_within(&Request::UploadCommit, "table", REPLY_AFTER_ERASE)
     }
 
-    /// Sends the chunk at `offset`; returns the offset of the next one.
+    /// Sends the chunk of the lobe table that begins at byte `offset`; returns the offset of the next chunk.
     fn send_chunk(&mut self, bytes: &[u8], offset: u32) -> Result<u32, DeviceError> {
         const CHUNK: &str = "piece of the table";
         let rest = bytes.get(offset as usize..).unwrap_or_default();

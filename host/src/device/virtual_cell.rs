@@ -43,7 +43,7 @@ impl VirtualCell {
     /// # Errors
     /// The case has no tool; a test excludes this.
     pub fn teeth(&self) -> Result<u8, CaseError> {
-        // The device refuses a number of teeth that it does not support.
+        // More than 255 teeth are stated as 255, which the device refuses.
         Ok(u8::try_from(self.case.tool()?.teeth).unwrap_or(u8::MAX))
     }
 

@@ -7,7 +7,7 @@ use super::material_table::MaterialRange;
 /// Immersion of the cut.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Immersion {
-    /// Angle at which a tooth enters, degrees, clockwise from the normal to the feed.
+    /// Angle at which a tooth enters the cut, degrees, clockwise from the normal to the feed.
     pub start_deg: f64,
     /// Angle at which a tooth leaves the cut, degrees, clockwise from the normal to the feed.
     pub exit_deg: f64,
@@ -20,7 +20,7 @@ impl Immersion {
         exit_deg: 180.0,
     };
 
-    /// Up-milling with a radial depth a_e and a diameter D: from 0 to arccos(1 − 2a_e/D).
+    /// Immersion of up-milling with a radial depth a_e and a diameter D: from 0 to arccos(1 − 2a_e/D).
     pub fn up(radial_depth_mm: f64, diameter_mm: f64) -> Self {
         Self {
             start_deg: 0.0,
@@ -28,7 +28,7 @@ impl Immersion {
         }
     }
 
-    /// Down-milling with a radial depth a_e and a diameter D: from 180° − arccos(1 − 2a_e/D) to 180°.
+    /// Immersion of down-milling with a radial depth a_e and a diameter D: from 180° − arccos(1 − 2a_e/D) to 180°.
     pub fn down(radial_depth_mm: f64, diameter_mm: f64) -> Self {
         Self {
             start_deg: 180.0 - engaged_deg(radial_depth_mm, diameter_mm),
@@ -67,7 +67,7 @@ pub enum MaterialAnswer {
 pub struct Answers {
     /// Name of the machine and job.
     pub name: String,
-    /// Comments that stand at the head of the file: machine, holder, sensor, each as the user wrote it.
+    /// Comments that stand at the head of the case file: machine, holder, sensor, each as the user wrote it.
     pub notes: Vec<(&'static str, String)>,
     /// Number of teeth.
     pub teeth: u8,
@@ -182,7 +182,7 @@ fn write_material(text: &mut String, answers: &Answers) -> std::fmt::Result {
     Ok(())
 }
 
-/// The number as TOML takes it, rounded to twelve digits so that no rounding error shows.
+/// A number as text of a TOML file, rounded to twelve digits so that no rounding error shows.
 fn float(value: f64) -> String {
     let rounded: f64 = format!("{value:.12e}").parse().unwrap_or(value);
     format!("{rounded:?}")

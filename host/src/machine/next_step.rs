@@ -159,7 +159,7 @@ pub fn next_step(folder: &MachineFolder) -> NextStep {
     )
 }
 
-/// True if the file exists and was changed at this time or later.
+/// True if the file exists and was last changed at the time `than` or later.
 fn is_newer(file: &Option<DatedFile>, than: SystemTime) -> bool {
     file.as_ref().is_some_and(|file| file.changed >= than)
 }
@@ -169,7 +169,7 @@ fn ranges(folder: &MachineFolder) -> String {
     let case = folder.case.as_ref().map(|(_, case)| case);
     let speeds = case.and_then(|case| {
         if let Some(limits) = case.limits {
-            // At rest there is no cut: the lowest speed of a chart is a twentieth of the highest.
+            // No cut exists at rest: the chart begins at a twentieth of the highest speed or above.
             return Some((limits.rpm_min.max(0.05 * limits.rpm_max), limits.rpm_max));
         }
         let structure = case.structure.as_ref()?.first_order().ok()?;
@@ -235,7 +235,7 @@ fn list(files: &[DatedFile]) -> String {
         .join(" ")
 }
 
-/// The path as a shell takes it: in single quotes if it has other characters than letters, digits and `/._-*`.
+/// A path as argument of a shell command: in single quotes if it has other characters than letters, digits and `/._-*`.
 fn quoted(path: &Path) -> String {
     let text = path.display().to_string();
     if text.chars().all(|c| c.is_alphanumeric() || "/._-*".contains(c)) {

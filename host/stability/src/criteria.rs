@@ -92,10 +92,9 @@ pub(crate) const MARGINS: [f64; 5] = [2.8, 0.3, 0.05, 0.01, 2e-3];
 /// outside the unit circle and that multiplier inside, so that the verdict is open. Unfounded.
 pub(crate) const FINE_MARGINS: [f64; 2] = [4e-4, 1e-4];
 
-/// Convergence of a winding number, which is the mean of an argument over points on a circle. It counts as converged if
-/// the means with the latest, the previous and the one before that number of points differ from one integer by less
-/// than these three values. Each doubling of the points squares the error once they resolve the nearest zero: 0.4
-/// becomes 0.16, and that 0.03.
+/// Convergence of a winding number, which is the mean of a logarithmic derivative over points on a circle. The number of
+/// points is doubled until the last three means, latest first, differ from one integer by less than these three values.
+/// Each doubling squares the error once the points resolve the nearest zero: 0.4 becomes 0.16, and that 0.03.
 pub(crate) const WINDING_ERRORS: [f64; 3] = [0.02, 0.1, 0.4];
 
 // Limits along the depth.

@@ -67,9 +67,9 @@ pub enum StabilityError {
     EndsEarly {
         /// Requested axial depth, mm.
         depth_mm: f64,
-        /// Largest axial depth for which the table suffices, mm.
+        /// Largest axial depth for which the table of receptances suffices, mm.
         deepest_mm: f64,
-        /// Last frequency of the table, Hz.
+        /// Last frequency of the table of receptances, Hz.
         last_hz: f64,
     },
     /// The result depends on receptances outside the frequency range of the table.
@@ -84,9 +84,9 @@ pub enum StabilityError {
         depth_mm: f64,
         /// Frequency of the vibration, Hz.
         frequency_hz: f64,
-        /// First frequency of the table, Hz.
+        /// First frequency of the table of receptances, Hz.
         first_hz: f64,
-        /// Last frequency of the table, Hz.
+        /// Last frequency of the table of receptances, Hz.
         last_hz: f64,
     },
     /// The standard deviations of the case are so large that many drawn machines are not physical.
@@ -100,7 +100,7 @@ pub enum StabilityError {
         path: PathBuf,
         /// Percentage of drawn machines that are not physical.
         percent: f64,
-        /// Reason why the first of these machines is not physical.
+        /// Reason why the first of the machines that are not physical is impossible.
         reason: String,
     },
     /// A speed or depth that is out of range.

@@ -88,7 +88,7 @@ impl<'a> AveragedLoop<'a> {
         Complex64::ONE + (h.row(2) * self.forced.map(Complex64::from))[0]
     }
 
-    /// Matrix H̃ α₀ at s, with H̃ = (I + H β₀)⁻¹ H from the Sherman–Morrison formula.
+    /// Loop matrix H̃ α₀ at a complex exponent s, with H̃ = (I + H β₀)⁻¹ H from the Sherman–Morrison formula.
     fn matrix(&self, s: Complex64) -> Option<Matrix3<Complex64>> {
         let h = self.problem.transfer(s)?;
         let change = h * self.forced.map(Complex64::from) * h.row(2);

@@ -175,8 +175,8 @@ impl<'a> HarmonicLoop<'a> {
         let kappa = self.regeneration(s) * depth_m;
         let (cut, forced) = self.matrices(s)?;
         let size = cut.nrows();
-        // A depth slightly off keeps the matrix regular; inverse iteration amplifies the eigenvector by 1e8 in each
-        // step.
+        // A depth that differs slightly from that of the root keeps the matrix regular; inverse iteration amplifies the
+        // eigenvector by 1e8 in each step.
         let mut matrix = DMatrix::identity(size, size) - &cut * (kappa * (1.0 + 1e-8));
         if let Some(forced) = forced {
             matrix += forced;

@@ -72,8 +72,8 @@ pub(crate) fn limits(open_loop: &impl OpenLoop, depth_m: f64) -> Result<Vec<Axis
                 depth_m: crossing.value.recip(),
                 omega: crossing.omega,
                 kind: StabilityLoss::Hopf,
-                // A root becomes unstable where its locus crosses the axis downward: 1 − w·locus then winds clockwise
-                // about 0.
+                // A root becomes unstable where its characteristic locus crosses the real axis downward: 1 − w·locus
+                // then winds clockwise about 0.
                 outward: !crossing.rises,
             }),
     );

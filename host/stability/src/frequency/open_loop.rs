@@ -6,11 +6,11 @@ use super::problem::{FrequencyProblem, Resonance};
 use crate::error::Breakdown;
 use crate::spectrum::stability_loss::StabilityLoss;
 
-/// End of the frequency range at which all loci are real or conjugate pairs: real multipliers cross the unit circle
-/// only there.
+/// End of the frequency range at which all characteristic loci are real or conjugate pairs: real multipliers cross the
+/// unit circle only there.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct RealEnd {
-    /// Frequency, rad/s: 0, or half the tooth-passing frequency.
+    /// Frequency of this end of the range, rad/s: 0, or half the tooth-passing frequency.
     pub(crate) omega: f64,
     /// Real characteristic loci at this end of the frequency range, 1/m.
     pub(crate) loci: Vec<f64>,

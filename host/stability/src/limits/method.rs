@@ -48,7 +48,8 @@ pub trait Method: Sync {
     /// As [`point()`](Self::point).
     fn line(&self, rpm: f64, depth_mm: f64, samples: usize) -> Result<SpeedLine, StabilityError>;
 
-    /// Dominant multiplier at a spindle speed (rev/min) and many depths (mm), in any order, each with its error.
+    /// Dominant multiplier of cuts at one spindle speed (rev/min) and many depths (mm), in any order, each with its
+    /// error.
     ///
     /// # Errors
     /// As [`point()`](Self::point).

@@ -5,7 +5,8 @@ use serde::Serialize;
 /// Accuracy of stability limits between the speeds of a chart, and where it is not reached.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Resolution {
-    /// Largest error of a limit on the straight line between two neighbouring speeds, relative to its depth.
+    /// Largest error in depth of a limit on the straight line between two neighbouring speeds of the chart, relative to
+    /// the depth of the limit.
     pub depth_share: f64,
     /// Largest error in spindle speed of a limit that is steep over the speed, relative to the speed.
     pub speed_share: f64,

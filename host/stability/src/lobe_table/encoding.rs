@@ -65,7 +65,7 @@ impl Table<'_> {
         }
         let content = Content {
             name: &self.first.name[..end],
-            // A tool has at most 64 teeth, so that the number fits.
+            // A tool has at most 64 teeth, so that the number of teeth fits.
             teeth: self
                 .table_layers
                 .first()

@@ -277,7 +277,7 @@ fn division(case: &Case, request: &TableRequest) -> Result<Division, BuildError>
     feeds_mm.dedup();
     let mut directions: Vec<f64> = request.feed_directions_deg.clone();
     directions.sort_by(f64::total_cmp);
-    // 0 and 360 degrees are one direction.
+    // Feed directions of 0 and 360 degrees are one direction.
     directions.dedup_by_key(|degrees| (degrees.rem_euclid(360.0) * 100.0).round() as i64);
     let directions_deg = if directions.is_empty() {
         vec![None]

@@ -25,7 +25,7 @@ pub struct ModeCoupling {
 }
 
 impl ModeCoupling {
-    /// Sets up the criterion for a problem.
+    /// Sets up the mode-coupling criterion for a problem given by its receptances.
     ///
     /// # Errors
     /// The structure has a single mode, or does not move in both directions that change the chip thickness, so that

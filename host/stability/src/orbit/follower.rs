@@ -99,7 +99,8 @@ fn dominant_of<M: PeriodMap>(map: M, rpm: f64, depth_mm: f64) -> Result<[Dominan
     Ok([at(map)?, at(finer)?])
 }
 
-/// Norm of the state at the start of the period at a depth, without cubic terms: the scale of an orbit.
+/// Norm of the orbit's state at the start of the period at a depth, without cubic terms: the unit of the state along a
+/// branch.
 pub(super) fn size_at(map: &impl PeriodMap, depth_m: f64) -> f64 {
     let rest = Orbit::rest(map);
     let linear = map
@@ -126,7 +127,7 @@ pub(super) struct Follower<M> {
 struct Sample {
     orbit: Orbit,
     tangent: Tangent,
-    /// Multipliers near or outside the unit circle, in the upper half plane or on the real axis.
+    /// Floquet multipliers of the orbit near or outside the unit circle, in the upper half plane or on the real axis.
     roots: Vec<Complex64>,
     largest: f64,
 }
@@ -152,7 +153,7 @@ impl<M: PeriodMap> Follower<M> {
         Self { map, rpm, scale }
     }
 
-    /// Orbit with multipliers at a depth, reached by continuation from depth 0.
+    /// Forced orbit with its multipliers at a depth, reached by continuation from depth 0.
     fn up_to(&self, depth_m: f64) -> Result<Sample, OrbitError> {
         let order = self.map.size();
         let mut along_depth = DVector::zeros(order + 1);
@@ -231,13 +232,13 @@ impl<M: PeriodMap> Follower<M> {
         })
     }
 
-    /// Orbit with multipliers one step further along the branch.
+    /// Forced orbit with its multipliers one step further along the branch.
     fn step(&self, from: &Sample, step: f64) -> Result<Sample, OrbitError> {
         let guess = from.orbit.along(&from.tangent, step, self.scale);
         self.sample(&guess, &from.tangent.along)
     }
 
-    /// Depth one step further along the branch, m.
+    /// Axial depth of the forced orbit one step further along the branch, m.
     fn depth_m(&self, from: &Sample, step: f64) -> Result<f64, OrbitError> {
         let guess = from.orbit.along(&from.tangent, step, self.scale);
         let (orbit, _) = Orbit::correct(&self.map, &guess, self.scale, &from.tangent.along)?;
@@ -295,7 +296,7 @@ impl<M: PeriodMap> Follower<M> {
             gain: !outward,
             multiplier: on_circle,
             chatter_hz: match kind {
-                // The orbit jumps to another one of the same period, so that no new frequency appears.
+                // At a fold the orbit jumps to another one of the same period, so that no new frequency appears.
                 StabilityLoss::Fold => None,
                 _ => self.map.chatter_hz(&sample.orbit, on_circle),
             },

@@ -13,9 +13,10 @@ use quietcut_numerics::quadrature::Gauss;
 pub(crate) struct Element {
     /// State transition G from the start to the end of the element without regenerative force, n × n.
     pub(crate) flow: DMatrix<f64>,
-    /// Matrix E, ports × n: displacements p due to the state at the start of the element.
+    /// Matrix E, ports × n: displacements p along the chip normals due to the state at the start of the element.
     pub(crate) observe: DMatrix<f64>,
-    /// Response Q of the displacements p to the regenerative chips p − p_τ, ports × ports, per meter of axial depth.
+    /// Response Q of the displacements p along the chip normals to the regenerative chips p − p_τ, ports × ports, per
+    /// meter of axial depth.
     pub(crate) kernel: DMatrix<f64>,
     /// Response T of the state at the end of the element to the regenerative chips p − p_τ, n × ports, per meter of
     /// axial depth.

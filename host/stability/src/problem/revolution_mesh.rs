@@ -50,7 +50,7 @@ pub(crate) enum Flight {
     Cut,
 }
 
-/// Displacements p of one tooth at all nodes of one subinterval.
+/// Displacements p along the chip normal of one tooth at all nodes of one subinterval.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Series {
     /// Index of the subinterval.
@@ -74,7 +74,7 @@ pub(crate) enum Source {
 #[derive(Clone, Debug)]
 pub(crate) struct DelayedDisplacement {
     pub(crate) source: Source,
-    /// Weights of those nodes: values of their Lagrange polynomials at the delayed time.
+    /// Weights of the nodes at which the preceding tooth cut the surface: their Lagrange polynomials at the delayed time.
     pub(crate) weights: Vec<f64>,
 }
 

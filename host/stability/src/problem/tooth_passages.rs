@@ -132,7 +132,8 @@ impl ToothPassages {
 
 /// Sorts times and drops those outside [0, period], s; times closer than rounding are merged.
 pub(crate) fn distinct(mut times_s: Vec<f64>, period_s: f64) -> Vec<f64> {
-    // Angles are given in degrees with a few digits: times closer than 1e-9 of the period belong to the same angle.
+    // Immersion angles are given in degrees with a few digits: times closer than 1e-9 of the period belong to the same
+    // angle.
     let least = 1e-9 * period_s;
     for time_s in &mut times_s {
         if time_s.abs() < least {

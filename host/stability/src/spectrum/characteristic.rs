@@ -216,8 +216,8 @@ impl Characteristic {
         depth_m: f64,
         work: &mut Workspace,
     ) -> Option<Complex64> {
-        // Both logarithmic derivatives of F are infinite at a root of F. Close to it their ratio is smooth, so that
-        // they are evaluated 1e-7 away.
+        // Both logarithmic derivatives of the characteristic function F are infinite at a root of F. Close to it their
+        // ratio is smooth, so that they are evaluated at a relative distance of 1e-7.
         let nearby = multiplier + Complex64::new(1e-7, 1e-7) * multiplier.norm();
         let logarithmic = self.logarithmic(nearby, depth_m, work)?;
         let ratio = -logarithmic.by_depth / logarithmic.by_multiplier;
