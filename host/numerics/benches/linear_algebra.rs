@@ -37,13 +37,13 @@ use quietcut_numerics::least_squares::{Idle, LinearProblem, NormalEquations};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// Columns of the matrices: a fit of a few modes, a map of a period, a large map.
+/// Numbers of columns of the matrices that are timed: a fit of a few modes, a map of a period, a large map.
 const SIZES: [usize; 3] = [10, 50, 200];
 
-/// Least time that the runs of one case take together.
+/// Least total time of the repeated runs by which one method is timed on one matrix.
 const ENOUGH: Duration = Duration::from_millis(300);
 
-/// Smallest time of a run, s, over at least three runs.
+/// Smallest time of a run, s: at least three runs are timed, and more until they take [`ENOUGH`] together.
 fn seconds<T>(mut run: impl FnMut() -> T) -> f64 {
     let start = Instant::now();
     let (mut best, mut runs) = (f64::INFINITY, 0);
@@ -87,7 +87,8 @@ fn main() {
     }
 }
 
-/// min ‖A x − b‖² with a pivoted QR decomposition, and that of nalgebra with singular values.
+/// Times the solution of min ‖A x − b‖²: by the pivoted QR decompositions of this crate and of faer, and by the
+/// singular values of nalgebra.
 fn least_squares(size: usize, matrix: &DMatrix<f64>, right: &DVector<f64>) {
     let ours = seconds(|| LinearProblem::new(matrix, right).solve().expect("full rank"));
     let nalgebra = seconds(|| {
@@ -106,7 +107,7 @@ fn least_squares(size: usize, matrix: &DMatrix<f64>, right: &DVector<f64>) {
     row("least squares, 4n × n", size, ours, nalgebra, faer);
 }
 
-/// N x = g by Cholesky.
+/// Times the solution of the normal equations N x = g by Cholesky decomposition in this crate, nalgebra and faer.
 fn normal_equations(size: usize, matrix: &DMatrix<f64>, right: &DVector<f64>) {
     let (normal, gradient) = (matrix.tr_mul(matrix), matrix.tr_mul(right));
     let ours = seconds(|| {

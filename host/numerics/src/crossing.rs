@@ -2,15 +2,16 @@
 
 use crate::roots::bisection;
 
-/// Fractions of the time step at which the function is evaluated. They are dense at the start of the step, where a state that has just
-/// changed, such as a contact, may change back. Unfounded.
+/// Fractions of the time step at which a function is evaluated in the search for its first zero crossing. They are
+/// dense at the start of the step, where a state that has just changed, such as a contact, may change back. Unfounded.
 const LOOKED_AT: [f64; 7] = [0.03, 0.12, 0.3, 0.5, 0.7, 0.85, 1.0];
 
-/// Last u in [0, 1], to 1e-12, before the function `f` first becomes negative; `None` if `f` stays at or above zero.
+/// Last fraction u in [0, 1] of a time step, to 1e-12, before the function `f` of u first becomes negative; `None` if
+/// `f` stays at or above zero.
 ///
-/// Detects every interval of negative values that contains one of the evaluated points. Between two evaluated points, it detects an interval
-/// that contains the minimum of the parabola through three neighbouring points. A negative value at u = 0 counts as zero, since the state
-/// has just changed there.
+/// Detects every interval of negative values that contains one of the evaluated fractions. Between two of them, it
+/// detects an interval that contains the minimum of the parabola through three neighbouring points. A negative value at
+/// u = 0 counts as zero, since the state has just changed there.
 pub fn first_below_zero(f: impl Fn(f64) -> f64) -> Option<f64> {
     let (mut before, mut last) = ((0.0, f64::NAN), (0.0, f(0.0).max(0.0)));
     for u in LOOKED_AT {
@@ -42,7 +43,8 @@ fn dip(a: (f64, f64), b: (f64, f64), c: (f64, f64)) -> Option<f64> {
     (bend > 0.0 && lowest < 0.5 * b.1 && (a.0..c.0).contains(&u)).then_some(u)
 }
 
-/// Sign change between `above`, where `f` is not negative, and `below`, where `f` is negative, by bisection.
+/// Last argument before the sign change of `f` between `above`, where `f` is not negative, and `below`, where `f` is
+/// negative, by bisection.
 fn last_not_below(f: &impl Fn(f64) -> f64, above: f64, below: f64) -> f64 {
     let [last, _] = bisection([above, below], 1e-12, |u| {
         let is_below = f(u) < 0.0;

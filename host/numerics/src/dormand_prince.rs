@@ -4,14 +4,14 @@
 //! II.6 (code DOPRI5). The local error is O(h⁶) for a step and O(h⁵) for the interpolant. A delay equation whose delayed values are
 //! taken from the interpolant keeps the global order 5.
 
-/// Polynomial of degree 4 in u = (t − t₀)/h on [0, 1]: the coefficients of 1, u, … u⁴.
+/// Polynomial of degree 4 in the fraction u = (t − t₀)/h of a time step, u in [0, 1]: the coefficients of 1, u, … u⁴.
 pub type Quartic = [f64; 5];
 
-/// Times c_i of the stages, as fractions of the step (Dormand–Prince tableau).
+/// Times c_i of the stages of a Dormand–Prince step, as fractions of the step.
 const NODES: [f64; 7] = [0.0, 1.0 / 5.0, 3.0 / 10.0, 4.0 / 5.0, 8.0 / 9.0, 1.0, 1.0];
 
-/// Coefficients a_ij of the stages (Dormand–Prince tableau): row i combines the preceding stages to stage i + 1. The last row also gives the
-/// fifth-order solution.
+/// Coefficients a_ij of the stages of a Dormand–Prince step: row i combines the preceding stages to stage i + 1. The
+/// last row also gives the fifth-order solution.
 const STAGES: [[f64; 6]; 6] = [
     [1.0 / 5.0, 0.0, 0.0, 0.0, 0.0, 0.0],
     [3.0 / 40.0, 9.0 / 40.0, 0.0, 0.0, 0.0, 0.0],
@@ -42,7 +42,8 @@ const STAGES: [[f64; 6]; 6] = [
     ],
 ];
 
-/// Coefficients of the error estimate: the difference between the fifth- and the fourth-order solution.
+/// Coefficients of the stages in the error estimate of a Dormand–Prince step: the difference between the fifth- and the
+/// fourth-order solution.
 const ERROR: [f64; 7] = [
     71.0 / 57600.0,
     0.0,
@@ -53,7 +54,7 @@ const ERROR: [f64; 7] = [
     -1.0 / 40.0,
 ];
 
-/// Coefficients of the term r5 of the interpolant (DOPRI5).
+/// Coefficients of the stages in the term r5 of the interpolant of a Dormand–Prince step (code DOPRI5).
 const INTERPOLANT: [f64; 7] = [
     -12715105075.0 / 11282082432.0,
     0.0,
@@ -82,17 +83,18 @@ impl DormandPrince {
         }
     }
 
-    /// Computes ẏ at the start of the next step; required before the first step and after every jump of ẏ.
+    /// Computes the derivative ẏ at the start of the next step; required before the first step and after every jump of
+    /// ẏ.
     pub fn start(&mut self, t: f64, y: &[f64], mut rate: impl FnMut(f64, &[f64], &mut [f64])) {
         rate(t, y, &mut self.stages[0]);
     }
 
-    /// Reuses ẏ at the end of the accepted step as ẏ at the start of the next.
+    /// Reuses the derivative ẏ at the end of the accepted step as ẏ at the start of the next step.
     pub fn follow(&mut self) {
         self.stages.swap(0, 6);
     }
 
-    /// Computes a trial step from y at t to t + h.
+    /// Computes a trial step of the differential equation ẏ = rate(t, y) from y at t to t + h.
     pub fn attempt(&mut self, t: f64, h: f64, y: &[f64], mut rate: impl FnMut(f64, &[f64], &mut [f64])) {
         for (index, weights) in STAGES.iter().enumerate() {
             let stage = index + 1;
@@ -117,7 +119,8 @@ impl DormandPrince {
         &self.end
     }
 
-    /// Root mean square over the elements of y of the estimated error of the last trial step, each divided by its `tolerance`.
+    /// Root mean square of the estimated errors of the elements of y in the last trial step of length `h`, each divided
+    /// by the `tolerance` of its element. Up to 1 the step meets the tolerances.
     pub fn error(&self, h: f64, tolerance: impl Fn(usize) -> f64) -> f64 {
         let sum: f64 = (0..self.end.len())
             .map(|element| {
@@ -145,7 +148,7 @@ impl DormandPrince {
     }
 }
 
-/// Value of a quartic at u.
+/// Value of the interpolant's polynomial of degree 4 at the fraction u of the time step.
 pub fn at(quartic: &Quartic, u: f64) -> f64 {
     quartic
         .iter()

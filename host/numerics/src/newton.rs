@@ -13,7 +13,7 @@ pub trait Unknown {
     /// Absolute value of a number, or Euclidean norm of a vector.
     fn size(&self) -> f64;
 
-    /// Subtracts the fraction `share` of `step` from x: x ← x − `share` · `step`.
+    /// Subtracts the fraction `share` of `step` from this unknown x: x ← x − `share` · `step`.
     fn subtract(&mut self, share: f64, step: &Self);
 }
 
@@ -84,7 +84,7 @@ pub struct Root<X> {
     pub x: X,
     /// Reason for which the iteration stopped.
     pub stop: Stop,
-    /// Number of steps that were computed.
+    /// Number of Newton steps that were computed.
     pub iterations: usize,
 }
 
@@ -107,7 +107,8 @@ impl Newton {
         }
     }
 
-    /// Limits each step to `factor` times the length of the preceding step, which keeps the iteration from jumping to a distant solution.
+    /// Limits each step to `factor` times the length of the preceding step, which keeps Newton's method from jumping to
+    /// a distant solution.
     #[must_use]
     pub fn with_growth(self, factor: f64) -> Self {
         Self {
@@ -116,7 +117,8 @@ impl Newton {
         }
     }
 
-    /// Searches the root near `start`; `step` returns J⁻¹ r at a given x, or the reason for which it cannot be computed.
+    /// Searches the root of r(x) = 0 near `start`; `step` returns the Newton step J⁻¹ r at a given x, or the reason for
+    /// which it cannot be computed.
     ///
     /// The search always ends; [`Root::stop`] states the reason. The last step before convergence is applied in full.
     pub fn solve<X: Unknown>(&self, start: X, mut step: impl FnMut(&X) -> Result<X, Stop>) -> Root<X> {

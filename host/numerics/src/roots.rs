@@ -1,9 +1,10 @@
 //! Roots and extrema of functions of one real variable: bisection, Newton's method with a bracket, regula falsi, golden section.
 
-/// Bracket of a root from bisection of the bracket [below, above], until it is no wider than `width` or its ends are neighbouring numbers.
+/// Narrows the bracket [below, above] of a root by bisection, until it is no wider than `width` or its ends are
+/// neighbouring numbers.
 ///
-/// The condition `is_below` is true at the first end and false at the second; either end may be the larger number. With `width` 0 the root
-/// is found to the last bit.
+/// The condition `is_below` is true at the first end and false at the second; either end may be the larger number. With
+/// `width` 0 the root is found to the last bit.
 ///
 /// ```
 /// use quietcut_numerics::roots::bisection;
@@ -62,24 +63,27 @@ pub fn monotone([mut low, mut high]: [f64; 2], start: f64, function: impl Fn(f64
     x
 }
 
-/// Bracket of a sign change of a function, narrowed by regula falsi with the weights of Anderson and Björck (BIT 13 (1973) 253).
+/// Bracket of a sign change of a function, narrowed by regula falsi with the weights of Anderson and Björck (BIT 13
+/// (1973) 253).
 ///
-/// The caller evaluates the function at [`Self::next`] and passes the value to [`Self::narrow`], so that an evaluation may fail or have
-/// further results. The order of convergence is 1.7. If four evaluations have not halved the bracket, it is bisected.
+/// The caller evaluates the function at [`Self::next`] and passes the value to [`Self::narrow`], so that an evaluation
+/// may fail or have further results. The order of convergence is 1.7. If four evaluations have not halved the bracket,
+/// it is bisected.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SignChange {
     ends: [[f64; 2]; 2],
-    /// Index of the end that the last step replaced; `None` before the first step.
+    /// Index of the end of the bracket that the last step replaced; `None` before the first step.
     replaced: Option<usize>,
-    /// Width of the bracket when it was last halved, and number of evaluations since then.
+    /// Width of the bracket when it was last halved, and number of evaluations of the function since then.
     halved: (f64, usize),
 }
 
-/// Number of evaluations without a halving of the bracket after which it is bisected. Regula falsi halves it within three if it converges.
+/// Number of evaluations of the function without a halving of the bracket after which it is bisected. Regula falsi
+/// halves it within three if it converges.
 const EVALUATIONS_PER_HALVING: usize = 4;
 
 impl SignChange {
-    /// Bracket between two points (x, f(x)) whose values differ in sign.
+    /// Bracket between two points (x, f(x)) of a function f whose values differ in sign.
     pub fn new(first: [f64; 2], second: [f64; 2]) -> Self {
         Self {
             ends: [first, second],
@@ -92,7 +96,8 @@ impl SignChange {
     pub fn next(&self) -> f64 {
         let [[a, fa], [b, fb]] = self.ends;
         let x = a + (b - a) * fa / (fa - fb);
-        // Rounding may place the secant's root outside the bracket, and equal values have no secant root: then bisection.
+        // The secant through both ends of the bracket has its root here. Rounding may place it outside the bracket, and
+        // equal values have no such root: then the bracket is bisected.
         if self.halved.1 < EVALUATIONS_PER_HALVING && (a.min(b)..=a.max(b)).contains(&x) {
             x
         } else {
@@ -100,11 +105,13 @@ impl SignChange {
         }
     }
 
-    /// Replaces the end whose value has the sign of `value` by the point (`x`, `value`); returns the index of that end, 0 or 1.
+    /// Replaces the end of the bracket whose value has the sign of `value` by the point (`x`, `value`); returns the
+    /// index of that end, 0 or 1.
     pub fn narrow(&mut self, x: f64, value: f64) -> usize {
         let index = usize::from((value > 0.0) != (self.ends[0][1] > 0.0));
         if self.replaced == Some(index) {
-            // The other end has stayed for two steps. Its value is reduced, since regula falsi would otherwise converge slowly.
+            // The other end of the bracket has stayed for two steps. Its value is reduced, since regula falsi would
+            // otherwise converge slowly.
             let gained = 1.0 - value / self.ends[index][1];
             self.ends[1 - index][1] *= if gained > 0.0 { gained } else { 0.5 };
         }

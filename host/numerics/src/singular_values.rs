@@ -2,7 +2,8 @@
 
 use nalgebra::{ComplexField, DMatrix, DVector, Dyn, SVD};
 
-/// Largest number of QR iterations per singular value; two or three are usual, more end the decomposition with an error.
+/// Largest number of QR iterations per singular value of a matrix; two or three are usual, more end the decomposition
+/// with an error.
 const ITERATIONS_PER_VALUE: usize = 100;
 
 /// Error of the singular value decomposition of a matrix.
@@ -16,7 +17,7 @@ pub enum SingularValueError {
         /// Columns.
         columns: usize,
     },
-    /// An entry is infinite or not a number.
+    /// An entry of the matrix is infinite or not a number.
     #[error(
         "a matrix of {rows} × {columns} has an entry that is not finite; check the data for gaps, overflow and division by zero"
     )]
@@ -26,7 +27,7 @@ pub enum SingularValueError {
         /// Columns.
         columns: usize,
     },
-    /// The QR iteration exceeds its bound.
+    /// The QR iteration for the singular values exceeds its bound.
     #[error(
         "the singular values of a matrix of {rows} × {columns} do not converge within {iterations} iterations; scale the data to similar magnitudes"
     )]

@@ -11,10 +11,12 @@ use crate::roots::bisection;
 /// Half the width of a two-sided 90 % interval of a normal distribution, in standard deviations: Φ⁻¹(0.95).
 pub const NINETY_PERCENT: f64 = 1.644_853_626_951_472_7;
 
-/// Relative change of a series or a continued fraction by one more term below which it has converged.
+/// Relative change of a series or a continued fraction of a distribution function by one more term below which it has
+/// converged.
 const SETTLED: f64 = 1e-16;
 
-/// Largest number of terms of a series or a continued fraction. A few times √(degrees of freedom) are needed.
+/// Largest number of terms of a series or a continued fraction of a distribution function. A few times √(degrees of
+/// freedom) are needed.
 const TERMS_MAX: usize = 100_000;
 
 /// Φ(x): the probability that a standard normal variable stays below x.
@@ -26,13 +28,15 @@ pub fn normal_probability(x: f64) -> f64 {
 ///
 /// A `share` of 0 or less, or of 1 or more, is replaced by the nearest probability with a finite quantile.
 pub fn normal_quantile(share: f64) -> f64 {
-    // A double cannot represent probabilities far below 1e-300, nor differences from 1 below its rounding.
+    // A double cannot represent probabilities far below 1e-300, nor the difference of a probability from 1 below its
+    // rounding.
     let share = share.clamp(1e-300, 1.0 - f64::EPSILON);
-    // Φ⁻¹ is odd about 1/2. In the lower half, erfc keeps its relative precision.
+    // Φ⁻¹ is antisymmetric about the probability 1/2. In the lower half, erfc keeps its relative precision.
     if share > 0.5 {
         return -normal_quantile(1.0 - share);
     }
-    // Start value from the tail bound of Φ. Halley's method then triples the number of correct digits in each iteration.
+    // Start value of the quantile from the tail bound of Φ. Halley's method then triples the number of correct digits
+    // in each iteration.
     let mut x = -(-2.0 * (2.0 * share).ln()).sqrt();
     for _ in 0..8 {
         let density = (-0.5 * x * x).exp() / (2.0 * PI).sqrt();
@@ -52,7 +56,8 @@ fn student_two_sided_probability(t: f64, freedoms: f64) -> f64 {
     incomplete_beta(0.5, 0.5 * freedoms, t * t / (freedoms + t * t))
 }
 
-/// Half the width of the two-sided interval that contains a variable of Student's distribution with the probability `share`; error 1e-10.
+/// Half the width of the interval about zero that contains a variable of Student's distribution with the probability
+/// `share`; error 1e-10.
 ///
 /// Infinite without degrees of freedom.
 fn student_two_sided_quantile(share: f64, freedoms: f64) -> f64 {
@@ -62,7 +67,8 @@ fn student_two_sided_quantile(share: f64, freedoms: f64) -> f64 {
     quantile(share, |t| student_two_sided_probability(t, freedoms))
 }
 
-/// Factor from a standard deviation that is estimated with `freedoms` degrees of freedom to half the width of the 90 % interval.
+/// Half the width of the 90 % interval of an estimate, in multiples of its standard deviation, if that is estimated
+/// with `freedoms` degrees of freedom.
 pub fn student_ninety_percent(freedoms: usize) -> f64 {
     student_two_sided_quantile(0.9, freedoms as f64)
 }
@@ -115,7 +121,8 @@ pub fn sample_quantile(sorted: &[f64], share: f64) -> Option<f64> {
     let (below, rest) = (position.floor() as usize, position.fract());
     let at = |index: usize| sorted.get(index).or(sorted.last()).copied();
     let (low, high) = (at(below)?, at(below + 1)?);
-    // Without interpolation, an order statistic next to an infinite one keeps its value.
+    // Without interpolation the order statistic itself is returned: a product with an infinite neighbour would not be a
+    // number.
     Some(if rest == 0.0 {
         low
     } else {
@@ -123,7 +130,7 @@ pub fn sample_quantile(sorted: &[f64], share: f64) -> Option<f64> {
     })
 }
 
-/// Inverts a distribution function on [0, ∞): the argument at which `probability` reaches `share`.
+/// Inverts a distribution function on [0, ∞): the argument at which `probability` reaches the value `share`.
 fn quantile(share: f64, probability: impl Fn(f64) -> f64) -> f64 {
     if share.is_nan() {
         return f64::NAN;
@@ -145,7 +152,8 @@ fn quantile(share: f64, probability: impl Fn(f64) -> f64) -> f64 {
     bisect(share, [low, high], probability)
 }
 
-/// Argument at which an increasing function reaches `share`, from bisection to neighbouring numbers.
+/// Argument between `ends` at which the increasing function `probability` reaches `share`, by bisection to neighbouring
+/// numbers.
 fn bisect(share: f64, ends: [f64; 2], probability: impl Fn(f64) -> f64) -> f64 {
     let [low, high] = bisection(ends, 0.0, |x| probability(x) < share);
     0.5 * (low + high)
@@ -183,7 +191,8 @@ fn incomplete_beta(a: f64, b: f64, x: f64) -> f64 {
     if x <= 0.0 || x >= 1.0 || x.is_nan() {
         return x.clamp(0.0, 1.0);
     }
-    // The continued fraction converges fast for x below about the mean of the distribution; above, symmetry applies.
+    // The continued fraction converges fast for x below about the mean of the beta distribution; above, I_x(a, b) = 1 −
+    // I_{1−x}(b, a) is used.
     if x > (a + 1.0) / (a + b + 2.0) {
         return 1.0 - incomplete_beta(b, a, 1.0 - x);
     }

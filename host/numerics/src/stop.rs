@@ -1,18 +1,18 @@
-//! The reason for which an iteration stopped.
+//! The reason for which an iterative solver stopped.
 
-/// The reason for which an iteration stopped; only [`Stop::Converged`] means that a solution is found.
+/// The reason for which an iterative solver stopped; only [`Stop::Converged`] means that a solution is found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stop {
-    /// The last step is below the tolerance.
+    /// The iteration has converged: its last step is below the tolerance.
     Converged,
-    /// No step improves the solution, however short it is.
+    /// No further step improves the solution, however short it is.
     Stagnated,
     /// The linear equations of a step are singular.
     Singular,
-    /// The iteration has reached a point where the model is not valid or not finite.
+    /// The iteration has reached arguments for which the function is not valid or not finite.
     LeftDomain,
-    /// The caller has given up the iteration.
+    /// The caller has given up the iteration before its end.
     GivenUp,
-    /// The largest number of iterations is reached.
+    /// The largest allowed number of iterations is reached without convergence.
     Iterations,
 }

@@ -5,14 +5,16 @@ use num_complex::Complex64;
 
 use super::error::{EigenvalueError, size_of};
 
-/// Largest number of QR iterations for one eigenvalue; more end the computation with an error. Two or three are usual; an exceptional shift
-/// in every tenth iteration breaks cycles.
+/// Largest number of QR iterations for one eigenvalue of a complex matrix; more end the computation with an error. Two
+/// or three are usual; an exceptional shift in every tenth iteration breaks cycles.
 const ITERATIONS_MAX: usize = 90;
 
-/// Largest number of rows of a matrix all of whose eigenvalues are computed at once; larger ones are projected on a Krylov space.
+/// Largest number of rows of a complex matrix whose eigenvalues are all computed, although only the largest are wanted;
+/// larger matrices are projected on a Krylov space. A choice.
 const WHOLE: usize = 20;
 
-/// Relative change of an eigenvalue, while the Krylov space grows by four dimensions, below which it has converged.
+/// Relative change of an eigenvalue of the projected matrix, while the Krylov space grows by four dimensions, below
+/// which the eigenvalue has converged. A choice.
 const SETTLED: f64 = 1e-11;
 
 /// All eigenvalues of a complex matrix, unordered; the method is backward stable.
@@ -28,10 +30,11 @@ pub fn of_complex(matrix: DMatrix<Complex64>) -> Result<Vec<Complex64>, Eigenval
     }
 }
 
-/// Eigenvalues of absolute value `floor` and above, and possibly smaller ones, in descending order of the absolute value.
+/// Eigenvalues of `matrix` with an absolute value of `floor` and above, and possibly smaller ones, in descending order
+/// of the absolute value.
 ///
-/// For a small matrix, all eigenvalues are computed. For a large one, a Krylov space grows until the eigenvalues above `floor` no longer
-/// change, at most until it is the whole space.
+/// For a small matrix, all eigenvalues are computed. For a large one, a Krylov space grows until the eigenvalues above
+/// `floor` no longer change, at most until it is the whole space.
 ///
 /// # Errors
 /// The matrix is not square, has an entry that is not finite, or the iteration exceeds its bound.
@@ -123,13 +126,13 @@ impl Krylov {
     }
 }
 
-/// Both eigenvalues of the 2 × 2 block that starts at (first, first).
+/// Both eigenvalues of the 2 × 2 diagonal block of `m` that starts at row and column `first`.
 fn pair(m: &DMatrix<Complex64>, first: usize) -> [Complex64; 2] {
     let (a, b) = (m[(first, first)], m[(first, first + 1)]);
     let (c, d) = (m[(first + 1, first)], m[(first + 1, first + 1)]);
     let (mean, half) = ((a + d) * 0.5, (a - d) * 0.5);
     let root = (half * half + b * c).sqrt();
-    // The larger eigenvalue is computed without cancellation, the smaller one from the determinant.
+    // The larger eigenvalue of the block is computed without cancellation, the smaller one from the determinant.
     let large = if (mean.conj() * root).re >= 0.0 {
         mean + root
     } else {
@@ -143,7 +146,8 @@ fn pair(m: &DMatrix<Complex64>, first: usize) -> [Complex64; 2] {
     [large, small]
 }
 
-/// Eigenvalues of a Hessenberg matrix by QR iteration with single shifts, with deflation of converged eigenvalues from the last row on.
+/// Eigenvalues of a complex Hessenberg matrix by QR iteration with single shifts; converged eigenvalues are split off
+/// from the last row on.
 fn of_hessenberg(mut m: DMatrix<Complex64>) -> Result<Vec<Complex64>, EigenvalueError> {
     let mut found = Vec::with_capacity(m.nrows());
     let norm = m.norm();

@@ -13,12 +13,12 @@ pub enum EigenvalueError {
         /// Columns.
         columns: usize,
     },
-    /// An entry is infinite or not a number.
+    /// An entry of the matrix is infinite or not a number.
     #[error(
         "a matrix of {size} × {size} has an entry that is not finite; check the data for gaps, overflow and division by zero"
     )]
     NotFinite {
-        /// Number of rows and of columns.
+        /// Number of rows, equal to that of columns, of the matrix with the entry.
         size: usize,
     },
     /// The matrix M of a symmetric pencil is not positive definite.
@@ -26,15 +26,15 @@ pub enum EigenvalueError {
         "the mass matrix of {size} × {size} is not positive definite; every degree of freedom needs a mass"
     )]
     NotDefinite {
-        /// Number of rows and of columns.
+        /// Number of rows, equal to that of columns, of the matrix M.
         size: usize,
     },
-    /// The QR iteration exceeds its bound.
+    /// The QR iteration for the eigenvalues exceeds its bound.
     #[error(
         "the QR iteration on a matrix of {size} × {size} does not converge within {iterations} iterations; use a lower model order, or scale the data to similar magnitudes"
     )]
     NotConverged {
-        /// Number of rows and of columns.
+        /// Number of rows, equal to that of columns, of the matrix whose eigenvalues do not converge.
         size: usize,
         /// Largest number of iterations.
         iterations: usize,

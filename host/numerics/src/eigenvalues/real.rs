@@ -9,8 +9,8 @@ use num_complex::Complex64;
 
 use super::error::{EigenvalueError, size_of};
 
-/// Largest number of QR iterations for one eigenvalue; more end the computation with an error. Three are usual; an exceptional shift at 10,
-/// 20, … breaks cycles.
+/// Largest number of QR iterations for one eigenvalue of a real matrix; more end the computation with an error. Three
+/// are usual; exceptional shifts in the iterations 10, 20, … break cycles.
 const ITERATIONS_MAX: usize = 90;
 
 /// All eigenvalues of a real matrix, unordered: complex ones in exact conjugate pairs, real ones with the imaginary part zero.
@@ -38,8 +38,8 @@ pub fn of_real(mut matrix: DMatrix<f64>) -> Result<Vec<Complex64>, EigenvalueErr
     Ok(found)
 }
 
-/// Scale of a matrix: a power of two near its largest entry if squares of entries would overflow or underflow, which keeps balancing from
-/// ending; otherwise 1.
+/// Divisor by which a matrix is scaled before balancing. If squares of its entries would overflow or underflow, which
+/// keeps balancing from ending, it is a power of two near the largest entry; otherwise 1.
 fn unit(largest: f64) -> f64 {
     if (1e-100..1e100).contains(&largest) || largest == 0.0 {
         1.0
@@ -63,7 +63,8 @@ impl Rows {
         self.entries[i * self.size + j] = value;
     }
 
-    /// Reduces the matrix to Hessenberg form, zero below the first subdiagonal, by Householder reflections from both sides.
+    /// Reduces the matrix to Hessenberg form, with zeros below the first subdiagonal, by Householder reflections from
+    /// both sides.
     fn reduce_to_hessenberg(&mut self) {
         let n = self.size;
         let mut vector = vec![0.0; n];
@@ -107,7 +108,8 @@ impl Rows {
         }
     }
 
-    /// Eigenvalues of a Hessenberg matrix by QR iteration, with deflation of converged eigenvalues from the last row on.
+    /// Eigenvalues of this Hessenberg matrix by QR iteration with double shifts; converged eigenvalues are split off
+    /// from the last row on.
     fn iterate(mut self) -> Result<Vec<Complex64>, EigenvalueError> {
         let n = self.size;
         let norm: f64 = self.entries.iter().map(|entry| entry.abs()).sum();
@@ -157,7 +159,8 @@ impl Rows {
         Ok(found)
     }
 
-    /// First row of the unreduced block (no negligible subdiagonal entry) that ends at row `last`.
+    /// First row of the diagonal block that ends at row `last` and has no negligible entry on its subdiagonal; `norm`
+    /// is the sum of all absolute entries.
     fn split(&mut self, last: usize, norm: f64) -> usize {
         let mut row = last;
         while row > 0 {
@@ -172,7 +175,8 @@ impl Rows {
         row
     }
 
-    /// Both eigenvalues of the 2 × 2 block that ends at row `last`, plus the sum `shifted` of exceptional shifts.
+    /// Both eigenvalues of the 2 × 2 diagonal block that ends at row `last`, plus the sum `shifted` of the exceptional
+    /// shifts so far.
     fn pair(&self, last: usize, shifted: f64) -> [Complex64; 2] {
         let x = self.at(last, last);
         let w = self.at(last, last - 1) * self.at(last - 1, last);
@@ -189,7 +193,7 @@ impl Rows {
         }
     }
 
-    /// One QR step with two shifts on the block from row `first` to row `last`.
+    /// One Francis QR step with two shifts on the diagonal block from row `first` to row `last`.
     fn sweep(&mut self, first: usize, last: usize, shift: Shift) {
         let (start, mut vector) = self.start(first, last, shift);
         for i in start + 2..=last {
@@ -232,7 +236,8 @@ impl Rows {
         }
     }
 
-    /// Applies a Householder reflection from the left to rows k, k + 1 and, if it is not beyond `last`, k + 2.
+    /// Applies a Householder reflection of a QR step from the left to rows k, k + 1 and, if it is not beyond `last`, k
+    /// + 2.
     fn reflect_rows(&mut self, k: usize, last: usize, [q, r]: [f64; 2], [x, y, z]: [f64; 3]) {
         let n = self.size;
         let (row_k, rest) = self.entries[k * n..].split_at_mut(n);
@@ -255,7 +260,8 @@ impl Rows {
         }
     }
 
-    /// Applies a Householder reflection from the right to columns k, k + 1 and, if `triple`, k + 2.
+    /// Applies a Householder reflection of a QR step from the right to columns k, k + 1 and, if `triple`, k + 2, in the
+    /// given rows.
     fn reflect_columns(
         &mut self,
         k: usize,
@@ -286,7 +292,8 @@ impl Rows {
         }
     }
 
-    /// Row at which the double step starts, after two successive small subdiagonal entries, and the first vector of the step.
+    /// Row at which the QR step with two shifts may start, after two successive small subdiagonal entries, and the
+    /// first vector that the step reflects.
     fn start(&self, first: usize, last: usize, shift: Shift) -> (usize, [f64; 3]) {
         let mut m = last - 2;
         loop {
@@ -317,7 +324,8 @@ impl Rows {
     }
 }
 
-/// The two shifts of a double step, by the entries of the last 2 × 2 block: both diagonal entries and the product of the others.
+/// The two shifts of a QR step, given by the last 2 × 2 diagonal block: its two diagonal entries x and y, and the
+/// product w of the other two.
 #[derive(Clone, Copy)]
 struct Shift {
     x: f64,

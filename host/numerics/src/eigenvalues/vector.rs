@@ -3,10 +3,12 @@
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 
-/// Number of steps of the inverse iteration. Each amplifies the eigenvector by 1e8 over the others.
+/// Number of steps of the inverse iteration for an eigenvector. Each step amplifies the wanted eigenvector by about 1e8
+/// relative to the others.
 const STEPS: usize = 3;
 
-/// Relative distance of the shift from the eigenvalue, which keeps the matrix regular.
+/// Distance of the shift of an inverse iteration from the eigenvalue, relative to the eigenvalue; it keeps the shifted
+/// matrix regular.
 const BESIDE: f64 = 1e-8;
 
 /// Right eigenvector of length 1 of a matrix for an approximate eigenvalue. `None` if the matrix is not finite.
@@ -20,8 +22,8 @@ pub fn eigenvector(matrix: &DMatrix<Complex64>, eigenvalue: Complex64) -> Option
     null_vector(matrix - DMatrix::identity(order, order) * shift)
 }
 
-/// Vector v of length 1 with the least ‖A v‖ of a matrix A that is nearly singular, but not exactly. `None` if A is singular or not
-/// finite.
+/// Vector v of length 1 with the least ‖A v‖ of a matrix A that is nearly singular, but not exactly. `None` if A is
+/// exactly singular or not finite.
 pub fn null_vector(matrix: DMatrix<Complex64>) -> Option<DVector<Complex64>> {
     let order = matrix.nrows();
     let lu = matrix.lu();

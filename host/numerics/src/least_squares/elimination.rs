@@ -2,12 +2,12 @@
 
 use nalgebra::DMatrix;
 
-/// Least-squares equations of the last columns of `matrix` after elimination of the first `count` columns: the lower right block of the
-/// triangle R of A = Q R.
+/// Least-squares equations for the parameters of the last columns of A = `matrix`, after elimination of the parameters
+/// of its first `count` columns: the lower right block of the triangle R of A = Q R.
 ///
-/// The parameters of the first columns may have any units. The remaining equations have the same solution and residual as the whole problem.
-/// Several problems with common parameters are therefore solved together from their remaining equations (Golub and Pereyra, SIAM J.
-/// Numer. Anal. 10 (1973) 413).
+/// The parameters of the first columns may have any units. The remaining equations have the same solution and residual
+/// as the whole problem. Several problems with common parameters are therefore solved together from their remaining
+/// equations (Golub and Pereyra, SIAM J. Numer. Anal. 10 (1973) 413).
 pub fn eliminated(mut matrix: DMatrix<f64>, count: usize) -> DMatrix<f64> {
     for mut column in matrix.column_iter_mut().take(count) {
         let length = column.norm();

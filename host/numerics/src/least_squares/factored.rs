@@ -4,8 +4,9 @@ use nalgebra::{ColPivQR, DMatrix, DVector, Dyn};
 
 use super::LeastSquaresError;
 
-/// Size of a pivot, relative to the first one, below which it is rounding and its parameter is not determined. Rounding errors of 2e-16 in
-/// some thousand rows of scaled columns give pivots below 1e-12.
+/// Size of a pivot of the QR decomposition, relative to the first pivot, below which it is rounding, so that the data
+/// do not determine its parameter. Rounding errors of 2e-16 in some thousand rows of scaled columns give pivots below
+/// 1e-12.
 const RANK_TOLERANCE: f64 = 1e-12;
 
 /// Decomposition A D P = Q R of a matrix A, where D scales each column to length 1 and P orders the columns by their pivots.
@@ -68,7 +69,7 @@ impl Factored {
         let parameters = self.order.len();
         self.decomposed.q_tr_mul(&mut right);
         let mut head = right.rows(0, parameters).into_owned();
-        // The triangle is regular: no pivot is zero, since `new` has checked the rank.
+        // The triangle R is regular: no pivot is zero, since `new` has checked the rank.
         self.triangle.solve_upper_triangular_mut(&mut head);
         let mut x = DVector::zeros(parameters);
         for (value, &index) in head.iter().zip(&self.order) {
@@ -92,7 +93,8 @@ impl Factored {
         covariance
     }
 
-    /// First pivot divided by the last one, an estimate of the condition number of A D.
+    /// First pivot of the QR decomposition divided by the last one, an estimate of the condition number of A with
+    /// columns of length 1.
     pub(super) fn condition(&self) -> f64 {
         let last = self.order.len() - 1;
         (self.triangle[(0, 0)] / self.triangle[(last, last)]).abs()

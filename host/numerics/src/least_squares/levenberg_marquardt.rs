@@ -1,4 +1,4 @@
-//! Nonlinear least squares by Levenberg and Marquardt.
+//! Nonlinear least squares by the Levenberg–Marquardt method.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -14,7 +14,7 @@ pub trait Objective {
     /// Type of the parameters θ.
     type Point;
 
-    /// The sum of squares at θ, with the intermediate results that comparison and linearization use.
+    /// The sum of squares at given parameters θ, with the intermediate results that comparison and linearization use.
     type Value;
 
     /// The sum of squares at the parameters `point`; `None` if the model is not valid there.
@@ -23,7 +23,7 @@ pub trait Objective {
     /// The normal equations at the parameters `point`; `None` if they cannot be computed.
     fn linearize(&mut self, point: &Self::Point, value: &Self::Value) -> Option<NormalSums>;
 
-    /// The parameters θ + δ with δ = `step`, limited to the bounds of the parameters.
+    /// The parameters θ + δ with θ = `point` and δ = `step`, limited to the bounds of the parameters.
     fn moved(&self, point: &Self::Point, step: &DVector<f64>) -> Self::Point;
 
     /// The step δ, shortened if it exceeds the largest change that the model allows in one step.
@@ -40,19 +40,22 @@ pub trait Objective {
     /// The last step may increase the sum slightly: weights that depend on the parameters keep it from decreasing close to the minimum.
     fn has_converged(&self, length: f64, next: &Self::Value, now: &Self::Value) -> bool;
 
-    /// True if the minimization is to be given up before it is linearized at `value`; `before` is the value at the preceding linearization.
+    /// True if the minimization is to be given up before it is linearized at `value`; `before` is the sum of squares at
+    /// the preceding linearization.
     fn gives_up(&self, _round: usize, _value: &Self::Value, _before: Option<&Self::Value>) -> bool {
         false
     }
 
-    /// True if the minimization is to be given up because the linearization predicts too small an improvement.
+    /// True if the minimization is to be given up because its linearization predicts too small a decrease of the sum of
+    /// squares.
     fn gives_up_linearized(&self, _round: usize, _value: &Self::Value, _sums: &NormalSums) -> bool {
         false
     }
 }
 
-/// Normal equations of a linearization: N = JᵀJ, n × n, and g = Jᵀr, n entries. The residuals r = measured − predicted and the Jacobian
-/// J = ∂predicted/∂θ are both divided by the standard deviation of the noise.
+/// Normal equations N δ = g of a linearized least-squares problem: N = JᵀJ, n × n, and g = Jᵀr, n entries. The
+/// residuals r = measured − predicted and the Jacobian J = ∂predicted/∂θ are both divided by the standard deviation of
+/// the noise.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NormalSums {
     /// Normal matrix N.
@@ -81,18 +84,19 @@ pub struct Minimum<P, V> {
 pub struct Damping {
     /// Damping λ of the first step; 0 if the start is near the minimum.
     pub first: f64,
-    /// Factor on λ after a step that reduces the sum, below 1.
+    /// Factor, below 1, by which λ changes after a step that reduces the sum of squares.
     pub shrink: f64,
-    /// Factor on λ after a step that increases the sum, above 1.
+    /// Factor, above 1, by which λ changes after a step that increases the sum of squares.
     pub growth: f64,
-    /// Smallest λ after a step that reduces the sum; above 0 if N is singular.
+    /// Smallest λ after a step that reduces the sum of squares; above 0 if the normal matrix N is singular.
     pub least: f64,
-    /// Smallest λ after a step that increases the sum.
+    /// Smallest λ after a step that increases the sum of squares.
     pub least_retried: f64,
 }
 
 impl Damping {
-    /// Damping that changes by a factor of ten, with undamped steps near the minimum; `first` is λ of the first step.
+    /// Rule of the damping λ that changes it by a factor of ten, with undamped steps near the minimum; `first` is λ of
+    /// the first step.
     pub fn tenfold(first: f64) -> Self {
         Self {
             first,
@@ -116,21 +120,23 @@ impl Damping {
     }
 }
 
-/// Damping λ below which the next step is not damped, since it would change the step by a millionth only.
+/// Damping λ of a Levenberg–Marquardt step below which the next step is not damped, since λ would change the step by a
+/// millionth only.
 const UNDAMPED: f64 = 1e-6;
 
-/// The damped Gauss–Newton iteration (Marquardt, J. SIAM 11 (1963) 431).
+/// Settings of the damped Gauss–Newton iteration of Levenberg and Marquardt (Marquardt, J. SIAM 11 (1963) 431).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LevenbergMarquardt {
     /// Damping of the steps.
     pub damping: Damping,
     /// Largest number of linearizations.
     pub iterations_max: usize,
-    /// Largest number of steps that are tried from one linearization.
+    /// Largest number of steps, each with more damping, that are tried from one linearization.
     pub trials_max: usize,
-    /// Ridge that is added to every damping: it regularizes parameters that depend on each other below the accuracy of the derivatives.
+    /// Ridge λ that is added to every damping: it regularizes combinations of parameters whose effects differ by less
+    /// than the accuracy of the derivatives.
     pub ridge: f64,
-    /// Treatment of parameters without effect on the prediction.
+    /// Treatment of parameters that have no effect on the prediction.
     pub idle: Idle,
 }
 
@@ -172,7 +178,8 @@ impl LevenbergMarquardt {
             let mut moved = None;
             for _ in 0..self.trials_max {
                 let Some(step) = self.step(sums, damping) else {
-                    // Far from the minimum, the normal matrix may be singular although the data determine the parameters: damp more.
+                    // Far from the minimum, the normal matrix may be singular although the data determine the
+                    // parameters: the step is tried with more damping.
                     if damping >= 1.0 {
                         here.stop = Stop::Singular;
                         return Some(here);

@@ -39,19 +39,20 @@ pub struct LinearFit {
     pub sum_of_squares: f64,
     /// Number of rows with a weight above zero, minus the number of parameters.
     pub degrees_of_freedom: usize,
-    /// First pivot divided by the last one, for columns scaled to unit length: usually the condition number within a factor of √n.
+    /// First pivot of the QR decomposition divided by the last one, for columns scaled to unit length: usually the
+    /// condition number within a factor of √n.
     pub condition: f64,
 }
 
 impl LinearFit {
-    /// Variance of a residual of weight 1, estimated from the residuals; infinite without degrees of freedom.
+    /// Variance of the noise of a row of weight 1, estimated from the residuals; infinite without degrees of freedom.
     pub fn variance(&self) -> f64 {
         self.sum_of_squares / self.degrees_of_freedom as f64
     }
 }
 
 impl<'a> LinearProblem<'a> {
-    /// The problem A x = b with unit weights and without a prior; A = `matrix`, b = `right`.
+    /// The least-squares problem A x = b with unit weights and without a prior; A = `matrix`, b = `right`.
     pub fn new(matrix: &'a DMatrix<f64>, right: &'a DVector<f64>) -> Self {
         Self {
             matrix,
@@ -70,7 +71,8 @@ impl<'a> LinearProblem<'a> {
         }
     }
 
-    /// This problem with a prior of mean x₀ and inverse variances pⱼ ≥ 0, n entries each; a mean of 0 is ridge regression.
+    /// This problem with a prior of the parameters: mean x₀ and inverse variances pⱼ ≥ 0, n entries each; a mean of 0
+    /// is ridge regression.
     #[must_use]
     pub fn with_prior(self, mean: &'a DVector<f64>, inverse_variances: &'a DVector<f64>) -> Self {
         Self {
@@ -154,7 +156,7 @@ impl<'a> LinearProblem<'a> {
                     expected,
                 });
             }
-            // Weights and inverse variances must not be negative, since their square roots scale the rows.
+            // Weights and inverse variances of the prior must not be negative, since their square roots scale the rows.
             let is_weight = !std::ptr::eq(vector, self.right) && what.starts_with("the vector");
             if vector
                 .iter()

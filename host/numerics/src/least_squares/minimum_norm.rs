@@ -28,7 +28,7 @@ impl MinimumNorm {
         Ok(Self { decomposed, least })
     }
 
-    /// The solution x for the right side b = `right`, m entries.
+    /// The solution x of least norm for the right side b = `right`, m entries.
     pub fn solve(&self, right: &DVector<f64>) -> DVector<f64> {
         let svd = &self.decomposed;
         let (Some(u), Some(v_t)) = (&svd.u, &svd.v_t) else {
@@ -42,7 +42,8 @@ impl MinimumNorm {
     }
 }
 
-/// Singular value of a matrix below which a combination of its columns counts as zero.
+/// Bound below which a singular value of a matrix counts as zero, so that the combination of columns that belongs to it
+/// has no effect.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Tolerance {
     /// Absolute bound, in the unit of the entries of the matrix.

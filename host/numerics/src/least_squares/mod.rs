@@ -30,20 +30,20 @@ pub use robust::{Loss, RobustFit};
 /// Error of a least-squares problem.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum LeastSquaresError {
-    /// Matrix, right side, weights or prior do not fit together.
+    /// The numbers of entries of matrix, right side, weights or prior do not fit together.
     #[error("{what} has {found} entries instead of {expected}")]
     Shape {
-        /// Name of the vector or matrix.
+        /// Name of the vector or matrix with the wrong number of entries or rows.
         what: &'static str,
-        /// Number of its entries or rows.
+        /// Number of entries or rows that the vector or matrix has.
         found: usize,
-        /// Expected number of entries or rows.
+        /// Number of entries or rows that the vector or matrix should have.
         expected: usize,
     },
-    /// An entry is infinite or not a number.
+    /// An entry of the matrix or of a vector is infinite or not a number.
     #[error("{what} has an entry that is not finite; check the data for gaps, overflow and division by zero")]
     NotFinite {
-        /// Name of the vector or matrix.
+        /// Name of the vector or matrix with the entry.
         what: &'static str,
     },
     /// The data do not determine all parameters.
@@ -55,7 +55,8 @@ pub enum LeastSquaresError {
         rank: usize,
         /// Number of columns.
         parameters: usize,
-        /// Indices, from 0, of the columns that depend linearly on the others, as column pivoting selects them.
+        /// Indices, from 0, of the columns of the matrix that depend linearly on the others, as column pivoting selects
+        /// them.
         undetermined: Vec<usize>,
     },
 }

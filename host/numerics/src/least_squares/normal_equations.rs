@@ -2,12 +2,12 @@
 
 use nalgebra::{Cholesky, ComplexField, DMatrix, DVector, Dyn};
 
-/// Treatment of a parameter without effect on the prediction, whose column of A is zero.
+/// Treatment of a parameter that has no effect on the prediction, so that its column of A is zero.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Idle {
-    /// Such a parameter is refused: the equations have no solution.
+    /// A parameter without effect is refused: the equations have no solution.
     Refuse,
-    /// Such a parameter is fixed at zero, with a covariance of zero.
+    /// A parameter without effect is fixed at zero, with a covariance of zero.
     Hold,
 }
 
@@ -29,16 +29,16 @@ pub enum Idle {
 #[derive(Clone, Debug)]
 pub struct NormalEquations<T: ComplexField = f64> {
     cholesky: Cholesky<T, Dyn>,
-    /// Diagonal of D; 0 for a parameter that is fixed at zero.
+    /// Diagonal of the matrix D that scales N to a unit diagonal; 0 for a parameter that is fixed at zero.
     scale: DVector<f64>,
 }
 
 impl<T: ComplexField<RealField = f64>> NormalEquations<T> {
-    /// Factors N = `matrix`, n × n and Hermitian, of which only the lower triangle is used. `ridge` is added to the diagonal after it is scaled
-    /// to 1.
+    /// Factors N = `matrix`, n × n and Hermitian, of which only the lower triangle is used. `ridge` is added to the
+    /// diagonal after it is scaled to 1.
     ///
-    /// A ridge λ is the damping of Levenberg and Marquardt, or regularizes columns that are linearly dependent within the accuracy √λ.
-    /// `None` if N is not positive definite or not finite.
+    /// A ridge λ is the damping of the Levenberg–Marquardt method, or regularizes columns of A that are linearly
+    /// dependent within the accuracy √λ. `None` if N is not positive definite or not finite.
     pub fn new(matrix: &DMatrix<T>, ridge: f64, idle: Idle) -> Option<Self> {
         let size = matrix.nrows();
         let mut scale = DVector::zeros(size);
@@ -96,7 +96,7 @@ impl<T: ComplexField<RealField = f64>> NormalEquations<T> {
         inverse
     }
 
-    /// Decrease gᴴ N⁻¹ g of the sum of squares from x = 0 to the solution, with g = `right`.
+    /// Decrease gᴴ N⁻¹ g of the sum of squared residuals from x = 0 to the solution of N x = g, with g = `right`.
     pub fn explained(&self, right: &DVector<T>) -> f64 {
         let mut whitened = right.clone();
         self.scaled(&mut whitened);

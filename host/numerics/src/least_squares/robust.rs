@@ -1,25 +1,28 @@
-//! Robust linear least squares: iteratively reweighted.
+//! Robust linear least squares: iteratively reweighted, so that outliers have little effect.
 
 use nalgebra::DVector;
 
 use super::{LeastSquaresError, LinearFit, LinearProblem};
 
-/// Largest number of rounds of reweighting; ten are usual.
+/// Largest number of rounds of reweighting in a robust fit; ten are usual.
 const ROUNDS_MAX: usize = 100;
 
-/// Change of every parameter in one round, in its standard deviation, below which the weights have settled.
+/// Change of every parameter in one round of reweighting, in its standard deviation, below which a robust fit has
+/// settled. A choice.
 const SETTLED: f64 = 1e-6;
 
-/// Factor from the median absolute deviation of a normal distribution to its standard deviation, 1/Φ⁻¹(3/4).
+/// Ratio of the standard deviation of a normal distribution to its median absolute deviation, 1/Φ⁻¹(3/4).
 const MEDIAN_TO_DEVIATION: f64 = 1.482_602_218_505_602;
 
-/// Loss function ρ(u) of a residual divided by its scale; it acts through its weight ψ(u)/u. Both functions have 95 % efficiency for normal
-/// noise.
+/// Loss function ρ(u) of a residual divided by the robust standard deviation of all residuals; it acts through its
+/// weight ψ(u)/u, ψ = dρ/du. Both functions have 95 % efficiency for normal noise.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Loss {
-    /// Huber's loss: linear beyond 1.345 scales. It is convex, so that the sum has one minimum.
+    /// Huber's loss: linear beyond 1.345 robust standard deviations. It is convex, so that the sum of losses has one
+    /// minimum.
     Huber,
-    /// Tukey's biweight: constant beyond 4.685 scales. The iteration starts from the solution with Huber's loss.
+    /// Tukey's biweight: constant beyond 4.685 robust standard deviations. The iteration starts from the solution with
+    /// Huber's loss.
     Tukey,
 }
 
@@ -35,19 +38,20 @@ impl Loss {
 /// A robust fit, with the factor by which the loss function reduced the weight of each row.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RobustFit {
-    /// The linear fit with the weights of the last round.
+    /// The linear fit with the weights of the last round of reweighting.
     pub fit: LinearFit,
-    /// Factor, from 0 to 1, on the weight of each row; 0 marks an outlier.
+    /// Factor, from 0 to 1, by which the loss function changed the weight of each row; 0 marks an outlier.
     pub kept: DVector<f64>,
     /// Robust standard deviation of the weighted residuals, in their unit.
     pub scale: f64,
-    /// False if the weights still changed in the last round.
+    /// False if the weights of the rows still changed in the last round of reweighting.
     pub is_settled: bool,
 }
 
 impl LinearProblem<'_> {
-    /// Parameters with the least sum of ρ(rᵢ √wᵢ / scale). Each round takes the scale from the median absolute residual (Huber and Ronchetti,
-    /// *Robust Statistics*, 2nd edition, 7.8).
+    /// Parameters with the least sum of losses ρ(rᵢ √wᵢ / scale) over the rows, with residuals rᵢ and weights wᵢ. Each
+    /// round takes the scale from the median absolute residual (Huber and Ronchetti, *Robust Statistics*, 2nd edition,
+    /// 7.8).
     ///
     /// # Errors
     /// See [`LeastSquaresError`]. Also if fewer rows than parameters remain without the outliers.
