@@ -16,7 +16,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// The limits from 700 to 1300 rev/min as text.
+/// The stability limits from 700 to 1300 rev/min as text.
 pub fn limits(case: &Path) -> Result<String, Box<dyn Error>> {
     let case = Case::read(case)?;
     // `CubicTerms::Refuse` returns an error for a structure with cubic terms, because its limits depend on the forced orbit;

@@ -10,12 +10,12 @@ pub struct Options {
 /// Stage of a diagnosis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stage {
-    /// Recordings are compared with the prediction of the baseline.
+    /// Stage of a diagnosis in which recordings are compared with the prediction of the baseline.
     Records,
-    /// The regressors of each cause are computed.
+    /// Stage in which the regressors of each cause are computed.
     Library,
-    /// Candidate models with this number of causes are compared.
+    /// Stage in which candidate models with this number of causes are compared.
     Causes(usize),
-    /// Parameters and intervals of the selected candidate model are computed.
+    /// Stage in which parameters and intervals of the selected candidate model are computed.
     Answer,
 }

@@ -19,7 +19,7 @@ pub struct ForceLaw {
     pub chip: Option<ChipLaw>,
     /// Process damping of the flank; `None` without process damping.
     pub process_damping: Option<ProcessDamping>,
-    /// Relative rate r of wear, 1/s.
+    /// Relative rate r of the force growth by wear, 1/s: all forces are multiplied by 1 + r·t.
     pub wear_per_s: f64,
 }
 
@@ -28,7 +28,7 @@ pub struct ForceLaw {
 pub struct ChipLaw {
     /// Exponent p, positive.
     pub exponent: f64,
-    /// Relative rate r of the force growth by wear, 1/s: all forces are multiplied by 1 + r·t.
+    /// Reference chip thickness h₀, m, positive: there the power law equals the linear law.
     pub reference_m: f64,
 }
 

@@ -64,7 +64,7 @@ pub struct Fluctuation {
     pub delta: f64,
     /// Modulation frequency f_m, Hz, positive.
     pub frequency_hz: f64,
-    /// Phase ψ of the modulation at t = 0, rad.
+    /// Phase ψ of the speed modulation at t = 0, rad.
     pub phase_rad: f64,
 }
 

@@ -37,7 +37,7 @@ pub(super) struct Contact<'a> {
 struct ToothState {
     /// True while the tooth is between the start angle and the exit angle of the cut (engagement arc).
     in_arc: bool,
-    /// Time of the next entry into, or exit from, the engagement arc, s.
+    /// Time of the tooth's next entry into, or exit from, the engagement arc, s.
     next_switch_s: f64,
     /// Number of the tooth's present passing through the engagement arc, counted by the spindle angle.
     pass: f64,

@@ -7,11 +7,11 @@ use quietcut_model::{Cutter, Spindle};
 /// The cutting process of one simulated cut: cutter, spindle, traverse of the workpiece and regeneration.
 #[derive(Clone, Debug)]
 pub struct Cutting {
-    /// Geometry and cutting force of the tool.
+    /// Geometry of the teeth, engagement and cutting force law of the tool.
     pub cutter: Cutter,
     /// Spindle angle over time.
     pub spindle: Spindle,
-    /// Entry into the workpiece, full engagement and exit.
+    /// Entry of the tool into the workpiece, full engagement, and exit.
     pub traverse: WorkpieceTraverse,
     /// Earlier vibration of the tool that the chip thickness contains: that of all tooth passings, of the last one, or none.
     pub regeneration: Regeneration,

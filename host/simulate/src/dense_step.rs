@@ -58,17 +58,17 @@ impl Workspace {
 }
 
 impl DenseStep<'_> {
-    /// Start time of the step, s.
+    /// Start time of the integration step, s.
     pub fn from_s(&self) -> f64 {
         self.from_s
     }
 
-    /// End time of the step, s.
+    /// End time of the integration step, s.
     pub fn to_s(&self) -> f64 {
         self.to_s
     }
 
-    /// The motion at the time `t`, s, within the step.
+    /// The motion of the tool at the time `t`, s, within the integration step.
     pub fn motion(&self, t: f64, workspace: &mut Workspace) -> Motion {
         let u = (t - self.from_s) / (self.to_s - self.from_s);
         for (state, quartic) in workspace.state.iter_mut().zip(self.quartics) {

@@ -10,7 +10,7 @@ use quietcut_model::restoring_force::{self, MotionState, Regime, Regimes};
 use quietcut_numerics::crossing::first_below_zero;
 use quietcut_numerics::dormand_prince::{DormandPrince, Quartic, at};
 
-/// Numbers of steps and events of one run.
+/// Numbers of integration steps and events of one simulation run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Statistics {
     /// Accepted steps.
@@ -48,7 +48,7 @@ pub(super) struct Integrator<'a> {
 enum Event {
     /// A tooth loses or regains contact.
     Contact(Change),
-    /// Restoring force `index` leaves its regime at the fraction `u` of the step.
+    /// Restoring force number `index` leaves its regime at the fraction `u` of the integration step.
     RegimeEnd { index: usize, u: f64 },
 }
 
@@ -85,7 +85,7 @@ impl<'a> Integrator<'a> {
         }
     }
 
-    /// Integrates to `end_s`, s; `observe` receives every step in the order of time.
+    /// Integrates to the time `end_s`, s; `observe` receives every integration step in the order of time.
     pub(super) fn run(
         mut self,
         end_s: f64,
@@ -305,7 +305,7 @@ impl<'a> Integrator<'a> {
         Ok((shorter, Some(event)))
     }
 
-    /// The first event within the last attempted step of length `h`, s.
+    /// The first event within the last attempted integration step of length `h`, s.
     fn first_event(&mut self, h: f64) -> Option<Event> {
         let contact = self
             .contact

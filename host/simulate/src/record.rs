@@ -231,7 +231,7 @@ struct Sensors {
     samplers: Vec<(Pickup, Sampler)>,
 }
 
-/// True if the same accelerometer serves both channels.
+/// True if two channels read the same accelerometer: same quantity, delay and location.
 fn is_one_sensor(a: &Pickup, b: &Pickup) -> bool {
     a.quantity == b.quantity && a.delay_s == b.delay_s && a.modes == b.modes
 }

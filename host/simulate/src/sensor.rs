@@ -24,7 +24,7 @@ const TAPS_PER_SIDE: usize = 32;
 /// the structure with [`Sampler::at_sensor`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Accelerometer {
-    /// Full scale, g, at ±32 768 counts.
+    /// Full scale of the accelerometer, g, at ±32 768 counts.
     pub range_g: f64,
     /// Amplitude spectral density of the white noise of each axis, g/√Hz.
     pub noise_g_per_root_hertz: f64,
@@ -41,7 +41,7 @@ pub struct Accelerometer {
 pub struct TachometerModel {
     /// Number of positions on the wheel, and number of missing ones, which form the gap.
     pub wheel: Wheel,
-    /// Standard deviation of the time stamp of an edge, s.
+    /// Standard deviation of the time stamp of a tachometer edge, s.
     pub jitter_s: f64,
 }
 
@@ -55,7 +55,7 @@ impl Accelerometer {
         stamp_jitter_s: 1e-6,
     };
 
-    /// True sampling rate, Hz, with the clock error.
+    /// True sampling rate of the accelerometer, Hz, with its clock error.
     pub fn rate_hz(&self) -> f64 {
         self.nominal_rate_hz * (1.0 + self.clock_error)
     }
@@ -133,7 +133,7 @@ impl Sampler {
         (TAPS_PER_SIDE + 1) as f64 * self.step_s
     }
 
-    /// Takes the samples that lie in the newest integration step.
+    /// Takes the acceleration samples that lie in the newest integration step.
     pub fn observe(&mut self, step: &DenseStep<'_>) {
         loop {
             let t = (self.taken as f64 - 0.5) * self.step_s - self.delay_s;

@@ -9,7 +9,7 @@ pub struct Settings {
     pub absolute_m: f64,
     /// Relative tolerance of the local error, as a fraction of the amplitude of the motion.
     pub relative: f64,
-    /// Displacement beyond which the motion counts as diverged, m.
+    /// Displacement of the tool beyond which the motion counts as diverged, m.
     pub largest_m: f64,
     /// Largest number of steps, accepted and rejected; more end the run as too stiff.
     pub steps_max: u64,

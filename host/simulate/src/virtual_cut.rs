@@ -16,7 +16,7 @@ use quietcut_recording::Quantity;
 /// A simulated cut of a case: spindle speed, axial depth, entry, duration and effects.
 #[derive(Clone, Debug)]
 pub struct VirtualCut {
-    /// Spindle speed at the start, rev/min.
+    /// Spindle speed at the start of the virtual cut, rev/min.
     pub spindle_rpm: f64,
     /// Spindle speed at the end of a linear speed sweep, rev/min; `None` for a constant speed. The feed speed is constant and gives the feed
     /// per tooth of the case at the mean spindle speed.
@@ -25,9 +25,9 @@ pub struct VirtualCut {
     pub depth_mm: f64,
     /// Duration of the simulation, s.
     pub seconds: f64,
-    /// Entry into, and exit from, the workpiece.
+    /// Entry of the tool into the workpiece, and its exit.
     pub entry: Entry,
-    /// Time without contact before and after the cut, s.
+    /// Duration of air cutting before and after the cut, s.
     pub air_s: f64,
     /// Pores of the workpiece material; `None` for solid material.
     pub pores: Option<Pores>,
@@ -77,10 +77,10 @@ pub enum VirtualCutError {
         spindle_rpm: f64,
         /// Sampling rate, Hz.
         rate_hz: f64,
-        /// Smallest sampling rate for this wheel, Hz.
+        /// Smallest sampling rate that resolves the pulses of this tachometer wheel, Hz.
         needed_hz: f64,
     },
-    /// Wear that makes the cutting force negative within the duration.
+    /// Wear that makes the cutting force negative within the duration of the virtual cut.
     #[error(
         "wear of {relative_rate_per_s} per s makes the cutting force negative within {seconds} s: a larger rate or a shorter time is needed"
     )]
@@ -90,7 +90,7 @@ pub enum VirtualCutError {
         /// Duration of the cut, s.
         seconds: f64,
     },
-    /// A duration too short to reach full engagement.
+    /// A virtual cut too short to reach full engagement.
     #[error(
         "{seconds} s are too short: with {air_s} s of air at both ends, way in and way out take {needed_s:.2} s, so give more than that"
     )]
@@ -111,7 +111,7 @@ pub struct SensedCut {
     pub blocks: Vec<Block>,
     /// Edges of the tachometer in the order of time.
     pub edges: Vec<Edge>,
-    /// Numbers of steps and events of the integration.
+    /// Numbers of integration steps and events.
     pub statistics: Statistics,
 }
 

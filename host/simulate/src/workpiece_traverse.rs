@@ -14,11 +14,11 @@ pub enum WorkpieceTraverse {
     Steady,
     /// The axial depth grows linearly for the time `ramp_s` from `start_s` on, and decreases linearly for the same time until `end_s`.
     Ramp {
-        /// First contact with the workpiece, s.
+        /// Time of the first contact of the tool with the workpiece, s.
         start_s: f64,
         /// Duration of the growth of the axial depth, and of its decrease, s.
         ramp_s: f64,
-        /// Last contact with the workpiece, s.
+        /// Time of the last contact of the tool with the workpiece, s.
         end_s: f64,
     },
     /// The tool feeds in through the front face of the workpiece and out through its end face, so that the immersion grows and decreases.
@@ -38,7 +38,7 @@ pub struct MaterialWindows {
 }
 
 impl MaterialWindows {
-    /// True if the time `t`, s, lies in one of the windows.
+    /// True if the time `t`, s, lies in one of the windows in which the tooth has material in front of it.
     pub fn contain(&self, t: f64) -> bool {
         self.windows
             .iter()
@@ -163,7 +163,7 @@ impl WorkpieceTraverse {
     }
 }
 
-/// Feed speed, m/s, at the mean spindle speed.
+/// Feed speed of the tool, m/s: feed per tooth at the mean spindle speed.
 fn feed_speed(cutter: &Cutter, spindle: &Spindle) -> f64 {
     cutter.feed_per_tooth_m * cutter.teeth.len() as f64 * spindle.speed_rad_per_s() / std::f64::consts::TAU
 }

@@ -64,7 +64,7 @@ impl Receptance {
         }
     }
 
-    /// H(iω), m/N; ω in rad/s. Zero at a pole on the imaginary axis.
+    /// Receptance H(iω) of the baseline, m/N, at ω, rad/s. Zero at a pole on the imaginary axis.
     pub(crate) fn at(&self, omega: f64) -> Matrix3<Complex64> {
         if let Some(whole) = &self.whole {
             return whole.receptance(omega).unwrap_or_else(Matrix3::zeros);
@@ -105,7 +105,7 @@ impl Receptance {
     }
 }
 
-/// H(iω) at the bins of the upsampled spectrum, m/N.
+/// Receptance H(iω) of the baseline at the bins of the upsampled spectrum, m/N.
 pub(crate) fn response(receptance: &Receptance, grid: &Grid) -> Vec<Matrix3<Complex64>> {
     (0..grid.fine_bins())
         .into_par_iter()

@@ -19,7 +19,7 @@ impl Cause for ProcessDampingCause {
     }
 
     fn locations(&self, study: &Study<'_>) -> Vec<Location> {
-        // Without the diameter the cutting speed is not known.
+        // Without the diameter of the tool the cutting speed V of the force −(C/V)·b·v_n is not known.
         if cutter(study).is_some_and(|cutter| cutter.radius_m.is_some()) {
             everywhere(study, self.name())
         } else {

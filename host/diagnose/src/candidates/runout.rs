@@ -46,8 +46,7 @@ impl Cause for RunoutCause {
             .tool
             .as_ref()
             .is_some_and(|tool| tool.runout.is_none());
-        // Start values (e cos ψ, −e sin ψ) of the runout in µm: zero, and a tenth and a quarter of the feed per tooth in several
-        // directions.
+        // With one tooth, runout changes no chip: that tooth cuts its own surface.
         if runs_true && teeth(study) > 1 {
             everywhere(study, self.name())
         } else {
@@ -55,7 +54,7 @@ impl Cause for RunoutCause {
         }
     }
 
-    /// Start values e cos ψ and −e sin ψ in µm: zero, and offsets so large that some teeth do not cut.
+    /// Start values (e cos ψ, −e sin ψ) of the runout in µm: zero, and a tenth and a quarter of the feed per tooth in several directions.
     fn nonlinear_grid(&self, study: &Study<'_>, _: &Location) -> Vec<Vec<f64>> {
         let feed_um = cutter(study).map_or(0.0, |cutter| 1e6 * cutter.feed_per_tooth_m);
         let directions = if teeth(study) > 2 { 6 } else { 2 };

@@ -139,7 +139,7 @@ pub struct Unexplained {
     /// Channel, frequency and time at which the unexplained residual is largest, in words.
     #[serde(rename = "where")]
     pub location: String,
-    /// A formula that may describe the residual: a guess.
+    /// A formula that may describe the unexplained restoring force: a guess.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub guess: Option<String>,
 }

@@ -36,7 +36,7 @@ impl Diagnosis {
         found.map(|cause| (cause.name, &cause.extension))
     }
 
-    /// The extended case; `None` without causes.
+    /// The case with the extensions of the acting causes; `None` without causes.
     pub fn extended(&self, case: &Case) -> Option<Case> {
         (self.acting > 0).then(|| {
             let mut extended = case.clone();

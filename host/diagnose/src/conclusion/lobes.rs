@@ -73,7 +73,7 @@ pub struct Chart {
     pub method: &'static str,
     /// Largest axial depth up to which stability limits were searched, mm.
     pub searched_mm: f64,
-    /// The stability limits, by spindle speed.
+    /// The stability limits of axial depth, one entry for each spindle speed.
     pub lines: Vec<SpeedLine>,
     /// Trial cuts and recorded cuts, each with the comparison of its outcome with the prediction.
     pub cuts: Vec<(TrialCut, Call)>,
@@ -99,7 +99,7 @@ pub struct Lobes {
     /// Right and wrong predictions for trial and recorded cuts before and after the extension; `None` without such cuts.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub calls: Option<CallsChange>,
-    /// Charts of the case and of the extended case.
+    /// Stability charts of the case and of the extended case.
     #[serde(skip)]
     pub charts: [Chart; 2],
     /// Sentences about intervals that cannot be computed, and about recorded cuts whose outcome cannot be determined.
@@ -225,7 +225,7 @@ fn spread(
     Ok(())
 }
 
-/// The trial cuts and recorded cuts of a chart.
+/// The trial cuts and recorded cuts that belong to a stability chart.
 struct Cuts<'a> {
     tried: &'a [TrialCut],
     recorded: Vec<TrialCut>,
@@ -255,7 +255,7 @@ impl<'a> Cuts<'a> {
     }
 }
 
-/// Spindle speeds of a chart and its largest axial depth.
+/// Spindle speeds of a stability chart, and its largest axial depth.
 struct Range {
     speeds_rpm: Vec<f64>,
     searched_mm: f64,
@@ -297,7 +297,7 @@ impl Chart {
         })
     }
 
-    /// Counts of right and wrong predictions of the cuts.
+    /// Counts of right and wrong stability predictions for the chart's cuts.
     pub fn calls(&self) -> Calls {
         let calls: Vec<Call> = self.cuts.iter().map(|(_, call)| *call).collect();
         Calls::of(&calls)

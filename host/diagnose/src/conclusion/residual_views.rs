@@ -38,7 +38,7 @@ pub struct ResidualView {
     pub left: Vec<f64>,
     /// The restoring force that would explain the residual of the baseline in this channel; `None` if the channel's axis has no motion.
     pub missing: Option<MissingForce>,
-    /// Spindle motion of a cut; `None` for other tests.
+    /// The channel and its residual sampled at the tooth passings of a cut; `None` for other tests.
     pub spindle_motion: Option<SpindleMotionView>,
 }
 

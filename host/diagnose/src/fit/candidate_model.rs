@@ -23,7 +23,7 @@ pub(crate) struct CandidateModel {
     pub choices: Vec<Choice>,
     /// The linear fit of all coefficients, in the order of `choices`.
     pub fit: Fit,
-    /// Number of fitted parameters, nonlinear ones included.
+    /// Number of fitted parameters of the candidate model, nonlinear ones included.
     pub parameter_count: usize,
     /// Result of the prediction-error fit, if one was made. Coefficients, nonlinear parameters and χ² of the model are then those of this
     /// fit.
@@ -45,7 +45,7 @@ pub(crate) struct Simulated {
 /// Prediction of the records by an extended case.
 #[derive(Debug)]
 pub(crate) struct ExtendedPrediction {
-    /// By record and channel: measured minus predicted samples.
+    /// For each record and channel: measured samples minus those that the extended case predicts.
     pub residuals: Vec<Vec<Vec<f64>>>,
     /// Noise-free samples of the channels.
     pub predicted: Vec<Clean>,

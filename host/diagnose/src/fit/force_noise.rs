@@ -131,7 +131,7 @@ impl OutputError<'_> {
         Some(spread)
     }
 
-    /// One draw of force-sensor noise, N, by record.
+    /// One random draw of the noise of the force sensors, N, for each record.
     fn drawn(&self, draw: u64) -> Vec<Forces> {
         let mut random = ChaCha8Rng::seed_from_u64(draw);
         random.set_stream(STREAM);

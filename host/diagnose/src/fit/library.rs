@@ -12,9 +12,9 @@ use quietcut_model::effects::EffectName;
 
 /// One cause at one location, with the regression columns for each set of its nonlinear parameters.
 pub(crate) struct Candidate {
-    /// Index of the cause in `Library::causes`.
+    /// Index of the candidate's cause in `Library::causes`.
     pub cause: usize,
-    /// Axis, axes or channel in which the cause acts.
+    /// Axis, axes or channel in which the candidate's cause acts.
     pub location: Location,
     /// Each set of the cause's nonlinear parameters, with the indices of its regression columns.
     pub variants: Vec<(Vec<f64>, Vec<usize>)>,
@@ -149,7 +149,7 @@ impl Library {
         &*self.causes[self.candidates[candidate].cause]
     }
 
-    /// Every candidate with every set of its nonlinear parameters.
+    /// All choices: every cause at every location with every set of its nonlinear parameters.
     pub(crate) fn choices(&self) -> Vec<Choice> {
         self.candidates
             .iter()

@@ -36,7 +36,7 @@ pub(crate) struct OutputError<'a> {
     /// Fitted, held-out and whole segments of all records, in the order of the records.
     segments: Vec<Segment>,
     pub(crate) horizons: Vec<Vec<Segment>>,
-    /// True if every record is a free decay.
+    /// True if every record of the study is a free decay.
     pub(crate) is_free_decay: bool,
 }
 

@@ -25,7 +25,7 @@ const ROUNDING: f64 = 1e-13;
 pub(crate) struct Fit {
     /// The coefficients.
     pub coefficients: Vec<f64>,
-    /// Covariance of the coefficients for unit-variance noise.
+    /// Covariance of the fitted coefficients for unit-variance noise.
     pub covariance: DMatrix<f64>,
     /// χ² of the linear fit: residual sum of squares in units of the noise.
     pub left: f64,

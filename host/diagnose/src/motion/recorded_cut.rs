@@ -24,7 +24,7 @@ const MOST_MISSED: usize = 24;
 /// A recorded cut: the tool, its engagement and the spindle angle.
 #[derive(Clone, Debug)]
 pub(crate) struct RecordedCut {
-    /// The tool with its immersion and depth.
+    /// The tool of the recorded cut with its immersion and axial depth.
     pub cutter: Cutter,
     /// The spindle angle over time.
     pub spindle_motion: SpindleMotion,

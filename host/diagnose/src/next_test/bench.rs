@@ -31,7 +31,7 @@ const WAITED: f64 = 4.0;
 pub(super) struct MeasuredChannel {
     pub(super) name: String,
     quantity: Quantity,
-    /// Standard deviation of the channel's noise; 0 if unknown.
+    /// Standard deviation of the channel's noise in the records; 0 if unknown.
     deviation: f64,
 }
 

@@ -147,7 +147,7 @@ impl Experiment {
     /// The experiment cannot be simulated, or the cut moves too far; the error is a sentence.
     pub(super) fn readings(&self, bench: &Bench<'_>, case: &Case) -> Result<Vec<SimulatedReading>, String> {
         let mounted = self.recording(bench, case)?;
-        // A second sensor next to the mounted one has none of its faults: the extensions of sensors are removed.
+        // A second sensor next to a mounted one is taken as free of errors, so the sensor extensions of the case are removed for it.
         let mut faultless = case.clone();
         faultless.extensions.retain(|name, _| {
             name.parse()
@@ -255,7 +255,7 @@ impl Experiment {
         }
     }
 
-    /// A second sensor next to a mounted one is taken as free of errors, so the sensor extensions of the case are removed for it.
+    /// The proposed test as the entry `next_test` of the answer.
     pub(super) fn described(&self, sensors: Sensors, distance: f64, why: String) -> NextTest {
         let plain = NextTest {
             kind: "",

@@ -1,4 +1,4 @@
-//! The distance of two candidate models in an experiment.
+//! The distance between the readings that two candidate models predict in an experiment.
 
 use nalgebra::{DMatrix, DVector};
 use quietcut_numerics::least_squares::LinearProblem;
@@ -130,7 +130,7 @@ fn move_by(table: &mut toml::Table, key: &str, step: f64) {
     }
 }
 
-/// Distance between the models `one` and `other` with these sensors.
+/// Distance between the readings of these sensors that the candidate models `one` and `other` predict.
 pub(super) fn between(bench: &Bench<'_>, one: &Predicted, other: &Predicted, sensors: Sensors) -> Difference {
     let there = difference(bench, one, other, sensors);
     let back = difference(bench, other, one, sensors);
@@ -152,7 +152,7 @@ fn difference(bench: &Bench<'_>, truth: &Predicted, model: &Predicted, sensors: 
         let values = compared.iter().flat_map(|&index| {
             let pairs = a[index].samples.iter().zip(&b[index].samples);
             let difference: Vec<f64> = pairs.map(|(a, b)| (a - b) / deviations[index]).collect();
-            // Sensors have unknown offsets: the mean is not compared.
+            // The offsets of sensors are unknown, so the means of the readings are not compared.
             let mean = difference.iter().sum::<f64>() / difference.len().max(1) as f64;
             difference.into_iter().map(move |value| value - mean)
         });

@@ -6,7 +6,7 @@ use num_complex::Complex64;
 use crate::baseline::derivatives;
 use quietcut_simulate::effect::Pickup;
 
-/// A channel that the baseline predicts.
+/// A measured channel of a record with the samples that the baseline predicts.
 #[derive(Clone, Debug)]
 pub(crate) struct Observed {
     /// The quantity, axes, delay and modes that the sensor reads.

@@ -16,9 +16,9 @@ use quietcut_simulate::path::SampledMotion;
 pub(crate) struct Cutting {
     /// Tool, engagement and spindle angle of the cut.
     pub cut: RecordedCut,
-    /// The chips of every tooth along the motion.
+    /// The chips of every tooth along the motion of the tool.
     chips: Chips,
-    /// The cutting force of the baseline along the motion.
+    /// The cutting force that the baseline predicts along the motion of the tool.
     pub force: CutForce,
     finer: usize,
     /// True if the record has a channel of cutting force.

@@ -80,7 +80,7 @@ fn is_of_a_cut(recording: &Recording) -> bool {
     recording.sidecar.kind == Some(TestKind::Cutting)
 }
 
-/// Samples of a recorded cut with full engagement.
+/// Range of the samples of a recorded cut in which the tool is fully engaged.
 #[derive(Debug, PartialEq)]
 struct Engaged {
     range: Range<usize>,
@@ -219,7 +219,7 @@ struct Levels {
     chatters: bool,
     /// Levels by channel and revolution.
     of: Vec<Vec<f64>>,
-    /// Standard deviation of each channel's noise over the reference level of the channel.
+    /// Standard deviation of each channel's noise, divided by the channel's vibration level in the cut.
     noise: Vec<f64>,
 }
 

@@ -40,7 +40,7 @@ pub(crate) struct Record {
     pub kind: Option<TestKind>,
     /// Quantity in which the record is compared: motion or force.
     pub domain: Domain,
-    /// Channels whose sensors are not at the tool tip.
+    /// Names of the channels whose sensors are not at the tool tip.
     pub elsewhere: Vec<String>,
     /// Time and frequency grid of the record, with its transforms.
     pub grid: Grid,

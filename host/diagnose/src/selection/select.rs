@@ -18,7 +18,7 @@ use crate::selection::search::{pairs as best_pairs, singles, triples};
 use crate::selection::stepwise::extended;
 use quietcut_recording::Recording;
 
-/// Largest number of causes that act together.
+/// Largest number of causes in a candidate model.
 const CAUSES: usize = 3;
 /// Number of candidate models with the largest gain in the regression that are simulated: among models of one, of two and of three causes.
 const SIMULATED: [usize; CAUSES] = [9, 5, 3];

@@ -66,7 +66,7 @@ impl Grid {
         self.length / 2 + 1
     }
 
-    /// Angular frequency of a bin, rad/s.
+    /// Angular frequency of bin number `bin` of a spectrum, rad/s.
     pub(crate) fn omega(&self, bin: usize) -> f64 {
         TAU * self.rate_hz * bin as f64 / self.length as f64
     }
@@ -102,7 +102,7 @@ impl Grid {
         samples
     }
 
-    /// Inverse transform of `spectrum` as an upsampled signal.
+    /// Inverse transform of `spectrum` as a signal with `finer` samples per sample of the record.
     pub(crate) fn fine_samples(&self, spectrum: &[Complex64]) -> Vec<f64> {
         let mut bins = vec![Complex64::ZERO; self.finer * self.length / 2 + 1];
         bins[..spectrum.len()].copy_from_slice(spectrum);

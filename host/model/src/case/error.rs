@@ -21,7 +21,7 @@ pub enum CaseError {
         line: usize,
         /// Text of the line.
         source_line: String,
-        /// The parser's message: the fault, and what it expected.
+        /// Message of the TOML parser: the fault, and what it expected.
         message: String,
     },
     /// A value that no machine, tool or cut can have.
@@ -31,7 +31,7 @@ pub enum CaseError {
         path: PathBuf,
         /// Line, from 1.
         line: usize,
-        /// The key, with its table: `tool.teeth`.
+        /// The key of the refused value with its table, such as `tool.teeth`.
         key: String,
         /// The refused value, as the case file has it.
         found: String,

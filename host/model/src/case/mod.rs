@@ -40,7 +40,7 @@ pub struct Case {
     pub material: Option<Material>,
     /// The cut.
     pub cut: Option<Cut>,
-    /// Limits of spindle speed and power.
+    /// Limits of spindle speed and power of the machine; `None` if the case does not give them.
     pub limits: Option<MachineLimits>,
     /// Posture of the robot at which the structure was measured.
     pub posture: Posture,

@@ -1,4 +1,4 @@
-//! An effect that is not possible.
+//! Errors of an effect with impossible or missing values, or that does not apply to the model.
 
 use super::{EffectName, nearest};
 

@@ -47,7 +47,7 @@ impl EffectSpec {
         self.parameters.iter().find(|parameter| parameter.main)
     }
 
-    /// The parameter of the effect with this key.
+    /// The parameter of the effect with this key; `None` if the effect has no such parameter.
     pub fn parameter(&self, key: &str) -> Option<&'static Parameter> {
         self.parameters.iter().find(|parameter| parameter.key == key)
     }
@@ -109,7 +109,7 @@ pub enum Argument {
 pub enum Locations {
     /// Along one direction, or along each of a list of directions. In a structure with a single direction the key may be missing.
     EachDirection,
-    /// On the whole structure, or only along the given directions.
+    /// Location of an effect on the whole structure, or only along the given directions.
     WholeOrDirection,
     /// Between two directions.
     TwoDirections,

@@ -18,7 +18,7 @@ pub struct Process {
 }
 
 impl Process {
-    /// The cutting process of a case with equal pitch.
+    /// The linear cutting process of a tool with equal pitch in a cut.
     pub fn new(tool: &Tool, material: &Material, cut: &Cut, axial_depth_modulation: bool) -> Self {
         Self {
             force: ToothForce::new(EdgeAngle::new(tool.edge_angle_deg), material),

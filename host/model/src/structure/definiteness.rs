@@ -14,7 +14,7 @@ use super::{Direction, Matrices};
 pub struct Indefinite {
     /// Name of the matrix: mass, damping or stiffness.
     pub matrix: &'static str,
-    /// Smallest eigenvalue of its symmetric part, in the unit of the matrix.
+    /// Smallest eigenvalue of the indefinite matrix's symmetric part, in the unit of the matrix.
     pub eigenvalue: f64,
     /// Smallest set of entries whose change makes the matrix definite; empty if one or two changes do not suffice.
     pub remedy: Vec<Remedy>,

@@ -17,7 +17,7 @@ use super::Matrices;
 pub struct Joint {
     /// Joint axis, of length 1: the link rotates about it by the right-hand rule.
     pub axis: Unit<Vector3<f64>>,
-    /// A point on the joint axis, m.
+    /// A point on the joint's axis in the base frame, with all joint angles at zero, m.
     pub point_m: Vector3<f64>,
     /// Joint stiffness, N m/rad.
     pub stiffness_nm_per_rad: f64,
@@ -31,7 +31,7 @@ pub struct Joint {
     pub rotor_kg_m2: f64,
     /// Mass of the link, kg.
     pub mass_kg: f64,
-    /// Centre of mass of the link, m.
+    /// Centre of mass of the joint's link in the base frame, with all joint angles at zero, m.
     pub center_m: Vector3<f64>,
     /// Inertia tensor of the link about its centre of mass, kg m².
     pub inertia_kg_m2: Matrix3<f64>,
@@ -145,7 +145,7 @@ impl Robot {
         }
     }
 
-    /// Diagonal matrix of one property of each joint.
+    /// Diagonal matrix with one property of each joint, such as its stiffness.
     fn of_joints(&self, of: impl Fn(&Joint) -> f64) -> DMatrix<f64> {
         let count = self.joints.len();
         DMatrix::from_fn(

@@ -21,11 +21,11 @@ pub enum Signal {
     },
     /// Step sine: one frequency after the other. Each step begins at phase 0 and is followed by a pause without force.
     StepSine {
-        /// The steps in the order of excitation.
+        /// The steps of the step sine in the order of excitation.
         steps: Vec<Step>,
         /// Duration of the excitation in each step of the step sine, s.
         dwell_s: f64,
-        /// Pause without force after each step, s.
+        /// Pause without force after each step of the step sine, s.
         pause_s: f64,
     },
     /// Linear sine sweep: the frequency changes linearly in time.
@@ -41,18 +41,18 @@ pub enum Signal {
     },
     /// Hammer impacts: half-sine pulses.
     Impacts {
-        /// The impacts in the order of time.
+        /// The hammer impacts in the order of time.
         impacts: Vec<Impact>,
         /// Duration of the recording, s.
         seconds: f64,
     },
     /// Free decay after a slow static pull.
     Release {
-        /// Static force at the end of the pull, N.
+        /// Static force at the end of the pull before the free decay, N.
         force_n: f64,
         /// Time in which the force grows as half a cosine, s; it is then held for a fifth of that time and removed.
         pull_s: f64,
-        /// Recording time after the force is removed, s.
+        /// Duration of the recorded free decay after the force is removed, s.
         seconds: f64,
     },
 }
@@ -146,7 +146,7 @@ impl Signal {
         }
     }
 
-    /// The commanded force at the time `t`, N.
+    /// The commanded excitation force at the time `t`, N.
     pub fn force_n(&self, t: f64) -> f64 {
         match self {
             Self::Tones {

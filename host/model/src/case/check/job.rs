@@ -1,4 +1,4 @@
-//! The job: material, cut, the machine's limits and the posture.
+//! Reads the job from the case file: material, cut, limits of the machine and posture of the robot.
 
 use toml::Spanned;
 

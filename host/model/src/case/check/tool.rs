@@ -1,4 +1,4 @@
-//! The tool: teeth, their pitch and runout.
+//! Reads the tool from the case file: teeth, their pitch and runout.
 
 use toml::Spanned;
 
