@@ -30,16 +30,16 @@ pub struct Accelerometer {
     pub noise_g_per_root_hertz: f64,
     /// Nominal sampling rate, Hz.
     pub nominal_rate_hz: f64,
-    /// Relative error of the sensor's clock, true rate over nominal rate − 1; within ± 0.03.
+    /// Relative error of the accelerometer's clock, true rate over nominal rate − 1; within ± 0.03.
     pub clock_error: f64,
-    /// Standard deviation of the time stamp of a block, s, from the interrupt latency.
+    /// Standard deviation of the time stamp of a block of samples, s, from the interrupt latency.
     pub stamp_jitter_s: f64,
 }
 
 /// A tachometer wheel on the spindle. Its first edge after the gap, or its only edge, is at the spindle angle 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TachometerModel {
-    /// Number of positions on the wheel, and number of missing ones, which form the gap.
+    /// Number of positions on the tachometer wheel, and number of missing ones, which form the gap.
     pub wheel: Wheel,
     /// Standard deviation of the time stamp of a tachometer edge, s.
     pub jitter_s: f64,

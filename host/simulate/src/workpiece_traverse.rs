@@ -163,7 +163,7 @@ impl WorkpieceTraverse {
     }
 }
 
-/// Feed speed of the tool, m/s: feed per tooth at the mean spindle speed.
+/// Feed speed of the tool, m/s: the feed per tooth times the tooth-passing frequency at the mean spindle speed.
 fn feed_speed(cutter: &Cutter, spindle: &Spindle) -> f64 {
     cutter.feed_per_tooth_m * cutter.teeth.len() as f64 * spindle.speed_rad_per_s() / std::f64::consts::TAU
 }

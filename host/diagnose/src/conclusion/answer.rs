@@ -134,7 +134,7 @@ impl Gain {
 /// The unexplained residual.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Unexplained {
-    /// Share of the baseline's residual energy above the noise that no candidate model explains.
+    /// Share of the baseline's residual energy above the noise that the best candidate model does not explain; 0 if only noise is left.
     pub fraction: f64,
     /// Channel, frequency and time at which the unexplained residual is largest, in words.
     #[serde(rename = "where")]

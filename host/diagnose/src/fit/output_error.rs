@@ -145,7 +145,8 @@ impl<'a> OutputError<'a> {
             .collect()
     }
 
-    /// Columns of J = ∂y_simulated/∂θ by finite differences, record after record. `left` is the residual at `point`.
+    /// Columns of the Jacobian J = ∂y_simulated/∂θ of the simulated samples by finite differences, record after record. `left` is the
+    /// residual at the parameter values `point`.
     pub(crate) fn columns(
         &self,
         problem: &FitProblem<'_>,

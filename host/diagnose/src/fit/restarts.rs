@@ -41,7 +41,7 @@ impl OutputError<'_> {
         found
     }
 
-    /// Restarts the search from the best point near its end: χ² is discontinuous where friction begins to slip.
+    /// Restarts the prediction-error search from the best point near its end: χ² is discontinuous where friction begins to slip.
     fn restarted_nearby(
         &self,
         problem: &mut FitProblem<'_>,

@@ -144,7 +144,7 @@ const STEP: f64 = 0.2;
 pub(crate) struct SpeedModulation {
     /// Relative amplitude δ, frequency f_m and phase ψ of the modulation.
     pub fluctuation: Fluctuation,
-    /// Standard deviations of δ, f_m in Hz and ψ in rad, from the residual of the edge times.
+    /// Standard deviations of the speed modulation's δ, f_m in Hz and ψ in rad, from the residual of the tachometer edge times.
     pub deviation: [f64; 3],
 }
 
