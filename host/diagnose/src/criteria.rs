@@ -102,8 +102,8 @@ pub(crate) const MOVING_OVER_NOISE: f64 = 3.0;
 /// hides its noise floor, and force sensors are better than this. Unfounded.
 pub(crate) const LARGEST_FORCE_NOISE: f64 = 0.02;
 
-/// Error of a predicted cut, as a share of the signal. The instants at which teeth enter and leave are known to a fraction of a sample, and
-/// the steps of the force with them. Unfounded.
+/// Error of the predicted samples of a cut, as a share of the signal. The instants at which teeth enter and leave, and so the steps of the
+/// force, are known to a fraction of a sample only. Unfounded.
 pub(crate) const RELATIVE_ERROR_OF_CUTS: f64 = 2e-4;
 
 // Full engagement
@@ -210,8 +210,8 @@ pub(crate) const SAMPLING_RESIDUAL_SIMULATED: f64 = 5e-5;
 /// Share of the baseline's residual energy by which interpolation between samples biases the comparison of candidate models. Unfounded.
 pub(crate) const INTERPOLATION_ERROR: f64 = 1e-4;
 
-/// Residual energy above the noise, as a share of the noise, up to which a residual counts as noise: error of the noise floor, and chance.
-/// Unfounded.
+/// Residual energy above the noise, as a share of the noise energy, up to which a residual counts as noise. It allows for errors of the
+/// noise floor and for chance. Unfounded.
 pub(crate) const NOISE_TOLERANCE: f64 = 0.15;
 
 /// Least share of the residual energy above the noise that a further cause explains. A cause that explains less may only compensate for a
@@ -287,8 +287,8 @@ pub(crate) const MISSING_FORCE_OVER_NOISE: f64 = 3.0;
 /// damping are not shown. Unfounded.
 pub(crate) const LEAST_AMPLITUDE: f64 = 0.02;
 
-/// Share of the samples in the first parts of the records below which only these parts are searched. With a larger share, little time is
-/// gained. Unfounded.
+/// Share of all samples that lie in the first parts of long records, below which causes are searched in these parts only. With a larger
+/// share, little time is gained. Unfounded.
 pub(crate) const SHORTENED_SHARE: f64 = 0.5;
 
 /// Largest difference between the immersion angles of a recorded cut and of the case at which the cut is drawn in the case's stability

@@ -83,7 +83,8 @@ fn answer(
         1.0
     };
     let confidence = doubt * confidence(selection.ahead, of_excess / allowed);
-    // Errors of the computation are proportional to the signal. If they resemble a cause, they do not average out.
+    // Errors of the computation are proportional to the signal. If they resemble the contribution of a cause, they bias its parameters, so
+    // the variances are raised.
     let uncertain = inflation + criteria.coherent;
     let spread = |model: &CandidateModel| {
         let closed = criteria.closed.as_ref();

@@ -34,8 +34,7 @@ fn beginnings(case: &Case, recordings: &[Recording]) -> Option<[Vec<Recording>; 
         .map(|recording| {
             let revolutions_s = revolutions_s(recording)?;
             let samples = |seconds: f64| (seconds * recording.sample_rate_hz).ceil() as usize;
-            // The first part of a cut begins after the transient of the tool's entry. The time left out is the smallest length of a first
-            // part.
+            // The first part of a cut begins after the transient of the tool's entry, for which `REVOLUTIONS` revolutions are left out.
             let from = samples(revolutions_s);
             let least = samples((PERIODS / lowest_hz).max(revolutions_s));
             let count = (SEARCHED / recordings.len()).max(least);

@@ -176,7 +176,7 @@ fn nuisance(record: &Record, segment: &Segment, unknown: Nuisance) -> Vec<Vec<f6
         Nuisance::Offsets => 0,
     };
     for state in 0..states {
-        // The unit free decays begin at the first sample of the segment, with a state of their own.
+        // The free decays of a segment begin at its first sample, because its initial state is unknown too.
         let shifted: Vec<Vec<f64>> = (0..channels)
             .map(|channel| {
                 let column = record.decays.column(channel, state);

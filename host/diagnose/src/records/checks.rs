@@ -102,7 +102,8 @@ pub(crate) fn unit(
     let factor = cross.abs() / own;
     let alike = cross * cross / (own * whole);
     let likely = likely(factor);
-    // A ratio that belongs to no known unit requires a higher correlation.
+    // A wrong unit is reported only at a high correlation of measured and predicted samples, higher if their ratio belongs to no known
+    // unit.
     let least_alike = if likely.is_some() {
         LEAST_CORRELATION_OF_KNOWN_UNIT
     } else {

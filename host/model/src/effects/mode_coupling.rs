@@ -49,9 +49,9 @@ pub(super) const MODE_COUPLING: EffectSpec = EffectSpec {
 
 #[derive(Clone, Copy, Debug)]
 struct ModeCoupling {
-    /// Coefficient k_xxyy of the quartic potential, N/m³.
+    /// Coefficient k_xxyy of the quartic potential ½·k_xxyy·x²y², N/m³.
     quartic: f64,
-    /// Coefficient k_xxy of the cubic potential, N/m².
+    /// Coefficient k_xxy of the cubic potential k_xxy·x²y, N/m².
     cubic: f64,
     directions: Option<[Direction; 2]>,
 }
