@@ -110,7 +110,7 @@ impl<'a> Contact<'a> {
         for index in 0..contact.teeth.len() {
             contact.teeth[index].in_material = contact.teeth[index].windows.contain(contact.same_time_s);
         }
-        // The surface may have a step at t = 0: before that time a tool at rest left it.
+        // The machined surface may have a step at t = 0: before that time a tool at rest left it.
         contact.kink_of_motion(0.0, 0);
         contact
     }

@@ -428,8 +428,8 @@ impl<'a> Integrator<'a> {
         contact.min(drive).min(end_s)
     }
 
-    /// The longest step, s: half the shortest tooth-passing period. The surface in front of a tooth is then known, and no change of contact is
-    /// missed.
+    /// The longest integration step, s: half the shortest tooth-passing period. The surface in front of a tooth is then known, and no
+    /// change of contact is missed.
     fn longest_step(&self, end_s: f64) -> f64 {
         self.contact
             .as_ref()

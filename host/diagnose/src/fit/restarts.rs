@@ -12,7 +12,8 @@ const NEARBY: [f64; 6] = [5e-4, 1e-3, 2e-3, 4e-3, 8e-3, 0.016];
 /// Factors that multiply the start value of each parameter of the cause where the fit of a free decay restarts; two parameters take every
 /// pair of factors.
 const SIZES: [f64; 6] = [0.1, 0.25, 0.5, 1.0, 2.0, 4.0];
-/// Largest number of parameters with which a search restarts from other amplitudes: the number of starts grows exponentially with it.
+/// Largest number of parameters with which a search restarts from multiples of the start values: the number of restarts grows exponentially
+/// with it.
 const MOST_PARAMETERS: usize = 2;
 /// Number of restarts that are searched to the end: those with the smallest χ² on the beginning of each record.
 const COMPLETED: usize = 3;

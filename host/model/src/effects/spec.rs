@@ -107,7 +107,8 @@ pub enum Argument {
 /// Locations at which an effect can act, and the keys that set them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Locations {
-    /// Along one direction, or along each of a list of directions. In a structure with a single direction the key may be missing.
+    /// Location of an effect along one direction, or along each of a list of directions. In a structure with a single direction the key may
+    /// be missing.
     EachDirection,
     /// Location of an effect on the whole structure, or only along the given directions.
     WholeOrDirection,
