@@ -9,8 +9,8 @@
 /// deliberate strikes after a second or more; the value between is unfounded.
 pub(crate) const BOUNCE_S: f64 = 0.4;
 
-/// Smallest peak of an impact, as a fraction of the largest force of the recording. Impacts by hand differ by less than a factor of ten.
-/// Unfounded.
+/// Smallest peak force of an impact of a hammer, as a fraction of the largest force of the recording. Impacts by hand
+/// differ by less than a factor of ten. Unfounded.
 pub(crate) const LEAST_IMPACT: f64 = 0.1;
 
 /// Smallest peak of a force pulse that counts as an impact of a hammer, in standard deviations of the force noise.

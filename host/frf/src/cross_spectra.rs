@@ -24,7 +24,7 @@ pub(super) struct CrossSpectra {
     pub(super) frequency_hz: Vec<f64>,
     /// Number of channels.
     channels: usize,
-    /// S_ab at all frequency lines for each pair of channels a ≤ b, in the order aa, ab, …, bb, …
+    /// Cross-spectrum S_ab at all frequency lines for each pair of channels a ≤ b, in the order aa, ab, …, bb, …
     pairs: Vec<Vec<Complex64>>,
     /// Effective number of independent averages in each cross-spectrum.
     pub(super) averages: f64,
@@ -48,7 +48,7 @@ impl CrossSpectra {
 /// Division of a record into windowed segments, over which its cross-spectra are averaged.
 #[derive(Clone, Debug)]
 pub(super) struct Segments {
-    /// Window weight of each sample of a segment; their number is the segment length.
+    /// Window weight of each sample of a segment; the number of weights is the segment length.
     pub(super) weights: Vec<f64>,
     /// Index of the first sample of each segment.
     pub(super) starts: Vec<usize>,
@@ -157,7 +157,7 @@ pub(super) fn smoothed(
             .collect(),
         channels,
         pairs,
-        // Zero padding adds lines, but no independent information.
+        // Zero padding adds lines to the Fourier transform, but no independent information.
         averages: width as f64 * samples as f64 / length as f64,
     }
 }
@@ -226,7 +226,7 @@ impl Transform {
         }
     }
 
-    /// Transform of the weighted samples, padded with zeros to the transform length.
+    /// Fourier transform of the weighted samples, padded with zeros to the transform length.
     fn of(&mut self, samples: &[f64], weights: &[f64], without_mean: bool) -> &[Complex64] {
         let mean = if without_mean {
             samples.iter().sum::<f64>() / samples.len().max(1) as f64

@@ -8,7 +8,7 @@ use quietcut_recording::file::FileError;
 /// Error of reading an FRF table or of measuring FRFs; every message names the file.
 #[derive(Debug, thiserror::Error)]
 pub enum FrfError {
-    /// The file does not exist, or cannot be read or written.
+    /// The file of an FRF table or a recording does not exist, or cannot be read or written.
     #[error(transparent)]
     File(#[from] FileError),
     /// A recording that cannot be read or lacks a required channel.
@@ -19,12 +19,12 @@ pub enum FrfError {
     Line {
         /// The file.
         path: PathBuf,
-        /// Number of the line, from 1.
+        /// Number of the malformed line in the file, from 1.
         line: u64,
         /// Description of the fault in the line, and the content expected there.
         what: String,
     },
-    /// A column of the file has an unknown name or unit.
+    /// A column of an FRF table in a text file has an unknown name or unit.
     #[error("{}, column \"{column}\": {what}", path.display())]
     Column {
         /// The file.

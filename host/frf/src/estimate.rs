@@ -61,7 +61,8 @@ pub(super) fn lines(tests: &[CrossSpectra], counts: ChannelCounts, estimator: Es
         .collect()
 }
 
-/// Auto- and cross-spectra of one test at one frequency line, divided by the number of averages: forces, responses with forces, responses.
+/// Spectra of one test at one frequency line, divided by the number of averages: S_ff of the forces, S_xf of the
+/// responses with the forces, S_xx of the responses.
 struct Powers {
     averages: f64,
     ff: Matrix,

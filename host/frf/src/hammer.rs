@@ -41,7 +41,7 @@ pub struct HammerWindows {
     pub exponential_s: Option<f64>,
 }
 
-/// Windowed segments of the impacts of one record.
+/// Windowed segments of the impacts of one hammer record.
 pub(super) struct ImpactSegments {
     /// Windowed signals: the force, then the responses. The segments of each signal are concatenated.
     pub(super) signals: Vec<Vec<f64>>,
@@ -187,11 +187,12 @@ fn longest_segment(impacts: &[MeasuredImpact], samples: usize) -> usize {
         .map(|(impact, end)| end - impact.first)
         .min()
         .unwrap_or(0);
-    // A segment also includes the fraction `BEFORE` of its length before the impact.
+    // The segment of an impact also includes the fraction `BEFORE` of its length before the impact.
     (shortest as f64 / (1.0 + BEFORE)) as usize
 }
 
-/// Detects all impacts of a force signal; pulses within [`BOUNCE_S`] after an impact belong to it.
+/// Detects all impacts of a hammer in a force signal; pulses within [`BOUNCE_S`] after an impact are its bounces and do
+/// not count.
 fn impacts(force: &[f64], rate: f64) -> Vec<MeasuredImpact> {
     let middle = median(&mut force.to_vec()).unwrap_or(0.0);
     let noise = noise(force, middle);

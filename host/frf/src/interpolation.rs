@@ -61,7 +61,7 @@ impl Interpolation {
     pub fn band_hz(&self) -> (f64, f64) {
         match self.frequency_hz.as_slice() {
             [first, .., last] => (*first, *last),
-            // This arm is not reached, since a table has at least four lines.
+            // This case does not occur, since a table has at least four lines.
             _ => (0.0, 0.0),
         }
     }

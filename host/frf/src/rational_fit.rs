@@ -51,12 +51,13 @@ pub struct RationalFit {
     pub(crate) poles: Vec<Complex64>,
     /// Residues R_kr, m/(N s): one row for each function, one column for each pole.
     pub residues: Vec<Vec<Complex64>>,
-    /// RMS residual of the fit over all functions, each divided by its own RMS.
+    /// RMS residual of the fit over all receptances; each residual is divided by the RMS of its receptance.
     pub(crate) residual: f64,
 }
 
 impl RationalFit {
-    /// Contribution of one mode to a function at `frequency_hz`: R/(s − λ) + R*/(s − λ*).
+    /// Contribution of one mode to the receptance with the index `function` at `frequency_hz`, m/N: R/(s − λ) + R*/(s −
+    /// λ*).
     pub(super) fn mode_at(&self, function: usize, mode: usize, frequency_hz: f64) -> Complex64 {
         let s = Complex64::new(0.0, TAU * frequency_hz);
         let (pole, residue) = (self.poles[mode], self.residues[function][mode]);
@@ -121,8 +122,8 @@ fn undetermined(frequency_hz: &[f64], functions: &[&[Complex64]], modes: usize) 
     }
 }
 
-/// Relocated poles: the zeros of σ(s) = 1 + Σ c_n φ_n(s), with the coefficients c_n for which σH is best fitted by a sum over the previous
-/// poles.
+/// Relocated poles of a vector fit: the zeros of σ(s) = 1 + Σ c_n φ_n(s), where φ_n are the basis functions of the
+/// previous poles. With the coefficients c_n, σH is best fitted by a sum over the previous poles.
 fn relocated(
     frequency_hz: &[f64],
     functions: &[&[Complex64]],
@@ -194,7 +195,8 @@ fn zeros(poles: &[Complex64], c: &DVector<f64>) -> Result<Vec<Complex64>, Eigenv
         .filter(|value| value.im > 0.0)
         .map(|value| Complex64::new(-value.re.abs(), value.im))
         .collect();
-    // A pair of real zeros is not an oscillatory mode; it is replaced by a start value near the upper end of the band.
+    // A pair of real zeros of σ is not an oscillatory mode; it is replaced by a start value near the upper end of the
+    // band.
     let highest = poles.iter().map(|pole| pole.im).fold(0.0, f64::max);
     while upper.len() < poles.len() {
         let omega = highest * (0.9 + 0.05 * upper.len() as f64);

@@ -25,7 +25,7 @@ pub struct ChannelLines {
     pub quantity: Quantity,
     /// Order of the time derivative of displacement that the channel measures: 0 displacement, 1 velocity, 2 acceleration; 0 for a force.
     pub derivatives: i32,
-    /// Root mean square of the samples, SI unit.
+    /// Root mean square of the channel's samples, SI unit.
     pub root_mean_square: f64,
     /// Variance of the white noise per sample, SI unit squared, from the noise plateau of the spectrum; `None` if there is no plateau.
     pub plateau: Option<f64>,

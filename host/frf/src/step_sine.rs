@@ -37,13 +37,13 @@ pub(super) struct FrequencyStep {
     pub(super) h: Vec<Complex64>,
     /// Coherence of each response over the subsegments of the step.
     pub(super) coherence: Vec<f64>,
-    /// Standard deviation of |H| of each response, in the unit of `h`.
+    /// Standard deviation of the magnitude of each response's phasor ratio, in the unit of `h`.
     pub(super) deviation: Vec<f64>,
     /// True if the phasor ratios of all responses reached their steady state within the step.
     pub(super) is_settled: bool,
 }
 
-/// All steps of a record at one force level.
+/// All frequency steps of a step-sine record at one level of the force amplitude.
 #[derive(Clone, Debug)]
 pub(super) struct ForceLevel {
     /// Median of the force amplitudes of the frequency steps, N.
@@ -52,7 +52,7 @@ pub(super) struct ForceLevel {
     pub(super) steps: Vec<FrequencyStep>,
 }
 
-/// All frequency steps of a record.
+/// All frequency steps of a step-sine record.
 #[derive(Clone, Debug)]
 pub(super) struct StepSine {
     /// Force levels in the order of time.
@@ -163,7 +163,8 @@ fn by_frequency(mut steps: Vec<FrequencyStep>) -> Vec<FrequencyStep> {
     kept
 }
 
-/// Segment of constant frequency: first and last sample, and period in samples, from the upward zero crossings of the force.
+/// Segment of a step-sine record with constant frequency: first and last sample, and period in samples, from the upward
+/// zero crossings of the force.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct ToneSegment {
     first: usize,
@@ -213,7 +214,7 @@ fn tone_segments(force: &[f64], rate: f64) -> Vec<ToneSegment> {
     tone_segments
 }
 
-/// Robust standard deviation of `periods`, in samples: 1.4826 · median absolute deviation.
+/// Robust standard deviation of the excitation periods `periods`, in samples: 1.4826 · median absolute deviation.
 fn scatter(periods: &[f64]) -> f64 {
     let mut sorted = periods.to_vec();
     sorted.sort_by(f64::total_cmp);
@@ -252,7 +253,8 @@ fn crossings(force: &[f64], rate: f64) -> Vec<f64> {
     crossings
 }
 
-/// Phasor ratios over the settled part of a segment of constant frequency; `None` if it has too few samples per period.
+/// Phasor ratios response/force over the settled part of a segment of constant frequency; `None` if the segment has too
+/// few samples per period.
 fn demodulated(
     channels: &TestChannels<'_>,
     force: &[f64],

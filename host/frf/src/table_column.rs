@@ -1,4 +1,5 @@
-//! Meaning of a column of an FRF table in a text file: frequency, part of a response, or coherence, from words, unit, option or sidecar.
+//! Meaning of a column of an FRF table in a text file: frequency, part of an FRF, or coherence. It follows from the
+//! words of the title, the unit, the option `--map` or the sidecar.
 
 use quietcut_model::structure::Direction;
 use quietcut_recording::{ColumnMap, RecordedChannel, Scale, TextColumn};

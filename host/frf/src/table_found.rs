@@ -26,7 +26,7 @@ pub struct ImportedTable {
     pub understood: Option<String>,
 }
 
-/// Reads a table from a text file of another program.
+/// Reads an FRF table from a text file of another program.
 pub(super) fn read(path: &Path, import: &Import) -> Result<ImportedTable, FrfError> {
     let text = TextTable::read(path)?;
     let sidecar = Sidecar::beside(path)?;

@@ -72,7 +72,7 @@ impl<'a> TestChannels<'a> {
         self.forces.iter().map(|(direction, _)| *direction).collect()
     }
 
-    /// Direction and derivative order of each response.
+    /// Direction of each response channel, and the order of the time derivative of displacement that it measures.
     pub(super) fn response_kinds(&self) -> Vec<(Direction, i32)> {
         self.responses
             .iter()

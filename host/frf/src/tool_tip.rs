@@ -152,8 +152,8 @@ fn ratios(housing: &FrfTable, tip: &FrfTable) -> Result<Vec<ModeRatio>, FrfError
     Ok(ratios)
 }
 
-/// Fits the smallest number of modes beyond which the residual hardly decreases. If no fit succeeds, the error of the first failed fit is
-/// returned.
+/// Fits receptances by the smallest number of modes beyond which the residual hardly decreases. If no fit succeeds, the
+/// error of the first failed fit is returned.
 pub(super) fn modes(
     frequency_hz: &[f64],
     functions: &[&[Complex64]],

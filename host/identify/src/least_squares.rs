@@ -38,7 +38,7 @@ pub enum FitError {
         /// Number of all dwells.
         all: usize,
     },
-    /// The iteration found no minimum of the sum of squares.
+    /// The iteration found no minimum of the sum of squares over the dwells.
     #[error("the fit does not converge; its sum of squares over degrees of freedom is {0:.3e}")]
     NotConverged(f64),
 }

@@ -65,7 +65,8 @@ const INTERPOLANT: [f64; 7] = [
     69997945.0 / 29380423.0,
 ];
 
-/// One step of the Dormand–Prince method: stages, result and error estimate. An integration reuses one value for all its steps.
+/// One step of the Dormand–Prince method: stages, result and error estimate. An integration reuses one such value for
+/// all its steps.
 #[derive(Clone, Debug)]
 pub struct DormandPrince {
     stages: [Vec<f64>; 7],

@@ -101,7 +101,7 @@ fn surface_at(surface: &[SurfacePoint], phi: f64, place: &mut usize) -> Option<S
     Some(SurfacePoint { reach_m, ..left })
 }
 
-/// Value at `phi` of the polynomial through all points (Lagrange).
+/// Height at the immersion angle `phi` of the Lagrange polynomial through all given points of the surface, m.
 fn interpolated(points: &[SurfacePoint], phi: f64) -> f64 {
     let weight = |i: usize| -> f64 {
         let others = points.iter().enumerate().filter(|(j, _)| *j != i);

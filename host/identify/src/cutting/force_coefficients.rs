@@ -33,8 +33,7 @@ pub const KEYS: [&str; 6] = [
     "kae_n_per_mm",
 ];
 
-/// A force coefficient or radial tooth offset with its standard deviation; the half-width of the 90 % interval is 1.645
-/// standard deviations.
+/// A fitted force coefficient or tooth offset; the half-width of its 90 % interval is 1.645 standard deviations.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Value {
     /// The estimated value.
@@ -43,8 +42,7 @@ pub struct Value {
     pub deviation: f64,
 }
 
-/// Length of a Gauss–Newton step below which the fit of force coefficients has converged, in standard deviations of the
-/// parameters. A choice.
+/// Largest Gauss–Newton step of a converged force-coefficient fit, in standard deviations of its parameters. A choice.
 const SETTLED: f64 = 1e-2;
 
 /// Largest length of the last Gauss–Newton step with which the fit of force coefficients is accepted, in standard
@@ -57,8 +55,7 @@ pub struct Fit {
     /// Force coefficients from instantaneous forces, in the order of [`KEYS`]; `None` for the axial ones if no axial
     /// force was measured.
     pub coefficients: [Option<Value>; 6],
-    /// Force coefficients from forces averaged over revolutions, in the order of [`KEYS`]; `None` if all feeds are
-    /// equal.
+    /// Force coefficients from mean forces of revolutions, in the order of [`KEYS`]; `None` if all feeds are equal.
     pub averaged: Option<[Option<Value>; 6]>,
     /// Radial offset of the edge of each tooth from the mean of all teeth, m.
     pub runout_m: Vec<Value>,
@@ -78,7 +75,7 @@ pub enum ForceCoefficientError {
     /// The tests have different numbers of teeth.
     #[error("the tests have tools with {0} and {1} teeth; tests of one tool are needed")]
     Teeth(usize, usize),
-    /// Radial and axial coefficients are not separately identifiable.
+    /// Radial and axial force coefficients are not separately identifiable.
     #[error(
         "no fz was measured, and with an edge angle of {0:.1} degrees radial and axial forces act in one direction in the plane of the tool; fz, or a square end mill (90 degrees), is needed"
     )]

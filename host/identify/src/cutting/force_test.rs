@@ -29,7 +29,7 @@ pub struct CuttingTest {
     pub angle: Vec<f64>,
     /// Force on the tool, N.
     pub force: Vec<Vector3<f64>>,
-    /// False if the axial force was not measured; its entries are 0.
+    /// False if the axial force was not measured; the axial entries of `force` are then 0.
     pub has_axial_force: bool,
     /// Displacement of the tool at each sample in feed, normal and axial direction, m; `None` where none was measured.
     pub displacement: Option<Vec<Vector3<f64>>>,

@@ -459,7 +459,7 @@ fn next_step(sums: &[f64], share: f64) -> f64 {
     }
     // The bisection stops at 1e-12 of the range of increments: far below the scatter of the particles.
     let [low, _] = bisection([0.0, high], 1e-12 * high, |step| effective(step) >= enough);
-    // A minimal increment guarantees that the tempering ends.
+    // A smallest increment of the likelihood exponent guarantees that the tempering ends.
     low.max(1e-6).min(1.0 - share)
 }
 

@@ -48,7 +48,7 @@ pub struct FourierSeries {
     pub direction: Direction,
     /// The quantity that the channel measures.
     pub quantity: Quantity,
-    /// Coefficients of 1, cos, sin, cos 2 …, in the unit of the channel.
+    /// Fourier coefficients of 1, cos, sin, cos 2 …, in the unit of the channel.
     pub coefficients: DVector<f64>,
     /// Noise variance of one sample.
     pub variance: f64,

@@ -24,11 +24,11 @@ const RIDGE: f64 = 1e-13;
 /// Sums over the frequency lines of one receptance H from which the normal equations of numerator and denominator
 /// follow, weighted with w = 1/σ. The entry of row i and column j depends on m = j − i alone.
 struct Sums {
-    /// Entries of the numerator's block: Σ w² z^m, m = 0 … n.
+    /// Entries of the numerator's block of the normal equations: Σ w² z^m over the lines, m = 0 … n, with the weight w.
     numerator: Vec<Complex64>,
-    /// Entries between numerator and denominator: Σ w² H z^m, m = −n … n.
+    /// Entries between numerator and denominator in the normal equations: Σ w² H z^m over the lines, m = −n … n.
     mixed: Vec<Complex64>,
-    /// Entries of the denominator's block: Σ w² |H|² z^m, m = 0 … n.
+    /// Entries of the denominator's block of the normal equations: Σ w² |H|² z^m over the lines, m = 0 … n.
     denominator: Vec<Complex64>,
 }
 

@@ -125,7 +125,7 @@ impl Receptances {
         Ok(())
     }
 
-    /// Sorts the directions in the order x, y, z.
+    /// Sorts force and response directions of the receptances in the order x, y, z.
     fn sort_directions(&mut self) {
         let order = |directions: &[Direction]| {
             let mut sorted = directions.to_vec();

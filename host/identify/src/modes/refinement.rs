@@ -187,7 +187,8 @@ impl Refined {
                 left: shaped.left.clone(),
                 right: shaped.right.clone(),
             },
-            // Propagated from the pole: ω = |λ|, ζ = −Re λ/|λ|.
+            // Standard deviations of frequency and damping ratio follow from that of the pole λ by ω = |λ|, ζ = −Re
+            // λ/|λ|.
             frequency_std_hz: by([pole.re / omega / TAU, pole.im / omega / TAU]),
             damping_ratio_std: by([
                 -pole.im * pole.im / omega.powi(3),

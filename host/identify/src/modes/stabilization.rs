@@ -50,7 +50,7 @@ impl Candidate {
 /// Stabilization diagram: poles of all model orders, and the poles that are modes.
 #[derive(Clone, Debug)]
 pub struct Stabilization {
-    /// Poles in the band with positive damping, by model order.
+    /// Poles in the band with a damping ratio above 0 and below 0.5, by model order.
     pub candidates: Vec<Candidate>,
     /// Highest model order.
     pub highest_order: usize,
@@ -77,11 +77,11 @@ impl Stabilization {
     }
 }
 
-/// Computes the poles of the models of order 1 to `highest_order`, or to the highest order that the number of lines allows, and
-/// selects the stable ones.
+/// Computes the poles of the models of order 1 to `highest_order`, or to the highest order that the number of lines
+/// allows, and selects the stable ones.
 ///
 /// # Errors
-/// Fewer lines than three for each unknown of the lowest orders, or an iteration that exceeds its bound.
+/// The number of lines or `highest_order` allows too few model orders, or an iteration exceeds its bound.
 pub(super) fn stabilize(data: &Receptances, highest_order: usize) -> Result<Stabilization, ModesError> {
     let lines = data.frequency_hz.len();
     let highest = highest_order.min((lines - 1) / 3);

@@ -92,7 +92,7 @@ impl Weights {
     }
 }
 
-/// Root mean square of the magnitudes.
+/// Root mean square of the magnitudes of complex values.
 pub(super) fn root_mean_square(values: &[Complex64]) -> f64 {
     (values.iter().map(|value| value.norm_sqr()).sum::<f64>() / values.len().max(1) as f64).sqrt()
 }

@@ -10,7 +10,7 @@ use crate::dwells::differentiation::derivative;
 use crate::dwells::dwell::Dwell;
 use crate::nonlinear::law::{Law, NonlinearTerm, Role};
 
-/// H₁, H₃(ω, ω, −ω) and H₅(ω, ω, ω, −ω, −ω) at one frequency, m/N, m/N³, m/N⁵.
+/// Higher-order FRFs H₁, H₃(ω, ω, −ω) and H₅(ω, ω, ω, −ω, −ω) of a structure at one frequency ω, in m/N, m/N³, m/N⁵.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HigherOrder {
     /// Angular frequency, rad/s.

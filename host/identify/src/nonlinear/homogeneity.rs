@@ -30,7 +30,8 @@ pub fn regions(points: &[(f64, f64)]) -> (Vec<Region>, Vec<f64>) {
         .collect();
     bends.sort_by(f64::total_cmp);
     let noise = bends.get(bends.len() / 2).copied().unwrap_or(0.0) / (0.6745 * 6.0_f64.sqrt());
-    // The curvature of X(F) within one region is not noise: deviations of 0.2 % of the largest response are allowed for.
+    // The curvature of the response X(F) within one region is not noise: deviations of 0.2 % of the largest response
+    // are allowed for.
     let largest = sorted.iter().fold(0.0_f64, |a, (_, x)| a.max(x.abs()));
     let noise = noise.max(CURVATURE_SHARE * largest);
     let mut cuts = vec![0, sorted.len()];
@@ -96,7 +97,7 @@ fn join_lines(points: &[(f64, f64)], noise: f64, cuts: &mut Vec<usize>) {
     }
 }
 
-/// Level at zero and slope of the least-squares line through the points.
+/// Value at x = 0 and slope of the least-squares line through the points (x, y).
 pub(crate) fn line(points: &[(f64, f64)]) -> [f64; 2] {
     let n = points.len() as f64;
     let (sx, sy) = points.iter().fold((0.0, 0.0), |(a, b), (x, y)| (a + x, b + y));

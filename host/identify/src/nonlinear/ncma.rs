@@ -11,7 +11,7 @@ use quietcut_numerics::roots::bisection;
 pub struct Curve {
     /// Amplitude of the force, N.
     pub force_n: f64,
-    /// Points (ω in rad/s, H in m/N), sorted by ω.
+    /// Points (ω in rad/s, H in m/N) of the receptance H, sorted by ω.
     pub points: Vec<(f64, Complex64)>,
 }
 
@@ -51,7 +51,8 @@ pub const THESIS_FREQUENCY_HZ: [f64; 6] = [-3.7e8, 1.3e9, 5.6e3, -6.3, -0.036, 8
 /// Coefficients of the map of thesis eq. 4.9 as printed: loss factor η_r of the first mode in y.
 pub const THESIS_LOSS_FACTOR: [f64; 6] = [6.1e7, -2.4e8, -1.1e3, 2.1e3, 0.005, 0.039];
 
-/// The value of a map with these coefficients: three polynomials in F of equal degree, see [`Map`].
+/// Value of a [`Map`] with the given coefficients, three polynomials of equal degree in the force F, at a force and a
+/// receptance.
 pub fn evaluate(coefficients: &[f64], force_n: f64, receptance: f64) -> f64 {
     let size = (coefficients.len() / 3).max(1);
     coefficients.chunks(size).fold(0.0, |value, polynomial| {

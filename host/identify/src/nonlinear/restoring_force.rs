@@ -188,7 +188,8 @@ impl Record<'_> {
             .band_hz
             .unwrap_or_else(|| band_of(self.motion, self.rate_hz, BAND_SIGNAL_TO_NOISE));
         let dominant_hz = dominant_frequency_hz(self.motion, self.rate_hz);
-        // Integration amplifies noise without limit towards frequency 0, so the band starts at a quarter of the dominant frequency.
+        // Integration of the motion amplifies noise without limit towards frequency 0, so the band starts at a quarter
+        // of the dominant frequency.
         let integrated = matches!(self.quantity, Quantity::Velocity | Quantity::Acceleration);
         let lowest_hz = if integrated { 0.25 * dominant_hz } else { 0.0 };
         band_hz[0] = band_hz[0].max(lowest_hz);
@@ -387,7 +388,7 @@ impl Surface {
         NINETY_PERCENT * self.deviations[index]
     }
 
-    /// The coefficient of a term; `None` if the law does not have it.
+    /// The coefficient of a term of the force law; `None` if the law does not have the term.
     pub fn value(&self, term: ForceTerm) -> Option<f64> {
         self.terms
             .iter()

@@ -182,7 +182,7 @@ fn strongest(smooth: &[f64]) -> usize {
     strongest
 }
 
-/// The frequency with the largest smoothed power, Hz, with a resolution of 1/400 of the sample rate.
+/// Frequency at which a record has the largest smoothed power, Hz, with a resolution of 1/400 of the sample rate.
 pub fn dominant_frequency_hz(samples: &[f64], rate_hz: f64) -> f64 {
     let (smooth, width_hz) = smooth_power(samples, rate_hz);
     (strongest(&smooth) as f64 + 0.5) * width_hz

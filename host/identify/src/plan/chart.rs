@@ -70,7 +70,8 @@ impl KnownLimit {
 #[derive(Clone, Debug)]
 pub(super) struct KnownChart {
     pub(super) limits: Vec<KnownLimit>,
-    /// Quasi-random points of the standard normal distribution in 1 … [`LOBES`] dimensions.
+    /// Quasi-random points of the standard normal distribution: one list for each number of dimensions from 1 to
+    /// [`LOBES`].
     points: Vec<Vec<DVector<f64>>>,
 }
 

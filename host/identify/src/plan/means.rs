@@ -28,7 +28,8 @@ pub struct Means {
 }
 
 impl Default for Means {
-    /// A 500 N hammer and an accelerometer of 75 µg/√Hz; sensors calibrated to 2 %, brackets of 5 %.
+    /// Default tests: a 500 N hammer, an accelerometer of 75 µg/√Hz, sensors calibrated to 2 %, and brackets of 5 % of
+    /// the limit.
     fn default() -> Self {
         Self {
             bracket: 0.05,

@@ -52,7 +52,7 @@ pub struct Request {
 /// Reason why a plan of tests cannot be computed.
 #[derive(Debug, thiserror::Error)]
 pub enum PlanError {
-    /// The case or a speed of the chart cannot be computed.
+    /// The stability of the case at a speed of the chart cannot be computed.
     #[error(transparent)]
     Stability(#[from] StabilityError),
     /// No speed of the chart has a stability limit that counts, up to the largest depth.

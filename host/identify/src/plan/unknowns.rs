@@ -41,7 +41,7 @@ impl Default for Prior {
 /// dynamometer.
 #[derive(Clone, Debug)]
 pub(super) struct Unknowns {
-    /// Variables that the stability limits depend on.
+    /// Unknown parameters of the case on which the stability limits depend.
     pub(super) variables: Vec<Variable>,
     /// Differences of natural frequencies and damping ratios at standstill from those during cutting.
     pub(super) standstill: Vec<Variable>,

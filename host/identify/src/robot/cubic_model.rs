@@ -25,7 +25,7 @@ pub(super) struct Model<'a> {
 pub(super) struct PostureMatrices {
     /// Jacobian of the tool center point by the joint angles, m/rad: 3 rows (x, y, z), a column per joint.
     pub(super) jacobian: DMatrix<f64>,
-    /// Mass matrix without the fitted payload, kg m², and mass matrix per kilogram of payload, m².
+    /// Mass matrices by the joint angles: without the fitted payload, kg m², and per kilogram of payload, m².
     pub(super) mass: [DMatrix<f64>; 2],
 }
 

@@ -76,7 +76,8 @@ fn sorted(mut values: Vec<Complex64>) -> Vec<Complex64> {
 /// Orthonormal basis of a Krylov space, and the matrix projected on it (Arnoldi process).
 struct Krylov {
     basis: Vec<DVector<Complex64>>,
-    /// Columns of the projected matrix: column j has the coefficients of M q_j in the basis vectors q.
+    /// Columns of the projected matrix: column j has the coefficients of M q_j in the basis vectors q, with the matrix
+    /// M that is projected.
     columns: Vec<Vec<Complex64>>,
 }
 

@@ -78,7 +78,7 @@ impl Factored {
         x
     }
 
-    /// Covariance of x for unit-variance noise: (AᵀA)⁻¹ = D P R⁻¹ R⁻ᵀ Pᵀ D.
+    /// Covariance of the solution x for unit-variance noise in b: (AᵀA)⁻¹ = D P R⁻¹ R⁻ᵀ Pᵀ D.
     pub(super) fn covariance(&self) -> DMatrix<f64> {
         let parameters = self.order.len();
         let mut inverse = DMatrix::identity(parameters, parameters);

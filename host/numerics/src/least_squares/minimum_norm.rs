@@ -46,8 +46,8 @@ impl MinimumNorm {
 /// has no effect.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Tolerance {
-    /// Absolute bound, in the unit of the entries of the matrix.
+    /// Absolute bound on the singular values, in the unit of the entries of the matrix.
     Absolute(f64),
-    /// Bound as a fraction of the largest singular value.
+    /// Bound on the singular values as a fraction of the largest one.
     Relative(f64),
 }

@@ -13,13 +13,14 @@ use crate::modes::shape;
 /// zero with unit variance.
 pub(super) struct Line {
     pub(super) s: Complex64,
-    /// FRF matrix sⁿ H; rows responses, columns forces of the record.
+    /// FRF matrix sⁿ H, with the number n of time derivatives that each response measures; rows responses, columns
+    /// forces of the record.
     pub(super) gain: Matrix3<Complex64>,
     /// Residual e = X − sⁿ H F − T of the measured responses X under the measured forces F, with the transient T.
     pub(super) left: Vector3<Complex64>,
     /// Weighted residual C⁻¹ e.
     pub(super) weighted: Vector3<Complex64>,
-    /// Weighted square of the residual, eᴴ C⁻¹ e.
+    /// Weighted square eᴴ C⁻¹ e of the residual e with the covariance C.
     pub(super) square: f64,
     /// Whitening matrix L⁻¹ of the residual, from its covariance C = L Lᴴ.
     pub(super) whitening: Matrix3<Complex64>,
@@ -107,7 +108,8 @@ pub(super) fn gain(data: &Data<'_>, record: usize, unknowns: &Unknowns, s: Compl
     gain
 }
 
-/// Polynomial basis (s/is₀)ʲ iʲ of the transient, alternately real and imaginary, as the transform of a real signal requires.
+/// Powers (s/is₀)ʲ iʲ at s that make up the polynomial of the transient, with the middle s₀ of the band. They are
+/// alternately real and imaginary, as the transform of a real signal requires.
 pub(super) fn powers(data: &Data<'_>, s: Complex64) -> [Complex64; SMOOTH] {
     std::array::from_fn(|j| (s / data.omega).powi(j as i32))
 }

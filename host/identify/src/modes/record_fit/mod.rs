@@ -1,20 +1,21 @@
-//! Maximum likelihood fit of modes to the transforms of whole records, with noise in forces and responses, and with the transient of each
-//! record as unknown parameters.
+//! Maximum likelihood fit of modes to the transforms of whole records, with noise in forces and responses, and with the
+//! transient of each record as unknown parameters.
 //!
 //! At each line of the transform of a whole record, without a window,
 //!
-//!   X(k) = sⁿ H(s) F(k) + T(s) + noise,   s = i2πk/duration,
+//!   X(k) = sⁿ H(s) F(k) + T(s) + noise, s = i2πk/duration,
 //!
-//! with n = 0 for a displacement, 1 for a velocity, 2 for an acceleration. The transient T has the poles of H and a polynomial in s. It models
-//! the initial and final state of the record, so that neither leakage nor frequency averaging biases the resonances
-//! (Pintelon and Schoukens, System Identification, 2nd ed. 2012, chapters 6 and 9). Averaged receptances (thesis eqs
-//! 7.7–7.12) do both; and H1 takes noise of the forces for force, which weighs where the forces of a cut are nearly
-//! dependent.
+//! with n = 0 for a displacement, 1 for a velocity, 2 for an acceleration. The transient T has the poles of H and a
+//! polynomial in s. It models the initial and final state of the record, so that neither leakage nor frequency
+//! averaging biases the resonances (Pintelon and Schoukens, System Identification, 2nd ed. 2012, chapters 6 and 9).
+//! Averaged receptances (thesis eqs 7.7–7.12) have both errors. Besides, H1 takes noise of the forces for force, which
+//! biases it most where the forces of a cut are nearly dependent.
 //!
-//! The residual e = X − sⁿ H F − T, has the covariance C = V_x + sⁿ H (V_f + V_d) Hᴴ s̄ⁿ: noise of the responses, noise of
-//! the measured forces, and unmeasured forces, such as nonlinear restoring forces of the structure.
-//! The parameters minimise Σ eᴴ C⁻¹ e with V_f's part of C moving along, which is maximum likelihood over the unknown
-//! true forces. Noise is white within the band, one variance per channel and record, estimated from the residual ([`noise`]).
+//! The residual e = X − sⁿ H F − T has the covariance C = V_x + sⁿ H (V_f + V_d) Hᴴ s̄ⁿ: noise of the responses (V_x),
+//! noise of the measured forces (V_f), and unmeasured forces (V_d), such as nonlinear restoring forces of the
+//! structure. The parameters minimise Σ eᴴ C⁻¹ e, where the part of V_f in C depends on the parameters; this is maximum
+//! likelihood with the true forces as further unknowns. Noise is white within the band, one variance per channel and
+//! record, estimated from the residual ([`noise`]).
 
 mod data;
 mod equations;
