@@ -10,7 +10,7 @@ use crate::criteria::{
 use crate::event_clock::{EventClock, EventClockState, Observation};
 use crate::units::{Hertz, Nanoseconds};
 
-/// Largest number of samples in one block.
+/// Largest number of acceleration samples in one block.
 pub const MAX_BLOCK_SAMPLES: usize = 64;
 
 /// Raw counts of the three axes x, y, z of the sensor at one instant.
@@ -34,7 +34,7 @@ pub struct Block {
 /// The properties of the accelerometer that the signal chain uses.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Sensor {
-    /// Nominal sample rate; the true rate is fitted to the time stamps.
+    /// Nominal sample rate of the accelerometer; its true rate is fitted to the time stamps of the device.
     pub nominal_rate: Hertz,
     /// Acceleration of one count, in m/s².
     pub meters_per_second2_per_count: f32,
@@ -84,7 +84,7 @@ pub struct SampleClockState {
     line: Option<EventClockState>,
     /// Expected sequence number of the next block.
     next_sequence: u32,
-    /// Number of samples of the preceding block.
+    /// Number of samples in the block before the newest one.
     block_samples: u32,
     /// Number of samples with a clipped axis since the start.
     clipped: u32,
@@ -97,9 +97,9 @@ pub struct SampleClockState {
 /// Relation of a block to the preceding one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Continuity {
-    /// No sample is missing between the two blocks.
+    /// No sample is missing between the preceding block and this one.
     Contiguous,
-    /// This number of samples is missing between the two blocks.
+    /// This number of samples is missing between the preceding block and this one.
     Gap(u32),
     /// The first block, or a block after a gap of unknown length.
     Restarted,
@@ -137,7 +137,8 @@ impl SampleClock {
         continuity
     }
 
-    /// Updates the fitted line with the time stamp of a block, if the number of samples lost since the preceding block is known.
+    /// Updates the fitted line of the sample clock with the time stamp of a block, if the number of samples lost since
+    /// the preceding block is known.
     fn follow(&self, state: &mut SampleClockState, block: &Block) -> Continuity {
         let Some(line) = &mut state.line else {
             return Continuity::Restarted;
@@ -167,7 +168,7 @@ impl SampleClock {
 }
 
 impl SampleClockState {
-    /// The state of the sample clock before the first block.
+    /// The state of the sample clock before the first block of samples.
     pub const fn new() -> Self {
         Self {
             line: None,
@@ -204,7 +205,7 @@ impl SampleClockState {
         self.lost
     }
 
-    /// Number of gaps in the stream since the start.
+    /// Number of gaps in the stream of samples since the start.
     pub fn gaps(&self) -> u32 {
         self.gaps
     }

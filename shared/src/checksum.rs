@@ -1,4 +1,4 @@
-//! The checksum of tables and frames.
+//! The CRC-32 checksum of lobe tables and protocol frames.
 
 use crc::{CRC_32_ISO_HDLC, Crc, Digest, Table};
 
@@ -26,18 +26,18 @@ impl Default for Crc32 {
 }
 
 impl Crc32 {
-    /// The CRC-32 before the first byte.
+    /// The CRC-32 checksum before the first byte of data.
     pub fn new() -> Self {
         static ENGINE: Crc<u32, Table<1>> = CRC_32;
         Self(ENGINE.digest())
     }
 
-    /// Appends bytes to the data of the checksum.
+    /// Appends bytes to the data of the CRC-32 checksum.
     pub fn update(&mut self, bytes: &[u8]) {
         self.0.update(bytes);
     }
 
-    /// The checksum of all appended bytes.
+    /// The CRC-32 checksum of all appended bytes.
     pub fn value(&self) -> u32 {
         self.0.clone().finalize()
     }

@@ -16,11 +16,12 @@ pub(crate) const SAMPLE_RATE_TOLERANCE: f32 = 0.05;
 /// 26 667 Hz. It averages the jitter and follows the thermal drift of the sensor's oscillator. Unfounded.
 pub(crate) const SAMPLE_CLOCK_MEMORY_BLOCKS: f32 = 256.0;
 
-/// Initial estimate, in ns, of the standard deviation of the blocks' time stamps: the latency of an interrupt. Unfounded.
+/// Initial estimate, in ns, of the standard deviation of the time stamps of sample blocks: the latency of an interrupt.
+/// Unfounded.
 pub(crate) const STAMP_JITTER_NS: f32 = 10_000.0;
 
-/// Longest gap, in samples, whose length is estimated from the sample clock. After a longer gap the stream of samples starts
-/// again. Unfounded.
+/// Longest gap between two blocks, in samples, whose length is estimated from the sample clock. After a longer gap the
+/// stream of samples starts again. Unfounded.
 pub(crate) const LONGEST_COUNTED_GAP: f32 = 20_000.0;
 
 // Clock of numbered events.
@@ -29,10 +30,11 @@ pub(crate) const LONGEST_COUNTED_GAP: f32 = 20_000.0;
 /// exceeds it once in 16 000 stamps.
 pub(crate) const OUTLIER_DEVIATIONS: f32 = 4.0;
 
-/// Number of consecutive outliers after which the fitted line starts again. Unfounded.
+/// Number of consecutive time stamps that are outliers after which the line fitted to the stamps starts again.
+/// Unfounded.
 pub(crate) const OUTLIERS_MAX: u8 = 4;
 
-/// Memory of the variance estimate of time stamps, in observations. Unfounded.
+/// Memory of the running variance estimate of the time stamps about their fitted line, in time stamps. Unfounded.
 pub(crate) const VARIANCE_MEMORY: f32 = 96.0;
 
 /// Gain of the running mean of the deviations of time stamps. The standard deviation of this mean is √(0.25/1.75) = 0.38 of that
@@ -44,8 +46,8 @@ pub(crate) const BIAS_GAIN: f32 = 0.25;
 /// change.
 pub(crate) const BIAS_BOUND: f32 = 3.0;
 
-/// Running mean of the deviations above which the rate is changing, in standard deviations of one time stamp. It is 5 standard
-/// deviations of the mean itself.
+/// Running mean of the deviations of time stamps from the fitted line above which the rate of the events is changing,
+/// in standard deviations of one time stamp. It is 5 standard deviations of the mean itself.
 pub(crate) const RATE_CHANGE_BIAS: f32 = 2.0;
 
 /// Lower bound of the estimated standard deviation of time stamps, in ns: the size of a tick of the device's timer, 12.5 ns on
@@ -54,18 +56,19 @@ pub(crate) const STAMP_RESOLUTION_NS: f32 = 20.0;
 
 // Tones of a power spectrum.
 
-/// Number of bins on each side of a peak, the median of whose powers is the noise floor. Unfounded.
+/// Number of spectrum bins on each side of a peak, the median of whose powers is the noise floor. Unfounded.
 pub(crate) const FLOOR_HALF_WIDTH: usize = 64;
 
-/// Number of bins on each side of a peak that do not count for the noise floor: the main lobe of the Hann window, ±2 bins, and
-/// one more.
+/// Number of spectrum bins on each side of a peak that do not count for the noise floor: the main lobe of the Hann
+/// window, ±2 bins, and one more.
 pub(crate) const LOBE_HALF_WIDTH: usize = 3;
 
 /// Smallest ratio of a tone's power to the noise floor: 14 dB. The power of white noise in a bin of one axis exceeds 25 times its
 /// median with the probability 2⁻²⁵, once in 3·10⁷ bins.
 pub const MIN_SNR: f32 = 25.0;
 
-/// Distance in bins within which a tone counts as a harmonic of the spindle: the main lobes of closer tones cannot be separated.
+/// Distance in bins of the spectrum within which a tone counts as a harmonic of the spindle: the main lobes of closer
+/// tones cannot be separated.
 pub(crate) const HARMONIC_BINS: f32 = 1.0;
 
 /// Largest tolerance around a harmonic of the spindle at which harmonics and other tones are distinguished, as a share of the
@@ -104,10 +107,11 @@ pub(crate) const TOOL_SAMPLES_PER_TOOTH: f32 = 2.5;
 /// Largest standard deviation of the spindle angle for resampling at fixed angles, in tooth periods. Unfounded.
 pub(crate) const ANGLE_DEVIATION_MAX: f32 = 0.03;
 
-/// Fewest tool-band samples between two evaluations of growth: 4 ms at 13.3 kHz. It limits the computing time. Unfounded.
+/// Fewest samples of the tool band between two evaluations of the growth of its vibration: 4 ms at 13.3 kHz. It limits
+/// the computing time. Unfounded.
 pub(crate) const GROWTH_INTERVAL_SAMPLES: u32 = 53;
 
-// Verdict and advice after each block.
+// Thresholds of the verdict and of the advice, which follow each block of samples.
 
 /// Time constant, in blocks, of the running mean of the share of clipped or lost samples. Unfounded.
 pub(crate) const DAMAGE_MEMORY_BLOCKS: f32 = 64.0;
@@ -115,7 +119,8 @@ pub(crate) const DAMAGE_MEMORY_BLOCKS: f32 = 64.0;
 /// Largest share of clipped or lost samples that still allows a verdict. Unfounded.
 pub(crate) const DAMAGE_MAX: f32 = 0.05;
 
-/// Largest relative change of the spindle speed per revolution at which tooth periods are comparable. Unfounded.
+/// Largest relative change of the spindle speed from one revolution to the next at which tooth periods are comparable.
+/// Unfounded.
 pub(crate) const SPEED_CHANGE_MAX: f32 = 0.02;
 
 /// Relative change of the spindle speed after which advice is computed again: a fifth of [`SPEED_BAND`]. The share is unfounded.
@@ -144,14 +149,16 @@ pub const SPEED_BAND: f32 = 0.01;
 /// A change of both speed and depth must gain at least as much depth as [`DEPTH_MARGIN`].
 pub const BETTER: f32 = 1.1;
 
-/// Factor within which two quiet depths count as equal, so that the one at the nearer speed is preferred. Unfounded.
+/// Factor within which two quiet depths (stable with margin) count as equal, so that the one at the nearer speed is
+/// advised. Unfounded.
 pub(crate) const EQUAL_DEPTHS: f32 = 1.02;
 
-/// Number of speeds whose quiet depth is computed exactly. They are the speeds with the largest upper bounds of the quiet depth.
-/// It limits the computing time. Unfounded.
+/// Number of spindle speeds at which the quiet depth (stable with margin) is computed exactly. They are the speeds with
+/// the largest upper bounds of the quiet depth. It limits the computing time. Unfounded.
 pub(crate) const CANDIDATE_SPEEDS: usize = 8;
 
-/// Relative speed step at which interpolated columns are checked: four steps per half of [`SPEED_BAND`]. Unfounded.
+/// Relative speed step at which the stability between two speeds of the lobe table is interpolated and checked: four
+/// steps per half of [`SPEED_BAND`]. Unfounded.
 pub(crate) const QUIET_SPEED_STEP: f32 = SPEED_BAND / 4.0;
 
 /// The largest lobe number k (whole vibrations per tooth period) of the tooth-passing rule.
@@ -160,17 +167,20 @@ pub(crate) const QUIET_SPEED_STEP: f32 = SPEED_BAND / 4.0;
 /// no pocket is as wide as the ±1 % of [`SPEED_BAND`].
 pub const MAX_LOBE: u16 = 20;
 
-// Validity of a layer of the lobe table.
+// Thresholds for the validity of a layer of the lobe table.
 
-/// Largest difference in degrees between the immersion angles of the cut and of a layer, at entry and at exit.
+/// Largest difference in degrees between the immersion angles of the cut and of a layer of the lobe table, at entry and
+/// at exit, at which the layer is valid for the cut.
 ///
 /// Half a degree changes the mean directional coefficients of a 90° cut by about 1 %, well below [`DEPTH_MARGIN`].
 pub const IMMERSION_TOLERANCE: Degrees = Degrees(0.5);
 
-/// Relative tolerance of the feed per tooth at the ends of a layer's feed range. It covers rounding only.
+/// Relative tolerance of the feed per tooth of a cut at the ends of the feed range of a table layer. It covers rounding
+/// only.
 pub const FEED_TOLERANCE: f32 = 1e-4;
 
-/// Largest angle in degrees between the feed directions of two layers that are interpolated. Unfounded.
+/// Largest angle in degrees between the feed directions of two table layers between which a lookup interpolates.
+/// Unfounded.
 pub const FEED_DIRECTION_SPAN: Degrees = Degrees(45.0);
 
 /// Largest angle in degrees between two feed directions that count as equal. Unfounded.

@@ -16,30 +16,30 @@
 use crate::acceleration::Counts;
 use crate::units::Hertz;
 
-/// Three axes x, y, z at one instant, in units of 2^−[`FRACTION_BITS`] counts.
+/// A filtered acceleration sample of the axes x, y, z, in units of 2^−[`FRACTION_BITS`] sensor counts.
 pub type Sample = [i32; 3];
 
-/// Number of fractional bits per count.
+/// Number of fractional bits per sensor count in the fixed-point samples of the filters.
 ///
-/// Full scale is 2²⁷. Of the 4 bits above it, one holds the overshoot of the filters, less than twice full scale in both bands, and
-/// one the sum of two samples.
+/// Full scale is 2²⁷. Of the 4 bits above it, one holds the overshoot of the filters, less than twice full scale in
+/// both bands, and one the sum of two samples.
 pub const FRACTION_BITS: u32 = 12;
 
 /// Smallest input rate.
 pub const MIN_RATE: Hertz = Hertz(1_000.0);
 /// Largest input rate.
 pub const MAX_RATE: Hertz = Hertz(102_400.0);
-/// Upper end of the tool band.
+/// Upper end of the frequency range of the tool band.
 pub const TOOL_BAND: Hertz = Hertz(5_000.0);
-/// Upper end of the structure band.
+/// Upper end of the frequency range of the structure band.
 pub const STRUCTURE_BAND: Hertz = Hertz(400.0);
 
-/// Upper end of the sharp filter's flat band, as a fraction of its input rate.
+/// Upper end of the flat band of the sharp half-band filter, as a fraction of its input rate.
 const SHARP_FLAT: f32 = 0.195;
-/// Upper end of the medium filter's flat band, as a fraction of its input rate.
+/// Upper end of the flat band of the medium half-band filter, as a fraction of its input rate.
 const MEDIUM_FLAT: f32 = 0.13;
 
-/// An input rate outside the supported range.
+/// Error of a sample rate of the sensor that is outside the range that the decimation supports.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct RateOutOfRange(pub Hertz);
@@ -100,12 +100,13 @@ const fn bessel_i0(square: f64) -> f64 {
     sum
 }
 
-/// Length of a half-band filter with `side` non-zero taps on each side.
+/// Length in taps of a half-band filter with `side` non-zero taps on each side of its middle tap.
 const fn length(side: usize) -> usize {
     4 * side - 1
 }
 
-/// Group delay of a filter in input samples: the distance of its middle tap from the newest sample.
+/// Group delay in input samples of a half-band filter with `side` non-zero taps on each side: the distance of its
+/// middle tap from the newest sample.
 const fn delay(side: usize) -> u32 {
     2 * side as u32 - 1
 }
@@ -114,8 +115,8 @@ const SHARP_SIDE: usize = 15;
 const MEDIUM_SIDE: usize = 7;
 const EASY_SIDE: usize = 5;
 
-// The argument of `half_band` is the β of the Kaiser window. For each filter length it is the value with the largest stop-band
-// attenuation, found by trial.
+// The argument of `half_band` is the β of the Kaiser window. For each filter length, β is the value with the largest
+// stop-band attenuation, found by trial.
 
 /// Sharp filter, pass band to 0.195 and stop band from 0.305 of its input rate: the last stage before the tool band.
 static SHARP: [i32; SHARP_SIDE] = half_band(10.3);
@@ -130,9 +131,9 @@ static EASY: [i32; EASY_SIDE] = half_band(11.4);
 #[derive(Clone, Debug)]
 struct Stage<const LENGTH: usize> {
     samples: [[Sample; LENGTH]; 2],
-    /// Index of the next sample within each of the two copies.
+    /// Index, within each of the two copies, at which the next input sample is stored.
     next: usize,
-    /// True if the next sample is the second of a pair, which gives no output.
+    /// True if the next input sample is the second of a pair, for which the filter gives no output sample.
     second: bool,
     filled: bool,
 }
@@ -147,7 +148,8 @@ impl<const LENGTH: usize> Stage<LENGTH> {
         }
     }
 
-    /// Takes an input sample. Returns a filtered sample for the first of every two inputs, `None` for the second.
+    /// Takes an input sample of the filter. Returns an output sample for the first of every two inputs, `None` for the
+    /// second.
     fn step<const SIDE: usize>(&mut self, taps: &[i32; SIDE], x: Sample) -> Option<Sample> {
         if !self.filled {
             // The filter starts as if all earlier samples equalled the first one, so that gravity causes no step response.
@@ -188,19 +190,20 @@ fn filter<const LENGTH: usize, const SIDE: usize>(
     (sum >> 31) as i32
 }
 
-/// The cascade for one nominal input rate.
+/// The cascade of decimation filters, configured for one nominal sample rate of the sensor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Decimation {
-    /// Number of halvings with the medium filter before the tool band, 0 to 2.
+    /// Number of halvings of the sample rate with the medium filter before the tool band, 0 to 2.
     medium_halvings: u8,
-    /// True if one halving with the sharp filter follows.
+    /// True if one halving of the sample rate with the sharp filter comes last before the tool band.
     sharp_halving: bool,
-    /// Number of halvings from the tool band to the structure band, 0 to 4. The last uses the medium filter, all others the easy one.
+    /// Number of halvings of the sample rate from the tool band to the structure band, 0 to 4. The last uses the medium
+    /// filter, all others the easy one.
     structure_halvings: u8,
 }
 
-/// State of the cascade: the samples stored in its filter stages.
+/// State of the decimation cascade: the samples stored in its filter stages.
 #[derive(Clone, Debug)]
 pub struct State {
     medium: [Stage<{ length(MEDIUM_SIDE) }>; 2],
@@ -210,7 +213,7 @@ pub struct State {
 }
 
 impl State {
-    /// The initial state, before the first sample.
+    /// The state of the decimation cascade before the first sample.
     pub const fn new() -> Self {
         Self {
             medium: [const { Stage::new() }; 2],
@@ -220,7 +223,7 @@ impl State {
         }
     }
 
-    /// Resets to the initial state. Used after a gap in the samples.
+    /// Resets the decimation filters to the initial state, after a gap in the samples.
     pub fn reset(&mut self) {
         *self = Self::new();
     }
@@ -235,14 +238,14 @@ impl Default for State {
 /// Output of the decimation cascade for one input sample: a sample of the tool band and one of the structure band, each only when due.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Output {
-    /// A sample of the tool band, if one is due.
+    /// A sample of the tool band, if this input sample completes one.
     pub tool: Option<Sample>,
-    /// A sample of the structure band, if one is due.
+    /// A sample of the structure band, if this input sample completes one.
     pub structure: Option<Sample>,
 }
 
 impl Decimation {
-    /// Configures the cascade for a nominal input rate.
+    /// Configures the decimation cascade for a nominal sample rate of the sensor.
     pub fn new(nominal_rate: Hertz) -> Result<Self, RateOutOfRange> {
         if !(MIN_RATE.0..=MAX_RATE.0).contains(&nominal_rate.0) {
             return Err(RateOutOfRange(nominal_rate));
@@ -263,17 +266,17 @@ impl Decimation {
         })
     }
 
-    /// Input samples per sample of the tool band: 1, 2 or 4.
+    /// Number of sensor samples per sample of the tool band: 1, 2 or 4.
     pub fn tool_divisor(&self) -> u32 {
         1 << (self.medium_halvings + u8::from(self.sharp_halving))
     }
 
-    /// Input samples per sample of the structure band: 1 to 64.
+    /// Number of sensor samples per sample of the structure band: 1 to 64.
     pub fn structure_divisor(&self) -> u32 {
         self.tool_divisor() << self.structure_halvings
     }
 
-    /// Group delay of the tool band in input samples, at all frequencies.
+    /// Group delay of the filters before the tool band, in sensor samples, equal at all frequencies.
     ///
     /// The output with input sample i corresponds to the signal at input sample i − delay.
     pub fn tool_delay(&self) -> u32 {
@@ -286,7 +289,8 @@ impl Decimation {
         medium + sharp
     }
 
-    /// Group delay of the structure band in input samples, at all frequencies, counted as in [`tool_delay`](Self::tool_delay).
+    /// Group delay of the filters before the structure band, in sensor samples, equal at all frequencies; counted as in
+    /// [`tool_delay`](Self::tool_delay).
     pub fn structure_delay(&self) -> u32 {
         let Some(easy) = self.structure_halvings.checked_sub(1) else {
             return self.tool_delay();
@@ -295,7 +299,7 @@ impl Decimation {
         self.tool_delay() + self.tool_divisor() * after_tool_band
     }
 
-    /// Processes one sample of the sensor.
+    /// Decimates one sample of the sensor.
     pub fn step(&self, state: &mut State, counts: Counts) -> Output {
         let mut tool = Some(counts.map(|c| i32::from(c) << FRACTION_BITS));
         for stage in state.medium.iter_mut().take(self.medium_halvings.into()) {

@@ -16,53 +16,58 @@ use crate::units::Nanoseconds;
 /// Settings of the estimator.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct EventClock {
-    /// Number of observations after which the weight of a stamp has decayed to 1/e. At least 2.
+    /// Number of time stamps after which the weight of a stamp in the fit has decayed to 1/e. At least 2.
     pub memory: f32,
-    /// Standard deviation of the initial estimate of the period, in units of the standard deviation of one stamp.
+    /// Standard deviation of the initial estimate of the period between events, in units of the standard deviation of
+    /// one time stamp.
     pub period_uncertainty: f32,
 }
 
 /// State of the estimator.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EventClockState {
-    /// Number of the newest observed event.
+    /// Number of the event whose time stamp was observed last.
     index: u64,
-    /// Fitted time of the newest observed event.
+    /// Fitted time of the event whose time stamp was observed last.
     time_ns: u64,
-    /// Time stamp of the newest observed event.
+    /// Time stamp, with jitter, of the event that was observed last.
     stamp_ns: u64,
     /// Fitted time from one event to the next, in ns.
     period_ns: f32,
-    /// Covariance of the fitted time a and period b, in units of the stamps' variance: var a, cov(a, b), var b.
+    /// Covariance of the fitted time a and period b of the events, divided by the variance of one time stamp: var a,
+    /// cov(a, b), var b.
     covariance: [f32; 3],
-    /// Variance of the stamps about the fitted line, in ns².
+    /// Variance of the time stamps about the fitted line, in ns².
     variance_ns2: f32,
-    /// Deviation of the preceding stamp from its prediction in ns, scaled so that its standard deviation is that of one stamp.
+    /// Deviation of the preceding time stamp from its prediction in ns, scaled so that its standard deviation is that
+    /// of one stamp.
     previous_ns: f32,
-    /// Running mean of the scaled deviations in ns. It differs from zero if the rate changes.
+    /// Running mean in ns of the scaled deviations of time stamps from their predictions. It differs from zero if the
+    /// rate of the events changes.
     bias_ns: f32,
     /// Number of consecutive outliers.
     outliers: u8,
-    /// Number of observations since the start.
+    /// Number of time stamps observed since the start.
     observations: u32,
 }
 
 /// Classification of one observation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Observation {
-    /// The stamp agrees with the fitted line.
+    /// The time stamp agrees with the fitted line.
     Fitted,
-    /// The recent deviations from the line have the same sign: the rate is changing. The line continues from this stamp with an
-    /// uncertain period.
+    /// The recent deviations of time stamps from the line have the same sign: the rate of the events is changing. The
+    /// line continues from this stamp with an uncertain period.
     RateChanged,
-    /// An outlier: a stamp too far from the line for jitter. The line is updated with a reduced deviation.
+    /// The time stamp is an outlier: too far from the line for jitter. The line is updated with a reduced deviation.
     Outlier,
     /// Too many consecutive outliers: the line starts again through this stamp and the preceding stamp.
     Restarted,
 }
 
 impl EventClock {
-    /// Starts at event 0 with time stamp `time`, and initial estimates of the period and of the stamps' standard deviation.
+    /// Starts the estimator at event 0 with time stamp `time`, and with initial estimates of the period between events
+    /// and of the standard deviation of the stamps.
     pub fn start(&self, time: Nanoseconds, period_ns: f32, jitter_ns: f32) -> EventClockState {
         EventClockState {
             index: 0,
@@ -82,7 +87,7 @@ impl EventClock {
         [1.0, 0.0, self.period_uncertainty * self.period_uncertainty]
     }
 
-    /// Processes the time stamp of the event whose number is `steps` above that of the newest event.
+    /// Processes the time stamp of an event whose number is higher by `steps` than that of the event observed last.
     pub fn observe(&self, state: &mut EventClockState, steps: u32, stamp: Nanoseconds) -> Observation {
         let dn = steps as f32;
         let predicted_ns = state.time_ns.saturating_add((dn * state.period_ns) as u64);
@@ -101,7 +106,8 @@ impl EventClock {
         let bound_ns2 = OUTLIER_DEVIATIONS * OUTLIER_DEVIATIONS * state.variance_ns2 * scale;
         let square_ns2 = deviation_ns * deviation_ns;
         let is_outlier = square_ns2 > bound_ns2;
-        // The deviation of an outlier keeps its sign and is reduced to bound²/deviation, which is below the bound.
+        // The deviation of an outlier from the fitted line keeps its sign and is reduced to bound²/deviation, which is
+        // below the outlier bound.
         let reduced_ns = if is_outlier {
             deviation_ns * (bound_ns2 / square_ns2)
         } else {
@@ -116,7 +122,7 @@ impl EventClock {
             if restarts {
                 state.period_ns = difference_ns(stamp.0, before_ns) / dn;
             }
-            // The period is now as uncertain as one that is computed from two stamps only.
+            // The period between events is now as uncertain as one that is computed from two time stamps only.
             state.covariance = [1.0, 0.0, 2.0 / (dn * dn)];
             (state.outliers, state.bias_ns, state.previous_ns) = (0, 0.0, 0.0);
             return if restarts {
@@ -163,12 +169,12 @@ impl EventClockState {
             && self.bias_ns * self.bias_ns > RATE_CHANGE_BIAS * RATE_CHANGE_BIAS * self.variance_ns2
     }
 
-    /// Number of the newest observed event.
+    /// Number of the event that was observed last.
     pub fn index(&self) -> u64 {
         self.index
     }
 
-    /// Fitted time of the newest event.
+    /// Fitted time of the event that was observed last.
     pub fn time(&self) -> Nanoseconds {
         Nanoseconds(self.time_ns)
     }
@@ -178,35 +184,36 @@ impl EventClockState {
         self.period_ns
     }
 
-    /// Number of observed stamps since the start.
+    /// Number of time stamps observed since the start.
     pub fn observations(&self) -> u32 {
         self.observations
     }
 
-    /// Variance of one stamp about the fitted line, in ns².
+    /// Variance of one time stamp about the fitted line, in ns².
     pub fn variance_ns2(&self) -> f32 {
         self.variance_ns2
     }
 
-    /// Variance of the fitted time at `events` after the newest event, in ns². It grows with the distance.
+    /// Variance, in ns², of the fitted time of the event that follows the newest one by `events`. It grows with the
+    /// distance.
     pub fn variance_at_ns2(&self, events: f32) -> f32 {
         let [aa, ab, bb] = self.covariance;
         self.variance_ns2 * (aa + events * (2.0 * ab + events * bb))
     }
 
-    /// Fitted time at `events` after the newest event; fractions and negative values are allowed.
+    /// Fitted time of the event that follows the newest one by `events`; fractions and negative values are allowed.
     ///
     /// The rounding error is that of one `f32` product: 6e-8 of the distance.
     pub fn time_at(&self, events: f32) -> Nanoseconds {
         Nanoseconds(offset_ns(self.time_ns, events * self.period_ns))
     }
 
-    /// Number of events from the newest one to `time`; negative before it.
+    /// Number of events from the newest one to the time `time`, by the fitted line; negative if `time` is earlier.
     pub fn events_to(&self, time: Nanoseconds) -> f32 {
         difference_ns(time.0, self.time_ns) / self.period_ns
     }
 
-    /// Clamps the fitted period to these bounds in ns.
+    /// Clamps the fitted period between events to the range from `least_ns` to `most_ns`.
     pub fn limit_period(&mut self, least_ns: f32, most_ns: f32) {
         self.period_ns = self.period_ns.clamp(least_ns, most_ns);
     }

@@ -106,7 +106,8 @@ fn first_pass(data: &mut [Complex], scale: impl Fn(i32) -> i32) {
     }
 }
 
-/// Radix-2 pass: joins two transforms of length 4 into one of length 8, in each block of eight values.
+/// Radix-2 pass of the Fourier transform: joins two transforms of length 4 into one of length 8, in each block of eight
+/// values.
 #[inline(always)]
 fn radix2_pass(data: &mut [Complex]) {
     const SQRT_HALF: i32 = 0x5A82_799A;
@@ -123,11 +124,12 @@ fn radix2_pass(data: &mut [Complex]) {
     }
 }
 
-/// Radix-4 pass: joins four transforms of length Q into one of length 4·Q, in each block of 4·Q values. The results are halved.
+/// Radix-4 pass of the Fourier transform: joins four transforms of length Q into one of length 4·Q, in each block of
+/// 4·Q values. The results are halved.
 #[inline(always)]
 fn radix4_pass<const Q: usize>(data: &mut [Complex], factors: &[[Complex; 3]; Q]) {
     for block in data.chunks_exact_mut(4 * Q) {
-        // The four transforms of a block are in bit-reversed order: 0, 2, 1, 3.
+        // The four transforms of length Q in a block are stored in bit-reversed order: 0, 2, 1, 3.
         let Some([x0, x2, x1, x3]) = quarters::<Q>(block) else {
             return;
         };
@@ -180,7 +182,7 @@ fn split(data: &mut [Complex], factors: &[Complex]) {
 /// Sorts into bit-reversed order: exchanges each value with the one at the bit-reversed index.
 #[inline(always)]
 fn sort_bit_reversed<const M: usize>(data: &mut [Complex; M]) {
-    // The bits of an index: a high half, one middle bit if their number is odd, and a low half.
+    // For the exchange, the bits of an index are a high half, one middle bit if their number is odd, and a low half.
     let half = M.trailing_zeros() / 2;
     let odd = M.trailing_zeros() % 2;
     let reversed = |bits: usize| bits.reverse_bits() >> (usize::BITS - half);
@@ -195,7 +197,7 @@ fn sort_bit_reversed<const M: usize>(data: &mut [Complex; M]) {
     }
 }
 
-/// Number of bits of the largest magnitude in the block, without the sign bit.
+/// Number of bits, without the sign bit, of the largest real or imaginary part in the block.
 #[inline(always)]
 fn bits_used(data: &[Complex]) -> i32 {
     let magnitude = |v: i32| v ^ (v >> 31);
@@ -205,15 +207,15 @@ fn bits_used(data: &[Complex]) -> i32 {
     (i32::BITS - union.leading_zeros()) as i32
 }
 
-/// First pass on the block, shifted so that its largest magnitude has `bits` bits without the sign bit. Returns the left shift
-/// in bits.
+/// First pass of the Fourier transform on a block, shifted so that its largest magnitude has `bits` bits without the
+/// sign bit. Returns the left shift in bits.
 #[inline(always)]
 fn normalized_first_pass(data: &mut [Complex], bits: i32) -> i32 {
     let left = bits - bits_used(data);
     if left >= 0 {
         first_pass(data, |v| v << left);
     } else {
-        // Rounding up may need one more bit, so the result is limited to `largest`.
+        // Rounding up may need one more bit than `bits`, so each shifted value is limited to `largest`.
         let (half, largest) = (1 << (-left - 1), (1 << bits) - 1);
         first_pass(data, |v| (v.saturating_add(half) >> -left).min(largest));
     }
@@ -229,7 +231,8 @@ pub struct Transform<'a> {
     pub exponent: i32,
 }
 
-/// cos and sin of 2π·`numerator`/`denominator` as Q31 numbers, rounded to nearest. +1 becomes 1 − 2⁻³¹, the largest Q31 number.
+/// cos and sin of the angle 2π·`numerator`/`denominator` as Q31 numbers, rounded to nearest. +1 becomes 1 − 2⁻³¹, the
+/// largest Q31 number.
 const fn cos_sin(numerator: u32, denominator: u32) -> Complex {
     // The angle is reduced to at most π/4 from the nearest axis, where the Taylor series converge fast.
     let quadrant = (8 * numerator + denominator) / (2 * denominator);
@@ -261,7 +264,7 @@ const fn q31(value: f64) -> i32 {
     (if scaled < 0.0 { scaled - 0.5 } else { scaled + 0.5 }) as i32
 }
 
-/// Twiddle factors exp(−2πi·j·r/4Q) for j = 0 … Q − 1 and r = 1, 2, 3.
+/// Twiddle factors exp(−2πi·j·r/4Q) of a radix-4 pass for j = 0 … Q − 1 and r = 1, 2, 3.
 const fn pass_factors<const Q: usize>() -> [[Complex; 3]; Q] {
     let mut table = [[[0; 2]; 3]; Q];
     let mut j = 0;
@@ -277,7 +280,8 @@ const fn pass_factors<const Q: usize>() -> [[Complex; 3]; Q] {
     table
 }
 
-/// Factors exp(−2πi·k/N) of the split for k = 1 … N/4 − 1 = COUNT.
+/// Twiddle factors exp(−2πi·k/N) for k = 1 … N/4 − 1 = COUNT, with which the transform of packed values is split into
+/// that of N real values.
 const fn split_factors<const COUNT: usize>() -> [Complex; COUNT] {
     let mut table = [[0; 2]; COUNT];
     let mut k = 0;

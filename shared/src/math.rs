@@ -10,12 +10,12 @@ use core::f32::consts::TAU;
 
 use micromath::F32;
 
-/// Largest integer not above `x`. Exact.
+/// Largest integer not above `x`, without rounding error.
 pub fn floor(x: f32) -> f32 {
     libm::floorf(x)
 }
 
-/// Nearest integer; halves are rounded away from zero. Exact.
+/// Integer nearest to `x`, without rounding error; halves are rounded away from zero.
 pub fn round(x: f32) -> f32 {
     libm::roundf(x)
 }
@@ -33,11 +33,12 @@ pub fn sqrt(x: f32) -> f32 {
     }
     let half = 0.5 * x;
     let mut inverse = F32(x).invsqrt().0;
-    // The relative error of the initial value is at most e = 0.036. Each step reduces it to 1.5·e²: 2e-3, then 6e-6.
+    // The relative error of the initial value of 1/√x is at most e = 0.036. Each Newton step reduces it to 1.5·e²:
+    // 2e-3, then 6e-6.
     for _ in 0..2 {
         inverse *= 1.5 - half * inverse * inverse;
     }
-    // One more Newton step on the root itself reduces the error to its rounding.
+    // One more Newton step on √x itself reduces its error to rounding.
     let root = x * inverse;
     root + 0.5 * inverse * (x - root * root)
 }
@@ -73,7 +74,7 @@ pub fn sin_cos_turns(turns: f32) -> (f32, f32) {
         0 => (sin, cos),
         1 => (cos, -sin),
         -1 => (-cos, sin),
-        // Quadrants −2 and 2, half a revolution. A NaN takes this branch too and remains NaN.
+        // The remaining quadrants, −2 and 2, are half a revolution. A NaN takes this branch too and remains NaN.
         _ => (-sin, -cos),
     }
 }
@@ -118,7 +119,7 @@ pub fn decibel(power_ratio: f32) -> f32 {
     10.0 * log10(power_ratio.max(f32::MIN_POSITIVE))
 }
 
-/// 2 to the power of `exponent`, which is clamped to −126 … 127. Exact.
+/// 2 to the power of `exponent`, which is clamped to −126 … 127; without rounding error.
 pub const fn exp2i(exponent: i32) -> f32 {
     let held = if exponent < -126 {
         -126

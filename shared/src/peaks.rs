@@ -17,9 +17,9 @@ pub use crate::criteria::MIN_SNR;
 pub struct Peak {
     /// Frequency of the tone.
     pub frequency: Hertz,
-    /// Zero-to-peak amplitude; over several axes the root of the sum of squares.
+    /// Zero-to-peak amplitude of the tone; over several axes the root of the sum of squares.
     pub amplitude: MetersPerSecond2,
-    /// Ratio of the highest bin's power to the median power of the bins around it.
+    /// Ratio of the power in the tone's highest bin to the noise floor, the median power of the bins around it.
     pub snr: f32,
 }
 
@@ -29,7 +29,7 @@ pub struct Peak {
 pub struct Rotation {
     /// Revolutions of the spindle per second.
     pub frequency: Hertz,
-    /// Largest error or change of that frequency within the spectrum.
+    /// Largest error or change of the spindle frequency within the duration of the spectrum.
     pub uncertainty: Hertz,
 }
 
@@ -39,9 +39,10 @@ pub struct Rotation {
 pub struct NonHarmonic {
     /// The tone.
     pub peak: Peak,
-    /// Spindle order of the harmonic nearest to the tone.
+    /// Order of the spindle harmonic nearest to the tone.
     pub nearest_order: u32,
-    /// Signed distance of the tone from that harmonic, in spindle orders: ½ for a tone halfway between two harmonics.
+    /// Signed distance of the tone from the nearest spindle harmonic, in spindle orders: ½ for a tone halfway between
+    /// two harmonics.
     pub orders_off: f32,
 }
 
@@ -51,9 +52,9 @@ pub struct NonHarmonic {
 pub enum Search {
     /// A tone was found.
     Found(NonHarmonic),
-    /// No tone was found below the given frequency.
+    /// No tone other than harmonics of the spindle was found below the given frequency.
     Nothing {
-        /// Above this frequency, harmonics of the spindle and other tones cannot be distinguished.
+        /// Upper end of the range in which harmonics of the spindle and other tones can be distinguished.
         resolved_to: Hertz,
     },
     /// At the uncertainty of the spindle speed and the resolution of the spectrum, harmonics and other tones cannot be
@@ -66,11 +67,12 @@ impl PowerSpectrum<'_> {
         self.power.get(k).copied().unwrap_or(0.0)
     }
 
-    /// Frequency in bins and mean square of the tone whose highest bin is `k`.
+    /// Frequency (in bins) and mean square of a tone of the spectrum whose highest bin is `k`.
     ///
-    /// With the amplitudes a, b, c of the bins below, at and above, the Hann window gives the offset δ = 2(c − a)/(a + 2b + c)
-    /// from the middle bin and the amplitude (a + 2b + c)·(1 − δ²)(4 − δ²)/12·πδ/sin πδ, both exact for a single tone (Agrež,
-    /// IEEE Trans. Instrum. Meas. 51, 2002). Noise 20 dB below the peak in its bin gives δ an error of 0.065 rms.
+    /// With the amplitudes a, b, c of the bins below, at and above, the Hann window gives the offset δ = 2(c − a)/(a +
+    /// 2b + c) from the middle bin and the amplitude (a + 2b + c)·(1 − δ²)(4 − δ²)/12·πδ/sin πδ, both exact for a
+    /// single tone (Agrež, IEEE Trans. Instrum. Meas. 51, 2002). Noise 20 dB below the peak in its bin gives δ an error
+    /// of 0.065 rms.
     fn interpolate(&self, k: usize) -> (f32, f32) {
         let [below, middle, above] = [k.wrapping_sub(1), k, k + 1].map(|i| math::sqrt(self.at(i)));
         let sum = below + 2.0 * middle + above;
@@ -88,7 +90,7 @@ impl PowerSpectrum<'_> {
         (k as f32 + offset, root * root)
     }
 
-    /// Noise floor at bin `k`: the median power of the bins around the peak.
+    /// Noise floor of the spectrum at bin `k`: the median power of the bins around the peak there.
     ///
     /// Other tones do not change it while they cover less than half of these bins.
     pub fn noise_floor(&self, k: usize) -> f32 {
@@ -98,7 +100,7 @@ impl PowerSpectrum<'_> {
         let bins = below.chain(above).filter_map(|i| self.power.get(i));
         let mut count = 0;
         for (slot, power) in around.iter_mut().zip(bins) {
-            // Non-negative floats have the same order as their bit patterns.
+            // Non-negative floats have the same order as their bit patterns, which can be sorted as integers.
             *slot = power.to_bits();
             count += 1;
         }
@@ -108,7 +110,7 @@ impl PowerSpectrum<'_> {
         f32::from_bits(*around.select_nth_unstable(count / 2).1)
     }
 
-    /// The tone whose highest bin is `k`.
+    /// Frequency, amplitude and signal-to-noise ratio of the tone whose highest bin is `k`.
     fn peak(&self, k: usize) -> Peak {
         let (bins, mean_square) = self.interpolate(k);
         let floor = self.noise_floor(k).max(f32::MIN_POSITIVE);
@@ -119,10 +121,11 @@ impl PowerSpectrum<'_> {
         }
     }
 
-    /// Local maxima between two frequencies, strongest first, at most [`MAXIMA_SEARCHED`].
+    /// Bins of the local maxima of the spectrum between two frequencies, strongest first, at most [`MAXIMA_SEARCHED`].
     fn maxima(&self, from: Hertz, to: Hertz) -> Vec<usize, MAXIMA_SEARCHED> {
         let mut found: Vec<usize, MAXIMA_SEARCHED> = Vec::new();
-        // After removal of the rounded mean, bins 0 and 1 contain its residual.
+        // The rounded mean of the samples was subtracted; its rounding error remains in bins 0 and 1, so these are
+        // skipped.
         let first = ((from.0 / self.bin.0) as usize).max(2);
         let end = ((to.0 / self.bin.0) as usize)
             .saturating_add(2)
@@ -137,7 +140,7 @@ impl PowerSpectrum<'_> {
                 if found.is_full() && place < MAXIMA_SEARCHED {
                     found.pop();
                 }
-                // If the list is full, a weaker maximum is dropped.
+                // If the list of maxima is full, the weakest is dropped.
                 let _ = found.insert(place, k);
             }
         }
@@ -168,7 +171,8 @@ impl PowerSpectrum<'_> {
             uncertainty,
         } = rotation;
         let width = HARMONIC_BINS * self.bin.0;
-        // At this order the tolerance around a harmonic reaches its largest share of the distance between two harmonics.
+        // At this spindle order the tolerance around a harmonic reaches its largest allowed share of the distance
+        // between two harmonics.
         let highest_order =
             (HARMONIC_TOLERANCE_MAX * frequency.0 - width) / uncertainty.0.max(1e-6 * frequency.0.abs());
         let resolved_to = Hertz((highest_order * frequency.0).min(to.0));
@@ -199,7 +203,8 @@ impl PowerSpectrum<'_> {
         Search::Nothing { resolved_to }
     }
 
-    /// True if the side lobes of the stronger maxima amount to at least half of the amplitude in bin `k`.
+    /// True if the Hann side lobes of the stronger maxima in the spectrum amount to at least half of the amplitude in
+    /// bin `k`.
     fn is_side_lobe(&self, k: usize, stronger: &[usize]) -> bool {
         let leaked: f32 = stronger
             .iter()

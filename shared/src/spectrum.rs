@@ -31,17 +31,17 @@ pub const STRUCTURE_BINS: usize = STRUCTURE_POINTS / 2 + 1;
 /// Equivalent noise bandwidth of the Hann window, in bins.
 pub const HANN_NOISE_BINS: f32 = 1.5;
 
-/// The last N samples of a band, for blocks that overlap.
+/// The last N samples of a band, from which blocks for overlapping spectra are taken.
 #[derive(Clone, Debug)]
 pub struct Overlap<const N: usize> {
     ring: [Sample; N],
     next: usize,
-    /// Number of samples until the next block is due.
+    /// Number of samples until the next block for a spectrum is due.
     missing: usize,
 }
 
 impl<const N: usize> Overlap<N> {
-    /// An empty buffer: the first block is due after N samples.
+    /// An empty buffer of samples: the first block is due after N samples.
     pub const fn new() -> Self {
         Self {
             ring: [[0; 3]; N],
@@ -50,12 +50,13 @@ impl<const N: usize> Overlap<N> {
         }
     }
 
-    /// Discards all samples, after a gap.
+    /// Discards all samples of the band, after a gap in the samples.
     pub fn reset(&mut self) {
         (self.next, self.missing) = (0, N);
     }
 
-    /// Takes a sample. Returns true if N samples are stored and at least `hop` of them came after the preceding block.
+    /// Takes a sample of the band. Returns true if N samples are stored and at least `hop` of them came after the
+    /// preceding block.
     pub fn push(&mut self, sample: Sample, hop: usize) -> bool {
         if let Some(slot) = self.ring.get_mut(self.next) {
             *slot = sample;
@@ -69,7 +70,7 @@ impl<const N: usize> Overlap<N> {
         true
     }
 
-    /// The values of one axis (0, 1, 2 for x, y, z), oldest first.
+    /// The stored samples of one axis (0, 1, 2 for x, y, z), oldest first.
     fn axis(&self, axis: usize) -> impl Iterator<Item = i32> {
         let (newer, older) = self.ring.split_at(self.next.min(N));
         older
@@ -90,19 +91,19 @@ impl<const N: usize> Default for Overlap<N> {
     }
 }
 
-/// A power spectrum, a view into the memory of its bins.
+/// A power spectrum of a band, as a view into the memory of its bins.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PowerSpectrum<'a> {
-    /// Power per bin from 0 Hz to half the sample rate, in (m/s²)².
+    /// Power in each bin of the spectrum from 0 Hz to half the sample rate, in (m/s²)².
     pub power: &'a [f32],
-    /// Width of a bin: the sample rate divided by the number of points.
+    /// Width of a bin of the spectrum: the sample rate divided by the number of points.
     pub bin: Hertz,
 }
 
-/// Spectrum of the tool band: the sum over the axes whose numbers `axes` gives.
+/// Power spectrum of the tool band: the sum over the axes whose numbers (0, 1, 2 for x, y, z) `axes` gives.
 ///
-/// `sample_rate` is the fitted rate of the tool band, `unit` the acceleration in m/s² of one unit of a [`Sample`], and `work`
-/// scratch memory.
+/// `sample_rate` is the fitted rate of the tool band, `unit` the acceleration in m/s² of one unit of a [`Sample`], and
+/// `work` scratch memory.
 pub fn tool_spectrum<'a>(
     block: &Overlap<TOOL_POINTS>,
     axes: &[usize],
@@ -127,7 +128,7 @@ pub fn tool_spectrum<'a>(
     }
 }
 
-/// Spectrum of the structure band; the arguments are those of [`tool_spectrum`].
+/// Power spectrum of the structure band; the arguments are those of [`tool_spectrum`].
 pub fn structure_spectrum<'a>(
     block: &Overlap<STRUCTURE_POINTS>,
     axes: &[usize],
@@ -166,7 +167,7 @@ fn add_power(bins: impl Iterator<Item = [f32; 2]>, unit: f32, power: &mut [f32])
     let (mut before, mut here) = ([0.0; 2], [dc, 0.0]);
     let last = power.len() - 1;
     for (k, slot) in power.iter_mut().enumerate() {
-        // The spectrum of a real signal continues beyond both ends as its mirrored conjugate.
+        // The spectrum of a real signal continues beyond both ends of its bins as its mirrored conjugate.
         let after = following.next().unwrap_or(conjugate(before));
         if k == 0 {
             before = conjugate(after);

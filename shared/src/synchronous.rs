@@ -15,9 +15,9 @@ use crate::tachometer::Turns;
 
 /// Angles per tooth period.
 pub const SLOTS: usize = 8;
-/// Values per tooth period: three axes at each slot.
+/// Number of values per tooth period: three axes at each of the [`SLOTS`] fixed angles.
 pub const CHANNELS: usize = 3 * SLOTS;
-/// Largest number of classes, one per tooth.
+/// Largest number of classes of tooth periods: one class per tooth.
 pub const MAX_CLASSES: usize = 12;
 
 /// One tooth period: acceleration in m/s², slot by slot, x, y, z within a slot.
@@ -26,19 +26,20 @@ pub type Passing = [f32; CHANNELS];
 /// Method of resampling.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Method {
-    /// The mean from the angle of the slot to that of the next: its bandwidth is about SLOTS/2 cycles per tooth period, with the least noise.
+    /// Each slot gets the mean of the signal from its angle to that of the next slot: the bandwidth is about SLOTS/2
+    /// cycles per tooth period, with the least noise.
     ///
-    /// The samples are joined by straight lines. A tone with n samples per cycle gets an amplitude that is too small by the
-    /// relative amount π²/(3n²): 0.3 % for 33 samples.
+    /// The samples are joined by straight lines. A tone with n samples per cycle gets an amplitude that is too small by
+    /// the relative amount π²/(3n²): 0.3 % for 33 samples.
     Mean,
-    /// The value at the angle of the slot, with the bandwidth of the samples.
+    /// Each slot gets the value of the signal at its angle, with the bandwidth of the samples.
     ///
-    /// A cubic through the four nearest samples gives the value. The relative error of a tone with n samples per cycle is at
-    /// most 36.5/n⁴: 0.06 % for 16, 1 % for 8 samples.
+    /// A cubic through the four nearest samples gives the value. The relative error of a tone with n samples per cycle
+    /// is at most 36.5/n⁴: 0.06 % for 16, 1 % for 8 samples.
     Value,
 }
 
-/// Converts samples of a band into passings.
+/// Resamples a band from fixed sample times to fixed spindle angles, and returns one [`Passing`] per tooth period.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Sampler {
     /// Teeth of the tool.
@@ -50,21 +51,21 @@ pub struct Sampler {
 /// State of a [`Sampler`].
 #[derive(Clone, Copy, Debug)]
 pub struct SamplerState {
-    /// The last four samples, newest last.
+    /// The last four acceleration samples of the band, newest last.
     samples: [[f32; 3]; 4],
-    /// Spindle angles of the second and third of the four samples.
+    /// Spindle angles of the second and the third of the last four samples.
     angles: [Turns; 2],
-    /// Spindle angle of the newest sample.
+    /// Spindle angle of the newest sample of the band.
     angle: Turns,
-    /// Samples taken since the start, up to 4.
+    /// Number of samples taken since the start, up to 4.
     filled: u8,
-    /// Number of the next angle slot to fill, counted from angle 0; `None` before the first.
+    /// Number of the next slot (fixed spindle angle) to fill, counted from angle 0; `None` before the first.
     next_slot: Option<u64>,
-    /// Number of consecutive angle slots filled without a gap.
+    /// Number of consecutive slots (fixed spindle angles) filled without a gap.
     unbroken: u8,
-    /// Integral of the signal over time since the last angle slot, in m/s² times sample periods.
+    /// Integral of the signal over time since the angle of the last filled slot, in m/s² times sample periods.
     integral: [f32; 3],
-    /// Time since the last angle slot, in sample periods.
+    /// Time since the angle of the last filled slot, in sample periods.
     span: f32,
     passing: Passing,
 }
@@ -76,7 +77,7 @@ impl Default for SamplerState {
 }
 
 impl SamplerState {
-    /// The state before the first sample.
+    /// The state of the resampling before the first sample.
     pub const fn new() -> Self {
         Self {
             samples: [[0.0; 3]; 4],
@@ -95,21 +96,21 @@ impl SamplerState {
 /// A complete tooth period.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Passed {
-    /// Tooth periods since angle 0 of the tachometer.
+    /// Number of tooth periods since angle 0 of the tachometer.
     pub tooth: u64,
     /// Acceleration at each angle slot.
     pub passing: Passing,
 }
 
 impl Sampler {
-    /// Spindle angle at which an angle slot begins.
+    /// Spindle angle at which the slot with number `slot` begins.
     fn angle_of(&self, slot: u64) -> Turns {
         let per_turn = u64::from(self.teeth) * SLOTS as u64;
         let part = ((slot % per_turn) << 32) / per_turn;
         Turns(((slot / per_turn) << 32) | part)
     }
 
-    /// Number of the first angle slot that begins at or after `angle`.
+    /// Number of the first slot whose spindle angle is `angle` or later.
     fn slot_from(&self, angle: Turns) -> u64 {
         let per_turn = u64::from(self.teeth) * SLOTS as u64;
         let part = u64::from(angle.fraction()) * per_turn;
@@ -133,7 +134,8 @@ impl Sampler {
         }
         let [from, to] = state.angles;
         if to.0.saturating_sub(from.0) > Turns::ONE.0 / u64::from(self.teeth) {
-            // The angle has moved by more than a tooth period within one sample: a jump of the tachometer's estimate.
+            // If the spindle angle moves by more than a tooth period within one sample, the tachometer's estimate has
+            // jumped.
             *state = SamplerState::default();
             return None;
         }
@@ -158,8 +160,8 @@ impl Sampler {
         passed
     }
 
-    /// Fills an angle slot whose angle lies between the two middle samples, at the fraction `part` of their distance. The integral
-    /// already covers the distance up to the fraction `done`.
+    /// Fills the slot whose spindle angle lies between the second and third of the last four samples, at the fraction
+    /// `part` of their distance. The integral already covers the distance up to the fraction `done`.
     fn fill(&self, state: &mut SamplerState, slot: u64, done: f32, part: f32) -> Option<Passed> {
         let value = match self.method {
             Method::Mean => {
@@ -170,7 +172,8 @@ impl Sampler {
             Method::Value => cubic(&state.samples, part),
         };
         (state.integral, state.span) = ([0.0; 3], 0.0);
-        // The mean over an angle slot is known at the beginning of the next angle slot.
+        // The mean from the angle of a slot to that of the next is known only at the next slot, so it belongs to the
+        // slot before.
         let slot = match self.method {
             Method::Mean => slot.checked_sub(1)?,
             Method::Value => slot,
@@ -179,7 +182,7 @@ impl Sampler {
         if let Some(values) = state.passing.get_mut(3 * place..3 * place + 3) {
             values.copy_from_slice(&value);
         }
-        // The integral of the first mean began within its angle slot, so that this mean is not used.
+        // The integral for the first mean began after the angle of its slot, so this mean is incomplete and not used.
         let partial = self.method == Method::Mean && state.unbroken == 0;
         state.unbroken = state.unbroken.saturating_add(1).min(SLOTS as u8 + 1);
         let whole = usize::from(state.unbroken) >= SLOTS + usize::from(self.method == Method::Mean);
@@ -191,8 +194,8 @@ impl Sampler {
 }
 
 impl SamplerState {
-    /// Adds the integral of the straight line between the two middle samples, from the fraction `from` to the fraction `to` of
-    /// their distance.
+    /// Adds the integral of the straight line between the second and third of the last four samples, from the fraction
+    /// `from` to the fraction `to` of their distance.
     fn integrate(&mut self, from: f32, to: f32) {
         let [_, a, b, _] = &self.samples;
         let (length, middle) = (to - from, 0.5 * (to + from));
@@ -222,40 +225,42 @@ fn cubic(samples: &[[f32; 3]; 4], part: f32) -> [f32; 3] {
     value
 }
 
-/// Mean of the passings of each class, and the mean square of the residual.
+/// Synchronous average: mean of the tooth periods of each class (tooth), and the mean square of the residual.
 ///
-/// Over the first [`MEMORY`](Self::MEMORY) revolutions the mean of a class is the arithmetic mean, later an exponentially
-/// weighted mean. After a change of the cutting conditions, [`reset`](Self::reset) discards the past.
+/// Over the first [`MEMORY`](Self::MEMORY) revolutions the mean of a class is the arithmetic mean, later an
+/// exponentially weighted mean. After a change of the cutting conditions, [`reset`](Self::reset) discards the past.
 #[derive(Clone, Copy, Debug)]
 pub struct Average {
     means: [Passing; MAX_CLASSES],
-    /// Number of passings of each class since the reset, at most `MEMORY` − 1.
+    /// Number of tooth periods of each class since the reset, at most `MEMORY` − 1.
     counts: [u8; MAX_CLASSES],
     classes: u8,
-    /// Mean square of the residual, over all channels.
+    /// Mean square of the residual (the part not periodic with the revolution), over all values of a tooth period,
+    /// (m/s²)².
     residual: f32,
-    /// Number of passings in the mean square of the residual, at most `MEMORY` per class.
+    /// Number of tooth periods in the mean square of the residual, at most `MEMORY` per class.
     residual_count: u16,
 }
 
-/// Levels of the parts of the vibration: root mean squares over angle slots and axes, in m/s².
+/// Levels of the components of the vibration: root mean squares over the angles of a tooth period and the axes, in
+/// m/s².
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Levels {
-    /// Forced vibration: the part common to all teeth, without its mean over the tooth period.
+    /// Forced vibration: the component common to all teeth, without its mean over the tooth period.
     pub forced: f32,
-    /// Runout: the part that differs from tooth to tooth and repeats with each revolution.
+    /// Runout: the component that differs from tooth to tooth and repeats with each revolution.
     pub runout: f32,
-    /// Part of the runout that changes sign from tooth to tooth; 0 for odd numbers of teeth.
+    /// Component of the runout vibration that changes sign from tooth to tooth; 0 for odd numbers of teeth.
     pub alternating: f32,
-    /// Residual: the part that is not periodic with the revolution.
+    /// Residual: the component of the vibration that is not periodic with the revolution.
     pub residual: f32,
 }
 
 impl Average {
-    /// Memory of the means, in revolutions.
+    /// Memory of the mean tooth period of each class, in revolutions.
     pub const MEMORY: u8 = 8;
 
-    /// The initial state for a number of classes, from 1 to [`MAX_CLASSES`].
+    /// The average before the first tooth period, for a number of classes (teeth) from 1 to [`MAX_CLASSES`].
     pub const fn new(classes: u8) -> Self {
         Self {
             means: [[0.0; CHANNELS]; MAX_CLASSES],
@@ -266,7 +271,7 @@ impl Average {
         }
     }
 
-    /// True if the average was created for this number of classes.
+    /// True if the average was created for this number of classes (teeth).
     pub fn is_for(&self, classes: u8) -> bool {
         self.classes == clamp_classes(classes)
     }
@@ -276,7 +281,7 @@ impl Average {
         *self = Self::new(self.classes);
     }
 
-    /// Updates the mean of a class with the passing of tooth period `tooth`.
+    /// Updates the mean of a class with the tooth period of number `tooth`, whose values are `passing`.
     pub fn update(&mut self, tooth: u64, passing: &Passing) {
         let class = (tooth % u64::from(self.classes)) as usize;
         let (Some(mean), Some(count)) = (self.means.get_mut(class), self.counts.get_mut(class)) else {
@@ -290,8 +295,8 @@ impl Average {
             square += difference * difference;
         }
         if *count > 0 {
-            // White noise of variance s deviates from the mean of c passings with the variance s·(1 + 1/c). The factor (1 −
-            // gain) removes this excess.
+            // White noise of variance s deviates from the mean of c tooth periods with the variance s·(1 + 1/c). The
+            // factor (1 − gain) removes this excess.
             let power = square * (1.0 - gain) / CHANNELS as f32;
             let memory = u16::from(Self::MEMORY) * u16::from(self.classes);
             self.residual_count = (self.residual_count + 1).min(memory);
@@ -300,7 +305,7 @@ impl Average {
         *count = (*count + 1).min(Self::MEMORY - 1);
     }
 
-    /// True once every class has had at least two passings.
+    /// True once every class (tooth) has had at least two tooth periods.
     pub fn is_filled(&self) -> bool {
         self.counts
             .iter()
@@ -344,7 +349,7 @@ impl Average {
     }
 }
 
-/// Clamps a number of classes to the range 1 to `MAX_CLASSES`.
+/// Clamps a number of classes (teeth) to the range 1 to `MAX_CLASSES`.
 pub(crate) const fn clamp_classes(classes: u8) -> u8 {
     if classes == 0 {
         1
@@ -355,7 +360,7 @@ pub(crate) const fn clamp_classes(classes: u8) -> u8 {
     }
 }
 
-/// Sum of the squared differences of two passings over all channels.
+/// Sum of the squared differences between the values of two tooth periods, (m/s²)².
 pub(crate) fn distance_square(a: &Passing, b: &Passing) -> f32 {
     a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum()
 }

@@ -26,7 +26,7 @@ unit!(
     Hertz, "Hz"
 );
 unit!(
-    /// Spindle speed in revolutions per minute.
+    /// Rotational speed of the spindle in revolutions per minute.
     Rpm, "rev/min"
 );
 unit!(

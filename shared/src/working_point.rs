@@ -1,10 +1,11 @@
-//! Cut, machine limits and tool, as set by the host.
+//! Cutting conditions, machine limits and tool, as set by the host.
 
 use serde::{Deserialize, Serialize};
 
 use crate::units::{Degrees, Millimeters, Rpm};
 
-/// The conditions of the cut. The spindle speed is not one of them, because the device measures it.
+/// The cutting conditions: depth, immersion, feed and posture. The spindle speed is not one of them, because the device
+/// measures it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct WorkingPoint {
@@ -34,6 +35,6 @@ pub struct Limits {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Tool {
-    /// Number of teeth, at least 1.
+    /// Number of teeth of the tool, at least 1.
     pub teeth: u8,
 }

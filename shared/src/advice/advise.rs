@@ -1,4 +1,4 @@
-//! The decision: advice from the lobe table first, from the tooth-passing rule otherwise.
+//! Decides the advice on spindle speed or depth: from the lobe table first, from the tooth-passing rule otherwise.
 
 use super::proposal::{Action, Advice, Obstacle, Source};
 use super::quiet_speed_search::QuietSpeedSearch;
@@ -83,13 +83,15 @@ pub fn advise(
     }
 }
 
-/// A lobe table with the cut for which advice is given: the table has a layer for it.
+/// A lobe table with the working point of the cut for which advice is given. The table has a layer for this working
+/// point.
 struct Cut<'t> {
     table: &'t LobeTable<'t>,
     at: WorkingPoint,
 }
 
-/// The working point as set or assumed, if the table has a layer for it at any speed.
+/// Pairs the lobe table with the working point as set or assumed; an error if the table has no layer for this working
+/// point.
 fn cut_in_table<'t>(
     judgement: &Judgement,
     speed: Rpm,
@@ -109,7 +111,8 @@ fn cut_in_table<'t>(
         Some(point) => *point,
         None => assumed_point(judgement, speed, table)?,
     };
-    // The present speed may lie outside the table while other speeds lie inside. All other conditions hold for every speed.
+    // The lookup uses the slowest speed of the table, because the present speed may lie outside it. Whether the table
+    // has a layer for the working point does not depend on the speed.
     let first = table.speed(0).ok_or(Obstacle::Table(NotKnown::Damaged))?;
     match table.lookup(first, &at) {
         TabulatedStability::NotKnown(why) if why != NotKnown::Undecided => Err(Obstacle::Table(why)),
@@ -175,7 +178,7 @@ fn by_table(cut: &Cut<'_>, speed: Rpm, range: (f32, f32), keep: Advice) -> Resul
     })
 }
 
-/// Advice from the tooth-passing rule, without the speeds that the table calls unstable.
+/// Advice from the tooth-passing rule, which skips the speeds that the lobe table calls unstable.
 fn by_rule(
     judgement: &Judgement,
     tool: &Tool,

@@ -1,36 +1,41 @@
-//! Stability of a whole cell of the table, without interpolation. A cell is the speed range between two neighbouring grid
-//! speeds.
+//! Stability in a whole cell of the lobe table, without interpolation. A cell is the range between two neighbouring
+//! spindle speeds of the table.
 
 use heapless::Vec;
 
 use crate::criteria::DEPTH_MARGIN;
 use crate::lobes::{CutLobes, FEW, Interval};
 
-/// Stability of a cell at one depth, including the depths within the depth margin around it.
+/// Stability of a cut in one cell of the lobe table (the range between two neighbouring speeds) at one depth and all
+/// depths within the depth margin around it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Cell {
-    /// Stable at every speed of the cell.
+    /// The cut is stable at every speed of the cell.
     Stable,
-    /// Unstable at every speed of the cell.
+    /// The cut is unstable at every speed of the cell.
     Unstable,
-    /// Stability changes within the cell, or the entries alone do not decide it.
+    /// The stability of the cut changes within the cell, or the entries at both ends of the cell do not decide it
+    /// without interpolation.
     Mixed,
 }
 
-/// Stability at one grid speed and one depth, including the depths within the depth margin, over all layers from which the cut
-/// is interpolated.
+/// Stability of a cut at one spindle speed of the lobe table, at one depth and the depths within the depth margin
+/// around it, in all layers of the table from which the cut is interpolated.
 #[derive(Clone, Copy)]
 pub(super) struct Node {
-    /// True if all depths within the margin are stable in all layers.
+    /// True if all depths within the margin around the depth of the cut are stable in all layers.
     is_stable: bool,
-    /// For the depths `(1 − DEPTH_MARGIN)·d`, `d` and `(1 + DEPTH_MARGIN)·d`: true if the depth is unstable in every layer.
+    /// Whether the depths `(1 − DEPTH_MARGIN)·d`, `d` and `(1 + DEPTH_MARGIN)·d`, with the depth d of the cut, are
+    /// unstable in every layer.
     is_unstable: [bool; 3],
 }
 
 impl Node {
-    /// Stability at the grid speed with this index and the depth `depth_mm`. `depth_to_mm` is the largest depth of the table.
+    /// Stability of the cut at the speed of the table with index `index` and the depth `depth_mm`. `depth_to_mm` is the
+    /// largest depth of the table.
     ///
-    /// `None` if the entries alone do not decide the stability between this grid speed and the next.
+    /// `None` if the entries of the table alone do not decide the stability between this speed and the next one of the
+    /// table.
     pub(super) fn at(
         cut: &CutLobes<'_>,
         speed_index: usize,
@@ -61,7 +66,7 @@ impl Node {
 }
 
 impl Cell {
-    /// The stability of the cell between two neighbouring grid speeds.
+    /// The stability of the cell of the table between two neighbouring speeds, from the stability at both.
     pub(super) fn between(a: Option<Node>, b: Option<Node>) -> Self {
         let (Some(a), Some(b)) = (a, b) else {
             return Self::Mixed;
@@ -76,10 +81,11 @@ impl Cell {
     }
 }
 
-/// Upper bound in mm of the quiet depths up to `depth_mm`, at one grid speed or between two neighbouring grid speeds.
+/// Upper bound in mm of the quiet depths (stable with the depth margin) up to `depth_mm`, at one spindle speed of the
+/// lobe table or between two neighbouring ones.
 ///
-/// A depth that is stable between two entries is stable in at least one of them. Therefore the margin range
-/// `(1 ± DEPTH_MARGIN)·d` of a quiet depth `d` lies within the union of the entries' stable ranges.
+/// A depth that is stable between two entries is stable in at least one of them. Therefore the margin range `(1 ±
+/// DEPTH_MARGIN)·d` of a quiet depth `d` lies within the union of the entries' stable ranges.
 pub(super) fn largest_possible_mm(
     cut: &CutLobes<'_>,
     speed_indices: impl IntoIterator<Item = usize>,
@@ -109,7 +115,7 @@ pub(super) fn largest_possible_mm(
     largest_mm
 }
 
-/// Stable depth ranges (from, to) in mm of up to four columns, sorted by their lower ends.
+/// Stable depth ranges (from, to) in mm from up to four entries of the lobe table, sorted by their lower ends.
 type Ranges = Vec<(f32, f32), { 4 * (FEW + 1) }>;
 
 fn add_stable_ranges(

@@ -1,4 +1,5 @@
-//! The largest quiet depth, used if no speed is quiet at the present depth.
+//! The largest quiet depth (stable with margin in depth and speed), which is advised if no speed is quiet at the
+//! present depth.
 
 use heapless::{Deque, Vec};
 
@@ -8,11 +9,11 @@ use super::rule::ratio;
 use crate::criteria::{BETTER, CANDIDATE_SPEEDS, DEPTH_MARGIN, EQUAL_DEPTHS, SPEED_BAND};
 use crate::units::{Millimeters, Rpm};
 
-/// Quiet depth ranges (from, to) in mm at one speed. Ranges beyond the capacity are dropped, so that their depths are not
-/// advised.
+/// Depth ranges (from, to) in mm that are stable with the depth margin at one spindle speed. Ranges beyond the capacity
+/// are dropped, so that their depths are not advised.
 type Ranges = Vec<(f32, f32), 24>;
 
-/// A candidate speed with an upper bound of its quiet depth.
+/// A spindle speed that may be advised, with an upper bound of the quiet depth (stable with margin) at it.
 #[derive(Clone, Copy)]
 struct Candidate {
     rpm: f32,
@@ -41,7 +42,8 @@ impl QuietSpeedSearch<'_> {
         best.map(|(rpm, depth_mm)| (Rpm(rpm), Millimeters(depth_mm)))
     }
 
-    /// The speeds whose upper bounds exceed `to_beat_mm`, in descending order of the bound.
+    /// The spindle speeds at which the upper bound of the quiet depth exceeds `to_beat_mm`, in descending order of the
+    /// bound.
     fn candidates(&self, speed: Rpm, to_beat_mm: f32) -> Vec<Candidate, CANDIDATE_SPEEDS> {
         let mut candidates: Vec<Candidate, CANDIDATE_SPEEDS> = Vec::new();
         let (low_rpm, high_rpm) = self.known_rpm;
@@ -49,7 +51,8 @@ impl QuietSpeedSearch<'_> {
             return candidates;
         }
         let mut behind = Window::default();
-        // `rpm` and `ahead_rpm` step through the same speeds. `ahead_rpm` leads by the upper half of the speed band.
+        // `rpm` and `ahead_rpm` step through the same spindle speeds. `ahead_rpm` leads, up to the upper end of the
+        // speed band around `rpm`.
         let mut rpm = low_rpm;
         let mut ahead_rpm = low_rpm;
         loop {
@@ -73,13 +76,15 @@ impl QuietSpeedSearch<'_> {
         }
     }
 
-    /// The next candidate speed: the next grid speed, or half a speed band further, whichever is nearer.
+    /// The next spindle speed at which the quiet depth is bounded: the next speed of the lobe table, or half a speed
+    /// band further, whichever is nearer.
     fn next_point(&self, rpm: f32, end_rpm: f32) -> f32 {
         let (_, cell_end_rpm) = self.cell_at(Direction::Faster, rpm, end_rpm);
         f32::min(rpm * (1.0 + 0.5 * SPEED_BAND), cell_end_rpm)
     }
 
-    /// Upper bound in mm of the quiet depth at a speed, from the table entries at this grid speed or at its two neighbours.
+    /// Upper bound in mm of the quiet depth at a spindle speed, from the entries of the lobe table at this speed or at
+    /// its two neighbours in the table.
     fn possible_mm(&self, rpm: f32) -> f32 {
         let index = self.table.speeds_up_to(Rpm(rpm)).saturating_sub(1);
         let is_on_grid = self.table.speed(index) == Some(Rpm(rpm));
@@ -111,7 +116,8 @@ impl QuietSpeedSearch<'_> {
         }
     }
 
-    /// The depth ranges, up to the depth of the cut, that are stable with the depth margin at exactly this speed.
+    /// The depth ranges, up to the depth of the cut, that are stable with the depth margin at exactly this spindle
+    /// speed.
     fn quiet_depths(&self, rpm: f32) -> Option<Ranges> {
         let column = self.cut.column(Rpm(rpm)).ok()?;
         let mut ranges = Ranges::new();
@@ -126,7 +132,8 @@ impl QuietSpeedSearch<'_> {
     }
 }
 
-/// Inserts a candidate in order of preference. Of candidates whose speeds lie within one speed band, only the best is kept.
+/// Inserts a candidate speed in descending order of its depth bound. Of candidates whose speeds lie within one speed
+/// band, only the best is kept.
 fn insert(candidates: &mut Vec<Candidate, CANDIDATE_SPEEDS>, new: Candidate, speed: Rpm) {
     let is_better = |a: &Candidate, b: &Candidate| {
         let is_nearer = ratio(Rpm(a.rpm), speed) < ratio(Rpm(b.rpm), speed);
@@ -148,15 +155,16 @@ fn insert(candidates: &mut Vec<Candidate, CANDIDATE_SPEEDS>, new: Candidate, spe
     if candidates.is_full() && place < candidates.len() {
         candidates.pop();
     }
-    // If the list is full, the least preferred candidate is dropped.
+    // If the list of candidate speeds is full, the one with the smallest depth bound is dropped.
     let _ = candidates.insert(place, new);
 }
 
-/// Smallest of the depth bounds whose speeds lie within a moving speed band.
+/// Minimum of the upper bounds of the quiet depth over a speed band that moves along the spindle speed.
 #[derive(Default)]
 struct Window {
-    /// Pairs (speed in rev/min, bound in mm), ascending in both. A bound is removed once a later bound is smaller. If the list
-    /// is full, the newest bound is dropped: the minimum is then too large, which is still an upper bound.
+    /// Pairs (speed in rev/min, upper bound of the quiet depth in mm), ascending in both. A bound is removed once a
+    /// later bound is smaller. If the list is full, the newest bound is dropped: the minimum is then too large, which
+    /// is still an upper bound.
     bounds: Deque<(f32, f32), 32>,
 }
 

@@ -1,4 +1,4 @@
-//! The result of advice: the proposed change, its source, and the obstacle to a better source.
+//! The advice of the device: the proposed change of speed or depth, its source, and the obstacle to a better source.
 
 use serde::{Deserialize, Serialize};
 
@@ -10,7 +10,7 @@ use crate::working_point::WorkingPoint;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Action {
-    /// No change: no chatter is detected.
+    /// No change of speed or depth is proposed: no chatter is detected.
     Keep,
     /// Change the spindle speed.
     Speed,
@@ -24,9 +24,10 @@ pub enum Action {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Source {
-    /// The lobe table of this machine.
+    /// The advice comes from the lobe table of this machine.
     Table,
-    /// The tooth-passing rule: a speed whose tooth-passing frequency is a fraction 1/k of the chatter frequency.
+    /// The advice comes from the tooth-passing rule: a speed whose tooth-passing frequency is a fraction 1/k of the
+    /// chatter frequency.
     ToothPassingRule,
 }
 
@@ -36,17 +37,19 @@ pub enum Source {
 pub enum Obstacle {
     /// No lobe table is loaded.
     NoTable,
-    /// The table has no entry for the present cut.
+    /// The lobe table has no entry for the present cut.
     Table(NotKnown),
-    /// The table says that the present point is stable with margin, but the cut chatters: the table is wrong here.
+    /// The lobe table says that the present speed and depth are stable with margin, but the cut chatters: the table is
+    /// wrong here.
     Contradicted,
-    /// The spindle speed is not a positive number.
+    /// The present spindle speed is not a positive number.
     Speed,
-    /// The table has no depth that is stable with margin at any speed within the limits.
+    /// The lobe table has no depth that is stable with margin at any speed within the limits of the machine.
     NothingStable,
     /// The chatter frequency is unknown; the tooth-passing rule requires it.
     ChatterFrequency,
-    /// Every speed of the tooth-passing rule is outside the limits of the machine or unstable in the table.
+    /// Every speed that the tooth-passing rule proposes is outside the limits of the machine or unstable in the lobe
+    /// table.
     NoSpeedWithinLimits,
 }
 
@@ -63,8 +66,8 @@ pub struct Advice {
     pub depth: Option<Millimeters>,
     /// Source of the advice.
     pub source: Source,
-    /// The assumed working point; `None` if a working point is set.
+    /// The working point that the advice assumes because none is set; `None` if one is set.
     pub assumed: Option<WorkingPoint>,
-    /// The reason why no better source was used; `None` if there is no better source.
+    /// The reason why the advice does not come from a better source; `None` if it comes from the best one.
     pub obstacle: Option<Obstacle>,
 }

@@ -1,4 +1,5 @@
-//! The search for quiet speeds: stable with the depth margin over the whole speed band.
+//! The search in the lobe table for quiet speeds: speeds at which the cut is stable with the depth margin over the
+//! whole speed band.
 
 use super::cell::{Cell, Node};
 use super::rule::ratio;
@@ -22,12 +23,12 @@ impl Direction {
         }
     }
 
-    /// True if `a` equals `b` or lies beyond it in this direction.
+    /// True if the speed `a` equals `b` or lies beyond it in this direction.
     fn is_beyond(self, a: f32, b: f32) -> bool {
         self.sign() * a >= self.sign() * b
     }
 
-    /// Whichever of `a` and `b` lies further in this direction.
+    /// Returns whichever of the speeds `a` and `b` lies further in this direction.
     fn further(self, a: f32, b: f32) -> f32 {
         if self.is_beyond(a, b) { a } else { b }
     }
@@ -41,7 +42,7 @@ pub(super) struct QuietSpeedSearch<'t> {
     pub(super) depth_to_mm: f32,
     /// Speed range of the machine in rev/min. The speed band around a speed is clipped to this range.
     pub(super) machine_rpm: (f32, f32),
-    /// Intersection of the machine's speed range with the speeds of the table, in rev/min.
+    /// Intersection of the machine's speed range with the speeds of the lobe table, in rev/min.
     pub(super) known_rpm: (f32, f32),
 }
 
@@ -75,14 +76,15 @@ impl<'t> QuietSpeedSearch<'t> {
         })
     }
 
-    /// The quiet speed with the smallest relative change from `speed`; it may be `speed` itself.
+    /// The quiet speed (stable with margin) with the smallest relative change from `speed`; it may be `speed` itself.
     pub(super) fn nearest_speed(&self, speed: Rpm) -> Option<Rpm> {
         let faster = self.walk(Direction::Faster, speed, f32::INFINITY);
         let limit = faster.map_or(f32::INFINITY, |faster| ratio(faster, speed));
         self.walk(Direction::Slower, speed, limit).or(faster)
     }
 
-    /// The first quiet speed from `speed` on, if its ratio to `speed` (the larger over the smaller) is below `limit`.
+    /// The first quiet speed (stable with margin) in this direction from `speed`, if its ratio to `speed` (the larger
+    /// over the smaller) is below `limit`.
     ///
     /// The search steps from cell to cell of the table. Only cells of mixed stability are interpolated.
     fn walk(&self, direction: Direction, speed: Rpm, limit: f32) -> Option<Rpm> {
@@ -106,7 +108,8 @@ impl<'t> QuietSpeedSearch<'t> {
         loop {
             let (index, cell_end_rpm) = self.cell_at(direction, rpm, end_rpm);
             let node = |index| match known {
-                // Two neighbouring cells share the grid speed between them, so that its node is computed once.
+                // Two neighbouring cells of the table share the speed between them, so the stability at that speed is
+                // computed once.
                 Some((known_index, node)) if known_index == index => node,
                 _ => Node::at(&self.cut, index, self.depth_mm, self.depth_to_mm),
             };
@@ -132,21 +135,21 @@ impl<'t> QuietSpeedSearch<'t> {
         }
     }
 
-    /// The next cell in this direction from `rpm`: the index of its lower grid speed, and the speed at which the cell or the
-    /// search ends.
+    /// The next cell of the lobe table in this direction from `rpm`: the index of the lower of its two speeds, and the
+    /// speed at which the cell or the search ends.
     pub(super) fn cell_at(&self, direction: Direction, rpm: f32, end_rpm: f32) -> (usize, f32) {
         let up_to = self.table.speeds_up_to(Rpm(rpm));
         let speed = |index: usize| self.table.speed(index).map_or(end_rpm, |speed| speed.0);
         let below = up_to.saturating_sub(1);
         let (index, ahead_rpm) = match direction {
             Direction::Faster => (below, speed(up_to)),
-            // Exactly at a grid speed, the next cell downwards is the one below it.
+            // From a speed that is exactly one of the table, the next cell in the slower direction is the one below it.
             Direction::Slower if speed(below) == rpm => {
                 (below.saturating_sub(1), speed(below.saturating_sub(1)))
             }
             Direction::Slower => (below, speed(below)),
         };
-        // In a damaged table a grid speed may be NaN. The search then still ends at `end_rpm`.
+        // In a damaged lobe table a speed may be NaN. The search then still ends at `end_rpm`.
         let is_ahead = ahead_rpm != rpm && direction.is_beyond(ahead_rpm, rpm);
         let is_before_end = direction.is_beyond(end_rpm, ahead_rpm);
         (
@@ -159,7 +162,8 @@ impl<'t> QuietSpeedSearch<'t> {
         )
     }
 
-    /// The next speed to check within a cell: its middle, its end, or one [`QUIET_SPEED_STEP`] further, whichever comes first.
+    /// The next speed to check within a cell of the lobe table: its middle, its end, or one [`QUIET_SPEED_STEP`]
+    /// further, whichever comes first.
     pub(super) fn next_rpm(&self, direction: Direction, rpm: f32, index: usize, cell_end_rpm: f32) -> f32 {
         let step = rpm * (1.0 + direction.sign() * QUIET_SPEED_STEP);
         let ends = self.table.speed(index).zip(self.table.speed(index + 1));
@@ -174,7 +178,7 @@ impl<'t> QuietSpeedSearch<'t> {
             .fold(cell_end_rpm, nearer)
     }
 
-    /// True if the depth of the cut is stable with the depth margin at exactly this speed.
+    /// True if the depth of the cut is stable with the depth margin at exactly the spindle speed `rpm`.
     fn is_stable(&self, rpm: f32) -> bool {
         let [from, to] =
             [1.0 - DEPTH_MARGIN, 1.0 + DEPTH_MARGIN].map(|factor| Millimeters(factor * self.depth_mm));
@@ -183,25 +187,26 @@ impl<'t> QuietSpeedSearch<'t> {
     }
 }
 
-/// A run of consecutive stable speeds. A speed is quiet once the run covers its whole speed band.
+/// A run of consecutive spindle speeds at which the cut is stable. A speed is quiet once the run covers the whole speed
+/// band around it.
 struct Run<'q, 't> {
     quiet: &'q QuietSpeedSearch<'t>,
     direction: Direction,
     /// The present speed. Speeds before it in the direction of the search are no candidates.
     speed: Rpm,
-    /// First speed of the run in rev/min; `None` outside a run.
+    /// First speed of the run of stable speeds in rev/min; `None` while no run has begun.
     start_rpm: Option<f32>,
 }
 
 impl Run<'_, '_> {
-    /// Ends the run, because a speed is unstable. Never returns a quiet speed.
+    /// Ends the run of stable speeds at an unstable speed. Returns `None`, as no quiet speed is reached.
     fn end(&mut self) -> Option<Rpm> {
         self.start_rpm = None;
         None
     }
 
-    /// Extends the run over the stable speeds from `from_rpm` to `to_rpm`. Returns the quiet speed once the run covers its speed
-    /// band.
+    /// Extends the run over the stable speeds from `from_rpm` to `to_rpm`. Returns the quiet speed once the run covers
+    /// the speed band around it.
     fn extend(&mut self, from_rpm: f32, to_rpm: f32) -> Option<Rpm> {
         let start_rpm = *self.start_rpm.get_or_insert(from_rpm);
         let centre_rpm = self.centre_rpm(start_rpm);
@@ -218,7 +223,8 @@ impl Run<'_, '_> {
         (is_wide && is_known && self.quiet.is_stable(centre_rpm)).then_some(Rpm(centre_rpm))
     }
 
-    /// Checks the speeds of a cell of mixed stability one by one. Returns the quiet speed, if one is reached in this cell.
+    /// Checks the speeds of a cell of the lobe table, in which stability changes, one by one. Returns the quiet speed,
+    /// if one is reached in this cell.
     fn check_speeds(&mut self, from_rpm: f32, index: usize, cell_end_rpm: f32) -> Option<Rpm> {
         let mut rpm = from_rpm;
         let mut unstable_rpm: Option<f32> = None;
@@ -241,8 +247,8 @@ impl Run<'_, '_> {
         }
     }
 
-    /// Bisects the boundary between an unstable and a stable speed, to 1/32 of their distance. Returns the stable end of the
-    /// last interval.
+    /// Bisects the stability boundary between an unstable and a stable speed, to 1/32 of their distance. Returns the
+    /// stable end of the last subinterval.
     fn onset_rpm(&self, mut unstable_rpm: f32, mut stable_rpm: f32) -> f32 {
         for _ in 0..5 {
             let middle_rpm = 0.5 * (unstable_rpm + stable_rpm);
@@ -255,7 +261,8 @@ impl Run<'_, '_> {
         stable_rpm
     }
 
-    /// The speed whose speed band begins at the start of the run. It is not before the present speed.
+    /// The speed whose speed band begins at the start of the run of stable speeds. It does not lie before the present
+    /// speed in the direction of the search.
     fn centre_rpm(&self, start_rpm: f32) -> f32 {
         let machine_rpm = match self.direction {
             Direction::Faster => self.quiet.machine_rpm.0,

@@ -44,7 +44,7 @@ pub fn tooth_passing_speed(
         .min_by(|&a, &b| f32::total_cmp(&ratio(a, speed), &ratio(b, speed)))
 }
 
-/// Ratio of two speeds, the larger over the smaller, hence at least 1.
+/// Ratio of two spindle speeds, the larger over the smaller, hence at least 1.
 pub(super) fn ratio(a: Rpm, b: Rpm) -> f32 {
     f32::max(a.0 / b.0, b.0 / a.0)
 }

@@ -6,26 +6,28 @@ use super::format::TURN;
 use super::slopes::{IntervalSlopes, LayerMode, MODES_MAX};
 use crate::units::{Degrees, Millimeters};
 
-/// Bound of the difference between the interpolated table and the stability method that computed the entries.
+/// Bound of the difference between the stability that the interpolated lobe table gives and that of the stability
+/// method that computed its entries.
 ///
-/// *Unsafe side*: a depth that is stable in the table is stable for the method, or lies within `depth` of a depth that is.
+/// *Unsafe side*: a depth that is stable in the table is stable for the method, or lies within `depth` of a depth that
+/// is.
 ///
-/// *Safe side*: a depth that is unstable in the table but stable for the method lies within `depth` of a limit of the method, or
-/// within the relative speed `speed` of a limit at the same depth. The second case occurs on steep flanks of the limit, and
-/// where the union of two columns replaces interpolation. Between layers the difference may be larger.
-/// are not interpolated but combined. Between layers the difference may be larger.
+/// *Safe side*: a depth that is unstable in the table but stable for the method lies within `depth` of a limit of the
+/// method, or within the relative speed `speed` of a limit at the same depth. The second case occurs on steep flanks of
+/// the limit, and where the union of two columns replaces interpolation. Between layers the difference may be larger,
+/// because their limits may not be interpolated but combined.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InterpolationError {
     /// Bound in depth.
     pub depth: Millimeters,
-    /// Bound in speed, relative to the speed; on the safe side only.
+    /// Bound of the interpolation error in spindle speed, relative to the speed; on the safe side only.
     pub speed: f32,
 }
 
 /// The optional parts of a lobe table that schema 2 adds: interpolation error, feed directions, modes and derivatives.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Additions<'a> {
-    /// Bound of the interpolation error, if known.
+    /// Bound of the interpolation error of the lobe table, if known.
     pub interpolation_error: Option<InterpolationError>,
     /// For each layer the feed direction for which it is valid, from the machine's x axis towards its y axis; `None` for any. An empty
     /// slice means any direction for all layers.
@@ -33,24 +35,25 @@ pub struct Additions<'a> {
     /// For each layer the modes by whose parameters the limits are differentiated; the same number for all layers, at most
     /// [`MODES_MAX`]. An empty slice means no derivatives.
     pub modes: &'a [&'a [LayerMode]],
-    /// The derivatives of every interval, in the order of layers, speeds and intervals.
+    /// Derivatives of the limits of every unstable depth interval, in the order of layers, speeds and intervals of the
+    /// table.
     pub slopes: &'a [IntervalSlopes],
 }
 
 impl Additions<'_> {
-    /// Number of modes of each layer.
+    /// Number of modes by whose parameters the limits of each table layer are differentiated.
     pub(super) fn mode_count(&self) -> usize {
         self.modes.first().map_or(0, |modes| modes.len())
     }
 
-    /// True if there is no addition, so that schema 1 suffices.
+    /// True if the table has no optional part of schema 2, so that schema 1 suffices.
     pub(super) fn is_empty(&self) -> bool {
         self.interpolation_error.is_none()
             && self.modes.is_empty()
             && self.feed_directions.iter().all(Option::is_none)
     }
 
-    /// Checks the additions against the numbers of layers and intervals of the table.
+    /// Checks the optional parts of a lobe table against its numbers of layers and of unstable depth intervals.
     pub(super) fn check(&self, layers: usize, intervals: usize) -> Result<(), TableError> {
         let count = self.mode_count();
         let wrong = TableError::Slopes {
@@ -93,7 +96,8 @@ pub(super) fn direction_code(direction: Degrees) -> Option<u16> {
     if !(-1.0e3..=1.0e3).contains(&turns) {
         return None;
     }
-    // The cast truncates towards zero. For a negative angle `whole` is one less, so that the rest lies between 0 and 1.
+    // The cast truncates towards zero. For a negative angle `whole` is one less, so that the remaining fraction of a
+    // revolution lies between 0 and 1.
     let whole = turns as i32 - i32::from(turns < 0.0);
     let hundredths = (turns - whole as f32) * f32::from(TURN) + 0.5;
     Some(hundredths as u16 % TURN)

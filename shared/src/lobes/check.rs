@@ -1,4 +1,4 @@
-//! Checks of the entries of a table: order, range and consistency.
+//! Checks of the entries of a lobe table: order, range and consistency.
 
 use super::bytes::saturate;
 use super::format::{HEADER_LENGTH, Header, MAX_INTERVALS};
@@ -29,7 +29,7 @@ impl<'a> LobeTable<'a> {
     }
 }
 
-/// Checks every speed, layer, column and interval.
+/// Checks every spindle speed, layer, column and unstable depth interval of a lobe table.
 fn check_entries(table: &LobeTable<'_>) -> Result<(), TableError> {
     check_speeds(table.speeds())?;
     check_layers(
@@ -54,7 +54,8 @@ fn check_entries(table: &LobeTable<'_>) -> Result<(), TableError> {
     check_additions(table)
 }
 
-/// Checks a column whose first interval must have the index `expected`. Returns the index after its last interval.
+/// Checks a column of a lobe table: the unstable depth intervals of one layer at one speed. Its first interval must
+/// have the index `expected` in the table. Returns the index after its last interval.
 fn check_column(
     LobeTable { bytes, shape, .. }: &LobeTable<'_>,
     layer: usize,
@@ -87,7 +88,7 @@ fn check_column(
     Ok(range.end)
 }
 
-/// Speeds must be positive, finite and strictly ascending.
+/// Checks that the spindle speeds of a lobe table are positive, finite and strictly ascending.
 pub(super) fn check_speeds(speeds: impl Iterator<Item = Rpm>) -> Result<(), TableError> {
     let mut previous = Rpm(0.0);
     for (index, found) in speeds.enumerate() {
@@ -102,8 +103,8 @@ pub(super) fn check_speeds(speeds: impl Iterator<Item = Rpm>) -> Result<(), Tabl
     Ok(())
 }
 
-/// Checks that every layer has a non-empty range and that no two layers are valid for the same cut. Each layer comes with its
-/// feed direction, `None` for any.
+/// Checks that every layer of a lobe table has a non-empty range of feed and immersion and that no two layers are valid
+/// for the same cut. Each layer comes with its feed direction, `None` for any.
 pub(super) fn check_layers(
     layers: impl Iterator<Item = (Validity, Option<Degrees>)> + Clone,
 ) -> Result<(), TableError> {
@@ -122,8 +123,8 @@ pub(super) fn check_layers(
             // Layers with different feed directions do not overlap. A layer for any direction overlaps every other.
             true if direction.zip(other_direction).is_some_and(|(a, b)| a != b) => false,
             true => other.feed_from <= layer.feed_to && layer.feed_from <= other.feed_to,
-            // Layers of equal immersion and posture form a family. The immersion ranges of two families, tolerance included,
-            // must not overlap.
+            // Table layers of equal immersion and posture form a family. The immersion ranges of two families,
+            // tolerance included, must not overlap.
             false => other.posture == layer.posture && is_near(&other, &layer),
         };
         if !is_range || layers.clone().take(index).any(clashes) {
@@ -141,13 +142,14 @@ pub(super) fn interval_order(layer: usize, speed: usize, interval: usize) -> Tab
     }
 }
 
-/// True if the immersion of a cut could lie within the tolerance of both layers.
+/// True if the immersion of a cut could lie within the tolerance of both table layers.
 fn is_near(a: &Validity, b: &Validity) -> bool {
     let tolerance = 2.0 * IMMERSION_TOLERANCE.0;
     (a.start.0 - b.start.0).abs() <= tolerance && (a.exit.0 - b.exit.0).abs() <= tolerance
 }
 
-/// Checks the additions of schema 2: all numbers finite, interpolation error and modes within their range.
+/// Checks the optional parts of schema 2 in a lobe table: all numbers finite, interpolation error and modes within
+/// their ranges.
 fn check_additions(table: &LobeTable<'_>) -> Result<(), TableError> {
     let LobeTable { bytes, shape, .. } = table;
     for layer in 0..shape.layers {

@@ -1,15 +1,15 @@
-//! A column: the unstable depth intervals at one speed and working point.
+//! A column of the lobe table: the unstable depth intervals at one spindle speed and working point.
 
 use heapless::Vec;
 
 use super::{Interval, IntervalKind, NotKnown, TabulatedStability};
 use crate::units::{Hertz, Millimeters};
 
-/// Largest number of intervals in a column, also after combining up to four columns. Further intervals are merged, which may
-/// call stable depths unstable.
+/// Largest number of unstable depth intervals in a column, also after combining up to four columns. Further intervals
+/// are merged, which may call stable depths unstable.
 const CAPACITY: usize = 32;
 
-/// The unstable depth intervals at one speed, ascending and without overlaps; intervals may touch.
+/// The unstable depth intervals at one spindle speed, ascending and without overlaps; intervals may touch.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Column {
     depth_from_mm: f32,
@@ -27,9 +27,10 @@ impl Column {
         }
     }
 
-    /// Appends an interval.
+    /// Appends an unstable depth interval to the column.
     ///
-    /// If the column is full, the last interval is extended instead. Stable depths may then be called unstable, never the reverse.
+    /// If the column is full, the last interval is extended instead. Stable depths may then be called unstable, never
+    /// the reverse.
     pub(super) fn push(&mut self, interval: Interval) {
         if let Some(last) = self.intervals.last_mut()
             && last.to == interval.from
@@ -70,7 +71,7 @@ impl Column {
             .map(|(from, to)| (Millimeters(from), Millimeters(to)))
     }
 
-    /// True if all depths of [from, to] are stable and inside the table.
+    /// True if all depths from `from` to `to` are stable and inside the depth range of the lobe table.
     pub fn is_stable_within(&self, from: Millimeters, to: Millimeters) -> bool {
         from.0 >= self.depth_from_mm
             && to.0 <= self.depth_to_mm
@@ -82,7 +83,7 @@ impl Column {
 
     /// Stability at a depth.
     pub fn at(&self, depth: Millimeters) -> TabulatedStability {
-        // The negated comparison also catches NaN.
+        // The negated comparison also catches a depth that is NaN.
         if !(depth.0 >= self.depth_from_mm && depth.0 <= self.depth_to_mm) {
             return TabulatedStability::NotKnown(NotKnown::Depth {
                 asked: depth,
@@ -107,7 +108,8 @@ impl Column {
         }
     }
 
-    /// True if the interval contains this depth. Its upper end is excluded, unless it is the end of the table.
+    /// True if the unstable interval contains this depth. Its upper end is excluded, unless it is the largest depth of
+    /// the table.
     fn covers(&self, interval: &Interval, depth_mm: f32) -> bool {
         interval.from.0 <= depth_mm
             && (depth_mm < interval.to.0
@@ -117,8 +119,8 @@ impl Column {
     fn distance_to_unstable_mm(&self, depth_mm: f32) -> f32 {
         let below = self.intervals.iter().rev().find(|i| i.to.0 <= depth_mm);
         let above = self.intervals.iter().find(|i| i.from.0 > depth_mm);
-        // With no unstable interval below, the smallest depth of the table limits the margin, unless it is 0: no cut has a depth
-        // below 0.
+        // With no unstable interval below the depth, the distance to the smallest depth of the table bounds the margin,
+        // unless that is 0: no cut has a depth below 0.
         let from_mm = match below {
             Some(interval) => interval.to.0,
             None if self.depth_from_mm > 0.0 => self.depth_from_mm,
@@ -128,7 +130,7 @@ impl Column {
         f32::min(depth_mm - from_mm, to_mm - depth_mm)
     }
 
-    /// The depth range in mm of an interval and of all intervals that touch it, of any kind.
+    /// The depth range in mm of an unstable interval and of all intervals of any kind that touch it.
     fn unstable_range_mm(&self, index: usize, interval: &Interval) -> (f32, f32) {
         let (mut from_mm, mut to_mm) = (interval.from.0, interval.to.0);
         for before in self.intervals.iter().take(index).rev() {
@@ -197,7 +199,8 @@ impl Column {
         }
     }
 
-    /// Appends the union of two groups. Where both groups are unstable, the union has the kind and frequency of `near`.
+    /// Appends the union of two groups of unstable intervals. Where the two overlap, the union has the kind and chatter
+    /// frequency of `near`.
     fn push_union(&mut self, near: &[Interval], far: &[Interval]) {
         let mut depth_mm = f32::NEG_INFINITY;
         loop {
@@ -224,7 +227,8 @@ impl Column {
     }
 }
 
-/// Numbers of leading intervals of columns `a` and `b` that form one group of overlapping or touching intervals.
+/// Numbers of intervals at the start of the lists `a` and `b` that form one group of overlapping or touching unstable
+/// intervals.
 fn group(a: &[Interval], b: &[Interval]) -> (usize, usize) {
     let (mut count_a, mut count_b) = (0, 0);
     let mut end_mm = f32::min(
@@ -239,7 +243,8 @@ fn group(a: &[Interval], b: &[Interval]) -> (usize, usize) {
             end_mm = f32::max(end_mm, i.to.0);
             count_b += 1;
         } else if count_a + count_b == 0 {
-            // Reached only with NaN entries. Consuming one interval of each column lets the caller's loop end.
+            // Reached only if depths of the table are NaN. Consuming one interval of each list lets the caller's loop
+            // end.
             return (1, 1);
         } else {
             return (count_a, count_b);

@@ -1,11 +1,11 @@
-//! The entries of a table, corrected for parameter changes.
+//! The unstable depth intervals of a lobe table, corrected for changed modal parameters and cutting force.
 
 use super::slopes::{IntervalSlopes, LayerMode, Learned, Slopes, corrected_limit};
 use super::{Column, Interval, LobeTable};
 use crate::units::{Hertz, Millimeters};
 
 impl LobeTable<'_> {
-    /// The modes of a layer in the order of the derivatives; empty if the table has no derivatives.
+    /// The modes of a layer of the lobe table, in the order of the derivatives; empty if the table has no derivatives.
     pub fn modes(&self, layer: usize) -> impl ExactSizeIterator<Item = LayerMode> + '_ {
         (0..self.shape.modes).map(move |mode| {
             self.shape
@@ -17,8 +17,8 @@ impl LobeTable<'_> {
         })
     }
 
-    /// Derivatives of the interval with this index, for a layer at one grid speed. `None` if the table has no derivatives or no
-    /// such interval.
+    /// Derivatives of both ends of the unstable depth interval with this index, for a layer at one speed of the table.
+    /// `None` if the table has no derivatives or no such interval.
     pub fn slopes(&self, layer: usize, speed_index: usize, interval: usize) -> Option<IntervalSlopes> {
         let range = self.shape.column_range(self.bytes, layer, speed_index)?;
         let index = range
@@ -28,11 +28,11 @@ impl LobeTable<'_> {
         self.shape.interval_slopes(self.bytes, index)
     }
 
-    /// The entries of one layer at one grid speed, corrected for parameter changes. In a table without derivatives they equal
-    /// those of [`entry`](Self::entry).
+    /// The unstable depth intervals of one layer at one speed of the table, corrected for changed modal parameters and
+    /// cutting force. In a table without derivatives they equal those of [`entry`](Self::entry).
     ///
-    /// Interval ends at the smallest or largest depth of the table are not shifted. An interval is removed if its ends meet. An
-    /// interval that would overlap the preceding one begins where the preceding one ends.
+    /// Interval ends at the smallest or largest depth of the table are not shifted. An interval is removed if its ends
+    /// meet. An interval that would overlap the preceding one begins where the preceding one ends.
     pub fn corrected_entry(&self, layer: usize, speed_index: usize, learned: &Learned) -> Option<Column> {
         let mut column = self.empty_column();
         let depths = self.depths();

@@ -1,4 +1,4 @@
-//! The lobes of one cut: the two layers of a table between which the cut is interpolated.
+//! The stability lobes of one cut: the two layers of a lobe table between which the cut is interpolated.
 
 use super::{
     Column, FEED_DIRECTION_SPAN, FEED_DIRECTION_TOLERANCE, FEED_TOLERANCE, IMMERSION_TOLERANCE, Interval,
@@ -7,28 +7,30 @@ use super::{
 use crate::units::{Degrees, Millimeters, Rpm};
 use crate::working_point::WorkingPoint;
 
-/// Largest number of intervals per stored column for which no combined column exceeds its capacity.
+/// Largest number of unstable depth intervals in a stored column of the lobe table for which no combination of up to
+/// four columns exceeds the capacity of a [`Column`].
 ///
 /// Two columns of n and m intervals combine to at most 2n + m intervals. Four columns of 3 combine to at most 27, and a
 /// [`Column`] holds 32.
 pub(crate) const FEW: usize = 3;
 
-/// Position of a speed between two grid speeds.
+/// Position of a spindle speed between two neighbouring speeds of the lobe table.
 #[derive(Clone, Copy)]
 struct Between {
-    /// Index of the grid speed at or below the speed.
+    /// Index of the largest speed of the lobe table that does not exceed the spindle speed.
     below: usize,
-    /// Interpolation weight of the grid speed above, 0 to 1.
+    /// Interpolation weight of the next higher speed of the lobe table, 0 to 1.
     weight: f32,
 }
 
-/// The columns of a table for one feed, feed direction, immersion and posture.
+/// The columns (unstable depths over spindle speed) of a lobe table for one feed, feed direction, immersion and
+/// posture.
 #[derive(Clone, Copy, Debug)]
 pub struct CutLobes<'a> {
     table: LobeTable<'a>,
     near: usize,
     far: usize,
-    /// Interpolation weight of layer `far`, 0 to 1.
+    /// Interpolation weight of the table layer with index `far`, 0 to 1; layer `near` has the rest.
     weight: f32,
 }
 
@@ -43,7 +45,7 @@ impl<'a> CutLobes<'a> {
         })
     }
 
-    /// The column at a spindle speed, interpolated between grid speeds and layers.
+    /// The unstable depth intervals at a spindle speed, interpolated between speeds and layers of the lobe table.
     pub fn column(&self, speed: Rpm) -> Result<Column, NotKnown> {
         let between = self.between(speed)?;
         let mut column = self.table.empty_column();
@@ -65,10 +67,11 @@ impl<'a> CutLobes<'a> {
             .flatten()
     }
 
-    /// The stored intervals of a layer at one grid speed.
+    /// The unstable depth intervals that the lobe table stores for a layer at one of its speeds.
     ///
-    /// A depth that is stable at both neighbouring grid speeds, in all [`layers`](Self::layers), is stable between them. A depth
-    /// that is stable at neither, in no layer, is unstable between them. Most lookups therefore need no interpolation.
+    /// A depth that is stable at two neighbouring speeds of the table, in all [`layers`](Self::layers), is stable
+    /// between them. A depth that is stable at neither, in no layer, is unstable between them. Most lookups therefore
+    /// need no interpolation.
     ///
     /// Returns `None` if the list cannot be read, or has more than [`FEW`] intervals, for which these two rules are not
     /// guaranteed. An item is `None` if that interval cannot be read.
@@ -83,7 +86,7 @@ impl<'a> CutLobes<'a> {
             .filter(|column| column.len() <= FEW)
     }
 
-    /// Reads the column of one layer, interpolated in speed, into an empty column.
+    /// Reads the unstable depth intervals of one table layer, interpolated in spindle speed, into an empty column.
     fn read(&self, layer: usize, between: Between, column: &mut Column) -> Result<(), NotKnown> {
         if between.weight == 0.0 {
             return self.table.read_column(layer, between.below, column);
@@ -95,7 +98,7 @@ impl<'a> CutLobes<'a> {
         Ok(())
     }
 
-    /// The position of a speed between two grid speeds of the table.
+    /// The position of a spindle speed between two neighbouring speeds of the lobe table.
     fn between(&self, speed: Rpm) -> Result<Between, NotKnown> {
         let count = self.table.shape.speeds;
         let outside = || NotKnown::Speed {
@@ -122,12 +125,12 @@ impl<'a> CutLobes<'a> {
 }
 
 impl<'a> LobeTable<'a> {
-    /// The columns of one cut; the axial depth of the working point is not used.
+    /// The stability lobes of the table for one cut; the axial depth of the working point is not used.
     pub fn cut(&self, working_point: &WorkingPoint) -> Result<CutLobes<'a>, NotKnown> {
         CutLobes::new(*self, working_point)
     }
 
-    /// The column at a speed and working point; the axial depth of the working point is not used.
+    /// The unstable depth intervals at a spindle speed for one cut; the axial depth of the working point is not used.
     pub fn column(&self, speed: Rpm, working_point: &WorkingPoint) -> Result<Column, NotKnown> {
         self.cut(working_point)?.column(speed)
     }
@@ -145,7 +148,7 @@ impl<'a> LobeTable<'a> {
 // `inline(never)` here and below: one copy of the code saves flash, and the time of a call is negligible.
 #[inline(never)]
 fn bracket(table: &LobeTable<'_>, working_point: &WorkingPoint) -> Result<(usize, usize, f32), NotKnown> {
-    // Schema 1 has no feed directions.
+    // A lobe table of schema 1 has no feed directions.
     if !table.shape.is_extended {
         return bracket_feed(table, working_point, &|_| true);
     }
@@ -182,7 +185,7 @@ fn bracket(table: &LobeTable<'_>, working_point: &WorkingPoint) -> Result<(usize
     }
 }
 
-/// The layers for the posture and immersion of the working point.
+/// Indices of the table layers for the posture and immersion of the working point.
 fn family<'t>(table: &'t LobeTable<'_>, working_point: &'t WorkingPoint) -> impl Iterator<Item = usize> + 't {
     table
         .layers()
@@ -195,8 +198,8 @@ fn family<'t>(table: &'t LobeTable<'_>, working_point: &'t WorkingPoint) -> impl
         .map(|(index, _)| index)
 }
 
-/// The nearest layer directions below and above a direction, if they are at most [`FEED_DIRECTION_SPAN`] apart. A layer for any
-/// direction counts as having exactly the requested one.
+/// The nearest feed directions of table layers below and above the requested one, if they are at most
+/// [`FEED_DIRECTION_SPAN`] apart. A layer for any direction counts as having exactly the requested one.
 #[inline(never)]
 fn neighbours(
     table: &LobeTable<'_>,
@@ -214,7 +217,8 @@ fn neighbours(
         }
     }
     let (below, above) = (below?, above?);
-    // If the table has one feed direction only, it is the neighbour below and above. It is then valid only within the tolerance.
+    // If the table has one feed direction only, it is the neighbour below and above the requested one. It is then valid
+    // only within the tolerance.
     let (to_below, to_above) = (turn(below, asked), turn(asked, above));
     let is_there = f32::min(to_below, to_above) <= FEED_DIRECTION_TOLERANCE.0;
     (is_there || to_below + to_above <= FEED_DIRECTION_SPAN.0).then_some((below, above))
@@ -237,8 +241,8 @@ fn turn(from: Degrees, to: Degrees) -> f32 {
     turn
 }
 
-/// The two layers whose feeds per tooth enclose that of the working point, and the interpolation weight of the second layer. A
-/// layer that contains the feed is returned twice. `belongs` selects the layers to search.
+/// The two table layers whose feeds per tooth enclose that of the working point, and the interpolation weight of the
+/// second layer. A layer whose feed range contains the feed is returned twice. `belongs` selects the layers to search.
 #[inline(never)]
 fn bracket_feed(
     table: &LobeTable<'_>,

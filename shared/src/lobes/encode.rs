@@ -1,4 +1,4 @@
-//! Encoding of a table into the caller's buffer.
+//! Encoding of a lobe table into a buffer that the caller provides.
 
 use super::additions::{Additions, direction_code};
 use super::bytes::saturate;
@@ -19,13 +19,13 @@ pub struct Content<'a> {
     pub name: &'a str,
     /// Number of teeth of the tool.
     pub teeth: u8,
-    /// Speed limits of the machine, if known.
+    /// Speed limits of the machine's spindle, if known.
     pub limits: Option<Limits>,
     /// The smallest computed depth.
     pub depth_from: Millimeters,
     /// The largest computed depth.
     pub depth_to: Millimeters,
-    /// Spindle speeds, strictly ascending, with steps of any size.
+    /// Spindle speeds of the lobe table, strictly ascending, with steps of any size.
     pub speeds: &'a [Rpm],
     /// The layers, in any order.
     pub layers: &'a [Layer<'a>],
@@ -34,10 +34,10 @@ pub struct Content<'a> {
 /// One layer of a table.
 #[derive(Clone, Copy, Debug)]
 pub struct Layer<'a> {
-    /// The cuts for which the layer is valid.
+    /// The cuts (feed, immersion, posture) for which the layer is valid.
     pub validity: Validity,
-    /// For each speed the unstable depth intervals, ascending and without overlaps. A speed whose computation failed has one
-    /// interval of kind [`Undecided`](super::IntervalKind::Undecided) over all depths.
+    /// For each spindle speed of the table the unstable depth intervals, ascending and without overlaps. A speed whose
+    /// computation failed has one interval of kind [`Undecided`](super::IntervalKind::Undecided) over all depths.
     pub columns: &'a [&'a [Interval]],
 }
 
@@ -56,7 +56,7 @@ pub fn encode<'b>(content: &Content<'_>, buffer: &'b mut [u8]) -> Result<&'b [u8
     encode_with(content, &Additions::default(), buffer)
 }
 
-/// Writes a table with the additions of schema 2. Without any addition the bytes are those of schema 1.
+/// Writes a lobe table with the optional parts of schema 2. If all of them are empty, the bytes are those of schema 1.
 pub fn encode_with<'b>(
     content: &Content<'_>,
     additions: &Additions<'_>,
@@ -93,7 +93,7 @@ pub fn encode_with<'b>(
         crc: 0,
     };
     head.copy_from_slice(&header.with_generation(0, payload).to_bytes());
-    // The written table must pass the checks of the reader.
+    // The table that was just written must pass the checks of the reader.
     LobeTable::parse(bytes).map(|table| table.bytes())
 }
 
@@ -110,7 +110,7 @@ fn shape_of(content: &Content<'_>, additions: &Additions<'_>) -> Shape {
         limits: content.limits,
         depth_from_mm: content.depth_from.0,
         depth_to_mm: content.depth_to.0,
-        // `f32::max` ignores NaN. `write_column` refuses it later.
+        // `f32::max` ignores a chatter frequency that is NaN. `write_column` refuses it later.
         chatter_max_hz: intervals().map(|i| i.chatter.0).fold(0.0, f32::max),
         layers: content.layers.len(),
         speeds: content.speeds.len(),
@@ -254,7 +254,7 @@ fn write_column(
     let (mut end_mm, mut end_code) = (shape.depth_from_mm, 0);
     for (index, interval) in column.iter().enumerate() {
         let (from_mm, to_mm) = (interval.from.0, interval.to.0);
-        // The negated comparison also refuses NaN.
+        // The negated comparison also refuses a depth that is NaN.
         if !(from_mm >= end_mm && from_mm < to_mm && to_mm <= shape.depth_to_mm) {
             return Err(interval_order(layer, speed, index));
         }
@@ -263,8 +263,8 @@ fn write_column(
                 found: interval.chatter,
             });
         }
-        // The bounds leave at least one depth step for this interval and for each following one, so that rounding removes no
-        // interval.
+        // The bounds leave at least one depth step for this unstable interval and for each following one, so that
+        // rounding removes no interval.
         let following = (column.len() - 1 - index) as u16;
         let top = u16::MAX.saturating_sub(following);
         let from = depth_code_down(shape, from_mm)
@@ -280,13 +280,15 @@ fn write_column(
     Ok(())
 }
 
-/// A depth within this distance of a step, in steps, is taken as exactly that step, so that a decoded table encodes to the same
-/// bytes.
+/// A depth within this distance of a step of the 16-bit depth scale, in steps, is taken as exactly that step, so that a
+/// decoded table encodes to the same bytes.
 ///
-/// Decoding in f32 errs by up to 65 535·2⁻²⁴ = 0.004 steps from the step size, and by as much from each of two roundings: 0.012.
+/// Decoding in f32 errs by up to 65 535·2⁻²⁴ = 0.004 steps from the step size, and by as much from each of two
+/// roundings: 0.012.
 const SNAP_STEPS: f64 = 0.02;
 
-// f64 keeps the error far below `SNAP_STEPS`. Only the host encodes tables.
+// Depth in steps of the 16-bit scale of the table. Double precision keeps the error far below `SNAP_STEPS`; only the
+// host encodes tables.
 fn depth_steps(shape: &Shape, depth_mm: f32) -> f64 {
     let range_mm = f64::from(shape.depth_to_mm) - f64::from(shape.depth_from_mm);
     (f64::from(depth_mm) - f64::from(shape.depth_from_mm)) / range_mm * f64::from(STEPS)
@@ -314,7 +316,8 @@ fn chatter_code(shape: &Shape, chatter_hz: f32) -> u16 {
     ((steps + 0.5) as u16).max(1)
 }
 
-/// Writes bytes to consecutive positions. The buffer length was computed from the same content, so nothing is cut off.
+/// Writes bytes of a lobe table to consecutive positions. The buffer length was computed from the same content, so
+/// nothing is cut off.
 struct Writer<'b> {
     rest: &'b mut [u8],
 }

@@ -1,15 +1,15 @@
-//! Errors of reading and encoding a table.
+//! Errors of reading and encoding a lobe table.
 
 use serde::{Deserialize, Serialize};
 
 use super::format::{MAGIC, MAX_INTERVALS, NAME_CAPACITY};
 use crate::units::{Hertz, Millimeters, Rpm};
 
-/// The reason why bytes are not a valid table, or why content cannot be encoded.
+/// The reason why bytes are not a valid lobe table, or why content cannot be encoded as one.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum TableError {
-    /// Fewer bytes than the header and the description need.
+    /// The bytes are fewer than the header and the description of a lobe table need.
     TooShort {
         /// Bytes needed at least.
         needed: u32,
@@ -28,74 +28,74 @@ pub enum TableError {
         /// The latest schema that this code knows.
         known: u16,
     },
-    /// The length in the header differs from the number of bytes.
+    /// The table length that the header states differs from the number of bytes.
     Length {
-        /// Length in the header, in bytes.
+        /// Length of the table that the header states, in bytes.
         header: u32,
         /// Bytes found.
         found: u32,
     },
-    /// Bytes have changed since the CRC was taken.
+    /// The CRC-32 does not match: bytes of the table have changed since it was computed.
     Crc {
         /// CRC-32 in the header.
         header: u32,
         /// CRC-32 computed from the bytes.
         computed: u32,
     },
-    /// The counts in the description do not match the length of the table.
+    /// The counts in the description of the table (layers, speeds, intervals) do not match the length of the table.
     Arrays {
-        /// The length in bytes that the description implies.
+        /// The length in bytes that the counts in the description of the table imply.
         needed: u64,
         /// The length in bytes of the table.
         found: u32,
     },
-    /// The name is too long or not UTF-8.
+    /// The name of the case in the table is too long or not UTF-8.
     Name {
-        /// Its length in bytes; at most [`NAME_CAPACITY`](super::format::NAME_CAPACITY).
+        /// Length of the name in bytes; at most [`NAME_CAPACITY`](super::format::NAME_CAPACITY).
         length: u32,
     },
     /// A tool without teeth.
     Teeth,
-    /// Machine limits that are not an ascending range of speeds.
+    /// The speed limits of the machine are not an ascending range.
     Limits {
         /// Slowest.
         from: Rpm,
         /// Fastest.
         to: Rpm,
     },
-    /// Depths that are not an ascending range from 0 or above.
+    /// The depth range of the table is not ascending, or begins below 0.
     Depths {
         /// Smallest.
         from: Millimeters,
         /// Largest.
         to: Millimeters,
     },
-    /// A chatter frequency that is negative or not finite.
+    /// A chatter frequency in the table is negative or not finite.
     Chatter {
         /// The value.
         found: Hertz,
     },
-    /// No speeds or too many, no layers or too many.
+    /// The table has no spindle speeds or too many, or no layers or too many.
     Count {
         /// Speeds; 1 to 65 535.
         speeds: u32,
         /// Layers; 1 to 65 535.
         layers: u32,
     },
-    /// Speeds that are not positive and strictly ascending.
+    /// The spindle speeds of the table are not positive and strictly ascending.
     SpeedOrder {
         /// Index of the wrong speed.
         index: u32,
         /// Its value.
         found: Rpm,
     },
-    /// A layer with an empty range, with feeds that overlap those of another layer of the same immersion and posture, or with an
-    /// immersion that differs from that of another layer by less than twice the tolerance.
+    /// A layer of the table has an empty range, feeds that overlap those of another layer of the same immersion and
+    /// posture, or an immersion that differs from that of another layer by less than twice the tolerance.
     Layer {
         /// Index of the layer.
         layer: u32,
     },
-    /// A layer whose number of columns differs from the number of speeds.
+    /// A layer of the table whose number of columns (one per speed) differs from the number of spindle speeds.
     Columns {
         /// Index of the layer.
         layer: u32,
@@ -104,66 +104,70 @@ pub enum TableError {
         /// Speeds of the table.
         speeds: u32,
     },
-    /// A column with more intervals than [`MAX_INTERVALS`](super::format::MAX_INTERVALS), or a layer with more than 65 535.
+    /// A column of the table with more unstable depth intervals than [`MAX_INTERVALS`](super::format::MAX_INTERVALS),
+    /// or a layer with more than 65 535.
     TooManyIntervals {
         /// Index of the layer.
         layer: u32,
         /// Index of the speed.
         speed: u32,
-        /// Number of intervals: in the column, or from the first column of the layer up to this one.
+        /// Number of unstable depth intervals: in the column, or from the first column of the layer up to this one.
         found: u32,
     },
-    /// A column whose intervals do not follow those of the preceding column.
+    /// A column of the table whose unstable depth intervals are not stored directly after those of the preceding
+    /// column.
     ColumnOrder {
         /// Index of the layer.
         layer: u32,
         /// Index of the speed.
         speed: u32,
     },
-    /// An interval that is empty, outside the depths of the table, not above the preceding one, or of unknown kind.
+    /// An unstable depth interval that is empty, outside the depths of the table, not above the preceding one, or of
+    /// unknown kind.
     IntervalOrder {
         /// Index of the layer.
         layer: u32,
         /// Index of the speed.
         speed: u32,
-        /// Index of the interval in its column.
+        /// Index of the unstable depth interval in its column.
         interval: u32,
     },
-    /// The buffer is too small for the table.
+    /// The buffer is too small for the bytes of the lobe table.
     Buffer {
         /// Bytes needed.
         needed: u64,
         /// Bytes available.
         found: u64,
     },
-    /// Unknown flags, or more modes than a table can have.
+    /// The table has unknown flags, or more modes than possible.
     Flags {
         /// The flags of the description.
         found: u16,
     },
     /// A feed direction that is not an angle, or a number of directions that differs from the number of layers.
     FeedDirection {
-        /// Index of the layer with an invalid direction, or the number of directions.
+        /// Index of the table layer with an invalid feed direction, or the number of feed directions.
         layer: u32,
     },
     /// A mode whose frequency is not positive, or whose damping ratio is not in [0, 1).
     Mode {
         /// Index of the layer.
         layer: u32,
-        /// Index of the mode in the layer.
+        /// Index of the mode in its table layer.
         mode: u32,
     },
-    /// An interpolation error that is negative or not finite.
+    /// The interpolation error that the table states is negative or not finite.
     InterpolationError {
         /// Stated error in depth.
         depth: Millimeters,
-        /// Stated error in speed, relative to the speed; it must be below 1.
+        /// Stated interpolation error in spindle speed, relative to the speed; it must be below 1.
         speed: f32,
     },
-    /// A derivative that is not finite, a number of derivatives that differs from the number of intervals, or layers with different
-    /// numbers of modes.
+    /// A derivative of a limit is not finite, the number of derivatives differs from the number of unstable intervals,
+    /// or layers have different numbers of modes.
     Slopes {
-        /// Index of the interval in the table, or the number of sets of derivatives.
+        /// Index in the table of the unstable interval with the faulty derivative, or the number of sets of
+        /// derivatives.
         index: u32,
     },
 }

@@ -46,17 +46,17 @@
 
 pub use super::header::Header;
 
-/// The first four bytes of a table.
+/// The first four bytes of a lobe table.
 pub const MAGIC: [u8; 4] = *b"QCLT";
-/// The latest schema that this code reads and writes.
+/// The latest schema of lobe tables that this code reads and writes.
 pub const SCHEMA: u16 = 2;
-/// The schema of tables without additions.
+/// The schema of lobe tables without optional parts.
 pub const SCHEMA_PLAIN: u16 = 1;
-/// Length of the header, in bytes.
+/// Length of the header of a lobe table, in bytes.
 pub const HEADER_LENGTH: usize = 32;
 /// Largest length of the name of a case, in bytes.
 pub const NAME_CAPACITY: usize = 32;
-/// Largest number of intervals in one stored column.
+/// Largest number of unstable depth intervals in one stored column of a lobe table.
 pub const MAX_INTERVALS: usize = 12;
 
 pub(super) const CRC_OFFSET: usize = 28;
@@ -67,14 +67,14 @@ pub(super) const LAYER_LENGTH: usize = 24;
 pub(super) const INTERVAL_LENGTH: usize = 8;
 pub(super) const STEPS: f32 = 65_535.0;
 
-/// Flag bit: the table contains its interpolation error.
+/// Flag bit of a lobe table: the table states its interpolation error.
 pub(super) const ERROR_GIVEN: u16 = 2;
-/// Position of the number of modes in the flags.
+/// Bit position of the number of modes in the flags of a lobe table.
 pub(super) const MODES_SHIFT: u16 = 8;
-/// All flag bits of schema 2, without the number of modes.
+/// All flag bits of a lobe table of schema 2, without the bits of the number of modes.
 pub(super) const KNOWN_FLAGS: u16 = 1 | ERROR_GIVEN;
 
-/// Number of feed-direction codes in 360°: 1/100 degree each.
+/// Number of codes for the feed direction in 360°: one per 1/100 degree.
 pub(super) const TURN: u16 = 36_000;
 
 pub(super) const ERROR_LENGTH: usize = 8;

@@ -9,7 +9,7 @@ pub(super) fn decode(code: u16) -> f32 {
     let exponent = u32::from(code >> 10) & 0x1F;
     let fraction = u32::from(code & 0x3FF);
     match exponent {
-        // Zero and subnormal numbers are multiples of 2⁻²⁴, which are exact in single precision.
+        // Zero and subnormal binary16 numbers are multiples of 2⁻²⁴, which are exact in single precision.
         0 => {
             let size = fraction as f32 * (1.0 / 16_777_216.0);
             f32::from_bits(size.to_bits() | sign)
@@ -29,7 +29,8 @@ pub(super) fn encode(value: f32) -> u16 {
     if size >= MAX {
         return sign | 0x7BFF;
     }
-    // Below 2⁻¹⁴ (subnormal) a code is a multiple of 2⁻²⁴. Above, it is the upper bits of the f32 with the exponent rebased.
+    // Below 2⁻¹⁴ (subnormal) a binary16 code is a multiple of 2⁻²⁴. Above, it is the upper bits of the f32 with the
+    // exponent rebased.
     let (bits, step) = if size < 1.0 / 16_384.0 {
         // In [1/2, 1) the last bit of an f32 has the value 2⁻²⁴, so that adding 1/2 rounds to a multiple of 2⁻²⁴.
         return sign | ((size + 0.5).to_bits() - 0.5_f32.to_bits()) as u16;

@@ -1,4 +1,4 @@
-//! The header of a table: schema, length, generation and CRC-32.
+//! The header of a lobe table: schema, length, generation and CRC-32.
 
 use serde::{Deserialize, Serialize};
 
@@ -7,17 +7,17 @@ use super::bytes::{array_at, saturate, u16_at, u32_at};
 use super::format::{CRC_OFFSET, HEADER_LENGTH, LAYERS_OFFSET, MAGIC, SCHEMA, SCHEMA_PLAIN};
 use crate::checksum::{Crc32, crc32};
 
-/// The first [`HEADER_LENGTH`] bytes of a table.
+/// The first [`HEADER_LENGTH`] bytes of a lobe table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Header {
-    /// Schema of the table. After [`read`](Self::read) it is one that this code [`knows`](Self::knows).
+    /// Schema of the lobe table. After [`read`](Self::read) it is one that this code [`knows`](Self::knows).
     pub schema: u16,
-    /// Length of the whole table in bytes, header included.
+    /// Length of the whole lobe table in bytes, header included.
     pub length: u32,
-    /// Incremented by the device with each upload; 0 in a file.
+    /// Generation number of the lobe table: incremented by the device with each upload; 0 in a file.
     pub generation: u32,
-    /// CRC-32 of all bytes of the table except the four of the CRC itself.
+    /// CRC-32 of all bytes of the lobe table except the four of the CRC itself.
     pub crc: u32,
 }
 
@@ -27,7 +27,8 @@ impl Header {
         schema == SCHEMA_PLAIN || schema == SCHEMA
     }
 
-    /// Reads the header at the beginning of `bytes`. Refuses a wrong magic number, an unknown schema and an impossible length.
+    /// Reads the header of a lobe table at the beginning of `bytes`. Refuses a wrong magic number, an unknown schema
+    /// and an impossible length.
     ///
     /// `bytes` may be longer than the table. The CRC is not checked here, but by [`check`](Self::check).
     pub fn read(bytes: &[u8]) -> Result<Self, TableError> {
@@ -61,7 +62,7 @@ impl Header {
         })
     }
 
-    /// Checks that `bytes` are exactly the table of this header, including the CRC.
+    /// Checks that `bytes` are exactly the lobe table of this header, including the CRC-32.
     pub fn check(&self, bytes: &[u8]) -> Result<(), TableError> {
         if bytes.len() as u64 != u64::from(self.length) {
             return Err(TableError::Length {
@@ -71,7 +72,7 @@ impl Header {
         }
         let payload = bytes.get(HEADER_LENGTH..).unwrap_or_default();
         self.check_payload(payload)?;
-        // The CRC assumes zeros in the reserved bytes of the header, so these bytes must be zero.
+        // The CRC-32 was computed with zeros in the reserved bytes of the header, so these bytes must be zero.
         if bytes.get(..HEADER_LENGTH) == Some(&self.to_bytes()) {
             return Ok(());
         }
@@ -82,7 +83,7 @@ impl Header {
         })
     }
 
-    /// Checks the CRC of the payload: the bytes after the header.
+    /// Checks the CRC-32 of a lobe table; `payload` are the bytes after this header.
     pub fn check_payload(&self, payload: &[u8]) -> Result<(), TableError> {
         let computed = self.crc_with(payload);
         if computed == self.crc {
@@ -95,7 +96,8 @@ impl Header {
         }
     }
 
-    /// This header with another generation and the matching CRC. `payload` are the bytes after the header.
+    /// This header of a lobe table with another generation number and the matching CRC-32. `payload` are the bytes
+    /// after the header.
     pub fn with_generation(self, generation: u32, payload: &[u8]) -> Self {
         let renewed = Self { generation, ..self };
         Self {
@@ -127,7 +129,7 @@ impl Header {
         bytes
     }
 
-    /// The CRC-32 over the header only; the caller updates it with the payload.
+    /// The CRC-32 over the header of the lobe table only; the caller updates it with the bytes after the header.
     pub fn begin_crc(&self) -> Crc32 {
         let mut crc = Crc32::new();
         crc.update(self.without_crc().get(..CRC_OFFSET).unwrap_or_default());

@@ -12,15 +12,15 @@ use crate::units::{Hertz, Millimeters};
 pub enum IntervalKind {
     /// Hopf (Neimark–Sacker): a complex pair of Floquet multipliers outside the unit circle.
     Hopf,
-    /// Flip (period doubling): a real multiplier below −1; the vibration has twice the tooth period.
+    /// Flip (period doubling): a real Floquet multiplier below −1; the vibration has twice the tooth period.
     Flip,
-    /// Fold: a real multiplier above +1; the forced orbit does not persist.
+    /// Fold: a real Floquet multiplier above +1; the forced orbit does not persist.
     Fold,
-    /// Undecided: the error bound of the multiplier crosses the unit circle, or the computation failed.
+    /// Undecided: the Floquet multiplier lies on the unit circle within its error bound, or the computation failed.
     Undecided,
 }
 
-/// A half-open depth interval [from, to) that is not stable.
+/// A half-open interval [from, to) of axial depths at which the cut is not stable.
 ///
 /// An interval that ends at the largest depth of the table includes that depth.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -28,7 +28,7 @@ pub enum IntervalKind {
 pub struct Interval {
     /// Smallest unstable depth.
     pub from: Millimeters,
-    /// Smallest stable depth above the interval, or the largest depth of the table.
+    /// Smallest stable depth above the unstable interval, or the largest depth of the table.
     pub to: Millimeters,
     /// Kind of stability loss.
     pub kind: IntervalKind,

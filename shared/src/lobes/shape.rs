@@ -1,4 +1,4 @@
-//! The description of a table: numbers of entries, their offsets, and the scales of stored numbers.
+//! The description of a lobe table: its numbers of entries, their byte offsets, and the scales of stored numbers.
 
 use core::ops::Range;
 
@@ -14,7 +14,7 @@ use super::{Interval, IntervalKind, TableError, Validity};
 use crate::units::{Degrees, Hertz, Millimeters, Rpm};
 use crate::working_point::Limits;
 
-/// Numbers of entries of a table, from which all offsets follow, and the scales of stored numbers.
+/// Numbers of entries of a lobe table, from which all byte offsets follow, and the scales of stored numbers.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Shape {
     pub(super) teeth: u8,
@@ -28,14 +28,14 @@ pub(super) struct Shape {
     pub(super) name_length: usize,
     /// True for schema 2.
     pub(super) is_extended: bool,
-    /// True if the table contains its interpolation error.
+    /// True if the lobe table states its interpolation error.
     pub(super) error_given: bool,
-    /// Number of modes per layer whose derivatives the table contains; 0 for none.
+    /// Number of modes per table layer by whose parameters the table contains derivatives; 0 without derivatives.
     pub(super) modes: usize,
 }
 
 impl Shape {
-    /// Reads the description and checks it.
+    /// Reads the description of a lobe table (numbers of entries and scales) and checks it.
     pub(super) fn read(bytes: &[u8]) -> Result<Self, TableError> {
         let found = saturate(bytes.len());
         let shape = Self::read_fields(bytes).ok_or(TableError::TooShort {
@@ -84,7 +84,7 @@ impl Shape {
         })
     }
 
-    /// Checks that the counts, depths and limits of the description are possible values.
+    /// Checks that the counts, depths and speed limits in the description of a lobe table are possible values.
     pub(super) fn check(&self) -> Result<(), TableError> {
         if self.teeth == 0 {
             return Err(TableError::Teeth);
@@ -119,7 +119,7 @@ impl Shape {
         Ok(())
     }
 
-    /// Length of the whole table in bytes.
+    /// Length of the whole lobe table in bytes.
     pub(super) fn length(&self) -> u64 {
         let intervals = (INTERVAL_LENGTH as u64) * (self.intervals as u64);
         self.intervals_offset() as u64 + intervals + self.additions_length()
@@ -140,9 +140,9 @@ impl Shape {
             .unwrap_or_default()
     }
 
-    // With 16-bit counts the offsets of speeds and columns fit into 32 bits. The offset of the intervals may reach 24·65535 +
-    // 4·65535 + 2·65535·65536, which exceeds 32 bits. It then saturates; such a table exceeds the memory of a 32-bit device
-    // anyway.
+    // With 16-bit counts of speeds and layers the byte offsets of speeds and columns fit into 32 bits. The offset of
+    // the intervals may reach 24·65535 + 4·65535 + 2·65535·65536, which exceeds 32 bits. It then saturates; such a
+    // table exceeds the memory of a 32-bit device anyway.
     fn speeds_offset(&self) -> usize {
         LAYERS_OFFSET + LAYER_LENGTH * self.layers
     }
@@ -175,7 +175,7 @@ impl Shape {
         f32_at(bytes, self.speeds_offset() + 4 * index)
     }
 
-    /// Range of the indices of a column's intervals.
+    /// Range of the indices, in the whole table, of the unstable depth intervals of one column.
     pub(super) fn column_range(&self, bytes: &[u8], layer: usize, speed: usize) -> Option<Range<usize>> {
         if layer >= self.layers || speed >= self.speeds {
             return None;
@@ -187,7 +187,7 @@ impl Shape {
         Some(from..to)
     }
 
-    /// The intervals of a column; an item is `None` if its kind is unknown.
+    /// The unstable depth intervals of a layer at one speed; an item is `None` if its kind is unknown.
     pub(super) fn column<'a>(
         &self,
         bytes: &'a [u8],
@@ -202,8 +202,8 @@ impl Shape {
         let entries = bytes.get(offset(range.start)?..offset(range.end)?)?;
         let (depth_from_mm, depth_to_mm) = (self.depth_from_mm, self.depth_to_mm);
         let (depth_step_mm, chatter_step_hz) = (self.depth_step_mm(), self.chatter_step_hz());
-        // The largest code gives the largest depth of the table without rounding. An interval that ends there reaches the end of
-        // the table.
+        // The largest 16-bit depth code gives the largest depth of the table without rounding. An interval that ends
+        // there reaches the end of the table.
         let depth = move |code: u16| match code {
             u16::MAX => Millimeters(depth_to_mm),
             _ => Millimeters(depth_from_mm + f32::from(code) * depth_step_mm),
@@ -221,15 +221,15 @@ impl Shape {
 }
 
 impl Shape {
-    /// Length in bytes of the additions after the intervals.
+    /// Length in bytes of the optional parts that follow the unstable intervals in the table.
     pub(super) fn additions_length(&self) -> u64 {
         let error = if self.error_given { ERROR_LENGTH as u64 } else { 0 };
         let modes = (MODE_LENGTH * self.modes) as u64 * self.layers as u64;
         error + modes + self.slopes_length() as u64 * self.intervals as u64
     }
 
-    /// Length in bytes of the derivatives of one interval: for both ends, 16 bits per derivative by the frequency and the damping
-    /// ratio of each mode and by the cutting force.
+    /// Length in bytes of the derivatives of one unstable interval: for each of its two ends, 16 bits per derivative by
+    /// the frequency and the damping ratio of each mode and by the cutting force.
     fn slopes_length(&self) -> usize {
         if self.modes == 0 {
             0
@@ -272,7 +272,7 @@ impl Shape {
         })
     }
 
-    /// Derivatives of the interval with this index, counted over the whole table.
+    /// Derivatives of the unstable interval with this index, counted over the whole table.
     pub(super) fn interval_slopes(&self, bytes: &[u8], index: usize) -> Option<IntervalSlopes> {
         if self.modes == 0 || index >= self.intervals {
             return None;
@@ -289,7 +289,7 @@ impl Shape {
         })
     }
 
-    /// The feed direction for which a layer is valid; `None` for any. An impossible code is an error.
+    /// The feed direction for which a table layer is valid; `None` for any. An impossible code is an error.
     pub(super) fn feed_direction(&self, bytes: &[u8], layer: usize) -> Result<Option<Degrees>, TableError> {
         let wrong = TableError::FeedDirection {
             layer: saturate(layer),
@@ -307,7 +307,7 @@ impl Shape {
     }
 }
 
-/// Refuses unknown flags of schema 2. In schema 1 all flags except the first are ignored.
+/// Refuses unknown flags of a lobe table of schema 2. In schema 1 all flags except the first are ignored.
 fn check_flags(flags: u16, is_extended: bool) -> Result<(), TableError> {
     let modes = usize::from(flags >> MODES_SHIFT);
     if is_extended && (flags & 0xFF & !KNOWN_FLAGS != 0 || modes > MODES_MAX) {

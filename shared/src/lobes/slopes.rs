@@ -8,10 +8,11 @@ use serde::{Deserialize, Serialize};
 
 use crate::units::{Hertz, Millimeters};
 
-/// Largest number of modes per layer with derivatives. It limits the size of a table.
+/// Largest number of modes per table layer by whose parameters limits are differentiated. It limits the size of a
+/// table.
 pub const MODES_MAX: usize = 4;
 
-/// A mode with the parameters from which the table was computed.
+/// A mode of the structure with the natural frequency and damping ratio from which the table layer was computed.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LayerMode {
     /// Natural frequency |λ|/2π.
@@ -20,18 +21,20 @@ pub struct LayerMode {
     pub damping_ratio: f32,
 }
 
-/// Derivatives of one end of an interval, in mm per relative change of a parameter.
+/// Derivatives of one end of an unstable depth interval, in mm per relative change of a parameter.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Slopes {
-    /// Derivatives by the natural frequency of each mode; 0 for modes that the table does not contain.
+    /// Derivatives of the limit by the natural frequency of each mode, mm per relative change; 0 for modes that the
+    /// table does not contain.
     pub by_frequency: [f32; MODES_MAX],
-    /// Derivatives by the damping ratio of each mode; 0 for modes that the table does not contain.
+    /// Derivatives of the limit by the damping ratio of each mode, mm per relative change; 0 for modes that the table
+    /// does not contain.
     pub by_damping_ratio: [f32; MODES_MAX],
-    /// Derivative by the cutting force coefficient K_tc.
+    /// Derivative of the limit by the cutting force coefficient K_tc, mm per relative change.
     pub by_cutting_force: f32,
 }
 
-/// Derivatives of both ends of an interval; 0 for an end at the smallest or largest depth of the table.
+/// Derivatives of both ends of an unstable depth interval; 0 for an end at the smallest or largest depth of the table.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct IntervalSlopes {
     /// Derivatives of the lower end.
@@ -40,26 +43,27 @@ pub struct IntervalSlopes {
     pub to: Slopes,
 }
 
-/// Relative changes of parameters since the table was computed. For example, 0.01 is an increase by 1 %.
+/// Relative changes of modal parameters and cutting force since the lobe table was computed. For example, 0.01 is an
+/// increase by 1 %.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Learned {
-    /// Relative change of the natural frequency of each mode of the layer.
+    /// Relative change of the natural frequency of each mode since the lobe table was computed.
     pub frequency: [f32; MODES_MAX],
-    /// Relative change of the damping ratio of each mode.
+    /// Relative change of the damping ratio of each mode since the lobe table was computed.
     pub damping_ratio: [f32; MODES_MAX],
-    /// Relative change of the cutting force coefficient.
+    /// Relative change of the cutting force coefficient K_tc since the lobe table was computed.
     pub cutting_force: f32,
 }
 
 impl Learned {
-    /// The relative changes if the mode with this index has the values `now` instead of `table`. They are 0 for an index beyond
-    /// the modes of the table.
+    /// The relative parameter changes if the mode with this index has the frequency and damping ratio of `now` instead
+    /// of those of `table`. They are 0 for an index beyond [`MODES_MAX`].
     pub fn of_mode(index: usize, table: &LayerMode, now: &LayerMode) -> Self {
         let mut learned = Self::default();
         if let Some(slot) = learned.frequency.get_mut(index) {
             *slot = (now.frequency.0 - table.frequency.0) / table.frequency.0;
         }
-        // For a damping ratio of zero the relative change is undefined.
+        // The relative change of a damping ratio of zero is undefined and stays 0.
         if let Some(slot) = learned.damping_ratio.get_mut(index)
             && table.damping_ratio > 0.0
         {
@@ -70,7 +74,8 @@ impl Learned {
 }
 
 impl Slopes {
-    /// Shift of the interval end in depth, to first order. It is positive if the limit rises.
+    /// Shift of the end of an unstable interval in depth that the parameter changes cause, to first order. It is
+    /// positive if the limit rises.
     pub fn shift(&self, learned: &Learned) -> Millimeters {
         let mut shift_mm = self.by_cutting_force * learned.cutting_force;
         for (slope, change) in self.by_frequency.iter().zip(&learned.frequency) {
@@ -82,7 +87,7 @@ impl Slopes {
         Millimeters(shift_mm)
     }
 
-    /// The derivatives in the order of their bytes in the table, for this number of modes.
+    /// The derivatives of a limit in the order of their bytes in the table, for `modes` modes.
     pub(super) fn numbers(&self, modes: usize) -> impl Iterator<Item = f32> + '_ {
         self.by_frequency
             .iter()
@@ -92,7 +97,7 @@ impl Slopes {
             .chain(core::iter::once(self.by_cutting_force))
     }
 
-    /// Reads the derivatives from numbers in the order of [`numbers`](Self::numbers).
+    /// Reads the derivatives of a limit from numbers in the order of [`numbers`](Self::numbers).
     pub(super) fn of_numbers(mut numbers: impl Iterator<Item = f32>, modes: usize) -> Option<Self> {
         let mut slopes = Self::default();
         for slot in slopes.by_frequency.iter_mut().take(modes) {
@@ -106,10 +111,11 @@ impl Slopes {
     }
 }
 
-/// The limit corrected to first order, clamped to the depths from `from` to `to`.
+/// The stability limit (depth) corrected to first order for parameter changes, clamped to the depths from `from` to
+/// `to`.
 ///
-/// The correction is valid while it is small against the distance to the next cusp of the lobes, which allows changes of a frequency by
-/// a few percent. A NaN correction leaves the limit unchanged.
+/// The correction is valid while it is small against the distance to the next cusp of the lobes, which allows changes
+/// of a natural frequency by a few percent. A NaN correction leaves the limit unchanged.
 pub fn corrected_limit(
     limit: Millimeters,
     slopes: &Slopes,

@@ -12,12 +12,13 @@ use crate::working_point::Limits;
 pub struct LobeTable<'a> {
     pub(super) bytes: &'a [u8],
     pub(super) shape: Shape,
-    /// Feed direction of the cut, if set.
+    /// Feed direction of the cut that is looked up, if set.
     pub(super) feed_direction: Option<Degrees>,
 }
 
 impl<'a> LobeTable<'a> {
-    /// Opens bytes that [`parse`](Self::parse) has accepted before, without checking CRC and entries again.
+    /// Opens the bytes of a lobe table that [`parse`](Self::parse) has accepted before, without checking CRC and
+    /// entries again.
     ///
     /// If the bytes were changed since, entries may be wrong. Every read is bounds-checked.
     pub fn reopen(bytes: &'a [u8]) -> Result<Self, TableError> {
@@ -29,7 +30,7 @@ impl<'a> LobeTable<'a> {
         })
     }
 
-    /// The bytes of the table, header included.
+    /// The bytes of the lobe table, header included.
     pub fn bytes(&self) -> &'a [u8] {
         self.bytes
     }
@@ -54,7 +55,7 @@ impl<'a> LobeTable<'a> {
         self.shape.limits
     }
 
-    /// The smallest and the largest depth of the table.
+    /// The smallest and the largest axial depth of the table.
     pub fn depths(&self) -> (Millimeters, Millimeters) {
         (
             Millimeters(self.shape.depth_from_mm),
@@ -62,14 +63,14 @@ impl<'a> LobeTable<'a> {
         )
     }
 
-    /// Largest rounding error of a stored depth: one step of the 16-bit grid.
+    /// Largest rounding error of a depth in the table: one step of its 16-bit scale.
     ///
     /// Depths are rounded to the unstable side: `from` down, `to` up (see [`format`]).
     pub fn depth_step(&self) -> Millimeters {
         Millimeters(self.shape.depth_step_mm())
     }
 
-    /// Largest rounding error of a stored chatter frequency: half a step of the 16-bit grid.
+    /// Largest rounding error of a chatter frequency in the table: half a step of its 16-bit scale.
     pub fn chatter_error(&self) -> Hertz {
         Hertz(0.5 * self.shape.chatter_step_hz())
     }
@@ -80,12 +81,12 @@ impl<'a> LobeTable<'a> {
         (0..self.shape.speeds).map(move |index| Rpm(table.speed_rpm(index)))
     }
 
-    /// The grid speed with this index.
+    /// The spindle speed of the table with this index; `None` beyond the last.
     pub fn speed(&self, index: usize) -> Option<Rpm> {
         (index < self.shape.speeds).then(|| Rpm(self.speed_rpm(index)))
     }
 
-    /// Number of grid speeds that are at most `speed`; their indices are 0 to this number − 1.
+    /// Number of spindle speeds of the table that are at most `speed`; their indices are 0 to this number − 1.
     pub fn speeds_up_to(&self, speed: Rpm) -> usize {
         let (mut low, mut high) = (0, self.shape.speeds);
         while low < high {
@@ -99,13 +100,13 @@ impl<'a> LobeTable<'a> {
         low
     }
 
-    /// The validity of each layer, in the order of the table.
+    /// The cuts for which each layer is valid (feed, immersion, posture), in the order of the table.
     pub fn layers(&self) -> impl ExactSizeIterator<Item = Validity> + Clone + use<'a> {
         let table = *self;
         (0..self.shape.layers).map(move |layer| table.shape.validity(table.bytes, layer).unwrap_or(NOWHERE))
     }
 
-    /// The entries of one layer at one grid speed.
+    /// The unstable depth intervals of one layer at one speed of the table.
     pub fn entry(&self, layer: usize, speed_index: usize) -> Option<Column> {
         let mut column = self.empty_column();
         self.read_column(layer, speed_index, &mut column).ok()?;
@@ -126,11 +127,12 @@ impl<'a> LobeTable<'a> {
     }
 
     pub(super) fn speed_rpm(&self, index: usize) -> f32 {
-        // If the bytes were changed after the check, the speed is NaN: all comparisons fail, and the lookup returns `NotKnown`.
+        // If the bytes of the table were changed after the check, the speed is NaN: all comparisons fail, and the
+        // lookup returns `NotKnown`.
         self.shape.speed_rpm(self.bytes, index).unwrap_or(f32::NAN)
     }
 
-    /// The stored intervals of one layer at one grid speed.
+    /// The unstable depth intervals that the table stores for one layer at one of its speeds.
     pub(super) fn intervals(
         &self,
         layer: usize,
@@ -141,7 +143,7 @@ impl<'a> LobeTable<'a> {
         Ok(intervals.map(|interval| interval.ok_or(NotKnown::Damaged)))
     }
 
-    /// Reads the intervals of one layer at one grid speed into an empty column.
+    /// Reads the unstable depth intervals of one layer at one speed of the table into an empty column.
     ///
     /// A column is large, so it is filled in place rather than returned.
     pub(super) fn read_column(
@@ -162,12 +164,13 @@ impl<'a> LobeTable<'a> {
 }
 
 impl LobeTable<'_> {
-    /// Bound of the interpolation error; `None` if the table has none.
+    /// Bound of the interpolation error that the lobe table states; `None` if it states none.
     pub fn interpolation_error(&self) -> Option<InterpolationError> {
         self.shape.interpolation_error(self.bytes)
     }
 
-    /// The feed direction for which a layer is valid, from the machine's x axis towards its y axis; `None` for any direction.
+    /// The feed direction for which a layer of the table is valid, from the machine's x axis towards its y axis; `None`
+    /// for any direction.
     pub fn feed_direction(&self, layer: usize) -> Option<Degrees> {
         self.shape.feed_direction(self.bytes, layer).ok().flatten()
     }

@@ -1,15 +1,15 @@
-//! The result of a lookup: stable, unstable, or not known with the reason.
+//! The result of a lookup in the lobe table: stable, unstable, or not known with the reason.
 
 use serde::{Deserialize, Serialize};
 
 use super::IntervalKind;
 use crate::units::{Degrees, Hertz, Millimeters, Rpm};
 
-/// The reason why a lookup gives no stability.
+/// The reason why a lookup in the lobe table does not say whether the cut is stable.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum NotKnown {
-    /// The speed lies outside the table.
+    /// The spindle speed lies outside the lobe table.
     Speed {
         /// The requested speed.
         asked: Rpm,
@@ -18,7 +18,7 @@ pub enum NotKnown {
         /// The fastest speed of the table.
         to: Rpm,
     },
-    /// The depth lies outside the table.
+    /// The axial depth lies outside the lobe table.
     Depth {
         /// The requested depth.
         asked: Millimeters,
@@ -27,44 +27,44 @@ pub enum NotKnown {
         /// The largest depth of the table.
         to: Millimeters,
     },
-    /// The feed per tooth lies outside the layers for this immersion and posture.
+    /// The feed per tooth lies outside all table layers for this immersion and posture.
     Feed {
         /// The requested feed per tooth.
         asked: Millimeters,
-        /// The smallest feed of these layers.
+        /// The smallest feed per tooth of the table layers for this immersion and posture.
         from: Millimeters,
-        /// The largest feed of these layers.
+        /// The largest feed per tooth of the table layers for this immersion and posture.
         to: Millimeters,
     },
-    /// The table has no layer for this immersion.
+    /// The lobe table has no layer for the immersion angles of the cut.
     Immersion {
         /// The requested entry angle.
         start: Degrees,
         /// The requested exit angle.
         exit: Degrees,
     },
-    /// The table has no layer for this posture.
+    /// The lobe table has no layer for the posture of the robot.
     Posture {
         /// The requested posture.
         asked: u8,
     },
-    /// The table was computed for another number of teeth.
+    /// The lobe table was computed for another number of teeth.
     Teeth {
-        /// Number of teeth of the tool.
+        /// Number of teeth of the tool that cuts.
         asked: u8,
-        /// Number of teeth in the table.
+        /// Number of teeth for which the lobe table was computed.
         table: u8,
     },
-    /// The point lies in the table, but its stability is [`Undecided`](super::IntervalKind::Undecided).
+    /// The speed and depth lie in the lobe table, but its entry there is [`Undecided`](super::IntervalKind::Undecided).
     Undecided,
-    /// The bytes of the table were changed after the check.
+    /// The bytes of the lobe table were changed after the check.
     Damaged,
-    /// The table has layers for several feed directions, and none is close enough to the requested one.
+    /// The lobe table has layers for several feed directions, and none is close enough to that of the cut.
     FeedDirection {
         /// The requested feed direction.
         asked: Degrees,
     },
-    /// The table has layers for several feed directions, and no feed direction is set.
+    /// The lobe table has layers for several feed directions, and the feed direction of the cut is not set.
     FeedDirectionNotTold,
 }
 
@@ -74,7 +74,7 @@ pub enum NotKnown {
 pub enum TabulatedStability {
     /// The cut is stable: a perturbation of the forced vibration decays.
     Stable {
-        /// Distance to the nearest depth that is not stable, or to the end of the table.
+        /// Distance of the cut's depth to the nearest depth that is not stable, or to the end of the lobe table.
         margin: Millimeters,
     },
     /// The cut is unstable.
@@ -83,9 +83,9 @@ pub enum TabulatedStability {
         kind: IntervalKind,
         /// Chatter frequency; 0 if unknown.
         chatter: Hertz,
-        /// Distance to the nearest stable depth, or to the end of the table.
+        /// Distance of the cut's depth to the nearest stable depth, or to the end of the lobe table.
         margin: Millimeters,
     },
-    /// The stability is not known, for the given reason.
+    /// The stability of the cut is not known, for the given reason.
     NotKnown(NotKnown),
 }

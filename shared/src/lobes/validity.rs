@@ -1,16 +1,16 @@
-//! The conditions for which a layer of a table is valid.
+//! The cutting conditions for which a layer of a lobe table is valid.
 
 use serde::{Deserialize, Serialize};
 
 use crate::units::{Degrees, Millimeters};
 
-/// The conditions for which a layer is valid: feed range, immersion and posture.
+/// The cutting conditions for which a layer of a lobe table is valid: feed range, immersion and posture.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Validity {
     /// Smallest feed per tooth.
     pub feed_from: Millimeters,
-    /// Largest feed per tooth; equal to the smallest if the limits depend on the feed.
+    /// Largest feed per tooth for which the layer is valid; equal to the smallest if the limits depend on the feed.
     pub feed_to: Millimeters,
     /// Entry angle of a tooth.
     pub start: Degrees,
@@ -21,13 +21,14 @@ pub struct Validity {
 }
 
 impl Validity {
-    /// True if both layers have the same immersion and posture, so that they may be interpolated in feed.
+    /// True if both table layers have the same immersion and posture, so that limits may be interpolated between them
+    /// in feed.
     pub(super) fn is_family_of(&self, other: &Self) -> bool {
         self.posture == other.posture && self.start == other.start && self.exit == other.exit
     }
 }
 
-/// Placeholder for a layer that cannot be read. No working point lies within its NaN bounds.
+/// Placeholder for a table layer that cannot be read. No working point lies within its NaN bounds.
 pub(super) const NOWHERE: Validity = Validity {
     feed_from: Millimeters(f32::NAN),
     feed_to: Millimeters(f32::NAN),

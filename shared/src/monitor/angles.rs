@@ -4,13 +4,13 @@ use super::pipeline::Monitor;
 use super::state::State;
 use crate::tachometer::Turns;
 
-/// Spindle angle at the first sample of a block, with its increment per sample.
+/// Spindle angle at the first sample of a block, and the increment of the angle per sample.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Angles {
     first: Turns,
-    /// Increment per sensor sample, in 2⁻³² revolutions.
+    /// Increment of the spindle angle per sensor sample, in 2⁻³² revolutions.
     per_sample: u64,
-    /// Standard deviation of the angle, in tooth periods.
+    /// Standard deviation of the spindle angle, in tooth periods.
     pub(super) deviation: f32,
     /// Sensor samples per tooth period.
     pub(super) samples_per_tooth: f32,
@@ -26,7 +26,7 @@ impl Angles {
 }
 
 impl Monitor {
-    /// The spindle angles of the newest block; `None` while the tachometer has no lock.
+    /// The spindle angles of the samples of the newest block; `None` while the tachometer has no lock.
     pub(super) fn angles(&self, state: &State) -> Option<Angles> {
         let tachometer = self.tachometer.as_ref()?;
         let phase = tachometer.phase(&state.tachometer, state.sample_clock.time_of(0)?)?;

@@ -1,4 +1,4 @@
-//! The state of one frequency band.
+//! The state of one frequency band of the signal chain.
 
 use crate::decimation::Sample;
 use crate::detector::growth::Growth;
@@ -8,25 +8,26 @@ use crate::spectrum::{Overlap, PowerSpectrum};
 use crate::synchronous::SamplerState;
 use crate::units::Hertz;
 
-/// The state of one frequency band: samples for the next spectrum, the newest spectrum, background spectrum and tone, and the
-/// tooth periods.
+/// The state of one frequency band: samples for the next spectrum, the newest spectrum, background spectrum, tracked
+/// tone, and tooth periods with their growth.
 #[derive(Clone, Debug)]
 pub(super) struct BandState<const POINTS: usize, const BINS: usize> {
     pub(super) overlap: Overlap<POINTS>,
     pub(super) power: [f32; BINS],
-    /// Width of a bin of the newest spectrum; 0 before the first spectrum.
+    /// Width of a bin of the newest spectrum of the band; 0 before the first spectrum.
     pub(super) bin: Hertz,
-    /// True if the newest block completed a spectrum.
+    /// True if the newest block completed a spectrum of the band.
     pub(super) fresh: bool,
     pub(super) background: Background<BINS>,
     pub(super) tone: Option<Tone>,
     pub(super) sampler: SamplerState,
     pub(super) growth: Growth,
-    /// True if the newest block completed a tooth period whose growth was evaluated.
+    /// True if the newest block completed a tooth period of the band after which the growth of the vibration was
+    /// evaluated.
     pub(super) passed: bool,
-    /// Root mean square of the sensor noise in one channel of a tooth period, in m/s².
+    /// Root mean square of the sensor noise in one value (one axis at one angle) of a tooth period, in m/s².
     pub(super) floor: f32,
-    /// Number of samples of the band since growth was last evaluated.
+    /// Number of samples of the band since the growth of its vibration was last evaluated.
     pub(super) samples_since_growth: u32,
 }
 
@@ -47,7 +48,7 @@ impl<const POINTS: usize, const BINS: usize> BandState<POINTS, BINS> {
         }
     }
 
-    /// Resets to the initial state. Buffers that are written before they are read keep their content.
+    /// Resets the band to its initial state. Buffers that are written before they are read keep their content.
     pub(super) fn reset(&mut self) {
         let Self {
             overlap,
@@ -70,20 +71,21 @@ impl<const POINTS: usize, const BINS: usize> BandState<POINTS, BINS> {
         (*fresh, *tone, *passed, *floor, *samples_since_growth) = (false, None, false, 0.0, 0);
     }
 
-    /// Takes a sample for the next spectrum; a spectrum is due every `hop` samples.
+    /// Takes a sample of the band for its next spectrum; a spectrum is due every `hop` samples.
     pub(super) fn take(&mut self, sample: Sample, hop: usize) {
         self.fresh |= self.overlap.push(sample, hop);
         self.samples_since_growth = self.samples_since_growth.saturating_add(1);
     }
 
-    /// Discards samples, tone and tooth periods after a gap in the samples. The background spectrum is kept.
+    /// Discards the samples, tracked tone and tooth periods of the band after a gap in the samples. The background
+    /// spectrum is kept.
     pub(super) fn interrupt(&mut self) {
         self.overlap.reset();
         self.tone = None;
         self.interrupt_angles();
     }
 
-    /// Discards the tooth periods and their growth, after the tachometer lost its lock.
+    /// Discards the tooth periods of the band and their growth, after the tachometer lost its lock.
     pub(super) fn interrupt_angles(&mut self) {
         self.sampler = SamplerState::new();
         self.growth.reset();
@@ -97,7 +99,8 @@ impl<const POINTS: usize, const BINS: usize> BandState<POINTS, BINS> {
     }
 }
 
-/// Updates the tracked tone from a new spectrum. Updates the background spectrum unless there is chatter.
+/// Updates the tracked tone of a band from its new spectrum. Also updates the background spectrum unless there is
+/// chatter.
 pub(super) fn follow_tone<const POINTS: usize, const BINS: usize>(
     band: &mut BandState<POINTS, BINS>,
     rotation: Option<Rotation>,

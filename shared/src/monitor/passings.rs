@@ -15,14 +15,14 @@ use crate::math;
 use crate::spectrum::{STRUCTURE_POINTS, TOOL_POINTS};
 use crate::synchronous::{Method, Passed, SLOTS, Sampler};
 
-/// Samples between two spectra of the tool band: an overlap of 1/2.
+/// Number of samples between two spectra of the tool band, which therefore overlap by 1/2.
 const TOOL_HOP: usize = TOOL_POINTS / 2;
-/// Samples between two spectra of the structure band: an overlap of 3/4.
+/// Number of samples between two spectra of the structure band, which therefore overlap by 3/4.
 const STRUCTURE_HOP: usize = STRUCTURE_POINTS / 4;
 
 impl Monitor {
-    /// True if a band, whose rate is the sensor's divided by `divisor`, has at least `least` samples per tooth period, and the
-    /// standard deviation of the spindle angle is small enough.
+    /// True if a band can be resampled at fixed spindle angles: at the sensor's rate divided by `divisor` it has at
+    /// least `least` samples per tooth period, and the standard deviation of the spindle angle is small enough.
     fn can_sample(&self, angles: &Angles, divisor: u32, least: f32) -> bool {
         angles.samples_per_tooth >= least * divisor as f32 && angles.deviation < ANGLE_DEVIATION_MAX
     }
@@ -46,15 +46,17 @@ impl Monitor {
         };
         let rate = self.settings.sensor.nominal_rate.0 / self.decimation.tool_divisor() as f32;
         let noise = self.noise_density() * 0.5 * rate;
-        // Slow growth is not evaluated in the tool band. The error of cubic interpolation leaves a residual of the forced
-        // vibration, which beats with the ratio of tooth period to sample period and would appear as slow growth.
+        // Slow growth of the vibration is not evaluated in the tool band. The error of cubic interpolation leaves a
+        // residual of the forced vibration, which beats with the ratio of tooth period to sample period and would
+        // appear as slow growth.
         let look = if band.samples_since_growth >= GROWTH_INTERVAL_SAMPLES {
             Look::Quick
         } else {
             Look::None
         };
         self.take_passing(band, &passed, noise, look);
-        // The stroboscopic map comes from the tool band only if the tooth period is too short for the structure band.
+        // The points of the stroboscopic map come from the tool band only if the tooth period has too few samples of
+        // the structure band.
         if !self.can_sample(
             angles,
             self.decimation.structure_divisor(),
@@ -86,8 +88,8 @@ impl Monitor {
         let Some(passed) = sampler.step(&mut band.sampler, sample.map(|x| x as f32 * unit), angle) else {
             return;
         };
-        // The mean of white noise over w seconds has the variance of its density over a bandwidth of 1/(2w) Hz; w is the
-        // duration of a slot.
+        // The mean of white noise over w seconds has the variance of the noise density times a bandwidth of 1/(2w) Hz;
+        // w is the duration of one of the equal angles into which a tooth period is divided.
         let rate = self.settings.sensor.nominal_rate.0;
         let bandwidth = 0.5 * rate * SLOTS as f32 / angles.samples_per_tooth;
         let noise = self.noise_density() * bandwidth.min(0.5 * rate / divisor as f32);
@@ -95,7 +97,8 @@ impl Monitor {
         show(&mut state.strobes, Band::Structure, &passed);
     }
 
-    /// Passes a complete tooth period to the growth estimators. `noise` is the noise variance in (m/s²)² of one channel.
+    /// Passes a complete tooth period of a band to the estimators of growth. `noise` is the variance of the sensor
+    /// noise in one value of the tooth period, (m/s²)².
     fn take_passing<const POINTS: usize, const BINS: usize>(
         &self,
         band: &mut BandState<POINTS, BINS>,
@@ -112,7 +115,7 @@ impl Monitor {
             look,
         );
         if look >= Look::Quick {
-            // Only an evaluation of growth gives the detector a new finding.
+            // The detector gets a new finding only when the growth of the vibration was evaluated.
             band.passed = true;
             band.samples_since_growth = 0;
         }

@@ -40,7 +40,7 @@ impl Monitor {
         &self.settings
     }
 
-    /// One-sided density of the sensor's white noise and of its rounding to counts, in (m/s²)² per Hz.
+    /// One-sided spectral density of the sensor's white noise and of its rounding to counts, in (m/s²)² per Hz.
     pub(super) fn noise_density(&self) -> f32 {
         let sensor = &self.settings.sensor;
         let density = sensor.noise_meters_per_second2_per_root_hertz;
@@ -48,7 +48,7 @@ impl Monitor {
         density * density + step * step / 6.0 / sensor.nominal_rate.0
     }
 
-    /// Acceleration in m/s² of one unit of a decimated sample.
+    /// Acceleration in m/s² that one unit of a decimated sample represents.
     pub(super) fn unit(&self) -> f32 {
         self.settings.sensor.meters_per_second2_per_count / (1 << FRACTION_BITS) as f32
     }

@@ -17,13 +17,13 @@ pub struct Settings {
     pub tool: Tool,
     /// The tachometer wheel; `None` without a tachometer.
     pub wheel: Option<Wheel>,
-    /// Spindle speed assumed without a tachometer.
+    /// Spindle speed that is assumed if no tachometer measures it; `None` if unknown.
     pub assumed_speed: Option<Rpm>,
     /// Speed limits of the spindle.
     pub limits: Option<Limits>,
 }
 
-/// Largest number of teeth of a tool.
+/// Largest number of teeth of a tool that the signal chain supports.
 pub const MAX_TEETH: u8 = 12;
 
 /// The reason why [`Settings`] are invalid.
@@ -35,9 +35,9 @@ pub enum SettingsError {
     Wheel(Wheel),
     /// The sample rate is outside the range of the decimation filters.
     SampleRate(Hertz),
-    /// The acceleration of one count is not a positive number.
+    /// The acceleration of one sensor count is not a positive number.
     CountScale(f32),
-    /// The noise of the sensor is not a number of at least 0.
+    /// The noise density of the sensor is negative or not a number.
     Noise(f32),
     /// The assumed spindle speed is not a positive number.
     AssumedSpeed(Rpm),
@@ -77,7 +77,7 @@ impl core::fmt::Display for SettingsError {
 
 impl core::error::Error for SettingsError {}
 
-/// Checks the settings. Each condition states what must hold, because NaN fails every comparison.
+/// Checks the settings of the signal chain. Each condition states what must hold, because NaN fails every comparison.
 pub(super) fn check(settings: &Settings) -> Result<(), SettingsError> {
     let Settings {
         sensor,

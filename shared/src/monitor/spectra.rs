@@ -11,7 +11,7 @@ use crate::peaks::Rotation;
 use crate::spectrum::{PowerSpectrum, structure_spectrum, tool_spectrum};
 use crate::units::Hertz;
 
-/// Spectra are summed over all axes.
+/// Axes over which the power spectra are summed: all three.
 const AXES: [usize; 3] = [0, 1, 2];
 /// Frequency range of the tone search in the structure band.
 const STRUCTURE_TONES: (Hertz, Hertz) = (Hertz(5.0), STRUCTURE_BAND);
@@ -75,8 +75,8 @@ impl Monitor {
         }
     }
 
-    /// Spindle speed in revolutions per second, from a tone near the assumed tooth-passing frequency; `None` if no tone there is
-    /// strong enough.
+    /// Spindle speed in revolutions per second, from a tone of the spectrum near the assumed tooth-passing frequency;
+    /// `None` if no tone there is strong enough.
     fn speed_from_tone(&self, spectrum: &PowerSpectrum<'_>) -> Option<Hertz> {
         let assumed = self.settings.assumed_speed?.to_hertz().0 * f32::from(self.settings.tool.teeth);
         let reach = ASSUMED_SPEED_UNCERTAINTY * assumed + spectrum.bin.0;

@@ -15,28 +15,29 @@ use crate::tachometer::TachometerState;
 use crate::units::{Degrees, Hertz, Rpm};
 use crate::working_point::WorkingPoint;
 
-/// The state of the signal chain: everything learned from the blocks so far.
+/// The state of the signal chain: everything learned from the blocks of samples so far.
 #[derive(Clone, Debug)]
 pub struct State {
     pub(super) sample_clock: SampleClockState,
     pub(super) tachometer: TachometerState,
-    /// Number of lost locks of the tachometer up to the preceding block.
+    /// Number of times that the tachometer had lost its lock up to the preceding block.
     pub(super) losses: u32,
     pub(super) decimation: decimation::State,
     pub(super) structure: BandState<STRUCTURE_POINTS, STRUCTURE_BINS>,
     pub(super) tool: BandState<TOOL_POINTS, TOOL_BINS>,
     pub(super) tool_work: [i32; TOOL_POINTS],
     pub(super) work: [f32; STRUCTURE_POINTS],
-    /// Running mean of the share of samples that are clipped or lost.
+    /// Running mean over the blocks of the share of samples that are clipped or lost.
     pub(super) damage: f32,
-    /// Spindle speed estimated from the spectrum, in revolutions per second; `None` with a measured speed.
+    /// Spindle speed estimated from the spectrum, in revolutions per second; `None` if the tachometer measures the
+    /// speed.
     pub(super) tone_speed: Option<Hertz>,
     pub(super) detector: Detector,
     pub(super) advice: Option<Advised>,
     pub(super) strobes: Vec<Strobe, MAX_BLOCK_STROBES>,
 }
 
-/// The newest advice with the inputs from which it was computed.
+/// The newest advice, with the inputs from which it was computed and whose change requires a new one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Advised {
     pub(super) advice: Advice,
@@ -46,7 +47,7 @@ pub(super) struct Advised {
     pub(super) working_point: Option<WorkingPoint>,
     /// CRC-32 of the lobe table.
     pub(super) table: Option<u32>,
-    /// Feed direction of the cut, if it is set.
+    /// Feed direction of the cut for which the advice was computed, if it is set.
     pub(super) feed_direction: Option<Degrees>,
 }
 
@@ -76,7 +77,7 @@ impl State {
         }
     }
 
-    /// Resets to the initial state in place. A state is too large for the stack of a microcontroller.
+    /// Resets the signal chain to its initial state in place. A state is too large for the stack of a microcontroller.
     pub fn reset(&mut self) {
         let Self {
             sample_clock,
@@ -109,7 +110,7 @@ impl State {
         &self.strobes
     }
 
-    /// The newest spectrum of a band, summed over the axes; `None` before the first.
+    /// The newest power spectrum of a band, summed over the axes; `None` before the first.
     pub fn spectrum(&self, band: Band) -> Option<PowerSpectrum<'_>> {
         match band {
             Band::Structure => self.structure.spectrum(),
@@ -125,7 +126,7 @@ impl State {
         }
     }
 
-    /// The newest finding of the growth estimators, from the tooth periods of a band.
+    /// The newest finding of the estimators of vibration growth, from the tooth periods of a band.
     pub fn finding(&self, band: Band) -> &Finding {
         match band {
             Band::Structure => self.structure.growth.finding(),
@@ -133,12 +134,12 @@ impl State {
         }
     }
 
-    /// The sample clock: fitted rate, clipped and lost samples.
+    /// The sample clock of the accelerometer: fitted rate, clipped and lost samples.
     pub fn sample_clock(&self) -> &SampleClockState {
         &self.sample_clock
     }
 
-    /// The tachometer: speed per revolution, rejected and missing edges.
+    /// The tachometer estimator: speed per revolution, rejected and missing edges.
     pub fn tachometer(&self) -> &TachometerState {
         &self.tachometer
     }

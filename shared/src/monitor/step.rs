@@ -57,7 +57,8 @@ impl Monitor {
         }
     }
 
-    /// Updates the sample clock with a block. After lost samples, resets filters, spectra and the detector's history.
+    /// Updates the sample clock with a block. After lost samples, resets filters, spectra and the history of the
+    /// chatter detector.
     fn take_block(&self, state: &mut State, block: &Block) {
         let lost = match self.sample_clock.observe(&mut state.sample_clock, block) {
             Continuity::Contiguous => 0,

@@ -17,10 +17,11 @@ pub struct Strobe {
     pub meters_per_second2: [f32; 3],
 }
 
-/// Largest number of [`Strobe`]s from one block.
+/// Largest number of points of the stroboscopic map ([`Strobe`]) from one block.
 pub const MAX_BLOCK_STROBES: usize = 32;
 
-/// Appends the acceleration at the first slot of a tooth period to the stroboscopic map.
+/// Appends a point to the stroboscopic map: the acceleration at the first of the fixed spindle angles of a tooth
+/// period.
 pub(super) fn show(strobes: &mut Vec<Strobe, MAX_BLOCK_STROBES>, band: Band, passed: &Passed) {
     let [x, y, z, ..] = passed.passing;
     let strobe = Strobe {
@@ -28,6 +29,6 @@ pub(super) fn show(strobes: &mut Vec<Strobe, MAX_BLOCK_STROBES>, band: Band, pas
         tooth: passed.tooth as u32,
         meters_per_second2: [x, y, z],
     };
-    // The map of one block has fewer points than its capacity.
+    // The push cannot fail: the map of one block has fewer points than its capacity.
     let _ = strobes.push(strobe);
 }

@@ -14,7 +14,8 @@ use crate::units::Rpm;
 use crate::working_point::WorkingPoint;
 
 impl Monitor {
-    /// Passes all findings, spectra and tones to the detector. Returns its verdict.
+    /// Passes the findings on growth, the spectra and the tones of both bands to the chatter detector. Returns its
+    /// verdict.
     pub(super) fn judge(&self, state: &mut State, speed: Option<Rpm>) -> Judgement {
         let change = state.tachometer.change_per_turn().unwrap_or(0.0);
         let sampled = self.tachometer.is_some();
@@ -38,7 +39,8 @@ impl Monitor {
         state.detector.step(&evidence)
     }
 
-    /// Returns the previous advice, or computes it again if one of its inputs has changed.
+    /// Returns the previous advice, or computes it again if the verdict, the speed or another of its inputs has
+    /// changed.
     pub(super) fn advise(
         &self,
         state: &mut State,

@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use super::version::VERSION;
 use crate::checksum::crc32;
 
-/// Largest length of a body, in bytes.
+/// Largest length of the body of a frame, in bytes.
 pub const MAX_BODY: usize = 512;
 
 const HEADER: usize = 3;
@@ -27,33 +27,33 @@ const MAX_RAW: usize = HEADER + MAX_BODY + CRC;
 /// Largest length of a frame on the wire, in bytes, with the closing zero: COBS adds one byte per 254.
 pub const MAX_FRAME: usize = MAX_RAW + MAX_RAW / 254 + 1 + 1;
 
-/// A message: a type that is sent as the body of a frame.
+/// A message: a type that can be sent as the body of a frame.
 pub trait Message: Serialize + DeserializeOwned {
-    /// Number of variants. The first byte of the body is the index of the variant.
+    /// Number of variants of the message type. The first byte of the body is the index of the variant.
     const VARIANTS: u8;
 }
 
-/// The reason why a frame is refused.
+/// The reason why a received frame is refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum FrameError {
-    /// More bytes than a frame may have, without a closing zero.
+    /// More bytes arrived than a frame may have, without a closing zero.
     TooLong {
         /// Largest length of a frame before COBS, in bytes.
         limit: u16,
     },
     /// The bytes are not valid COBS (consistent overhead byte stuffing).
     Cobs,
-    /// Fewer bytes than the version, the sequence number, a body of one byte and the CRC take.
+    /// The frame has fewer bytes than the version, the sequence number, a body of one byte and the CRC take.
     TooShort {
         /// Bytes found.
         found: u8,
     },
-    /// The CRC does not match: bytes were changed on the line.
+    /// The CRC-32 of the frame does not match: bytes were changed on the line.
     Crc {
         /// The CRC in the frame.
         frame: u32,
-        /// The CRC of the bytes found.
+        /// The CRC-32 computed from the bytes of the frame.
         computed: u32,
     },
     /// The frame has another protocol version.
@@ -68,7 +68,7 @@ pub enum FrameError {
         /// The number of the variant.
         variant: u8,
     },
-    /// The body is not a valid message of this variant.
+    /// The body of the frame is not a valid message of the variant that its first byte names.
     Body {
         /// The number of the variant.
         variant: u8,
@@ -119,7 +119,7 @@ impl core::fmt::Display for FrameError {
 
 impl core::error::Error for FrameError {}
 
-/// Number of frames refused with each [`FrameError`].
+/// Number of refused frames, counted for each kind of [`FrameError`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct FrameErrors {
@@ -218,7 +218,8 @@ impl Frame<'_> {
     /// Decodes the message in the frame.
     ///
     /// # Errors
-    /// [`FrameError::UnknownMessage`], [`FrameError::Body`] and [`FrameError::TrailingBytes`].
+    /// [`FrameError::UnknownMessage`], [`FrameError::Body`] or [`FrameError::TrailingBytes`] if the body is not exactly
+    /// one message.
     pub fn message<M: Message>(&self) -> Result<M, FrameError> {
         let variant = self.body.first().copied().unwrap_or_default();
         if variant >= M::VARIANTS {
@@ -263,7 +264,7 @@ impl Decoder {
         }
     }
 
-    /// Takes a byte. At the end of a frame it returns the frame, or the reason why the frame is refused.
+    /// Takes a byte from the line. At the end of a frame it returns the frame, or the reason why the frame is refused.
     pub fn push(&mut self, byte: u8) -> Option<Result<Frame<'_>, FrameError>> {
         if self.is_skipping {
             self.is_skipping = byte != 0;
@@ -291,7 +292,8 @@ impl Decoder {
             },
             Ok(DecodeResult::DataComplete) => Some(open(self.raw.get(..self.length).unwrap_or_default())),
             Err(_) => {
-                // The error is a zero byte within a frame. The COBS decoder is idle again, so the next byte begins a frame.
+                // The decoder found a zero byte within a frame. The COBS decoder is idle again, so the next byte begins
+                // a new frame.
                 Some(Err(FrameError::Cobs))
             }
         }
@@ -331,12 +333,12 @@ pub struct Sequence {
 }
 
 impl Sequence {
-    /// A sequence whose next frame has the number `next`.
+    /// The sequence numbers of frames whose next frame has the number `next`.
     pub const fn from(next: u16) -> Self {
         Self { due: Some(next) }
     }
 
-    /// The number of the next frame to send; 0 for the first.
+    /// Returns the sequence number of the next frame to send; 0 for the first.
     pub fn take(&mut self) -> u16 {
         let number = self.due.unwrap_or_default();
         self.due = Some(number.wrapping_add(1));

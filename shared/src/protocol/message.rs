@@ -12,24 +12,24 @@ use crate::tachometer::Edge;
 use crate::units::{Degrees, Hertz, Millimeters, Nanoseconds, Rpm};
 use crate::working_point::{Limits, WorkingPoint};
 
-/// Largest number of table bytes in one [`Request::UploadChunk`].
+/// Largest number of bytes of a lobe table in one [`Request::UploadChunk`].
 pub const MAX_CHUNK: usize = 256;
 /// Largest number of tachometer edges in one [`Feed`]; further edges precede it in [`Request::FeedEdges`].
 pub const MAX_FEED_EDGES: usize = 8;
 /// Largest number of tachometer edges in one [`Request::FeedEdges`].
 pub const MAX_EDGES: usize = 32;
-/// Largest number of tachometer edges that a device holds for one block.
+/// Largest number of tachometer edges that a device holds for one block of fed samples.
 pub const MAX_BLOCK_EDGES: usize = 128;
-/// Largest number of bins in one [`SpectrumChunk`].
+/// Largest number of spectrum bins in one [`SpectrumChunk`].
 pub const MAX_CHUNK_BINS: usize = 96;
-/// Largest number of points in one [`StrobeChunk`].
+/// Largest number of points of the stroboscopic map in one [`StrobeChunk`].
 pub const MAX_CHUNK_STROBES: usize = 16;
 /// Number of table slots of a device: places in its flash that hold one lobe table each.
 pub const SLOTS: usize = 2;
 
-/// A request of the host. Each gets one [`Reply`].
+/// A request of the host to the device. The device answers each with one [`Reply`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-// The buffers of the link have the size of the largest variant. Boxing its fields would need an allocator.
+// The buffers of the link have the size of the largest request anyway, and boxing its fields would need an allocator.
 #[allow(clippy::large_enum_variant)]
 pub enum Request {
     /// Begins a session and restarts the sequence numbers. Reply: [`Reply::Info`].
@@ -42,37 +42,38 @@ pub enum Request {
     Settings,
     /// Configures the signal chain and resets its state.
     SetSettings(Settings),
-    /// Sets the working point; `None` if it is unknown.
+    /// Sets the working point (depth, immersion, feed, posture) of the cut; `None` if it is unknown.
     SetWorkingPoint(Option<WorkingPoint>),
     /// Selects the messages that the device sends without a request. After [`Hello`](Self::Hello) there are none.
     Subscribe(Subscription),
-    /// Begins or resumes the upload of the table with this file header. Reply: [`Reply::Upload`] with the offset of the next chunk. A
-    /// device keeps the part of the same table that it already holds.
+    /// Begins or resumes the upload of the lobe table with this file header. Reply: [`Reply::Upload`] with the offset
+    /// of the next chunk. A device keeps the part of the same table that it already holds.
     UploadBegin(Header),
-    /// A chunk of the table. Reply: [`Reply::Upload`].
+    /// Sends a chunk of the lobe table. Reply: [`Reply::Upload`].
     UploadChunk {
-        /// Offset in bytes from the start of the file; it must be the next one expected.
+        /// Offset of the chunk in bytes from the start of the lobe table; it must be the next one expected.
         offset: u32,
-        /// The bytes of the chunk, at least 1.
+        /// The bytes of the chunk of the lobe table, at least 1.
         data: Vec<u8, MAX_CHUNK>,
     },
-    /// Requests the progress of the upload, also after a restart of the device. Reply: [`Reply::Upload`].
+    /// Requests the progress of the upload of a lobe table, also after a restart of the device. Reply:
+    /// [`Reply::Upload`].
     UploadQuery,
-    /// Ends the upload: the device checks the table and uses it from now on.
+    /// Ends the upload: the device checks the lobe table and uses it from now on.
     UploadCommit,
     /// Aborts the upload.
     UploadAbort,
-    /// A block of samples that replaces those of the sensor. The reply comes after the block is processed: reports, spectra and strobes
-    /// of the block are sent before it.
+    /// A block of acceleration samples that the device processes instead of those of its sensor. The reply comes after
+    /// the block is processed: reports, spectra and strobes of the block are sent before it.
     Feed(Feed),
     /// Tachometer edges that precede those of the next [`Feed`], in order of time.
     FeedEdges(Vec<Edge, MAX_EDGES>),
-    /// Resets the signal chain and processes blocks of the sensor again.
+    /// Resets the signal chain and makes the device process blocks of its own sensor again.
     Reset,
-    /// Sets the feed direction, from the machine's x axis towards its y axis; `None` if it is unknown. Tables with layers per feed
-    /// direction require it.
+    /// Sets the feed direction of the cut, from the machine's x axis towards its y axis; `None` if it is unknown. Lobe
+    /// tables with layers for several feed directions require it.
     SetFeedDirection(Option<Degrees>),
-    /// Requests the feed direction that is set. Reply: [`Reply::FeedDirection`].
+    /// Requests the feed direction that is set on the device. Reply: [`Reply::FeedDirection`].
     FeedDirection,
 }
 
@@ -91,9 +92,9 @@ pub enum Response {
         /// The reply to that request.
         reply: Reply,
     },
-    /// A frame was unreadable, or did not have the expected sequence number.
+    /// A frame of the host was unreadable, or did not have the expected sequence number.
     FrameRefused(FrameError),
-    /// The report of the signal chain on a block.
+    /// The report of the signal chain on a block of samples.
     Report(Report),
     /// A chunk of a spectrum.
     Spectrum(SpectrumChunk),
@@ -121,11 +122,11 @@ pub enum Reply {
     Settings(Settings),
     /// Progress of the upload.
     Upload(Upload),
-    /// The feed direction that is set.
+    /// The feed direction that is set on the device; `None` if none is set.
     FeedDirection(Option<Degrees>),
 }
 
-/// The reason why a request is refused.
+/// The reason why the device refuses a request.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Refusal {
     /// [`Request::Hello`] must come first.
@@ -134,18 +135,18 @@ pub enum Refusal {
     Settings(SettingsError),
     /// The working point is invalid: depth and feed must be numbers of at least 0, the entry angle below the exit angle.
     WorkingPoint(WorkingPoint),
-    /// The table or its header is invalid.
+    /// The lobe table or its header is invalid.
     Table(TableError),
     /// The lobe table does not fit into a table slot of the device's flash.
     TableTooLong {
         /// Its length in bytes.
         length: u32,
-        /// Capacity of a table slot in bytes.
+        /// Capacity of a flash slot for a lobe table, in bytes.
         capacity: u32,
     },
-    /// There is no upload to continue.
+    /// There is no upload of a lobe table to continue.
     NoUpload,
-    /// The chunk is not the expected one, or extends beyond the end of the table.
+    /// The chunk is not the next one of the lobe table, or extends beyond its end.
     ChunkOffset {
         /// The expected offset.
         expected: u32,
@@ -163,7 +164,7 @@ pub enum Refusal {
     },
     /// Erasing, writing or reading back the flash memory failed.
     Flash,
-    /// More tachometer edges than the device can hold for one block.
+    /// The host sent more tachometer edges than the device can hold for one block.
     TooManyEdges {
         /// Largest number of edges.
         limit: u16,
@@ -231,24 +232,24 @@ pub struct Info {
     pub firmware: String<16>,
     /// The accelerometer of the board; `None` if the host feeds the samples.
     pub sensor: Option<Sensor>,
-    /// Largest length of a table in bytes.
+    /// Largest length of a lobe table that fits into a slot, in bytes.
     pub slot_capacity: u32,
-    /// The slots of the flash for lobe tables.
+    /// State of the flash slots for lobe tables.
     pub slots: [Slot; SLOTS],
     /// The table in use.
     pub table: Option<TableSummary>,
 }
 
-/// Content of a table slot of the device's flash.
+/// Content of a slot in the device's flash for a lobe table.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Slot {
     /// The slot is empty.
     Empty,
-    /// An incomplete upload, with its progress.
+    /// The slot holds an incomplete upload, with its progress.
     Unfinished(Upload),
-    /// Bytes that are not a valid table.
+    /// The slot holds bytes that are not a valid lobe table, for the given reason.
     Damaged(TableError),
-    /// A valid table that is not in use.
+    /// The slot holds a valid lobe table that is not in use.
     Valid(Header),
     /// The table in use.
     InUse(Header),
@@ -259,9 +260,9 @@ pub enum Slot {
 pub struct TableSummary {
     /// Name of the case.
     pub name: String<NAME_CAPACITY>,
-    /// Number of teeth of the tool.
+    /// Number of teeth of the tool for which the lobe table was computed.
     pub teeth: u8,
-    /// Speed limits of the machine, if the case has any.
+    /// Speed limits of the machine that the lobe table states, if it has any.
     pub limits: Option<Limits>,
     /// Number of speeds.
     pub speeds: u16,
@@ -302,32 +303,32 @@ pub struct Status {
     pub uptime: Nanoseconds,
     /// Blocks processed since the start.
     pub blocks: u32,
-    /// Clipped samples since the signal chain was configured or reset.
+    /// Number of clipped samples since the signal chain was configured or reset.
     pub clipped: u32,
-    /// Lost samples since the signal chain was configured or reset.
+    /// Number of lost samples since the signal chain was configured or reset.
     pub lost: u32,
-    /// True if the samples come from the host, false if they come from the sensor.
+    /// True if the processed samples come from the host, false if they come from the device's sensor.
     pub is_fed: bool,
-    /// The working point of the cut, if it is set.
+    /// The working point of the cut that is set on the device, if any.
     pub working_point: Option<WorkingPoint>,
-    /// The messages that are sent without a request.
+    /// The messages that the device sends without a request.
     pub subscription: Subscription,
     /// Frames received.
     pub frames: u32,
     /// Refused frames.
     pub frame_errors: FrameErrors,
-    /// Reports, spectra and strobes dropped because the line is too slow.
+    /// Number of reports, spectra and stroboscopic points that were dropped because the line is too slow.
     pub dropped: u32,
 }
 
-/// The reports that are sent without a request.
+/// The reports that the device sends without a request.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Reports {
     /// No reports.
     #[default]
     None,
-    /// Reports whose verdict, reason or advice differs from the preceding one.
+    /// Only the reports whose verdict, reason or advice differs from the preceding one.
     Changes,
     /// All reports.
     All,
@@ -339,23 +340,23 @@ pub enum Reports {
 pub struct Subscription {
     /// The reports to send.
     pub reports: Reports,
-    /// True to send each new spectrum.
+    /// True to send each new spectrum of the bands.
     pub spectra: bool,
-    /// True to send the points of the stroboscopic map.
+    /// True to send the points of the stroboscopic map of each block.
     pub strobes: bool,
 }
 
-/// Progress of the upload of a table.
+/// Progress of the upload of a lobe table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Upload {
     /// Header of the file.
     pub header: Header,
-    /// Bytes received from the start of the file, its header included: the offset of the next chunk.
+    /// Number of bytes received from the start of the lobe table, its header included: the offset of the next chunk.
     pub received: u32,
 }
 
-/// A block of samples from the host.
+/// A block of acceleration samples that the host feeds to the device.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Feed {
     sequence: u32,
@@ -365,12 +366,13 @@ pub struct Feed {
     /// Counts of x, y and z as six bytes per sample, little-endian. With the variable-length integers of postcard, a block of
     /// large counts would exceed the frame.
     counts: Vec<[u8; 6], MAX_BLOCK_SAMPLES>,
-    /// Tachometer edges up to the end of the block, in order of time. They follow those of [`Request::FeedEdges`].
+    /// Tachometer edges from the host up to the end of the block, in order of time. They follow those of
+    /// [`Request::FeedEdges`].
     pub edges: Vec<Edge, MAX_FEED_EDGES>,
 }
 
 impl Feed {
-    /// The message that feeds this block with these tachometer edges.
+    /// The message that feeds the samples of `block` with the tachometer edges `edges` to the device.
     pub fn new(block: &Block, edges: Vec<Edge, MAX_FEED_EDGES>) -> Self {
         Self {
             sequence: block.sequence,
@@ -418,7 +420,7 @@ pub struct SpectrumChunk {
     pub bin: Hertz,
     /// Number of bins of the whole spectrum.
     pub bins: u16,
-    /// Index of the first bin in this chunk.
+    /// Index of the first spectrum bin in this chunk.
     pub first: u16,
     /// Power per bin, in (m/s²)².
     pub power: Vec<f32, MAX_CHUNK_BINS>,
