@@ -37,7 +37,7 @@ pub struct HammerWindows {
     /// Time constant τ of the exponential window on force and response, s; `None` for no window.
     ///
     /// With e^{−t/τ} on both signals the FRF is exactly H(iω + 1/τ): every pole λ moves to λ − 1/τ. [`measure`](crate::measure)
-    /// takes this damping off again.
+    /// removes the damping that the window adds.
     pub exponential_s: Option<f64>,
 }
 

@@ -36,7 +36,7 @@ pub enum RationalFitError {
     /// The least-squares equations have no computable singular values.
     #[error(transparent)]
     Equations(#[from] SingularValueError),
-    /// The list of mode numbers to try is empty.
+    /// The list of the numbers of modes to try is empty.
     #[error("no model order is tried")]
     NoOrder,
     /// The poles cannot be computed.

@@ -108,7 +108,7 @@ pub fn binomial_interval(share: f64, hits: usize, trials: usize) -> [f64; 2] {
     [low, high]
 }
 
-/// Median of values, whose order it changes: the value in the middle of their order, for an even number the upper of the two.
+/// Median of `values`, which the call reorders; for an even number of values, the upper of the two in the middle.
 /// `None` without values.
 pub fn median(values: &mut [f64]) -> Option<f64> {
     let middle = values.len() / 2;

@@ -384,8 +384,8 @@ fn is_due_to_quadratic_spring(points: &[DwellStiffness], dwells: &[Dwell]) -> bo
         .iter()
         .filter_map(|dwell| {
             let (_, motion) = pair(dwell)?;
-            // Ratio X₂/X of the second harmonic of the displacement to its fundamental: each differentiation in the
-            // measured quantity has multiplied it by 2.
+            // Ratio X₂/X of the second harmonic of the displacement to its fundamental. In a velocity or an acceleration
+            // the ratio is larger by the factor 2 for each differentiation.
             let larger = f64::from(1 << derivative(motion.quantity));
             let share = at_harmonic(motion, dwell, 2)?.0 / motion.amplitude(1) / larger;
             let size = motion.amplitude(1) / dwell.omega.powi(i32::from(derivative(motion.quantity)));
