@@ -2,7 +2,7 @@
 //!
 //! They stand at the root of the crate, because checks of records, fits and the selection of a candidate model use them alike. A number
 //! without a derivation and without a campaign behind it is marked "Unfounded". Step sizes, grids and limits of iterations decide nothing
-//! about a record and stay beside the code that uses them. Thresholds of the fit of cuts in closed loop stand beside that code.
+//! about a record and stay beside the code that uses them.
 
 use std::ops::RangeInclusive;
 
@@ -150,6 +150,50 @@ pub(crate) const GROWTH_FROM_REST: f64 = 2.0;
 /// Fewest revolutions of full engagement with which a cut is diagnosed. Unfounded.
 pub(crate) const LEAST_ENGAGED_REVOLUTIONS: f64 = 8.0;
 
+/// Share of the power of a channel of motion that lies within the band of the motion. Its upper end sets the highest frequency of a
+/// record, to which delays and shapes of effects are scaled. Unfounded.
+pub(crate) const MOTION_BAND_SHARE: f64 = 0.995;
+
+/// Smallest inverse modal mass along an axis with which a mode counts as excited along that axis, as a share of the largest inverse modal
+/// mass there. Unfounded.
+pub(crate) const LEAST_INVERSE_MASS_SHARE: f64 = 1e-3;
+
+// Physical parameters of candidates
+
+/// Largest distance from 1 of the fitted coefficient of axial depth modulation b = b₀ − z at which the effect is accepted. The right
+/// equation gives 1, within the error of the other parameters; the distance is unfounded.
+pub(crate) const AXIAL_DEPTH_COEFFICIENT_ERROR: f64 = 0.35;
+
+/// Largest distance from 1 of the fitted coefficient of the speed modulation at which the records confirm the modulation in the tachometer
+/// signal. It is half the way to 0, the coefficient of records without the modulation.
+pub(crate) const SPEED_MODULATION_COEFFICIENT_ERROR: f64 = 0.5;
+
+/// Largest accepted share 1 − 1/g of a sensor gain g, which is a gain of 50. A reading with a larger gain would hardly contain the true
+/// value. Unfounded.
+pub(crate) const LARGEST_GAIN_SHARE: f64 = 0.98;
+
+/// Smallest accepted gain of a force sensor: the inverse of the largest gain of 50 of other sensors (`LARGEST_GAIN_SHARE`). Unfounded.
+pub(crate) const LEAST_FORCE_GAIN: f64 = 0.02;
+
+/// Largest ratio, and inverse of the smallest ratio, of the fitted sensor delay to the delay for which its regressor was computed. Beyond it
+/// the fit does not describe a delay. Unfounded.
+pub(crate) const ANOTHER_DELAY: f64 = 100.0;
+
+/// Smallest response of a mode along the sensor's axis with which the mode has a sensor-to-tool-tip ratio of its own, as a share of the
+/// largest modal response there. It lies far above rounding and below the noise of every sensor (`LEAST_RELATIVE_NOISE`). Unfounded between.
+pub(crate) const LEAST_RESPONSE_WITH_RATIO: f64 = 1e-6;
+
+/// Largest fitted share of a spring that acts through a gap. A share cannot exceed 1; the tolerance of 2 % for the scatter of the fit is
+/// unfounded.
+pub(crate) const LARGEST_SPRING_SHARE: f64 = 1.02;
+
+/// Smallest and largest change from 1 of the exponent of a chip law F ∝ h^p: exponents from 0.2 to 2. Published exponents lie between 0.5 and
+/// 1 (Kienzle: 1 − m_c with m_c up to 0.5). The margins are unfounded.
+pub(crate) const CHIP_EXPONENT_CHANGE: [f64; 2] = [-0.8, 1.0];
+
+/// Smallest relative change of a mass, damping constant or stiffness. At −1 the parameter vanishes; the distance of 5 % is unfounded.
+pub(crate) const LEAST_RELATIVE_CHANGE: f64 = -0.95;
+
 // Fits
 
 /// Largest difference between the motion of a cut and its closed-loop prediction, in standard deviations of the noise, at which their
@@ -163,6 +207,22 @@ pub(crate) const SEARCH_SETTLED: f64 = 0.1;
 /// Excess of a candidate model's χ² over that of the best rival at which its prediction-error search is given up. A candidate model is not
 /// selected if its χ² is 16 (`EQUIVALENT`) larger; the linear prediction of a search errs by a multiple of that. Unfounded.
 pub(crate) const HOPELESS_LAG: f64 = 300.0;
+
+/// Share of its lag in χ² behind the best rival that a step of a prediction-error search may leave; a search whose step leaves more is
+/// given up, since it will not catch up. Unfounded.
+pub(crate) const SLOW_CATCHING_UP: f64 = 0.6;
+
+/// Share of the present χ² that the linearized model may leave in the next step of a search that lags behind the best rival; the search is
+/// given up if it leaves more. Unfounded.
+pub(crate) const HOPELESS_PREDICTED_SHARE: f64 = 0.5;
+
+/// Smallest decrease of χ² that the linear fit of the extended case must predict for a further prediction of the cuts: half of what chance
+/// lets one parameter gain on average, which is 1.
+pub(crate) const RELINEARIZATION_SETTLED: f64 = 0.5;
+
+/// Addition to `HOPELESS_LAG` for the first prediction of the cuts, as a share of the best rival's χ². The first prediction follows the
+/// measured motion, whose noise adds to χ². Unfounded.
+pub(crate) const FIRST_PREDICTION_LAG: f64 = 0.1;
 
 /// χ² of a simulated candidate model at the start of its search, over the χ² of its linear regression plus the number of compared values,
 /// above which the search first fits the beginning of each record alone. Unfounded.
@@ -198,6 +258,29 @@ pub(crate) const LEAST_GAIN: f64 = 20.0;
 /// is normal with mean d² and standard deviation 2d: the wrong model leads by 16 with a probability of at most Φ(−√16) = 3e-5 at any d, the
 /// four standard deviations of `CHANCE`.
 pub(crate) const EQUIVALENT: f64 = 16.0;
+
+/// χ² of a candidate model, per compared value or over that of another candidate model, below which it explains the records nearly as well:
+/// it may still be the simpler truth. Unfounded.
+pub(crate) const NEARLY_EXPLAINED: f64 = 1.5;
+
+/// χ² of a candidate model's regression along the measured motion, over the χ² of a rival that explains the records, above which the
+/// candidate model is not simulated. Unfounded.
+pub(crate) const REGRESSION_FAR_BEHIND: f64 = 6.0;
+
+/// The same ratio as `REGRESSION_FAR_BEHIND` for a candidate model with fewer parameters than the rival. It may be the truth that the rival
+/// contains. Unfounded.
+pub(crate) const REGRESSION_FAR_BEHIND_SIMPLER: f64 = 30.0 * REGRESSION_FAR_BEHIND;
+
+/// Number of simulated candidate models, by gain, whose parameters are refined by predicting the records again. Unfounded.
+pub(crate) const MOST_REFINED: usize = 4;
+
+/// Numbers of candidate models that are simulated because one more cause explains most of the residual of a simulated model with one cause
+/// less: of the best such model, and of the second. Unfounded.
+pub(crate) const MOST_EXTENDED: [usize; 2] = [6, 3];
+
+/// Number of candidate models that are simulated because they fit best about the baseline that the best model with one cause less extends.
+/// Unfounded.
+pub(crate) const MOST_REBASELINED: usize = 4;
 
 /// Share of the baseline's residual energy that the right candidate model leaves along the measured motion, because sampling hides the
 /// motion between samples. Unfounded.

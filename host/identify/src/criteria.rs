@@ -68,6 +68,10 @@ pub(crate) const SAME_POLE_SHAPE: f64 = 0.9;
 /// mode. Unfounded.
 pub(crate) const LEAST_HEIGHT: f64 = 3e-3;
 
+/// Fewest frequency lines per receptance from which the correlation between the residuals of receptances is estimated.
+/// With fewer, the estimate is too inaccurate for weights. Unfounded.
+pub(crate) const LINES_PER_RECEPTANCE: usize = 6;
+
 // Modes from whole records
 
 /// Largest number of frequency lines of all records together in a modal fit to whole records: a fit of more takes
@@ -127,6 +131,14 @@ pub(crate) const STEADY_DEVIATIONS: f64 = 4.0;
 /// noise are too narrow by √1.3 = 1.14, and a sandwich from 30 dwells scatters by as much, 1/√58 = 13 %: below, it
 /// gains nothing. Unfounded for other numbers of dwells.
 pub(crate) const LARGEST_MISFIT: f64 = 1.3;
+
+/// Largest receptance of a point that is paired with a point on the other side of the resonance peak, relative to the
+/// peak. Two points at the peak have nearly one frequency and phase, so that noise determines their damping. Unfounded.
+pub(crate) const LARGEST_PAIRED_RECEPTANCE: f64 = 0.98;
+
+/// Share of the force power that lies within the band of a fit to the periods of a multisine. The motion is measured
+/// and integrated within that band. Unfounded.
+pub(crate) const FORCE_BAND_SHARE: f64 = 0.99;
 
 /// Fewest force levels at a frequency for higher-order FRF: H₁, H₃ and H₅ are three unknowns.
 pub(crate) const LEAST_LEVELS: usize = 3;
@@ -195,6 +207,10 @@ pub(crate) const KIND_EVIDENCE: f64 = 25.0;
 /// effect, which is 1 % in squares.
 pub(crate) const EXPLAINED_SHARE: f64 = 0.01;
 
+/// Smoothed power of a sweep's force, relative to its maximum, above which a frequency lies within the sweep. Unfounded:
+/// −10 dB.
+pub(crate) const SWEPT_POWER_SHARE: f64 = 0.1;
+
 /// Fewest independent receptance estimates in the common band of two sweeps that are compared. Unfounded.
 pub(crate) const LEAST_SWEEP_ESTIMATES: f64 = 10.0;
 
@@ -229,6 +245,12 @@ pub(crate) const LEAST_REVOLUTIONS: usize = 4;
 /// Mean force of a revolution, relative to the mean force in full engagement, above which the tool is fully engaged.
 /// Unfounded.
 pub(crate) const ENGAGED_SHARE: f64 = 0.9;
+
+/// Largest length of the last Gauss–Newton step with which the fit of force coefficients is accepted, in standard
+/// deviations of the parameters. Chips at the edge of contact may change with every step. The parameters then lie
+/// within 0.3 of a standard deviation of a minimum, which adds 4 % to their mean error (√(1 + 0.3²)); the share is
+/// unfounded.
+pub(crate) const LARGEST_LAST_STEP: f64 = 0.3;
 
 /// Relative difference of the feeds per tooth of two cutting tests up to which they count as one feed. Unfounded.
 pub(crate) const SAME_FEED: f64 = 0.02;
@@ -290,6 +312,10 @@ pub(crate) const LINEARIZATION_ERROR: f64 = 0.1;
 /// value: relative change, the usual 1 % of stabilization diagrams. Second value: in standard deviations, which chance
 /// exceeds in 0.3 % of cases.
 pub(crate) const SAME_MODE: (f64, f64) = (0.01, 3.0);
+
+/// Smallest and largest number of blocks into which an ambient record is divided. The smallest number gives the
+/// covariance of the modes eleven degrees of freedom. Unfounded.
+pub(crate) const AMBIENT_BLOCKS: [usize; 2] = [12, 40];
 
 /// Largest damping ratio of a mode from ambient vibration: a pole that decays faster describes the spectrum of the excitation.
 /// Unfounded.

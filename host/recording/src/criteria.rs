@@ -3,15 +3,15 @@
 use super::unit::Quantity;
 
 /// Largest deviation of a time stamp from even sampling, in sample intervals. It allows for stamps printed with few digits, and detects a
-/// missing sample (deviation 1). The value is a choice between the two.
+/// missing sample (deviation 1). The value between the two is unfounded.
 pub(crate) const UNEVEN: f64 = 0.25;
 
-/// Tolerance when a start or end time selects a sample, in sample intervals. It absorbs the rounding of printed times. The value is a
-/// choice, far below one interval.
+/// Tolerance when a start or end time selects a sample, in sample intervals. It absorbs the rounding of printed times. The value lies
+/// far below one interval; it is unfounded.
 pub(crate) const SAME_SAMPLE: f64 = 1e-3;
 
-/// Smallest change of the tachometer level that counts as an edge, as a fraction of its range over the recording. A choice, above the noise
-/// of usual sensors.
+/// Smallest change of the tachometer level that counts as an edge, as a fraction of its range over the recording. It lies above the noise
+/// of usual sensors. Unfounded.
 pub(crate) const LEAST_SWING: f64 = 0.02;
 
 /// Number of equal samples in a row at the largest or smallest value that counts as clipping. Two equal samples at a peak occur in unclipped
@@ -30,11 +30,11 @@ pub(crate) const DROPOUT_RUN: usize = 32;
 pub(crate) const AT_REST: f64 = 0.2;
 
 /// Largest correlation error, 1 − r, at which acceleration from one channel and acceleration from another channel are the same motion. With
-/// r² the share of common energy, 0.98 leaves 4 % to noise and to the distance between the sensors. A choice.
+/// r² the share of common energy, 0.98 leaves 4 % to noise and to the distance between the sensors. Unfounded.
 pub(crate) const SAME_MOTION: f64 = 0.02;
 
 /// Largest relative distance of an amplitude ratio from a factor of units (9.80665, 1000, 10⁶) at which the unit is called wrong. Calibration
-/// errors of accelerometers are below 5 %. Data sheets state 5 to 10 % for industrial sensors; 5 % is a choice.
+/// errors of accelerometers are below 5 %. Data sheets state 5 to 10 % for industrial sensors; 5 % is unfounded.
 pub(crate) const UNIT_FACTOR: f64 = 0.05;
 
 /// Range of peak values, SI, that sensors on machine tools measure; `None` for quantities without a bound. A peak outside suggests a unit that
@@ -54,7 +54,7 @@ pub(crate) fn plausible_peak(quantity: Quantity) -> Option<(f64, f64)> {
 }
 
 /// Lowest sample rate, samples per second, at which a time column without unit is taken for seconds without a warning. Milliseconds read as
-/// seconds give a rate that is a thousandth: below 50 for loggers of up to 50 kHz. Tests of machine tools are sampled faster than that. A choice.
+/// seconds give a rate that is a thousandth: below 50 for loggers of up to 50 kHz. Tests of machine tools are sampled faster than that. Unfounded.
 pub(crate) const LOWEST_RATE: f64 = 50.0;
 
 /// Largest difference of the levels between pulses, as a fraction of the range of the level, at which the base line of the tachometer is

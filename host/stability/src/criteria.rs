@@ -208,6 +208,17 @@ pub(crate) const PERCENTILE_SETTLED: f64 = 7e-3;
 /// standard deviations of the case are refused. Unfounded.
 pub(crate) const IMPOSSIBLE_MAX: f64 = 0.2;
 
+/// Depth down to which the limit of a drawn machine is searched first, as a multiple of the limit predicted from
+/// derivatives. A machine whose limit lies deeper is searched over the whole depth. Unfounded.
+pub(crate) const SEARCHED_BEYOND: f64 = 1.2;
+
+/// Least predicted limit of a drawn machine in the first search, as a share of the nominal limit. Unfounded.
+pub(crate) const SHALLOWEST_SEARCH: f64 = 0.25;
+
+/// Depth of the first search for a drawn machine's limit, as a share of the whole depth, from which on the whole depth is
+/// searched at once. Unfounded.
+pub(crate) const WORTH_SEARCHING_NEAR: f64 = 0.7;
+
 /// Number of batches of 64 machines for the probability that a cell is stable: 256 machines, whose share has a standard
 /// error of √(0.25/256) = 3 % at most.
 pub(crate) const BATCHES_OF_CELLS: u32 = 4;
@@ -274,6 +285,18 @@ pub(crate) const ROOT_LINES: [f64; 14] = [
 /// Smallest locus, as a share of the inverse axial depth 1/w, that is traced along a line Re s = σ to predict roots
 /// away from the line. Unfounded.
 pub(crate) const LOCUS_REACH: f64 = 0.05;
+
+/// Range of the real part of the position, on the chord between two samples of a locus, at which the chord predicts a
+/// root: 0 at the one sample, 1 at the other. A chord predicts poorly far beyond its ends. Unfounded.
+pub(crate) const PREDICTED_BETWEEN: std::ops::RangeInclusive<f64> = -0.6..=1.6;
+
+/// Largest distance of a predicted root from the line Re s = σ, as a multiple of the frequency interval plus the slowest
+/// decay rate. Unfounded.
+pub(crate) const PREDICTED_DISTANCE: f64 = 20.0;
+
+/// Distance of a predicted root to the left of the rightmost root found, in slowest decay rates, beyond which it is not
+/// computed. The distance of that root from the line Re s = σ is added. Unfounded.
+pub(crate) const PREDICTED_LAG: f64 = 3.0;
 
 /// Factor on [`LOCUS_BEND`] for the zeroth-order approximation. With a tenth the phase mismatch ωτ − π + 2 arg(1/λ)
 /// changes monotonically between two frequency samples, except where lobes touch. Unfounded.

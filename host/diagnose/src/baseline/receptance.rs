@@ -4,14 +4,12 @@ use nalgebra::{DMatrix, Matrix3};
 use num_complex::Complex64;
 use rayon::prelude::*;
 
+use crate::criteria::LEAST_INVERSE_MASS_SHARE;
 use crate::signal::grid::Grid;
 use quietcut_model::structure::FirstOrder;
 
 /// Largest relative difference |λ₁ − λ₂|/|λ| of two poles of the structure that count as one pole: the rounding error of eigenvalues.
 const SAME: f64 = 1e-9;
-/// Smallest inverse modal mass along an axis with which a mode counts as excited along that axis, as a fraction of the largest inverse
-/// modal mass there.
-const LEAST_INVERSE_MASS_SHARE: f64 = 1e-3;
 
 /// H(s) = Σ_r R_r/(s − λ_r) of a structure in first-order form, m/N; rows displacement, columns force.
 #[derive(Clone, Debug)]

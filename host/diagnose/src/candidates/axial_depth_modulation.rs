@@ -5,15 +5,12 @@
 
 use super::process::{changed, everywhere, has_axial};
 use crate::candidates::cause::{Cause, Location, Parameter, Regressors};
+use crate::criteria::AXIAL_DEPTH_COEFFICIENT_ERROR;
 use crate::records::record::Record;
 use crate::records::study::Study;
 use quietcut_model::effects::EffectName;
 
 pub(super) struct AxialDepthModulationCause;
-
-/// Largest distance from 1 of the fitted coefficient of axial depth modulation b = b₀ − z, for the effect to be accepted. In theory the
-/// coefficient is 1.
-const ROUNDING: f64 = 0.35;
 
 impl Cause for AxialDepthModulationCause {
     fn effect(&self) -> EffectName {
@@ -43,7 +40,7 @@ impl Cause for AxialDepthModulationCause {
         _: &[f64],
         coefficients: &[f64],
     ) -> Option<Vec<Parameter>> {
-        ((coefficients.first()? - 1.0).abs() < ROUNDING).then(Vec::new)
+        ((coefficients.first()? - 1.0).abs() < AXIAL_DEPTH_COEFFICIENT_ERROR).then(Vec::new)
     }
 
     fn extension(&self, _: &Location, _: &[Parameter]) -> toml::Table {

@@ -5,6 +5,7 @@
 //! parameter. Source: Nordin and Gutman, Automatica 38 (2002).
 
 use super::restoring::{Restoring, largest_m, logarithmic, plain, smallest_m};
+use crate::criteria::LARGEST_SPRING_SHARE;
 use quietcut_model::effects::EffectName;
 
 pub(super) const CAUSE: Restoring = Restoring {
@@ -18,6 +19,6 @@ pub(super) const CAUSE: Restoring = Restoring {
             .collect()
     },
     bounds: |study, axis| vec![[1.0 * smallest_m(study, axis), 2e3 * largest_m(study, axis)]],
-    physical: |share| share[0] > 0.0 && share[0] <= 1.02,
+    physical: |share| share[0] > 0.0 && share[0] <= LARGEST_SPRING_SHARE,
     ..plain(EffectName::Backlash, &["stiffness_fraction"])
 };

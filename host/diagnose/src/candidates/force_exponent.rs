@@ -8,6 +8,7 @@
 
 use super::process::{added, changed, cutter, everywhere, step};
 use crate::candidates::cause::{Cause, Location, Parameter, Regressors, WRONG_PARAMETERS};
+use crate::criteria::CHIP_EXPONENT_CHANGE;
 use crate::records::record::Record;
 use crate::records::study::Study;
 use quietcut_model::effects::EffectName;
@@ -67,7 +68,10 @@ impl Cause for ForceExponent {
 
     fn settled(&self, _: &[f64], coefficients: &[f64]) -> Option<Vec<f64>> {
         let (less, q) = (*coefficients.first()?, *coefficients.get(1)?);
-        Some(vec![1.0 + less.clamp(-0.8, 1.0), q.clamp(-1.0, 1.0)])
+        Some(vec![
+            1.0 + less.clamp(CHIP_EXPONENT_CHANGE[0], CHIP_EXPONENT_CHANGE[1]),
+            q.clamp(-1.0, 1.0),
+        ])
     }
 
     fn parameters(
@@ -79,8 +83,8 @@ impl Cause for ForceExponent {
     ) -> Option<Vec<Parameter>> {
         let &[less, q] = coefficients else { return None };
         let reference_mm = 1e3 * reference_m(study) * (-q / less).exp();
-        // Exponents from 0.2 to 2 contain all published chip laws.
-        let physical = less > -0.8 && less < 1.0 && reference_mm.is_finite() && reference_mm > 0.0;
+        let [least, largest] = CHIP_EXPONENT_CHANGE;
+        let physical = less > least && less < largest && reference_mm.is_finite() && reference_mm > 0.0;
         physical.then(|| vec![("exponent", 1.0 + less), ("reference_chip_mm", reference_mm)])
     }
 }

@@ -17,6 +17,7 @@ use rayon::prelude::*;
 use crate::baseline::dynamic_stiffness;
 use crate::baseline::receptance::Receptance;
 use crate::candidates::cause::{Cause, Location, Parameter, Regressor, Regressors};
+use crate::criteria::LEAST_RELATIVE_CHANGE;
 use crate::records::domain::Domain;
 use crate::records::record::Record;
 use crate::records::study::Study;
@@ -206,7 +207,7 @@ impl Cause for LinearChange {
         coefficients: &[f64],
     ) -> Option<Vec<Parameter>> {
         let relative = *coefficients.first()?;
-        if relative <= -0.95 {
+        if relative <= LEAST_RELATIVE_CHANGE {
             return None;
         }
         Some(match self.entry(study, location) {

@@ -8,6 +8,7 @@ use num_complex::Complex64;
 
 use super::sensor::{is_at, one_or_all, reading_in_cut, readings_at, with_chip_of_true_motion};
 use crate::candidates::cause::{Cause, Location, Parameter, Regressor, Regressors, WRONG_PARAMETERS};
+use crate::criteria::ANOTHER_DELAY;
 use crate::records::record::Record;
 use crate::records::study::Study;
 use quietcut_model::effects::EffectName;
@@ -16,10 +17,6 @@ pub(super) struct SensorDelayCause;
 
 /// Longest sensor delay that the search tries, in periods of the highest frequency of the motion.
 const LONGEST: f64 = 0.4;
-
-/// Largest ratio, and inverse of the smallest ratio, of the fitted sensor delay to the delay for which its regressor was computed. Beyond
-/// it the fit does not describe a delay.
-const ANOTHER: f64 = 100.0;
 
 impl Cause for SensorDelayCause {
     fn effect(&self) -> EffectName {
@@ -94,7 +91,7 @@ impl Cause for SensorDelayCause {
             .map(|delay| vec![*delay])
     }
 
-    /// The fitted sensor delay. `None` if it differs by a factor above [`ANOTHER`] from the delay for which the regressor is computed.
+    /// The fitted sensor delay. `None` if it differs by a factor above [`ANOTHER_DELAY`] from the delay for which the regressor is computed.
     fn parameters(
         &self,
         _: &Study<'_>,
@@ -103,6 +100,7 @@ impl Cause for SensorDelayCause {
         coefficients: &[f64],
     ) -> Option<Vec<Parameter>> {
         let (delay, made_for) = (*coefficients.first()?, *nonlinear_parameters.first()?);
-        (delay > made_for / ANOTHER && delay < made_for * ANOTHER).then(|| vec![("delay_s", delay)])
+        (delay > made_for / ANOTHER_DELAY && delay < made_for * ANOTHER_DELAY)
+            .then(|| vec![("delay_s", delay)])
     }
 }

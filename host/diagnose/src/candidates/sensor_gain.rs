@@ -9,22 +9,20 @@ use num_complex::Complex64;
 
 use super::sensor::{one_or_all, readings_at, with_chip_of_true_motion};
 use crate::candidates::cause::{Cause, Location, Parameter, Regressors};
+use crate::criteria::LARGEST_GAIN_SHARE;
 use crate::records::record::Record;
 use crate::records::study::Study;
 use quietcut_model::effects::EffectName;
 
 pub(super) struct SensorGainCause;
 
-/// Largest accepted share 1 − 1/g of a sensor gain g, which is a gain of 50. Beyond it the reading would hardly contain the true value.
-const LARGEST_SHARE: f64 = 0.98;
-
 /// Share 1 − 1/g of a sensor gain g at which the finite difference of the change of chip thickness, and so of cutting force, is taken.
 const SMALL_SHARE: f64 = 0.05;
 
-/// The sensor gain g from the fitted share 1 − 1/g; `None` if the share exceeds [`LARGEST_SHARE`].
+/// The sensor gain g from the fitted share 1 − 1/g; `None` if the share exceeds [`LARGEST_GAIN_SHARE`].
 pub(super) fn factor(coefficients: &[f64]) -> Option<f64> {
     let share = *coefficients.first()?;
-    (share < LARGEST_SHARE).then(|| 1.0 / (1.0 - share))
+    (share < LARGEST_GAIN_SHARE).then(|| 1.0 / (1.0 - share))
 }
 
 impl Cause for SensorGainCause {

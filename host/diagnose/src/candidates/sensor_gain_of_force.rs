@@ -6,15 +6,13 @@
 //! calibration factor of ISO 16063; Altintas, Manufacturing Automation (2012), ch. 2, for dynamometers in cuts.
 
 use crate::candidates::cause::{Cause, LocatedEffect, Location, Parameter, Regressor, Regressors};
+use crate::criteria::LEAST_FORCE_GAIN;
 use crate::records::record::Record;
 use crate::records::study::Study;
 use quietcut_model::effects::EffectName;
 use quietcut_recording::Quantity;
 
 pub(super) struct ForceSensorGainCause;
-
-/// Smallest gain g of a force sensor that is accepted: with a smaller gain the reading would hardly contain the force.
-const LEAST: f64 = 0.02;
 
 /// Names of the channels at the location of a sensor error; empty if the location is no channel.
 fn names(location: &Location) -> &[String] {
@@ -70,7 +68,7 @@ impl Cause for ForceSensorGainCause {
         coefficients: &[f64],
     ) -> Option<Vec<Parameter>> {
         let gain = 1.0 + *coefficients.first()?;
-        (gain > LEAST).then(|| vec![("gain", gain)])
+        (gain > LEAST_FORCE_GAIN).then(|| vec![("gain", gain)])
     }
 
     fn located_effects(&self, location: &Location, parameters: &[Parameter]) -> Vec<LocatedEffect> {

@@ -11,6 +11,7 @@ use super::sensor::one_or_all;
 use super::sensor_gain::{SensorGainCause, factor};
 use crate::baseline::receptance::{Receptance, response};
 use crate::candidates::cause::{Cause, Location, Parameter, Regressor, Regressors};
+use crate::criteria::LEAST_RESPONSE_WITH_RATIO;
 use crate::records::channel::Observed;
 use crate::records::channel::main_axis;
 use crate::records::domain::Domain;
@@ -25,10 +26,6 @@ pub(super) struct SensorOffsetCause;
 const RATIOS: [&str; 9] = [
     "ratio_1", "ratio_2", "ratio_3", "ratio_4", "ratio_5", "ratio_6", "ratio_7", "ratio_8", "ratio_9",
 ];
-
-/// Smallest response of a mode along the sensor's axis for which the mode has a sensor-to-tool-tip ratio of its own, as a fraction of the
-/// largest modal response there.
-const SEEN: f64 = 1e-6;
 
 /// Indices of the modes that have a sensor-to-tool-tip ratio of their own in the channel, and the number of modes of the case; `None` if
 /// one ratio holds for all modes.
@@ -53,7 +50,7 @@ fn modes(study: &Study<'_>, location: &Location) -> Option<(Vec<usize>, usize)> 
     };
     let largest = modes.iter().map(size).fold(0.0, f64::max);
     let seen: Vec<usize> = (0..modes.len())
-        .filter(|mode| size(&modes[*mode]) > SEEN * largest)
+        .filter(|mode| size(&modes[*mode]) > LEAST_RESPONSE_WITH_RATIO * largest)
         .collect();
     (seen.len() > 1).then_some((seen, modes.len()))
 }

@@ -9,6 +9,7 @@
 
 use super::process::everywhere;
 use crate::candidates::cause::{Cause, Location, Parameter, Regressor, Regressors, WRONG_PARAMETERS};
+use crate::criteria::SPEED_MODULATION_COEFFICIENT_ERROR;
 use crate::motion::spindle_motion::{SpeedModulation, SpindleMotion, speed_modulation};
 use crate::records::record::Record;
 use crate::records::study::Study;
@@ -16,10 +17,6 @@ use quietcut_model::effects::EffectName;
 use quietcut_simulate::Fluctuation;
 
 pub(super) struct SpeedFluctuationCause;
-
-/// Largest distance from 1 of the fitted coefficient of the speed modulation at which the records confirm the modulation found in the
-/// tachometer signal.
-const ROUNDING: f64 = 0.5;
 
 /// The speed modulation in the tachometer signals of all cuts.
 fn of_tachometer(study: &Study<'_>) -> Option<SpeedModulation> {
@@ -94,7 +91,7 @@ impl Cause for SpeedFluctuationCause {
             return None;
         };
         let share = *coefficients.first()?;
-        ((share - 1.0).abs() < ROUNDING).then(|| {
+        ((share - 1.0).abs() < SPEED_MODULATION_COEFFICIENT_ERROR).then(|| {
             vec![
                 ("delta", delta),
                 ("frequency_hz", frequency_hz),

@@ -9,6 +9,9 @@
 use std::sync::Arc;
 
 use crate::candidates::extension_tables::joined;
+use crate::criteria::{
+    FIRST_PREDICTION_LAG, HOPELESS_LAG, HOPELESS_PREDICTED_SHARE, RELINEARIZATION_SETTLED,
+};
 use crate::fit::candidate_model::ExtendedPrediction;
 use crate::fit::candidate_model::{CandidateModel, Choice, Simulated};
 use crate::fit::closed_fit::ClosedFit;
@@ -21,12 +24,6 @@ use quietcut_recording::Recording;
 
 /// Readings with an extended case at most.
 const ROUNDS: usize = 5;
-/// A step that promises less than this of χ² is not taken.
-const SETTLED: f64 = 0.5;
-/// χ² by which an explanation may stay behind another, to first order, before it is given up.
-const HOPELESS: f64 = 300.0;
-/// By which share more the first reading may leave: it follows the measured motion, with the noise in it.
-const FIRST: f64 = 0.1;
 
 /// Residuals by record and channel.
 type Residuals = Vec<Vec<Vec<f64>>>;
@@ -155,9 +152,14 @@ impl ClosedFit for Relinearization<'_> {
                 best = Some((at.clone(), reading.clone()));
             }
             let promised = refit.before - refit.taken;
-            let first = if round == 0 { FIRST * rival } else { 0.0 };
-            let hopeless = promised - rival > HOPELESS + first && promised > 0.5 * refit.before;
-            if !is_better || hopeless || (round > 0 && refit.taken < SETTLED) {
+            let first = if round == 0 {
+                FIRST_PREDICTION_LAG * rival
+            } else {
+                0.0
+            };
+            let hopeless =
+                promised - rival > HOPELESS_LAG + first && promised > HOPELESS_PREDICTED_SHARE * refit.before;
+            if !is_better || hopeless || (round > 0 && refit.taken < RELINEARIZATION_SETTLED) {
                 break;
             }
             predicted = Some(reading);

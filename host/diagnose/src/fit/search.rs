@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 use quietcut_numerics::Stop;
 use quietcut_numerics::least_squares::{Damping, Idle, LevenbergMarquardt, NormalSums, Objective};
 
-use crate::criteria::{HOPELESS_LAG, SEARCH_SETTLED};
+use crate::criteria::{HOPELESS_LAG, HOPELESS_PREDICTED_SHARE, SEARCH_SETTLED, SLOW_CATCHING_UP};
 use crate::fit::output_error::OutputError;
 use crate::fit::segment::Segment;
 use crate::fit::unknowns::{
@@ -78,17 +78,19 @@ impl Objective for Search<'_, '_, '_> {
         next.left < now.left && now.left - next.left < SEARCH_SETTLED
     }
 
-    /// Gives up if an iteration has reduced the lag behind the rival candidate model by less than 40 %: the search will not catch up.
+    /// Gives up if an iteration leaves more of the lag behind the rival candidate model than the share [`SLOW_CATCHING_UP`].
     fn gives_up(&self, round: usize, now: &Residuals, before: Option<&Residuals>) -> bool {
         let behind = self.behind(now.left);
-        round >= 2 && behind > 0.0 && before.is_some_and(|before| behind > 0.6 * self.behind(before.left))
+        round >= 2
+            && behind > 0.0
+            && before.is_some_and(|before| behind > SLOW_CATCHING_UP * self.behind(before.left))
     }
 
-    /// Gives up if even the linearized model predicts a χ² that lags behind the rival candidate model and is more than half of the present
-    /// χ².
+    /// Gives up if even the linearized model predicts a χ² that lags behind the rival candidate model and exceeds the share
+    /// [`HOPELESS_PREDICTED_SHARE`] of the present χ².
     fn gives_up_linearized(&self, round: usize, now: &Residuals, sums: &NormalSums) -> bool {
         let promised = now.left - predicted(&sums.matrix, &sums.gradient);
-        round >= 1 && self.behind(promised) > 0.0 && promised > 0.5 * now.left
+        round >= 1 && self.behind(promised) > 0.0 && promised > HOPELESS_PREDICTED_SHARE * now.left
     }
 }
 

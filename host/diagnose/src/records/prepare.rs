@@ -8,7 +8,7 @@
 use crate::baseline::Baseline;
 use crate::baseline::dynamic_stiffness;
 use crate::baseline::receptance::{Receptance, response};
-use crate::criteria::LARGEST_FORCE_NOISE;
+use crate::criteria::{LARGEST_FORCE_NOISE, MOTION_BAND_SHARE};
 use crate::error::DiagnoseError;
 use crate::motion::free_decay::Decays;
 use crate::records::channel::{Observed, main_axis};
@@ -238,7 +238,7 @@ fn channels(baseline: &Baseline<'_>, recording: &Recording, domain: Domain) -> V
         .collect()
 }
 
-/// Frequency below which 99.5 % of the power of every channel of motion lies, Hz; at least three times the resolution of the record.
+/// Frequency below which the share [`MOTION_BAND_SHARE`] of the power of every channel of motion lies, Hz; at least three times the resolution of the record.
 fn highest_hz(recording: &Recording) -> f64 {
     let grid = Grid::new(recording.len(), recording.sample_rate_hz, 0.0, 1);
     let of_motion = recording.channels.iter().filter(|channel| {
@@ -263,7 +263,7 @@ fn highest_hz(recording: &Recording) -> f64 {
                 .iter()
                 .position(|power| {
                     sum += power;
-                    sum >= 0.995 * whole
+                    sum >= MOTION_BAND_SHARE * whole
                 })
                 .unwrap_or(0);
             grid.omega(bin) / std::f64::consts::TAU

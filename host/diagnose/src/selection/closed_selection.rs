@@ -2,7 +2,10 @@
 
 use std::collections::VecDeque;
 
-use crate::criteria::EQUIVALENT;
+use crate::criteria::{
+    EQUIVALENT, MOST_EXTENDED, MOST_REBASELINED, MOST_REFINED, NEARLY_EXPLAINED, REGRESSION_FAR_BEHIND,
+    REGRESSION_FAR_BEHIND_SIMPLER,
+};
 use crate::fit::candidate_model::CandidateModel;
 use crate::fit::closed_fit::ClosedFit;
 use crate::fit::library::Library;
@@ -10,19 +13,6 @@ use crate::fit::regression::{Regression, Subset};
 use crate::selection::rebaselined::extended_rebaselined;
 use crate::selection::select::SelectionCriteria;
 use crate::selection::stepwise::{distinct, extended, nested, without};
-
-/// χ² per number below which an explanation explains nearly all, and over that of another below which it is nearly as good; and how
-/// many times that another may leave along the measured motion and still be simulated.
-const NEARLY: f64 = 1.5;
-const FAR_OFF: f64 = 6.0;
-/// How many times further off one with fewer parameters may be.
-const SIMPLER: f64 = 30.0;
-/// Of how many the parameters are sought to the end where that asks for more readings.
-const POLISHED: usize = 4;
-/// Explanations that are simulated because of what a simulation with one cause less left: of the best, of the second.
-const EXTENDED: [usize; 2] = [6, 3];
-/// And because of what looks best around the machine as the best of those with one cause less has it.
-const AROUND: usize = 4;
 
 impl SelectionCriteria<'_> {
     /// The first of `found` as simulation has them, where it can; else all as they are. `fewer` are the best with one cause
@@ -63,11 +53,11 @@ impl SelectionCriteria<'_> {
             // Where one explains nearly all, what is far from that along the measured motion need not be simulated.
             // But a simpler one may be the truth that the other holds as a part.
             let far_off = if explanation.parameter_count < parameter_count {
-                SIMPLER * FAR_OFF
+                REGRESSION_FAR_BEHIND_SIMPLER
             } else {
-                FAR_OFF
+                REGRESSION_FAR_BEHIND
             };
-            if rival < NEARLY * noise && explanation.fit.left > far_off * rival.max(noise) {
+            if rival < NEARLY_EXPLAINED * noise && explanation.fit.left > far_off * rival.max(noise) {
                 continue;
             }
             if leading.as_ref().is_some_and(|leading| {
@@ -111,9 +101,9 @@ impl SelectionCriteria<'_> {
         // Cuts, whose libraries are costly, go without.
         if let Some(base) = bases().next().filter(|_| self.coherent == 0.0) {
             let around = extended_rebaselined(self.study, self.recordings, library, regression, base);
-            tried.extend(around.into_iter().take(AROUND));
+            tried.extend(around.into_iter().take(MOST_REBASELINED));
         }
-        for (base, most) in bases().zip(EXTENDED) {
+        for (base, most) in bases().zip(MOST_EXTENDED) {
             if let Some(left) = closed.left_of(library, base) {
                 tried.extend(
                     extended(self.study, library, regression, base, &left)
@@ -140,11 +130,11 @@ impl SelectionCriteria<'_> {
             .map(|explanation| self.gain(regression, explanation, inflation))
             .collect();
         let mut gained = 0.0;
-        for position in 0..found.len().min(POLISHED) {
+        for position in 0..found.len().min(MOST_REFINED) {
             // What was behind by more than twice what the best gained will not come up to it, unless it is simpler: of that the other
             // may have mended what the slopes of the baseline got wrong.
             let is_simpler = found[position].parameter_count < found[0].parameter_count
-                && found[position].fit.left < NEARLY * found[0].fit.left;
+                && found[position].fit.left < NEARLY_EXPLAINED * found[0].fit.left;
             if position > 0 && !is_simpler && before[0] - before[position] > EQUIVALENT + 2.0 * gained {
                 continue;
             }
@@ -185,7 +175,7 @@ impl SelectionCriteria<'_> {
                 if enough(regression, &fewer) {
                     return Some(fewer);
                 }
-                if fewer.fit.left > NEARLY * kept.fit.left {
+                if fewer.fit.left > NEARLY_EXPLAINED * kept.fit.left {
                     return None;
                 }
                 closed

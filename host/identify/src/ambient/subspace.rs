@@ -17,7 +17,7 @@ use quietcut_numerics::singular_values::{SingularValueError, Vectors, decompose,
 use rayon::prelude::*;
 
 use super::recording::Ambient;
-use crate::criteria::{LARGEST_AMBIENT_DAMPING, SAME_MODE};
+use crate::criteria::{AMBIENT_BLOCKS, LARGEST_AMBIENT_DAMPING, SAME_MODE};
 use crate::student::NINETY_PERCENT;
 use crate::student::ninety_percent;
 
@@ -73,10 +73,6 @@ pub enum AmbientError {
     Poles(#[from] EigenvalueError),
 }
 
-/// Smallest and largest number of blocks into which an ambient record is divided. A choice: the smallest number gives
-/// the covariance of the modes eleven degrees of freedom.
-const BLOCKS: [usize; 2] = [12, 40];
-
 /// Ratio of the length of a block of an ambient record to the longest lag of its covariances. At this ratio the
 /// correlation between neighbouring blocks is negligible.
 const BLOCK_LENGTH: usize = 6;
@@ -97,12 +93,12 @@ pub fn modes(ambient: &Ambient, [low_hz, high_hz]: [f64; 2]) -> Result<AmbientMo
     let rows = ((PERIODS * ambient.rate_hz / low_hz).ceil() as usize).clamp(6, 60);
     let samples = ambient.channels.first().map_or(0, Vec::len);
     let block = BLOCK_LENGTH * 2 * rows;
-    let blocks = (samples.saturating_sub(2 * rows) / block).min(BLOCKS[1]);
-    if blocks < BLOCKS[0] {
+    let blocks = (samples.saturating_sub(2 * rows) / block).min(AMBIENT_BLOCKS[1]);
+    if blocks < AMBIENT_BLOCKS[0] {
         return Err(AmbientError::TooShort {
             seconds: ambient.seconds(),
             low_hz,
-            needed_s: (BLOCKS[0] * block + 2 * rows) as f64 / ambient.rate_hz,
+            needed_s: (AMBIENT_BLOCKS[0] * block + 2 * rows) as f64 / ambient.rate_hz,
         });
     }
     let length = (samples - 2 * rows) / blocks;

@@ -15,7 +15,7 @@ use quietcut_numerics::least_squares::{
 };
 use rayon::prelude::*;
 
-use crate::criteria::{LEAST_METHOD_DIFFERENCE, SAME_FEED};
+use crate::criteria::{LARGEST_LAST_STEP, LEAST_METHOD_DIFFERENCE, SAME_FEED};
 use crate::cutting::chip::{Chip, chips};
 use crate::cutting::force_test::CuttingTest;
 use crate::cutting::prepared_test::{Prepared, prepared};
@@ -44,10 +44,6 @@ pub struct Value {
 
 /// Largest Gauss–Newton step of a converged force-coefficient fit, in standard deviations of its parameters. A choice.
 const SETTLED: f64 = 1e-2;
-
-/// Largest length of the last Gauss–Newton step with which the fit of force coefficients is accepted, in standard
-/// deviations of the parameters. Chips at the edge of contact may change with every step. A choice.
-const SETTLED_ENOUGH: f64 = 0.3;
 
 /// Result of the fit: force coefficients from a set of cutting tests.
 #[derive(Clone, Debug)]
@@ -305,7 +301,7 @@ impl Fitter<'_> {
                 return Ok(state);
             }
         }
-        if length < SETTLED_ENOUGH {
+        if length < LARGEST_LAST_STEP {
             Ok(state)
         } else {
             Err(ForceCoefficientError::NotConverged)

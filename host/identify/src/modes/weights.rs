@@ -8,10 +8,7 @@ use num_complex::Complex64;
 
 use super::pole_residue::PoleResidue;
 use super::receptances::Receptances;
-
-/// Fewest frequency lines per receptance from which the correlation between the residuals of receptances is estimated.
-/// A choice: with fewer, the estimate is too inaccurate for weights.
-const LINES_PER_RECEPTANCE: usize = 6;
+use crate::criteria::LINES_PER_RECEPTANCE;
 
 /// Ridge on the unit diagonal of the correlation matrix between the residuals of receptances. A choice: it bounds the
 /// weight of combinations of receptances with almost no residual.

@@ -6,6 +6,8 @@ use num_complex::Complex64;
 use quietcut_numerics::least_squares::LinearProblem;
 use quietcut_numerics::roots::bisection;
 
+use crate::criteria::LARGEST_PAIRED_RECEPTANCE;
+
 /// A measured receptance at constant force amplitude over frequency.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Curve {
@@ -114,7 +116,7 @@ impl Curve {
         let mut found = Vec::new();
         for (index, &(omega, h)) in self.points.iter().enumerate() {
             let level = h.norm();
-            if index == peak || level < share * top || level > 0.98 * top {
+            if index == peak || level < share * top || level > LARGEST_PAIRED_RECEPTANCE * top {
                 continue;
             }
             let other = if index < peak {

@@ -9,7 +9,7 @@
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
-use crate::criteria::LEAST_PERIOD_SAMPLES;
+use crate::criteria::{FORCE_BAND_SHARE, LEAST_PERIOD_SAMPLES};
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use quietcut_numerics::Stop;
@@ -342,7 +342,7 @@ fn first_guess(balance: &Balance, forces: &[Vec<f64>], motions: &[Vec<f64>]) -> 
     Some(fit.parameters)
 }
 
-/// Angular frequency below which 99 % of the force power lies, rad/s.
+/// Angular frequency below which the share [`FORCE_BAND_SHARE`] of the force power lies, rad/s.
 fn force_band(balance: &Balance, forces: &[Vec<f64>]) -> f64 {
     let mut power = vec![0.0; balance.omega.len() / 2];
     for force in forces {
@@ -356,7 +356,7 @@ fn force_band(balance: &Balance, forces: &[Vec<f64>]) -> f64 {
     let mut sum = 0.0;
     for (power, omega) in power.iter().zip(&balance.omega) {
         sum += power;
-        if sum >= 0.99 * all {
+        if sum >= FORCE_BAND_SHARE * all {
             return *omega;
         }
     }

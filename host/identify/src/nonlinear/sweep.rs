@@ -10,7 +10,7 @@ use num_complex::Complex64;
 use quietcut_numerics::least_squares::{Idle, NormalEquations};
 use rustfft::FftPlanner;
 
-use crate::criteria::{LEAST_SWEEP_CHANGE, LEAST_SWEEP_ESTIMATES, SWEEP_MISFIT};
+use crate::criteria::{LEAST_SWEEP_CHANGE, LEAST_SWEEP_ESTIMATES, SWEEP_MISFIT, SWEPT_POWER_SHARE};
 
 /// Number R of frequency lines on each side of the middle line that a local estimate of the receptance uses.
 const R: i64 = 7;
@@ -65,7 +65,8 @@ impl Spectra {
         }
     }
 
-    /// Lowest and highest frequency at which the smoothed power of the force exceeds a tenth of its maximum, Hz.
+    /// Lowest and highest frequency at which the smoothed power of the force exceeds the share [`SWEPT_POWER_SHARE`] of
+    /// its maximum, Hz.
     fn band_hz(&self) -> Option<[f64; 2]> {
         let width = (2 * R + 1) as usize;
         let power: Vec<f64> = self
@@ -74,7 +75,7 @@ impl Spectra {
             .map(|lines| lines.iter().map(Complex64::norm_sqr).sum())
             .collect();
         let largest = power.iter().copied().fold(0.0, f64::max);
-        let strong = |power: &f64| *power > 0.1 * largest;
+        let strong = |power: &f64| *power > SWEPT_POWER_SHARE * largest;
         let (first, last) = (power.iter().position(strong)?, power.iter().rposition(strong)?);
         let hertz = |chunk: usize| (chunk * width) as f64 * self.spacing_hz;
         Some([hertz(first + 1), hertz(last)])

@@ -8,7 +8,9 @@ use super::limits::unstable_roots;
 use super::loci::{steps, trace};
 use super::open_loop::OpenLoop;
 use super::problem::FrequencyProblem;
-use crate::criteria::{LEAST_ERROR, LOCUS_REACH, ROOT_LINES};
+use crate::criteria::{
+    LEAST_ERROR, LOCUS_REACH, PREDICTED_BETWEEN, PREDICTED_DISTANCE, PREDICTED_LAG, ROOT_LINES,
+};
 use crate::error::{Breakdown, StabilityError};
 use crate::limits::point::CutStability;
 use crate::spectrum::stability_loss::StabilityLoss;
@@ -94,11 +96,13 @@ fn from_line(
     for [(low, from), (high, to)] in steps(&samples) {
         let share = (target - from) / (to - from);
         let width = high - low;
-        if !(-0.6..=1.6).contains(&share.re) || share.im.abs() * width > 20.0 * (width + decay) {
+        if !PREDICTED_BETWEEN.contains(&share.re)
+            || share.im.abs() * width > PREDICTED_DISTANCE * (width + decay)
+        {
             continue;
         }
         let guess = Complex64::new(sigma, low) + Complex64::I * share * width;
-        if best.is_some_and(|best| guess.re < best.re - 3.0 * decay - (best.re - sigma).abs()) {
+        if best.is_some_and(|best| guess.re < best.re - PREDICTED_LAG * decay - (best.re - sigma).abs()) {
             continue;
         }
         if let Some(root) = polish(open_loop, depth_m, guess)

@@ -24,14 +24,17 @@ use super::plane::{Linearized, Plane};
 use super::sampling::{Basis, Variable};
 use super::speed_line::SpeedLine;
 use super::spread::{LimitSpread, Percentile, PercentileIntervals, Percentiles};
-use crate::criteria::{BATCH, BATCHES, BATCHES_OF_CELLS, IMPOSSIBLE_MAX, PILOT};
+use crate::criteria::{
+    BATCH, BATCHES, BATCHES_OF_CELLS, IMPOSSIBLE_MAX, PILOT, SEARCHED_BEYOND, SHALLOWEST_SEARCH,
+    WORTH_SEARCHING_NEAR,
+};
 use crate::error::StabilityError;
 use quietcut_model::case::Case;
 
 /// Shares of the drawn machines that define the percentiles of the limit: 5, 50 and 95 %.
 const SHARES: [f64; 3] = [0.05, 0.5, 0.95];
 
-/// Number of depth steps of the first search for a machine's limit, from 0 to 1.2 times the limit predicted from
+/// Number of depth steps of the first search for a machine's limit, from 0 to beyond the limit predicted from
 /// derivatives. If it finds none, the whole depth is searched.
 const SAMPLES_NEAR: usize = 16;
 
@@ -207,11 +210,13 @@ impl<'a> Uncertainty<'a> {
             .iter()
             .map(|plane| plane.depth_mm + plane.gradient.dot(machine))
             .fold(f64::INFINITY, f64::min);
-        // Linearization may predict a limit below depth 0 where a limit is steep; a quarter of the nominal limit is
-        // tried then.
-        let shallowest_mm = planes.first().map_or(depth_mm, |plane| 0.25 * plane.depth_mm);
-        let near_mm = 1.2 * predicted_mm.max(shallowest_mm);
-        if !whole && near_mm < 0.7 * depth_mm {
+        // Linearization may predict a limit below depth 0 where a limit is steep; a share of the nominal limit is
+        // searched then.
+        let shallowest_mm = planes
+            .first()
+            .map_or(depth_mm, |plane| SHALLOWEST_SEARCH * plane.depth_mm);
+        let near_mm = SEARCHED_BEYOND * predicted_mm.max(shallowest_mm);
+        if !whole && near_mm < WORTH_SEARCHING_NEAR * depth_mm {
             let line = method.line(rpm, near_mm, SAMPLES_NEAR)?;
             if limit_of(&line).is_some() {
                 return Ok(Ok(line));
