@@ -15,21 +15,21 @@ pub struct Acquisition<A> {
     accelerometer: A,
     clock: EventClock,
     nominal_period_ns: f32,
-    /// The line fitted to the stamps; its newest event is sample number [`Self::stamped_sample`].
+    /// The line fitted to the time stamps of samples; its newest event is sample number [`Self::stamped_sample`].
     line: Option<EventClockState>,
     stamped_sample: u64,
-    /// Number of the next sample to read, if none is lost.
+    /// Number that the next sample read from the sensor has, if no sample is lost.
     next_sample: u64,
     /// True after a restart of the sensor. The sensor does not count the samples lost during the restart.
     uncounted: bool,
-    /// Number of samples that the last read left in the queue.
+    /// Number of samples that the last read left in the sensor's queue.
     left: u16,
     block: Block,
     next_sequence: u32,
 }
 
 impl<A: Accelerometer> Acquisition<A> {
-    /// Prepares the acquisition; nothing is sent to the sensor before [`start`](Self::start).
+    /// Prepares the acquisition of samples; nothing is sent to the sensor before [`start`](Self::start).
     pub fn new(accelerometer: A) -> Self {
         let nominal_period_ns = 1e9 / accelerometer.sensor().nominal_rate.0;
         Self {
@@ -54,11 +54,11 @@ impl<A: Accelerometer> Acquisition<A> {
         &mut self.accelerometer
     }
 
-    /// Starts the sensor, or restarts it after an error. The number of samples lost during the restart is estimated from the
-    /// fitted clock.
+    /// Starts the sensor, or restarts it after an error. The number of samples lost during the restart is estimated
+    /// from the fitted clock.
     ///
     /// # Errors
-    /// Those of the sensor's driver.
+    /// The sensor's driver fails.
     pub fn start(&mut self) -> Result<(), A::Error> {
         self.accelerometer.start()?;
         self.uncounted = self.line.is_some();
@@ -66,19 +66,20 @@ impl<A: Accelerometer> Acquisition<A> {
         Ok(())
     }
 
-    /// True if the last read left at least the watermark in the queue. The watermark line then stays high, and the next read
-    /// must not wait for its rise.
+    /// True if the last read left at least as many samples as the watermark in the sensor's queue. The watermark line
+    /// then stays high, and the next read must not wait for its rise.
     pub fn is_behind(&self) -> bool {
         self.left >= self.accelerometer.watermark()
     }
 
-    /// Reads the next block; `None` if the queue is empty.
+    /// Reads the next block of samples from the sensor's queue; `None` if the queue is empty.
     ///
-    /// `now` is the time just before the call. `rise` is the time of the last rise of the watermark line, if it rose after the
-    /// end of the preceding read. A rise *during* a read belongs to no known sample; the caller must discard it.
+    /// `now` is the time just before the call. `rise` is the time of the last rise of the watermark line, if it rose
+    /// after the end of the preceding read. A rise *during* a read belongs to no known sample; the caller must discard
+    /// it.
     ///
     /// # Errors
-    /// Those of the sensor's driver. The sensor must then be restarted.
+    /// The sensor's driver fails; the sensor must then be restarted.
     pub fn read(&mut self, rise: Option<Nanoseconds>, now: Nanoseconds) -> Result<Option<&Block>, A::Error> {
         let queue = self.accelerometer.read(&mut self.block.counts)?;
         let count = self.block.counts.len();
@@ -135,34 +136,36 @@ impl<A: Accelerometer> Acquisition<A> {
         if !(queue.overrun || self.uncounted || remainder != 0) {
             return 0;
         }
-        // An overrun without a gap gives 0: the overrun came after the preceding call had read the status, and that call has
-        // counted the lost samples.
+        // An overrun of the queue without a gap in the sensor's count gives 0: the overrun came after the preceding
+        // call had read the status, and that call has counted the lost samples.
         let Some(line) = &self.line else {
             return remainder as u32;
         };
-        // Number of the newest sample in the queue: that of the stamped sample plus the whole sample periods since.
+        // Number of the newest sample in the sensor's queue: that of the stamped sample plus the whole sample periods
+        // since.
         let newest = self.stamped_sample as i64 + line.events_to(now) as i64;
         let lost = newest + 1 - i64::from(queue.level) - self.next_sample as i64;
         let lost = match gap {
             None => lost,
             Some(gap) => {
                 let modulus = i64::from(gap.modulus).max(1);
-                // The number of lost samples nearest to the clock's estimate that has the remainder counted by the sensor.
+                // Of the numbers of lost samples that agree with the remainder in the sensor's count, the one nearest
+                // to the clock's estimate.
                 lost - (lost - remainder + modulus / 2).rem_euclid(modulus) + modulus / 2
             }
         };
         lost.max(remainder).try_into().unwrap_or(u32::MAX)
     }
 
-    /// Time at which sample number `first` was taken.
+    /// Time at which the sample with number `first` was taken, on the device's clock.
     fn time_of(&self, first: u64, rise: Option<Nanoseconds>, queue: Queue, now: Nanoseconds) -> Nanoseconds {
         let before = |time: Nanoseconds, samples: f32, period_ns: f32| {
             Nanoseconds(time.0.saturating_sub((samples * period_ns) as u64))
         };
         match (&self.line, rise) {
             (None, _) => before(now, f32::from(queue.level), self.nominal_period_ns),
-            // The time is computed from the stamp itself, not from the fitted line, because the signal chain fits the block
-            // times again.
+            // The time is computed from the time stamp itself, not from the line fitted to the stamps, because the
+            // signal chain fits the block times again.
             (Some(line), Some(rise)) if first <= self.stamped_sample => {
                 before(rise, (self.stamped_sample - first) as f32, line.period_ns())
             }

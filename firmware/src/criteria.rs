@@ -11,5 +11,6 @@ pub(crate) const CLOCK_MEMORY_STAMPS: f32 = 256.0;
 /// fit with an error does not end on it.
 pub(crate) const RATE_TOLERANCE: f32 = 0.05;
 
-/// Initial estimate, in ns, of the standard deviation of the time stamps: eight ticks of the device's timer. Unfounded.
+/// Initial estimate, in ns, of the standard deviation of the time stamps of the watermark line: eight ticks of the
+/// device's timer. Unfounded.
 pub(crate) const STAMP_JITTER_NS: f32 = 100.0;

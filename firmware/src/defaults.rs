@@ -5,7 +5,7 @@ use quietcut_core::monitor::Settings;
 use quietcut_core::tachometer::Wheel;
 use quietcut_core::working_point::Tool;
 
-/// Default settings: a tool of four teeth, a tachometer with one mark per revolution, no speed limits.
+/// Settings of a new device: a tool of four teeth, a tachometer with one mark per revolution, no speed limits.
 pub const fn settings(sensor: Sensor) -> Settings {
     Settings {
         sensor,

@@ -46,7 +46,7 @@ pub trait Clock {
 pub struct Identity {
     /// Name of the board; at most 24 bytes.
     pub board: &'static str,
-    /// The accelerometer; `None` if the host feeds the samples.
+    /// The accelerometer of the board; `None` if the host feeds the samples.
     pub sensor: Option<Sensor>,
 }
 
@@ -65,17 +65,17 @@ pub struct Device<'a, M, C> {
     subscription: Subscription,
     /// Verdict, reason and advice of the last report sent to a host that subscribes to changes.
     last_sent: Option<ReportKey>,
-    /// Tachometer edges from the host for the next block that it feeds.
+    /// Tachometer edges received from the host for the next block of samples that it feeds.
     edges: Vec<Edge, MAX_BLOCK_EDGES>,
     is_fed: bool,
     blocks: u32,
     clipped: u32,
     lost: u32,
-    /// Bytes read from the line and not yet processed.
+    /// Bytes that were read from the line to the host and are not yet processed.
     input: Vec<u8, 64>,
 }
 
-/// The parts of a report that count as its change.
+/// The parts of a report whose change makes the report a changed one, which a host that subscribes to changes receives.
 type ReportKey = (Verdict, Reason, Option<Advice>);
 
 /// The session of one host.
@@ -88,12 +88,12 @@ struct Session {
 }
 
 impl<'a, M: TableMemory, C: Clock> Device<'a, M, C> {
-    /// Creates a device and resets `state`.
+    /// Creates a device and resets `state`, the state of its signal chain.
     ///
     /// The state is borrowed because it is large: a board keeps it in static memory.
     ///
     /// # Errors
-    /// The settings are invalid.
+    /// The settings of the signal chain are invalid.
     pub fn new(
         identity: Identity,
         settings: Settings,
@@ -125,9 +125,9 @@ impl<'a, M: TableMemory, C: Clock> Device<'a, M, C> {
         Ok(device)
     }
 
-    /// Processes a block of the sensor, with the new tachometer edges up to its end.
+    /// Processes a block of samples from the sensor, with the new tachometer edges up to its end.
     ///
-    /// The block is ignored while the host feeds.
+    /// The block is ignored while the host feeds blocks.
     pub fn take(&mut self, block: &Block, edges: &[Edge]) {
         if !self.is_fed {
             self.step(block, edges);
@@ -135,11 +135,11 @@ impl<'a, M: TableMemory, C: Clock> Device<'a, M, C> {
         }
     }
 
-    /// Sends as many bytes as the line accepts, and receives until one request is done. Returns true if it did anything; the
-    /// caller then calls it again.
+    /// Sends as many bytes as the line to the host accepts, and receives until one request is done. Returns true if it
+    /// did anything; the caller then calls it again.
     ///
     /// # Errors
-    /// Those of the line.
+    /// Reading from or writing to the line fails.
     pub fn poll<IO: Line>(&mut self, line: &mut IO) -> Result<bool, IO::Error> {
         let mut is_busy = self.link.flush(line)?;
         loop {
@@ -159,10 +159,10 @@ impl<'a, M: TableMemory, C: Clock> Device<'a, M, C> {
         }
     }
 
-    /// Sends as many bytes as the line accepts, and receives nothing.
+    /// Sends as many bytes as the line to the host accepts, and receives nothing.
     ///
     /// # Errors
-    /// Those of the line.
+    /// Writing to the line fails.
     pub fn flush<IO: Line>(&mut self, line: &mut IO) -> Result<(), IO::Error> {
         while self.link.flush(line)? {
             self.pump();
@@ -170,7 +170,7 @@ impl<'a, M: TableMemory, C: Clock> Device<'a, M, C> {
         Ok(())
     }
 
-    /// Processes bytes from the host. Returns how many it has taken.
+    /// Processes bytes from the host. Returns how many of them it has processed.
     ///
     /// While earlier replies wait to be sent it does not take all bytes; the caller then calls it again with the rest.
     pub fn receive(&mut self, bytes: &[u8]) -> usize {
@@ -193,7 +193,7 @@ impl<'a, M: TableMemory, C: Clock> Device<'a, M, C> {
         }
     }
 
-    /// Bytes to be sent to the host, or the first part of them.
+    /// Bytes that wait to be sent to the host, or the first part of them.
     pub fn outgoing(&self) -> &[u8] {
         self.link.outgoing()
     }
@@ -214,14 +214,14 @@ impl<'a, M: TableMemory, C: Clock> Device<'a, M, C> {
         self.storage.into_memory()
     }
 
-    /// Moves waiting messages to the output queue of the link, as far as it has room.
+    /// Moves waiting messages to the output queue of the link to the host, as far as it has room.
     fn pump(&mut self) {
         if let Some(reply) = self.outbox.pump(&mut self.link, self.state) {
             self.session.last = Some(reply);
         }
     }
 
-    /// Resets the signal chain and discards the waiting messages.
+    /// Resets the signal chain and discards the messages that wait to be sent.
     fn restart(&mut self) {
         self.state.reset();
         self.outbox.clear();
@@ -261,7 +261,7 @@ impl<'a, M: TableMemory, C: Clock> Device<'a, M, C> {
         }
     }
 
-    /// Performs a request. Queues its reply, or the reason of its refusal.
+    /// Performs a request of the host. Queues its reply, or the reason why it is refused.
     fn answer(&mut self, sequence: u16, request: Request) {
         if request == Request::Hello {
             self.begin_session(sequence);
@@ -336,7 +336,7 @@ impl<'a, M: TableMemory, C: Clock> Device<'a, M, C> {
         Ok(Reply::Done)
     }
 
-    /// Stores tachometer edges for the next block of the host: all of them, or none if they are too many.
+    /// Stores tachometer edges for the next block that the host feeds: all of them, or none if they are too many.
     fn hold(&mut self, edges: &[Edge]) -> Result<(), Refusal> {
         self.edges
             .extend_from_slice(edges)
@@ -348,7 +348,7 @@ impl<'a, M: TableMemory, C: Clock> Device<'a, M, C> {
     fn feed(&mut self, block: &Block) {
         let edges = core::mem::take(&mut self.edges);
         if !self.is_fed {
-            // The state of the signal chain must not contain blocks of both the sensor and the host.
+            // The signal chain is reset, because its state must not contain blocks of both the sensor and the host.
             self.restart();
             self.is_fed = true;
         }
@@ -402,7 +402,7 @@ fn checked(point: Option<WorkingPoint>) -> Result<Option<WorkingPoint>, Refusal>
 /// Checks that a feed direction is an angle from −360° to 360°.
 fn checked_direction(direction: Option<Degrees>) -> Result<Option<Degrees>, Refusal> {
     match direction {
-        // The negated comparison also refuses NaN.
+        // The negated comparison also refuses a feed direction that is NaN.
         Some(direction) if !(-360.0..=360.0).contains(&direction.0) => Err(Refusal::FeedDirection(direction)),
         _ => Ok(direction),
     }

@@ -9,7 +9,7 @@ use embedded_storage::nor_flash::{
 
 use crate::storage::TableMemory;
 
-/// Flash memory with words of `WRITE` bytes and pages of `ERASE` bytes. Its content is stored in `B`.
+/// Model of a flash memory with words of `WRITE` bytes and pages of `ERASE` bytes. Its content is stored in `B`.
 #[derive(Clone, Debug)]
 pub struct FlashModel<B, const WRITE: usize, const ERASE: usize> {
     bytes: B,
@@ -20,7 +20,8 @@ pub struct FlashModel<B, const WRITE: usize, const ERASE: usize> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Power {
     On,
-    /// Power fails during an operation, after this number of complete ones. The seed `noise` determines the bits left behind.
+    /// Power fails during a flash operation, after this number of complete ones. The seed `noise` determines the bits
+    /// left behind.
     FailsAfter {
         operations: u32,
         noise: u64,
@@ -28,7 +29,7 @@ enum Power {
     Off,
 }
 
-/// Outcome of an operation when the power may fail.
+/// Outcome of a write or erase of the modelled flash: done, or interrupted by a loss of power.
 enum Fate {
     Done,
     Cut(Noise),
@@ -45,7 +46,7 @@ impl Noise {
         self.0
     }
 
-    /// A value below `bound`; 0 if `bound` is 0.
+    /// A pseudo-random number from 0 to `bound` − 1; 0 if `bound` is 0.
     fn below(&mut self, bound: usize) -> usize {
         if bound == 0 {
             0
@@ -54,7 +55,8 @@ impl Noise {
         }
     }
 
-    /// The value of a byte after an interrupted change: the old value, the new value, or a mixture of their bits.
+    /// The value of a flash byte after a loss of power during its change: the old value, the new value, or a mixture of
+    /// their bits.
     fn between(&mut self, before: u8, wanted: u8) -> u8 {
         match self.below(3) {
             0 => before,
@@ -68,7 +70,7 @@ impl Noise {
 }
 
 impl<B: AsRef<[u8]> + AsMut<[u8]>, const WRITE: usize, const ERASE: usize> FlashModel<B, WRITE, ERASE> {
-    /// Flash with this content. In erased flash all bits are ones.
+    /// A flash memory with this content. In erased flash all bits are ones.
     pub const fn new(bytes: B) -> Self {
         Self {
             bytes,
@@ -82,19 +84,19 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>, const WRITE: usize, const ERASE: usize> Flash
     /// one word with a mixture of old and new bits, and the rest unchanged. An interrupted erase leaves any value in every byte
     /// of the page. All later operations fail.
     pub fn fail_after(&mut self, operations: u32, noise: u64) {
-        // Xorshift cannot leave the state 0.
+        // The seed is made non-zero, because a xorshift generator cannot leave the state 0.
         self.power = Power::FailsAfter {
             operations,
             noise: noise.max(1),
         };
     }
 
-    /// True after the power has failed.
+    /// True after the power of the modelled flash has failed.
     pub fn is_off(&self) -> bool {
         self.power == Power::Off
     }
 
-    /// The content, also after a loss of power.
+    /// The content of the modelled flash, also after a loss of power.
     pub fn into_bytes(self) -> B {
         self.bytes
     }
@@ -161,7 +163,8 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>, const WRITE: usize, const ERASE: usize> NorFl
                 Ok(())
             }
             Fate::Cut(mut noise) => {
-                // The bytes become random; in one of four cases they keep the old content.
+                // An interrupted erase makes the bytes of the page random; in one of four cases they keep the old
+                // content.
                 let is_as_before = noise.below(4) == 0;
                 for byte in bytes.iter_mut().filter(|_| !is_as_before) {
                     *byte = match noise.below(2) {

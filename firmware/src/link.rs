@@ -1,4 +1,4 @@
-//! The device's end of the line: frames to and from the host, without blocking.
+//! The device's end of the serial line: frames to and from the host, without blocking.
 
 use embedded_io::{Read, ReadReady, Write, WriteReady};
 use heapless::Deque;
@@ -6,13 +6,13 @@ use quietcut_core::protocol::{
     Decoder, FrameError, FrameErrors, MAX_FRAME, Request, Response, Sequence, encode,
 };
 
-/// Capacity in bytes of the output queue: four frames of the largest length.
+/// Capacity in bytes of the output queue to the host: four frames of the largest length.
 const OUTGOING: usize = 4 * MAX_FRAME;
 
-/// A request with its sequence number, or the reason why a frame is refused.
+/// A received request with its sequence number, or the reason why its frame is refused.
 pub type Received = Result<(u16, Request), FrameError>;
 
-/// The device's end of the line.
+/// The device's end of the serial line to the host.
 pub struct Link {
     decoder: Decoder,
     sent: Sequence,
@@ -28,7 +28,7 @@ impl Default for Link {
 }
 
 impl Link {
-    /// A line before the first byte.
+    /// A link before the first byte is received or sent.
     pub const fn new() -> Self {
         Self {
             decoder: Decoder::new(),
@@ -49,8 +49,8 @@ impl Link {
         }
     }
 
-    /// Processes bytes up to the end of the first frame. Returns the number of bytes taken, and the request or refusal if a frame
-    /// is complete.
+    /// Processes received bytes up to the end of the first frame. Returns the number of bytes processed, and the
+    /// request, or the refusal of its frame, if a frame is complete.
     pub fn receive(&mut self, bytes: &[u8]) -> (usize, Option<Received>) {
         for (index, &byte) in bytes.iter().enumerate() {
             let Some(result) = self.decoder.push(byte) else {
@@ -66,7 +66,7 @@ impl Link {
         (bytes.len(), None)
     }
 
-    /// Counts a frame that was readable but was refused later, because of its sequence number.
+    /// Counts a refused frame that was readable, but whose sequence number is not the expected one.
     pub fn count(&mut self, error: &FrameError) {
         self.errors.count(error);
     }
@@ -81,12 +81,12 @@ impl Link {
         &self.errors
     }
 
-    /// Number of frames of the largest length that fit into the output queue.
+    /// Number of frames of the largest length for which the output queue has room.
     pub fn room(&self) -> usize {
         (OUTGOING - self.outgoing.len()) / MAX_FRAME
     }
 
-    /// Appends a frame to the output queue. Returns false if there is no room.
+    /// Appends the frame of a response to the output queue. Returns false if there is no room.
     pub fn send(&mut self, response: &Response) -> bool {
         let mut buffer = [0; MAX_FRAME];
         if self.room() == 0 {
@@ -98,7 +98,7 @@ impl Link {
         frame.iter().all(|&byte| self.outgoing.push_back(byte).is_ok())
     }
 
-    /// The output queue, or the first part of it.
+    /// The bytes in the output queue of the link, or the first part of them.
     pub fn outgoing(&self) -> &[u8] {
         match self.outgoing.as_slices() {
             ([], second) => second,
@@ -113,10 +113,10 @@ impl Link {
         }
     }
 
-    /// Sends as much as the line accepts without blocking. Returns true if it accepted anything.
+    /// Sends as many bytes of the output queue as the line accepts without blocking. Returns true if it accepted any.
     ///
     /// # Errors
-    /// Those of the line.
+    /// Writing to the line fails.
     pub fn flush<IO: Write + WriteReady>(&mut self, io: &mut IO) -> Result<bool, IO::Error> {
         let mut is_busy = false;
         while !self.outgoing().is_empty() && io.write_ready()? {

@@ -17,13 +17,13 @@ pub const MAX_FRAME_BYTES: usize = 640;
 /// Answer to a processed stimulus.
 pub const TAKEN: u8 = 0x06;
 
-/// Answer to a stimulus that is unreadable or exceeds the memory.
+/// Answer byte to a stimulus that is unreadable or exceeds the board's memory.
 pub const REFUSED: u8 = 0x15;
 
 /// Size in bytes of the emulated flash for lobe tables, at the start of the board's non-volatile memory.
 pub const FLASH_BYTES: usize = 256 * 1024;
 
-/// Offset of stored stimuli in the board's non-volatile memory.
+/// Offset in bytes of stored stimuli from the start of the board's non-volatile memory.
 pub const STORE_OFFSET: usize = 1024 * 1024;
 
 /// Size of the board's non-volatile memory in bytes.
@@ -31,16 +31,16 @@ pub const MEMORY_BYTES: usize = 16 * 1024 * 1024;
 
 /// A message of simulated signals, which takes the place of sensor and tachometer.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-// A box would need an allocator. Most messages are blocks, and few are held at a time.
+// Boxing the large variant would need an allocator. Most messages are blocks, and few are held at a time.
 #[allow(clippy::large_enum_variant)]
 pub enum Stimulus {
     /// Samples of the accelerometer.
     Block(Block),
-    /// A rising edge of the tachometer.
+    /// A rising edge of the simulated tachometer.
     Edge(Edge),
-    /// Stimuli are stored in the board's memory.
+    /// Stimuli that the host has stored in the board's memory are to be processed.
     Stored {
-        /// Length in bytes, from [`STORE_OFFSET`] on.
+        /// Length of the stored stimuli in bytes, from [`STORE_OFFSET`] on.
         bytes: u32,
     },
     /// Requests a log entry with the largest stack depth and the processing times of blocks.

@@ -20,24 +20,24 @@ pub use configuration::{Configuration, Divisor, Filter, Range};
 
 use super::{Accelerometer, Gap, Queue};
 
-/// Content of the identity register of an IIS3DWB.
+/// Content of the identity register of an IIS3DWB accelerometer.
 pub const IDENTITY: u8 = 0x7b;
 
-/// Capacity of the sensor's queue in words.
+/// Capacity of the sample queue in the accelerometer, in words (one word per sample).
 pub const QUEUE_WORDS: u16 = 512;
 
-/// Bytes of one word of the queue: a tag and three axes of 16 bits.
+/// Length in bytes of one word in the sensor's sample queue: a tag and three axes of 16 bits.
 const WORD_BYTES: usize = 7;
 
 /// Boot time after power-on.
 const BOOT_MILLISECONDS: u32 = 10;
 
-/// Settling time of the samples after the sensor is switched on.
+/// Time after the sensor is switched on until its samples have settled.
 const SETTLING_MILLISECONDS: u32 = 10;
 
-/// Number of polls of the reset bit. A reset takes about 50 µs.
+/// Largest number of polls of the sensor's reset bit before the reset has failed. A reset takes about 50 µs.
 const RESET_POLLS: u32 = 20;
-/// Interval between two polls of the reset bit.
+/// Interval between two polls of the sensor's reset bit.
 const RESET_POLL_MICROSECONDS: u32 = 100;
 
 /// Error of the sensor driver.
@@ -46,19 +46,19 @@ const RESET_POLL_MICROSECONDS: u32 = 100;
 pub enum Error<B> {
     /// The bus failed.
     Bus(B),
-    /// The identity register has another value; 0x00 and 0xFF mean that no sensor answers.
+    /// The identity register of the sensor has another value than expected; 0x00 and 0xFF mean that no sensor answers.
     WrongIdentity {
-        /// Value of the identity register; 0x7B is expected.
+        /// Value read from the identity register; 0x7B is expected.
         found: u8,
     },
-    /// The reset of the sensor did not end in time.
+    /// The sensor did not end its reset in time.
     ResetTimeout,
-    /// The requested watermark is out of range.
+    /// The requested watermark (queue level that raises the interrupt line) is out of range.
     WatermarkOutOfRange {
-        /// The requested watermark; 1 to 511 are possible.
+        /// The requested watermark, in samples; 1 to 511 are possible.
         asked: u16,
     },
-    /// A register does not hold the value that was written to it.
+    /// A register of the sensor does not hold the value that was written to it.
     NotWritten {
         /// Address of the register.
         register: u8,
@@ -67,12 +67,12 @@ pub enum Error<B> {
         /// The value read back.
         found: u8,
     },
-    /// The queue level read from the sensor exceeds its capacity.
+    /// The queue level that the sensor states exceeds the capacity of its queue.
     LevelOutOfRange {
-        /// The level read from the sensor; at most 512 is possible.
+        /// The queue level that the sensor states, in samples; at most 512 is possible.
         found: u16,
     },
-    /// A word of the queue has a tag other than acceleration, or a wrong parity bit.
+    /// A word from the sensor's queue has a tag other than acceleration, or a wrong parity bit in the tag.
     BadTag {
         /// The tag byte.
         found: u8,
@@ -90,12 +90,12 @@ pub struct Iis3dwb<S, D> {
     spi: S,
     delay: D,
     configuration: Configuration,
-    /// The 2-bit sample count in the tag of the last word read from the queue.
+    /// The 2-bit sample count in the tag of the last word read from the sensor's queue; `None` before the first word.
     last_slot: Option<u8>,
 }
 
 impl<S: SpiDevice, D: DelayNs> Iis3dwb<S, D> {
-    /// A sensor on this bus; nothing is sent before [`start`](Accelerometer::start).
+    /// A driver for the sensor on this bus; nothing is sent before [`start`](Accelerometer::start).
     pub fn new(spi: S, delay: D, configuration: Configuration) -> Self {
         Self {
             spi,
@@ -152,7 +152,7 @@ impl<S: SpiDevice, D: DelayNs> Iis3dwb<S, D> {
         let settings = [
             (register::CTRL3_C, bits::BDU | bits::IF_INC),
             (register::CTRL4_C, bits::I2C_OFF),
-            // Writing 0 enables all three axes.
+            // Writing 0 to this register enables all three axes.
             (register::CTRL6_C, 0),
             (register::CTRL8_XL, corner << 5),
             (register::FIFO_CTRL1, watermark_low),
@@ -183,7 +183,7 @@ impl<S: SpiDevice, D: DelayNs> Iis3dwb<S, D> {
         Ok(())
     }
 
-    /// Level of the queue in words, and whether the queue has overflowed since the preceding call.
+    /// Level of the sensor's queue in words, and whether the queue has overflowed since the preceding call.
     fn queue(&mut self) -> Result<(u16, bool), Error<S::Error>> {
         let mut status = [0; 2];
         self.read_registers(register::FIFO_STATUS1, &mut status)?;
@@ -240,7 +240,8 @@ impl<S: SpiDevice, D: DelayNs> Accelerometer for Iis3dwb<S, D> {
             return Err(Error::LevelOutOfRange { found: level });
         };
         if count > 0 {
-            // The sensor's address counts from 0x78 to 0x7E and wraps, so that one transfer reads word after word.
+            // The register address that the sensor reads out counts from 0x78 to 0x7E and wraps, so that one transfer
+            // reads word after word of its queue.
             self.read_registers(register::FIFO_DATA_OUT_TAG, words)?;
         }
         let mut gap = None;
@@ -260,7 +261,7 @@ impl<S: SpiDevice, D: DelayNs> Accelerometer for Iis3dwb<S, D> {
             }
             self.last_slot = Some(slot);
             let counts = [[x0, x1], [y0, y1], [z0, z1]].map(i16::from_le_bytes);
-            // The push cannot fail: the number of words read is limited to the room in `samples`.
+            // The push cannot fail: only as many words were read from the queue as fit into `samples`.
             let _ = samples.push(counts);
         }
         Ok(Queue { level, overrun, gap })

@@ -11,18 +11,18 @@ use embedded_hal::delay::DelayNs;
 use embedded_hal::spi::{ErrorType, Operation, SpiDevice};
 use quietcut_core::acceleration::Counts;
 
-/// Time of one byte on an SPI bus of 10 MHz.
+/// Time of one byte on the modelled SPI bus at 10 MHz.
 const BYTE_NS: u64 = 800;
-/// Time between two transfers: chip select off and on, and the driver's code.
+/// Time between two SPI transfers: chip select off and on, and the driver's code.
 const SELECT_NS: u64 = 2_000;
 const RESET_NS: u64 = 50_000;
-/// Time after power-on before which the sensor does not answer.
+/// Time after power-on during which the sensor does not answer.
 const BOOT_NS: u64 = 10_000_000;
-/// Time after the start of sampling before which the sensor's filter has not settled.
+/// Time after the start of sampling during which the sensor's filter has not settled.
 const SETTLING_NS: u64 = 10_000_000;
 const QUEUE_WORDS: usize = 512;
 
-/// Output of the model before its filter has settled.
+/// Sample that the model gives before its filter has settled.
 pub(crate) const UNSETTLED: Counts = [i16::MAX; 3];
 
 /// The modelled sensor with its clock.
@@ -36,14 +36,15 @@ pub(crate) struct Model {
     shown: [u8; 7],
     overrun_latched: bool,
     reset_ends_ns: Option<u64>,
-    /// Time at which sampling last started; `None` while it is off.
+    /// Time at which the model last started to sample; `None` while sampling is off.
     on_since_ns: Option<u64>,
-    /// Number of samples since sampling last started.
+    /// Number of samples taken since the model last started to sample.
     taken: u64,
-    /// Times at which pin INT1 rose.
+    /// Times at which pin INT1 of the modelled sensor rose.
     pub(crate) rises_ns: Vec<u64>,
     line: bool,
-    /// Sample times of all samples that went to the queue. The counts x, y, z of a sample encode its index in this list.
+    /// Times of all samples that went to the modelled queue. The counts x, y, z of a sample encode its index in this
+    /// list.
     pub(crate) queued_ns: Vec<u64>,
     fault: Fault,
 }
@@ -52,13 +53,13 @@ pub(crate) struct Model {
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Fault {
     None,
-    /// The identity register has this other value.
+    /// The identity register of the modelled sensor has this other value.
     Identity(u8),
     /// The reset never ends.
     ResetHangs,
-    /// Writes to the register with this address have no effect.
+    /// Writes to the sensor register with this address have no effect.
     WritesIgnored(u8),
-    /// This bit of every tag is inverted in the transfer.
+    /// In every tag that the modelled sensor sends, this bit is inverted.
     TagBit(u8),
 }
 
@@ -83,7 +84,7 @@ impl Model {
         Rc::new(RefCell::new(model))
     }
 
-    /// The counts of sample number `index`: they encode the index and differ between the axes.
+    /// The counts x, y, z of the modelled sample number `index`: they encode the index and differ between the axes.
     pub(crate) fn counts(index: u64) -> Counts {
         let low = (index % 30_000) as i16;
         [low, -low, (index / 30_000) as i16]
@@ -108,7 +109,7 @@ impl Model {
         self.set_defaults();
     }
 
-    /// Inverts this bit of every tag from now on.
+    /// Inverts this bit of every tag that the modelled sensor sends from now on.
     pub(crate) fn break_tags(&mut self, bit: u8) {
         self.fault = Fault::TagBit(bit);
     }
@@ -220,7 +221,7 @@ impl Model {
             self.reset_ends_ns.is_none(),
             "register {address:#04x} is written during a reset"
         );
-        // Bits that the data sheet defines for each register. Writes must keep all other bits at zero.
+        // For each sensor register, the bits that the data sheet defines. Writes must keep all other bits at zero.
         let may = match address {
             0x07 => 0xff,
             0x08 => 0b1000_0001,
@@ -257,7 +258,8 @@ impl Model {
         self.update_line();
     }
 
-    /// The register address of the next byte of a transfer. From the last output byte of the queue it wraps to the tag.
+    /// The register address of the next byte in an SPI transfer after `address`. From the last output byte of the queue
+    /// it wraps to the tag.
     fn next(&self, address: u8) -> u8 {
         let counts_up = self.registers[0x12] & 0b100 != 0;
         match address {
@@ -268,7 +270,7 @@ impl Model {
     }
 }
 
-/// An SPI bus that is connected to the model.
+/// An SPI bus to which the modelled sensor is connected.
 pub(crate) struct Bus(pub(crate) Rc<RefCell<Model>>);
 
 impl ErrorType for Bus {
@@ -303,7 +305,7 @@ impl SpiDevice for Bus {
                     for byte in bytes.iter_mut() {
                         let at = address.expect("a transfer begins with an address");
                         assert!(reading, "a byte is read in a write");
-                        // The sensor takes the value of a byte at the beginning of its transfer.
+                        // The sensor fixes the value of a byte at the beginning of the byte's transfer.
                         *byte = if model.now_ns < BOOT_NS {
                             0xff
                         } else {
@@ -320,7 +322,7 @@ impl SpiDevice for Bus {
     }
 }
 
-/// A delay that advances the model's clock.
+/// A delay that advances the clock of the modelled sensor.
 pub(crate) struct Delay(pub(crate) Rc<RefCell<Model>>);
 
 impl DelayNs for Delay {

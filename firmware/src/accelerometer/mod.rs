@@ -17,7 +17,7 @@ pub trait Accelerometer {
     /// The properties of the sensor that the signal chain uses.
     fn sensor(&self) -> Sensor;
 
-    /// Level of the queue, in samples, at which the line rises.
+    /// Level of the sensor's queue, in samples, at which the watermark line rises.
     fn watermark(&self) -> u16;
 
     /// Resets and configures the sensor and empties its queue. Returns once the samples have settled.
@@ -29,18 +29,19 @@ pub trait Accelerometer {
     fn read(&mut self, samples: &mut Vec<Counts, MAX_BLOCK_SAMPLES>) -> Result<Queue, Self::Error>;
 }
 
-/// The state of the queue at one read.
+/// The state of the sensor's sample queue at one read.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Queue {
-    /// Level of the queue at the beginning of the read, in samples.
+    /// Level of the sensor's queue at the beginning of the read, in samples.
     pub level: u16,
-    /// True if the queue has overflowed since the preceding read, so that samples are lost.
+    /// True if the sensor's queue has overflowed since the preceding read, so that samples are lost.
     pub overrun: bool,
-    /// Samples missing between the preceding read and this one; `None` if the sensor does not number its samples.
+    /// Number of samples missing between the preceding read and this one; `None` if the sensor does not number its
+    /// samples.
     pub gap: Option<Gap>,
 }
 
-/// A number of missing samples that is known only up to multiples of `modulus`.
+/// A number of missing samples, known from the sensor's count only up to multiples of `modulus`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Gap {
     /// Missing samples modulo `modulus`.

@@ -23,32 +23,32 @@ pub(super) struct Outbox {
     dropped: u32,
 }
 
-/// Points of the stroboscopic map that are being sent.
+/// Progress of sending the points of the stroboscopic map of one block.
 struct Strobes {
     sequence: u32,
     next: usize,
 }
 
-/// A spectrum that is being sent.
+/// Progress of sending one power spectrum.
 struct Spectrum {
     /// Sequence number of the block that completed the spectrum.
     sequence: u32,
-    /// Index of the first bin of the spectrum that is not sent.
+    /// Index of the first bin of the spectrum that is not yet sent.
     next: usize,
 }
 
 impl Outbox {
-    /// Number of messages dropped because the line is too slow.
+    /// Number of messages to the host that were dropped because the line is too slow.
     pub(super) fn dropped(&self) -> u32 {
         self.dropped
     }
 
-    /// True while a reply waits. The next request is not received until the reply is sent.
+    /// True while a reply waits to be sent. The next request is not received until then.
     pub(super) fn has_reply(&self) -> bool {
         self.reply.is_some()
     }
 
-    /// Discards all waiting messages, after the state of the signal chain was reset.
+    /// Discards all messages that wait to be sent, after the state of the signal chain was reset.
     pub(super) fn clear(&mut self) {
         *self = Self {
             dropped: self.dropped,
@@ -56,8 +56,8 @@ impl Outbox {
         };
     }
 
-    /// Drops waiting reports and stroboscopic points, because the next step overwrites them. Spectra stay, because the next step
-    /// may leave them unchanged.
+    /// Drops the reports and stroboscopic points that wait to be sent, because the next step of the signal chain
+    /// overwrites them. Spectra stay, because the next step may leave them unchanged.
     pub(super) fn drop_overwritten(&mut self) {
         self.dropped = self
             .dropped
@@ -65,7 +65,7 @@ impl Outbox {
             .saturating_add(u32::from(self.strobes.take().is_some()));
     }
 
-    /// Queues the results of a step to which the host subscribes.
+    /// Queues those results of a step of the signal chain to which the host subscribes.
     pub(super) fn fill(
         &mut self,
         report: Option<Report>,
@@ -79,7 +79,8 @@ impl Outbox {
         }
         for (band, sending) in BANDS.into_iter().zip(&mut self.spectra) {
             if state.has_fresh_spectrum(band) {
-                // The new spectrum has overwritten one that was only partly sent.
+                // The new spectrum has overwritten an older one that was not completely sent, which therefore counts as
+                // dropped.
                 self.dropped = self.dropped.saturating_add(u32::from(sending.is_some()));
                 *sending = subscription.spectra.then_some(Spectrum { sequence, next: 0 });
             }
@@ -98,7 +99,7 @@ impl Outbox {
         self.is_reply_last = true;
     }
 
-    /// Sends as much as the output queue has room for. Returns the reply if it was sent.
+    /// Sends as many waiting messages as the output queue of the link has room for. Returns the reply if it was sent.
     pub(super) fn pump(&mut self, link: &mut Link, state: &State) -> Option<(u16, Reply)> {
         let mut sent = None;
         while link.room() > 0 {
@@ -128,7 +129,7 @@ impl Outbox {
         Some((request, reply))
     }
 
-    /// The next spectrum to send: its band, the field for the unsent rest, and its progress.
+    /// The next spectrum to send: its band, the field that stores its progress for the next call, and its progress.
     fn next_spectrum(&mut self) -> Option<(Band, &mut Option<Spectrum>, Spectrum)> {
         BANDS.into_iter().zip(&mut self.spectra).find_map(|(band, slot)| {
             let spectrum = slot.take()?;
@@ -137,7 +138,7 @@ impl Outbox {
     }
 }
 
-/// Sends the next points of the stroboscopic map. Returns the progress if some points are left.
+/// Sends the next points of the stroboscopic map. Returns the progress if some points are not yet sent.
 fn send_strobes(link: &mut Link, state: &State, strobes: Strobes) -> Option<Strobes> {
     let rest = state.strobes().get(strobes.next..).unwrap_or_default();
     let mut chunk = StrobeChunk {
@@ -154,7 +155,7 @@ fn send_strobes(link: &mut Link, state: &State, strobes: Strobes) -> Option<Stro
     (next < state.strobes().len()).then_some(Strobes { next, ..strobes })
 }
 
-/// Sends the next chunk of a spectrum. Returns the progress if some bins are left.
+/// Sends the next chunk of a spectrum. Returns the progress if some bins are not yet sent.
 fn send_spectrum(link: &mut Link, state: &State, band: Band, sending: Spectrum) -> Option<Spectrum> {
     let spectrum = state.spectrum(band)?;
     let mut power = Vec::new();

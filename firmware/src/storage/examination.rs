@@ -1,4 +1,4 @@
-//! Examination of the slots: their content, the newest table, and the slot of the next upload.
+//! Examination of the table slots in flash: their content, the newest table, and the slot of the next upload.
 
 use quietcut_core::lobes::format::HEADER_LENGTH;
 use quietcut_core::lobes::{Header, LobeTable, TableError};
@@ -14,17 +14,17 @@ impl<M: TableMemory> Storage<M> {
         self.contents.get(slot).copied().unwrap_or(Contents::Empty)
     }
 
-    /// Examines a slot with a full check of its table.
+    /// Determines the content of a table slot with a full check of its table.
     pub(super) fn examine(&mut self, slot: usize) {
         self.record_contents(slot, |table| LobeTable::parse(table).map(|_| ()));
     }
 
-    /// Checks the entries of a table whose CRC-32 has been verified.
+    /// Checks the entries of a lobe table whose CRC-32 has already been verified.
     pub(super) fn entries_checked(table: &[u8]) -> Result<(), TableError> {
         LobeTable::reopen(table)?.check_entries()
     }
 
-    /// Records the content of a slot. `check` decides whether its bytes are a valid table.
+    /// Records the content of a table slot. `check` decides whether its bytes are a valid table.
     pub(super) fn record_contents(
         &mut self,
         slot: usize,
@@ -50,21 +50,21 @@ impl<M: TableMemory> Storage<M> {
         }
     }
 
-    /// The slot with the newest valid table.
+    /// The slot with the newest valid lobe table; `None` if no slot holds a valid one.
     pub(super) fn newest(&self) -> Option<usize> {
         let generation = |slot: &usize| match self.contents_of(*slot) {
             Contents::Valid(header) => Some(header.generation),
             _ => None,
         };
         let slots = || (0..SLOTS).filter(|slot| generation(slot).is_some());
-        // Generation numbers wrap at 2³². The newer of two numbers is less than 2³¹ ahead of the other.
+        // Generation numbers of lobe tables wrap at 2³². The newer of two numbers is less than 2³¹ ahead of the other.
         slots().reduce(|a, b| match (generation(&a), generation(&b)) {
             (Some(of_a), Some(of_b)) if of_b.wrapping_sub(of_a) < u32::MAX / 2 => b,
             _ => a,
         })
     }
 
-    /// The generation number of the next uploaded table.
+    /// The generation number that the next uploaded lobe table gets.
     pub(super) fn next_generation(&self) -> u32 {
         match self.in_use.map(|slot| self.contents_of(slot)) {
             Some(Contents::Valid(header)) => header.generation.wrapping_add(1),

@@ -29,27 +29,27 @@ const RECORD_LENGTH: usize = MAGIC.len() + HEADER_LENGTH + 4;
 const MARKS_OFFSET: usize = 64;
 const MARK_LENGTH: usize = 4;
 
-/// Position and layout of the journal of a slot.
+/// Position and layout in flash of the journal of a table slot.
 pub(super) struct Journal<M> {
     start: u32,
-    /// Length of a section in bytes.
+    /// Length in bytes of a section: the part of the table slot after which the journal gets a mark.
     section: u32,
     marks: u32,
     memory: PhantomData<M>,
 }
 
 impl<M: NorFlash> Journal<M> {
-    /// Distance of two marks in bytes, a multiple of the flash word.
+    /// Distance in bytes of two progress marks in the journal, a multiple of the flash word.
     const MARK_STEP: usize = if M::WRITE_SIZE < MARK_LENGTH {
         MARK_LENGTH
     } else {
         M::WRITE_SIZE
     };
 
-    /// Smallest page in bytes that holds the record and one mark.
+    /// Smallest flash page in bytes that holds the record of an upload and one progress mark.
     pub(super) const LEAST_PAGE: usize = MARKS_OFFSET + Self::MARK_STEP;
 
-    /// The journal at offset `start` of the memory, for a slot with `capacity` bytes for the table.
+    /// The journal at offset `start` of the flash memory, for a slot with `capacity` bytes for the lobe table.
     pub(super) fn new(start: u32, capacity: u32) -> Self {
         let page = M::ERASE_SIZE as u32;
         let room = ((M::ERASE_SIZE - MARKS_OFFSET) / Self::MARK_STEP) as u32;
@@ -67,7 +67,7 @@ impl<M: NorFlash> Journal<M> {
         self.start
     }
 
-    /// The record of an upload, padded to whole flash words.
+    /// The journal's record of an upload (magic, header of the file, CRC-32), padded to whole flash words.
     pub(super) fn record(header: &Header) -> [u8; MARKS_OFFSET] {
         let mut record = [ERASED; MARKS_OFFSET];
         let header = header.to_bytes();
@@ -79,17 +79,18 @@ impl<M: NorFlash> Journal<M> {
         record
     }
 
-    /// The offset in the slot of the next mark after `written` bytes: the end of a section.
+    /// Offset in the slot, after `written` bytes, at which the next progress mark is due: the end of the present
+    /// section.
     pub(super) fn next_mark(&self, written: u32) -> u32 {
         (written / self.section + 1) * self.section
     }
 
-    /// True if a section ends at this offset, so that its mark is due.
+    /// True if a section of the slot ends after `written` bytes, so that its progress mark is due.
     pub(super) fn is_at_mark(&self, written: u32) -> bool {
         written > 0 && written.is_multiple_of(self.section)
     }
 
-    /// Offset in the memory and content of the mark for `written` bytes.
+    /// Offset in the flash memory, and content, of the journal's mark that `written` bytes of the table are written.
     pub(super) fn mark(&self, header: &Header, written: u32) -> (u32, Vec<u8, MAX_WRITE_SIZE>) {
         let number = written.div_ceil(self.section).saturating_sub(1);
         let value = mark_value(header, number);
@@ -97,7 +98,7 @@ impl<M: NorFlash> Journal<M> {
         (self.start + self.offset_of(number), bytes)
     }
 
-    /// Header of the uploaded file and number of received bytes; `None` if the journal has no valid record.
+    /// Header of the uploaded file and number of received bytes, from the journal; `None` if it has no valid record.
     pub(super) fn read(&self, memory: &[u8]) -> Option<(Header, u32)> {
         let page = memory.get(self.start as usize..)?.get(..M::ERASE_SIZE)?;
         let record = page.get(..RECORD_LENGTH)?;

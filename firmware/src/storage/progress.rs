@@ -1,4 +1,4 @@
-//! The progress of an upload: received bytes and their CRC-32.
+//! The progress of the upload of a lobe table: received bytes and their CRC-32.
 
 use heapless::Vec;
 use quietcut_core::checksum::Crc32;
@@ -13,23 +13,25 @@ pub(super) struct Progress {
     pub(super) slot: usize,
     /// Header of the uploaded file.
     pub(super) header: Header,
-    /// Number of received bytes of the table, header included.
+    /// Number of received bytes of the uploaded table, header included.
     pub(super) received: u32,
     /// Offset up to which the table slot is erased or written.
     pub(super) erased_to: u32,
-    /// Received bytes that do not yet fill a flash word.
+    /// Received bytes of the table that do not yet fill a flash word.
     pub(super) tail: Vec<u8, MAX_WRITE_SIZE>,
-    /// The header to be written to the slot. It has the device's generation number; its CRC is set at the end of the upload.
+    /// The header of the uploaded table as it is written to the slot. It has the device's generation number; its CRC is
+    /// set at the end of the upload.
     renewed: Header,
     /// Running CRC-32 of the received table with the file's header. A computation at the end of the upload would delay the
     /// device.
     crc: Crc32,
-    /// Running CRC-32 of the received table with the header for the slot.
+    /// Running CRC-32 of the received table with the header that is written to the slot.
     renewed_crc: Crc32,
 }
 
 impl Progress {
-    /// Resumes an upload. `payload` are the bytes after the header that are already in the slot, up to the end of a page.
+    /// Resumes an upload. `payload` are the bytes after the header of the table that are already in the slot, up to the
+    /// end of a page.
     pub(super) fn resumed(slot: usize, header: Header, generation: u32, payload: &[u8]) -> Self {
         let received = (HEADER_LENGTH + payload.len()) as u32;
         let renewed = Header { generation, ..header };
@@ -37,7 +39,7 @@ impl Progress {
             slot,
             header,
             received,
-            // The page after the last complete page may be partly written. It is erased again.
+            // The flash page after the last complete one may be partly written. It is erased again.
             erased_to: if payload.is_empty() { 0 } else { received },
             tail: Vec::new(),
             renewed,
@@ -53,7 +55,7 @@ impl Progress {
         self.renewed_crc.update(payload);
     }
 
-    /// The header for the slot, if the received bytes match the CRC of the file's header.
+    /// The header to write to the slot, if the received bytes of the table match the CRC in the file's header.
     pub(super) fn checked(&self) -> Result<Header, TableError> {
         let (header, computed) = (self.header.crc, self.crc.value());
         if header == computed {

@@ -1,4 +1,4 @@
-//! Reception of a table: erases pages, writes words and marks the progress in the journal.
+//! Reception of an uploaded lobe table: erases pages, writes words and marks the progress in the journal.
 
 use quietcut_core::lobes::Header;
 use quietcut_core::lobes::format::HEADER_LENGTH;
@@ -32,7 +32,7 @@ impl<M: TableMemory> Storage<M> {
         let _ = self.erase(journal, Self::PAGE);
     }
 
-    /// Appends received data: writes whole flash words at once and keeps the rest in the tail.
+    /// Appends received bytes of the table: writes whole flash words at once and keeps the rest in the tail.
     pub(super) fn receive(&mut self, mut upload: Progress, mut data: &[u8]) -> Result<Progress, Refusal> {
         let journal = self.journal(upload.slot);
         while !data.is_empty() {
@@ -69,14 +69,14 @@ impl<M: TableMemory> Storage<M> {
         Ok(upload)
     }
 
-    /// Writes whole flash words at an offset of the slot. Erases each page before the first word of it.
+    /// Writes whole flash words at an offset of the table slot. Erases each page before its first word is written.
     fn program(&mut self, upload: &mut Progress, offset: u32, words: &[u8]) -> Result<(), Refusal> {
         let start = self.start_of(upload.slot);
         let end = offset + words.len() as u32;
         while upload.erased_to < end {
             let erased = self.erase(start + upload.erased_to, Self::PAGE);
             if upload.erased_to == 0 {
-                // The first page held the header of the old table, which is now erased.
+                // The first page of the slot held the header of the old table, which is now erased.
                 self.examine(upload.slot);
             }
             erased?;
@@ -87,7 +87,8 @@ impl<M: TableMemory> Storage<M> {
 
     /// Marks the number of written bytes in the journal.
     ///
-    /// A loss of power may have left this mark partly written. It is then skipped, since the next mark includes it.
+    /// A loss of power may have left this mark partly written. It is then not written again, since the next mark also
+    /// covers these bytes.
     fn mark(&mut self, journal: &Journal<M>, upload: &Progress) -> Result<(), Refusal> {
         let (offset, mark) = journal.mark(&upload.header, upload.written());
         let range = offset as usize..offset as usize + mark.len();

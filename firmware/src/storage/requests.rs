@@ -1,4 +1,4 @@
-//! The requests of the host: list the slots, upload a table.
+//! The requests of the host about lobe tables: list the slots, upload a table.
 
 use quietcut_core::lobes::format::{HEADER_LENGTH, SCHEMA};
 use quietcut_core::lobes::{Header, LobeTable, TableError};
@@ -13,7 +13,8 @@ use super::progress::Progress;
 use super::slots::Storage;
 
 impl<M: TableMemory> Storage<M> {
-    /// Examines the memory. The newest valid table becomes the table in use, and an unfinished upload is resumed.
+    /// Examines the flash memory for lobe tables. The newest valid table becomes the table in use, and an unfinished
+    /// upload is resumed.
     ///
     /// A memory of fewer than four pages cannot hold tables.
     pub fn new(memory: M) -> Self {
@@ -61,19 +62,20 @@ impl<M: TableMemory> Storage<M> {
         })
     }
 
-    /// The progress of the upload.
+    /// The progress of the upload of a lobe table.
     ///
     /// # Errors
-    /// [`Refusal::NoUpload`].
+    /// [`Refusal::NoUpload`] if there is no upload.
     pub fn upload(&self) -> Result<Upload, Refusal> {
         self.upload.as_ref().map(Progress::state).ok_or(Refusal::NoUpload)
     }
 
-    /// Begins the upload of the table with this header into the slot that is not in use. Resumes it if a part of the same table is
-    /// already there.
+    /// Begins the upload of the table with this header into the slot that is not in use. Resumes it if a part of the
+    /// same table is already there.
     ///
     /// # Errors
-    /// [`Refusal::Table`], [`Refusal::TableTooLong`], [`Refusal::Flash`].
+    /// [`Refusal::Table`], [`Refusal::TableTooLong`] or [`Refusal::Flash`]: the header is invalid, the table too long,
+    /// or the flash memory fails.
     pub fn begin(&mut self, header: Header) -> Result<Upload, Refusal> {
         if !Header::knows(header.schema) {
             return Err(Refusal::Table(TableError::Schema {
@@ -101,8 +103,8 @@ impl<M: TableMemory> Storage<M> {
         let slot = self.free_slot();
         self.upload = None;
         let journal = self.journal(slot);
-        // The journal is written first, because it identifies the table whose part is in the slot. Pages are erased when they
-        // are reached.
+        // The journal is written first, because it names the table of which the slot holds a part. Pages of the slot
+        // are erased when the upload reaches them.
         self.erase(journal.start(), Self::PAGE)?;
         let record = Journal::<M>::record(&header);
         self.write(journal.start(), &record)?;
@@ -112,11 +114,11 @@ impl<M: TableMemory> Storage<M> {
         Ok(state)
     }
 
-    /// Receives a chunk of the table.
+    /// Receives a chunk of the uploaded lobe table.
     ///
     /// # Errors
-    /// [`Refusal::NoUpload`], [`Refusal::ChunkOffset`]; after [`Refusal::Flash`] the upload must begin again. It then resumes
-    /// at the last complete page.
+    /// [`Refusal::NoUpload`], [`Refusal::ChunkOffset`]; after [`Refusal::Flash`] the upload must begin again. It then
+    /// resumes at the last complete page.
     pub fn chunk(&mut self, offset: u32, data: &[u8]) -> Result<Upload, Refusal> {
         let upload = self.upload.take().ok_or(Refusal::NoUpload)?;
         let (expected, length) = (upload.received, upload.header.length);
@@ -135,7 +137,7 @@ impl<M: TableMemory> Storage<M> {
         Ok(state)
     }
 
-    /// Checks the received table and puts it in use.
+    /// Checks the uploaded lobe table and puts it in use.
     ///
     /// # Errors
     /// [`Refusal::NoUpload`], [`Refusal::Incomplete`]; after [`Refusal::Table`] or [`Refusal::Flash`] the upload is
@@ -155,7 +157,8 @@ impl<M: TableMemory> Storage<M> {
             Ok(renewed) => self
                 .write(self.start_of(slot), &renewed.to_bytes())
                 .and_then(|()| {
-                    // The CRC was computed from bytes that were written and read back, so only the entries need a check.
+                    // The CRC of the table was computed from bytes that were written and read back, so only its entries
+                    // need a check.
                     self.record_contents(slot, Self::entries_checked);
                     match self.contents_of(slot) {
                         Contents::Valid(_) => Ok(()),
@@ -172,17 +175,17 @@ impl<M: TableMemory> Storage<M> {
         committed
     }
 
-    /// Aborts the upload.
+    /// Aborts the upload of a lobe table.
     ///
     /// # Errors
-    /// [`Refusal::NoUpload`].
+    /// [`Refusal::NoUpload`] if there is no upload.
     pub fn abort(&mut self) -> Result<(), Refusal> {
         let slot = self.upload.take().ok_or(Refusal::NoUpload)?.slot;
         self.discard(slot);
         Ok(())
     }
 
-    /// Returns the memory and drops the storage.
+    /// Returns the flash memory and drops the storage.
     pub fn into_memory(self) -> M {
         self.memory
     }

@@ -1,4 +1,4 @@
-//! The two slots: their layout, and reading, erasing and writing of their bytes.
+//! The two table slots in flash: their layout, and reading, erasing and writing of their bytes.
 
 use quietcut_core::lobes::Header;
 use quietcut_core::protocol::Refusal;
@@ -9,7 +9,7 @@ use super::contents::Contents;
 use super::journal::Journal;
 use super::progress::Progress;
 
-/// The table slots of a device.
+/// The slots in the flash memory of a device that hold its lobe tables.
 pub struct Storage<M> {
     pub(super) memory: M,
     pub(super) contents: [Contents; SLOTS],
@@ -20,7 +20,7 @@ pub struct Storage<M> {
 impl<M: TableMemory> Storage<M> {
     pub(super) const PAGE: u32 = M::ERASE_SIZE as u32;
 
-    /// Largest length of a table in bytes.
+    /// Largest length in bytes of a lobe table that fits into a slot.
     pub fn slot_capacity(&self) -> u32 {
         self.slot_length().saturating_sub(Self::PAGE)
     }
@@ -38,14 +38,14 @@ impl<M: TableMemory> Storage<M> {
         Journal::new(self.start_of(slot) + self.slot_capacity(), self.slot_capacity())
     }
 
-    /// The bytes of a slot, without its journal.
+    /// The bytes of a table slot, without its journal.
     pub(super) fn slot_bytes(&self, slot: usize) -> &[u8] {
         let start = self.start_of(slot) as usize;
         let end = start + self.slot_capacity() as usize;
         self.memory.mapped().get(start..end).unwrap_or_default()
     }
 
-    /// The bytes of the table in a slot, with the length that its header gives.
+    /// The bytes of the lobe table in a slot, with the length that its header states.
     pub(super) fn table_bytes(&self, slot: usize) -> Option<&[u8]> {
         let bytes = self.slot_bytes(slot);
         let header = Header::read(bytes).ok()?;
@@ -56,7 +56,7 @@ impl<M: TableMemory> Storage<M> {
         self.memory.erase(from, from + length).map_err(|_| Refusal::Flash)
     }
 
-    /// Writes flash words and verifies them by reading back.
+    /// Writes flash words at an offset of the memory and verifies them by reading back.
     pub(super) fn write(&mut self, offset: u32, words: &[u8]) -> Result<(), Refusal> {
         self.memory.write(offset, words).map_err(|_| Refusal::Flash)?;
         let range = offset as usize..offset as usize + words.len();

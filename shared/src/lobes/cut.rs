@@ -144,8 +144,10 @@ impl<'a> LobeTable<'a> {
     }
 }
 
-/// The two layers that enclose the working point in feed or in feed direction, and the weight of the second.
-// `inline(never)` here and below: one copy of the code saves flash, and the time of a call is negligible.
+/// The two table layers that enclose the working point in feed or in feed direction, and the interpolation weight of the
+/// second.
+// `inline(never)` on this function and those below: one copy of the code saves flash, and the time of a call is
+// negligible.
 #[inline(never)]
 fn bracket(table: &LobeTable<'_>, working_point: &WorkingPoint) -> Result<(usize, usize, f32), NotKnown> {
     // A lobe table of schema 1 has no feed directions.

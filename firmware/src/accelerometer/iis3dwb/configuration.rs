@@ -6,13 +6,13 @@ use quietcut_core::acceleration::MAX_BLOCK_SAMPLES;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Range {
-    /// ±2 g, 0.061 mg per count.
+    /// ±2 g; one count is 0.061 mg.
     G2,
-    /// ±4 g, 0.122 mg per count.
+    /// ±4 g; one count is 0.122 mg.
     G4,
-    /// ±8 g, 0.244 mg per count.
+    /// ±8 g; one count is 0.244 mg.
     G8,
-    /// ±16 g, 0.488 mg per count.
+    /// ±16 g; one count is 0.488 mg.
     #[default]
     G16,
 }
@@ -41,10 +41,11 @@ impl Range {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Filter {
-    /// The first filter only: flat from DC to 6 kHz.
+    /// Only the first low-pass filter of the sensor: flat from DC to 6 kHz.
     #[default]
     Wide,
-    /// A second low-pass filter; its corner frequency is the sampling rate over a divisor.
+    /// Also the second low-pass filter of the sensor; its corner frequency is the sampling rate divided by this
+    /// divisor.
     LowPass(Divisor),
 }
 
@@ -79,13 +80,13 @@ pub struct Configuration {
     pub range: Range,
     /// Filters in the signal path.
     pub filter: Filter,
-    /// Level of the queue, in samples, at which pin INT1 rises: 1 to 511.
+    /// Level of the sensor's queue, in samples, at which pin INT1 rises: 1 to 511.
     pub watermark: u16,
 }
 
 impl Default for Configuration {
-    /// The largest range and the full band, with an interrupt every 64 samples. 17 ms remain from the interrupt until the queue
-    /// is full.
+    /// The largest range and the full band, with an interrupt every 64 samples. 17 ms remain from the interrupt until
+    /// the sensor's queue is full.
     fn default() -> Self {
         Self {
             range: Range::default(),

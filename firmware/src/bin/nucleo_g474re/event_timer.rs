@@ -24,8 +24,8 @@ const TICKS_PER_SECOND: u32 = 80_000_000;
 const TACHOMETER: Channel = Channel::Ch1;
 const WATERMARK: Channel = Channel::Ch2;
 
-/// Capacity of the edge queue: 0.17 s of a wheel with 60 positions at 1 500 rev/min, or about twice the edges at 6 000 rev/min
-/// during a page erase of 22 ms.
+/// Capacity of the queue of tachometer edges: 0.17 s of a wheel with 60 positions at 1 500 rev/min, or about twice the
+/// edges at 6 000 rev/min during a page erase of 22 ms.
 const MAX_EDGES: usize = 256;
 
 /// Edges of the tachometer, in order of time. If the queue is full, the newest edges are dropped.
@@ -35,10 +35,10 @@ pub(crate) static EDGES: Queue<CriticalSectionRawMutex, Edge, MAX_EDGES> = Queue
 pub(crate) static RISE: Signal<CriticalSectionRawMutex, Nanoseconds> = Signal::new();
 
 static TIMER: Mutex<RefCell<Option<Timer<'static, TIM2>>>> = Mutex::new(RefCell::new(None));
-/// The newest count of the timer, extended to 64 bits.
+/// The newest count of the timer TIM2, extended to 64 bits.
 static TICKS: Mutex<Cell<u64>> = Mutex::new(Cell::new(0));
 
-/// Starts the clock. The pins remain inputs of the timer.
+/// Starts the clock. From then on the two pins are inputs of the timer.
 pub(crate) fn start(
     timer: Peri<'static, TIM2>,
     tachometer: Peri<'static, PA0>,
@@ -64,7 +64,7 @@ pub(crate) fn start(
     timer.generate_update_event();
     timer.start();
     critical_section::with(|token| TIMER.borrow_ref_mut(token).replace(timer));
-    // SAFETY: the handler shares data with the rest of the program through mutexes only.
+    // SAFETY: the interrupt handler shares data with the rest of the program through mutexes only.
     unsafe { interrupt::TIM2.enable() };
 }
 
@@ -79,10 +79,10 @@ pub(crate) fn now() -> Nanoseconds {
     })
 }
 
-/// The time of a timer count that is at most half a period of the timer from the newest one.
+/// The time that belongs to a timer count, which is at most half a period of the timer from the newest count.
 fn carry_on(token: CriticalSection<'_>, count: u32) -> Nanoseconds {
     let newest = TICKS.borrow(token).get();
-    // Two captures served in one interrupt may be out of order, so the difference is signed.
+    // The captures of both inputs, served in one interrupt, may be out of order, so the difference is signed.
     let difference = count.wrapping_sub(newest as u32).cast_signed();
     let ticks = newest.saturating_add_signed(i64::from(difference));
     TICKS.borrow(token).set(newest.max(ticks));

@@ -10,12 +10,12 @@ use embedded_io::{ErrorType, Read, ReadReady, Write, WriteReady};
 
 use crate::WORK;
 
-/// Capacity in bytes of the queue from host to device: 22 ms at 921 600 baud, the time of a page erase.
+/// Capacity in bytes of the queue from host to device: 22 ms of bytes at 921 600 baud, the time of a page erase.
 static RECEIVED: Pipe<CriticalSectionRawMutex, 2048> = Pipe::new();
 /// Capacity in bytes of the queue from device to host.
 static SENT: Pipe<CriticalSectionRawMutex, 2048> = Pipe::new();
 
-/// Task: passes received bytes to the device.
+/// Task that passes the bytes received from the host to the device.
 #[embassy_executor::task]
 pub(crate) async fn receive(mut port: RingBufferedUartRx<'static>) {
     let mut bytes = [0; 128];
@@ -25,13 +25,13 @@ pub(crate) async fn receive(mut port: RingBufferedUartRx<'static>) {
                 RECEIVED.write_all(bytes.get(..count).unwrap_or_default()).await;
                 WORK.signal(());
             }
-            // A frame with missing bytes fails its CRC.
+            // Lost bytes need no other handling: a frame with missing bytes fails its CRC.
             Err(error) => defmt::warn!("link: {}", error),
         }
     }
 }
 
-/// Task: sends the bytes of the device to the host.
+/// Task that sends the bytes of the device to the host.
 #[embassy_executor::task]
 pub(crate) async fn send(mut port: UartTx<'static, Async>) {
     let mut bytes = [0; 256];
@@ -44,7 +44,7 @@ pub(crate) async fn send(mut port: UartTx<'static, Async>) {
     }
 }
 
-/// The link's byte stream for the device.
+/// The link's byte stream, from which the device reads and to which it writes.
 pub(crate) struct LinkLine;
 
 impl ErrorType for LinkLine {
@@ -58,7 +58,7 @@ impl ReadReady for LinkLine {
 }
 
 impl Read for LinkLine {
-    /// Reads the bytes that have arrived; returns 0 if there are none.
+    /// Reads the bytes of the host that have arrived; returns 0 if there are none.
     fn read(&mut self, bytes: &mut [u8]) -> Result<usize, Infallible> {
         Ok(RECEIVED.try_read(bytes).unwrap_or(0))
     }
@@ -71,7 +71,7 @@ impl WriteReady for LinkLine {
 }
 
 impl Write for LinkLine {
-    /// Accepts as many bytes as the queue has room for.
+    /// Accepts as many bytes as the queue to the host has room for.
     fn write(&mut self, bytes: &[u8]) -> Result<usize, Infallible> {
         Ok(SENT.try_write(bytes).unwrap_or(0))
     }

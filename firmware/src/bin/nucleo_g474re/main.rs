@@ -70,17 +70,19 @@ const WATCHDOG_MICROSECONDS: u32 = 2_000_000;
 /// Longest sleep of the main loop if nothing happens.
 const LONGEST_SLEEP: Duration = Duration::from_millis(500);
 
-/// Wakes the main loop: a block has arrived, bytes have arrived, or the line accepts bytes again.
+/// Signal that wakes the main loop: a block of samples has arrived, bytes have arrived, or the line accepts bytes
+/// again.
 static WORK: Signal<CriticalSectionRawMutex, ()> = Signal::new();
 static IO_EXECUTOR: InterruptExecutor = InterruptExecutor::new();
 
-/// Memory for the state of the signal chain, which the device resets. All-zero bits take no space in the image.
+/// Memory for the state of the signal chain, which the device resets. A value with all bits zero takes no space in the
+/// program image.
 static STATE: ConstStaticCell<State> = ConstStaticCell::new(NO_BITS);
 
 // SAFETY: the compiler refuses a constant whose bits are not a valid value of its type.
 const NO_BITS: State = unsafe { core::mem::zeroed() };
 
-/// The interrupt of an unused port runs the tasks for sensor and link.
+/// The interrupt of the unused port UART4, in which the tasks for sensor and link run.
 #[interrupt]
 unsafe fn UART4() {
     // SAFETY: this is the interrupt that the executor was started with.
@@ -138,8 +140,8 @@ async fn main(_spawner: Spawner) {
     defmt::info!("quietcut on NUCLEO-G474RE");
     let mut edges = BlockEdges::default();
     loop {
-        // All waiting blocks are processed before a request, which may erase a page. Their number is limited, so that requests
-        // are done even if the signal chain is too slow for the samples.
+        // All waiting blocks of samples are processed before a request of the host, which may erase a flash page. Their
+        // number is limited, so that requests are done even if the signal chain is too slow for the samples.
         for _ in 0..2 * MAX_BLOCKS {
             let Ok(block) = BLOCKS.try_receive() else { break };
             device.take(&block, edges.until_the_end_of(&block));
@@ -157,7 +159,7 @@ async fn main(_spawner: Spawner) {
     }
 }
 
-/// The only instance of a task.
+/// Returns the first instance of a task; a second instance of the same task stops the program.
 fn first<S>(task: Result<SpawnToken<S>, SpawnError>) -> SpawnToken<S> {
     match task {
         Ok(task) => task,
@@ -165,16 +167,16 @@ fn first<S>(task: Result<SpawnToken<S>, SpawnError>) -> SpawnToken<S> {
     }
 }
 
-/// The tachometer edges of each block.
+/// Assigns the tachometer edges to the blocks of samples.
 #[derive(Default)]
 struct BlockEdges {
     edges: Vec<Edge, MAX_BLOCK_EDGES>,
-    /// An edge that lies after the end of the newest block.
+    /// A tachometer edge that lies after the end of the newest block and belongs to a later one.
     ahead: Option<Edge>,
 }
 
 impl BlockEdges {
-    /// The new tachometer edges up to the end of a block.
+    /// The tachometer edges since the preceding block, up to the end of `block`.
     fn until_the_end_of(&mut self, block: &Block) -> &[Edge] {
         let period_ns = (1e9 / Sensor::IIS3DWB_16G.nominal_rate.0) as u64;
         let end = Nanoseconds(block.time.0 + block.counts.len() as u64 * period_ns);
@@ -187,14 +189,14 @@ impl BlockEdges {
                 self.ahead = Some(edge);
                 break;
             }
-            // The push cannot fail: the loop ends when the list is full.
+            // The push cannot fail: the loop ends when the list of edges is full.
             let _ = self.edges.push(edge);
         }
         &self.edges
     }
 }
 
-/// The board's clock, for the device.
+/// The clock of the board, from which the device takes the time.
 struct BoardClock;
 
 impl Clock for BoardClock {
@@ -232,7 +234,7 @@ unsafe fn NonMaskableInt() {
     }
 }
 
-/// Logs the panic and resets the board.
+/// Logs the panic message and resets the board.
 #[panic_handler]
 fn panic(info: &core::panic::PanicInfo) -> ! {
     defmt::error!("{}", defmt::Display2Format(info));

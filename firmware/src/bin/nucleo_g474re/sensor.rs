@@ -22,8 +22,8 @@ use crate::event_timer::{self, RISE};
 pub(crate) type Sensor =
     Iis3dwb<ExclusiveDevice<Spi<'static, Blocking, Master>, Output<'static>, Delay>, Delay>;
 
-/// Capacity of the block queue: 38 ms of blocks, for the duration of a page erase or of the check of a table. A test in the
-/// emulator asserts that no request takes longer.
+/// Capacity of the queue of sample blocks: 38 ms of blocks, for the duration of a page erase or of the check of a lobe
+/// table. A test in the emulator asserts that no request takes longer.
 pub(crate) const MAX_BLOCKS: usize = 16;
 
 /// Longest wait for the watermark line, which rises every 2.4 ms. If the line is not connected, the sensor's queue is read at
@@ -34,7 +34,7 @@ const RETRY: Duration = Duration::from_secs(1);
 /// Blocks of samples, in order. If the queue is full, the newest blocks are dropped.
 pub(crate) static BLOCKS: Channel<CriticalSectionRawMutex, Block, MAX_BLOCKS> = Channel::new();
 
-/// The reason why the sensor is restarted.
+/// The reason why the accelerometer is restarted.
 #[derive(defmt::Format)]
 enum Failure {
     /// The driver returned an error.
@@ -43,7 +43,7 @@ enum Failure {
     Silent,
 }
 
-/// Task: starts the sensor, reads it, and restarts it after an error.
+/// Task that starts the accelerometer, reads it, and restarts it after an error.
 #[embassy_executor::task]
 pub(crate) async fn read(sensor: Sensor) {
     let mut acquisition = Acquisition::new(sensor);
@@ -60,10 +60,11 @@ pub(crate) async fn read(sensor: Sensor) {
     }
 }
 
-/// Queues blocks until the sensor fails.
+/// Reads sample blocks from the accelerometer and queues them, until the accelerometer fails.
 async fn read_blocks(acquisition: &mut Acquisition<Sensor>) -> Result<Infallible, Failure> {
     loop {
-        // While the watermark line is high it cannot rise: the queue already holds the watermark.
+        // While the watermark line is high it cannot rise: the sensor's queue already holds as many samples as the
+        // watermark.
         let rise = if watermark_is_reached() || acquisition.is_behind() {
             RISE.try_take()
         } else {
@@ -80,12 +81,12 @@ async fn read_blocks(acquisition: &mut Acquisition<Sensor>) -> Result<Infallible
             );
         }
         WORK.signal(());
-        // Discards a rise of the line during the read, which belongs to no known sample.
+        // Discards a rise of the watermark line during the read, which belongs to no known sample.
         RISE.reset();
     }
 }
 
-/// True while the sensor's queue holds at least the watermark.
+/// True while the sensor's queue holds at least as many samples as the watermark.
 fn watermark_is_reached() -> bool {
     pac::GPIOA.idr().read().idr(1) == pac::gpio::vals::Idr::HIGH
 }

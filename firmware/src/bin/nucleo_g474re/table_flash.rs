@@ -22,7 +22,7 @@ unsafe extern "C" {
 /// The flash of both table slots, from the start of the first to the end of the second.
 pub(crate) struct TableFlash {
     flash: Flash<'static, Blocking>,
-    /// Offset of the first table slot in the flash.
+    /// Offset of the first table slot from the start of the flash memory.
     start: u32,
     bytes: u32,
 }
@@ -38,7 +38,8 @@ impl TableFlash {
         }
     }
 
-    /// Offset in the flash of a range of the table slots, if the slots contain the range.
+    /// Offset from the start of the flash memory of `length` bytes at `offset` within the table slots; an error if they
+    /// reach beyond the slots.
     fn place(&self, offset: u32, length: usize) -> Result<u32, Error> {
         let end = u32::try_from(length)
             .ok()
@@ -56,7 +57,7 @@ impl TableFlash {
 pub(crate) fn pass_over_damage() -> bool {
     let is_damage = pac::FLASH.eccr().read().eccd();
     if is_damage {
-        // Writing a one clears the flag.
+        // Writing a one to the bit clears the flag of the flash error.
         pac::FLASH.eccr().modify(|register| register.set_eccd(true));
     }
     is_damage
@@ -64,7 +65,8 @@ pub(crate) fn pass_over_damage() -> bool {
 
 impl TableMemory for TableFlash {
     fn mapped(&self) -> &[u8] {
-        // SAFETY: `memory.x` reserves these addresses for the slots. Any byte value is valid, and they are written through `self` only.
+        // SAFETY: `memory.x` reserves these addresses for the table slots. Any byte value is valid, and they are
+        // written through `self` only.
         unsafe { core::slice::from_raw_parts(&raw const __table_slots_start, self.bytes as usize) }
     }
 }

@@ -23,16 +23,16 @@ pub(crate) fn start() {
     }
 }
 
-/// Handles the interrupt of the timer, which counts its wraps.
+/// Handles the interrupt of timer 0, which counts the wraps of the timer.
 pub(crate) fn wrap() {
     // SAFETY: clears the interrupt flag of timer 0.
     unsafe { (INTERRUPT as *mut u32).write_volatile(1) };
     WRAPS.store(WRAPS.load(Ordering::Relaxed).wrapping_add(1), Ordering::Relaxed);
 }
 
-/// Time in ticks of 40 ns, modulo 2³².
+/// Time since the start of timer 0 in ticks of 40 ns, modulo 2³².
 pub(crate) fn ticks() -> u32 {
-    // SAFETY: reads the value of timer 0.
+    // SAFETY: this only reads the value of timer 0.
     u32::MAX - unsafe { (VALUE as *const u32).read_volatile() }
 }
 
@@ -47,7 +47,7 @@ pub(crate) fn microseconds() -> u64 {
     }
 }
 
-/// The board's clock, for the device.
+/// The clock of the board, from which the device takes the time.
 pub(crate) struct BoardClock;
 
 impl device::Clock for BoardClock {
@@ -56,7 +56,7 @@ impl device::Clock for BoardClock {
     }
 }
 
-/// Waits in a loop for this time.
+/// Waits in a loop for `microseconds` microseconds.
 pub(crate) fn wait_microseconds(microseconds: u32) {
     let start = ticks();
     while ticks().wrapping_sub(start) < microseconds * TICKS_PER_MICROSECOND {}

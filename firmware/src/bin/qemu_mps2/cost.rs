@@ -11,9 +11,9 @@ const PAINTED_BYTES: usize = 128 * 1024;
 const SPARED_BYTES: usize = 256;
 const PAINT: u32 = 0xdead_beef;
 
-/// The largest costs measured so far.
+/// The largest costs of the device, in time and stack memory, measured so far.
 pub(crate) struct Cost {
-    /// The stack pointer at which the memory below was filled.
+    /// Value of the stack pointer when the memory below it was filled with the pattern.
     top: usize,
     blocks: u32,
     ticks: u64,
@@ -25,8 +25,8 @@ pub(crate) struct Cost {
 }
 
 impl Cost {
-    /// Starts the measurement. It excludes the frame of the caller: the main function, which holds the device. The real board holds the device
-    /// in static memory.
+    /// Starts the measurement of stack depth and times. The stack frame of the caller does not count: it is the main
+    /// function, which holds the device. The real board holds the device in static memory.
     ///
     /// # Safety
     /// Interrupts must be disabled, and the stack at most some kilobytes deep.
@@ -34,7 +34,7 @@ impl Cost {
     pub(crate) unsafe fn watch() -> Self {
         let top = cortex_m::register::msp::read() as usize;
         for word in (top - PAINTED_BYTES..top - SPARED_BYTES).step_by(4) {
-            // SAFETY: the memory between statics and stack pointer is unused.
+            // SAFETY: the memory between static variables and stack pointer is unused.
             unsafe { (word as *mut u32).write_volatile(PAINT) };
         }
         Self {
@@ -47,7 +47,7 @@ impl Cost {
         }
     }
 
-    /// Runs the processing of a block and records its time.
+    /// Runs `work`, the processing of a block of samples, and records its time.
     pub(crate) fn of_block(&mut self, work: impl FnOnce()) {
         let start = clock::ticks();
         work();
@@ -57,7 +57,7 @@ impl Cost {
         self.most_ticks = self.most_ticks.max(ticks);
     }
 
-    /// Runs a poll of the link and records its time.
+    /// Runs `work`, a poll of the link, and records its time.
     pub(crate) fn of_request<T>(&mut self, work: impl FnOnce() -> T) -> T {
         let (start, flash_start) = (clock::ticks(), flash::busy_ticks());
         let done = work();
@@ -68,7 +68,7 @@ impl Cost {
         done
     }
 
-    /// Writes the costs to the log.
+    /// Writes the largest stack depth and the largest times to the log.
     pub(crate) fn log(&self) {
         defmt::info!(
             "cost: {=usize} bytes of stack; {=u32} blocks took {=u64} ticks, one at most {=u32}; a request at most {=u32}, and the flash {=u32}",
@@ -83,7 +83,7 @@ impl Cost {
 
     fn stack_bytes(&self) -> usize {
         let is_painted = |word: &usize| {
-            // SAFETY: the address is in RAM that was written at the start.
+            // SAFETY: the address is in RAM that was filled with the pattern at the start.
             unsafe { (*word as *const u32).read_volatile() == PAINT }
         };
         let painted = (self.top - PAINTED_BYTES..self.top)

@@ -23,7 +23,7 @@ const WRITE_DOUBLE_WORD_MICROSECONDS: u32 = 82;
 
 static BUSY_TICKS: AtomicU32 = AtomicU32::new(0);
 
-/// Total time for which the flash was busy, in ticks of the clock, modulo 2³².
+/// Total time for which the emulated flash was busy, in ticks of the board's clock, modulo 2³².
 pub(crate) fn busy_ticks() -> u32 {
     BUSY_TICKS.load(Ordering::Relaxed)
 }
@@ -35,7 +35,7 @@ fn be_busy(microseconds: u32) {
     BUSY_TICKS.store(busy_ticks().wrapping_add(ticks), Ordering::Relaxed);
 }
 
-/// The only handle of the flash, created by [`Flash::take`].
+/// The only handle of the emulated flash, created by [`Flash::take`].
 pub(crate) struct Flash(());
 
 impl Flash {
@@ -56,7 +56,7 @@ impl ErrorType for Flash {
 
 impl TableMemory for Flash {
     fn mapped(&self) -> &[u8] {
-        // SAFETY: the memory exists, may hold any bytes, and is written through `self` only.
+        // SAFETY: the non-volatile memory exists, may hold any bytes, and is written through `self` only.
         unsafe { core::slice::from_raw_parts(PSRAM_BASE as *const u8, FLASH_BYTES) }
     }
 }
@@ -88,8 +88,8 @@ impl NorFlash for Flash {
         for page in (from as usize..to as usize).step_by(PAGE_BYTES) {
             be_busy(ERASE_PAGE_MICROSECONDS);
             for offset in (page..page + PAGE_BYTES).step_by(DOUBLE_WORD_BYTES) {
-                // SAFETY: the range was checked to lie in the flash. The write is volatile, so that the words reach the
-                // emulator's file in this order.
+                // SAFETY: the range was checked to lie in the emulated flash. The write is volatile, so that the words
+                // reach the emulator's file in this order.
                 unsafe { Self::word(offset).write_volatile(u64::MAX) };
             }
         }
@@ -103,14 +103,14 @@ impl NorFlash for Flash {
             .zip(bytes.chunks_exact(DOUBLE_WORD_BYTES))
         {
             let word = word.try_into().map_or(0, u64::from_le_bytes);
-            // SAFETY: the range was checked to lie in the flash.
+            // SAFETY: the range of the read was checked to lie in the emulated flash.
             let erased = unsafe { Self::word(offset).read_volatile() } == u64::MAX;
             // The real flash refuses to overwrite a written double word, except with zeros.
             if !erased && word != 0 {
                 return Err(NorFlashErrorKind::Other);
             }
             be_busy(WRITE_DOUBLE_WORD_MICROSECONDS);
-            // SAFETY: the range was checked to lie in the flash.
+            // SAFETY: the range of the write was checked to lie in the emulated flash.
             unsafe { Self::word(offset).write_volatile(word) };
         }
         Ok(())

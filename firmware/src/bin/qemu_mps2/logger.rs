@@ -32,9 +32,9 @@ unsafe impl defmt::Logger for Logger {
     fn acquire() {
         // SAFETY: `release` ends the critical section; defmt calls it once after each `acquire`.
         let restore = unsafe { critical_section::acquire() };
-        // A nested log statement is dropped.
+        // A log statement within another one is a fault of the program and stops it.
         assert!(!TAKEN.swap(true, Ordering::Relaxed));
-        // SAFETY: interrupts are off and no other code holds the logger.
+        // SAFETY: interrupts are off and no other code has acquired the logger.
         unsafe {
             *STATE.restore.get() = restore;
             (*STATE.encoder.get()).start_frame(send);
@@ -44,7 +44,7 @@ unsafe impl defmt::Logger for Logger {
     unsafe fn flush() {}
 
     unsafe fn release() {
-        // SAFETY: the logger is held since `acquire`.
+        // SAFETY: interrupts have been off since `acquire`, so no other code uses the encoder.
         unsafe {
             (*STATE.encoder.get()).end_frame(send);
             TAKEN.store(false, Ordering::Relaxed);
@@ -53,7 +53,7 @@ unsafe impl defmt::Logger for Logger {
     }
 
     unsafe fn write(bytes: &[u8]) {
-        // SAFETY: the logger is held since `acquire`.
+        // SAFETY: interrupts have been off since `acquire`, so no other code uses the encoder.
         unsafe { (*STATE.encoder.get()).write(bytes, send) };
     }
 }

@@ -38,11 +38,12 @@ const IDENTITY: Identity = Identity {
     sensor: None,
 };
 
-/// Number of polls without an event before the board sleeps. The emulator takes longer to wake the board than to pass a byte, so
-/// the board stays awake within a message.
+/// Number of polls of the ports without an event before the board sleeps. The emulator takes longer to wake the board
+/// than to pass a byte, so the board stays awake within a message.
 const IDLE_POLLS_BEFORE_SLEEP: u32 = 2000;
 
-/// Memory for the state of the signal chain, which the device resets. All-zero bits take no space in the image.
+/// Memory for the state of the signal chain, which the device resets. A value with all bits zero takes no space in the
+/// program image.
 static STATE: ConstStaticCell<State> = ConstStaticCell::new(NO_BITS);
 
 // SAFETY: the compiler refuses a constant whose bits are not a valid value of its type.
@@ -56,9 +57,9 @@ fn main() -> ! {
     LOG.open(false);
     LINK.open(true);
     SPINDLE.open(true);
-    // SAFETY: the interrupt handler and this function share an atomic only.
+    // SAFETY: the handler of this interrupt and this function share an atomic only.
     unsafe { NVIC::unmask(Irq::Clock) };
-    // SAFETY: this is the only call.
+    // SAFETY: `take` may be called once, and this is its only call.
     let flash = unsafe { Flash::take() };
 
     let settings = defaults::settings(Sensor::IIS3DWB_16G);
@@ -85,10 +86,10 @@ fn main() -> ! {
     }
 }
 
-/// Sleeps until a byte arrives, unless one is available.
+/// Sleeps until a byte arrives at a serial port, unless one is waiting.
 ///
-/// The ports' interrupts are enabled in this function only, while interrupts are masked globally. A pending one is not served, but ends
-/// the sleep, also if it occurs between the check and the sleep.
+/// The ports' interrupts are enabled in this function only, while interrupts are masked globally. A pending interrupt
+/// is not served, but ends the sleep, also if it occurs between the check and the sleep.
 fn sleep() {
     cortex_m::interrupt::disable();
     for (port, irq) in [(LINK, Irq::Link), (SPINDLE, Irq::Spindle)] {
@@ -107,7 +108,7 @@ fn sleep() {
     unsafe { cortex_m::interrupt::enable() };
 }
 
-/// Numbers of the interrupts of this board that the program uses.
+/// Numbers of those interrupts of the emulated board that the program uses.
 #[derive(Clone, Copy)]
 enum Irq {
     Link = 0,

@@ -1,4 +1,4 @@
-//! Receiver of the simulated signals, in place of sensor and tachometer.
+//! Receiver of the simulated signals of the emulated board, in place of sensor and tachometer.
 
 use heapless::Vec;
 use quietcut_core::protocol::message::MAX_BLOCK_EDGES;
@@ -11,12 +11,12 @@ use crate::cost::Cost;
 use crate::flash::{Flash, PSRAM_BASE};
 use crate::uart::Uart;
 
-/// Receiver of stimuli, which passes them to the device.
+/// Receiver of stimuli (simulated sample blocks and tachometer edges), which passes them to the device.
 pub(crate) struct Spindle {
     frame: Vec<u8, MAX_FRAME_BYTES>,
-    /// True while the rest of an overlong frame is skipped.
+    /// True while the rest of a stimulus frame that is too long is skipped.
     is_skipping: bool,
-    /// Tachometer edges for the next block.
+    /// Tachometer edges that arrived for the next block of samples.
     edges: Vec<Edge, MAX_BLOCK_EDGES>,
     /// Measured costs of the device.
     pub(crate) cost: Cost,
@@ -34,7 +34,7 @@ impl Spindle {
         }
     }
 
-    /// Processes a byte of the stimulus port. Returns the answer at the end of a frame.
+    /// Processes a byte from the stimulus port. At the end of a frame it returns the byte that answers the frame.
     pub(crate) fn take(&mut self, byte: u8, device: &mut BoardDevice, line: &mut Uart) -> Option<u8> {
         if self.is_skipping {
             self.is_skipping = byte != 0;
@@ -58,13 +58,14 @@ impl Spindle {
         Some(if is_done.is_some() { TAKEN } else { REFUSED })
     }
 
-    /// Passes the stimuli stored in the board's memory to the device.
+    /// Passes the stimuli of `bytes` bytes that are stored in the board's memory to the device; `None` if they are
+    /// refused.
     fn play(&mut self, bytes: usize, device: &mut BoardDevice, line: &mut Uart) -> Option<()> {
         if bytes > MEMORY_BYTES - STORE_OFFSET {
             return None;
         }
-        // SAFETY: the range lies within the PSRAM, where the linker places nothing. The host does not write to it between its
-        // message and the answer.
+        // SAFETY: the range of stored stimuli lies within the PSRAM, where the linker places nothing. The host does not
+        // write to it between its message and the answer.
         let mut rest =
             unsafe { core::slice::from_raw_parts((PSRAM_BASE + STORE_OFFSET) as *const u8, bytes) };
         while !rest.is_empty() {
@@ -82,7 +83,8 @@ impl Spindle {
             Stimulus::Block(block) => {
                 self.cost.of_block(|| device.take(&block, &self.edges));
                 self.edges.clear();
-                // Waits until all messages are sent, which a simulated spindle can do, so that no report is dropped.
+                // Waits until all messages of the device are sent, so that no report is dropped. A simulated spindle
+                // can wait.
                 loop {
                     let Ok(is_busy) = device.poll(line);
                     if !is_busy && device.outgoing().is_empty() {

@@ -36,12 +36,13 @@ impl Uart {
 
     /// Enables the port, for sending only or, with `receive`, for both directions.
     pub(crate) fn open(self, receive: bool) {
-        // 16 is the smallest divider; the emulator ignores the baud rate.
+        // 16 is the smallest divider of the baud rate; the emulator ignores the baud rate.
         self.write(Self::DIVIDER, 16);
         self.write(Self::CONTROL, Self::TX_ON);
         if receive {
             self.write(Self::CONTROL, Self::TX_ON | Self::RX_ON | Self::RX_INTERRUPT_ON);
-            // A read makes QEMU check its input again. Without it the first byte arrives a second later.
+            // Reading the data register makes QEMU check its input again. Without it the first byte arrives a second
+            // later.
             self.read(Self::DATA);
         }
     }
@@ -65,7 +66,7 @@ impl Uart {
         self.read(Self::STATE) & Self::TX_FULL == 0
     }
 
-    /// Clears the interrupt of the port.
+    /// Clears the interrupt flag of the serial port.
     pub(crate) fn clear_interrupt(self) {
         self.write(Self::INTERRUPT, Self::RX_INTERRUPT);
     }
@@ -76,7 +77,8 @@ impl Uart {
     }
 
     fn write(self, register: usize, value: u32) {
-        // SAFETY: `base` and `register` are as in `read`. No register of a port makes it write to memory.
+        // SAFETY: `base` is one of the three ports above and `register` one of their registers. No register of a port
+        // makes it write to memory.
         unsafe { ((self.base + 4 * register) as *mut u32).write_volatile(value) }
     }
 }
@@ -92,7 +94,7 @@ impl ReadReady for Uart {
 }
 
 impl Read for Uart {
-    /// Reads the bytes that have arrived; returns 0 if there are none.
+    /// Reads the bytes that have arrived at the port; returns 0 if there are none.
     fn read(&mut self, buffer: &mut [u8]) -> Result<usize, Infallible> {
         let bytes = core::iter::from_fn(|| self.receive());
         Ok(buffer
