@@ -21,7 +21,10 @@ fn lobes_of_a_case() {
         text.contains("1058 rev/min: stable up to 1.484 mm, then Flip at 17.63 Hz"),
         "{text}"
     );
-    assert!(text.contains("1045 rev/min, 2 mm: |multiplier| = 1."), "{text}");
+    assert!(
+        text.contains("1045 rev/min, 2 mm: |Floquet multiplier| = 1."),
+        "{text}"
+    );
 }
 
 #[test]

@@ -47,7 +47,7 @@ pub fn limits(case: &Path) -> Result<String, Box<dyn Error>> {
     let dominant = point(&problem, 1045.0, 2.0)?;
     writeln!(
         text,
-        "1045 rev/min, 2 mm: |multiplier| = {:.4}, {:?}",
+        "1045 rev/min, 2 mm: |Floquet multiplier| = {:.4}, {:?}",
         dominant.multiplier.norm(),
         dominant.verdict
     )?;

@@ -6,7 +6,6 @@
 mod angles;
 mod band;
 mod band_state;
-mod passings;
 mod pipeline;
 mod report;
 mod settings;
@@ -14,6 +13,7 @@ mod spectra;
 mod state;
 mod step;
 mod strobe;
+mod tooth_passings;
 mod verdict;
 
 pub use band::Band;

@@ -20,7 +20,7 @@ mod shape;
 #[cfg(test)]
 mod tests;
 
-use crate::synchronous::{CHANNELS, MAX_CLASSES, Passing, clamp_classes};
+use crate::synchronous::{CHANNELS, MAX_CLASSES, ToothPassing, clamp_classes};
 
 pub use alternation::Alternation;
 pub use exponential::{Exponential, Guess};
@@ -32,9 +32,9 @@ pub const CAPACITY: usize = 64;
 /// The last passings, less those of the first revolution after the reset, so that rounding does not follow gravity and force.
 #[derive(Clone, Debug)]
 pub struct Stroboscope {
-    passings: [Passing; CAPACITY],
+    passings: [ToothPassing; CAPACITY],
     /// The first passing of each class.
-    reference: [Passing; MAX_CLASSES],
+    reference: [ToothPassing; MAX_CLASSES],
     classes: u8,
     /// Passings remembered, up to the capacity.
     filled: u8,
@@ -73,7 +73,7 @@ impl Stroboscope {
     }
 
     /// Takes a passing of tooth period `tooth`. Tooth periods come in order and without gaps, or the caller resets.
-    pub fn push(&mut self, tooth: u64, passing: &Passing) {
+    pub fn push(&mut self, tooth: u64, passing: &ToothPassing) {
         self.class = (tooth % u64::from(self.classes)) as u8;
         let Some(reference) = self.reference.get_mut(usize::from(self.class)) else {
             return;
@@ -133,8 +133,8 @@ impl Window<'_> {
         (usize::from(self.stroboscope.class) + classes - age % classes) % classes
     }
 
-    /// Passing in row `row`, 0 the oldest, less the reference of its class.
-    pub fn row(&self, row: usize) -> &Passing {
+    /// Tooth passing in row `row`, 0 the oldest, less the reference of its class.
+    pub fn row(&self, row: usize) -> &ToothPassing {
         let start = usize::from(self.stroboscope.next) + 2 * CAPACITY - self.length;
         // The remainder is below the capacity.
         &self.stroboscope.passings[(start + row) % CAPACITY]

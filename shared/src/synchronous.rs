@@ -1,11 +1,11 @@
 //! Resampling at fixed spindle angles, and the synchronous average with its residual.
 //!
 //! A tooth period (one tooth pitch of the spindle) is divided into [`SLOTS`] equal angles. [`Sampler`] converts the samples of a band, which
-//! are equally spaced in time, into one [`Passing`] per tooth period: three axes at each slot. The passings of one tooth, one per
+//! are equally spaced in time, into one [`ToothPassing`] per tooth period: three axes at each slot. The tooth passings of one tooth, one per
 //! revolution, form a *class*. [`Average`] keeps the mean of each class and splits the signal:
 //!
 //! ```text
-//! passing = at rest + forced (same for all teeth) + runout (same for one tooth, sums to 0 over the teeth) + residual
+//! tooth passing = at rest + forced (same for all teeth) + runout (same for one tooth, sums to 0 over the teeth) + residual
 //! ```
 //!
 //! The caller compensates the group delay of preceding filters: each sample comes with the spindle angle at the time that it represents.
@@ -21,7 +21,7 @@ pub const CHANNELS: usize = 3 * SLOTS;
 pub const MAX_CLASSES: usize = 12;
 
 /// One tooth period: acceleration in m/s², slot by slot, x, y, z within a slot.
-pub type Passing = [f32; CHANNELS];
+pub type ToothPassing = [f32; CHANNELS];
 
 /// Method of resampling.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -39,7 +39,7 @@ pub enum Method {
     Value,
 }
 
-/// Resamples a band from fixed sample times to fixed spindle angles, and returns one [`Passing`] per tooth period.
+/// Resamples a band from fixed sample times to fixed spindle angles, and returns one [`ToothPassing`] per tooth period.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Sampler {
     /// Teeth of the tool.
@@ -67,7 +67,7 @@ pub struct SamplerState {
     integral: [f32; 3],
     /// Time since the angle of the last filled slot, in sample periods.
     span: f32,
-    passing: Passing,
+    passing: ToothPassing,
 }
 
 impl Default for SamplerState {
@@ -99,7 +99,7 @@ pub struct Passed {
     /// Number of tooth periods since angle 0 of the tachometer.
     pub tooth: u64,
     /// Acceleration at each angle slot.
-    pub passing: Passing,
+    pub passing: ToothPassing,
 }
 
 impl Sampler {
@@ -231,7 +231,7 @@ fn cubic(samples: &[[f32; 3]; 4], part: f32) -> [f32; 3] {
 /// exponentially weighted mean. After a change of the cutting conditions, [`reset`](Self::reset) discards the past.
 #[derive(Clone, Copy, Debug)]
 pub struct Average {
-    means: [Passing; MAX_CLASSES],
+    means: [ToothPassing; MAX_CLASSES],
     /// Number of tooth periods of each class since the reset, at most `MEMORY` − 1.
     counts: [u8; MAX_CLASSES],
     classes: u8,
@@ -282,7 +282,7 @@ impl Average {
     }
 
     /// Updates the mean of a class with the tooth period of number `tooth`, whose values are `passing`.
-    pub fn update(&mut self, tooth: u64, passing: &Passing) {
+    pub fn update(&mut self, tooth: u64, passing: &ToothPassing) {
         let class = (tooth % u64::from(self.classes)) as usize;
         let (Some(mean), Some(count)) = (self.means.get_mut(class), self.counts.get_mut(class)) else {
             return;
@@ -361,7 +361,7 @@ pub(crate) const fn clamp_classes(classes: u8) -> u8 {
 }
 
 /// Sum of the squared differences between the values of two tooth periods, (m/s²)².
-pub(crate) fn distance_square(a: &Passing, b: &Passing) -> f32 {
+pub(crate) fn distance_square(a: &ToothPassing, b: &ToothPassing) -> f32 {
     a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum()
 }
 
@@ -424,7 +424,7 @@ mod tests {
             let sign = |odd: bool| if odd { -1.0 } else { 1.0 };
             let runout = 0.5 * sign(tooth % 2 == 1);
             let residual = 0.1 * sign(tooth % 4 >= 2);
-            let passing: Passing = std::array::from_fn(|channel| {
+            let passing: ToothPassing = std::array::from_fn(|channel| {
                 let forced = 2.0 * sign(channel / 3 % 2 == 1);
                 9.8 + forced + runout + residual
             });

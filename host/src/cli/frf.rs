@@ -309,8 +309,8 @@ struct ColumnsAnswer {
     /// linearly dependent ones.
     least_singular_value: f64,
     left_out_hz: Vec<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    blows: Option<ImpactCounts>,
+    #[serde(rename = "blows", skip_serializing_if = "Option::is_none")]
+    impacts: Option<ImpactCounts>,
 }
 
 #[derive(Serialize)]
@@ -434,7 +434,7 @@ impl ColumnsAnswer {
             averages: part.averages,
             least_singular_value: part.least_singular,
             left_out_hz: part.left_out_hz.clone(),
-            blows: part.impacts.as_ref().map(|(used, double)| ImpactCounts {
+            impacts: part.impacts.as_ref().map(|(used, double)| ImpactCounts {
                 used: used.len(),
                 double_s: double.iter().map(|impact| impact.time_s).collect(),
             }),

@@ -131,7 +131,7 @@ fn run_points(method: &dyn Method, at: &[(f64, f64)], output: Output) -> Result<
         // Writing to a String cannot fail.
         let _ = write!(
             text,
-            "\n{} rev/min, {} mm: {}, |multiplier| = {:.6} ± {:.0e} ({}{chatter})",
+            "\n{} rev/min, {} mm: {}, |Floquet multiplier| = {:.6} ± {:.0e} ({}{chatter})",
             point.rpm,
             point.depth_mm,
             point.verdict.name(),

@@ -75,7 +75,7 @@ fn write(case: &Case, chart: &CellChart, path: &Path) -> Result<(), Error> {
 fn picture(case: &Case, chart: &CellChart) -> Result<String, Error> {
     let mut sorted = chart.clone();
     sorted.speeds.sort_by(|a, b| a.rpm.total_cmp(&b.rpm));
-    let title = format!("{}: |multiplier|, method: {}", case.name, chart.label);
+    let title = format!("{}: |Floquet multiplier|, method: {}", case.name, chart.label);
     // The map cannot be drawn for a single spindle speed or for descending depths: these are input errors.
     cell_map(&title, &sorted).map_err(Error::input)
 }

@@ -75,8 +75,8 @@ struct Tests {
     #[arg(long, value_name = "P", default_value_t = 100.0 * Means::default().chatter_frequency, value_parser = positive)]
     chatter_frequency_percent: f64,
     /// Number of impacts of a hammer test.
-    #[arg(long, value_name = "N", default_value_t = Means::default().blows as u16, value_parser = clap::value_parser!(u16).range(1..))]
-    blows: u16,
+    #[arg(long = "blows", value_name = "N", default_value_t = Means::default().impacts as u16, value_parser = clap::value_parser!(u16).range(1..))]
+    impacts: u16,
     /// Peak force of an impact in N.
     #[arg(long, value_name = "F", default_value_t = Means::default().peak_n, value_parser = positive)]
     peak_n: f64,
@@ -148,7 +148,7 @@ fn request(args: &Args) -> Request {
         means: Means {
             bracket: share(tests.bracket_percent),
             chatter_frequency: share(tests.chatter_frequency_percent),
-            blows: usize::from(tests.blows),
+            impacts: usize::from(tests.impacts),
             peak_n: tests.peak_n,
             accelerometer_g_per_root_hertz: 1e-6 * tests.noise_ug,
             calibration: share(tests.calibration_percent),
@@ -163,9 +163,9 @@ fn request(args: &Args) -> Request {
 /// Sentence that tells the machinist how to carry out one planned test.
 fn instruction(step: &Step) -> String {
     match &step.test {
-        Test::Hammer { direction, blows } => {
+        Test::Hammer { direction, impacts } => {
             format!(
-                "{blows} hammer impacts on the tool tip in {direction}; measure its acceleration in every direction"
+                "{impacts} hammer impacts on the tool tip in {direction}; measure its acceleration in every direction"
             )
         }
         Test::Force {

@@ -1,4 +1,5 @@
-//! Stability lobe diagram: stable axial depths over spindle speed, kind of each limit, trial cuts.
+//! Stability lobe diagram: stable axial depths over spindle speed, kind of each limit, trial cuts. A limit is a depth at which the dominant
+//! Floquet multiplier (characteristic multiplier) has the modulus 1.
 
 use plotters::chart::SeriesLabelPosition;
 use plotters::prelude::{Circle, LineSeries, PathElement, Polygon, Rectangle, WHITE};

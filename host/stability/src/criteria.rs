@@ -1,4 +1,5 @@
-//! Thresholds by which this crate decides: which multipliers are followed, when a limit is accepted, which error is stated.
+//! Thresholds by which this crate decides: which Floquet multipliers (characteristic multipliers) are
+//! followed, when a limit is accepted, which error is stated.
 //!
 //! The comment of each states where the number comes from. "Unfounded" marks a number that rests on experience with the
 //! cases of `tests/cases` alone. Tolerances of pure numerics (the last step of Newton's method, rounding, sizes of

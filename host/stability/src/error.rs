@@ -142,8 +142,7 @@ pub(crate) const NO_SOLUTION: &str = "the equations of the period have no finite
 pub(crate) const NOT_FINITE: &str = "receptances are not finite";
 
 /// Text for the error that no method finds the dominant multiplier.
-pub(crate) const NO_DOMINANT: &str =
-    "motions grow beyond the range of numbers, or multipliers of nearly one size are too many to tell apart";
+pub(crate) const NO_DOMINANT: &str = "motions grow beyond the range of numbers, or Floquet multipliers of nearly one size are too many to tell apart";
 
 /// Reason why Floquet multipliers, or roots of a loop, cannot be computed at one speed and depth.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -173,7 +172,7 @@ impl Breakdown {
     pub(crate) fn at(self, rpm: f64, depth_mm: f64, no_solution: &'static str) -> StabilityError {
         let what = match self {
             Self::NoSolution => no_solution,
-            Self::TooManyMultipliers => "multipliers of nearly one size are too many to tell apart",
+            Self::TooManyMultipliers => "Floquet multipliers of nearly one size are too many to tell apart",
             Self::Eigenvalues(cause) => return StabilityError::Eigenvalues { rpm, depth_mm, cause },
         };
         StabilityError::BrokeDown { rpm, depth_mm, what }

@@ -4,7 +4,7 @@ use crate::synchronous::Levels;
 
 /// The kinds of growth.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
+pub enum GrowthKind {
     /// A complex pair of multipliers.
     Hopf,
     /// A real multiplier below −1.
@@ -21,7 +21,7 @@ pub struct Multiplier {
     /// arg μ in turns, 0 to ½.
     pub angle_turns: f32,
     /// What it is, if it is outside the unit circle.
-    pub kind: Kind,
+    pub kind: GrowthKind,
     /// What it multiplies: root mean square of the deviation over slots and axes, the noise of the sensor taken off, in m/s².
     pub level: f32,
 }
@@ -75,8 +75,8 @@ impl Finding {
 
     /// Level of what chatters, the noise of the sensor (root mean square in one channel) taken off, in m/s². A flip of an even number of
     /// teeth comes back with each turn.
-    pub fn level_of(&self, kind: Kind, teeth: u8, noise: f32) -> f32 {
-        if kind == Kind::Flip && teeth.is_multiple_of(2) {
+    pub fn level_of(&self, kind: GrowthKind, teeth: u8, noise: f32) -> f32 {
+        if kind == GrowthKind::Flip && teeth.is_multiple_of(2) {
             self.levels.alternating
         } else {
             beyond(self.levels.residual, noise)

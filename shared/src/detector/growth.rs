@@ -5,10 +5,10 @@ mod fast;
 mod slow;
 mod steadiness;
 
-use crate::detector::finding::{Finding, Kind, Multiplier};
+use crate::detector::finding::{Finding, GrowthKind, Multiplier};
 use crate::math::sqrt;
 use crate::stroboscope::Stroboscope;
-use crate::synchronous::{Average, CHANNELS, Passing, SLOTS};
+use crate::synchronous::{Average, CHANNELS, SLOTS, ToothPassing};
 use alternating::AlternatingGrowth;
 use fast::Predictions;
 use slow::SlowGrowth;
@@ -16,7 +16,7 @@ use steadiness::LIKELY;
 
 /// How closely a passing is looked at: what that costs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Look {
+pub enum Evaluation {
     /// It is only remembered.
     None,
     /// Fast growth and what alternates.
@@ -94,7 +94,14 @@ impl Growth {
 
     /// Takes a passing. `noise` is the mean square of white noise in one channel, in (m/s²)².
     /// True where the conditions have changed with this passing.
-    pub fn push(&mut self, tooth: u64, passing: &Passing, noise: f32, teeth: u8, look: Look) -> bool {
+    pub fn push(
+        &mut self,
+        tooth: u64,
+        passing: &ToothPassing,
+        noise: f32,
+        teeth: u8,
+        look: Evaluation,
+    ) -> bool {
         if !self.average.is_for(teeth) {
             (self.average, self.stroboscope) = (Average::new(teeth), Stroboscope::new(teeth));
             self.reset();
@@ -121,14 +128,14 @@ impl Growth {
         self.finding.activity = activity;
         self.finding.passings = self.stroboscope.since_reset();
         self.since_seen = self.since_seen.map(|since| since.saturating_add(1));
-        if look >= Look::Quick {
+        if look >= Evaluation::Quick {
             self.look(noise, look);
         }
         false
     }
 
     /// Root mean square of what moves, over the last few passings.
-    fn activity(&mut self, passing: &Passing) -> f32 {
+    fn activity(&mut self, passing: &ToothPassing) -> f32 {
         let mut mean = [0.0; 3];
         for axes in passing.chunks_exact(3) {
             for (mean, value) in mean.iter_mut().zip(axes) {
@@ -168,7 +175,7 @@ impl Growth {
         event
     }
 
-    fn look(&mut self, noise: f32, look: Look) {
+    fn look(&mut self, noise: f32, look: Evaluation) {
         let levels = self.finding.levels;
         let Predictions {
             best,
@@ -176,7 +183,7 @@ impl Growth {
             persistent,
         } = Predictions::new(&self.stroboscope, levels.forced, noise);
         let growing =
-            growing.filter(|m| look < Look::Close || m.abs > FAST || !self.slow.sees(m.angle_turns));
+            growing.filter(|m| look < Evaluation::Close || m.abs > FAST || !self.slow.sees(m.angle_turns));
         let decays = best.is_some_and(|best| best.abs + LIKELY * best.deviation < 1.0);
         let alternating = self.alternating.look(
             &self.stroboscope,
@@ -192,7 +199,7 @@ impl Growth {
         self.finding.growing = self.second_look(alternating.growing.or(growing));
         let moving = self.finding.growing.or(persistent);
         self.finding.cycles = moving.and_then(|m| fast::cycles(&self.stroboscope, &m));
-        if look == Look::Close
+        if look == Evaluation::Close
             && let Some((multiplier, cycles)) = self.look_for_slow_growth(best)
         {
             self.finding.growing = Some(multiplier);
@@ -220,6 +227,6 @@ impl Growth {
         let predicted = best.map(|best| best.angle_turns);
         let slow = self.slow.look(&window, passings, predicted, levels.forced);
         // A flip is told by what alternates.
-        slow.filter(|_| growing.is_none_or(|growing| growing.kind == Kind::Hopf))
+        slow.filter(|_| growing.is_none_or(|growing| growing.kind == GrowthKind::Hopf))
     }
 }

@@ -1,7 +1,7 @@
 //! Chatter that was found, and is held until it has died down.
 
 use crate::detector::evidence::Evidence;
-use crate::detector::finding::{Finding, Kind, Multiplier};
+use crate::detector::finding::{Finding, GrowthKind, Multiplier};
 use crate::detector::frequency::frequency;
 use crate::detector::tone::Tone;
 use crate::detector::{Judgement, Reason, Verdict};
@@ -22,7 +22,7 @@ const SAME_TONE: f32 = 0.05;
 /// Chatter that was found and is held.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct LatchedChatter {
-    pub(super) kind: Kind,
+    pub(super) kind: GrowthKind,
     pub(super) band: usize,
     /// True where a tone alone told it, without samples at fixed angles.
     pub(super) by_tone: bool,
@@ -101,8 +101,8 @@ impl LatchedChatter {
             ..
         } = finding.levels;
         let larger = match multiplier.kind {
-            Kind::Hopf => residual > alternating,
-            Kind::Flip => alternating > residual,
+            GrowthKind::Hopf => residual > alternating,
+            GrowthKind::Flip => alternating > residual,
         };
         multiplier.kind != self.kind && reason == Reason::Growing && larger
     }
@@ -150,8 +150,8 @@ impl LatchedChatter {
     pub(super) fn judgement(&self) -> Judgement {
         Judgement {
             verdict: match self.kind {
-                Kind::Hopf => Verdict::Hopf,
-                Kind::Flip => Verdict::PeriodDoubling,
+                GrowthKind::Hopf => Verdict::Hopf,
+                GrowthKind::Flip => Verdict::PeriodDoubling,
             },
             reason: self.reason,
             chatter: self.frequency,

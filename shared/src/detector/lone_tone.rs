@@ -2,7 +2,7 @@
 
 use crate::detector::Reason;
 use crate::detector::evidence::{BANDS, Evidence};
-use crate::detector::finding::{Finding, Kind};
+use crate::detector::finding::{Finding, GrowthKind};
 use crate::detector::latched_chatter::{LAST_GROWTH, LatchedChatter};
 use crate::detector::tone::Tone;
 
@@ -63,15 +63,15 @@ fn is_wild(finding: &Finding, share: f32) -> bool {
 }
 
 /// With an odd number of teeth the frequencies of a flip, odd multiples of half the tooth passing, are no harmonics of the spindle.
-fn kind_of(tone: &Tone, evidence: &Evidence<'_>) -> Kind {
+fn kind_of(tone: &Tone, evidence: &Evidence<'_>) -> GrowthKind {
     let Some(speed) = evidence.speed else {
-        return Kind::Hopf;
+        return GrowthKind::Hopf;
     };
     let halves = 2.0 * tone.frequency.0 / (speed.0 * f32::from(evidence.teeth));
     let nearest = crate::math::round(halves);
     if evidence.teeth % 2 == 1 && nearest as u32 % 2 == 1 && (halves - nearest).abs() < 0.02 {
-        Kind::Flip
+        GrowthKind::Flip
     } else {
-        Kind::Hopf
+        GrowthKind::Hopf
     }
 }

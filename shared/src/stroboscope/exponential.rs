@@ -20,7 +20,7 @@
 use super::Window;
 use super::shape::strongest;
 use crate::math::{exp, sqrt};
-use crate::synchronous::{CHANNELS, MAX_CLASSES, Passing};
+use crate::synchronous::{CHANNELS, MAX_CLASSES, ToothPassing};
 
 mod column;
 mod fit;
@@ -91,8 +91,8 @@ fn growth(fit: &Fit, length: usize) -> f32 {
 
 /// What is constant and drifts, channel by channel, and the power of the rest.
 struct Constant {
-    means: [Passing; MAX_CLASSES],
-    slope: Passing,
+    means: [ToothPassing; MAX_CLASSES],
+    slope: ToothPassing,
     power: f32,
 }
 

@@ -21,7 +21,7 @@ use super::Window;
 use super::roots::{Complex, largest};
 use crate::math::{atan2_turns, exp, ln, sqrt};
 use crate::stroboscope::CAPACITY;
-use crate::synchronous::{CHANNELS, Passing};
+use crate::synchronous::{CHANNELS, ToothPassing};
 
 /// The highest order.
 pub const MAX_ORDER: usize = 4;
@@ -164,7 +164,7 @@ impl Window<'_> {
         first: usize,
         stride: usize,
         start: usize,
-    ) -> [Passing; MAX_ORDER + 1] {
+    ) -> [ToothPassing; MAX_ORDER + 1] {
         let mut means = [[0.0; CHANNELS]; MAX_ORDER + 1];
         let rows = self.length() - first;
         let count = (rows - start).div_ceil(self.classes()) as f32;
@@ -184,7 +184,7 @@ const fn product(i: usize, j: usize) -> usize {
     j * (j + 1) / 2 + i
 }
 
-fn dot(a: &Passing, b: &Passing) -> f32 {
+fn dot(a: &ToothPassing, b: &ToothPassing) -> f32 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 

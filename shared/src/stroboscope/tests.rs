@@ -1,7 +1,7 @@
 //! The estimators on passings in closed form: deviations c·μ^k with a shape over the channels, offsets of the classes, noise.
 
 use super::{CAPACITY, Exponential, Guess, Plan, Stroboscope};
-use crate::synchronous::{CHANNELS, Passing};
+use crate::synchronous::{CHANNELS, ToothPassing};
 
 /// Uniform numbers of variance 1 (Knuth's linear congruential generator).
 struct Noise(u64);
@@ -43,7 +43,7 @@ fn noisy(
     let mut source = Noise(seed);
     let mut stroboscope = Stroboscope::new(classes);
     for k in 0..passings {
-        let passing: Passing = std::array::from_fn(|channel| {
+        let passing: ToothPassing = std::array::from_fn(|channel| {
             let (slot, axis) = (channel / 3, channel % 3);
             let offset = runout * f64::from((k as u8 % classes) * 7 % 5) * (1.0 + channel as f64);
             let deviation: f64 = deviations
@@ -121,7 +121,7 @@ fn noise_and_what_wanders_do_not_grow() {
         for k in 0..64 {
             // A mode of 40 passings per e-fold that noise drives.
             (re, im) = (0.975 * re + source.next(), 0.975 * im + source.next());
-            let noise: Passing = std::array::from_fn(|_| source.next() as f32);
+            let noise: ToothPassing = std::array::from_fn(|_| source.next() as f32);
             white.push(k, &noise);
             wanders.push(
                 k,

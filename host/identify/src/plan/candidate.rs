@@ -37,7 +37,8 @@ pub enum Test {
         /// Direction of the impact.
         direction: String,
         /// Number of impacts.
-        blows: usize,
+        #[serde(rename = "blows")]
+        impacts: usize,
     },
     /// A stable cut on a dynamometer, which records the cutting force.
     Force {
@@ -211,7 +212,7 @@ fn hammers(case: &Case, unknowns: &Unknowns, means: &Means) -> Result<Vec<Candid
                     continue;
                 };
                 let force = half_sine(means.peak_n, pulse_s, hz);
-                let scale = omega * omega * force * (4.0 * means.blows as f64 * weight_hz / density).sqrt();
+                let scale = omega * omega * force * (4.0 * means.impacts as f64 * weight_hz / density).sqrt();
                 for output in axes.iter().map(|&(_, axis)| axis) {
                     let slope = |index: usize| match structures.get(index) {
                         Some([low, high]) => {
@@ -239,7 +240,7 @@ fn hammers(case: &Case, unknowns: &Unknowns, means: &Means) -> Result<Vec<Candid
             Candidate {
                 test: Test::Hammer {
                     direction: direction.name().into(),
-                    blows: means.blows,
+                    impacts: means.impacts,
                 },
                 information,
                 limit: None,

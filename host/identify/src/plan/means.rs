@@ -8,7 +8,7 @@ pub struct Means {
     /// Standard deviation of a measured chatter frequency, relative to the frequency.
     pub chatter_frequency: f64,
     /// Number of impacts of a hammer test in one direction.
-    pub blows: usize,
+    pub impacts: usize,
     /// Peak force of an impact, N.
     pub peak_n: f64,
     /// Noise density of the accelerometer of a hammer test, g/√Hz.
@@ -34,7 +34,7 @@ impl Default for Means {
         Self {
             bracket: 0.05,
             chatter_frequency: 0.002,
-            blows: 5,
+            impacts: 5,
             peak_n: 500.0,
             accelerometer_g_per_root_hertz: 75e-6,
             calibration: 0.02,

@@ -134,7 +134,7 @@ impl Campaign<'_> {
                 let b = PI / pulse_s;
                 let force = means.peak_n * 2.0 * b * (0.5 * omega * pulse_s).cos() / (b * b - omega * omega);
                 // In a record of length T, white noise of one-sided density S gives each part of a line the variance S T/4.
-                let deviation = noise * (0.25 * SECONDS / means.blows as f64).sqrt();
+                let deviation = noise * (0.25 * SECONDS / means.impacts as f64).sqrt();
                 let h = structure.receptance(omega).unwrap();
                 for output in 0..3 {
                     all.push(h[(output, axis)] * (gain * omega * omega * force / deviation));

@@ -66,7 +66,7 @@ pub(super) const COULOMB_FRICTION: EffectSpec = EffectSpec {
         let play_mm = values.number("play_mm")?.unwrap_or(0.0);
         let contact_mm = values.number("contact_mm")?.unwrap_or(0.0);
         if contact_mm > 0.0 && play_mm == 0.0 {
-            let needed = "play_mm above 0: it is the contact at the ends of a play that";
+            let needed = "play_mm above 0: it is the contact at the ends of a backlash that";
             return Err(values.clash("contact_mm", contact_mm, needed));
         }
         Ok(Arc::new(CoulombFriction {
@@ -109,10 +109,10 @@ pub(super) fn take_backlash(all: &mut Vec<Values>) -> Result<(), EffectError> {
         let needed = "\"coulomb-friction\", and that effect too,";
         return Err(all[index].clash("before", before, needed));
     };
-    let mut play = all[index].clone();
-    let gap_mm = play.main("gap_mm")?;
+    let mut backlash = all[index].clone();
+    let gap_mm = backlash.main("gap_mm")?;
     all[friction].put("play_mm", Value::Number(gap_mm));
-    if let Some(contact_mm) = play.number("contact_mm")? {
+    if let Some(contact_mm) = backlash.number("contact_mm")? {
         all[friction].put("contact_mm", Value::Number(contact_mm));
     }
     all.remove(index);

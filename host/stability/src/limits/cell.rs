@@ -1,4 +1,4 @@
-//! The dominant multiplier of one cell of a chart.
+//! The dominant Floquet multiplier (characteristic multiplier) of one cell of a chart.
 
 use super::point::CutStability;
 use crate::criteria::LEAST_ERROR;

@@ -249,7 +249,12 @@ impl<S: Spectrum> Scan<S> {
             .iter()
             .filter(|root| root.excess() > 0.0)
             .min_by(|a, b| a.excess().total_cmp(&b.excess()))
-            .ok_or_else(|| self.broke_down(high.depth_m, "a multiplier was lost while halving"))?;
+            .ok_or_else(|| {
+                self.broke_down(
+                    high.depth_m,
+                    "a Floquet multiplier was lost while the interval of depth was halved",
+                )
+            })?;
         Ok(vec![DirectedCrossing {
             crossing: Crossing {
                 depth_m: 0.5 * (low.depth_m + high.depth_m),

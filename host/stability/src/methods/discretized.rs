@@ -1,4 +1,5 @@
-//! Methods that divide the period into a given number of time steps, with an error estimate from finer steps.
+//! Methods that divide the period into a given number of time steps. The error of a Floquet multiplier
+//! (characteristic multiplier) is estimated from finer steps.
 
 use num_complex::Complex64;
 

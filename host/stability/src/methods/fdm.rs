@@ -7,7 +7,7 @@
 //!
 //! each factor being linear in σ between its values at both ends (Ding, Zhu, Zhang & Ding, Int. J. Mach. Tools Manuf.
 //! 50 (2010) 502). Matrix exponentials depend on h alone. Steps end where a tooth enters or leaves, with one-sided
-//! limits of the coefficients at their ends, so that multipliers converge with h² at any immersion.
+//! limits of the coefficients at their ends, so that Floquet multipliers converge with h² at any immersion.
 
 use nalgebra::{DMatrix, Matrix3};
 

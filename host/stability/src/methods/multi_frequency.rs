@@ -1,5 +1,5 @@
 //! The multi-frequency solution (Budak & Altintas 1998, Merdol & Altintas 2004), with harmonics of the directional
-//! coefficients.
+//! coefficients. Roots s of the loop give the Floquet multipliers (characteristic multipliers) exp(sτ).
 
 use num_complex::Complex64;
 

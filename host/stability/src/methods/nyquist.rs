@@ -47,7 +47,7 @@ impl Nyquist {
         count.ok_or(StabilityError::BrokeDown {
             rpm,
             depth_mm,
-            what: "the turns of the determinant cannot be counted",
+            what: "the revolutions of the determinant about the origin cannot be counted",
         })
     }
 
@@ -88,7 +88,7 @@ fn confirmed(
         if unstable_roots(open_loop, between_m, 0.0) != Some(outside) {
             return Err(broke_down(
                 between_m,
-                "the turns of the determinant do not confirm the crossings of the loci",
+                "the revolutions of the determinant about the origin do not confirm the crossings of the loci",
             ));
         }
     }

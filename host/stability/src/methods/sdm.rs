@@ -7,8 +7,8 @@
 //!
 //! where ŷ is the constant y(t_i − τ_d) (order 0) or linear from y(t_i − τ_d) to y(t_i + h − τ_d) (order 1): Insperger
 //! & Stépán, Int. J. Numer. Meth. Engng 61 (2004) 117; Insperger, Stépán & Turi, J. Sound Vib. 313 (2008) 334.
-//! Multipliers converge with h for order 0 and with h² for order 1. Steps end where a tooth enters or leaves, so that
-//! no mean covers both cutting and free flight.
+//! Floquet multipliers converge with h for order 0 and with h² for order 1. Steps end where a tooth enters or leaves,
+//! so that no mean covers both cutting and free flight.
 
 use nalgebra::DMatrix;
 

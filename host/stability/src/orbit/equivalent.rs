@@ -347,7 +347,12 @@ impl<'a> Follower<'a> {
             .filter(|root| root.norm() > 1.0)
             .min_by(|a, b| a.norm().total_cmp(&b.norm()))
             .copied()
-            .ok_or_else(|| self.broke_down(high.depth_m(), "a multiplier was lost while halving"))?;
+            .ok_or_else(|| {
+                self.broke_down(
+                    high.depth_m(),
+                    "a Floquet multiplier was lost while the interval of depth was halved",
+                )
+            })?;
         let chatter_hz = match StabilityLoss::of(crossed) {
             StabilityLoss::Fold => None,
             _ => self.chatter_hz(outer, crossed),
@@ -418,7 +423,7 @@ impl Units {
 
 impl Method for EquivalentProblem {
     fn name(&self) -> &'static str {
-        "collocation about the forced orbit, with equivalent stiffness and damping of what is not smooth"
+        "collocation about the forced orbit, with equivalent stiffness and damping of non-smooth forces"
     }
 
     /// Evaluates the branch of orbits reached when the depth grows from 0. The error is the distance to the multiplier

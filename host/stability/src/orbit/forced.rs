@@ -200,7 +200,7 @@ impl ForcedProblem {
         if is_linear && pitched.has_variable_pitch() {
             return refuse(
                 "tool.pitch_deg: on a linear structure the forced orbit of teeth at unequal pitch is not followed, it grows beyond \
-                 all bounds where a multiplier over the revolution reaches 1; equal pitch is needed beside process-damping",
+                 all bounds where a Floquet multiplier over the revolution reaches 1; equal pitch is needed beside process-damping",
             );
         }
         Ok(Self {

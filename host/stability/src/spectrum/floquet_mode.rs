@@ -1,4 +1,4 @@
-//! Floquet mode of a multiplier and its adjoint, along one tooth period.
+//! Floquet mode of a Floquet multiplier (characteristic multiplier) and its adjoint, along one tooth period.
 //!
 //! With G(t) = A + B M(t) C, M = κ Σ cutting·normalᵀ − β over the cutting teeth, and the complex depth κ = w (1 − 1/μ),
 //! the Floquet mode fulfils ẋ = G x with x(τ) = μ x(0). The adjoint fulfils ẏ = −Gᵀ y with y(τ) = l and lᵀΦ = μ lᵀ.

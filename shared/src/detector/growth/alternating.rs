@@ -1,7 +1,7 @@
 //! Growth of what alternates from tooth to tooth, where runout may alternate too.
 
 use super::steadiness::{LEAST_DEVIATION, STEADY, chance, is_steady};
-use crate::detector::finding::{Kind, Multiplier};
+use crate::detector::finding::{GrowthKind, Multiplier};
 use crate::stroboscope::{Alternation, Stroboscope, Window};
 use crate::synchronous::CHANNELS;
 
@@ -72,7 +72,7 @@ impl AlternatingGrowth {
                 abs: a.multiplier_abs,
                 deviation: ((a.multiplier_abs - a.least) / SURE).max(LEAST_DEVIATION),
                 angle_turns: 0.5,
-                kind: Kind::Flip,
+                kind: GrowthKind::Flip,
                 level,
             }),
             interval: found.map(|a| (a.least, a.most)),

@@ -1,7 +1,7 @@
 //! Growth that linear prediction over a few passings sees.
 
 use super::steadiness::{LEAST_DEVIATION, LIKELY, is_steady};
-use crate::detector::finding::{Kind, Multiplier};
+use crate::detector::finding::{GrowthKind, Multiplier};
 use crate::math::sqrt;
 use crate::stroboscope::{CAPACITY, Plan, Prediction, Stroboscope};
 
@@ -118,9 +118,9 @@ fn multiplier(stroboscope: &Stroboscope, prediction: &Prediction, noise: f32) ->
         deviation: prediction.deviation.max(LEAST_DEVIATION),
         angle_turns,
         kind: if angle_turns > 0.5 - FLIP_ANGLE {
-            Kind::Flip
+            GrowthKind::Flip
         } else {
-            Kind::Hopf
+            GrowthKind::Hopf
         },
         level: sqrt((prediction.level * prediction.level - noise).max(0.0)),
     }
@@ -130,8 +130,8 @@ fn multiplier(stroboscope: &Stroboscope, prediction: &Prediction, noise: f32) ->
 pub(super) fn cycles(stroboscope: &Stroboscope, multiplier: &Multiplier) -> Option<f32> {
     let window = stroboscope.window(stroboscope.filled().min(SHAPE_WINDOW))?;
     match multiplier.kind {
-        Kind::Hopf => window.cycles(multiplier.angle_turns),
-        Kind::Flip => window.alternating_cycles(),
+        GrowthKind::Hopf => window.cycles(multiplier.angle_turns),
+        GrowthKind::Flip => window.alternating_cycles(),
     }
 }
 

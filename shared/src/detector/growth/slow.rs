@@ -1,7 +1,7 @@
 //! Slow growth, which noise hides from passing to passing: seen over the whole window, twice, and larger the second time.
 
 use super::steadiness::LEAST_DEVIATION;
-use crate::detector::finding::{Kind, Multiplier};
+use crate::detector::finding::{GrowthKind, Multiplier};
 use crate::math::exp;
 use crate::stroboscope::exponential::ANGLES;
 use crate::stroboscope::{Exponential, Guess, Window};
@@ -110,7 +110,7 @@ fn multiplier(found: &Exponential) -> Multiplier {
         abs,
         deviation: (abs * found.rate / found.certainty).max(LEAST_DEVIATION),
         angle_turns: found.angle_turns,
-        kind: Kind::Hopf,
+        kind: GrowthKind::Hopf,
         level: found.level,
     }
 }

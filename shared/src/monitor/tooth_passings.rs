@@ -10,7 +10,7 @@ use crate::criteria::{
     ANGLE_DEVIATION_MAX, GROWTH_INTERVAL_SAMPLES, STRUCTURE_SAMPLES_PER_TOOTH, TOOL_SAMPLES_PER_TOOTH,
 };
 use crate::decimation::Sample;
-use crate::detector::growth::Look;
+use crate::detector::growth::Evaluation;
 use crate::math;
 use crate::spectrum::{STRUCTURE_POINTS, TOOL_POINTS};
 use crate::synchronous::{Method, Passed, SLOTS, Sampler};
@@ -50,9 +50,9 @@ impl Monitor {
         // residual of the forced vibration, which beats with the ratio of tooth period to sample period and would
         // appear as slow growth.
         let look = if band.samples_since_growth >= GROWTH_INTERVAL_SAMPLES {
-            Look::Quick
+            Evaluation::Quick
         } else {
-            Look::None
+            Evaluation::None
         };
         self.take_passing(band, &passed, noise, look);
         // The points of the stroboscopic map come from the tool band only if the tooth period has too few samples of
@@ -93,7 +93,7 @@ impl Monitor {
         let rate = self.settings.sensor.nominal_rate.0;
         let bandwidth = 0.5 * rate * SLOTS as f32 / angles.samples_per_tooth;
         let noise = self.noise_density() * bandwidth.min(0.5 * rate / divisor as f32);
-        self.take_passing(band, &passed, noise, Look::Close);
+        self.take_passing(band, &passed, noise, Evaluation::Close);
         show(&mut state.strobes, Band::Structure, &passed);
     }
 
@@ -104,7 +104,7 @@ impl Monitor {
         band: &mut BandState<POINTS, BINS>,
         passed: &Passed,
         noise: f32,
-        look: Look,
+        look: Evaluation,
     ) {
         band.floor = math::sqrt(noise);
         band.growth.push(
@@ -114,7 +114,7 @@ impl Monitor {
             self.settings.tool.teeth,
             look,
         );
-        if look >= Look::Quick {
+        if look >= Evaluation::Quick {
             // The detector gets a new finding only when the growth of the vibration was evaluated.
             band.passed = true;
             band.samples_since_growth = 0;
