@@ -1,12 +1,9 @@
 //! Percentiles of first limits, with confidence intervals from the scatter between batches of drawn machines.
 
-use quietcut_numerics::statistics::sample_quantile;
+use quietcut_numerics::statistics::{NINETY_PERCENT, sample_quantile};
 
 use super::speed_line::SpeedLine;
 use crate::criteria::PERCENTILE_SETTLED;
-
-/// Two-sided 90 % quantile of the standard normal distribution.
-const CONFIDENCE_90: f64 = 1.644_853_626_951_473;
 
 /// First stability limits of all drawn machines, in all and by batch.
 pub(super) struct Limits {
@@ -52,7 +49,7 @@ impl Limits {
 /// (Abramowitz & Stegun 26.7.5).
 fn student_90(count: usize) -> f64 {
     let freedom = count.saturating_sub(1).max(1) as f64;
-    let z = CONFIDENCE_90;
+    let z = NINETY_PERCENT;
     let (first, second) = (
         (z.powi(2) + 1.0) / 4.0,
         (5.0 * z.powi(4) + 16.0 * z.powi(2) + 3.0) / 96.0,
