@@ -1,0 +1,182 @@
+//! Arguments of `quietcut frf`.
+
+use std::path::PathBuf;
+
+use crate::cli::segment::RecordedSegment;
+use crate::cli::{Output, finite, positive};
+use crate::file;
+use crate::frf::{Estimator, Excitation, HammerWindows, MeasurementSettings, Window};
+
+/// Estimates receptances and their coherence from recordings of a shaker, a hammer or a cut.
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Example:\n  quietcut simulate tests/cases/kuka-kr90-acetal.toml --experiment hammer --direction y --force-n 300 --sample-rate-hz 512 --noise-percent 0.1 --out hammer.csv\n  quietcut frf hammer.csv --band-hz 10:30 --out frf.csv --out frf.svg\n\n\
+                  Recordings with the same forces are averaged; recordings with other forces add columns to the matrix of receptances.\n\
+                  The sidecar key `kind` sets how a recording is divided into segments; --excitation overrides it.\n\
+                  Forces that are not selected count as noise."
+)]
+pub struct Args {
+    /// The recordings: CSV, UFF 58, WAV or MAT.
+    #[arg(value_name = "REC", required = true)]
+    pub(super) recordings: Vec<PathBuf>,
+    /// Table or chart to write; the ending sets the format: csv, uff, svg or html. May be repeated.
+    #[arg(long, value_name = "FILE", value_parser = OutputFile::parse)]
+    pub(super) out: Vec<OutputFile>,
+    /// Estimator: h1 is unbiased by noise of the responses, h2 by noise of the forces, mean is (h1 + h2)/2. pseudo-inverse
+    /// combines several cuts, in each of which the forces are linearly dependent.
+    #[arg(long, value_enum, default_value_t)]
+    pub(super) method: Method,
+    /// Kind of excitation in the recordings; overrides the key kind of the sidecar file.
+    #[arg(long, value_enum)]
+    pub(super) excitation: Option<ExcitationKind>,
+    /// First and last frequency of the estimated receptances, in Hz.
+    #[arg(long, value_name = "FIRST:LAST", value_parser = band)]
+    pub(super) band_hz: Option<(f64, f64)>,
+    /// Distance between the frequency lines of the receptances, in Hz. Default: for each force, that of eight segments
+    /// of a record of random excitation, or of eight averaged lines of a sweep.
+    #[arg(long, value_name = "D", value_parser = positive, allow_negative_numbers = true)]
+    pub(super) resolution_hz: Option<f64>,
+    /// Window function on each segment of a record of random excitation.
+    #[arg(long, value_enum, default_value_t)]
+    pub(super) window: WindowName,
+    /// Overlap of neighbouring segments of a record of random excitation, as a fraction of the segment length.
+    #[arg(long, value_name = "FRACTION", value_parser = overlap, default_value = "0.5", allow_negative_numbers = true)]
+    pub(super) overlap: f64,
+    /// Channel to use where a recording has several forces, or several sensors of one direction; may be repeated.
+    #[arg(long, value_name = "NAME")]
+    pub(super) channel: Vec<String>,
+    /// Time constant τ in s of the exponential window on hammer impacts. The window adds 1/τ to the decay rate of every mode;
+    /// the written receptances have that damping taken off again.
+    #[arg(long, value_name = "TAU", value_parser = positive, allow_negative_numbers = true)]
+    pub(super) exponential_window_s: Option<f64>,
+    /// Force level in N to use where a step-sine test has several levels.
+    #[arg(long, value_name = "F", value_parser = positive, allow_negative_numbers = true)]
+    pub(super) force_n: Option<f64>,
+    /// Tool-tip calibration: FRF from the tool tip to the sensor on the housing.
+    #[arg(long, value_name = "FILE", requires = "tip")]
+    pub(super) housing: Option<PathBuf>,
+    /// Tool-tip calibration: FRF from the tool tip to itself.
+    #[arg(long, value_name = "FILE", requires = "housing")]
+    pub(super) tip: Option<PathBuf>,
+    /// Write uff files as binary (58b).
+    #[arg(long)]
+    pub(super) uff_binary: bool,
+    #[command(flatten)]
+    pub(super) segment: RecordedSegment,
+    #[command(flatten)]
+    pub(super) output: Output,
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+pub(super) enum Method {
+    #[default]
+    H1,
+    H2,
+    Mean,
+    PseudoInverse,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub(super) enum ExcitationKind {
+    Random,
+    Sweep,
+    Hammer,
+    StepSine,
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+pub(super) enum WindowName {
+    #[default]
+    Hann,
+    Hamming,
+    Rectangular,
+}
+
+/// Output file with its format.
+#[derive(Clone, Debug)]
+pub(super) struct OutputFile {
+    pub(super) path: PathBuf,
+    pub(super) format: FileFormat,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum FileFormat {
+    Csv,
+    Uff,
+    Svg,
+    Html,
+}
+
+impl OutputFile {
+    fn parse(text: &str) -> Result<Self, String> {
+        let path = PathBuf::from(text);
+        let ending = file::ending(&path);
+        let format = match ending.as_str() {
+            "csv" => FileFormat::Csv,
+            "uff" | "unv" => FileFormat::Uff,
+            "svg" => FileFormat::Svg,
+            "html" => FileFormat::Html,
+            _ => {
+                return Err(format!(
+                    "`{text}` ends in \"{ending}\"; csv, uff, svg or html is needed"
+                ));
+            }
+        };
+        Ok(Self { path, format })
+    }
+}
+
+fn band(text: &str) -> Result<(f64, f64), String> {
+    let wrong = || format!("`{text}` is no band; two frequencies are needed, such as 10:30");
+    let (first, last) = text.split_once(':').ok_or_else(wrong)?;
+    let (first, last) = (finite(first)?, finite(last)?);
+    if 0.0 <= first && first < last {
+        Ok((first, last))
+    } else {
+        Err(format!(
+            "`{text}` is not possible: the first frequency must be 0 or more, and the last greater"
+        ))
+    }
+}
+
+fn overlap(text: &str) -> Result<f64, String> {
+    let value = finite(text)?;
+    if (0.0..=0.95).contains(&value) {
+        Ok(value)
+    } else {
+        Err(format!("{value} is not possible: it must be from 0 to 0.95"))
+    }
+}
+
+impl Args {
+    pub(super) fn settings(&self) -> MeasurementSettings {
+        MeasurementSettings {
+            excitation: self.excitation.map(|kind| match kind {
+                ExcitationKind::Random => Excitation::Random,
+                ExcitationKind::Sweep => Excitation::Sweep,
+                ExcitationKind::Hammer => Excitation::Hammer,
+                ExcitationKind::StepSine => Excitation::StepSine,
+            }),
+            estimator: match self.method {
+                Method::H1 => Estimator::H1,
+                Method::H2 => Estimator::H2,
+                Method::Mean => Estimator::Mean,
+                Method::PseudoInverse => Estimator::PseudoInverse,
+            },
+            resolution_hz: self.resolution_hz,
+            overlap: self.overlap,
+            window: match self.window {
+                WindowName::Hann => Window::Hann,
+                WindowName::Hamming => Window::Hamming,
+                WindowName::Rectangular => Window::Rectangular,
+            },
+            band_hz: self.band_hz,
+            channels: self.channel.clone(),
+            hammer: HammerWindows {
+                segment_s: None,
+                exponential_s: self.exponential_window_s,
+            },
+            force_n: self.force_n,
+        }
+    }
+}
