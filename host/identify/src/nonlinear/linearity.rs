@@ -7,6 +7,7 @@
 
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
+use quietcut_model::effects::Harmonic;
 use quietcut_numerics::least_squares::LinearProblem;
 
 use crate::criteria::{
@@ -15,7 +16,7 @@ use crate::criteria::{
 };
 use crate::dwells::differentiation::derivative;
 use crate::dwells::dwell::{Dwell, FourierSeries};
-use crate::nonlinear::describing::{self, Nonlinearity};
+use crate::nonlinear::describing::Nonlinearity;
 use crate::nonlinear::homogeneity::line;
 
 /// Result of the linearity test.
@@ -304,29 +305,28 @@ struct Candidate {
 }
 
 fn candidates(base: &LinearModel<'_>, points: &[DwellStiffness]) -> Vec<Candidate> {
-    let feature =
-        |of: &dyn Fn(&DwellStiffness) -> Complex64| -> Vec<Complex64> { points.iter().map(of).collect() };
-    let cubic = feature(&|p| describing::cubic_stiffness(p.amplitude));
-    let quintic = feature(&|p| describing::quintic_stiffness(p.amplitude));
-    let candidate = |kind, spring, parameters, features| Candidate {
+    // Describing functions of the first `count` terms of a kind, at all points; the force law bends at `bend_m`, m.
+    let features = |kind: Nonlinearity, count: usize, bend_m: f64| -> Vec<Vec<Complex64>> {
+        let of = |point: &DwellStiffness, term: usize| {
+            let at = Harmonic::new(point.amplitude, point.omega).with_bend_m(bend_m);
+            kind.describing_functions(at)[term]
+        };
+        (0..count)
+            .map(|term| points.iter().map(|point| of(point, term)).collect())
+            .collect()
+    };
+    let linear = |kind, spring, parameters| Candidate {
         kind,
         spring,
         parameters,
-        features,
+        features: features(kind, parameters, 0.0),
     };
     // The gap of backlash and the yield displacement of hysteresis are searched from far below the smallest to just
     // above the largest measured amplitude.
     let sizes = points.iter().map(|point| point.amplitude);
     let (least, largest) = sizes.fold((f64::INFINITY, 0.0_f64), |(a, b), x| (a.min(x), b.max(x)));
-    let scan = |of: &dyn Fn(&DwellStiffness, f64) -> Complex64| {
-        let features = |size: f64| {
-            vec![
-                points
-                    .iter()
-                    .map(|point| of(point, size.exp()))
-                    .collect::<Vec<_>>(),
-            ]
-        };
+    let with_bend = |kind| {
+        let features = |size: f64| features(kind, 1, size.exp());
         let sum = |size: f64| base.sum_of_squares(&features(size));
         let (mut from, mut to) = ((0.05 * least).ln(), (1.5 * largest).ln());
         // The coarse grid of gaps or yield displacements is refined three times around the best value.
@@ -342,35 +342,20 @@ fn candidates(base: &LinearModel<'_>, points: &[DwellStiffness]) -> Vec<Candidat
             }
             (from, to) = (best.1 - step, best.1 + step);
         }
-        features(0.5 * (from + to))
+        Candidate {
+            kind,
+            spring: true,
+            parameters: 2,
+            features: features(0.5 * (from + to)),
+        }
     };
     vec![
-        candidate(Nonlinearity::CubicStiffness, true, 1, vec![cubic.clone()]),
-        candidate(
-            Nonlinearity::CubicDamping,
-            false,
-            1,
-            vec![feature(&|p| describing::cubic_damping(p.amplitude, p.omega))],
-        ),
-        candidate(
-            Nonlinearity::CoulombFriction,
-            false,
-            1,
-            vec![feature(&|p| describing::coulomb_friction(p.amplitude))],
-        ),
-        candidate(Nonlinearity::SofteningHardening, true, 2, vec![cubic, quintic]),
-        candidate(
-            Nonlinearity::Backlash,
-            true,
-            2,
-            scan(&|point, gap| describing::backlash(point.amplitude, gap)),
-        ),
-        candidate(
-            Nonlinearity::Hysteresis,
-            true,
-            2,
-            scan(&|point, yield_m| describing::hysteresis(point.amplitude, yield_m)),
-        ),
+        linear(Nonlinearity::CubicStiffness, true, 1),
+        linear(Nonlinearity::CubicDamping, false, 1),
+        linear(Nonlinearity::CoulombFriction, false, 1),
+        linear(Nonlinearity::SofteningHardening, true, 2),
+        with_bend(Nonlinearity::Backlash),
+        with_bend(Nonlinearity::Hysteresis),
     ]
 }
 

@@ -25,6 +25,7 @@ pub(super) const AXIAL_DEPTH_MODULATION: EffectSpec = EffectSpec {
     hidden_by: "an edge angle of 90°, or a structure that is stiff along z",
     source: "thesis, eq. 3.5",
     example: "on = true",
+    describing_function: None,
     build: |values| Ok(Arc::new(AxialDepthModulation(values.switch("on")?))),
 };
 

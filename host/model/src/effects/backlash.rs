@@ -8,7 +8,8 @@ use num_complex::Complex64;
 
 use super::location::{along, axis_of, static_stiffness};
 use super::{
-    Argument, Class, Effect, EffectError, EffectName, EffectSpec, Locations, Parameter, Prior, Treatment,
+    Argument, Class, Effect, EffectError, EffectName, EffectSpec, Harmonic, Locations, Parameter, Prior,
+    Treatment,
 };
 use crate::structure::{Direction, Structure};
 use crate::{MotionState, Regime, RestoringForce};
@@ -50,6 +51,7 @@ pub(super) const BACKLASH: EffectSpec = EffectSpec {
     hidden_by: "amplitudes within the gap, where it is less stiffness; it changes no damping",
     source: "Nordin and Gutman, Automatica 38 (2002)",
     example: "gap_mm = 0.05\nstiffness_fraction = 0.3\ndirection = \"x\"",
+    describing_function: Some(describing_function),
     build: |values| {
         Ok(Arc::new(Backlash {
             half_gap_m: 0.5e-3 * values.main("gap_mm")?,
@@ -64,15 +66,16 @@ const SHARE: Prior = Prior {
     ..Prior::open(0.0, 1.0, "a share above 0 and up to 1")
 };
 
-/// Describing function of f_r for a stiffness of 1: dead zone of ±`half_gap` minus the linear spring, at the displacement amplitude
-/// `amplitude` (both in m).
-pub fn describing_function(amplitude: f64, half_gap: f64) -> Complex64 {
-    if amplitude <= half_gap {
-        return Complex64::new(-1.0, 0.0);
-    }
-    let share = half_gap / amplitude;
-    let missing = 2.0 / PI * (share.asin() + share * (1.0 - share * share).sqrt());
-    Complex64::new(-missing, 0.0)
+/// Describing function of f_r for a stiffness of 1 N/m: a dead zone of ± half the gap minus the linear spring.
+fn describing_function(at: Harmonic) -> [Complex64; 2] {
+    let half_gap_m = at.bend_m;
+    let missing = if at.amplitude_m <= half_gap_m {
+        1.0
+    } else {
+        let share = half_gap_m / at.amplitude_m;
+        2.0 / PI * (share.asin() + share * (1.0 - share * share).sqrt())
+    };
+    [Complex64::new(-missing, 0.0), Complex64::ZERO]
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -119,8 +122,9 @@ impl RestoringForce for BacklashSpring {
         along(self.axis, -self.stiffness * missing)
     }
 
-    fn describing_function(&self, amplitude_m: f64, _: f64) -> Option<Complex64> {
-        Some(self.stiffness * describing_function(amplitude_m, self.half_gap_m))
+    fn describing_function(&self, amplitude_m: f64, omega: f64) -> Option<Complex64> {
+        let at = Harmonic::new(amplitude_m, omega).with_bend_m(self.half_gap_m);
+        Some(self.stiffness * describing_function(at)[0])
     }
 
     fn margin(&self, regime: Regime, at: &MotionState, _: &[f64], _: f64) -> f64 {

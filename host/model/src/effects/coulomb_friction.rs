@@ -14,8 +14,8 @@ use num_complex::Complex64;
 
 use super::location::{along, axis_of};
 use super::{
-    Argument, Class, Effect, EffectError, EffectName, EffectSpec, Locations, Parameter, Prior, Treatment,
-    Value, Values,
+    Argument, Class, Effect, EffectError, EffectName, EffectSpec, Harmonic, Locations, Parameter, Prior,
+    Treatment, Value, Values,
 };
 use crate::structure::{Direction, Structure};
 use crate::{MotionState, Regime, RestoringForce};
@@ -60,6 +60,7 @@ pub(super) const COULOMB_FRICTION: EffectSpec = EffectSpec {
     hidden_by: "large amplitudes; a hysteresis loop with very stiff pre-slip is the same; it moves no frequency while it slips",
     source: "Armstrong-Hélouvry, Dupont and Canudas de Wit, Automatica 30 (1994)",
     example: "fc_n = 3.0\ndirection = \"x\"",
+    describing_function: Some(describing_function),
     build: |values| {
         let plus_n = values.main("fc_n")?;
         let minus_n = values.number("fc_minus_n")?.unwrap_or(plus_n);
@@ -82,9 +83,9 @@ pub(super) const COULOMB_FRICTION: EffectSpec = EffectSpec {
 const FORCE: Prior = Prior::not_negative("a force of 0 or more");
 const LENGTH: Prior = Prior::not_negative("a length of 0 or more");
 
-/// Describing function of Coulomb friction for fc = 1 N at the displacement amplitude X, m: 4/(πX) in phase with the velocity.
-pub fn describing_function(amplitude: f64) -> Complex64 {
-    Complex64::new(0.0, 4.0 / (PI * amplitude))
+/// Describing function of Coulomb friction for fc = 1 N: 4/(πX) in phase with the velocity.
+fn describing_function(at: Harmonic) -> [Complex64; 2] {
+    [Complex64::new(0.0, 4.0 / (PI * at.amplitude_m)), Complex64::ZERO]
 }
 
 /// Moves gap and contact of a backlash in series with friction (`[extension.backlash]` with `before = "coulomb-friction"`) to the values
@@ -214,8 +215,9 @@ impl RestoringForce for Friction {
     }
 
     /// If the friction force differs between the two directions of motion, the fundamental of the force is that of the mean friction force.
-    fn describing_function(&self, amplitude_m: f64, _: f64) -> Option<Complex64> {
-        Some(0.5 * (self.plus_n + self.minus_n) * describing_function(amplitude_m))
+    fn describing_function(&self, amplitude_m: f64, omega: f64) -> Option<Complex64> {
+        let at = Harmonic::new(amplitude_m, omega);
+        Some(0.5 * (self.plus_n + self.minus_n) * describing_function(at)[0])
     }
 
     fn holds(&self) -> Option<usize> {

@@ -26,6 +26,7 @@ pub(super) const CROSS_AXIS: EffectSpec = EffectSpec {
     hidden_by: "another direction at rest; a cross receptance is reciprocal and not the same",
     source: "McConnell and Varoto, Vibration Testing (2008)",
     example: "fraction = 0.04\ndirection = \"y\"\nchannel = \"x\"",
+    describing_function: None,
     build: |values| {
         Ok(Arc::new(CrossAxis {
             fraction: values.main("fraction")?,

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use num_complex::Complex64;
 
 use super::local_force::LocalForce;
-use super::{Argument, Class, EffectName, EffectSpec, Locations, Parameter, Treatment};
+use super::{Argument, Class, EffectName, EffectSpec, Harmonic, Locations, Parameter, Treatment};
 
 /// The specification.
 pub(super) const CUBIC_DAMPING: EffectSpec = EffectSpec {
@@ -25,20 +25,21 @@ pub(super) const CUBIC_DAMPING: EffectSpec = EffectSpec {
     hidden_by: "recordings at one level, where it is damping; it moves no frequency",
     source: "Worden and Tomlinson, Nonlinearity in Structural Dynamics (2001), ch. 2",
     example: "c3_ns3_per_m3 = 4e6\ndirection = \"y\"",
+    describing_function: Some(describing_function),
     build: |values| {
         Ok(Arc::new(LocalForce {
             id: EffectName::CubicDamping,
             coefficients: [values.main("c3_ns3_per_m3")?, 0.0],
             law: |[c3, _], _, v| c3 * v.powi(3),
             slopes: |[c3, _], _, v| [0.0, 3.0 * c3 * v.powi(2)],
-            describing_function: |[c3, _], amplitude, omega| c3 * describing_function(amplitude, omega),
             bends_at_rest: false,
             direction: values.direction()?,
         }))
     },
 };
 
-/// Describing function of c3·v³ for c3 = 1 at the displacement amplitude X, m, and ω, rad/s: ¾ω³X² in phase with the velocity.
-pub fn describing_function(amplitude: f64, omega: f64) -> Complex64 {
-    Complex64::new(0.0, 0.75 * omega.powi(3) * amplitude * amplitude)
+/// Describing function of c3·v³ for c3 = 1: ¾ω³X² in phase with the velocity.
+fn describing_function(at: Harmonic) -> [Complex64; 2] {
+    let damping = 0.75 * at.omega.powi(3) * at.amplitude_m * at.amplitude_m;
+    [Complex64::new(0.0, damping), Complex64::ZERO]
 }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use num_complex::Complex64;
 
 use super::local_force::LocalForce;
-use super::{Argument, Class, EffectName, EffectSpec, Locations, Parameter, Treatment};
+use super::{Argument, Class, EffectName, EffectSpec, Harmonic, Locations, Parameter, Treatment};
 
 /// The specification.
 pub(super) const CUBIC_STIFFNESS: EffectSpec = EffectSpec {
@@ -25,20 +25,23 @@ pub(super) const CUBIC_STIFFNESS: EffectSpec = EffectSpec {
     hidden_by: "recordings at one level; softening-hardening below its turn; it shows no even harmonics, no offset and no damping that depends on amplitude",
     source: "Worden and Tomlinson, Nonlinearity in Structural Dynamics (2001), ch. 2; Kerschen et al., MSSP 20 (2006)",
     example: "k3_n_per_m3 = -5e12\ndirection = \"x\"",
+    describing_function: Some(describing_function),
     build: |values| {
         Ok(Arc::new(LocalForce {
             id: EffectName::CubicStiffness,
             coefficients: [values.main("k3_n_per_m3")?, 0.0],
             law: |[k3, _], x, _| k3 * x.powi(3),
             slopes: |[k3, _], x, _| [3.0 * k3 * x.powi(2), 0.0],
-            describing_function: |[k3, _], amplitude, _| k3 * describing_function(amplitude),
             bends_at_rest: false,
             direction: values.direction()?,
         }))
     },
 };
 
-/// Describing function of k3·x³ for k3 = 1 at the displacement amplitude X, m: ¾X².
-pub fn describing_function(amplitude: f64) -> Complex64 {
-    Complex64::new(0.75 * amplitude * amplitude, 0.0)
+/// Describing function of k3·x³ for k3 = 1: ¾X².
+pub(super) fn describing_function(Harmonic { amplitude_m, .. }: Harmonic) -> [Complex64; 2] {
+    [
+        Complex64::new(0.75 * amplitude_m * amplitude_m, 0.0),
+        Complex64::ZERO,
+    ]
 }

@@ -28,5 +28,6 @@ pub(super) const DAMPING: EffectSpec = EffectSpec {
     hidden_by: "mass, stiffness and damping changed by one factor, which is a sensor gain",
     source: "Pintelon and Schoukens, System Identification (2012)",
     example: "relative_change = 0.3\ndirection = \"x\"",
+    describing_function: None,
     build: |values| build(Matrix::Damping, values),
 };

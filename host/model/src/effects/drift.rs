@@ -44,6 +44,7 @@ pub(super) const DRIFT: EffectSpec = EffectSpec {
     hidden_by: "levels that only rise or fall with time; wear and speed fluctuation, unless motion and tachometer are separate",
     source: "Poulimenos and Fassois, MSSP 20 (2006)",
     example: "relative_change = -0.05\ntime_constant_s = 30.0\ndirection = \"x\"",
+    describing_function: None,
     build: |values| {
         let direction = values.direction()?;
         let time_constant = values.number("time_constant_s")?;

@@ -27,6 +27,7 @@ pub(super) const EDGE_FORCE: EffectSpec = EffectSpec {
     hidden_by: "recordings at one feed; wear in a short recording looks the same",
     source: "Altintas, Manufacturing Automation (2012), ch. 2; Budak, Altintas and Armarego (1996)",
     example: "kte_n_per_mm = 20.0\nkre_n_per_mm = 10.0",
+    describing_function: None,
     build: |values| {
         let mut n_per_mm = [None; 3];
         for (n_per_mm, key) in n_per_mm

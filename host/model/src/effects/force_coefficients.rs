@@ -29,6 +29,7 @@ pub(super) const FORCE_COEFFICIENTS: EffectSpec = EffectSpec {
     hidden_by: "a vanishing chip; without measured force all coefficients by one factor are a gain of all channels",
     source: "Altintas, Manufacturing Automation (2012), ch. 2",
     example: "ktc_mpa = 700.0\nkrc_mpa = 210.0",
+    describing_function: None,
     build: |values| {
         let relative_change = values.number("")?;
         let mut mpa = [None; 3];

@@ -31,6 +31,7 @@ pub(super) const FORCE_EXPONENT: EffectSpec = EffectSpec {
     hidden_by: "recordings at one chip thickness, where it is other coefficients",
     source: "Kienzle, VDI-Z 94 (1952)",
     example: "exponent = 0.8\nreference_chip_mm = 0.05",
+    describing_function: None,
     build: |values| {
         Ok(Arc::new(ForceExponent {
             exponent: values.main("exponent")?,

@@ -10,7 +10,8 @@ use quietcut_numerics::roots::bisection;
 
 use super::location::{along, axis_of};
 use super::{
-    Argument, Class, Effect, EffectError, EffectName, EffectSpec, Locations, Parameter, Prior, Treatment,
+    Argument, Class, Effect, EffectError, EffectName, EffectSpec, Harmonic, Locations, Parameter, Prior,
+    Treatment,
 };
 use crate::structure::{Direction, Structure};
 use crate::{MotionState, Regime, RestoringForce};
@@ -52,6 +53,7 @@ pub(super) const HYSTERESIS: EffectSpec = EffectSpec {
     hidden_by: "large slip, where it is friction and less stiffness; it has no even harmonics",
     source: "Wen, J. Eng. Mech. Div. ASCE 102 (1976)",
     example: "hysteretic_stiffness_n_per_m = 2e5\nyield_m = 1e-5\nexponent = 1.5\ngamma = 0.6\ndirection = \"x\"",
+    describing_function: Some(describing_function),
     build: |values| {
         Ok(Arc::new(Hysteresis {
             stiffness: values.main("hysteretic_stiffness_n_per_m")?,
@@ -69,11 +71,11 @@ const ZERO_TO_ONE: Prior = Prior {
     ..Prior::open(0.0, 1.0, "a number from 0 to 1")
 };
 
-/// Describing function of z − x, a Bouc–Wen element of stiffness 1 minus the linear spring, for n = 1 and γ = β = ½, at the displacement
-/// amplitude `amplitude`, m.
+/// Describing function of z − x, a Bouc–Wen element of stiffness 1 N/m minus the linear spring, for n = 1 and γ = β = ½.
 ///
 /// With n = 1 and γ = β the element is linear while it unloads, and saturates exponentially while it loads.
-pub fn describing_function(amplitude: f64, yield_m: f64) -> Complex64 {
+fn describing_function(at: Harmonic) -> [Complex64; 2] {
+    let (amplitude, yield_m) = (at.amplitude_m, at.bend_m);
     // Half a period from the upper to the lower peak of x: z unloads from +z₀ with slope 1 to 0, then loads over the rest s of the
     // stroke as z = −z_y(1 − e^{−s/z_y}), to −z₀. The peak z₀ is the fixed point of this map.
     let stroke = 2.0 * amplitude;
@@ -95,7 +97,7 @@ pub fn describing_function(amplitude: f64, yield_m: f64) -> Complex64 {
         // Component of z − x in phase with the displacement cos p, and in phase with the velocity −sin p.
         sum += Complex64::new(rest * p.cos(), -rest * p.sin());
     }
-    sum * (2.0 / (f64::from(count) * amplitude))
+    [sum * (2.0 / (f64::from(count) * amplitude)), Complex64::ZERO]
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -145,9 +147,10 @@ impl RestoringForce for BoucWen {
         along(self.axis, self.effect.stiffness * (own[0] - at.x[self.axis]))
     }
 
-    fn describing_function(&self, amplitude_m: f64, _: f64) -> Option<Complex64> {
+    fn describing_function(&self, amplitude_m: f64, omega: f64) -> Option<Complex64> {
         let has_closed_form = self.effect.exponent == 1.0 && self.effect.gamma == 0.5;
-        has_closed_form.then(|| self.effect.stiffness * describing_function(amplitude_m, self.effect.yield_m))
+        let at = Harmonic::new(amplitude_m, omega).with_bend_m(self.effect.yield_m);
+        has_closed_form.then(|| self.effect.stiffness * describing_function(at)[0])
     }
 
     fn rate(&self, regime: Regime, at: &MotionState, own: &[f64], rate: &mut [f64]) {

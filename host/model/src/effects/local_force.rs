@@ -3,15 +3,12 @@
 use num_complex::Complex64;
 
 use super::location::{along, axis_of};
-use super::{Effect, EffectError, EffectName};
+use super::{DescribingFunction, Effect, EffectError, EffectName, Harmonic};
 use crate::structure::{Direction, Structure};
 use crate::{MotionState, Regime, RestoringForce, Slopes};
 
 /// Force law: f_r, N, from up to two coefficients, the displacement x, m, and the velocity v, m/s.
 pub(super) type Law = fn([f64; 2], f64, f64) -> f64;
-
-/// Describing function N(X, ω), N/m, of a force law, from its coefficients, the displacement amplitude X, m, and ω, rad/s.
-pub(super) type DescribingFunction = fn([f64; 2], f64, f64) -> Complex64;
 
 /// A force that depends on displacement and velocity along one direction.
 #[derive(Clone, Copy, Debug)]
@@ -23,8 +20,6 @@ pub(super) struct LocalForce {
     pub(super) law: Law,
     /// Derivatives ∂f_r/∂x, N/m, and ∂f_r/∂v, N s/m, of the force law.
     pub(super) slopes: fn([f64; 2], f64, f64) -> [f64; 2],
-    /// Describing function N(X, ω) of the force law: see [`RestoringForce::describing_function`].
-    pub(super) describing_function: DescribingFunction,
     /// True if a derivative of the force law jumps where the velocity is zero.
     pub(super) bends_at_rest: bool,
     /// Direction of the force; `None` if the structure has only one direction.
@@ -36,7 +31,7 @@ struct ForceAlongAxis {
     coefficients: [f64; 2],
     law: Law,
     slopes: fn([f64; 2], f64, f64) -> [f64; 2],
-    describing_function: DescribingFunction,
+    describing_function: Option<DescribingFunction>,
     bends_at_rest: bool,
     axis: usize,
 }
@@ -55,7 +50,7 @@ impl Effect for LocalForce {
             coefficients: self.coefficients,
             law: self.law,
             slopes: self.slopes,
-            describing_function: self.describing_function,
+            describing_function: self.id.spec().describing_function,
             bends_at_rest: self.bends_at_rest,
             axis: axis_of(structure, self.direction, self.id.name())?,
         })])
@@ -77,7 +72,8 @@ impl RestoringForce for ForceAlongAxis {
     }
 
     fn describing_function(&self, amplitude_m: f64, omega: f64) -> Option<Complex64> {
-        Some((self.describing_function)(self.coefficients, amplitude_m, omega))
+        let [first, second] = self.describing_function?(Harmonic::new(amplitude_m, omega));
+        Some(self.coefficients[0] * first + self.coefficients[1] * second)
     }
 
     /// Ends a regime where the velocity changes its sign, if a derivative of the force law jumps there: an integration step over that jump

@@ -22,5 +22,6 @@ pub(super) const MASS: EffectSpec = EffectSpec {
     hidden_by: "mass, stiffness and damping changed by one factor, which is a sensor gain",
     source: "Pintelon and Schoukens, System Identification (2012)",
     example: "relative_change = 0.1\ndirection = \"x\"",
+    describing_function: None,
     build: |values| build(Matrix::Mass, values),
 };

@@ -29,6 +29,7 @@ pub(super) const MISSING_MODE: EffectSpec = EffectSpec {
     hidden_by: "frequencies far outside the band, where it is a little stiffness or mass",
     source: "Ewins, Modal Testing (2000), ch. 4",
     example: "frequency_hz = 85.0\ndamping_ratio = 0.03\nmodal_mass_kg = 40.0\ndirection = \"x\"",
+    describing_function: None,
     build: |values| {
         Ok(Arc::new(MissingMode {
             frequency_hz: values.main("frequency_hz")?,

@@ -11,6 +11,7 @@ mod cross_axis;
 mod cubic_damping;
 mod cubic_stiffness;
 mod damping;
+mod describing;
 mod drift;
 mod edge_force;
 mod effect;
@@ -49,6 +50,7 @@ mod round_trip_tests;
 #[cfg(test)]
 mod tests;
 
+pub use describing::{DescribingFunction, Harmonic};
 pub use effect::Effect;
 pub use error::EffectError;
 use list::list;
@@ -57,17 +59,6 @@ pub use pickup::Pickup;
 pub use set::Effects;
 pub use spec::{Argument, Class, EffectSpec, Locations, Treatment};
 pub use values::{Value, Values};
-
-/// Describing functions of the nonlinear forces with a coefficient of 1: see
-/// [`RestoringForce::describing_function`](crate::RestoringForce::describing_function).
-pub mod describing_functions {
-    pub use super::backlash::describing_function as backlash;
-    pub use super::coulomb_friction::describing_function as coulomb_friction;
-    pub use super::cubic_damping::describing_function as cubic_damping;
-    pub use super::cubic_stiffness::describing_function as cubic_stiffness;
-    pub use super::hysteresis::describing_function as hysteresis;
-    pub use super::softening_hardening::quintic_describing_function as quintic_stiffness;
-}
 
 list! {
     Mass => mass::MASS,

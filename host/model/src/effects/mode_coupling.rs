@@ -30,6 +30,7 @@ pub(super) const MODE_COUPLING: EffectSpec = EffectSpec {
     hidden_by: "recordings in which one of the directions rests",
     source: "Nayfeh and Mook, Nonlinear Oscillations (1979), ch. 6",
     example: "kxyy_n_per_m3 = 1e12\ndirections = [\"x\", \"y\"]",
+    describing_function: None,
     build: |values| {
         let cubic = values.number("kxxy_n_per_m2")?;
         let quartic = match cubic {

@@ -31,6 +31,7 @@ pub(super) const PROCESS_DAMPING: EffectSpec = EffectSpec {
     hidden_by: "recordings at one speed and depth, where it is damping",
     source: "Altintas, Eynian and Onozuka, CIRP Annals 57 (2008)",
     example: "process_damping_n_per_m = 2e5\nfriction = 0.3",
+    describing_function: None,
     build: |values| {
         Ok(Arc::new(FlankDamping(ProcessDamping {
             n_per_m: values.main("process_damping_n_per_m")?,

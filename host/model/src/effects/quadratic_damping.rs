@@ -6,7 +6,7 @@ use std::sync::Arc;
 use num_complex::Complex64;
 
 use super::local_force::LocalForce;
-use super::{Argument, Class, EffectName, EffectSpec, Locations, Parameter, Treatment};
+use super::{Argument, Class, EffectName, EffectSpec, Harmonic, Locations, Parameter, Treatment};
 
 /// The specification.
 pub(super) const QUADRATIC_DAMPING: EffectSpec = EffectSpec {
@@ -27,21 +27,21 @@ pub(super) const QUADRATIC_DAMPING: EffectSpec = EffectSpec {
     hidden_by: "recordings at one level, where it is damping; it moves no frequency",
     source: "Worden and Tomlinson, Nonlinearity in Structural Dynamics (2001), ch. 2",
     example: "c2_ns2_per_m2 = 600.0\ndirection = \"x\"",
+    describing_function: Some(describing_function),
     build: |values| {
         Ok(Arc::new(LocalForce {
             id: EffectName::QuadraticDamping,
             coefficients: [values.main("c2_ns2_per_m2")?, 0.0],
             law: |[c2, _], _, v| c2 * v.abs() * v,
             slopes: |[c2, _], _, v| [0.0, 2.0 * c2 * v.abs()],
-            describing_function: |[c2, _], amplitude, omega| c2 * describing_function(amplitude, omega),
             bends_at_rest: true,
             direction: values.direction()?,
         }))
     },
 };
 
-/// Describing function of c2·|v|·v for c2 = 1 at the displacement amplitude X, m, and ω, rad/s: (8/3π)·ω²·X in phase with the velocity, which
-/// is an equivalent damping of (8/3π)·ω·X.
-fn describing_function(amplitude: f64, omega: f64) -> Complex64 {
-    Complex64::new(0.0, 8.0 / (3.0 * PI) * omega * omega * amplitude)
+/// Describing function of c2·|v|·v for c2 = 1: (8/3π)·ω²·X in phase with the velocity, which is an equivalent damping of (8/3π)·ω·X.
+fn describing_function(at: Harmonic) -> [Complex64; 2] {
+    let damping = 8.0 / (3.0 * PI) * at.omega * at.omega * at.amplitude_m;
+    [Complex64::new(0.0, damping), Complex64::ZERO]
 }

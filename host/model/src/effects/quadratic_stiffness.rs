@@ -25,14 +25,14 @@ pub(super) const QUADRATIC_STIFFNESS: EffectSpec = EffectSpec {
     hidden_by: "it moves no frequency to first order and has no odd harmonics; a static preload on a cubic spring has the same term",
     source: "Worden and Tomlinson, Nonlinearity in Structural Dynamics (2001), ch. 2",
     example: "k2_n_per_m2 = 2e9\ndirection = \"x\"",
+    // An even function of x has no component at the fundamental frequency.
+    describing_function: Some(|_| [Complex64::ZERO; 2]),
     build: |values| {
         Ok(Arc::new(LocalForce {
             id: EffectName::QuadraticStiffness,
             coefficients: [values.main("k2_n_per_m2")?, 0.0],
             law: |[k2, _], x, _| k2 * x.powi(2),
             slopes: |[k2, _], x, _| [2.0 * k2 * x, 0.0],
-            // An even function of x has no component at the fundamental frequency.
-            describing_function: |_, _, _| Complex64::ZERO,
             bends_at_rest: false,
             direction: values.direction()?,
         }))

@@ -31,6 +31,7 @@ pub(super) const RUNOUT: EffectSpec = EffectSpec {
     hidden_by: "a flip of an even number of teeth once it no longer grows",
     source: "Kline and DeVor, Int. J. Mach. Tool Des. Res. 23 (1983)",
     example: "runout_um = 12.0\nangle_deg = 30.0",
+    describing_function: None,
     build: |values| {
         Ok(Arc::new(ToolRunout(Runout {
             offset_um: values.main("runout_um")?,

@@ -21,6 +21,7 @@ pub(super) const SENSOR_DELAY: EffectSpec = EffectSpec {
     hidden_by: "narrow bands, where it is damping; it changes no amplitude",
     source: "McConnell and Varoto, Vibration Testing (2008)",
     example: "delay_s = 1e-4\nchannel = \"x\"",
+    describing_function: None,
     build: |values| {
         Ok(Arc::new(SensorDelay {
             delay_s: values.main("delay_s")?,

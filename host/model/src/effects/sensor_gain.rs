@@ -28,6 +28,7 @@ pub(super) const SENSOR_GAIN: EffectSpec = EffectSpec {
     hidden_by: "the only channel under a measured force: mass, damping and stiffness by one factor; all channels of a steady cut without measured force: a factor of the cutting force",
     source: "the calibration factor of ISO 16063",
     example: "gain = 1.1\nchannel = \"x\"",
+    describing_function: None,
     build: |values| {
         Ok(Arc::new(SensorGain {
             gain: values.main("gain")?,

@@ -33,6 +33,7 @@ pub(super) const SENSOR_OFFSET_FROM_TOOL_TIP: EffectSpec = EffectSpec {
     hidden_by: "one mode, where it is a sensor gain",
     source: "Ewins, Modal Testing (2000), ch. 2",
     example: "ratio = 0.8\nchannel = \"x\"",
+    describing_function: None,
     build: |values| {
         Ok(Arc::new(SensorOffset {
             ratios: values.main_numbers("ratio")?,

@@ -6,7 +6,7 @@ use num_complex::Complex64;
 
 use super::cubic_stiffness;
 use super::local_force::LocalForce;
-use super::{Argument, Class, EffectName, EffectSpec, Locations, Parameter, Treatment};
+use super::{Argument, Class, EffectName, EffectSpec, Harmonic, Locations, Parameter, Treatment};
 
 /// The specification.
 pub(super) const SOFTENING_HARDENING: EffectSpec = EffectSpec {
@@ -29,23 +29,21 @@ pub(super) const SOFTENING_HARDENING: EffectSpec = EffectSpec {
     hidden_by: "levels below the turn, where it is cubic stiffness; two regimes with an edge between them are backlash",
     source: "Nayfeh and Mook, Nonlinear Oscillations (1979), ch. 4",
     example: "k3_n_per_m3 = -5e12\nk5_n_per_m5 = 2e21\ndirection = \"x\"",
+    describing_function: Some(describing_function),
     build: |values| {
         Ok(Arc::new(LocalForce {
             id: EffectName::SofteningHardening,
             coefficients: [values.main("k3_n_per_m3")?, values.needed("k5_n_per_m5")?],
             law: |[k3, k5], x, _| x * x * x * (k3 + k5 * x * x),
             slopes: |[k3, k5], x, _| [x * x * (3.0 * k3 + 5.0 * k5 * x * x), 0.0],
-            describing_function: |[k3, k5], amplitude, _| {
-                k3 * cubic_stiffness::describing_function(amplitude)
-                    + k5 * quintic_describing_function(amplitude)
-            },
             bends_at_rest: false,
             direction: values.direction()?,
         }))
     },
 };
 
-/// Describing function of k5·x⁵ for k5 = 1 at the displacement amplitude X, m: ⅝X⁴.
-pub fn quintic_describing_function(amplitude: f64) -> Complex64 {
-    Complex64::new(0.625 * amplitude.powi(4), 0.0)
+/// Describing functions of k3·x³ for k3 = 1, and of k5·x⁵ for k5 = 1: ⅝X⁴.
+fn describing_function(at: Harmonic) -> [Complex64; 2] {
+    let [cubic, _] = cubic_stiffness::describing_function(at);
+    [cubic, Complex64::new(0.625 * at.amplitude_m.powi(4), 0.0)]
 }

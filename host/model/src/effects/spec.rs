@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::effect::Effect;
 use super::parameter::Parameter;
 use super::values::Values;
-use super::{EffectError, EffectName};
+use super::{DescribingFunction, EffectError, EffectName};
 
 /// Specification of one effect of the list [`EffectName`]. Cases, answers, help and documentation all use it.
 pub struct EffectSpec {
@@ -37,6 +37,8 @@ pub struct EffectSpec {
     pub source: &'static str,
     /// Example: the lines of a table `[extension.NAME]` of a case.
     pub example: &'static str,
+    /// Describing function of the effect's restoring force; `None` for an effect without one, or without a closed form of it.
+    pub describing_function: Option<DescribingFunction>,
     /// Builds the effect from the given values and removes from them those that it uses; a key left over is unknown to the effect.
     pub(super) build: fn(&mut Values) -> Result<Arc<dyn Effect>, EffectError>,
 }

@@ -34,6 +34,7 @@ pub(super) const SPEED_FLUCTUATION: EffectSpec = EffectSpec {
     hidden_by: "recordings without a tachometer, where drift of the structure does the same",
     source: "Sexton, Milne and Stone (1977); Insperger and Stépán, J. Vib. Control 10 (2004)",
     example: "delta = 0.01\nfrequency_hz = 2.0\nphase_deg = 45.0",
+    describing_function: None,
     build: |values| {
         Ok(Arc::new(SpeedFluctuation(Fluctuation {
             delta: values.main("delta")?,

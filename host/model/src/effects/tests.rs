@@ -147,5 +147,7 @@ fn closed_forms_of_describing_functions_are_the_sums() {
             tried += 1;
         }
     }
-    assert_eq!(tried, 8);
+    // Every describing function of the list is compared.
+    let all = ALL.iter().filter(|spec| spec.describing_function.is_some());
+    assert_eq!(tried, all.count());
 }

@@ -28,6 +28,7 @@ pub(super) const WEAR: EffectSpec = EffectSpec {
     hidden_by: "a sensor whose gain drifts; it moves no frequency",
     source: "Altintas, Manufacturing Automation (2012), ch. 2",
     example: "relative_rate_per_s = 1e-3",
+    describing_function: None,
     build: |values| {
         Ok(Arc::new(Wear {
             relative_rate_per_s: values.rate("relative_rate_per_s")?,
