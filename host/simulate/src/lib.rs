@@ -66,6 +66,7 @@ mod reading;
 mod record;
 pub mod rig;
 mod run;
+mod section_filter;
 mod sensor;
 mod settings;
 mod surface;

@@ -224,7 +224,7 @@ impl VirtualCut {
     }
 }
 
-/// The accelerometers of a recording: one for each combination of delay and sensor location.
+/// The accelerometers of a recording: one for each combination of delay, dynamics and sensor location.
 struct Sensors {
     accelerometer: Option<(Accelerometer, u64)>,
     /// Each simulated accelerometer, with the pickup of one of the channels that read it.
@@ -233,7 +233,7 @@ struct Sensors {
 
 /// True if two channels read the same accelerometer: same quantity, delay and location.
 fn is_one_sensor(a: &Pickup, b: &Pickup) -> bool {
-    a.quantity == b.quantity && a.delay_s == b.delay_s && a.modes == b.modes
+    a.quantity == b.quantity && a.delay_s == b.delay_s && a.modes == b.modes && a.sections == b.sections
 }
 
 impl Sensors {
@@ -252,7 +252,8 @@ impl Sensors {
             if !samplers.iter().any(|(known, _)| is_one_sensor(known, pickup)) {
                 let sampler = Sampler::new(model, accelerometer)
                     .at_sensor(model, &pickup.modes)
-                    .late_by(pickup.delay_s);
+                    .late_by(pickup.delay_s)
+                    .through(&pickup.sections);
                 samplers.push((pickup.clone(), sampler));
             }
         }

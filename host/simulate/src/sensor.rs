@@ -9,6 +9,8 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
+use super::effect::FirstOrderSection;
+use super::section_filter::SectionFilter;
 use super::{DenseStep, Model, Spindle, Workspace};
 
 /// Standard gravity, m/s².
@@ -91,6 +93,8 @@ pub struct Sampler {
     /// Number of tool velocities evaluated so far. Velocity k belongs to the time (k − ½) intervals of the oversampled rate.
     taken: usize,
     velocity: [f64; 3],
+    /// Dynamics in front of the sensor; they act on the velocity.
+    dynamics: Option<SectionFilter<3>>,
     /// Ring buffer of the newest accelerations at the oversampled rate, m/s², for the anti-aliasing filter.
     ring: Vec<[f64; 3]>,
     samples: Vec<[f64; 3]>,
@@ -107,6 +111,7 @@ impl Sampler {
             workspace: Workspace::new(model),
             taken: 0,
             velocity: [0.0; 3],
+            dynamics: None,
             ring: vec![[0.0; 3]; 2 * TAPS_PER_SIDE + 1],
             samples: Vec::new(),
         }
@@ -127,6 +132,13 @@ impl Sampler {
         Self { delay_s, ..self }
     }
 
+    /// This sampler behind first-order sections in series.
+    #[must_use]
+    pub fn through(self, sections: &[FirstOrderSection]) -> Self {
+        let dynamics = (!sections.is_empty()).then(|| SectionFilter::at_rest(sections, [0.0; 3]));
+        Self { dynamics, ..self }
+    }
+
     /// Time that the simulation must continue after the last sample, s, apart from the sensor's delay: half the length of the anti-aliasing
     /// filter.
     pub fn tail_s(&self) -> f64 {
@@ -138,15 +150,28 @@ impl Sampler {
         loop {
             let t = (self.taken as f64 - 0.5) * self.step_s - self.delay_s;
             if t > step.to_s() {
+                if self.dynamics.is_some() {
+                    self.velocity_at(step.to_s(), step);
+                }
                 return;
             }
             let velocity = if t < 0.0 {
                 [0.0; 3]
             } else {
-                step.motion(t, &mut self.workspace).velocity_m_per_s
+                self.velocity_at(t, step)
             };
             self.take(velocity);
         }
+    }
+
+    /// Velocity at the time `t`, s, within the step, behind the dynamics of the sensor.
+    fn velocity_at(&mut self, t: f64, step: &DenseStep<'_>) -> [f64; 3] {
+        let mut at = |t: f64| step.motion(t, &mut self.workspace).velocity_m_per_s;
+        let Some(dynamics) = &mut self.dynamics else {
+            return at(t);
+        };
+        let from_s = dynamics.until_s;
+        dynamics.pass(t - from_s, [from_s, 0.5 * (from_s + t), t].map(&mut at))
     }
 
     fn take(&mut self, velocity: [f64; 3]) {

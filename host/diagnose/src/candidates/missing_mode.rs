@@ -230,7 +230,9 @@ fn free_decay_of_mode<'a>(
     let natural = TAU * frequency_hz;
     let pole = natural * Complex64::new(-damping_ratio, (1.0 - damping_ratio * damping_ratio).sqrt());
     // η(t) = η(0)·Re[−λ̄/(i ω_d)·e^(λt)]: η(0) at the start, with zero velocity.
-    let start = -pole.conj() / Complex64::new(0.0, pole.im) * pole.powi(derivatives(channel.pickup.quantity));
+    let start = -pole.conj() / Complex64::new(0.0, pole.im)
+        * pole.powi(derivatives(channel.pickup.quantity))
+        * channel.pickup.dynamics(pole);
     let size = channel.pickup.weights[axis] * force_n / (natural * natural);
     let since = move |sample: usize| sample as f64 / record.grid.rate_hz() - channel.pickup.delay_s;
     (0_usize..).map(move |sample| match since(sample) {

@@ -78,6 +78,7 @@ pub(super) fn read(
             .zip(&record.channels)
             .filter(|(_, other)| other.pickup.quantity == channel.pickup.quantity)
             .filter(|(_, other)| other.pickup.delay_s == channel.pickup.delay_s)
+            .filter(|(_, other)| other.pickup.sections == channel.pickup.sections)
             .find_map(|(reading, other)| {
                 let only = (0..3).all(|from| (from == axis) == (other.pickup.weights[from] != 0.0));
                 only.then(|| (reading, weight / other.pickup.weights[axis]))

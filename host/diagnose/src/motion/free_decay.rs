@@ -45,6 +45,7 @@ impl Decays {
                 for _ in 0..derivatives(pickup.quantity) {
                     row = &row * &first_order.a;
                 }
+                row = through_sensor(row, pickup, &first_order.a);
                 let mut columns = vec![Vec::with_capacity(count); order];
                 for _ in 0..count {
                     for (column, value) in columns.iter_mut().zip(row.iter()) {
@@ -139,4 +140,18 @@ impl Decays {
             }
         }
     }
+}
+
+/// Output row `row` of the free motion ẋ = A x behind the dynamics of a sensor: row·(b₀ + b₁·A)·(1 + T·A)⁻¹ for each section. A section with
+/// a pole of the structure as its pole, for which the inverse does not exist, is left out.
+fn through_sensor(row: DMatrix<f64>, pickup: &Pickup, a: &DMatrix<f64>) -> DMatrix<f64> {
+    let one = DMatrix::<f64>::identity(a.nrows(), a.ncols());
+    pickup.sections.iter().fold(row, |row, section| {
+        let above = &one * section.static_gain + a * section.derivative_s;
+        let below = &one + a * section.time_constant_s;
+        match below.try_inverse() {
+            Some(inverse) => row * above * inverse,
+            None => row,
+        }
+    })
 }

@@ -9,7 +9,7 @@ use quietcut_simulate::effect::Pickup;
 /// A measured channel of a record with the samples that the baseline predicts.
 #[derive(Clone, Debug)]
 pub(crate) struct Observed {
-    /// The quantity, axes, delay and modes that the sensor reads.
+    /// The quantity, axes, delay, dynamics and modes of the sensor.
     pub pickup: Pickup,
     /// Measured samples, SI units.
     pub measured: Vec<f64>,
@@ -35,13 +35,15 @@ impl Observed {
             .collect()
     }
 
-    /// Transfer function from the displacement to the reading of this channel, without the channel's weights: (iω)^q e^(−iωτ) sinc(ωT/2),
-    /// where q is the number of derivatives, τ the delay and T the averaging time.
+    /// Transfer function from the displacement to the reading of this channel, without the channel's weights:
+    /// (iω)^q e^(−iωτ) S(iω) sinc(ωT/2), where q is the number of derivatives, τ the delay, S the dynamics of the sensor and T the averaging
+    /// time.
     pub(crate) fn factor(&self, omega: f64) -> Complex64 {
         let half = 0.5 * omega * self.mean_s;
         let mean = if half == 0.0 { 1.0 } else { half.sin() / half };
         Complex64::new(0.0, omega).powi(derivatives(self.pickup.quantity))
             * Complex64::cis(-omega * self.pickup.delay_s)
+            * self.pickup.dynamics(Complex64::new(0.0, omega))
             * mean
     }
 }

@@ -41,7 +41,7 @@ pub trait Effect: Debug + Send + Sync {
         Ok(Vec::new())
     }
 
-    /// Changes tool, cut or cutting force.
+    /// Changes tool, cut or cutting force. The tool has the mean spindle speed of the cut, if that is known.
     ///
     /// # Errors
     /// The tool or the cut lacks a quantity that the effect requires.
@@ -52,6 +52,6 @@ pub trait Effect: Debug + Send + Sync {
     /// Changes the rotation of the spindle.
     fn alter_spindle(&self, _spindle: &mut Spindle) {}
 
-    /// Changes weights, gain or delay of a measured channel.
+    /// Changes weights, gain, delay or dynamics of a measured channel.
     fn alter_channel(&self, _channel: &mut Pickup) {}
 }

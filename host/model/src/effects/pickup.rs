@@ -1,8 +1,11 @@
 //! The reading of a channel.
 
+use num_complex::Complex64;
 use quietcut_recording::Quantity;
 
-/// The reading of a channel: a weighted sum of the machine's axes, delayed.
+use super::FirstOrderSection;
+
+/// The reading of a channel: a weighted sum of the machine's axes, delayed, and filtered by the dynamics of the sensor.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Pickup {
     /// Name of the channel, such as `ax`, `y` or `fx`.
@@ -16,6 +19,8 @@ pub struct Pickup {
     pub modes: Vec<f64>,
     /// Delay of the reading behind the motion, s.
     pub delay_s: f64,
+    /// Dynamics of the sensor: sections of its transfer function, in series. Empty if the reading follows the motion at once.
+    pub sections: Vec<FirstOrderSection>,
 }
 
 impl Pickup {
@@ -35,10 +40,18 @@ impl Pickup {
             weights,
             modes: Vec::new(),
             delay_s: 0.0,
+            sections: Vec::new(),
         }
     }
 
-    /// The reading if the measured quantity has the components `value` along x, y and z.
+    /// Transfer function of the sensor's dynamics at s: the product of its [sections](Self::sections), without gain and delay.
+    pub fn dynamics(&self, s: Complex64) -> Complex64 {
+        self.sections
+            .iter()
+            .fold(Complex64::ONE, |product, section| product * section.at(s))
+    }
+
+    /// The reading, without delay and dynamics, if the measured quantity has the components `value` along x, y and z.
     pub fn read(&self, value: [f64; 3]) -> f64 {
         self.weights
             .iter()

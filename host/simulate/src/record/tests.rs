@@ -191,3 +191,57 @@ fn a_wheel_too_fine_for_the_rate_is_refused() {
         .unwrap_err();
     assert!(error.to_string().contains("60000 Hz"), "{error}");
 }
+
+/// A sensor effect with a first-order low pass of 3 ms, in every channel of acceleration.
+#[derive(Debug)]
+struct Lag;
+
+impl crate::Effect for Lag {
+    fn id(&self) -> crate::effect::EffectName {
+        crate::effect::EffectName::SensorDelay
+    }
+
+    fn alter_channel(&self, channel: &mut Pickup) {
+        if channel.quantity == Quantity::Acceleration {
+            channel
+                .sections
+                .push(crate::effect::FirstOrderSection::low_pass(3e-3));
+        }
+    }
+}
+
+#[test]
+fn an_accelerometer_with_dynamics_reads_the_filtered_acceleration() {
+    let case = case("kuka-kr90-full-cubic");
+    let accelerometer = Accelerometer {
+        noise_g_per_root_hertz: 0.0,
+        range_g: 2.0,
+        ..Accelerometer::IIS3DWB_16G
+    };
+    let record = |effects: Effects| {
+        let cut = VirtualCut {
+            effects,
+            ..cut(900.0, 1.0)
+        };
+        let recorder = Recorder::Sensor {
+            accelerometer,
+            seed: 1,
+        };
+        let (recording, _) = cut
+            .record(&case, recorder, TachometerModel::ONE_MARK, Path::new("cut.csv"))
+            .unwrap();
+        recording.channel("ax").unwrap().samples.clone()
+    };
+    let truth = record(Effects::default());
+    let lagging = record(Effects(vec![std::sync::Arc::new(Lag)]));
+    // T·dy/dt = x − y by the trapezoidal rule at the sampling rate.
+    let share = 0.5 / (3e-3 * accelerometer.rate_hz());
+    let (mut y, mut error, mut size) = (0.0, 0.0, 0.0);
+    for (pair, lagging) in truth.windows(2).zip(&lagging[1..]) {
+        y = ((1.0 - share) * y + share * (pair[0] + pair[1])) / (1.0 + share);
+        error += (y - lagging).powi(2);
+        size += y * y;
+    }
+    // A sample is rounded to a count, and the rule damps the highest frequencies.
+    assert!(error < 1e-4 * size, "{} {}", error.sqrt(), size.sqrt());
+}

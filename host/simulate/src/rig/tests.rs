@@ -481,3 +481,47 @@ fn a_joint_with_cubic_terms_is_the_spring_that_it_makes_at_the_tool() {
         assert!((a - b).abs() < 1e-5 * largest, "{a} {b}");
     }
 }
+
+/// A sensor effect with a first-order low pass, in every channel of motion.
+#[derive(Debug)]
+struct Lag(f64);
+
+impl crate::Effect for Lag {
+    fn id(&self) -> crate::effect::EffectName {
+        crate::effect::EffectName::SensorDelay
+    }
+
+    fn alter_channel(&self, channel: &mut Pickup) {
+        if channel.quantity != Quantity::Force {
+            channel
+                .sections
+                .push(crate::effect::FirstOrderSection::low_pass(self.0));
+        }
+    }
+}
+
+#[test]
+fn a_sensor_with_dynamics_reads_a_tone_through_its_transfer_function() {
+    let tone = Signal::tones(&[17.2], [2.0, 2.0], 42.0, 1);
+    let lagging = Rig {
+        effects: Effects(vec![std::sync::Arc::new(Lag(8e-3))]),
+        ..rig(tone, &[])
+    };
+    let (recording, _) = lagging.record(&linear(), Path::new("a.csv")).unwrap();
+    let omega = TAU * 17.2;
+    let s = num_complex::Complex64::new(0.0, omega);
+    let h = linear().first_order().unwrap().receptance(omega).unwrap()[(1, 1)] / (1.0 + 8e-3 * s);
+    for k in 20_000..21_000 {
+        let t = k as f64 / 500.0;
+        let drive = num_complex::Complex64::from_polar(2.0, omega * t - 0.5 * PI);
+        for (name, factor) in [("y", 1.0.into()), ("vy", s), ("ay", s * s)] {
+            let size = (h * factor).norm();
+            let wanted = (h * factor * drive).re;
+            let found = samples(&recording, name)[k];
+            assert!(
+                (found - wanted).abs() < 1e-4 * size,
+                "{name} {k}: {found} {wanted}"
+            );
+        }
+    }
+}
