@@ -29,6 +29,8 @@ pub struct Cutter {
     pub axial_depth_modulation: bool,
     /// Cutting force law.
     pub force: ForceLaw,
+    /// Mean spindle speed of the cut, rev/min; `None` if it is not known.
+    pub spindle_rpm: Option<f64>,
     feed_direction: [f64; 2],
     edge: EdgeAngle,
 }
@@ -69,11 +71,26 @@ impl Cutter {
             feed_direction: [feed_rad.cos(), feed_rad.sin()],
             edge,
             force: ForceLaw::new(*material, edge),
+            spindle_rpm: None,
         };
         if let Some(runout) = tool.runout {
             cutter.set_runout(runout);
         }
         Ok(cutter)
+    }
+
+    /// This cutter at the mean spindle speed `spindle_rpm`, rev/min.
+    #[must_use]
+    pub fn at_speed(self, spindle_rpm: f64) -> Self {
+        Self {
+            spindle_rpm: Some(spindle_rpm),
+            ..self
+        }
+    }
+
+    /// Mean cutting speed V = π·D·n, m/s; `None` if diameter or spindle speed is not known.
+    pub fn cutting_speed_m_per_s(&self) -> Option<f64> {
+        Some(self.radius_m? * TAU * self.spindle_rpm? / 60.0)
     }
 
     /// This cutter with another feed per tooth (mean over the teeth), m.

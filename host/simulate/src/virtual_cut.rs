@@ -1,5 +1,7 @@
 //! A virtual cut: cutting conditions, model, and simulated sensor output.
 
+use std::f64::consts::TAU;
+
 use quietcut_core::acceleration::Block;
 use quietcut_core::tachometer::Edge;
 
@@ -138,12 +140,9 @@ impl VirtualCut {
     /// missing.
     pub fn model(&self, case: &Case) -> Result<Model, VirtualCutError> {
         let effects = Effects::of_case(case)?.and(&self.effects);
-        let cutter = effects.cutter(Cutter::new(
-            case.tool()?,
-            case.material()?,
-            case.cut()?,
-            1e-3 * self.depth_mm,
-        )?)?;
+        let mean_rpm = self.spindle_motion().speed_rad_per_s() * 60.0 / TAU;
+        let cutter = Cutter::new(case.tool()?, case.material()?, case.cut()?, 1e-3 * self.depth_mm)?;
+        let cutter = effects.cutter(cutter.at_speed(mean_rpm))?;
         if cutter.force.wear(self.seconds) < 0.0 {
             return Err(VirtualCutError::WornOut {
                 relative_rate_per_s: cutter.force.wear_per_s,

@@ -13,7 +13,7 @@ use crate::recording::{ColumnMap, Import};
 use crate::stability::{
     Collocation, CubicTerms, Fdm, FrequencyProblem, FullDiscretization, Method, ModeCoupling, MultiFrequency,
     Nyquist, Pitched, Problem, RevolutionCollocation, Sdm, SdmOrder, SemiDiscretization, Zoa, after,
-    needs_orbit,
+    depends_on_speed, needs_orbit,
 };
 
 /// Default number of time steps per tooth-passing period of semi-discretization and full discretization: a choice.
@@ -115,8 +115,9 @@ impl MethodChoice {
             warn_of_table(&table)?;
             return self.on_receptances(FrequencyProblem::of_table(case, &table)?, path);
         }
-        let about_orbit = needs_orbit(case) && !self.linear;
-        // Only collocation handles cubic terms; the other methods refuse them unless `--linear` removes them.
+        let needs_collocation = (needs_orbit(case) || depends_on_speed(case)) && !self.linear;
+        // Only collocation handles cubic terms and coefficients that depend on the speed; the other methods refuse them, cubic terms unless
+        // `--linear` removes them.
         let cubic = if self.linear {
             CubicTerms::LeaveOut
         } else {
@@ -124,7 +125,7 @@ impl MethodChoice {
         };
         let steps = self.steps.unwrap_or(STEPS);
         Ok(match self.name() {
-            MethodName::Collocation if about_orbit => collocation_of(case)?,
+            MethodName::Collocation if needs_collocation => collocation_of(case)?,
             MethodName::Collocation if case.tool().map_err(Error::input)?.has_variable_pitch() => {
                 Box::new(RevolutionCollocation {
                     pitched: Pitched::new(case, cubic)?,

@@ -117,6 +117,7 @@ pub use methods::sdm::{Sdm, SdmOrder, SemiDiscretization};
 pub use methods::zoa::Zoa;
 pub use problem::linear::{CubicTerms, Problem};
 pub use problem::pitched::Pitched;
+pub use process::speed_dependence::depends_on_speed;
 pub use process::treatment::needs_orbit;
 pub use process::wear_and_drift::after;
 pub use spectrum::stability_loss::StabilityLoss;

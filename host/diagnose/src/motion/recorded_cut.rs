@@ -73,10 +73,11 @@ impl RecordedCut {
             ));
         }
         let wrong = |error| DiagnoseError::simulate(&case.path, error);
-        let cutter = Cutter::new(tool, material, &cut, 1e-3 * depth_mm)
-            .and_then(|cutter| effects.cutter(cutter))
-            .map_err(wrong)?;
+        let cutter = Cutter::new(tool, material, &cut, 1e-3 * depth_mm).map_err(wrong)?;
         let spindle_motion = SpindleMotion::new(recording, effects.spindle(Spindle::new(1.0)).fluctuation())?;
+        let cutter = effects
+            .cutter(cutter.at_speed(spindle_motion.rpm()))
+            .map_err(wrong)?;
         if let Some(rpm) = given.spindle_rpm
             && (spindle_motion.rpm() / rpm - 1.0).abs() > SPEED_MISMATCH
         {

@@ -95,7 +95,7 @@ fn engaged(baseline: &Baseline<'_>, recording: &Recording) -> Option<Engaged> {
     }
     // A recording without a usable tachometer is refused when its record is prepared.
     let revolution_s = SpindleMotion::new(recording, None).ok()?.revolution_s();
-    let cutter = cutter(baseline, recording)?;
+    let cutter = cutter(baseline, recording, 60.0 / revolution_s)?;
     let levels = Levels::of(
         baseline,
         recording,
@@ -132,13 +132,13 @@ fn engaged(baseline: &Baseline<'_>, recording: &Recording) -> Option<Engaged> {
     })
 }
 
-/// The tool in its cut; `None` if a required value is missing or wrong, which the preparation of the record reports as an error.
-fn cutter(baseline: &Baseline<'_>, recording: &Recording) -> Option<Cutter> {
+/// The tool in its cut at the mean spindle speed `rpm`, rev/min; `None` if a required value is missing or wrong, which the preparation of the record reports as an error.
+fn cutter(baseline: &Baseline<'_>, recording: &Recording, rpm: f64) -> Option<Cutter> {
     let case = baseline.case;
     let depth_mm = recording.sidecar.cut?.axial_depth_mm?;
     let cut = cut_of(case, recording).ok()?;
     let cutter = Cutter::new(case.tool().ok()?, case.material().ok()?, &cut, 1e-3 * depth_mm).ok()?;
-    baseline.effects.cutter(cutter).ok()
+    baseline.effects.cutter(cutter.at_speed(rpm)).ok()
 }
 
 /// Response of the baseline to the chips of the feed alone: harmonics of the spindle frequency `omega`, rad/s, in force, N, and

@@ -144,6 +144,8 @@ pub enum Treatment {
     LinearStructure,
     /// The effect changes coefficients or geometry of the linear cutting process.
     LinearProcess,
+    /// The effect changes coefficients of the linear cutting process with the spindle speed: they are evaluated at each speed.
+    ProcessOfSpeed,
     /// A smooth restoring force: it is linearized about the forced periodic orbit.
     Smooth,
     /// A power law of the chip thickness or process damping: the cutting force is linearized about the forced chip thickness.

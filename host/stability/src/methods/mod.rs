@@ -1,5 +1,6 @@
 //! One file per method behind [`Method`](crate::Method).
 
+pub(crate) mod at_each_speed;
 pub(crate) mod collocation;
 pub(crate) mod discretized;
 pub(crate) mod fdm;

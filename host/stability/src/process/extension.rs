@@ -57,15 +57,31 @@ pub(crate) fn material(case: &Case) -> Result<Material, StabilityError> {
     Ok(law(case, has_own)?.material())
 }
 
-/// Cutting force law of a case with the extensions that fulfil `wanted`.
-fn law(case: &Case, wanted: impl Fn(&EffectSpec) -> bool) -> Result<ForceLaw, StabilityError> {
-    Ok(cutter(case, wanted)?.force)
+/// Cutting coefficients of a case at a spindle speed, rev/min, with the extensions that fulfil `wanted`.
+pub(super) fn material_at(
+    case: &Case,
+    rpm: f64,
+    wanted: impl Fn(&EffectSpec) -> bool,
+) -> Result<Material, StabilityError> {
+    Ok(cutter(case, Some(rpm), wanted)?.force.material())
 }
 
-/// Cutter geometry of a case with the extensions that fulfil `wanted`.
-fn cutter(case: &Case, wanted: impl Fn(&EffectSpec) -> bool) -> Result<Cutter, StabilityError> {
-    // The cutter geometry does not depend on the axial depth, which is set to an arbitrary value.
-    let cutter = Cutter::new(case.tool()?, case.material()?, case.cut()?, 1e-3);
+/// Cutting force law of a case with the extensions that fulfil `wanted`.
+fn law(case: &Case, wanted: impl Fn(&EffectSpec) -> bool) -> Result<ForceLaw, StabilityError> {
+    Ok(cutter(case, None, wanted)?.force)
+}
+
+/// Tool and force law of a case with the extensions that fulfil `wanted`, at a spindle speed, rev/min, if that matters.
+fn cutter(
+    case: &Case,
+    rpm: Option<f64>,
+    wanted: impl Fn(&EffectSpec) -> bool,
+) -> Result<Cutter, StabilityError> {
+    // The geometry does not depend on the axial depth, which is set to an arbitrary value.
+    let cutter = Cutter::new(case.tool()?, case.material()?, case.cut()?, 1e-3).map(|cutter| match rpm {
+        Some(rpm) => cutter.at_speed(rpm),
+        None => cutter,
+    });
     let effects = effects(case, wanted)?;
     let cutter = cutter.and_then(|cutter| effects.cutter(cutter));
     cutter.map_err(|cause| wrong(case, cause))
@@ -76,7 +92,7 @@ fn cutter(case: &Case, wanted: impl Fn(&EffectSpec) -> bool) -> Result<Cutter, S
 /// # Errors
 /// A section is missing, or an extension cannot be applied to the case.
 pub(crate) fn radial_m(case: &Case) -> Result<Vec<f64>, StabilityError> {
-    let teeth = cutter(case, |spec| {
+    let teeth = cutter(case, None, |spec| {
         spec.treatment == Treatment::LinearProcess && spec.class == Class::Geometry
     })?
     .teeth;

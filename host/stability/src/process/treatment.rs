@@ -61,6 +61,11 @@ fn reason(spec: &EffectSpec, treated: Treated) -> Option<&'static str> {
             "it is not smooth: its equivalent depends on the amplitude of the forced motion, which this method does not follow; \
              --method collocation takes its equivalent stiffness and damping there, and `simulate` runs it as it is",
         ),
+        Treatment::ProcessOfSpeed => (
+            false,
+            "its coefficients hold at one spindle speed, and here one set of coefficients serves all speeds; --method collocation \
+             takes those of each speed",
+        ),
         Treatment::OfMoment(reason) | Treatment::Refused(reason) => (false, reason),
     };
     (!is_treated).then_some(reason)
