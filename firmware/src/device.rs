@@ -37,14 +37,14 @@ use outbox::Outbox;
 
 /// The clock that stamps samples and tachometer edges.
 pub trait Clock {
-    /// Time since the start of the device.
+    /// Time since the start of the device, in nanoseconds.
     fn now(&self) -> Nanoseconds;
 }
 
 /// Identity of a board.
 #[derive(Clone, Copy, Debug)]
 pub struct Identity {
-    /// Name of the board; at most 24 bytes.
+    /// Name of the board on which the device runs; at most 24 bytes.
     pub board: &'static str,
     /// The accelerometer of the board; `None` if the host feeds the samples.
     pub sensor: Option<Sensor>,
@@ -83,7 +83,8 @@ type ReportKey = (Verdict, Reason, Option<Advice>);
 struct Session {
     is_open: bool,
     requests: Sequence,
-    /// Sequence number and reply of the last request, for a host that did not receive the reply and repeats the request.
+    /// Sequence number and reply of the last request, sent again if the host did not receive the reply and repeats the
+    /// request.
     last: Option<(u16, Reply)>,
 }
 
@@ -198,7 +199,7 @@ impl<'a, M: TableMemory, C: Clock> Device<'a, M, C> {
         self.link.outgoing()
     }
 
-    /// Removes the first `count` bytes of [`outgoing`](Self::outgoing), after they were sent.
+    /// Removes the first `count` bytes of [`outgoing`](Self::outgoing), after the caller has sent them.
     pub fn sent(&mut self, count: usize) {
         self.link.sent(count);
         self.pump();
@@ -209,7 +210,7 @@ impl<'a, M: TableMemory, C: Clock> Device<'a, M, C> {
         &self.storage
     }
 
-    /// Returns the flash memory and drops the device.
+    /// Returns the flash memory and drops the rest of the device.
     pub fn into_memory(self) -> M {
         self.storage.into_memory()
     }
@@ -383,7 +384,7 @@ impl<'a, M: TableMemory, C: Clock> Device<'a, M, C> {
     }
 }
 
-/// Checks a working point: depth and feed at least 0, entry angle below exit angle.
+/// Checks a working point from the host: depth and feed at least 0, entry angle below exit angle.
 fn checked(point: Option<WorkingPoint>) -> Result<Option<WorkingPoint>, Refusal> {
     let Some(cut) = point else { return Ok(None) };
     let is_length = |mm: f32| mm >= 0.0 && mm.is_finite();
@@ -399,7 +400,7 @@ fn checked(point: Option<WorkingPoint>) -> Result<Option<WorkingPoint>, Refusal>
     }
 }
 
-/// Checks that a feed direction is an angle from −360° to 360°.
+/// Checks that a feed direction from the host is an angle from −360° to 360°.
 fn checked_direction(direction: Option<Degrees>) -> Result<Option<Degrees>, Refusal> {
     match direction {
         // The negated comparison also refuses a feed direction that is NaN.

@@ -106,7 +106,7 @@ impl Link {
         }
     }
 
-    /// Removes the first `count` bytes of [`outgoing`](Self::outgoing), after they were sent.
+    /// Removes the first `count` bytes of [`outgoing`](Self::outgoing), after the caller has sent them.
     pub fn sent(&mut self, count: usize) {
         for _ in 0..count {
             self.outgoing.pop_front();
@@ -131,7 +131,7 @@ impl Link {
     }
 }
 
-/// A non-blocking byte stream in both directions.
+/// A serial line to the host as a non-blocking byte stream in both directions.
 pub trait Line: Read + ReadReady + Write + WriteReady {}
 
 impl<T: Read + ReadReady + Write + WriteReady> Line for T {}

@@ -21,11 +21,11 @@ pub type Counts = [i16; 3];
 pub struct Block {
     /// Sequence number, incremented by one per block; a jump means lost blocks.
     pub sequence: u32,
-    /// Time of the first sample of the block, on the device's clock.
+    /// Time of the first sample of the block, on the clock of the device.
     pub time: Nanoseconds,
     /// Number of samples lost between the preceding block and this one.
     pub lost: u32,
-    /// Number of samples of this block in which at least one axis is at an end of its range.
+    /// Number of samples of this block in which at least one axis is at an end of the 16-bit range.
     pub clipped: u16,
     /// The samples, oldest first.
     pub counts: Vec<Counts, MAX_BLOCK_SAMPLES>,
@@ -36,9 +36,9 @@ pub struct Block {
 pub struct Sensor {
     /// Nominal sample rate of the accelerometer; its true rate is fitted to the time stamps of the device.
     pub nominal_rate: Hertz,
-    /// Acceleration of one count, in m/s².
+    /// Acceleration that one count of the sensor represents, in m/s².
     pub meters_per_second2_per_count: f32,
-    /// White noise of one axis, in m/s² per √Hz.
+    /// Noise density of one axis of the sensor, in m/s² per √Hz; the noise is white.
     pub noise_meters_per_second2_per_root_hertz: f32,
 }
 
@@ -50,7 +50,7 @@ impl Sensor {
         noise_meters_per_second2_per_root_hertz: 75e-6 * 9.806_65,
     };
 
-    /// The estimator of this sensor's true sample rate.
+    /// The estimator of the true sample rate of this sensor, from the time stamps of its blocks.
     pub fn clock(&self) -> SampleClock {
         let period_ns = 1e9 / self.nominal_rate.0;
         SampleClock {
@@ -63,7 +63,7 @@ impl Sensor {
     }
 }
 
-/// True if at least one axis is at an end of the 16-bit range.
+/// True if at least one axis of the sample is at an end of the 16-bit range.
 pub fn is_clipped(counts: Counts) -> bool {
     counts.iter().any(|&c| c == i16::MAX || c == i16::MIN)
 }
@@ -82,11 +82,11 @@ pub struct SampleClock {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SampleClockState {
     line: Option<EventClockState>,
-    /// Expected sequence number of the next block.
+    /// Sequence number that the next block of samples should have.
     next_sequence: u32,
     /// Number of samples in the block before the newest one.
     block_samples: u32,
-    /// Number of samples with a clipped axis since the start.
+    /// Number of samples since the start in which an axis was clipped.
     clipped: u32,
     /// Number of lost samples since the start, without those of gaps whose length is unknown.
     lost: u32,
@@ -94,19 +94,19 @@ pub struct SampleClockState {
     gaps: u32,
 }
 
-/// Relation of a block to the preceding one.
+/// Relation of a block of samples to the preceding block.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Continuity {
     /// No sample is missing between the preceding block and this one.
     Contiguous,
     /// This number of samples is missing between the preceding block and this one.
     Gap(u32),
-    /// The first block, or a block after a gap of unknown length.
+    /// The block is the first one, or follows a gap of unknown length.
     Restarted,
 }
 
 impl SampleClock {
-    /// Processes a block: updates the fitted sample clock and the counts of clipped and lost samples.
+    /// Processes a block of samples: updates the fitted sample clock and the counts of clipped and lost samples.
     pub fn observe(&self, state: &mut SampleClockState, block: &Block) -> Continuity {
         let continuity = self.follow(state, block);
         match continuity {
@@ -180,12 +180,13 @@ impl SampleClockState {
         }
     }
 
-    /// Fitted time of sample `n` of the newest block, counted from 0.
+    /// Fitted time at which sample `n` of the newest block was taken; n counts from 0.
     pub fn time_of(&self, n: u32) -> Option<Nanoseconds> {
         self.time_at(n as f32)
     }
 
-    /// Fitted time at `samples` sample periods after the first sample of the newest block; fractions and negative values are allowed.
+    /// Fitted time at `samples` sample periods after the first sample of the newest block; fractions and negative
+    /// values are allowed for `samples`.
     pub fn time_at(&self, samples: f32) -> Option<Nanoseconds> {
         self.line.map(|line| line.time_at(samples))
     }

@@ -126,8 +126,8 @@ static MEDIUM: [i32; MEDIUM_SIDE] = half_band(10.6);
 /// Easy filter, pass band to 0.065 and stop band from 0.435 of its input rate: all other stages before the structure band.
 static EASY: [i32; EASY_SIDE] = half_band(11.4);
 
-/// State of a filter stage: its last LENGTH input samples. They are stored twice in a row, so that every window of LENGTH
-/// samples is contiguous.
+/// State of one filter stage of the decimation: its last LENGTH input samples. They are stored twice in a row, so that
+/// every window of LENGTH samples is contiguous.
 #[derive(Clone, Debug)]
 struct Stage<const LENGTH: usize> {
     samples: [[Sample; LENGTH]; 2],
@@ -166,13 +166,13 @@ impl<const LENGTH: usize> Stage<LENGTH> {
             return None;
         }
         let window = self.samples.as_flattened().get(newest + 1..)?.first_chunk()?;
-        // `black_box` keeps the compiler from replacing products with constants by slower shifts and sums.
+        // `black_box` keeps the compiler from replacing the products with the constant taps by slower shifts and sums.
         let taps = core::hint::black_box(taps);
         Some([0, 1, 2].map(|axis| filter::<LENGTH, SIDE>(window, axis, taps)))
     }
 }
 
-/// Filter output of one axis: Σ taps × window, with the middle tap ½.
+/// Output of a half-band filter for one axis: the sum of taps times samples of the window, with the middle tap ½.
 #[inline(always)]
 fn filter<const LENGTH: usize, const SIDE: usize>(
     window: &[Sample; LENGTH],
@@ -183,7 +183,8 @@ fn filter<const LENGTH: usize, const SIDE: usize>(
     let middle = LENGTH / 2;
     let mut sum = (i64::from(window[middle][axis]) << 30) + (1 << 30);
     for (j, &tap) in taps.iter().enumerate() {
-        // The taps at even distances from the middle are zero; those at the odd distance 2j + 1 are equal on both sides.
+        // The filter taps at even distances from the middle are zero; those at the odd distance 2j + 1 are equal on
+        // both sides.
         let pair = window[middle - 1 - 2 * j][axis] + window[middle + 1 + 2 * j][axis];
         sum += i64::from(pair) * i64::from(tap);
     }

@@ -61,7 +61,7 @@ pub enum Observation {
     RateChanged,
     /// The time stamp is an outlier: too far from the line for jitter. The line is updated with a reduced deviation.
     Outlier,
-    /// Too many consecutive outliers: the line starts again through this stamp and the preceding stamp.
+    /// Too many consecutive time stamps are outliers: the line starts again through this stamp and the preceding one.
     Restarted,
 }
 
@@ -144,11 +144,11 @@ impl EventClock {
 }
 
 impl EventClockState {
-    /// Updates the variance of the stamps with a deviation that is scaled as [`previous_ns`](Self::previous_ns). Returns true if
-    /// the recent deviations show a rate change.
+    /// Updates the variance of the time stamps with the deviation of one stamp from its prediction, scaled so that its
+    /// standard deviation is that of a stamp. Returns true if the recent deviations show a change of the event rate.
     ///
-    /// The variance is half the mean square of the *differences* of consecutive deviations. During a rate change the deviations
-    /// have a bias, which the differences remove.
+    /// The variance is half the mean square of the *differences* of consecutive deviations. During a rate change the
+    /// deviations have a bias, which the differences remove.
     fn learn_jitter(&mut self, deviation_ns: f32) -> bool {
         let difference_ns = deviation_ns - self.previous_ns;
         self.previous_ns = deviation_ns;
@@ -160,7 +160,8 @@ impl EventClockState {
         } else {
             VARIANCE_MEMORY
         };
-        // With n observations the gain is 3/(n + 2), larger than the 1/n of a mean, so that the initial estimate decays quickly.
+        // After n time stamps the variance is updated with the gain 3/(n + 2), larger than the 1/n of a mean, so that
+        // its initial estimate decays quickly.
         self.variance_ns2 += (0.5 * difference_ns * difference_ns - self.variance_ns2) * 3.0 / (memory + 2.0);
         if self.variance_ns2 < STAMP_RESOLUTION_NS * STAMP_RESOLUTION_NS {
             self.variance_ns2 = STAMP_RESOLUTION_NS * STAMP_RESOLUTION_NS;

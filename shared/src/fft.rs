@@ -88,8 +88,8 @@ fn add_i(a: Complex, b: Complex) -> Complex {
     [a[0] - b[1], a[1] + b[0]]
 }
 
-/// First pass: applies `scale` to every value, then transforms each four values whose distance is a quarter of the block. The
-/// results are in bit-reversed order.
+/// First pass of the Fourier transform: applies `scale` to every value, then transforms each four values whose distance
+/// is a quarter of the block. The results are in bit-reversed order.
 #[inline(always)]
 fn first_pass(data: &mut [Complex], scale: impl Fn(i32) -> i32) {
     let (lower, upper) = data.split_at_mut(data.len() / 2);
@@ -149,7 +149,7 @@ fn radix4_pass<const Q: usize>(data: &mut [Complex], factors: &[[Complex; 3]; Q]
     }
 }
 
-/// Splits a block of 4·Q values into its four quarters.
+/// Splits a block of 4·Q values of the transform into its four quarters.
 #[inline(always)]
 fn quarters<const Q: usize>(block: &mut [Complex]) -> Option<[&mut [Complex; Q]; 4]> {
     let (first, rest) = block.split_first_chunk_mut()?;
@@ -158,7 +158,7 @@ fn quarters<const Q: usize>(block: &mut [Complex]) -> Option<[&mut [Complex; Q];
     Some([first, second, third, rest.first_chunk_mut()?])
 }
 
-/// Computes the spectrum of the real values from the transform of the packed complex values, in place.
+/// Computes the spectrum of N real values from the Fourier transform of the N/2 packed complex values, in place.
 #[inline(always)]
 fn split(data: &mut [Complex], factors: &[Complex]) {
     let middle = data.len() / 2;
@@ -179,7 +179,8 @@ fn split(data: &mut [Complex], factors: &[Complex]) {
     }
 }
 
-/// Sorts into bit-reversed order: exchanges each value with the one at the bit-reversed index.
+/// Sorts the values of the transform into bit-reversed order: exchanges each value with the one at the bit-reversed
+/// index.
 #[inline(always)]
 fn sort_bit_reversed<const M: usize>(data: &mut [Complex; M]) {
     // For the exchange, the bits of an index are a high half, one middle bit if their number is odd, and a low half.
@@ -234,7 +235,8 @@ pub struct Transform<'a> {
 /// cos and sin of the angle 2π·`numerator`/`denominator` as Q31 numbers, rounded to nearest. +1 becomes 1 − 2⁻³¹, the
 /// largest Q31 number.
 const fn cos_sin(numerator: u32, denominator: u32) -> Complex {
-    // The angle is reduced to at most π/4 from the nearest axis, where the Taylor series converge fast.
+    // The angle is measured from the nearest axis, at most π/4 away, where the Taylor series of cos and sin converge
+    // fast.
     let quadrant = (8 * numerator + denominator) / (2 * denominator);
     let offset = (4 * numerator) as f64 - (quadrant * denominator) as f64;
     let angle = offset / denominator as f64 * core::f64::consts::FRAC_PI_2;

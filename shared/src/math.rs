@@ -25,7 +25,7 @@ pub fn round(x: f32) -> f32 {
 /// Newton's iteration from the initial value of micromath's inverse square root takes half the instructions of an integer square
 /// root. Numbers near the ends of the `f32` range, where the iteration would overflow, use libm.
 pub fn sqrt(x: f32) -> f32 {
-    // The comparison of bit patterns also excludes zero, negative numbers and NaN.
+    // The comparison of bit patterns excludes numbers outside the range, and also zero, negative numbers and NaN.
     let smallest = f32::MIN_POSITIVE.to_bits();
     let largest = exp2i(126).to_bits();
     if x.to_bits().wrapping_sub(smallest) >= largest - smallest {

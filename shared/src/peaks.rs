@@ -23,17 +23,17 @@ pub struct Peak {
     pub snr: f32,
 }
 
-/// Rotation of the spindle during a spectrum.
+/// Rotational speed of the spindle during a spectrum, with its uncertainty.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Rotation {
-    /// Revolutions of the spindle per second.
+    /// Rotational frequency of the spindle, revolutions per second.
     pub frequency: Hertz,
     /// Largest error or change of the spindle frequency within the duration of the spectrum.
     pub uncertainty: Hertz,
 }
 
-/// The strongest tone that is no harmonic of the spindle.
+/// The strongest tone of a spectrum that is no harmonic of the spindle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct NonHarmonic {
@@ -57,8 +57,8 @@ pub enum Search {
         /// Upper end of the range in which harmonics of the spindle and other tones can be distinguished.
         resolved_to: Hertz,
     },
-    /// At the uncertainty of the spindle speed and the resolution of the spectrum, harmonics and other tones cannot be
-    /// distinguished.
+    /// Nowhere in the range can harmonics of the spindle and other tones be distinguished, because of the uncertainty
+    /// of the spindle speed and the resolution of the spectrum.
     Unresolved,
 }
 
@@ -155,7 +155,8 @@ impl PowerSpectrum<'_> {
         lobe.map(|k| self.at(k)).sum::<f32>() / HANN_NOISE_BINS
     }
 
-    /// The strongest tone between two frequencies, if it exceeds the noise floor by [`MIN_SNR`].
+    /// The strongest tone of the spectrum between two frequencies, if its power exceeds the noise floor by the factor
+    /// [`MIN_SNR`].
     pub fn dominant(&self, from: Hertz, to: Hertz) -> Option<Peak> {
         let strongest = *self.maxima(from, to).first()?;
         Some(self.peak(strongest)).filter(|peak| peak.snr >= MIN_SNR)

@@ -79,7 +79,7 @@ impl<const N: usize> Overlap<N> {
             .map(move |sample| sample.get(axis).copied().unwrap_or(0))
     }
 
-    /// Mean of the stored samples of one axis, rounded down.
+    /// Mean of the stored samples of one axis, rounded down to an integer.
     fn mean(&self, axis: usize) -> i32 {
         (self.axis(axis).map(i64::from).sum::<i64>() / N as i64) as i32
     }
@@ -152,12 +152,15 @@ pub fn structure_spectrum<'a>(
     }
 }
 
-/// Applies the Hann window to a packed spectrum and adds its power, scaled to `unit`, to `power`.
+/// Applies the Hann window to the packed spectrum of one axis and adds its power, (m/s²)², to `power`; `unit` is the
+/// acceleration in m/s² of one unit of `bins`.
 ///
-/// `bins` are the N/2 entries of a packed spectrum, of which the first holds the real values at 0 Hz and half the sample rate.
+/// `bins` are the N/2 entries of a packed spectrum, of which the first holds the real values at 0 Hz and half the
+/// sample rate.
 fn add_power(bins: impl Iterator<Item = [f32; 2]>, unit: f32, power: &mut [f32]) {
     let points = (2 * power.len() - 2) as f32;
-    // After the window, the bin of a tone of amplitude A has the value A·N/4. The factor (4/N)²/2 gives its mean square A²/2.
+    // With the Hann window, a tone of amplitude A has the value A·N/4 in its bin. The factor (4/N)²/2 turns its square
+    // into the mean square A²/2.
     let amplitude_scale = unit * 4.0 / points;
     let scale = 0.5 * amplitude_scale * amplitude_scale;
     let conjugate = |z: [f32; 2]| [z[0], -z[1]];

@@ -20,7 +20,8 @@ pub const CHANNELS: usize = 3 * SLOTS;
 /// Largest number of classes of tooth periods: one class per tooth.
 pub const MAX_CLASSES: usize = 12;
 
-/// One tooth period: acceleration in m/s², slot by slot, x, y, z within a slot.
+/// The resampled acceleration of one tooth period in m/s²: for each fixed spindle angle (slot) the values along x, y
+/// and z.
 pub type ToothPassing = [f32; CHANNELS];
 
 /// Method of resampling.
@@ -206,7 +207,8 @@ impl SamplerState {
     }
 }
 
-/// Value of the cubic through four equally spaced samples, at the fraction `part` between the second and the third sample.
+/// Value of the cubic through four equally spaced samples, at the fraction `part` of the distance from the second to
+/// the third sample.
 fn cubic(samples: &[[f32; 3]; 4], part: f32) -> [f32; 3] {
     let (before, after) = (part + 1.0, part - 1.0);
     let beyond = part - 2.0;

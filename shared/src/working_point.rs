@@ -17,7 +17,7 @@ pub struct WorkingPoint {
     pub exit: Degrees,
     /// Feed per tooth.
     pub feed_per_tooth: Millimeters,
-    /// Index of the robot's posture, the same on host and device; 0 on a machine tool.
+    /// Index of the robot's posture during the cut, the same on host and device; 0 on a machine tool.
     pub posture: u8,
 }
 
@@ -31,7 +31,7 @@ pub struct Limits {
     pub rpm_max: Rpm,
 }
 
-/// The properties of the tool that the signal chain uses.
+/// The properties of the milling tool that the signal chain uses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Tool {

@@ -121,7 +121,7 @@ impl<S: SpiDevice, D: DelayNs> Iis3dwb<S, D> {
         }
     }
 
-    /// Resets all registers of the sensor to their defaults.
+    /// Resets all registers of the sensor to their default values.
     fn reset(&mut self) -> Result<(), Error<S::Error>> {
         self.write_register(register::CTRL3_C, bits::IF_INC | bits::SW_RESET)?;
         for _ in 0..RESET_POLLS {

@@ -29,7 +29,7 @@ pub(crate) const UNSETTLED: Counts = [i16::MAX; 3];
 pub(crate) struct Model {
     /// Time since power-on.
     pub(crate) now_ns: u64,
-    /// True sample period, which differs from the nominal one by up to a few percent.
+    /// True sample period of the modelled sensor, which differs from the nominal one by up to a few percent.
     pub(crate) period_ns: f64,
     registers: [u8; 128],
     queue: VecDeque<[u8; 7]>,

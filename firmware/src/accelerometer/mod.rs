@@ -46,6 +46,6 @@ pub struct Queue {
 pub struct Gap {
     /// Missing samples modulo `modulus`.
     pub remainder: u8,
-    /// Number of samples after which the sensor's count wraps.
+    /// Number of samples after which the sensor's count of its samples wraps.
     pub modulus: u8,
 }

@@ -16,7 +16,8 @@ pub(super) struct Outbox {
     report: Option<Report>,
     strobes: Option<Strobes>,
     spectra: [Option<Spectrum>; BANDS.len()],
-    /// The reply to the current request, with the sequence number of the request.
+    /// The reply to the request that is being answered, with the sequence number of the request; `None` once it is
+    /// sent.
     reply: Option<(u16, Reply)>,
     /// True if the reply follows all messages that the request caused, false if it precedes them.
     is_reply_last: bool,
@@ -31,7 +32,7 @@ struct Strobes {
 
 /// Progress of sending one power spectrum.
 struct Spectrum {
-    /// Sequence number of the block that completed the spectrum.
+    /// Sequence number of the block of samples that completed the spectrum.
     sequence: u32,
     /// Index of the first bin of the spectrum that is not yet sent.
     next: usize,

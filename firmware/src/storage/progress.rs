@@ -15,15 +15,15 @@ pub(super) struct Progress {
     pub(super) header: Header,
     /// Number of received bytes of the uploaded table, header included.
     pub(super) received: u32,
-    /// Offset up to which the table slot is erased or written.
+    /// Offset in the table slot up to which the flash is erased or written.
     pub(super) erased_to: u32,
     /// Received bytes of the table that do not yet fill a flash word.
     pub(super) tail: Vec<u8, MAX_WRITE_SIZE>,
     /// The header of the uploaded table as it is written to the slot. It has the device's generation number; its CRC is
     /// set at the end of the upload.
     renewed: Header,
-    /// Running CRC-32 of the received table with the file's header. A computation at the end of the upload would delay the
-    /// device.
+    /// Running CRC-32 of the received table with the header of the uploaded file. Computing it only at the end of the
+    /// upload would delay the device.
     crc: Crc32,
     /// Running CRC-32 of the received table with the header that is written to the slot.
     renewed_crc: Crc32,

@@ -133,7 +133,7 @@ pub(super) fn recording(
     })
 }
 
-/// Refuses a file without names of columns, unless the map or the sidecar names a column.
+/// Refuses a file that gives no names for its columns, unless the option `--map` or the sidecar names a column.
 fn require_names(path: &Path, raw: &Raw, sidecar: &Sidecar, import: &Import) -> Result<(), RecordingError> {
     let names: Vec<String> = raw.columns.iter().map(|column| column.name.clone()).collect();
     let is_named = |index: usize| {

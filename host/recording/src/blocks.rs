@@ -27,7 +27,7 @@ pub struct Sensed {
     pub settings: Settings,
     /// Working point of the cut; `None` if the sidecar lacks depth, entry angle, exit angle or feed.
     pub working_point: Option<WorkingPoint>,
-    /// Blocks of accelerometer counts, in order.
+    /// Blocks of accelerometer counts, in order of time.
     pub blocks: Vec<Block>,
     /// Rising tachometer edges, in order.
     pub edges: Vec<Edge>,
@@ -35,12 +35,12 @@ pub struct Sensed {
     pub is_calibrated: bool,
 }
 
-/// Spindle speed and number of teeth given by the user; they override the recording.
+/// Spindle speed and number of teeth that the user gives; they override those of the recording and its sidecar.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct SpindleSettings {
-    /// Spindle speed, rev/min; it replaces a recorded tachometer, whose edges are then ignored.
+    /// Spindle speed that the user gives, rev/min; it replaces a recorded tachometer, whose edges are then ignored.
     pub rpm: Option<f64>,
-    /// Number of teeth; it overrides the sidecar.
+    /// Number of teeth that the user gives; it overrides that of the sidecar.
     pub teeth: Option<u8>,
 }
 
@@ -119,7 +119,7 @@ impl Sensed {
     }
 }
 
-/// Acceleration channels of the axes x, y, z, and whether their unit is known.
+/// Acceleration channels of the recording for the axes x, y, z, and whether their unit is known.
 fn axes(recording: &Recording) -> Result<([Option<&Channel>; 3], bool), RecordingError> {
     let axes = ["ax", "ay", "az"].map(|name| recording.channel(name));
     if axes.iter().any(Option::is_some) {
@@ -161,7 +161,7 @@ fn count(largest: f64, is_calibrated: bool) -> f64 {
     }
 }
 
-/// Number of teeth: given by the user, else from the sidecar.
+/// Number of teeth of the tool: given by the user, else from the sidecar.
 fn teeth(recording: &Recording, speed: SpindleSettings) -> Result<u8, RecordingError> {
     let recorded = recording.sidecar.cut.and_then(|cut| cut.teeth);
     match (speed.teeth, recorded) {
@@ -241,7 +241,7 @@ fn blocks(axes: &[Option<&Channel>; 3], count: f64, rate: f64) -> Vec<Block> {
         .collect()
 }
 
-/// Rising edges of the channel `tacho` as the device finds them, in order; empty without this channel.
+/// Rising edges of the tachometer channel `tacho` as the device detects them, in order; empty without this channel.
 fn edges(recording: &Recording) -> Vec<Edge> {
     let level = recording.channel("tacho").map(|tacho| tacho.samples.as_slice());
     rises(level.unwrap_or_default())

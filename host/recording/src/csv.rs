@@ -14,10 +14,11 @@ use super::text_dialect::{Dialect, Separator};
 use super::text_head::{Head, HeadColumn, head, is_comment};
 use crate::file::FileError;
 
-/// Chunk size of reading, bytes; a choice.
+/// Number of bytes of a text table that are read at once; a choice.
 const CHUNK: usize = 1 << 18;
 
-/// Largest head of a file, bytes: prose, names, units. A choice; the heads of logging programs have a few kilobytes.
+/// Largest length of the head of a text file, bytes: prose, names, units. A choice; the heads of logging programs have
+/// a few kilobytes.
 const HEAD_MAX: usize = 1 << 18;
 
 /// Reads a text table. With `finite`, a NaN or infinite value is an error that names its line.
@@ -44,7 +45,7 @@ pub(super) fn read(path: &Path, finite: bool) -> Result<Raw, RecordingError> {
     Ok(raw)
 }
 
-/// Names of the columns, from the head of the file alone; empty if there is no row of names.
+/// Names of the columns of a text table, from the head of the file alone; empty if it has no row of names.
 pub(super) fn titles(path: &Path) -> Result<Vec<String>, RecordingError> {
     let unreadable = |cause| FileError::Read {
         path: path.into(),
@@ -99,7 +100,7 @@ fn table(
         what,
     })?;
     let mut table = Table::new(path, &head, length, finite);
-    // The first `kept` bytes of the buffer hold the incomplete last line of the previous chunk.
+    // The first `kept` bytes of the buffer hold the incomplete last line of the chunk read before.
     let mut text = start[head.offset.min(start.len())..].chain(text);
     let mut buffer = vec![0; chunk.max(1)];
     let mut kept = 0;
@@ -219,7 +220,7 @@ impl<'a> Table<'a> {
         Ok(())
     }
 
-    /// Parses the numbers of the first line of `text` and returns the text after this line.
+    /// Parses the numbers in the first line of `text` into the columns and returns the text after this line.
     fn row<'t>(&mut self, text: &'t [u8]) -> Result<&'t [u8], RecordingError> {
         let mut rest = text;
         for index in 0..self.columns.len() {
@@ -383,7 +384,7 @@ impl<'a> Table<'a> {
     }
 }
 
-/// True for samples that count the rows from 0 or 1, as the index column of a data frame does.
+/// True if the samples count the rows of the table from 0 or 1, as the index column of a data frame does.
 fn is_counting(samples: &[f64]) -> bool {
     let first = samples.first().copied().unwrap_or(f64::NAN);
     (first == 0.0 || first == 1.0)

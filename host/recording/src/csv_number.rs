@@ -1,4 +1,4 @@
-//! Number at the start of a line of a CSV file.
+//! Parser of the number at the start of a line of a CSV file, and the separator after it.
 
 /// Separator after a number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -5,7 +5,7 @@ use std::path::Path;
 use super::{Quantity, Recording, RecordingError};
 use crate::file::Prepared;
 
-/// Significant digits of written samples: nine digits represent every 32-bit float exactly.
+/// Number of significant digits of written samples: nine digits represent every 32-bit float exactly.
 const DIGITS: usize = 9;
 
 /// Writes a recording to a temporary CSV file, not yet under its final name: time in seconds, then one column per
@@ -21,7 +21,7 @@ pub(super) fn prepared(path: &Path, recording: &Recording) -> Result<Prepared, R
         let mut row: Vec<String> = Vec::with_capacity(recording.channels.len() + 1);
         for sample in 0..recording.len() {
             row.clear();
-            // Time is written with all digits: nine digits resolve only 10 µs after an hour.
+            // Time is written with all digits: nine digits would resolve only 10 µs after an hour.
             row.push(recording.time_s(sample).to_string());
             row.extend(
                 recording

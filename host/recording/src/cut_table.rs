@@ -16,9 +16,9 @@ use crate::file::{FileError, read_text};
 pub enum Outcome {
     /// The vibration decayed.
     Stable,
-    /// The vibration grew, or stayed large.
+    /// Chatter: the vibration of the trial cut grew, or stayed large.
     Chatter,
-    /// The outcome could not be classified.
+    /// Marginal: the outcome of the trial cut is neither clearly stable nor clearly chatter.
     Marginal,
 }
 
@@ -37,10 +37,10 @@ pub struct TrialCut {
     pub chatter_hz: Option<f64>,
 }
 
-/// Why a table of cuts cannot be read.
+/// Reason why a table of trial cuts cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum CutTableError {
-    /// The file is not there or cannot be read.
+    /// The file of the table of cuts does not exist or cannot be read.
     #[error(transparent)]
     File(#[from] FileError),
     /// A line is wrong.
@@ -86,10 +86,10 @@ pub fn read(path: &Path) -> Result<Vec<TrialCut>, CutTableError> {
     parse(path, &read_text(path)?)
 }
 
-/// Reads the text of a table; `path` is for messages.
+/// Reads the text of a table of trial cuts; `path` names the file in error messages.
 ///
 /// # Errors
-/// As [`read`].
+/// The errors of [`read`], except that of a missing file.
 pub fn parse(path: &Path, text: &str) -> Result<Vec<TrialCut>, CutTableError> {
     let wrong = |line: u64, what: String| CutTableError::Line {
         path: path.into(),

@@ -28,7 +28,7 @@ pub enum RecordingError {
         /// The ending.
         found: String,
     },
-    /// The content of the file is malformed or contradictory.
+    /// The content of the recorded file is malformed or contradictory.
     #[error("{}: {what}", path.display())]
     Content {
         /// The file.
@@ -46,7 +46,7 @@ pub enum RecordingError {
         /// Fault and the expected content.
         what: String,
     },
-    /// The unit of a column is unknown.
+    /// The text of the unit of a column is no known unit.
     #[error("{}, column \"{column}\": {cause}", path.display())]
     Unit {
         /// The file.
@@ -56,7 +56,7 @@ pub enum RecordingError {
         /// The unknown unit.
         cause: UnknownUnit,
     },
-    /// The unit of a channel contradicts its name.
+    /// The unit of a channel measures another quantity than the name of the channel requires.
     #[error(
         "{}, column \"{column}\": {found} ({}), but a channel of this name is {expected}; correct the head, or --map \"{column}=NAME:UNIT\" \
          with the name and unit that hold",
@@ -105,7 +105,7 @@ pub enum RecordingError {
         /// The columns in doubt, each with a proposal of what the user could state about it.
         doubts: Vec<Doubt>,
     },
-    /// Neither file nor sidecar states the sample rate.
+    /// Neither the recorded file nor its sidecar states the sample rate.
     #[error(
         "{}: the sample rate is not given; --rate 25600 with the rate that holds, sample_rate_hz = 25600 in {}, or a column \"t [s]\" is needed",
         path.display(),
@@ -114,17 +114,17 @@ pub enum RecordingError {
     NoSampleRate {
         /// The file.
         path: PathBuf,
-        /// Sidecar file that could state the sample rate.
+        /// Sidecar file in which the user could state the sample rate.
         sidecar: PathBuf,
     },
-    /// The recording lacks a required channel or setting.
+    /// The recording lacks a channel or a setting that the command requires.
     #[error("{}: it has no {needed}; its channels are {}{}", path.display(), found.join(", "), without_unit(found))]
     NoChannel {
         /// The file.
         path: PathBuf,
         /// Description of the channel or setting that the recording lacks.
         needed: String,
-        /// Names and units of the channels of the recording.
+        /// Names and units of the channels that the recording has.
         found: Vec<String>,
     },
 }

@@ -3,20 +3,21 @@
 use super::segment::Segment;
 use super::unit::{Sensitivity, Unit};
 
-/// What the user states about the files of a command; it takes precedence over the files and their sidecars.
+/// Facts that the user states on the command line about the files of a command; they take precedence over the files and
+/// their sidecars.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Import {
     /// Segment of the recording that is read, by start and end time.
     pub segment: Segment,
-    /// Columns that the user names (`--map`).
+    /// Columns for which the user states name and unit with the option `--map`.
     pub map: Vec<ColumnMap>,
     /// Sample rate, samples per second (`--rate`); it replaces the time column of the file.
     pub rate_hz: Option<f64>,
-    /// Number of the record in a file with several records, from 1 (`--record`); `None` for all.
+    /// Number of the one record to read from a file with several records, from 1 (`--record`); `None` for all.
     pub record: Option<usize>,
 }
 
-/// Name and unit of one column, as in `acc=ax:g`.
+/// Channel name and unit that the user states for one column, as in `acc=ax:g`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ColumnMap {
     /// Name of the column in the file, or its number in the file from 1.
@@ -30,26 +31,27 @@ pub struct ColumnMap {
     pub scale: Option<Scale>,
 }
 
-/// Unit of the samples of a column, or sensitivity of its sensor.
+/// Unit of the samples of a column, or sensitivity of the sensor that gave them.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Scale {
     /// Unit of the samples, which may have a factor: `g`, `98.1 m/s^2`.
     Unit(Unit),
     /// Sensitivity of the sensor, for samples in volts: `10.2 mV/g`.
     Sensitivity(Sensitivity),
-    /// Unit of a frequency response function, response per force: `um/N`, `(m/s^2)/N`, `deg`, `dB`.
+    /// Unit of a frequency response function, that is of response per force: `um/N`, `(m/s^2)/N`, `deg`, `dB`.
     Ratio(String),
 }
 
 impl ColumnMap {
-    /// Parses `COLUMN=NAME` or `COLUMN=NAME:UNIT`, such as `acc=ax:g`, `2=fx:N`, `acc=-az`, `ch1=ax:10.2 mV/g`.
+    /// Parses the text of the option `--map` for one column, `COLUMN=NAME` or `COLUMN=NAME:UNIT`, such as `acc=ax:g`,
+    /// `2=fx:N`, `acc=-az`, `ch1=ax:10.2 mV/g`.
     ///
     /// # Errors
     /// The text has another form, or the unit is unknown; the message states the forms.
     pub fn parse(text: &str) -> Result<Self, String> {
         let forms =
             "COLUMN=NAME or COLUMN=NAME:UNIT is needed, such as acc=ax:g, 2=fx:N or \"ch1=ax:10.2 mV/g\"";
-        // The name of a column may itself have an equals sign; the name of a channel has none.
+        // The name of a column in the file may itself contain an equals sign; the name of a channel contains none.
         let (column, channel) = text
             .rsplit_once('=')
             .ok_or_else(|| format!("`{text}`: {forms}"))?;

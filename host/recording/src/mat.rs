@@ -24,33 +24,37 @@ use crate::file::FileError;
 use source::{CHUNK, SMALL_MAX, Source, size_of_kind, word};
 use value::{Item, Value, Variable};
 
-/// Length of the file header, bytes (MAT-File Format, level 5).
+/// Length of the file header of a MAT-file of level 5, bytes.
 const HEADER: usize = 128;
 
-/// Largest compression factor of the deflate format (1032:1). An element with a larger factor is damaged.
+/// Largest compression factor that the deflate format allows (1032:1). A compressed element that states more is
+/// damaged.
 const INFLATION_MAX: u64 = 1032;
 
-/// Memory for values that every file may use, bytes, however short it is: one million samples of eight channels of 8 bytes. Constant
-/// channels of this size compress to almost nothing. The size is a choice.
+/// Memory that the values of any MAT-file may take, bytes, however short the file is: one million samples of eight
+/// channels of 8 bytes. Constant channels of this size compress to almost nothing. The size is a choice.
 const VALUES_MIN: u64 = 64 << 20;
 
-/// Memory for values per byte of the file, bytes. One-byte integers that become 8-byte numbers need a factor of 8, and measured channels
-/// compress by a factor below 20: together 160.
+/// Memory that the values of a MAT-file may take per byte of the file, bytes. One-byte integers that become 8-byte
+/// numbers need a factor of 8, and measured channels compress by a factor below 20: together 160.
 const VALUES_PER_BYTE: u64 = 200;
 
-/// Number of values for which memory is reserved before reading, even if the file is shorter. A choice; it bounds what a false header costs.
+/// Number of values of a MAT-file for which memory is reserved before they are read, even if the file is shorter. A
+/// choice; it bounds the cost of a header with a false size.
 const TRUSTED: u64 = 1 << 16;
 
-/// Data type of a compressed element (miCOMPRESSED).
+/// Code of the data type of a compressed element in a MAT-file (miCOMPRESSED).
 const COMPRESSED: u32 = 15;
 
-/// Data type of a matrix element (miMATRIX).
+/// Code of the data type of a matrix element in a MAT-file (miMATRIX).
 const MATRIX: u32 = 14;
 
-/// Largest depth of structures in structures that is read. A choice; recordings have one or two levels.
+/// Largest depth to which structures within structures of a MAT-file are read. A choice; recordings have one or two
+/// levels.
 const DEPTH_MAX: usize = 6;
 
-/// Largest number of elements of all structures and cells of a file. A choice; a record of a structure array takes a few.
+/// Largest total number of elements of all structures and cells of a MAT-file. A choice; a record in a structure array
+/// has a few.
 const ELEMENTS_MAX: usize = 100_000;
 
 /// Reads the records of a MAT-file: one from its vectors and matrices, or one from each of its structures.
@@ -278,7 +282,7 @@ fn matrix(source: &mut Source<'_>, memory: &mut ValueMemory, depth: usize) -> Re
     }))
 }
 
-/// Reads the elements of a structure array or a cell array of `count` elements.
+/// Reads the elements of a MAT structure array or cell array of `count` elements.
 fn elements(
     source: &mut Source<'_>,
     memory: &mut ValueMemory,

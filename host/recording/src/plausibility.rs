@@ -4,7 +4,7 @@
 use super::criteria::{SAME_MOTION, UNIT_FACTOR, plausible_peak};
 use super::{Channel, Quantity, Recording};
 
-/// Factors by which a unit is usually wrong: g instead of m/s², milli, micro.
+/// Factors by which the unit of a channel is often wrong: g instead of m/s², milli, micro.
 const FACTORS: [(f64, &str); 3] = [(9.806_65, "9.81 (g and m/s²)"), (1e3, "1000"), (1e6, "a million")];
 
 /// Warnings about channels whose unit is probably wrong; empty if all units are plausible.

@@ -1,4 +1,4 @@
-//! Content of a file before its columns are understood.
+//! Content of a recorded file before the meaning of its columns is determined.
 
 use super::unit::Unit;
 

@@ -14,7 +14,7 @@ pub struct Recording {
     pub path: PathBuf,
     /// Sample rate, samples per second.
     pub sample_rate_hz: f64,
-    /// Time of the first sample, s.
+    /// Time of the first sample of the recording, s.
     pub start_s: f64,
     /// Time from the start of the whole recording to the first sample of this segment, s; 0 for a whole recording. Effects that depend on
     /// time, such as drift, count their time from the start of the whole recording.
@@ -57,7 +57,7 @@ impl Recording {
         self.start_s + sample as f64 / self.sample_rate_hz
     }
 
-    /// The segment of the recording that holds the samples of `range`, with its start times.
+    /// The segment of the recording with the samples whose indices are in `range`, with its own start times.
     ///
     /// # Panics
     /// The recording has fewer samples than `range` requires.

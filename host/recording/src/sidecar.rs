@@ -47,16 +47,16 @@ pub struct Sidecar {
     /// Posture of the robot during the recording.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub posture: Option<RecordedPosture>,
-    /// Descriptions of channels, by the name of the channel in the file.
+    /// Descriptions of channels; the keys are the names of the channels in the recorded file.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub channels: BTreeMap<String, RecordedChannel>,
 }
 
-/// Posture of the robot during a recording.
+/// Posture of the robot during a recording, as joint angles.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RecordedPosture {
-    /// Joint angles, degrees, starting at the base.
+    /// Angles of the robot's joints, degrees, starting at the base.
     pub joints_deg: Vec<f64>,
 }
 
@@ -116,7 +116,8 @@ pub struct RecordedChannel {
 }
 
 impl Sidecar {
-    /// Description of the channel with a standard name, whether the file uses that name or another; `None` if there is none.
+    /// Description of the channel with a standard name such as `ax`, also if the file calls it by another name; `None`
+    /// if the sidecar has no description of it.
     pub fn channel(&self, name: &str) -> Option<&RecordedChannel> {
         let renamed = self
             .channels
@@ -152,7 +153,8 @@ impl Sidecar {
         Ok(sidecar)
     }
 
-    /// Checks the bounds of all values: positive rate, speed and teeth, non-negative depth and feed, ascending angles, possible wheels.
+    /// Checks the bounds of all values in a sidecar: positive rate, speed and teeth, non-negative depth and feed,
+    /// ascending angles, possible tachometer wheels.
     fn check(&self, path: &Path) -> Result<(), RecordingError> {
         let cut = self.cut.unwrap_or_default();
         let positive = [

@@ -1,4 +1,4 @@
-//! Form of the lines of a text table: separator between fields and decimal mark.
+//! Notation of the lines of a text table: separator between fields and decimal mark.
 
 /// Separator between the fields of a line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -24,11 +24,11 @@ pub(super) struct Head {
     pub(super) columns: Option<Vec<HeadColumn>>,
     /// Number of columns in the first line of numbers of the text table; 0 if the file has no such line.
     pub(super) width: usize,
-    /// Offset of the first line of numbers in the file, bytes.
+    /// Offset of the first line of numbers from the start of the file, bytes.
     pub(super) offset: usize,
     /// Number of lines before it.
     pub(super) lines: u64,
-    /// Sample rate stated in a line before the numbers, samples per second.
+    /// Sample rate that a line before the numbers of the text table states, samples per second; `None` if none does.
     pub(super) rate_hz: Option<f64>,
     /// Facts about the reading of the head that the user should know: separator, encoding.
     pub(super) notes: Vec<String>,
@@ -39,7 +39,7 @@ struct Line<'a> {
     text: &'a str,
     /// Offset in the file, bytes.
     offset: usize,
-    /// Number of the line, from 1.
+    /// Number of the line in the file, from 1.
     number: u64,
 }
 
@@ -49,7 +49,7 @@ impl Line<'_> {
     }
 }
 
-/// True for a line of comment: `#`, `%` or `//` at its start.
+/// True if the line of a text file is a comment: `#`, `%` or `//` at its start.
 pub(super) fn is_comment(line: &str) -> bool {
     let line = line.trim_start();
     line.starts_with(['#', '%']) || line.starts_with("//")
@@ -205,7 +205,7 @@ pub(super) fn latin(bytes: &[u8]) -> String {
     bytes.iter().map(|&byte| char::from(byte)).collect()
 }
 
-/// Lines of the decoded text with their offsets in the bytes of the file.
+/// Lines of the decoded text of a file, each with its offset in the bytes of the file.
 fn lines<'t>(text: &'t str, bytes: &[u8]) -> Vec<Line<'t>> {
     let mut offset = if bytes.starts_with(b"\xef\xbb\xbf") { 3 } else { 0 };
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
@@ -228,7 +228,7 @@ fn lines<'t>(text: &'t str, bytes: &[u8]) -> Vec<Line<'t>> {
 /// Number of lines that are searched for a decimal comma: a choice, since the first samples may be whole numbers.
 const LINES_FOR_DECIMAL: usize = 200;
 
-/// Separator and decimal mark of a line of numbers, and of the lines after it; `None` if the line has no number.
+/// Separator and decimal mark, found from one line of numbers and the lines after it; `None` if the line has no number.
 fn dialect(line: &str, lines: &[&Line]) -> Option<Dialect> {
     let with = |separator| Dialect {
         separator,

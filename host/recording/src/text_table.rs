@@ -26,10 +26,11 @@ pub struct TextColumn {
 }
 
 impl TextTable {
-    /// Reads a text table.
+    /// Reads a text table, with any separator and decimal mark.
     ///
     /// # Errors
-    /// The file cannot be read; a line has text among its numbers, or another number of values than the head; a value is NaN or infinite.
+    /// The file cannot be read; a line has text among its numbers, or another number of values than the head; a value
+    /// is NaN or infinite.
     pub fn read(path: &Path) -> Result<Self, RecordingError> {
         let raw = csv::read(path, true)?;
         let columns = raw.columns.into_iter().map(|column| TextColumn {

@@ -85,7 +85,8 @@ pub(super) fn understand(
     }
 }
 
-/// Combines what file, sidecar and map state about a column; the map takes precedence over the sidecar, the sidecar over the file.
+/// Combines the facts that file, sidecar and the option `--map` state about a column; the option takes precedence over
+/// the sidecar, the sidecar over the file.
 fn stated(
     path: &Path,
     column: &RawColumn,
@@ -238,7 +239,8 @@ fn meaning(
     checked(path, column, found)
 }
 
-/// True for the names of channels: `t`, `fx`, `x`, `vx`, `ax` …, `tacho`, and these with a suffix (`ax_2`).
+/// True if the name is a standard channel name: `t`, `fx`, `x`, `vx`, `ax` …, `tacho`, or one of these with a suffix
+/// (`ax_2`).
 fn is_channel_name(name: &str) -> bool {
     let stem = name.split_once('_').map_or(name, |(stem, suffix)| {
         // Only a number may follow: `ax_2` and `ax_7_2` are further sensors of direction x. `a_x` and `x_value` are no
@@ -255,7 +257,8 @@ fn is_channel_name(name: &str) -> bool {
     Quantity::of_name(stem).is_some() || stem == "tacho"
 }
 
-/// Channel of a column that is called by its axis alone, such as `X [g]`: the unit states the quantity.
+/// Name of the motion channel of a column that is called by its axis alone, such as `X [g]`: the unit states the
+/// quantity.
 fn motion_of_axis(name: &str, quantity: Quantity) -> Option<String> {
     let is_axis = matches!(name, "x" | "y" | "z");
     let prefix = match quantity {
@@ -276,7 +279,7 @@ fn checked(path: &Path, column: &RawColumn, found: Meaning) -> Result<Meaning, R
     {
         return Err(unknown_unit(path, column, text));
     }
-    // A voltage without sensitivity may represent any quantity, so it contradicts no channel name.
+    // A voltage without sensitivity may represent any quantity, so its unit contradicts no channel name.
     if let Some(expected) = Quantity::of_name(&found.name)
         && ![expected, Quantity::Voltage, Quantity::Unknown].contains(&found.quantity)
     {

@@ -37,7 +37,7 @@ pub struct UnderstoodColumn {
     pub column: String,
     /// Name of the channel that the column became; `t` is time.
     pub channel: String,
-    /// True if the channel points against its axis, so that the samples changed their sign.
+    /// True if the sensor points against its axis, so that the samples of the channel changed their sign.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub is_negative: bool,
     /// Unit of the column, as the file, the sidecar or the option states it; `None` if none of them does.
@@ -63,7 +63,7 @@ pub enum Basis {
     Words,
     /// The sidecar names the channel.
     Sidecar,
-    /// The option `--map` names the channel.
+    /// The user names the channel with the option `--map`.
     Option,
     /// No word in the head of the column names a quantity: it is an auxiliary channel.
     Auxiliary,

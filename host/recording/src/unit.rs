@@ -6,7 +6,7 @@ use std::str::FromStr;
 /// Standard gravity, m/s² (ISO 80000-3); converts `g` and kilogram-force.
 const G: f64 = 9.806_65;
 
-/// Physical quantity measured by a channel. Samples are in its SI unit.
+/// Physical quantity that a channel measures. The samples of the channel are in its SI unit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Quantity {
     /// Time, s.
@@ -27,7 +27,7 @@ pub enum Quantity {
     Voltage,
     /// Dimensionless number, such as the level of a tachometer signal.
     Level,
-    /// Unknown quantity: neither file nor sidecar states a unit.
+    /// Unknown quantity: neither the file nor the sidecar states a unit.
     Unknown,
 }
 
@@ -48,7 +48,8 @@ impl Quantity {
         }
     }
 
-    /// Quantity of a channel with a standard name (`t`; `fx`; `x`; `vx`; `ax`, and the same for y and z); `None` for other names.
+    /// Quantity that a standard channel name stands for (`t`; `fx`; `x`; `vx`; `ax`, and the same for y and z); `None`
+    /// for other names.
     pub fn of_name(name: &str) -> Option<Self> {
         match name {
             "t" => Some(Self::Time),
@@ -83,11 +84,11 @@ impl fmt::Display for Quantity {
 pub struct Unit {
     /// Quantity that the unit measures.
     pub quantity: Quantity,
-    /// Conversion factor: value in SI units = `factor` · value in this unit.
+    /// Conversion factor of the unit: value in SI units = `factor` · value in this unit.
     pub factor: f64,
 }
 
-/// Table of all units that are read: name, quantity, factor to SI. The first unit of each quantity is the SI unit.
+/// Table of all units that can be read: name, quantity, factor to SI. The first unit of each quantity is the SI unit.
 const UNITS: &[(&str, Quantity, f64)] = &[
     ("s", Quantity::Time, 1.0),
     ("ms", Quantity::Time, 1e-3),
@@ -132,7 +133,7 @@ const UNITS: &[(&str, Quantity, f64)] = &[
     ("", Quantity::Level, 1.0),
 ];
 
-/// Error for a unit that is not in the table; the message lists the known units.
+/// Error for a unit that is not in the table of units; the message lists the known ones.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("unit \"{found}\"; known are {}", known())]
 pub struct UnknownUnit {
@@ -152,9 +153,10 @@ fn known() -> String {
 impl FromStr for Unit {
     type Err = UnknownUnit;
 
-    /// Parses a unit, such as `m/s^2`, or a factor with a unit, such as `98.1 m/s^2` (a sample of 1 is that much).
+    /// Parses a unit, such as `m/s^2`, or a factor with a unit, such as `98.1 m/s^2`: a sample of 1 means 98.1 m/s².
     ///
-    /// `²`, `⁻²`, `**`, `m/s/s`, `m s^-2`, `m/sec²`, whole words (`Newton`, `volts`, `sec`) and both Unicode letters for micro (µ, μ) are accepted.
+    /// `²`, `⁻²`, `**`, `m/s/s`, `m s^-2`, `m/sec²`, whole words (`Newton`, `volts`, `sec`) and both Unicode letters
+    /// for micro (µ, μ) are accepted.
     fn from_str(text: &str) -> Result<Self, UnknownUnit> {
         if let Some(unit) = plain(text) {
             return Ok(unit);
@@ -215,7 +217,7 @@ fn respelled(text: &str) -> Option<String> {
         return Some(word.into());
     }
     let plain = plain.replace("sec", "s").replace("/s/s", "/s^2");
-    // `m s^-2`, `m s-2`, `ms^-2` and `m/s-2` are `m/s^2`; `m s^-1` is `m/s`.
+    // The spellings `m s^-2`, `m s-2`, `ms^-2` and `m/s-2` mean `m/s^2`; `m s^-1` means `m/s`.
     let (length, rest) = ["um", "mm", "cm", "m", "in", "ft"]
         .iter()
         .find_map(|length| Some((*length, plain.strip_prefix(length)?)))?;
@@ -252,7 +254,7 @@ impl FromStr for Sensitivity {
         let (number, units) = leading_number(text).ok_or_else(wrong)?;
         let (volts, measured) = units.split_once('/').ok_or_else(wrong)?;
         let volts: Unit = volts.parse().map_err(|_| wrong())?;
-        // Parentheses are allowed around a unit with a slash: "mV/(m/s^2)".
+        // Parentheses are allowed around the measured unit of a sensitivity if it has a slash: "mV/(m/s^2)".
         let measured = measured
             .trim()
             .strip_prefix('(')

@@ -52,7 +52,8 @@ impl Channels {
             .collect()
     }
 
-    /// Adds the configured noise to the channels of `recording`; `seed` sets the random numbers.
+    /// Adds the configured measurement noise to the channels of the simulated `recording`; `seed` sets the random
+    /// numbers.
     ///
     /// # Errors
     /// `--noise` names a channel that the recording does not have.

@@ -128,7 +128,7 @@ fn lobes(cell: &VirtualCell, output: Output) -> Result<Vec<u8>, Error> {
     Ok(bytes)
 }
 
-/// Starts the simulated device and uploads the lobe table to it.
+/// Starts the simulated device and sends the lobe table of the virtual cell to it.
 fn switch_on(cell: &VirtualCell, table: &LobeTable<'_>, output: Output) -> Result<Bench, Error> {
     let (mut bench, info) = Bench::new(cell.clone())?;
     let port = bench.serial_port();
@@ -144,7 +144,7 @@ fn switch_on(cell: &VirtualCell, table: &LobeTable<'_>, output: Output) -> Resul
     Ok(bench)
 }
 
-/// Sentence with the lowest stability limit of the table, its spindle speed and its kind of stability loss.
+/// Sentence about the lowest stability limit of a lobe table: depth, spindle speed and kind of stability loss.
 fn lowest_limit(table: &LobeTable<'_>) -> String {
     let limits = table.speeds().enumerate().filter_map(|(index, speed)| {
         let limit = *table.entry(0, index)?.first_limit()?;
@@ -162,7 +162,7 @@ fn lowest_limit(table: &LobeTable<'_>) -> String {
     }
 }
 
-/// Makes one cut and, where the device advises another speed or depth, the advised cut.
+/// Makes one cut of the demonstration and, if the device advises another speed or depth, a second cut as advised.
 fn story(
     bench: &mut Bench,
     cell: &VirtualCell,
@@ -250,7 +250,8 @@ fn print_events(trial: &Trial, output: Output) -> Result<(), Error> {
     ))
 }
 
-/// Root mean square of the acceleration at the end of the cut, m/s², along the axis with the largest value.
+/// Root mean square of the acceleration in the last quarter of full engagement, m/s², along the axis with the largest
+/// value.
 fn largest_vibration(trial: &Trial) -> f64 {
     trial.vibration().into_iter().fold(0.0, f64::max)
 }

@@ -29,12 +29,12 @@ pub enum Error {
 }
 
 impl Error {
-    /// An error of usage or input, with exit status 2.
+    /// Makes an error of usage or input, with exit status 2.
     pub fn input(cause: impl Into<Cause>) -> Self {
         Self::Input(cause.into())
     }
 
-    /// An error that the user cannot correct, with exit status 1.
+    /// Makes an error that the user cannot correct, with exit status 1.
     pub fn other(cause: impl Into<Cause>) -> Self {
         Self::Other(cause.into())
     }
@@ -50,7 +50,8 @@ impl Error {
 }
 
 impl std::fmt::Display for Error {
-    /// The message, followed after colons by each source error that the message does not already contain.
+    /// Writes the message of the error, followed after colons by each source error that the message does not already
+    /// contain.
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let (Self::Input(cause) | Self::Other(cause)) = self else {
             return f.write_str("the reader of standard output has gone");

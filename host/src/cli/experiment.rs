@@ -56,7 +56,7 @@ pub(super) struct Experiment {
     drop_ns_per_m: f64,
 }
 
-/// Kinds of excitation of a simulated test.
+/// Kinds of excitation of a simulated vibration test.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(super) enum ExperimentKind {
     /// Shaker with one or several simultaneous tones, whose force is constant or increases linearly.
@@ -75,7 +75,7 @@ pub(super) enum ExperimentKind {
     SpeedSweep,
 }
 
-/// Options that a simulated vibration test shares with a simulated cut.
+/// Options of `quietcut simulate` that a simulated vibration test shares with a simulated cut.
 pub(super) struct Common<'a> {
     pub(super) seconds: Option<f64>,
     pub(super) sample_rate_hz: Option<f64>,
@@ -162,7 +162,7 @@ pub(super) fn run(
 }
 
 impl ExperimentKind {
-    /// Whether the excitation is the cutting force of a milling cut.
+    /// True if the structure is excited by the cutting force of a milling cut (porous, speed-sweep).
     pub(super) fn is_milling(self) -> bool {
         matches!(self, Self::Porous | Self::SpeedSweep)
     }

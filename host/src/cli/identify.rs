@@ -61,7 +61,7 @@ pub fn run(args: Args) -> Result<(), Error> {
     args.output.answer_with(&understood, &answer, text(&answer))
 }
 
-/// TOML tables of the case file at `path`, after a check that it is a valid case.
+/// Sections (TOML tables) of the case file at `path`, after a check that it is a valid case.
 fn sections(path: &Path) -> Result<toml::Table, Error> {
     Case::read(path).map_err(Error::input)?;
     let text = crate::file::read_text(path)?;

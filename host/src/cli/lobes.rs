@@ -282,13 +282,14 @@ fn resolution_as_text(chart: &Chart, resolution: &Resolution) -> String {
     text
 }
 
-/// 5, 50 and 95 % percentiles of the first limit as text, mm; `beyond` stands for a limit deeper than the last depth.
+/// 5, 50 and 95 % percentiles of the first stability limit as text, mm; `beyond` is the text for a limit deeper than
+/// the largest computed depth.
 fn percentiles(spread: &LimitSpread, beyond: &str) -> [String; 3] {
     let percentiles = spread.limit_percentiles_mm;
     [percentiles.low, percentiles.median, percentiles.high].map(|depth_mm| depth_or(depth_mm, beyond))
 }
 
-/// 90 % confidence interval of each percentile of the first limit as text, mm.
+/// 90 % confidence interval of each percentile of the first stability limit as text, mm.
 fn intervals(spread: &LimitSpread, beyond: &str) -> [[String; 2]; 3] {
     let intervals = spread.limit_percentiles_ci90_mm;
     let intervals = [intervals.low, intervals.median, intervals.high];
@@ -374,7 +375,8 @@ fn row(line: &SpeedLine) -> maud::Markup {
     }
 }
 
-/// CSV with one row per change of stability over depth; a speed without any change has one row with only its speed.
+/// Stability chart as CSV with one row per change of stability over depth; a speed without any change has one row with
+/// only its speed.
 fn as_csv(chart: &Chart) -> Result<String, Error> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     let mut header = vec![
@@ -407,7 +409,7 @@ fn as_csv(chart: &Chart) -> Result<String, Error> {
                 percentiles(spread, "").into_iter().chain(ends)
             })
             .collect();
-        // Lines between the requested speeds have no percentiles.
+        // Spindle speeds that were added between the requested ones have no percentiles of the limit.
         spread.resize(spread_columns, String::new());
         let spread = spread.iter().map(String::as_str);
         if line.switches.is_empty() {
@@ -420,7 +422,7 @@ fn as_csv(chart: &Chart) -> Result<String, Error> {
             let first = line
                 .first_limit
                 .is_some_and(|limit| limit.depth_mm == switch.depth_mm);
-            // The undecided interval of depths that contains this change of stability.
+            // The interval of axial depths around this change of stability in which the method cannot decide.
             let undecided = line
                 .undecided_mm
                 .iter()

@@ -80,7 +80,8 @@ fn picture(case: &Case, chart: &CellChart) -> Result<String, Error> {
     cell_map(&title, &sorted).map_err(Error::input)
 }
 
-/// CSV with one row per grid point: speed, depth, |multiplier|, its error and the verdict.
+/// Stability map as CSV with one row per grid point: speed, depth, modulus of the dominant Floquet multiplier, its
+/// error and the verdict.
 fn as_csv(chart: &CellChart) -> Result<String, Error> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     writer

@@ -175,7 +175,7 @@ impl TableOutput {
     }
 }
 
-/// Width of the picture of a channel, characters: with the name of the channel a line has at most 80.
+/// Width in characters of the picture of a channel: with the name of the channel a line has at most 80.
 const WIDTH: usize = 64;
 
 impl RecordOutput {
@@ -288,7 +288,7 @@ fn shown(value: f64) -> String {
     }
 }
 
-/// Envelope of a channel in block characters.
+/// Picture of the envelope of a channel, drawn with block characters in one line.
 fn picture(samples: &[f64]) -> String {
     const BLOCKS: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
     envelope(samples, WIDTH)

@@ -62,7 +62,7 @@ pub(super) struct MethodChoice {
     /// Ignore the cubic terms of the structure: limits of the linear structure, valid for vanishing feed.
     #[arg(long)]
     linear: bool,
-    /// Operating time in s at which drift and wear of the case are evaluated.
+    /// Operating time in s for which the drift and wear of the case are evaluated.
     #[arg(long, value_name = "T", value_parser = non_negative, allow_negative_numbers = true)]
     after_s: Option<f64>,
     /// Time steps per tooth-passing period of sdm and fdm. Default: 100.
@@ -73,23 +73,23 @@ pub(super) struct MethodChoice {
     order: Option<SdmOrder>,
 }
 
-/// Stability methods of the command line.
+/// Stability methods that `--method` can choose.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
 enum MethodName {
     /// Collocation of the monodromy operator over the tooth period; over the revolution with variable pitch, about the
     /// forced periodic orbit with cubic terms.
     #[default]
     Collocation,
-    /// Semi-discretization (Insperger, Stépán) with a fixed number of steps.
+    /// Semi-discretization (Insperger, Stépán) with a fixed number of time steps.
     Sdm,
-    /// First-order full discretization (Ding) with a fixed number of steps.
+    /// First-order full discretization (Ding) with a fixed number of time steps.
     Fdm,
     /// Zeroth-order approximation (Altintas, Budak): averaged directional coefficients in closed form; does not find
     /// flips.
     Zoa,
     /// Nyquist criterion on the receptances: averaged directional coefficients, or periodic ones with --harmonics.
     Nyquist,
-    /// Multi-frequency solution: harmonics of the directional coefficients; finds flips.
+    /// Multi-frequency solution with harmonics of the directional coefficients; finds flips.
     MultiFrequency,
     /// Mode-coupling criterion without the regenerative effect, for comparison.
     ModeCoupling,
@@ -148,7 +148,7 @@ impl MethodChoice {
         })
     }
 
-    /// Reads the table of `--frf` with its `--map`.
+    /// Reads the table of receptances in the file of `--frf`, with the meanings of its columns from `--map`.
     fn table(&self, path: &Path) -> Result<ImportedTable, Error> {
         let import = Import {
             map: self.map.clone(),
@@ -157,7 +157,8 @@ impl MethodChoice {
         FrfTable::import(path, &import).map_err(Error::input)
     }
 
-    /// Prints on stderr how the table of `--frf` was understood, if it had to be interpreted.
+    /// Prints on stderr how the table of receptances in the file of `--frf` was understood, if it had to be
+    /// interpreted.
     pub(super) fn announce(&self) -> Result<(), Error> {
         if let Some(path) = &self.frf
             && let Some(understood) = self.table(path)?.understood
@@ -176,7 +177,7 @@ impl MethodChoice {
         })
     }
 
-    /// Builds a method that uses receptances only; `path` is the file of the receptances, for messages.
+    /// Builds a stability method that uses receptances only; `path` is their file, for error messages.
     fn on_receptances(&self, problem: FrequencyProblem, path: &Path) -> Result<Box<dyn Method>, Error> {
         Ok(match self.name() {
             MethodName::Zoa => Box::new(Zoa { problem }),

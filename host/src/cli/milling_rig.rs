@@ -9,7 +9,7 @@ use crate::case::Case;
 use crate::recording::Quantity;
 use crate::simulate::{Effects, Entry, Pores, Recorder, TachometerModel, VirtualCut};
 
-/// Options of simulated cuts whose forces excite the structure.
+/// Options of simulated cuts whose cutting forces excite the structure for its identification.
 #[derive(Debug, clap::Args)]
 #[command(next_help_heading = "Milling rigs")]
 pub(super) struct MillingRig {
@@ -22,7 +22,8 @@ pub(super) struct MillingRig {
     /// Size of the pores in the material of porous, in mm.
     #[arg(long, value_name = "D", default_value_t = 0.2, value_parser = positive, allow_negative_numbers = true)]
     pore_mm: f64,
-    /// Independent variation of the tangential, radial and axial cutting coefficients of the porous material, in percent.
+    /// Amplitude of the independent variations of the tangential, radial and axial cutting coefficients within the
+    /// porous material, in percent.
     #[arg(long, value_name = "P", default_value_t = 40.0, value_parser = share, allow_negative_numbers = true)]
     strength_percent: f64,
     /// Immersion angle in degrees where the teeth enter; replaces that of the case.
@@ -39,7 +40,7 @@ struct MillingRigOutput {
     sample_rate_hz: f64,
     samples: usize,
     largest_displacement_mm: f64,
-    /// Standard deviation of each measured force over time, N.
+    /// Standard deviation over time of each measured cutting force, N.
     force_rms_n: Vec<f64>,
     steps: u64,
     contact_changes: u64,
@@ -48,7 +49,7 @@ struct MillingRigOutput {
 /// Default sampling rate, Hz: a choice far above the natural frequencies of a milling robot (tens of Hz).
 const SAMPLE_RATE_HZ: f64 = 2048.0;
 
-/// Simulates the cut and writes the recording of its sensors.
+/// Simulates the cut of porous or speed-sweep and writes the recording of its sensors.
 pub(super) fn run(
     case: &Case,
     kind: ExperimentKind,
@@ -141,7 +142,7 @@ fn fastest_hz(cut: &VirtualCut, case: &Case) -> f64 {
     (3.0 * pores_hz).max(1000.0 * teeth_hz)
 }
 
-/// Copy of the case with the entry and exit angles of the options.
+/// Copy of the case with the immersion angles at entry and exit that the options give.
 pub(super) fn immersed(case: &Case, rig: &MillingRig) -> Result<Case, Error> {
     let mut case = case.clone();
     if let Some(cut) = &mut case.cut {

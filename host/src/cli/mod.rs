@@ -98,15 +98,16 @@ pub fn main() -> ExitCode {
             eprintln!("quietcut: {error}");
             ExitCode::from(error.exit_status())
         }
-        // The panic hook has already printed the message.
+        // The panic hook has already printed the message of the panic.
         Err(_) => ExitCode::from(1),
     }
 }
 
-/// Exit status after Ctrl-C, by the convention of shells: 128 plus the signal number 2.
+/// Exit status of the process after Ctrl-C, by the convention of shells: 128 plus the signal number 2.
 const INTERRUPTED: i32 = 130;
 
-/// Makes Ctrl-C remove the files that are being written and end the command at once; `monitor` ends by itself.
+/// Makes Ctrl-C remove the unfinished output files and end the process at once, except in the verb `monitor`, which
+/// ends by itself.
 fn leave_nothing_half_written(verb: &Verb) -> Result<(), ctrlc::Error> {
     if matches!(verb, Verb::Monitor(_)) {
         return Ok(());

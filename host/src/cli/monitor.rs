@@ -25,7 +25,8 @@ pub struct Args {
     output: Output,
 }
 
-/// Time between printed lines while the verdict does not change: a choice, short enough to show that the device still answers.
+/// Time between two printed lines while the verdict of the device does not change: a choice, short enough to show that
+/// the device still answers.
 const UNCHANGED_LINE_PERIOD: Duration = Duration::from_secs(2);
 
 /// Longest wait for an event of the device before Ctrl-C and `--seconds` are checked: a choice.

@@ -30,7 +30,7 @@ pub fn non_negative(text: &str) -> Result<f64, String> {
     }
 }
 
-/// Parses an immersion angle from 0 to 360 degrees.
+/// Parses an immersion angle of the command line from 0 to 360 degrees.
 pub fn angle(text: &str) -> Result<f64, String> {
     let value = finite(text)?;
     if (0.0..=360.0).contains(&value) {

@@ -50,7 +50,8 @@ impl Output {
         }
     }
 
-    /// As [`Output::answer`]; the JSON object also has `understood`, if a file had to be interpreted.
+    /// Prints the result of the verb as [`Output::answer`] does. The JSON object also has the key `understood`, if a
+    /// file had to be interpreted.
     pub(super) fn answer_with(
         self,
         understood: &[Understood],

@@ -45,7 +45,7 @@ pub struct Args {
     output: Output,
 }
 
-/// Standard deviations of the parameters of a case that states none.
+/// Standard deviations that are assumed for the parameters of a case that states none.
 #[derive(Debug, clap::Args)]
 #[command(next_help_heading = "Standard deviations, where the case has no keys that end in _std")]
 struct Assumed {
@@ -74,10 +74,10 @@ struct Tests {
     /// Standard deviation of a measured chatter frequency, in percent of the frequency.
     #[arg(long, value_name = "P", default_value_t = 100.0 * Means::default().chatter_frequency, value_parser = positive)]
     chatter_frequency_percent: f64,
-    /// Number of impacts of a hammer test.
+    /// Number of impacts of a planned hammer test.
     #[arg(long = "blows", value_name = "N", default_value_t = Means::default().impacts as u16, value_parser = clap::value_parser!(u16).range(1..))]
     impacts: u16,
-    /// Peak force of an impact in N.
+    /// Peak force of each impact of a planned hammer test, in N.
     #[arg(long, value_name = "F", default_value_t = Means::default().peak_n, value_parser = positive)]
     peak_n: f64,
     /// Noise density of the accelerometer of a hammer test, in µg per √Hz.
@@ -125,7 +125,7 @@ pub fn run(args: Args) -> Result<(), Error> {
     args.output.answer(&found, output_text)
 }
 
-/// Spindle speeds as a list for a message, rounded to 0.1 rev/min.
+/// Text that lists spindle speeds in a message, rounded to 0.1 rev/min.
 fn listed(speeds_rpm: &[f64]) -> String {
     let words: Vec<String> = speeds_rpm.iter().map(|rpm| format!("{rpm:.1}")).collect();
     words.join(", ")

@@ -10,7 +10,7 @@ use super::Error;
 use crate::device::{self, Client};
 use crate::report::answer::number;
 
-/// Port of the device; part of the arguments of every verb that connects to one.
+/// Port of the device: options of every verb that connects to a device.
 #[derive(Debug, clap::Args)]
 pub struct PortArgs {
     /// Serial port of the device, or `simulated`.
@@ -22,7 +22,7 @@ pub struct PortArgs {
 }
 
 impl PortArgs {
-    /// Name of the port, as given on the command line.
+    /// Name of the device's port, as given on the command line.
     pub fn name(&self) -> &str {
         &self.port
     }

@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-/// Period of the animation of the progress line: a choice, short enough to show that the command works.
+/// Period of the animation of the progress line on the terminal: a choice, short enough to show that the command works.
 const TICK: Duration = Duration::from_millis(200);
 
 /// The progress line that stands on the terminal at present; `None` if there is none.
@@ -32,7 +32,8 @@ pub(super) fn clear() {
     }
 }
 
-/// A progress bar of `steps` on standard error, or a spinner without a number of steps; hidden if standard error is no terminal.
+/// Shows a progress bar of `steps` steps on standard error, or a spinner if the number of steps is unknown; it is
+/// hidden if standard error is no terminal.
 pub(super) fn bar(steps: Option<u64>, template: &str) -> ProgressBar {
     let is_terminal = std::io::stderr().is_terminal();
     let target = if is_terminal {

@@ -13,7 +13,8 @@ pub struct Range {
 }
 
 impl Range {
-    /// Upper bound of the count, a choice: more values than a chart can show indicate a typing error.
+    /// Upper bound of the number of values in a range, a choice: more values than a chart can show indicate a typing
+    /// error.
     const MAX_COUNT: usize = 1_000_000;
 
     /// First value of the range.
@@ -42,7 +43,7 @@ impl Range {
             .collect()
     }
 
-    /// Number of equal steps from 0 to the larger end of the range that are no wider than the steps of the range.
+    /// Number of equal steps from 0 to the larger end of the range such that no step is wider than those of the range.
     pub fn steps_from_zero(&self) -> usize {
         let widest = (self.last - self.first).abs() / self.count.max(2) as f64;
         if widest > 0.0 {
@@ -52,7 +53,7 @@ impl Range {
         }
     }
 
-    /// Parses a range of numbers greater than 0.
+    /// Parses `first:last:count`, a range of numbers greater than 0.
     pub fn positive(text: &str) -> Result<Self, String> {
         let range: Self = text.parse()?;
         if range.first > 0.0 && range.last > 0.0 {
@@ -66,7 +67,7 @@ impl Range {
 }
 
 impl Range {
-    /// Parses a range of numbers of 0 or more, not all 0.
+    /// Parses `first:last:count`, a range of numbers of 0 or more, not all 0.
     pub fn non_negative(text: &str) -> Result<Self, String> {
         let range: Self = text.parse()?;
         if range.first >= 0.0 && range.last >= 0.0 && range.first.max(range.last) > 0.0 {

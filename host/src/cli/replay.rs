@@ -90,7 +90,7 @@ pub fn run(args: Args) -> Result<(), Error> {
         .answer_with(&recorded.understood, &log, format_args!("{}", log.summary))
 }
 
-/// Runs the signal chain on this computer.
+/// Runs the signal chain of the device on a recording, on this computer.
 fn on_host(args: &Args, sensed: &Sensed, table: Option<&[u8]>) -> Result<VerdictLog, Error> {
     let monitor = Monitor::new(sensed.settings)
         .map_err(|error| Error::input(format!("{}: {error}", args.recording.display())))?;
@@ -119,7 +119,8 @@ fn on_host(args: &Args, sensed: &Sensed, table: Option<&[u8]>) -> Result<Verdict
     Ok(log)
 }
 
-/// Runs the signal chain on a device, and afterwards restores its settings and returns it to its own sensor.
+/// Runs the signal chain of a device on a recording. Afterwards it restores the settings of the device and returns it
+/// to its own sensor.
 fn on_device(args: &Args, port: &str, sensed: &Sensed, table: Option<&[u8]>) -> Result<VerdictLog, Error> {
     let (mut client, _) = Client::connect(device::open(port, None)?)?;
     if let (Some(bytes), Some(path)) = (table, &args.table) {
@@ -159,8 +160,8 @@ fn feed_recording(args: &Args, client: &mut Client, sensed: &Sensed) -> Result<V
     let mut log = VerdictLog::default();
     for (block, edges) in sensed.steps() {
         client.feed(block, edges)?;
-        // The last report before the reply belongs to this block. Earlier reports belong to the device's own sensor, which
-        // it evaluates until the first block is fed.
+        // The last report before the reply to a fed block is the report on this block. Earlier reports belong to the
+        // device's own sensor, which it evaluates until the first block is fed.
         let mut last = None;
         while let Some(event) = client.next_event(Duration::ZERO)? {
             if let Event::Report(report) = event {

@@ -20,7 +20,7 @@ pub(super) struct RecordedSegment {
     stated: StatedColumns,
 }
 
-/// What the user states about the files of recordings.
+/// Facts that the user states about the files of recordings: channels, units, sample rate.
 #[derive(Clone, Debug, Default, clap::Args)]
 #[command(next_help_heading = "Import of the recordings")]
 pub(super) struct StatedColumns {
@@ -36,7 +36,7 @@ pub(super) struct StatedColumns {
     record: Option<u32>,
 }
 
-/// Recordings of a verb, and how their files were understood where they had to be interpreted.
+/// Recordings that a verb has read, and how their files were understood where they had to be interpreted.
 #[derive(Default)]
 pub(super) struct Recorded {
     pub(super) recordings: Vec<Recording>,

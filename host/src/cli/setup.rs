@@ -31,7 +31,7 @@ pub struct Args {
     /// TOML file with answers.
     #[arg(long, value_name = "FILE")]
     answers: Option<PathBuf>,
-    /// Replace the case file of the folder.
+    /// Replace the case file in the folder of the machine if there is one.
     #[arg(long)]
     replace: bool,
     #[command(flatten)]
@@ -380,7 +380,8 @@ impl Given {
         let ktc_mpa = self
             .ktc_mpa
             .ok_or_else(|| Error::input("--material or --ktc-mpa is missing"))?;
-        // Without a measurement the radial force is three tenths of the tangential one, as textbooks assume for a sharp edge.
+        // Without a measurement the radial cutting coefficient is three tenths of the tangential one, as textbooks
+        // assume for a sharp edge.
         let krc_mpa = self.krc_mpa.unwrap_or(0.3 * ktc_mpa);
         Ok(MaterialAnswer::Given {
             cutting_mpa: [ktc_mpa, krc_mpa, self.kac_mpa.unwrap_or(0.0)],

@@ -100,7 +100,7 @@ const SAMPLE_RATE_HZ: f64 = 26_667.0;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum EntryKind {
-    /// Through the side faces of the workpiece: the immersion increases at entry and decreases at exit.
+    /// The tool feeds through the side faces of the workpiece: the immersion increases at entry and decreases at exit.
     Feed,
     /// The axial depth rises linearly from 0 at entry and falls linearly to 0 at exit.
     Ramp,
@@ -309,7 +309,7 @@ fn cut(args: &Args, case: &Case, effects: Effects) -> Result<VirtualCut, Error> 
     Ok(cut)
 }
 
-/// Adds the case file or the option that caused the error to its message.
+/// Adds to an error of a simulated cut the case file or the option that caused it.
 fn with_source(args: &Args, error: VirtualCutError) -> Error {
     let case = args.case.display();
     match error {

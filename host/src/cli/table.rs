@@ -76,7 +76,8 @@ struct TableOutput {
     warnings: Vec<String>,
 }
 
-/// Bound of the interpolation error between the entries of a lobe table: in depth, mm, and in relative spindle speed.
+/// Bound of the interpolation error between the entries of a lobe table: in depth, mm, and in spindle speed, relative
+/// to the speed.
 #[derive(Serialize)]
 struct ErrorOutput {
     depth_mm: f32,
@@ -102,7 +103,7 @@ struct ModeOutput {
     damping_ratio: f32,
 }
 
-/// Derivatives of both ends of an unstable depth interval, mm per relative change of the parameter.
+/// Derivatives of both ends of an unstable depth interval of the lobe table, mm per relative change of the parameter.
 #[derive(Serialize)]
 struct DerivativesOutput {
     by_frequency_mm: [Vec<f32>; 2],

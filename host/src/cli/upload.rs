@@ -10,7 +10,7 @@ use super::port::{PortArgs, TableAnswer};
 use super::{Error, Output};
 use crate::file;
 
-/// Sends a lobe table to the device; resumes an interrupted upload.
+/// Sends a lobe table to the device; continues an interrupted upload.
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Example:\n  quietcut table tests/cases/kuka-kr90-acetal.toml --out kuka.qct\n  quietcut upload simulated kuka.qct --state device.bin"
@@ -65,7 +65,7 @@ pub fn run(args: Args) -> Result<(), Error> {
     args.output.answer(&answer, text)
 }
 
-/// Progress bar on stderr if stderr is a terminal, else an invisible bar.
+/// Progress bar of an upload of `bytes` bytes on stderr, invisible if stderr is no terminal.
 fn progress_bar(bytes: usize) -> ProgressBar {
     let bar = ProgressBar::new(bytes as u64);
     if let Ok(style) = ProgressStyle::with_template("upload {bar:40} {bytes}/{total_bytes} {eta}") {

@@ -9,7 +9,7 @@ use super::{Error, Output, Range};
 use crate::case::Case;
 use crate::stability::{Label, SpeedLine, chart};
 
-/// Option for a third parameter of the chart besides spindle speed and axial depth.
+/// Options that vary a third parameter of the stability chart besides spindle speed and axial depth.
 #[derive(Debug, clap::Args)]
 pub(super) struct Varied {
     /// Compute the limits for each of these feed directions: degrees from the machine's x towards its y, first:last:count.
@@ -68,7 +68,7 @@ impl Varied {
     }
 }
 
-/// Computes and prints the chart of limits for each value of the varied parameter.
+/// Computes and prints the stability chart for each value of the varied feed or feed direction.
 pub(super) fn run(
     case: &Case,
     method: &MethodChoice,
@@ -90,7 +90,7 @@ pub(super) fn run(
             speeds: chart.speeds,
         });
     }
-    // A range has at least one value.
+    // A range of the command line has at least one value, so there is a label.
     let Some(label) = label else { return Ok(()) };
     let mut text = format!(
         "method: {label}\n{:>18}    rev/min  first limit [mm]  kind",

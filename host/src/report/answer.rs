@@ -13,7 +13,7 @@ use super::words;
 /// Verdict of the chatter detector after one block of samples.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct VerdictAnswer {
-    /// Time of the end of the block, s, on the clock of the samples.
+    /// Time of the end of the block of samples to which the verdict belongs, s, on the clock of the samples.
     pub t_s: f64,
     /// Key of the verdict, see [`words::verdict_key`].
     pub verdict: &'static str,
@@ -23,7 +23,7 @@ pub struct VerdictAnswer {
     pub confidence: f64,
     /// Spindle speed, rev/min; `None` if it is not measured and not set.
     pub spindle_rpm: Option<f64>,
-    /// Advice of the device; `None` if there is none.
+    /// Advice of the device on speed and depth; `None` if there is none.
     pub advice: Option<AdviceAnswer>,
 }
 
@@ -45,7 +45,7 @@ pub struct AdviceAnswer {
 }
 
 impl VerdictAnswer {
-    /// Converts the report of the signal chain after one block.
+    /// Converts the report of the signal chain on one block of samples.
     pub fn new(report: &Report) -> Self {
         let judgement = &report.judgement;
         Self {
@@ -79,7 +79,7 @@ impl AdviceAnswer {
 /// Log of the changes in a sequence of reports: the output of `replay` and `monitor`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct VerdictLog {
-    /// First verdict, and every later one whose verdict or advice differs from the previous one.
+    /// The first verdict of the sequence, and every later one that differs from the previous one in verdict or advice.
     pub verdicts: Vec<VerdictAnswer>,
     /// Summary over all reports.
     pub summary: Summary,
@@ -88,7 +88,8 @@ pub struct VerdictLog {
 /// Summary of a sequence of reports: main verdict and counts of blocks, clipped samples and gaps.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Summary {
-    /// First kind of chatter that was detected; without chatter the last verdict. `None` without any report.
+    /// Main verdict of a sequence of reports: the first kind of chatter that was detected; without chatter the last
+    /// verdict. `None` without any report.
     pub verdict: Option<&'static str>,
     /// Time of the first report with the main verdict, s, on the clock of the samples.
     pub since_s: Option<f64>,
@@ -119,7 +120,7 @@ impl fmt::Display for Summary {
 }
 
 impl VerdictLog {
-    /// Adds the next report; returns its verdict if verdict or advice differs from the previous one.
+    /// Adds the next report to the log; returns its verdict if verdict or advice differs from the previous one.
     pub fn take(&mut self, report: &Report) -> Option<&VerdictAnswer> {
         let next = VerdictAnswer::new(report);
         let summary = &mut self.summary;

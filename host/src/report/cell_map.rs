@@ -20,13 +20,13 @@ const BANDS: [(f64, RGBColor, &str); 9] = [
     (f64::INFINITY, RGBColor(0xc8, 0x60, 0x53), "above 2"),
 ];
 
-/// Colour and name of cells whose interval |μ| ± error contains 1.
+/// Colour and name of cells of the map whose interval |μ| ± error contains 1, so that stability is undecided.
 const UNDECIDED: (RGBColor, &str) = (RGBColor(0x9a, 0xa0, 0xa8), "undecided");
 
-/// Size of the picture in pixels.
+/// Width and height in pixels of the map of Floquet multipliers.
 const SIZE: (u32, u32) = (1100, 520);
 
-/// Draws the map as SVG. Speeds and depths must be ascending, at least two of each.
+/// Draws the map of Floquet multipliers as SVG. Speeds and depths must be ascending, at least two of each.
 ///
 /// # Errors
 /// Speeds or depths are fewer than two or not ascending, or the drawing library fails.
@@ -64,7 +64,8 @@ pub fn cell_map(title: &str, chart: &CellChart) -> Result<String, PictureError> 
     })
 }
 
-/// Cell borders: midpoints between values; the outer borders lie half a step outside the first and the last value.
+/// Borders between the cells of the map: midpoints between neighbouring speeds or depths. The outer borders lie half a
+/// step outside the first and the last value.
 fn edges(values: &[f64]) -> Vec<f64> {
     let count = values.len();
     let mut edges: Vec<f64> = values.windows(2).map(|pair| 0.5 * (pair[0] + pair[1])).collect();
@@ -73,7 +74,8 @@ fn edges(values: &[f64]) -> Vec<f64> {
     edges
 }
 
-/// Index of the band of |μ| of a cell; `BANDS.len()` for undecided cells.
+/// Index of the colour band of a cell of the map from its |μ| (modulus of the dominant Floquet multiplier);
+/// `BANDS.len()` for undecided cells.
 fn band_of(multiplier_abs: f64, verdict: Verdict) -> usize {
     if verdict == Verdict::Undecided {
         return BANDS.len();
@@ -82,7 +84,8 @@ fn band_of(multiplier_abs: f64, verdict: Verdict) -> usize {
     BANDS.iter().position(below).unwrap_or(BANDS.len() - 1)
 }
 
-/// Draws the cells of one band; neighbouring cells along the depth become one rectangle.
+/// Draws the cells of the map whose |μ| lies in one colour band; neighbouring cells along the depth become one
+/// rectangle.
 fn draw_band(
     axes: &mut Axes<'_, '_>,
     chart: &CellChart,
@@ -147,7 +150,8 @@ fn contour(chart: &CellChart, speeds: &[f64]) -> Vec<(MapPoint, MapPoint)> {
     segments
 }
 
-/// Zero of ln |μ| between two points by linear interpolation; `None` if its sign does not change.
+/// Point between two points of the map at which |μ| = 1 (ln |μ| = 0), by linear interpolation; `None` if ln |μ| does
+/// not change its sign.
 fn crossing((from, a): (MapPoint, f64), (to, b): (MapPoint, f64)) -> Option<MapPoint> {
     let share = ((a > 0.0) != (b > 0.0)).then(|| (a / (a - b)).clamp(0.0, 1.0))?;
     Some((from.0 + (to.0 - from.0) * share, from.1 + (to.1 - from.1) * share))

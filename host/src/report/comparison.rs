@@ -16,7 +16,7 @@ pub struct Line {
     pub name: String,
     /// Points (x, y).
     pub points: Vec<(f64, f64)>,
-    /// Meaning of the line, which sets its colour and shape.
+    /// Meaning of the line in the chart, which sets its colour and shape.
     pub role: LineRole,
 }
 

@@ -120,7 +120,7 @@ fn prediction_error_table(diagnosis: &Diagnosis) -> Markup {
     }
 }
 
-/// Pictures of the channels with the largest ratio of residual to noise.
+/// Residual pictures of the channels with the largest ratio of residual to noise.
 fn all_pictures(diagnosis: &Diagnosis) -> Result<Markup, PictureError> {
     let mut views: Vec<&ResidualView> = diagnosis.views.iter().collect();
     let residual_to_noise = |view: &ResidualView| view.sizes()[1] / view.deviation.max(f64::MIN_POSITIVE);

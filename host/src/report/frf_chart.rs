@@ -9,10 +9,10 @@ use super::picture::{
 };
 use crate::frf::{Frf, FrfTable};
 
-/// Size of the picture in pixels.
+/// Width and height in pixels of the chart of receptances.
 const SIZE: (u32, u32) = (900, 860);
 
-/// Colours of the receptances, used cyclically.
+/// Colours of the receptances in the chart, used cyclically.
 const COLORS: [RGBColor; 6] = [BLUE, ORANGE, QUIET, CHATTER, VIOLET, INK];
 
 /// Draws magnitude in µm/N, phase in degrees and coherence of all receptances of a table as SVG.
@@ -51,7 +51,7 @@ pub fn frf_chart(title: &str, table: &FrfTable) -> Result<String, PictureError> 
     })
 }
 
-/// Draws one panel: one value (magnitude, phase or coherence) of every receptance over frequency.
+/// Draws one panel of the chart: magnitude, phase or coherence of every receptance over frequency.
 fn lines(
     canvas: &Canvas<'_>,
     table: &FrfTable,

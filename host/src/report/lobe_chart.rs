@@ -27,7 +27,7 @@ pub struct FirstLimit {
 pub struct Column {
     /// Spindle speed, rev/min.
     pub rpm: f64,
-    /// Stable depths, mm, as ascending intervals.
+    /// Stable axial depths at this speed, mm, as ascending intervals.
     pub stable_mm: Vec<(f64, f64)>,
     /// Undecided depths, mm, as ascending intervals in which the modulus of the dominant Floquet multiplier is 1 within
     /// the error of the method.
@@ -40,7 +40,7 @@ pub struct Column {
 }
 
 impl Column {
-    /// Columns of one layer of a lobe table, with the rounding of the device.
+    /// Stability at each spindle speed from one layer of a lobe table, with the depths as the device rounds them.
     pub fn of_table(table: &LobeTable<'_>, layer: usize) -> Vec<Self> {
         let speeds = table.speeds().enumerate();
         speeds
@@ -101,11 +101,11 @@ const STABLE: RGBColor = RGBColor(0xd2, 0xea, 0xdc);
 const UNDECIDED: RGBColor = RGBColor(0xd6, 0xd8, 0xdc);
 const UNSTABLE: RGBColor = RGBColor(0xfa, 0xec, 0xec);
 
-/// Size of the picture in pixels.
+/// Width and height in pixels of the lobe diagram.
 const SIZE: (u32, u32) = (960, 480);
 
-/// Draws the diagram as SVG. `columns` must be sorted by speed, with at least two different speeds; depths range from 0 to
-/// `depth_max_mm`.
+/// Draws the stability lobe diagram as SVG. `columns` must be sorted by speed, with at least two different speeds;
+/// depths range from 0 to `depth_max_mm`.
 ///
 /// # Errors
 /// There are fewer than two speeds or no depth, or the drawing library fails.
@@ -172,7 +172,7 @@ fn draw_undecided(
     Ok(())
 }
 
-/// Draws the band between the 5 and 95 % percentiles of the first limit, and its median.
+/// Draws the band between the 5 and 95 % percentiles of the first stability limit, and its median.
 fn draw_percentiles(
     chart: &mut Axes<'_, '_>,
     columns: &[Column],
@@ -211,8 +211,8 @@ fn limit_look(kind: LimitKind) -> (RGBColor, &'static str) {
     }
 }
 
-/// Polygons of intervals over speed: trapezoids between two columns with equally many intervals, else rectangles to the midpoint
-/// between the columns.
+/// Polygons of depth intervals over the spindle speed: trapezoids between two neighbouring speeds with equally many
+/// intervals, else rectangles to the midpoint between the speeds.
 fn areas(columns: &[Column], intervals: impl Fn(&Column) -> &[(f64, f64)]) -> Vec<Vec<(f64, f64)>> {
     let mut areas = Vec::new();
     for (left, right) in columns.iter().zip(columns.iter().skip(1)) {
@@ -232,7 +232,7 @@ fn areas(columns: &[Column], intervals: impl Fn(&Column) -> &[(f64, f64)]) -> Ve
     areas
 }
 
-/// Draws the first limits of one kind of stability loss as lines.
+/// Draws the first stability limits of one kind (Hopf, flip or fold) as lines.
 fn draw_limits(
     chart: &mut Axes<'_, '_>,
     columns: &[Column],
@@ -252,7 +252,8 @@ fn draw_limits(
     Ok(())
 }
 
-/// Runs of neighbouring speeds whose first limit has this kind; a run extends to the midpoint towards a neighbour of another kind.
+/// Runs of neighbouring spindle speeds whose first stability limit has kind `kind`; a run extends to the midpoint
+/// towards a neighbour of another kind.
 fn limit_runs(columns: &[Column], depth_max_mm: f64, kind: LimitKind) -> Vec<Vec<(f64, f64)>> {
     let visible = |column: &Column| column.first_limit.filter(|limit| limit.depth_mm <= depth_max_mm);
     let mut runs: Vec<Vec<(f64, f64)>> = Vec::new();

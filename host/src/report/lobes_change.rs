@@ -9,7 +9,8 @@ use super::page::figure;
 use crate::criteria::UNCHANGED_LIMIT;
 use crate::diagnose::lobes::{Change, Chart, Lobes};
 
-/// Sentences about the change of the limits and of the predicted trial cuts.
+/// Sentences about the change of the stability limits by the extension of a case, and about the trial cuts that both
+/// predict.
 pub fn sentences(lobes: &Lobes) -> Vec<String> {
     let changes = lobes
         .speeds

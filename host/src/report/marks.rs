@@ -18,20 +18,20 @@ pub enum MarkKind {
     Marginal,
 }
 
-/// Mark of one cut on the chart.
+/// Mark of one cut on the stability chart.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mark {
     /// Spindle speed, rev/min.
     pub rpm: f64,
     /// Axial depth, mm.
     pub depth_mm: f64,
-    /// Outcome of the cut, which sets the symbol.
+    /// Outcome of the marked cut, which sets the symbol.
     pub kind: MarkKind,
-    /// Label beside the symbol; empty for none.
+    /// Label beside the symbol of the cut; empty for none.
     pub label: String,
-    /// Advised spindle speed in rev/min and depth in mm, shown by an arrow.
+    /// Spindle speed in rev/min and axial depth in mm that the device advised after the cut, shown by an arrow.
     pub advice: Option<(f64, f64)>,
-    /// Whether the chart predicts the opposite outcome, shown by a ring.
+    /// True if the stability chart predicts the opposite outcome of the cut, which a ring shows.
     pub wrong: bool,
 }
 
@@ -59,7 +59,7 @@ fn overlap(a: Area, b: Area) -> bool {
     a.0 < b.2 && b.0 < a.2 && a.1 < b.3 && b.1 < a.3
 }
 
-/// Draws the marks with their labels and arrows.
+/// Draws the marks of cuts with their labels and arrows on the stability chart.
 pub(super) fn draw_marks(
     canvas: &Canvas<'_>,
     chart: &mut Axes<'_, '_>,
@@ -104,7 +104,7 @@ pub(super) fn draw_marks(
     Ok(())
 }
 
-/// Draws a label near `at` that does not cover another one: above, below, then farther away.
+/// Draws a label near the pixel `at` where it does not cover another label: above, below, then farther away.
 fn draw_label(
     canvas: &Canvas<'_>,
     at: (i32, i32),
@@ -145,7 +145,7 @@ fn draw_label(
     Ok(())
 }
 
-/// Draws an arrow that ends 12 pixels before its target.
+/// Draws an arrow between two pixels that ends 12 pixels before its target.
 fn draw_arrow(canvas: &Canvas<'_>, from: (i32, i32), to: (i32, i32)) -> Result<(), PictureError> {
     const GAP: f64 = 12.0;
     const HEAD: f64 = 11.0;

@@ -19,7 +19,7 @@ impl<E: std::error::Error + Send + Sync> From<DrawingAreaErrorKind<E>> for Pictu
 }
 
 impl PictureError {
-    /// Error for missing data; `what` states the data that the picture needs.
+    /// Error of a picture for which data are missing; `what` states the needed data.
     pub(super) fn nothing(what: &str) -> Self {
         Self(what.into())
     }

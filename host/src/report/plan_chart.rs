@@ -8,10 +8,10 @@ use super::marks::{Mark, MarkKind, draw_marks};
 use super::picture::{Axes, BLUE, INK, Labels, PictureError, axes, draw, text};
 use crate::plan::{Plan, Speed, Test};
 
-/// Size of the picture in pixels.
+/// Width and height in pixels of the chart of a test plan.
 const SIZE: (u32, u32) = (960, 480);
 
-/// Draws the chart as SVG with depths from 0 to `depth_max_mm`; it sorts the speeds.
+/// Draws the chart of a test plan as SVG with depths from 0 to `depth_max_mm`; it sorts the speeds.
 ///
 /// # Errors
 /// There are fewer than two speeds, or the drawing library fails.

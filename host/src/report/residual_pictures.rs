@@ -10,10 +10,10 @@ use super::time_signal::thinned;
 use crate::criteria::AMPLITUDE_RATIO;
 use crate::diagnose::{MissingForce, ResidualView, SpindleMotionView};
 
-/// Largest number of points of a scatter plot: a choice that limits the file size.
+/// Largest number of points of a scatter plot of residuals: a choice that limits the file size.
 const POINTS: usize = 3000;
 
-/// Size in pixels of pictures that stand side by side.
+/// Width and height in pixels of residual pictures that stand side by side.
 const HALF_WIDTH_SIZE: (u32, u32) = (470, 330);
 
 /// Highest spindle order in the picture divided by the number of teeth: a choice that shows four harmonics of the tooth passing.
@@ -22,7 +22,8 @@ const ORDERS_PER_TOOTH: f64 = 4.5;
 /// Number of tooth passings in the stroboscopic picture, the last ones of the record: a choice.
 const PASSINGS: usize = 400;
 
-/// All pictures of one channel of one record; `channel_views` are the residuals of this channel in all records.
+/// All residual pictures of one channel of one record; `channel_views` are the residuals of this channel in all
+/// records.
 ///
 /// # Errors
 /// A picture cannot be drawn.
@@ -120,7 +121,8 @@ fn over_time(view: &ResidualView, what: &str) -> Result<String, PictureError> {
     comparison((960, 300), [what, "time [s]", &unit], &lines, None)
 }
 
-/// Amplitude spectra of measured signal and residuals up to `last_hz`; `scale` converts Hz to the unit of the axis.
+/// Amplitude spectra of measured signal and residuals of a channel up to `last_hz`; `scale` converts Hz to the unit of
+/// the horizontal axis.
 fn spectra(view: &ResidualView, points: usize, last_hz: f64, scale: f64) -> Vec<Line> {
     let mut lines: Vec<Line> = signals(view)
         .into_iter()

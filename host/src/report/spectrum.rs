@@ -5,10 +5,10 @@ use plotters::style::Color;
 
 use super::picture::{BLUE, CHATTER, Labels, ORANGE, PictureError, axes, draw, label, legend, span};
 
-/// Size of the picture in pixels.
+/// Width and height in pixels of the picture of a spectrum.
 const SIZE: (u32, u32) = (470, 330);
 
-/// Frequencies marked in a spectrum, Hz.
+/// Frequencies that are marked in the picture of a spectrum, Hz.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SpectrumMarks {
     /// Tooth-passing frequency, Hz; thin lines mark its harmonics.

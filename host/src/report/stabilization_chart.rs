@@ -9,10 +9,10 @@ use super::picture::{
 };
 use crate::identify::modes::{ModalModel, Receptances};
 
-/// Size of the picture in pixels.
+/// Width and height in pixels of the stabilization diagram.
 const SIZE: (u32, u32) = (900, 820);
 
-/// Colours of the receptances, used cyclically.
+/// Colours of the receptances in the stabilization diagram, used cyclically.
 const COLORS: [RGBColor; 6] = [BLUE, ORANGE, QUIET, CHATTER, VIOLET, INK];
 
 /// Draws stable poles, unstable poles and the selected modes over frequency and model order; below them the magnitude of the

@@ -16,9 +16,10 @@ pub struct TimeMark {
     pub label: String,
 }
 
-/// Size of the picture in pixels.
+/// Width and height in pixels of the chart of a signal over time.
 const SIZE: (u32, u32) = (960, 280);
-/// Number of subintervals of time whose minimum and maximum are drawn: a choice slightly above the width of the picture in pixels.
+/// Number of subintervals of the time axis, in each of which the minimum and maximum of the signal are drawn: a choice
+/// slightly above the width of the picture in pixels.
 const SUBINTERVALS: usize = 1200;
 
 /// Draws `values` at the ascending times `t_s` (equally many, s) as SVG; `range` is that of the vertical axis, by default that of
@@ -58,7 +59,7 @@ pub fn time_signal(
     })
 }
 
-/// Reduces a signal to the minimum and maximum of each subinterval of time, in their order.
+/// Reduces a signal over time to its minimum and maximum in each subinterval of time, in the order in which they occur.
 pub(super) fn thinned(t_s: &[f64], values: &[f64]) -> Vec<(f64, f64)> {
     let points: Vec<(f64, f64)> = t_s.iter().copied().zip(values.iter().copied()).collect();
     let length = points.len().div_ceil(SUBINTERVALS).max(1);

@@ -9,7 +9,7 @@ use quietcut_core::working_point::WorkingPoint;
 
 use super::time::seconds;
 
-/// Key of a verdict in JSON and CSV.
+/// Text of a verdict that JSON and CSV outputs use as its key.
 pub fn verdict_key(verdict: Verdict) -> &'static str {
     match verdict {
         Verdict::AirCut => "air-cut",
@@ -22,7 +22,7 @@ pub fn verdict_key(verdict: Verdict) -> &'static str {
     }
 }
 
-/// Key of an advised action in JSON and CSV.
+/// Text of an advised action that JSON and CSV outputs use as its key.
 pub fn action_key(action: Action) -> &'static str {
     match action {
         Action::Keep => "keep",
@@ -32,7 +32,7 @@ pub fn action_key(action: Action) -> &'static str {
     }
 }
 
-/// Key of the source of advice in JSON and CSV.
+/// Text of the source of advice that JSON and CSV outputs use as its key.
 pub fn source_key(source: Source) -> &'static str {
     match source {
         Source::Table => "table",
@@ -161,7 +161,7 @@ fn source_reason(advice: &Advice, judgement: &Judgement, speed: Option<Rpm>) -> 
     }
 }
 
-/// Reason why a better source of advice was not used.
+/// Text of the reason why advice does not come from a better source, such as the lobe table.
 pub fn obstacle(obstacle: &Obstacle) -> String {
     match obstacle {
         Obstacle::NoTable => "the device has no lobe table".into(),
@@ -180,7 +180,7 @@ pub fn obstacle(obstacle: &Obstacle) -> String {
     }
 }
 
-/// Kind of the loss of stability as a text.
+/// Text of the kind of stability loss, such as Hopf.
 pub fn limit(kind: lobes::IntervalKind) -> &'static str {
     match kind {
         lobes::IntervalKind::Hopf => "chatter at a frequency not synchronous with the teeth (Hopf)",
@@ -190,7 +190,7 @@ pub fn limit(kind: lobes::IntervalKind) -> &'static str {
     }
 }
 
-/// Reason why a lobe table does not cover a cut.
+/// Text of the reason why a lobe table does not say whether a cut is stable.
 pub fn not_known(why: &NotKnown) -> String {
     match why {
         NotKnown::Speed { asked, from, to } => {

@@ -40,7 +40,7 @@ pub fn advise(
     if !judgement.verdict.is_chatter() {
         return keep;
     }
-    // The negated comparison also refuses a NaN speed.
+    // The negated comparison also refuses a spindle speed that is NaN.
     if !(speed.0 > 0.0 && speed.0.is_finite()) {
         return Advice {
             action: Action::NotKnown,
@@ -120,8 +120,8 @@ fn cut_in_table<'t>(
     }
 }
 
-/// The working point to assume if none is set: the first layer, at the smallest depth with chatter of the detected kind, else
-/// with chatter of any kind.
+/// The working point that advice assumes if none is set: that of the first layer of the lobe table, at the smallest
+/// depth with chatter of the detected kind, else with chatter of any kind.
 fn assumed_point(judgement: &Judgement, speed: Rpm, table: &LobeTable<'_>) -> Result<WorkingPoint, Obstacle> {
     let layer = table.layers().next().ok_or(Obstacle::Table(NotKnown::Damaged))?;
     let mut at = WorkingPoint {
@@ -156,7 +156,7 @@ fn speed_range(limits: Option<&Limits>, table: Option<&LobeTable<'_>>) -> (f32, 
         })
 }
 
-/// Advice from the table: a quiet speed at the present depth, else a smaller depth.
+/// Advice from the lobe table: a quiet speed (stable with margin) at the present depth, else a smaller depth.
 fn by_table(cut: &Cut<'_>, speed: Rpm, range: (f32, f32), keep: Advice) -> Result<Advice, Obstacle> {
     let quiet = QuietSpeedSearch::new(cut.table, &cut.at, range).map_err(Obstacle::Table)?;
     if let Some(quiet_speed) = quiet.nearest_speed(speed) {

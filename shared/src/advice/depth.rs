@@ -21,11 +21,11 @@ struct Candidate {
 }
 
 impl QuietSpeedSearch<'_> {
-    /// The largest quiet depth that does not exceed the depth of the cut, and its speed. This is the present speed, unless the
-    /// quiet depth of another speed is larger by the factor [`BETTER`].
+    /// The largest quiet depth (stable with margin) up to the depth of the cut, and the spindle speed for it. That is
+    /// the present speed, unless the quiet depth of another speed is larger by the factor [`BETTER`].
     ///
-    /// The entries at the grid speeds give an upper bound of the quiet depth at every speed. For the speeds with the largest
-    /// bounds the quiet depth is computed exactly, until no bound exceeds the best quiet depth found.
+    /// The entries at the grid speeds give an upper bound of the quiet depth at every speed. For the speeds with the
+    /// largest bounds the quiet depth is computed exactly, until no bound exceeds the best quiet depth found.
     pub(super) fn largest_depth(&self, speed: Rpm) -> Option<(Rpm, Millimeters)> {
         let present_mm = self.largest_depth_mm(speed.0, 0.0);
         let mut best = present_mm.map(|depth_mm| (speed.0, depth_mm));
@@ -92,7 +92,8 @@ impl QuietSpeedSearch<'_> {
         largest_possible_mm(&self.cut, indices, self.depth_mm, self.depth_to_mm)
     }
 
-    /// The largest quiet depth in mm at a speed, if it exceeds `at_least_mm`. All speeds of the speed band are checked.
+    /// The largest quiet depth (stable with margin) in mm at a spindle speed, if it exceeds `at_least_mm`. All speeds
+    /// of the speed band around it are checked.
     fn largest_depth_mm(&self, rpm: f32, at_least_mm: f32) -> Option<f32> {
         let (low_rpm, high_rpm) = self.known_rpm;
         let from_rpm = f32::max(rpm * (1.0 - SPEED_BAND), self.machine_rpm.0);
@@ -193,7 +194,7 @@ impl Window {
     }
 }
 
-/// Intersection of two ascending lists of depth ranges.
+/// Intersection of two ascending lists of axial depth ranges.
 fn intersection(a: &Ranges, b: &Ranges) -> Ranges {
     let mut common = Ranges::new();
     for &(a_from, a_to) in a {

@@ -14,7 +14,7 @@ pub enum Action {
     Keep,
     /// Change the spindle speed.
     Speed,
-    /// Reduce the axial depth, at [`Advice::speed`].
+    /// Reduce the axial depth of the cut, at the spindle speed [`Advice::speed`].
     Depth,
     /// No advice can be given; [`Advice::obstacle`] says what is missing.
     NotKnown,
@@ -31,7 +31,7 @@ pub enum Source {
     ToothPassingRule,
 }
 
-/// The reason why no better source of advice was used.
+/// The reason why advice does not come from a better source, such as the lobe table.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Obstacle {

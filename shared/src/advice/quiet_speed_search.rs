@@ -8,7 +8,7 @@ use crate::lobes::{CutLobes, LobeTable, NotKnown};
 use crate::units::{Millimeters, Rpm};
 use crate::working_point::WorkingPoint;
 
-/// Direction of the search in spindle speed.
+/// Direction of the search for quiet speeds: towards faster or slower spindle speeds.
 #[derive(Clone, Copy)]
 pub(super) enum Direction {
     Faster,
@@ -34,7 +34,7 @@ impl Direction {
     }
 }
 
-/// The search for quiet speeds and depths of one cut.
+/// The search in the lobe table for speeds and depths at which one cut is stable with margin.
 pub(super) struct QuietSpeedSearch<'t> {
     pub(super) table: &'t LobeTable<'t>,
     pub(super) cut: CutLobes<'t>,
@@ -47,7 +47,7 @@ pub(super) struct QuietSpeedSearch<'t> {
 }
 
 impl<'t> QuietSpeedSearch<'t> {
-    /// Prepares a search within the speed range `machine_rpm` of the machine.
+    /// Prepares the search for quiet speeds of a cut within the speed range `machine_rpm` of the machine.
     ///
     /// # Errors
     /// The table has no layer for this cut, or is damaged.
@@ -58,7 +58,8 @@ impl<'t> QuietSpeedSearch<'t> {
     ) -> Result<Self, NotKnown> {
         let first_rpm = table.speeds().next().map_or(f32::NAN, |speed| speed.0);
         let last_rpm = table.speeds().next_back().map_or(f32::NAN, |speed| speed.0);
-        // The negated comparison also refuses NaN, which a table damaged after its check may contain.
+        // The negated comparison also refuses a speed range with NaN, which a table damaged after its check may
+        // contain.
         if !(first_rpm > 0.0 && first_rpm <= last_rpm && last_rpm.is_finite()) {
             return Err(NotKnown::Damaged);
         }
@@ -192,7 +193,8 @@ impl<'t> QuietSpeedSearch<'t> {
 struct Run<'q, 't> {
     quiet: &'q QuietSpeedSearch<'t>,
     direction: Direction,
-    /// The present speed. Speeds before it in the direction of the search are no candidates.
+    /// The present spindle speed, from which the search starts. Speeds before it in the direction of the search are not
+    /// advised.
     speed: Rpm,
     /// First speed of the run of stable speeds in rev/min; `None` while no run has begun.
     start_rpm: Option<f32>,

@@ -1,4 +1,4 @@
-//! The tooth-passing rule: a spindle speed from the chatter frequency alone.
+//! The tooth-passing rule: advises a spindle speed from the chatter frequency alone.
 
 use crate::criteria::{MAX_LOBE, SPEED_BAND};
 use crate::units::{Hertz, Rpm};

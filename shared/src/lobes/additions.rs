@@ -24,7 +24,8 @@ pub struct InterpolationError {
     pub speed: f32,
 }
 
-/// The optional parts of a lobe table that schema 2 adds: interpolation error, feed directions, modes and derivatives.
+/// The optional parts of a lobe table: interpolation error, feed directions of layers, modes and derivatives of limits.
+/// Schema 2 adds them.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Additions<'a> {
     /// Bound of the interpolation error of the lobe table, if known.
@@ -90,7 +91,8 @@ impl Additions<'_> {
     }
 }
 
-/// The feed direction in 1/100 degree, from 0 to below 360°; `None` for an angle that is not finite or beyond ±1000 revolutions.
+/// The code of a feed direction in 1/100 degree, from 0 to below 360°; `None` for an angle that is not finite or beyond
+/// ±1000 revolutions.
 pub(super) fn direction_code(direction: Degrees) -> Option<u16> {
     let turns = direction.0 / 360.0;
     if !(-1.0e3..=1.0e3).contains(&turns) {

@@ -7,7 +7,7 @@ use super::{IMMERSION_TOLERANCE, LobeTable, TableError, Validity};
 use crate::units::{Degrees, Rpm};
 
 impl<'a> LobeTable<'a> {
-    /// Parses `bytes`, which must be exactly one table, and checks header, CRC-32 and every entry.
+    /// Parses `bytes`, which must be exactly one lobe table, and checks header, CRC-32 and every entry.
     ///
     /// Cost: one pass over the bytes for the CRC and one over the entries.
     pub fn parse(bytes: &'a [u8]) -> Result<Self, TableError> {
@@ -23,7 +23,8 @@ impl<'a> LobeTable<'a> {
         Ok(table)
     }
 
-    /// Checks the entries as [`parse`](Self::parse) does, for a table whose CRC-32 was verified elsewhere.
+    /// Checks the entries of the lobe table as [`parse`](Self::parse) does, without the CRC-32, which the caller has
+    /// verified.
     pub fn check_entries(&self) -> Result<(), TableError> {
         check_entries(self)
     }
@@ -120,7 +121,8 @@ pub(super) fn check_layers(
             && layer.exit.0.is_finite();
         let clashes = |(other, other_direction): (Validity, Option<Degrees>)| match other.is_family_of(&layer)
         {
-            // Layers with different feed directions do not overlap. A layer for any direction overlaps every other.
+            // Table layers with different feed directions do not overlap. A layer for any direction overlaps every
+            // other.
             true if direction.zip(other_direction).is_some_and(|(a, b)| a != b) => false,
             true => other.feed_from <= layer.feed_to && layer.feed_from <= other.feed_to,
             // Table layers of equal immersion and posture form a family. The immersion ranges of two families,

@@ -18,7 +18,8 @@ pub struct Column {
 }
 
 impl Column {
-    /// A column for this depth range without unstable intervals.
+    /// A column of the lobe table without unstable intervals, for the depth range from `depth_from_mm` to
+    /// `depth_to_mm`.
     pub(super) fn new(depth_from_mm: f32, depth_to_mm: f32) -> Self {
         Self {
             depth_from_mm,
@@ -52,12 +53,13 @@ impl Column {
         &self.intervals
     }
 
-    /// The lowest unstable interval: its lower end is the stability limit for growing depth.
+    /// The lowest unstable depth interval: its lower end is the stability limit for growing depth.
     pub fn first_limit(&self) -> Option<&Interval> {
         self.intervals.first()
     }
 
-    /// The stable depth ranges [from, to), ascending. The last range includes the largest depth of the table if it ends there.
+    /// The ranges [from, to) of stable axial depths, ascending. The last range includes the largest depth of the table
+    /// if it ends there.
     pub fn stable(&self) -> impl Iterator<Item = (Millimeters, Millimeters)> + '_ {
         let starts = core::iter::once(self.depth_from_mm).chain(self.intervals.iter().map(|i| i.to.0));
         let ends = self
@@ -148,10 +150,12 @@ impl Column {
         (from_mm, to_mm)
     }
 
-    /// Fills an empty column with the interpolation between two neighbouring columns. `weight` is the weight of `b`, 0 to 1.
+    /// Fills an empty column (unstable depth intervals at one speed) with the interpolation between two neighbouring
+    /// columns of the lobe table. `weight` is the weight of `b`, 0 to 1.
     ///
-    /// Intervals that overlap or touch, within one column or across both, form a group. A group is interpolated if both columns have
-    /// the same sequence of kinds in it and the intervals overlap pairwise. Otherwise the union of both columns is unstable.
+    /// Intervals that overlap or touch, within one column or across both, form a group. A group is interpolated if both
+    /// columns have the same sequence of kinds in it and the intervals overlap pairwise. Otherwise the union of both
+    /// columns is unstable.
     pub(super) fn blend(&mut self, a: &Self, b: &Self, weight: f32) {
         let (mut rest_a, mut rest_b) = (a.intervals.as_slice(), b.intervals.as_slice());
         while !(rest_a.is_empty() && rest_b.is_empty()) {
@@ -171,9 +175,10 @@ impl Column {
         }
     }
 
-    /// Linear interpolation between two corresponding intervals.
+    /// Linear interpolation between two corresponding unstable depth intervals of neighbouring columns.
     ///
-    /// An interval end at the end of the table may lie beyond it in truth. The result then also ends at the end of the table.
+    /// An interval end at the end of the table may lie beyond it in truth. The result then also ends at the end of the
+    /// table.
     fn interpolate(&self, a: &Interval, b: &Interval, weight: f32) -> Interval {
         let between = |x: f32, y: f32| x + (y - x) * weight;
         let from_mm = if f32::min(a.from.0, b.from.0) <= self.depth_from_mm {

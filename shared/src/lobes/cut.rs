@@ -60,7 +60,7 @@ impl<'a> CutLobes<'a> {
         Ok(blended)
     }
 
-    /// Indices of the one or two layers from which the cut is interpolated.
+    /// Indices of the one or two table layers from which the cut is interpolated.
     pub(crate) fn layers(&self) -> impl Iterator<Item = usize> + use<> {
         [Some(self.near), (self.far != self.near).then_some(self.far)]
             .into_iter()
@@ -135,7 +135,7 @@ impl<'a> LobeTable<'a> {
         self.cut(working_point)?.column(speed)
     }
 
-    /// Stability of the cut at `speed`, according to the table.
+    /// Stability of the cut at spindle speed `speed` and the working point, from the lobe table.
     pub fn lookup(&self, speed: Rpm, working_point: &WorkingPoint) -> TabulatedStability {
         match self.column(speed, working_point) {
             Ok(column) => column.at(working_point.axial_depth),
@@ -179,7 +179,8 @@ fn bracket(table: &LobeTable<'_>, working_point: &WorkingPoint) -> Result<(usize
         return at(above);
     }
     match (at(below)?, at(above)?) {
-        // A lookup interpolates in feed or in direction, not in both: it would need four layers.
+        // A lookup interpolates between table layers in feed or in feed direction, not in both: that would need four
+        // layers.
         ((low, same_low, _), (high, same_high, _)) if low == same_low && high == same_high => {
             Ok((low, high, to_below / (to_below + to_above)))
         }

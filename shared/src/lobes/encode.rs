@@ -15,7 +15,7 @@ use crate::working_point::Limits;
 /// The content of a table.
 #[derive(Clone, Copy, Debug)]
 pub struct Content<'a> {
-    /// Name of the case; at most [`NAME_CAPACITY`] bytes.
+    /// Name of the case from which the table is computed; at most [`NAME_CAPACITY`] bytes.
     pub name: &'a str,
     /// Number of teeth of the tool.
     pub teeth: u8,
@@ -51,7 +51,7 @@ pub fn encoded_length_with(content: &Content<'_>, additions: &Additions<'_>) -> 
     shape_of(content, additions).length()
 }
 
-/// Writes a table of schema 1 into `buffer` and returns its bytes. The generation in the header is 0.
+/// Writes a lobe table of schema 1 into `buffer` and returns its bytes. The generation number in the header is 0.
 pub fn encode<'b>(content: &Content<'_>, buffer: &'b mut [u8]) -> Result<&'b [u8], TableError> {
     encode_with(content, &Additions::default(), buffer)
 }

@@ -18,14 +18,14 @@ pub enum TableError {
     },
     /// The bytes do not begin with the magic number of a lobe table.
     Magic {
-        /// The first four bytes found; a table begins with [`MAGIC`](super::format::MAGIC).
+        /// The first four bytes that were found; a lobe table begins with [`MAGIC`](super::format::MAGIC).
         found: [u8; 4],
     },
-    /// The table has a schema that this code does not know.
+    /// The lobe table has a schema that this code does not know.
     Schema {
         /// The schema of the table.
         found: u16,
-        /// The latest schema that this code knows.
+        /// The latest schema of lobe tables that this code knows.
         known: u16,
     },
     /// The table length that the header states differs from the number of bytes.
@@ -46,7 +46,7 @@ pub enum TableError {
     Arrays {
         /// The length in bytes that the counts in the description of the table imply.
         needed: u64,
-        /// The length in bytes of the table.
+        /// The actual length in bytes of the table.
         found: u32,
     },
     /// The name of the case in the table is too long or not UTF-8.
@@ -144,12 +144,12 @@ pub enum TableError {
         /// The flags of the description.
         found: u16,
     },
-    /// A feed direction that is not an angle, or a number of directions that differs from the number of layers.
+    /// A feed direction of a table layer is no angle, or the number of directions differs from the number of layers.
     FeedDirection {
         /// Index of the table layer with an invalid feed direction, or the number of feed directions.
         layer: u32,
     },
-    /// A mode whose frequency is not positive, or whose damping ratio is not in [0, 1).
+    /// A mode of a table layer has a frequency that is not positive, or a damping ratio that is not in [0, 1).
     Mode {
         /// Index of the layer.
         layer: u32,

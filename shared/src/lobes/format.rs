@@ -54,7 +54,7 @@ pub const SCHEMA: u16 = 2;
 pub const SCHEMA_PLAIN: u16 = 1;
 /// Length of the header of a lobe table, in bytes.
 pub const HEADER_LENGTH: usize = 32;
-/// Largest length of the name of a case, in bytes.
+/// Largest length of the name of a case in a lobe table, in bytes.
 pub const NAME_CAPACITY: usize = 32;
 /// Largest number of unstable depth intervals in one stored column of a lobe table.
 pub const MAX_INTERVALS: usize = 12;

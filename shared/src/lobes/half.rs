@@ -32,7 +32,8 @@ pub(super) fn encode(value: f32) -> u16 {
     // Below 2⁻¹⁴ (subnormal) a binary16 code is a multiple of 2⁻²⁴. Above, it is the upper bits of the f32 with the
     // exponent rebased.
     let (bits, step) = if size < 1.0 / 16_384.0 {
-        // In [1/2, 1) the last bit of an f32 has the value 2⁻²⁴, so that adding 1/2 rounds to a multiple of 2⁻²⁴.
+        // In [1/2, 1) the last bit of an f32 has the value 2⁻²⁴, so that adding 1/2 rounds a number to a multiple of
+        // 2⁻²⁴.
         return sign | ((size + 0.5).to_bits() - 0.5_f32.to_bits()) as u16;
     } else {
         (size.to_bits() - (112 << 23), 1_u32 << 13)

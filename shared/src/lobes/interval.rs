@@ -1,4 +1,4 @@
-//! A depth interval that is not stable, and the kind of its stability loss.
+//! A depth interval of a lobe table that is not stable, and the kind of its stability loss.
 
 use serde::{Deserialize, Serialize};
 

@@ -7,7 +7,7 @@ use super::{Column, InterpolationError, Interval, NotKnown, TableError, Validity
 use crate::units::{Degrees, Hertz, Millimeters, Rpm};
 use crate::working_point::Limits;
 
-/// A validated lobe table, read in place from its bytes.
+/// A lobe table whose bytes were checked. It is read in place, without a copy.
 #[derive(Clone, Copy, Debug)]
 pub struct LobeTable<'a> {
     pub(super) bytes: &'a [u8],
@@ -50,7 +50,7 @@ impl<'a> LobeTable<'a> {
         self.shape.teeth
     }
 
-    /// Speed limits of the machine, if the case has any.
+    /// Speed limits of the machine that the table states; `None` if the case has none.
     pub fn limits(&self) -> Option<Limits> {
         self.shape.limits
     }
@@ -121,7 +121,7 @@ impl<'a> LobeTable<'a> {
         }
     }
 
-    /// The feed direction of the cut, as set by [`towards`](Self::towards).
+    /// The feed direction of the cut that is looked up, as set by [`towards`](Self::towards).
     pub fn cut_direction(&self) -> Option<Degrees> {
         self.feed_direction
     }

@@ -13,18 +13,18 @@ pub enum NotKnown {
     Speed {
         /// The requested speed.
         asked: Rpm,
-        /// The slowest speed of the table.
+        /// The slowest spindle speed of the lobe table.
         from: Rpm,
-        /// The fastest speed of the table.
+        /// The fastest spindle speed of the lobe table.
         to: Rpm,
     },
     /// The axial depth lies outside the lobe table.
     Depth {
         /// The requested depth.
         asked: Millimeters,
-        /// The smallest depth of the table.
+        /// The smallest axial depth of the lobe table.
         from: Millimeters,
-        /// The largest depth of the table.
+        /// The largest axial depth of the lobe table.
         to: Millimeters,
     },
     /// The feed per tooth lies outside all table layers for this immersion and posture.
@@ -68,7 +68,7 @@ pub enum NotKnown {
     FeedDirectionNotTold,
 }
 
-/// Stability of a point (speed, working point) according to the table.
+/// Stability of a cut (spindle speed and working point) according to the lobe table.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum TabulatedStability {

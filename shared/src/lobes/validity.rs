@@ -16,7 +16,7 @@ pub struct Validity {
     pub start: Degrees,
     /// Exit angle of a tooth.
     pub exit: Degrees,
-    /// Index of the robot's posture; 0 on a machine tool.
+    /// Index of the robot's posture for which the layer is valid; 0 on a machine tool.
     pub posture: u8,
 }
 

@@ -17,7 +17,8 @@ pub(super) struct Angles {
 }
 
 impl Angles {
-    /// The spindle angle `delay` samples before sample `n` of the block. `delay` is the group delay of a filter.
+    /// The spindle angle at `delay` samples before sample `n` of the block. `delay` is the group delay of the filter
+    /// through which the sample passed.
     pub(super) fn at(&self, n: usize, delay: u32) -> Turns {
         let forward = self.per_sample.wrapping_mul(n as u64);
         let back = self.per_sample.wrapping_mul(u64::from(delay));

@@ -6,8 +6,8 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Band {
-    /// 5 to 400 Hz: modes of a robot or of a machine's frame.
+    /// The structure band, 5 to 400 Hz: modes of a robot or of a machine's frame.
     Structure,
-    /// Up to 5 kHz: modes of tool, holder and spindle.
+    /// The tool band, up to 5 kHz: modes of tool, holder and spindle.
     Tool,
 }

@@ -26,14 +26,14 @@ pub struct Settings {
 /// Largest number of teeth of a tool that the signal chain supports.
 pub const MAX_TEETH: u8 = 12;
 
-/// The reason why [`Settings`] are invalid.
+/// The reason why the settings of the signal chain are invalid.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum SettingsError {
     /// The tool has no teeth, or more than [`MAX_TEETH`].
     Teeth(u8),
-    /// The wheel has no positions, or fewer than four teeth outside of its gap.
+    /// The tachometer wheel has no positions, or fewer than four teeth outside of its gap.
     Wheel(Wheel),
-    /// The sample rate is outside the range of the decimation filters.
+    /// The sample rate of the sensor is outside the range of the decimation filters.
     SampleRate(Hertz),
     /// The acceleration of one sensor count is not a positive number.
     CountScale(f32),

@@ -13,9 +13,9 @@ use crate::units::Hertz;
 
 /// Axes over which the power spectra are summed: all three.
 const AXES: [usize; 3] = [0, 1, 2];
-/// Frequency range of the tone search in the structure band.
+/// Frequency range in which tones are searched in the structure band.
 const STRUCTURE_TONES: (Hertz, Hertz) = (Hertz(5.0), STRUCTURE_BAND);
-/// Frequency range of the tone search in the tool band.
+/// Frequency range in which tones are searched in the tool band.
 const TOOL_TONES: (Hertz, Hertz) = (Hertz(150.0), TOOL_BAND);
 
 impl Monitor {

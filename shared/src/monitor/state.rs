@@ -118,7 +118,7 @@ impl State {
         }
     }
 
-    /// True if the newest block completed a spectrum of the band.
+    /// True if the newest block of samples completed a spectrum of the band.
     pub fn has_fresh_spectrum(&self, band: Band) -> bool {
         match band {
             Band::Structure => self.structure.fresh,

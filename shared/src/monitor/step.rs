@@ -78,7 +78,7 @@ impl Monitor {
         }
     }
 
-    /// Processes the tachometer edges up to `now`. Returns the measured spindle speed.
+    /// Processes the tachometer edges up to the time `now`. Returns the measured spindle speed, if there is one.
     fn take_edges(&self, state: &mut State, edges: &[Edge], now: Nanoseconds) -> Option<Rpm> {
         let tachometer = self.tachometer.as_ref()?;
         for &edge in edges {

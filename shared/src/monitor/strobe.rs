@@ -13,7 +13,7 @@ pub struct Strobe {
     pub band: Band,
     /// Number of tooth periods since the tachometer locked. Modulo the number of teeth it is the index of the tooth.
     pub tooth: u32,
-    /// Acceleration along x, y and z, in m/s².
+    /// Acceleration along x, y and z at this angle, in m/s².
     pub meters_per_second2: [f32; 3],
 }
 

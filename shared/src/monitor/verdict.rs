@@ -1,4 +1,4 @@
-//! Verdict and advice after each block.
+//! Computes the verdict and the advice after each block of samples.
 
 use super::pipeline::Monitor;
 use super::settings::Settings;

@@ -21,7 +21,7 @@ pub const MAX_BODY: usize = 512;
 
 const HEADER: usize = 3;
 const CRC: usize = 4;
-/// Largest length of a frame before COBS, in bytes.
+/// Largest length of a frame before COBS encoding, in bytes.
 const MAX_RAW: usize = HEADER + MAX_BODY + CRC;
 
 /// Largest length of a frame on the wire, in bytes, with the closing zero: COBS adds one byte per 254.
@@ -39,7 +39,7 @@ pub trait Message: Serialize + DeserializeOwned {
 pub enum FrameError {
     /// More bytes arrived than a frame may have, without a closing zero.
     TooLong {
-        /// Largest length of a frame before COBS, in bytes.
+        /// Largest length of a frame before COBS encoding, in bytes.
         limit: u16,
     },
     /// The bytes are not valid COBS (consistent overhead byte stuffing).
@@ -56,7 +56,7 @@ pub enum FrameError {
         /// The CRC-32 computed from the bytes of the frame.
         computed: u32,
     },
-    /// The frame has another protocol version.
+    /// The frame was sent with another protocol version.
     Version {
         /// The version of this code.
         ours: u8,
@@ -78,7 +78,7 @@ pub enum FrameError {
         /// Number of surplus bytes.
         count: u16,
     },
-    /// The sequence number is not the expected one: frames were lost, repeated or reordered.
+    /// The sequence number of the frame is not the expected one: frames were lost, repeated or reordered.
     OutOfOrder {
         /// The expected sequence number.
         expected: u16,
@@ -243,7 +243,7 @@ pub struct Decoder {
     state: DecoderState,
     raw: [u8; MAX_RAW],
     length: usize,
-    /// True while the rest of an overlong frame is skipped.
+    /// True while the rest of a frame that is too long is skipped.
     is_skipping: bool,
 }
 
@@ -359,7 +359,7 @@ impl Sequence {
         }
     }
 
-    /// Accepts the sequence number `found`: the number after it is expected next.
+    /// Accepts a received frame with the sequence number `found`: the number after it is expected next.
     pub fn restart_after(&mut self, found: u16) {
         self.due = Some(found.wrapping_add(1));
     }

@@ -36,11 +36,11 @@ pub enum Request {
     Hello,
     /// Requests the identity of the device. Reply: [`Reply::Info`].
     Info,
-    /// Requests the operating status. Reply: [`Reply::Status`].
+    /// Requests the operating status of the device. Reply: [`Reply::Status`].
     Status,
     /// Requests the settings of the signal chain. Reply: [`Reply::Settings`].
     Settings,
-    /// Configures the signal chain and resets its state.
+    /// Configures the signal chain of the device and resets its state.
     SetSettings(Settings),
     /// Sets the working point (depth, immersion, feed, posture) of the cut; `None` if it is unknown.
     SetWorkingPoint(Option<WorkingPoint>),
@@ -66,7 +66,7 @@ pub enum Request {
     /// A block of acceleration samples that the device processes instead of those of its sensor. The reply comes after
     /// the block is processed: reports, spectra and strobes of the block are sent before it.
     Feed(Feed),
-    /// Tachometer edges that precede those of the next [`Feed`], in order of time.
+    /// Sends tachometer edges that precede those of the next [`Feed`], in order of time.
     FeedEdges(Vec<Edge, MAX_EDGES>),
     /// Resets the signal chain and makes the device process blocks of its own sensor again.
     Reset,
@@ -118,7 +118,7 @@ pub enum Reply {
     Info(Info),
     /// Operating status of the device.
     Status(Status),
-    /// The settings of the signal chain.
+    /// The settings of the signal chain that the device uses.
     Settings(Settings),
     /// Progress of the upload.
     Upload(Upload),
@@ -137,7 +137,7 @@ pub enum Refusal {
     WorkingPoint(WorkingPoint),
     /// The lobe table or its header is invalid.
     Table(TableError),
-    /// The lobe table does not fit into a table slot of the device's flash.
+    /// The lobe table is longer than a table slot of the device's flash.
     TableTooLong {
         /// Its length in bytes.
         length: u32,
@@ -162,14 +162,14 @@ pub enum Refusal {
         /// Length of the table.
         length: u32,
     },
-    /// Erasing, writing or reading back the flash memory failed.
+    /// Erasing, writing or reading back the flash memory of the device failed.
     Flash,
     /// The host sent more tachometer edges than the device can hold for one block.
     TooManyEdges {
         /// Largest number of edges.
         limit: u16,
     },
-    /// The feed direction is not an angle from −360° to 360°.
+    /// The feed direction in the request is not an angle from −360° to 360°.
     FeedDirection(Degrees),
 }
 
@@ -334,7 +334,7 @@ pub enum Reports {
     All,
 }
 
-/// The messages that the device sends without a request.
+/// Selection of the messages that the device sends without a request.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Subscription {
@@ -414,7 +414,7 @@ fn counts_of([a, b, c, d, e, f]: [u8; 6]) -> Counts {
 pub struct SpectrumChunk {
     /// The frequency band of the spectrum.
     pub band: Band,
-    /// Sequence number of the block that completed the spectrum.
+    /// Sequence number of the block of samples that completed the spectrum.
     pub sequence: u32,
     /// Width of a bin.
     pub bin: Hertz,

@@ -2,7 +2,7 @@
 
 use quietcut_core::acceleration::MAX_BLOCK_SAMPLES;
 
-/// Measuring range: the acceleration at which an axis clips.
+/// Measuring range of the sensor: the acceleration at which an axis clips.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Range {
@@ -49,7 +49,7 @@ pub enum Filter {
     LowPass(Divisor),
 }
 
-/// Divisor of the sampling rate that gives the corner of the second low-pass filter.
+/// Divisor of the sampling rate that gives the corner frequency of the second low-pass filter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u8)]

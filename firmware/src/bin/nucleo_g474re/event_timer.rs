@@ -45,7 +45,8 @@ pub(crate) fn start(
     watermark: Peri<'static, PA1>,
 ) {
     use embassy_stm32::gpio::Pull;
-    // The tachometer output is push-pull. The pull-down only defines the level of an open input.
+    // The pull-down resistor only defines the level of an input without a tachometer. The output of a tachometer is
+    // push-pull.
     core::mem::forget(CapturePin::<TIM2, Ch1>::new(tachometer, Pull::Down));
     core::mem::forget(CapturePin::<TIM2, Ch2>::new(watermark, Pull::Down));
 
@@ -68,7 +69,7 @@ pub(crate) fn start(
     unsafe { interrupt::TIM2.enable() };
 }
 
-/// The time on the device's clock.
+/// The present time on the device's clock.
 pub(crate) fn now() -> Nanoseconds {
     critical_section::with(|token| {
         let count = match &*TIMER.borrow_ref(token) {

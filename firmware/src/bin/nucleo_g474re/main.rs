@@ -67,7 +67,7 @@ const IDENTITY: Identity = Identity {
 const LINK_BAUD: u32 = 921_600;
 const SENSOR_BUS: Hertz = Hertz(10_000_000);
 const WATCHDOG_MICROSECONDS: u32 = 2_000_000;
-/// Longest sleep of the main loop if nothing happens.
+/// Longest sleep of the main loop if no event wakes it.
 const LONGEST_SLEEP: Duration = Duration::from_millis(500);
 
 /// Signal that wakes the main loop: a block of samples has arrived, bytes have arrived, or the line accepts bytes
@@ -150,10 +150,10 @@ async fn main(_spawner: Spawner) {
         }
         let Ok(is_busy) = device.poll(&mut LinkLine);
         watchdog.pet();
-        // Reads the timer at least once per wrap, which extends its count beyond 32 bits.
+        // Reads the timer at least once per wrap, so that its count can be extended beyond 32 bits.
         event_timer::now();
         if !is_busy {
-            // A timeout is no error: the loop then runs once without an event.
+            // That no event came is no error: the main loop then runs once without one.
             let _ = with_timeout(LONGEST_SLEEP, WORK.wait()).await;
         }
     }
@@ -225,8 +225,9 @@ fn clocks() -> Config {
     config
 }
 
-/// Interrupt on reading a table that a loss of power has damaged: returns and lets the read continue.
-// SAFETY: the handler touches a flag of the flash only.
+/// Handler of the interrupt that reading a lobe table raises if a loss of power has damaged it: returns and lets the read
+/// continue.
+// SAFETY: the handler touches a flag of the flash memory only.
 #[exception]
 unsafe fn NonMaskableInt() {
     if !table_flash::pass_over_damage() {

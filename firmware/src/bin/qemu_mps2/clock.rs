@@ -18,7 +18,7 @@ pub(crate) fn start() {
     unsafe {
         (RELOAD as *mut u32).write_volatile(u32::MAX);
         (VALUE as *mut u32).write_volatile(u32::MAX);
-        // Enables the timer and its interrupt when it reaches zero.
+        // Enables timer 0 of the emulated board, and its interrupt when it reaches zero.
         (CONTROL as *mut u32).write_volatile(0b1001);
     }
 }

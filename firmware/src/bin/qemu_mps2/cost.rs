@@ -5,9 +5,10 @@
 
 use crate::{clock, flash};
 
-/// Largest stack depth that can be measured, in bytes: it exceeds the RAM of the real board.
+/// Largest stack depth of the device that can be measured, in bytes: it exceeds the RAM of the real board.
 const PAINTED_BYTES: usize = 128 * 1024;
-/// Bytes below the stack pointer that are not filled, because the filling function uses them.
+/// Number of bytes below the stack pointer that are not filled with the pattern, because the filling function uses
+/// them.
 const SPARED_BYTES: usize = 256;
 const PAINT: u32 = 0xdead_beef;
 
@@ -18,9 +19,10 @@ pub(crate) struct Cost {
     blocks: u32,
     ticks: u64,
     most_ticks: u32,
-    /// Largest time of a poll of the link without its flash operations, in ticks. A poll performs at most one request.
+    /// Largest processing time of a poll of the link without its flash operations, in ticks of 40 ns. A poll performs
+    /// at most one request.
     request_ticks: u32,
-    /// Largest time of the flash operations of one poll of the link, in ticks.
+    /// Largest time of the flash operations during one poll of the link, in ticks of 40 ns.
     flash_ticks: u32,
 }
 

@@ -1,4 +1,4 @@
-//! Logger: sends the frames of defmt to the log port.
+//! Logger of the emulated board: sends the frames of the logging library defmt to the log port.
 
 use core::cell::UnsafeCell;
 use core::sync::atomic::{AtomicBool, Ordering};
@@ -30,7 +30,7 @@ fn send(bytes: &[u8]) {
 // SAFETY: `acquire` turns interrupts off and refuses a second caller; `release` undoes both.
 unsafe impl defmt::Logger for Logger {
     fn acquire() {
-        // SAFETY: `release` ends the critical section; defmt calls it once after each `acquire`.
+        // SAFETY: `release` ends the critical section; the logging library calls it once after each `acquire`.
         let restore = unsafe { critical_section::acquire() };
         // A log statement within another one is a fault of the program and stops it.
         assert!(!TAKEN.swap(true, Ordering::Relaxed));

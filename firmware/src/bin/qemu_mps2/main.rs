@@ -123,7 +123,7 @@ unsafe impl cortex_m::interrupt::InterruptNumber for Irq {
     }
 }
 
-/// Handler of all interrupts, since there is no device crate.
+/// Handler of all interrupts of the emulated board, for which there is no crate with a named handler for each.
 // SAFETY: the handler touches shared data through an atomic only, so that it may interrupt anything.
 #[exception]
 unsafe fn DefaultHandler(number: i16) {

@@ -137,7 +137,8 @@ fn record(
     }
 }
 
-/// Sample rate that a scalar states by its name, samples per second.
+/// Sample rate, samples per second, from a scalar variable whose name says that it is a sample rate or a sample
+/// interval.
 fn rate(items: &[Item]) -> Option<f64> {
     let scalar = |names: &[&str]| {
         items.iter().find_map(|item| match &item.value {

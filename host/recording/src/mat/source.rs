@@ -2,7 +2,7 @@
 
 use std::io::{BufRead, ErrorKind, Read, copy, sink};
 
-/// Chunk size of reading, bytes; a choice. It is a multiple of the size of every number type.
+/// Number of bytes of a MAT-file that are read at once; a choice. It is a multiple of the size of every number type.
 pub(super) const CHUNK: usize = 1 << 16;
 
 /// Largest length that is accepted for an element of a MAT-file with flags, dimensions or a name, bytes. Valid names
@@ -20,7 +20,8 @@ pub(super) fn size_of_kind(kind: u32) -> Option<usize> {
     })
 }
 
-/// Decodes numbers of data type `kind` and passes each to `take`. A matrix of doubles may be stored in a smaller integer type without loss.
+/// Decodes numbers of MAT data type `kind` and passes each to `take`. A matrix of doubles may be stored in a smaller
+/// integer type without loss.
 fn decode(kind: u32, data: &[u8], big_endian: bool, mut take: impl FnMut(f64)) {
     macro_rules! decode {
         ($type:ty) => {
@@ -61,9 +62,9 @@ pub(super) fn word(bytes: &[u8], big_endian: bool) -> u32 {
     }
 }
 
-/// Tag of a data element: data type and length.
+/// Tag of a data element in a MAT-file: data type and length.
 pub(super) struct Tag {
-    /// Data type of the element (miINT8 = 1 … miCOMPRESSED = 15).
+    /// Code of the data type of the element (miINT8 = 1 … miCOMPRESSED = 15).
     pub(super) kind: u32,
     /// Length of the data, bytes.
     pub(super) length: u64,
@@ -138,7 +139,7 @@ impl Source<'_> {
         })
     }
 
-    /// Reads the next element, which holds flags, dimensions or a name: at most [`SMALL_MAX`] bytes.
+    /// Reads the next element of a MAT-file that holds flags, dimensions or a name: at most [`SMALL_MAX`] bytes.
     pub(super) fn small(&mut self) -> Result<Vec<u8>, String> {
         let tag = self.tag()?;
         if tag.length > SMALL_MAX {
@@ -152,11 +153,11 @@ impl Source<'_> {
         Ok(data)
     }
 
-    /// Reads the text of an element: UTF-8, UTF-16 or bytes.
+    /// Reads the text in an element of a MAT-file: UTF-8, UTF-16 or bytes.
     pub(super) fn text(&mut self, tag: &Tag) -> Result<String, String> {
         let mut codes = Vec::new();
         self.numbers(tag, |code| codes.push(code as u32))?;
-        // Data types 16 (UTF-8), 1 and 2 hold bytes of UTF-8; the others hold one code for each letter.
+        // MAT data types 16, 1 and 2 hold the bytes of UTF-8; the others hold one code for each letter.
         if matches!(tag.kind, 1 | 2 | 16) {
             let bytes: Vec<u8> = codes.iter().map(|&code| code as u8).collect();
             return Ok(String::from_utf8_lossy(&bytes).into_owned());
@@ -191,7 +192,7 @@ impl Source<'_> {
         self.pad(tag.length)
     }
 
-    /// Skips the padding after `length` bytes; the padding of the last element may be missing.
+    /// Skips the padding after an element of `length` bytes; the padding of the last element may be missing.
     fn pad(&mut self, length: u64) -> Result<(), String> {
         let padding = length.next_multiple_of(8) - length;
         let read = copy(&mut (&mut *self.reader).take(padding), &mut sink());

@@ -9,10 +9,11 @@ use super::header::{Binary, Header};
 use super::number;
 use super::source::{Source, SourceError};
 
-/// Largest number of values for which memory is reserved before reading. A choice; it bounds what a false count in the header costs.
+/// Number of values of a UFF data set for which memory is reserved before they are read, at most. A choice; it bounds
+/// the cost of a false count in the header.
 const TRUSTED: usize = 1 << 16;
 
-/// Values per chunk when reading binary data; a choice.
+/// Number of values of a binary UFF data set that are read at once; a choice.
 const CHUNK: usize = 1 << 13;
 
 /// Ordinate values of a function.

@@ -1,15 +1,15 @@
-//! Header of a data set 58: its eleven records, and the first line of the binary form 58b.
+//! Header of a UFF data set 58: its eleven records, and the first line of the binary form 58b.
 
-/// Number type of the ordinate (record 7).
+/// Number type of the ordinate of a UFF function (record 7).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct OrdinateType {
-    /// True for double precision (8 bytes), false for single precision (4 bytes).
+    /// True if the ordinate is stored in double precision (8 bytes), false if in single precision (4 bytes).
     pub is_double: bool,
     /// True for complex values.
     pub is_complex: bool,
 }
 
-/// Function type (record 6); only the types used here have a variant.
+/// Function type of a UFF data set 58 (record 6); only the types used here have a variant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Function {
     /// Type 0: general or unknown.
@@ -25,7 +25,7 @@ pub enum Function {
 }
 
 impl Function {
-    /// Function type of a code in record 6.
+    /// UFF function type that a code in record 6 stands for.
     pub(super) fn of_code(code: i64) -> Self {
         match code {
             0 => Self::General,
@@ -36,7 +36,7 @@ impl Function {
         }
     }
 
-    /// Code of the function type in record 6.
+    /// Code of the UFF function type in record 6.
     pub fn code(self) -> i64 {
         match self {
             Self::General => 0,
@@ -48,36 +48,38 @@ impl Function {
     }
 }
 
-/// Degree of freedom of response or reference (record 6): node and direction.
+/// Degree of freedom of the response or the reference of a UFF function (record 6): node and direction.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct DegreeOfFreedom {
     /// Name of the measured entity at this degree of freedom, up to ten characters; empty if there is none.
     pub entity: String,
     /// Node number.
     pub node: i64,
-    /// Direction: 0 scalar; ±1, ±2, ±3 translation along ±x, ±y, ±z; ±4, ±5, ±6 rotation about them.
+    /// Direction of the degree of freedom: 0 scalar; ±1, ±2, ±3 translation along ±x, ±y, ±z; ±4, ±5, ±6 rotation about
+    /// them.
     pub direction: i64,
 }
 
-/// Quantity and unit of an axis (records 8 to 11).
+/// Quantity and unit of an axis of a UFF function (records 8 to 11).
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Axis {
-    /// Specific data type: 8 displacement, 11 velocity, 12 acceleration, 13 excitation force, 17 time, 18 frequency …
+    /// Code of the quantity of the axis (specific data type): 8 displacement, 11 velocity, 12 acceleration, 13
+    /// excitation force, 17 time, 18 frequency …
     pub kind: i64,
-    /// Exponents of the units of length and of force.
+    /// Exponents of length and of force in the unit of the axis.
     pub exponents: [i64; 2],
-    /// Unit label; empty if there is none.
+    /// Text of the unit of the axis; empty if there is none.
     pub unit: String,
 }
 
 /// Header (records 1 to 11) of a UFF data set 58.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Header {
-    /// Five lines of free text (records 1 to 5).
+    /// Five lines of free text at the start of a UFF header (records 1 to 5).
     pub words: [String; 5],
-    /// Function type, such as time history or frequency response.
+    /// Function type of the data set, such as time history or frequency response.
     pub function: Function,
-    /// Degree of freedom of the response.
+    /// Degree of freedom of the measured response.
     pub response: DegreeOfFreedom,
     /// Degree of freedom of the reference; in a frequency response function that of the force.
     pub reference: DegreeOfFreedom,
@@ -123,7 +125,8 @@ impl Header {
     }
 }
 
-/// Parses record 6, Fortran format `2(I5,I10), 2(1X,A10,I10,I4)`: function type, response and reference.
+/// Parses record 6 of a UFF header, Fortran format `2(I5,I10), 2(1X,A10,I10,I4)`: function type, response and
+/// reference.
 fn degrees_of_freedom(record: &str) -> Result<(Function, DegreeOfFreedom, DegreeOfFreedom), String> {
     let function = match field(record, 0, 5) {
         // Some writers ignore the column positions of record 6; the first word is then the function type.
@@ -167,10 +170,11 @@ fn degrees_of_freedom(record: &str) -> Result<(Function, DegreeOfFreedom, Degree
     Ok((Function::of_code(function), response, reference))
 }
 
-/// Content of record 7: number type, number of values, first value and step of an even abscissa.
+/// Content of record 7 of a UFF header: number type, number of values, first value and step of an evenly spaced
+/// abscissa.
 type DataForm = (OrdinateType, usize, Option<(f64, f64)>);
 
-/// Parses record 7, Fortran format `3I10, 3E13.5`.
+/// Parses record 7 of a UFF header, Fortran format `3I10, 3E13.5`.
 fn data_form(record: &str) -> Result<DataForm, String> {
     let fields = [
         field(record, 0, 10),
@@ -234,7 +238,8 @@ fn parse_data_form([kind, count, spacing, first, step]: [&str; 5]) -> Result<Dat
     ))
 }
 
-/// Parses a record of 8 to 11, Fortran format `I10, 3I5, 2(1X,A20)`: quantity and unit of an axis.
+/// Parses one of the records 8 to 11 of a UFF header, Fortran format `I10, 3I5, 2(1X,A20)`: quantity and unit of an
+/// axis.
 fn axis(record: &str) -> Result<Axis, String> {
     Ok(Axis {
         kind: whole(field(record, 0, 10), "specific data type")?,
@@ -246,7 +251,7 @@ fn axis(record: &str) -> Result<Axis, String> {
     })
 }
 
-/// First line of a binary data set, Fortran format `I6, A1, I6, I6, I12, I12, …`.
+/// First line of a binary UFF data set, Fortran format `I6, A1, I6, I6, I12, I12, …`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Binary {
     pub(super) is_big_endian: bool,
@@ -289,7 +294,7 @@ impl Binary {
     }
 }
 
-/// Columns `from .. from + length` of a record, trimmed; empty if the record is shorter.
+/// Text in the columns `from .. from + length` of a UFF record, trimmed; empty if the record is shorter.
 fn field(record: &str, from: usize, length: usize) -> &str {
     let at = |index: usize| {
         record
@@ -310,7 +315,7 @@ fn named(text: &str) -> String {
     }
 }
 
-/// Parses an integer; an empty field is 0, as in Fortran.
+/// Parses an integer field of a UFF record; an empty field is 0, as in Fortran.
 fn whole(text: &str, what: &str) -> Result<i64, String> {
     if text.is_empty() {
         return Ok(0);
@@ -319,7 +324,7 @@ fn whole(text: &str, what: &str) -> Result<i64, String> {
         .map_err(|_| format!("{what} \"{text}\"; a whole number is needed"))
 }
 
-/// Parses a finite real number; an empty field is 0, as in Fortran.
+/// Parses a finite real field of a UFF record; an empty field is 0, as in Fortran.
 fn real(text: &str, what: &str) -> Result<f64, String> {
     let mut values = Vec::new();
     if text.is_empty() {

@@ -32,7 +32,7 @@ use super::raw::{Raw, RawColumn};
 use super::{Quantity, Recording, RecordingError};
 use crate::file::{FileError, Prepared};
 
-/// One data set 58: a function with its header and values.
+/// One UFF data set 58: a function with its header and values.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DataSet {
     /// Number of the line in the file, from 1, that holds the data set number 58.
@@ -47,10 +47,11 @@ pub struct DataSet {
     pub units: FileUnits,
 }
 
-/// Reads all data sets 58 of a file, in order; there is at least one.
+/// Reads all data sets 58 of a UFF file, in order; there is at least one.
 ///
 /// # Errors
-/// The file cannot be read, is not a UFF file, or a data set is damaged; the message names the line and the expected content.
+/// The file cannot be read, is not a UFF file, or a data set is damaged; the message names the line and the expected
+/// content.
 pub fn data_sets(path: &Path) -> Result<Vec<DataSet>, RecordingError> {
     let file = File::open(path).map_err(|cause| FileError::Read {
         path: path.into(),
@@ -133,7 +134,7 @@ fn next_delimiter<R: BufRead>(source: &mut Source<R>) -> Result<Option<u64>, Fau
     Ok(None)
 }
 
-/// Reads the next line that is not blank; `None` at the end of the file.
+/// Reads the next line of the UFF file that is not blank; `None` at the end of the file.
 fn next_filled<R: BufRead>(source: &mut Source<R>) -> Result<Option<Line>, Fault> {
     while let Some(line) = source.next()? {
         if !line.is_blank() {
@@ -153,7 +154,7 @@ fn skip<R: BufRead>(source: &mut Source<R>) -> Result<(), Fault> {
     Ok(())
 }
 
-/// Reads the units of the file from data set 164.
+/// Reads the units that data set 164 states for the whole UFF file.
 fn file_units<R: BufRead>(source: &mut Source<R>) -> Result<FileUnits, Fault> {
     let mut lines = Vec::new();
     let mut first = source.line() + 1;
@@ -169,7 +170,7 @@ fn file_units<R: BufRead>(source: &mut Source<R>) -> Result<FileUnits, Fault> {
     FileUnits::parse(&lines).map_err(|(index, what)| fault(first + index as u64, what))
 }
 
-/// Reads a data set 58 after its first line; `rest` is the text after `58` in that line.
+/// Reads a UFF data set 58 after its first line; `rest` is the text after `58` in that line.
 fn data_set<R: BufRead>(source: &mut Source<R>, line: u64, rest: &str) -> Result<DataSet, Fault> {
     let binary = match rest.strip_prefix(['b', 'B']) {
         Some(rest) => Some(Binary::parse(rest).map_err(|what| fault(line, what))?),
@@ -347,7 +348,7 @@ impl DataSet {
     }
 }
 
-/// Unique channel names: equal names get the node number as suffix, then their position in the file.
+/// Unique channel names for UFF data sets: equal names get the node number as suffix, then their position in the file.
 fn names(sets: &[DataSet]) -> Vec<String> {
     let plain: Vec<String> = sets.iter().map(DataSet::name).collect();
     let is_twice = |names: &[String], name: &String| names.iter().filter(|other| *other == name).count() > 1;
@@ -375,7 +376,8 @@ fn names(sets: &[DataSet]) -> Vec<String> {
         .collect()
 }
 
-/// A recording as a UFF file that is written but not yet published: data set 164 with SI units, then one data set 58 per channel.
+/// Writes a recording to a temporary UFF file, not yet under its final name: data set 164 with SI units, then one data
+/// set 58 per channel.
 pub(super) fn prepared(
     path: &Path,
     recording: &Recording,

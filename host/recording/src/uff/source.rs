@@ -1,4 +1,4 @@
-//! Sequential reader of text lines and binary data from one file; a long record is in memory only once.
+//! Sequential reader of text lines and binary data from one UFF file; a long record is in memory only once.
 
 use std::collections::VecDeque;
 use std::io::BufRead;
@@ -49,7 +49,7 @@ impl Line {
 pub(super) enum SourceError {
     /// Error of the operating system.
     Io(std::io::Error),
-    /// The file ends before all required bytes are read.
+    /// The UFF file ends before all required bytes are read.
     Ends {
         /// Number of bytes that were read before the file ended.
         found: usize,

@@ -20,7 +20,7 @@ impl FileUnits {
         force: 1.0,
     };
 
-    /// Parses the lines of a data set 164: its conversion factors, or else its units code.
+    /// Parses the lines of a UFF data set 164 (units): its conversion factors, or else its units code.
     ///
     /// # Errors
     /// Index of the faulty line, from 0, and a description of the fault.

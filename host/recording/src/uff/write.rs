@@ -14,7 +14,7 @@ pub enum UffForm {
     /// Text.
     #[default]
     Text,
-    /// Binary, little-endian IEEE 754 doubles (58b).
+    /// Binary form 58b: little-endian IEEE 754 doubles.
     Binary,
 }
 

@@ -172,7 +172,7 @@ impl ColumnsAnswer {
 }
 
 impl ReceptanceAnswer {
-    /// Peak magnitude of one receptance with its 90 % interval from the random error of the estimate and from folding.
+    /// Peak magnitude of one receptance with its 90 % interval from the random error of the estimate and from aliasing.
     fn new(measurement: &Measurement, table: &FrfTable, index: usize) -> Self {
         let entry = &table.entries()[index];
         let size = |line: usize| entry.receptance[line].norm();

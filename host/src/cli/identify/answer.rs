@@ -159,26 +159,26 @@ pub(super) struct Coefficients {
     pub(super) receptance_m_per_n: [f64; 2],
 }
 
-/// Mode that was identified without a measured force.
+/// Vibration mode that was identified without a measured force.
 #[derive(Debug, Serialize)]
 pub(super) struct EstimatedMode {
     pub(super) frequency_hz: Figure,
     pub(super) damping_ratio: Figure,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) stiffness_n_per_m: Option<Figure>,
-    /// Parameters that are not identifiable from the data.
+    /// Names of the parameters of the mode that the data do not identify.
     pub(super) cannot_tell: Vec<&'static str>,
 }
 
 /// Identified parameters of a robot joint and its link.
 #[derive(Debug, Serialize)]
 pub(super) struct EstimatedJoint {
-    /// Number of the joint, counted from 1 at the base.
+    /// Number of the robot joint, counted from 1 at the base.
     pub(super) joint: usize,
     pub(super) parameters: BTreeMap<&'static str, Figure>,
 }
 
-/// Results of cutting tests besides the fitted force coefficients.
+/// Results of cutting tests besides the fitted force coefficients: coefficients from mean forces, and runout.
 #[derive(Debug, Serialize)]
 pub(super) struct Cutting {
     /// Force coefficients from the regression of mean forces on the feed (Altintas); `null` if all feeds are equal.
@@ -189,7 +189,7 @@ pub(super) struct Cutting {
     pub(super) feeds: usize,
 }
 
-/// Stiffness and damping parameters from slices of the restoring-force surface.
+/// Stiffness and damping of the structure, from slices of the restoring-force surface.
 #[derive(Debug, Serialize)]
 pub(super) struct Slices {
     pub(super) stiffness: BTreeMap<&'static str, Figure>,
@@ -224,7 +224,7 @@ impl Coefficients {
 }
 
 impl Model {
-    /// Direction or pair of directions that precedes each parameter in the text output.
+    /// Text that precedes each parameter in the text output: its direction or pair of directions.
     pub(super) fn label(&self) -> String {
         match (&self.direction, &self.directions) {
             (Some(direction), _) => format!("{direction} "),
@@ -235,7 +235,7 @@ impl Model {
 }
 
 impl IdentifyOutput {
-    /// Output of `method` with the parameters `estimates`.
+    /// Output of identification method `method` with the estimated parameters `estimates`.
     pub(super) fn of(method: &'static str, directions: Vec<Direction>, estimates: Vec<Estimate>) -> Self {
         let mut models: Vec<Model> = Vec::new();
         for estimate in &estimates {

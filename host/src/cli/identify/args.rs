@@ -86,7 +86,7 @@ pub struct Args {
     /// For force-coefficients: edge angle κ of the tool in degrees; 90 is a square end mill.
     #[arg(long, value_name = "D", default_value_t = 90.0, value_parser = positive, allow_negative_numbers = true)]
     pub(super) edge_angle_deg: f64,
-    /// For force-coefficients: angle from x to the feed in degrees.
+    /// For force-coefficients: angle in degrees from x to the feed direction.
     #[arg(long, value_name = "D", default_value_t = 0.0, value_parser = finite, allow_negative_numbers = true)]
     pub(super) feed_direction_deg: f64,
     /// For force-coefficients: start and end of full engagement, in s. Default: detected in the measured force.
@@ -144,7 +144,7 @@ pub(super) enum SurfaceTerm {
     Offset,
 }
 
-/// Lower and upper frequency of `--band-hz`, Hz.
+/// Lower and upper frequency of the option `--band-hz`, Hz; `None` without the option.
 pub(super) fn band(args: &Args) -> Result<Option<[f64; 2]>, Error> {
     match args.band_hz[..] {
         [] => Ok(None),

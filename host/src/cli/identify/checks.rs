@@ -16,7 +16,8 @@ use crate::identify::sweep::{Spectra, compare};
 use crate::recording::{Quantity, Recording, TestKind};
 use crate::structure::Direction;
 
-/// Tests steady sine responses (levels, harmonics, homogeneity, reciprocity) and compares pairs of sweeps.
+/// Tests a structure for linearity from steady sine responses (levels, harmonics, homogeneity, reciprocity), and
+/// compares pairs of sweeps.
 pub(super) fn linearity(args: &Args, recordings: &[Recording]) -> Result<IdentifyOutput, Error> {
     let harmonics = usize::from(args.harmonics).max(3);
     let of_kind = |kind| {
@@ -108,7 +109,8 @@ fn response(dwell: &Dwell) -> Option<(f64, f64)> {
     Some((force.amplitude(1), motion.amplitude(1)))
 }
 
-/// Compares every sweep with the first sweep of its direction and quantity; the texts name the pairs that cannot be compared.
+/// Compares every sine sweep with the first sweep of its direction and quantity. The returned texts name the pairs that
+/// cannot be compared.
 fn compare_sweeps(sweeps: &[&Recording]) -> Result<(Vec<SweepPair>, Vec<String>), Error> {
     let mut known: Vec<((Direction, Quantity), PathBuf, Spectra)> = Vec::new();
     let (mut found, mut refused) = (Vec::new(), Vec::new());

@@ -86,7 +86,7 @@ fn postures(recordings: &[Recording]) -> Result<Vec<AtPosture>, Error> {
     Ok(postures)
 }
 
-/// Steady sine responses of every posture, with warnings about recordings that have none.
+/// Steady sine responses at every posture of the robot, with warnings about recordings that contain none.
 fn dwells(args: &Args, postures: &[AtPosture], settling: Settling) -> Vec<(PostureDwells, Vec<String>)> {
     postures
         .iter()
@@ -114,7 +114,7 @@ fn has_levels(dwells: &[Dwell]) -> bool {
     })
 }
 
-/// Identifies stiffness, damping and cubic terms from steady sine responses at several force levels.
+/// Identifies stiffness, damping and cubic terms of robot joints from steady sine responses at several force levels.
 fn from_tones(
     args: &Args,
     start: &Robot,
@@ -185,7 +185,7 @@ fn slowest_decay(robot: &Robot, postures: &[AtPosture]) -> Result<f64, Error> {
     Ok(slowest.max(1e-3))
 }
 
-/// Identifies stiffness and damping from receptances.
+/// Identifies stiffness and damping of robot joints from receptances at several postures.
 fn from_receptances(args: &Args, start: &Robot, postures: &[AtPosture]) -> Result<JointFit, Error> {
     let settings = MeasurementSettings {
         band_hz: band(args)?.map(|[low, high]| (low, high)),

@@ -58,7 +58,7 @@ struct SteadyFit {
     warnings: Vec<String>,
 }
 
-/// Directions with a measured force and a measured motion, or with a measured motion while other directions are excited.
+/// Directions whose motion is measured in every steady response and whose force is measured in at least one.
 fn directions(dwells: &[Dwell]) -> Vec<Direction> {
     Direction::ALL
         .into_iter()
@@ -202,7 +202,8 @@ pub(super) fn ncma(args: &Args, recordings: &[Recording]) -> Result<IdentifyOutp
     let taken = steady(recordings, usize::from(args.harmonics), settling(args));
     let curves = curves(&taken.dwells);
     let points: Vec<_> = curves.iter().flat_map(|curve| curve.linearized(0.4)).collect();
-    // A map quadratic in the force needs three force levels; two levels give a linear map, the form of eqs 4.8 and 4.9.
+    // A map (natural frequency or loss factor over force and receptance) that is quadratic in the force needs three
+    // force levels; with two levels it is linear in the force.
     let degree = if curves.len() >= 3 { args.degree.into() } else { 1 };
     let maps = Map::fit(&points, degree, |point| point.omega / TAU)
         .zip(Map::fit(&points, degree, |point| point.loss_factor));

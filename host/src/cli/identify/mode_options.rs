@@ -17,7 +17,7 @@ pub(super) struct ModeOptions {
     /// Stabilization diagram to write; the ending sets the format: svg or html.
     #[arg(long, value_name = "FILE")]
     pub(super) stabilization: Option<PathBuf>,
-    /// Frequency resolution in Hz of the receptances from recordings; as the option of frf.
+    /// Frequency resolution in Hz of the receptances that are estimated from recordings, like the option of frf.
     #[arg(long, value_name = "D", value_parser = positive, allow_negative_numbers = true)]
     pub(super) resolution_hz: Option<f64>,
     /// Use the pseudo-inverse estimator of frf: the recordings are several cuts, in each of which the forces are linearly dependent.

@@ -17,7 +17,7 @@ use crate::report::page::{figure, page};
 use crate::report::stabilization_chart::stabilization_chart;
 use crate::structure::Direction;
 
-/// Identifies complex modes from the receptances or recordings of the command line.
+/// Identifies complex modes from the receptances or recordings that the command line names.
 pub(super) fn modes(args: &Args, understood: &mut Vec<Understood>) -> Result<IdentifyOutput, Error> {
     let options = &args.modes;
     if let Some(path) = &options.stabilization {
@@ -118,11 +118,11 @@ fn source(args: &Args, understood: &mut Vec<Understood>) -> Result<Source, Error
     })
 }
 
-/// The table of receptances in a file. The inner error is the reason why a UFF file is not a table, or `None` for a file that is certainly
-/// a recording.
+/// Reads the table of receptances in a file. The inner error is for a file that holds no table: the reason in a UFF
+/// file, and `None` in a file that is certainly a recording.
 ///
 /// # Errors
-/// The file cannot be read, or its head is that of a table but its content is wrong.
+/// The file cannot be read, or it has the head of a table of receptances but wrong content.
 fn table(path: &Path, import: &Import) -> Result<Result<ImportedTable, Option<FrfError>>, Error> {
     match crate::file::ending(path).as_str() {
         "uff" | "unv" | "bunv" => Ok(FrfTable::import(path, import).map_err(Some)),
@@ -131,7 +131,7 @@ fn table(path: &Path, import: &Import) -> Result<Result<ImportedTable, Option<Fr
     }
 }
 
-/// Median coherence of each response within the frequency band.
+/// Median over a frequency band of the coherence of each response.
 fn coherence(table: &FrfTable, [from_hz, to_hz]: [f64; 2]) -> BTreeMap<&'static str, f64> {
     let mut medians = BTreeMap::new();
     for entry in table.entries() {
@@ -173,7 +173,7 @@ fn of_mode(model: &ModalModel, found: &IdentifiedMode) -> ComplexMode {
     }
 }
 
-/// Warning about directions that the case file does not contain.
+/// Warning about directions of the identified modes that the case file does not contain; `None` if it contains all.
 fn not_in_case(args: &Args, model: &ModalModel) -> Option<String> {
     args.out.as_ref()?;
     let directions = model.directions();

@@ -192,7 +192,8 @@ pub(super) struct ForceAndMotion<'a> {
 
 /// First direction with a recorded motion and force; without any recorded force, a motion with zero force (free decay).
 pub(super) fn force_and_motion(recording: &Recording) -> Result<ForceAndMotion<'_>, Error> {
-    // Displacement has priority: integrating velocity or acceleration loses the low frequencies.
+    // A displacement channel has priority: integrating velocity or acceleration to displacement loses the low
+    // frequencies.
     let order = [Quantity::Displacement, Quantity::Velocity, Quantity::Acceleration];
     for quantity in order {
         for direction in Direction::ALL {

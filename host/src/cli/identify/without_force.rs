@@ -13,7 +13,7 @@ use crate::identify::{case_file, subspace};
 use crate::recording::{Recording, TestKind, cut_table};
 use crate::stability::{CubicTerms, Problem};
 
-/// Identifies modes from a recording of motion under unmeasured excitation.
+/// Identifies modes from a recording of motion under unmeasured excitation (operational modal analysis).
 pub(super) fn output_only(args: &Args, recordings: &[Recording]) -> Result<IdentifyOutput, Error> {
     let [recording] = recordings else {
         return Err(Error::input(format!(
