@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use super::{Error, Output, Range, positive, progress};
 use crate::case::Case;
 use crate::file;
-use crate::plan::{Means, Plan, Prior, Request, Step, Test, plan};
+use crate::plan::{Means, Plan, Prior, Request, Step, Test, WithoutDerivative, plan};
 use crate::report::page::{figure, page};
 use crate::report::plan_chart::plan_chart;
 
@@ -107,13 +107,8 @@ pub fn run(args: Args) -> Result<(), Error> {
     );
     let found = plan(&case, &request, || bar.inc(1))?;
     bar.finish_and_clear();
-    if !found.without_derivative_rpm.is_empty() {
-        tracing::warn!(
-            "{}: the limits at {} speeds have no derivatives with respect to the unknowns and are not considered: {} rev/min",
-            args.case.display(),
-            found.without_derivative_rpm.len(),
-            listed(&found.without_derivative_rpm)
-        );
+    for warning in derivative_warnings(&found.without_derivative) {
+        tracing::warn!("{}: {warning}", args.case.display());
     }
     if let Some(path) = &args.out {
         write(&case, &found, request.depth_mm, path)?;
@@ -125,10 +120,38 @@ pub fn run(args: Args) -> Result<(), Error> {
     args.output.answer(&found, output_text)
 }
 
-/// Text that lists spindle speeds in a message, rounded to 0.1 rev/min.
-fn listed(speeds_rpm: &[f64]) -> String {
-    let words: Vec<String> = speeds_rpm.iter().map(|rpm| format!("{rpm:.1}")).collect();
-    words.join(", ")
+/// Warnings about limits without derivatives: first limits, whose speeds the plan leaves out, and deeper lobes.
+fn derivative_warnings(without_derivative: &[WithoutDerivative]) -> Vec<String> {
+    let listed = |is_first: bool| -> Vec<String> {
+        without_derivative
+            .iter()
+            .filter(|limit| limit.is_first == is_first)
+            .map(|limit| {
+                format!(
+                    "{:.1} rev/min, {:.3} mm ({})",
+                    limit.rpm, limit.depth_mm, limit.reason
+                )
+            })
+            .collect()
+    };
+    let (first, deeper) = (listed(true), listed(false));
+    let mut warnings = Vec::new();
+    if !first.is_empty() {
+        warnings.push(format!(
+            "the limits at {} speeds have no derivatives with respect to the unknowns and are not considered: {}",
+            first.len(),
+            first.join("; ")
+        ));
+    }
+    if !deeper.is_empty() {
+        warnings.push(format!(
+            "{} lobes above the first limit have no derivatives with respect to the unknowns; the intervals of the limits there do not \
+             include that these lobes may become the lowest, and may be too narrow: {}",
+            deeper.len(),
+            deeper.join("; ")
+        ));
+    }
+    warnings
 }
 
 fn request(args: &Args) -> Request {
@@ -227,7 +250,12 @@ fn text(plan: &Plan) -> String {
             );
         }
     }
-    let stable = plan.without_limit_rpm.len() - plan.without_derivative_rpm.len();
+    let left_out = plan
+        .without_derivative
+        .iter()
+        .filter(|limit| limit.is_first)
+        .count();
+    let stable = plan.without_limit_rpm.len() - left_out;
     if stable > 0 {
         let _ = write!(
             text,
@@ -260,4 +288,37 @@ fn write(case: &Case, plan: &Plan, depth_mm: f64, path: &Path) -> Result<(), Err
         }
     };
     Ok(file::write(path, text.as_bytes())?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_limit_without_derivatives_is_listed_with_its_reason() {
+        let limit = |rpm, is_first, reason: &str| WithoutDerivative {
+            rpm,
+            depth_mm: 2.0,
+            is_first,
+            reason: reason.into(),
+        };
+        assert!(derivative_warnings(&[]).is_empty());
+        let warnings = derivative_warnings(&[
+            limit(900.0, true, "at the tip of an island"),
+            limit(950.0, false, "no motion"),
+            limit(990.0, true, "not finite"),
+        ]);
+        let [first, deeper] = &warnings[..] else {
+            panic!("{warnings:?}")
+        };
+        assert!(first.contains("limits at 2 speeds"), "{first}");
+        assert!(
+            first.contains("900.0 rev/min, 2.000 mm (at the tip of an island); 990.0"),
+            "{first}"
+        );
+        assert!(
+            deeper.contains("1 lobes above") && deeper.contains("(no motion)"),
+            "{deeper}"
+        );
+    }
 }

@@ -6,7 +6,7 @@ use quietcut_numerics::statistics::sample_quantile;
 use crate::criteria::NEVER_LOWEST;
 use crate::student::NINETY_PERCENT;
 use quietcut_stability::Basis;
-use quietcut_stability::{Linearized, Plane, SpeedLine};
+use quietcut_stability::{Linearized, Plane, SpeedLine, StabilityError};
 
 /// Number of stability lobes, from the lowest on, that are considered at each spindle speed of a chart.
 const LOBES: usize = 4;
@@ -25,27 +25,75 @@ pub(super) struct KnownLimit {
     pub(super) planes: Vec<Plane>,
 }
 
+/// A stability limit whose derivatives with respect to the unknown parameters cannot be computed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct WithoutDerivative {
+    /// Spindle speed, rev/min.
+    pub rpm: f64,
+    /// Axial depth at which stability is lost, mm.
+    pub depth_mm: f64,
+    /// True for the first limit at the speed, so that the plan leaves the speed out. False for a deeper lobe: the
+    /// interval of the first limit then does not include that this lobe may become the lowest.
+    pub is_first: bool,
+    /// Reason why the limit has no derivatives.
+    pub reason: String,
+}
+
 impl KnownLimit {
-    /// The stability limit at a spindle speed; `None` if there is no limit, or if it has no derivative with respect to
-    /// the unknowns.
+    /// The stability limit at a spindle speed, and the lobes there without derivatives with respect to the unknowns.
     ///
-    /// The gradient of the limit has `size` entries; those of unknowns that affect only tests are zero.
-    pub(super) fn new(line: &SpeedLine, linearized: &Linearized, size: usize) -> Option<Self> {
-        let first_mm = line.first_limit?.depth_mm;
-        let planes = linearized.planes(line).into_iter();
-        let mut planes: Vec<Plane> = planes.filter_map(Result::ok).collect();
-        planes.retain(|plane| plane.depth_mm >= first_mm);
-        planes.truncate(LOBES);
-        for plane in &mut planes {
-            plane.gradient.resize_vertically_mut(size, 0.0);
-            if let Some((_, gradient)) = &mut plane.chatter_hz {
-                gradient.resize_vertically_mut(size, 0.0);
+    /// The limit is `None` if stability is not lost, or if the first limit is among those without derivatives. Its
+    /// gradient has `size` entries; those of unknowns that affect only tests are zero.
+    pub(super) fn new(
+        line: &SpeedLine,
+        linearized: &Linearized,
+        size: usize,
+    ) -> (Option<Self>, Vec<WithoutDerivative>) {
+        Self::of_planes(line, linearized.planes(line), size)
+    }
+
+    /// [`KnownLimit::new`] from the linearized losses of stability at the spindle speed, first limit first.
+    pub(super) fn of_planes(
+        line: &SpeedLine,
+        planes: Vec<Result<Plane, StabilityError>>,
+        size: usize,
+    ) -> (Option<Self>, Vec<WithoutDerivative>) {
+        let Some(first) = line.first_limit else {
+            return (None, Vec::new());
+        };
+        let (mut known, mut without_derivative) = (Vec::new(), Vec::new());
+        let losses = line.switches.iter().filter(|switch| !switch.gain);
+        for (switch, plane) in losses
+            .zip(planes)
+            .filter(|(switch, _)| switch.depth_mm >= first.depth_mm)
+        {
+            if known.len() == LOBES {
+                break;
+            }
+            match plane {
+                Ok(mut plane) => {
+                    plane.gradient.resize_vertically_mut(size, 0.0);
+                    if let Some((_, gradient)) = &mut plane.chatter_hz {
+                        gradient.resize_vertically_mut(size, 0.0);
+                    }
+                    known.push(plane);
+                }
+                Err(reason) => without_derivative.push(WithoutDerivative {
+                    rpm: line.rpm,
+                    depth_mm: switch.depth_mm,
+                    is_first: switch.depth_mm == first.depth_mm,
+                    reason: reason.to_string(),
+                }),
             }
         }
-        (planes.first()?.depth_mm == first_mm).then_some(Self {
+        let has_first = known
+            .first()
+            .is_some_and(|plane| plane.depth_mm == first.depth_mm);
+        let limit = has_first.then_some(Self {
             rpm: line.rpm,
-            planes,
-        })
+            planes: known,
+        });
+        (limit, without_derivative)
     }
 
     /// The stability limit of the nominal case, mm.

@@ -19,6 +19,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 pub use candidate::Test;
+pub use chart::WithoutDerivative;
 pub use means::Means;
 pub use unknowns::Prior;
 
@@ -157,10 +158,10 @@ pub struct Plan {
     /// Spindle speeds that the plan leaves out, rev/min: without a stability limit up to the largest depth, or with a
     /// limit without derivatives.
     pub without_limit_rpm: Vec<f64>,
-    /// Spindle speeds whose stability limit has no derivatives by the unknown parameters, rev/min; they are among
-    /// [`Plan::without_limit_rpm`].
+    /// Stability limits without derivatives with respect to the unknown parameters, with the reasons. The speeds of first
+    /// limits are among [`Plan::without_limit_rpm`].
     #[serde(skip)]
-    pub without_derivative_rpm: Vec<f64>,
+    pub without_derivative: Vec<WithoutDerivative>,
     /// All spindle speeds of the chart whose stability limit counts in the plan.
     pub chart: Vec<Speed>,
 }
@@ -183,13 +184,30 @@ pub fn plan(case: &Case, request: &Request, progress: impl Fn() + Sync) -> Resul
     Ok(basis.plan(request, &selection, &chosen))
 }
 
+/// Error of a chart in which no speed has a limit with derivatives: the reason of the first limit without derivatives,
+/// or that no speed has a limit.
+fn no_known_limit(case: &Case, request: &Request, without_derivative: &[WithoutDerivative]) -> PlanError {
+    let case = case.path.display().to_string();
+    match without_derivative.iter().find(|limit| limit.is_first) {
+        Some(limit) => PlanError::NoDerivatives {
+            case,
+            what: limit.reason.clone(),
+        },
+        None => PlanError::NoLimit {
+            case,
+            speeds: request.speeds_rpm.len(),
+            depth_mm: request.depth_mm,
+        },
+    }
+}
+
 /// Data of a plan: unknowns, linearized limits and candidate tests.
 struct Basis {
     unknowns: Unknowns,
     chart: KnownChart,
     candidates: Vec<Candidate>,
     without_limit_rpm: Vec<f64>,
-    without_derivative_rpm: Vec<f64>,
+    without_derivative: Vec<WithoutDerivative>,
 }
 
 impl Basis {
@@ -216,23 +234,20 @@ impl Basis {
             })
             .collect();
         let lines = lines.into_iter().collect::<Result<Vec<_>, _>>()?;
-        let limits: Vec<Option<KnownLimit>> = lines
+        let (limits, without_derivative): (Vec<Option<KnownLimit>>, Vec<Vec<WithoutDerivative>>) = lines
             .par_iter()
             .map(|line| KnownLimit::new(line, &linearized, unknowns.len()))
-            .collect();
-        let not_counted = || lines.iter().zip(&limits).filter(|(_, limit)| limit.is_none());
-        let without_limit_rpm = not_counted().map(|(line, _)| line.rpm).collect();
-        let without_derivative_rpm = not_counted()
-            .filter(|(line, _)| line.first_limit.is_some())
+            .unzip();
+        let without_limit_rpm = lines
+            .iter()
+            .zip(&limits)
+            .filter(|(_, limit)| limit.is_none())
             .map(|(line, _)| line.rpm)
             .collect();
+        let without_derivative: Vec<WithoutDerivative> = without_derivative.into_iter().flatten().collect();
         let chart = KnownChart::new(limits.into_iter().flatten().collect());
         if chart.limits.is_empty() {
-            return Err(PlanError::NoLimit {
-                case: case.path.display().to_string(),
-                speeds: request.speeds_rpm.len(),
-                depth_mm: request.depth_mm,
-            });
+            return Err(no_known_limit(case, request, &without_derivative));
         }
         let candidates = candidates(case, &problem, &unknowns, &chart, &request.means)
             .map_err(|error| no_derivatives(error.to_string()))?;
@@ -241,7 +256,7 @@ impl Basis {
             chart,
             candidates,
             without_limit_rpm,
-            without_derivative_rpm,
+            without_derivative,
         })
     }
 
@@ -273,7 +288,7 @@ impl Basis {
             after,
             obstacle,
             without_limit_rpm: self.without_limit_rpm.clone(),
-            without_derivative_rpm: self.without_derivative_rpm.clone(),
+            without_derivative: self.without_derivative.clone(),
             chart: speeds
                 .map(|((limit, before_mm), after_mm)| Speed {
                     rpm: limit.rpm,

@@ -468,3 +468,56 @@ fn an_unknown_whose_change_gives_no_valid_machine_is_named() {
         "{error}"
     );
 }
+
+#[test]
+fn lobes_without_derivatives_are_listed_with_the_reasons() {
+    let case = case("kuka-kr90-acetal");
+    let (line, linearized) = (0..40)
+        .map(|step| first_limit(&case, 600.0 + 20.0 * f64::from(step), 12.0))
+        .find(|line| line.switches.iter().filter(|switch| !switch.gain).count() >= 2)
+        .map(|line| {
+            let unknowns = Unknowns::new(&case, &Prior::default(), &Means::default()).unwrap();
+            (line, Linearized::new(&case, &unknowns.variables).unwrap())
+        })
+        .unwrap();
+    let (limit, missing) = KnownLimit::new(&line, &linearized, 20);
+    assert!(limit.unwrap().planes.len() >= 2 && missing.is_empty());
+    // A linear structure has no fold, hence no Floquet mode and no derivative of one.
+    let losses: Vec<usize> = (0..line.switches.len())
+        .filter(|index| !line.switches[*index].gain)
+        .collect();
+    let without = |loss: usize| {
+        let mut line = line.clone();
+        line.switches[losses[loss]].kind = quietcut_stability::StabilityLoss::Fold;
+        KnownLimit::new(&line, &linearized, 20)
+    };
+    let (limit, missing) = without(1);
+    let depth_mm = line.switches[losses[1]].depth_mm;
+    assert!(
+        limit
+            .unwrap()
+            .planes
+            .iter()
+            .all(|plane| plane.depth_mm != depth_mm)
+    );
+    assert_eq!(
+        (missing.len(), missing[0].depth_mm, missing[0].is_first),
+        (1, depth_mm, false)
+    );
+    assert!(
+        missing[0].reason.contains("no motion belongs to this limit"),
+        "{missing:?}"
+    );
+    // Without the derivatives of the first limit the speed is left out, and a chart of such speeds is refused for that
+    // reason and not for want of a limit.
+    let (limit, missing) = without(0);
+    assert!(limit.is_none() && missing[0].is_first);
+    let request = request(&[line.rpm], 12.0, 0.1);
+    let error = no_known_limit(&case, &request, &missing).to_string();
+    assert!(
+        error.contains("no derivatives") && error.contains("no motion belongs"),
+        "{error}"
+    );
+    let error = no_known_limit(&case, &request, &[]).to_string();
+    assert!(error.contains("at none of the 1 speeds"), "{error}");
+}
