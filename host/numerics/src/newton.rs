@@ -75,6 +75,7 @@ pub struct Newton {
     iterations_max: usize,
     tolerance: f64,
     growth: f64,
+    least_size: f64,
 }
 
 /// The unknown x at which Newton's method stopped, and the reason for the stop.
@@ -104,6 +105,17 @@ impl Newton {
             iterations_max,
             tolerance,
             growth: f64::INFINITY,
+            least_size: f64::MIN_POSITIVE,
+        }
+    }
+
+    /// Sets the smallest ‖x‖ that the tolerance refers to, for unknowns whose root may lie at or near zero: the search
+    /// converges at ‖step‖ ≤ tolerance · max(‖x‖, `size`).
+    #[must_use]
+    pub fn with_least_size(self, size: f64) -> Self {
+        Self {
+            least_size: size,
+            ..self
         }
     }
 
@@ -142,7 +154,7 @@ impl Newton {
                     ..root
                 };
             }
-            if length <= self.tolerance * size_before.max(f64::MIN_POSITIVE) {
+            if length <= self.tolerance * size_before.max(self.least_size) {
                 root.x.subtract(1.0, &found);
                 return Root {
                     stop: Stop::Converged,
@@ -241,5 +253,9 @@ mod tests {
         assert_eq!(slow.converged(), None);
         // A root at zero: relative to its size no step is short, but a step of zero is.
         assert_eq!(newton.solve(0.0, |x: &f64| Ok(*x)).stop, Stop::Converged);
+        let halved = Newton::new(40, 1e-9).with_least_size(1.0);
+        let found = halved.solve(1.0, |x: &f64| Ok(0.5 * x));
+        // The step of iteration k is 2⁻ᵏ, which is below 1e-9 from k = 30 on.
+        assert_eq!((found.stop, found.iterations), (Stop::Converged, 30));
     }
 }

@@ -2,6 +2,8 @@
 //! belongs to it.
 
 use num_complex::Complex64;
+use quietcut_numerics::Stop;
+use quietcut_numerics::newton::Newton;
 
 use super::averaged::AveragedLoop;
 use super::limits::unstable_roots;
@@ -154,35 +156,37 @@ pub(crate) fn polish(open_loop: &impl OpenLoop, depth_m: f64, guess: Complex64) 
             .map(|locus| depth_m - locus.inv())
             .min_by(|p, q| p.norm().total_cmp(&q.norm()))
     };
+    // A characteristic locus is infinite at a pole of the loop, which is the root at depth 0.
+    let is_pole = depth_m == 0.0;
     let scale = guess.norm().max(1e-6);
-    let (mut before, mut s) = (
-        guess + Complex64::new(1e-4, 1e-4) * scale,
-        guess + Complex64::new(1e-6, 0.0) * scale,
-    );
-    let (mut miss_before, mut miss_now) = (miss(before)?, miss(s)?);
-    for _ in 0..40 {
-        if miss_now.norm() < 1e-13 * depth_m.max(1e-3 * SHALLOW_M) {
-            return Some(s);
-        }
-        let step = miss_now * (s - before) / (miss_now - miss_before);
-        if !step.is_finite() {
-            return None;
-        }
-        (before, miss_before) = (s, miss_now);
-        s -= step;
-        if (s - guess).norm() > 0.3 * scale {
-            return None;
-        }
-        miss_now = match miss(s) {
-            Some(miss) => miss,
-            // A characteristic locus is infinite at a pole of the loop, which is the root at depth 0.
-            None => return (depth_m == 0.0).then_some(s),
-        };
-        if step.norm() < 1e-13 * scale {
-            return (miss_now.norm() < 1e-6 * depth_m.max(SHALLOW_M)).then_some(s);
-        }
+    let mut before = guess + Complex64::new(1e-4, 1e-4) * scale;
+    let mut miss_before = miss(before)?;
+    let start = guess + Complex64::new(1e-6, 0.0) * scale;
+    let root = Newton::new(40, 1e-13)
+        .with_least_size(scale)
+        .solve(start, |&s: &Complex64| {
+            if (s - guess).norm() > 0.3 * scale {
+                return Err(Stop::LeftDomain);
+            }
+            let Some(miss_now) = miss(s) else {
+                return if is_pole {
+                    Ok(Complex64::ZERO)
+                } else {
+                    Err(Stop::LeftDomain)
+                };
+            };
+            if miss_now.norm() < 1e-13 * depth_m.max(1e-3 * SHALLOW_M) {
+                return Ok(Complex64::ZERO);
+            }
+            let step = miss_now * (s - before) / (miss_now - miss_before);
+            (before, miss_before) = (s, miss_now);
+            Ok(step)
+        })
+        .converged()?;
+    match miss(root) {
+        Some(miss) => (miss.norm() < 1e-6 * depth_m.max(SHALLOW_M)).then_some(root),
+        None => is_pole.then_some(root),
     }
-    None
 }
 
 /// Dominant Floquet multiplier of a loop with averaged coefficients.

@@ -225,7 +225,7 @@ impl Characteristic {
     }
 
     /// Crossing of the unit circle near a guess, at a depth between `low_m` and `high_m`, by Newton's method in depth
-    /// and angle of the multiplier. Both unknowns have a tolerance of their own.
+    /// and angle of the multiplier. `None` if it does not converge, or leaves the range of depths.
     pub(crate) fn crossing_near(
         &self,
         guess: Crossing,
@@ -234,43 +234,53 @@ impl Characteristic {
         work: &mut Workspace,
     ) -> Option<Crossing> {
         let real = guess.multiplier.im == 0.0;
-        let mut depth_m = guess.depth_m;
-        let mut angle = guess.multiplier.arg();
-        let mut multiplier = guess.multiplier / guess.multiplier.norm();
-        for _ in 0..30 {
-            let Some(logarithmic) = self.logarithmic(multiplier, depth_m, work) else {
-                break;
-            };
-            let by_angle = logarithmic.by_multiplier * multiplier * Complex64::I;
-            let (by_depth, one) = (logarithmic.by_depth, Complex64::ONE);
-            let (step, turn) = if real {
-                (-by_depth.re.recip(), 0.0)
-            } else {
-                // Newton step towards F(w, θ) = 0 from 1 + (∂ ln F/∂w) dw + (∂ ln F/∂θ) dθ = 0, real and imaginary
-                // part.
-                let determinant = by_depth.re * by_angle.im - by_depth.im * by_angle.re;
-                (
-                    -(one.re * by_angle.im - one.im * by_angle.re) / determinant,
-                    -(by_depth.re * one.im - by_depth.im * one.re) / determinant,
-                )
-            };
-            depth_m += step;
-            angle += turn;
-            if !real {
-                multiplier = Complex64::cis(angle);
-            }
-            let margin = 0.5 * (high_m - low_m);
-            if !(low_m - margin..=high_m + margin).contains(&depth_m) {
-                return None;
-            }
-            if step.abs() < 1e-9 * high_m && turn.abs() < 1e-9 {
-                break;
-            }
-        }
+        let unit = guess.multiplier / guess.multiplier.norm();
+        let multiplier_at = |angle: f64| if real { unit } else { Complex64::cis(angle) };
+        let margin_m = 0.5 * (high_m - low_m);
+        let allowed_m = low_m - margin_m..=high_m + margin_m;
+        // Both unknowns in one complex number: the depth as a share of the larger depth, and the angle θ in rad.
+        let start = Complex64::new(guess.depth_m / high_m, unit.arg());
+        let found = Newton::new(30, 1e-9)
+            .with_least_size(1.0)
+            .solve(start, |at: &Complex64| {
+                let (depth_m, multiplier) = (at.re * high_m, multiplier_at(at.im));
+                if !allowed_m.contains(&depth_m) {
+                    return Err(Stop::LeftDomain);
+                }
+                let Some(logarithmic) = self.logarithmic(multiplier, depth_m, work) else {
+                    // F vanishes to rounding, so that this is the crossing, or the numbers are out of range.
+                    return if self.is_finite_at(multiplier, depth_m, work) {
+                        Ok(Complex64::ZERO)
+                    } else {
+                        Err(Stop::LeftDomain)
+                    };
+                };
+                let by_angle = logarithmic.by_multiplier * multiplier * Complex64::I;
+                let by_depth = logarithmic.by_depth;
+                let (step_m, turn) = if real {
+                    (by_depth.re.recip(), 0.0)
+                } else {
+                    // Newton step from F(w, θ) = 0: (∂ ln F/∂w) dw + (∂ ln F/∂θ) dθ = 1, real and imaginary part.
+                    let determinant = by_depth.re * by_angle.im - by_depth.im * by_angle.re;
+                    (by_angle.im / determinant, -by_depth.im / determinant)
+                };
+                Ok(Complex64::new(step_m / high_m, turn))
+            })
+            .converged()?;
+        let (depth_m, multiplier) = (found.re * high_m, multiplier_at(found.im));
         (low_m..=high_m).contains(&depth_m).then_some(Crossing {
             depth_m,
             multiplier: Complex64::new(multiplier.re, multiplier.im.abs()),
         })
+    }
+
+    /// True if the transition matrix Φ at (μ, w) is finite.
+    fn is_finite_at(&self, multiplier: Complex64, depth_m: f64, work: &mut Workspace) -> bool {
+        self.evaluate((Complex64::ONE - inverse(multiplier)) * depth_m, work);
+        work.value
+            .iter()
+            .chain(&work.slope)
+            .all(|entry| entry.is_finite())
     }
 
     /// Transition matrix Φ(κ), n × n row by row.

@@ -1,12 +1,15 @@
 //! Multipliers and limits of the default method against references and against Runge–Kutta integration, and lines
 //! against single depths on random machines.
 
+use std::f64::consts::PI;
+
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 
 use super::{problem, random_case, rpm_of};
 use crate::problem::period::{Period, Resolution};
 use crate::spectrum::characteristic::Characteristic;
+use crate::spectrum::crossing::Crossing;
 use crate::spectrum::period_map;
 use crate::*;
 use quietcut_model::case::Case;
@@ -239,6 +242,38 @@ fn the_collocated_map_and_the_characteristic_matrix_have_the_same_multipliers() 
             assert!((polished - multiplier).norm() < 1e-9 * multiplier.norm().max(1.0));
         }
     }
+}
+
+/// A crossing of the unit circle is returned only if the iteration has converged to one, from any guess.
+#[test]
+fn every_crossing_found_has_a_multiplier_on_the_unit_circle() {
+    let problem = problem("kuka-kr90-acetal");
+    let deepest_m = 6e-3;
+    let period = Period::new(&problem, 1200.0, 2.0 * deepest_m, Resolution::WORKING);
+    let characteristic = Characteristic::new(&period, 2.0 * deepest_m);
+    let mut work = characteristic.workspace();
+    let crossing_near = |depth_m, angle, most_m, work: &mut _| {
+        let multiplier = Complex64::cis(angle);
+        let guess = Crossing { depth_m, multiplier };
+        characteristic.crossing_near(guess, 0.0, most_m, work)
+    };
+    // The transition matrix leaves the range of numbers there.
+    assert!(crossing_near(1e200, 1.0, 2e200, &mut work).is_none());
+    let mut count = 0;
+    for index in 0..400 {
+        let share = |factor: f64| (0.5 + f64::from(index) * factor).fract();
+        let (depth_m, angle) = (deepest_m * share(0.618_033_988_7), PI * share(0.414_213_562_4));
+        let Some(found) = crossing_near(depth_m, angle, deepest_m, &mut work) else {
+            continue;
+        };
+        count += 1;
+        let there = characteristic
+            .multiplier_near(found.multiplier, found.depth_m, 1e-6, &mut work)
+            .unwrap();
+        assert!((there - found.multiplier).norm() < 1e-9, "{found:?} {there}");
+    }
+    println!("{count} crossings of 400 guesses");
+    assert!(count > 20);
 }
 
 #[test]
