@@ -196,6 +196,9 @@ fn run_chart(
         };
         chart = chart.with_spread(uncertainty, deepest_mm, &cells_mm)?;
     }
+    for warning in error_warning(&chart) {
+        tracing::warn!("{}: {warning}", case.path.display());
+    }
     let calls = cuts.as_deref().map(|cuts| Calls::new(method, cuts)).transpose()?;
     if let Some(path) = &out {
         let marks: Vec<Mark> = cuts.iter().flatten().map(Mark::from).collect();
@@ -220,6 +223,22 @@ fn run_chart(
         cuts: calls,
     };
     output.answer(&answer, text)
+}
+
+/// Warning about limits whose error cannot be computed, with every reason; `None` if there are none.
+fn error_warning(chart: &Chart) -> Option<String> {
+    let reasons: Vec<&str> = chart
+        .lines()
+        .into_iter()
+        .flat_map(|line| line.without_error.iter().map(String::as_str))
+        .collect();
+    (!reasons.is_empty()).then(|| {
+        format!(
+            "the error of {} limits cannot be computed, and is stated as the last depth: {}",
+            reasons.len(),
+            reasons.join("; ")
+        )
+    })
 }
 
 fn limits_as_text(chart: &Chart) -> String {

@@ -138,6 +138,9 @@ pub enum StabilityError {
 /// Text for the error that the equations over a period have no finite solution.
 pub(crate) const NO_SOLUTION: &str = "the equations of the period have no finite solution";
 
+/// Text for the error that a limit is not confirmed on a finer mesh.
+pub(crate) const NO_FINER: &str = "a finer mesh has no Floquet multiplier near that of the limit";
+
 /// Text for the error that receptances are infinite or not a number.
 pub(crate) const NOT_FINITE: &str = "receptances are not finite";
 

@@ -64,7 +64,7 @@
 //! | `criteria`, `error` | thresholds of decisions; why stability cannot be computed |
 //! | `process` | extensions of the case in the stability problem |
 //! | `problem` | the linear delay problem: equation, tooth passages, meshes |
-//! | `spectrum` | multipliers of a period map: Krylov, characteristic matrix, winding number, Floquet modes |
+//! | `spectrum` | Floquet multipliers of a period map: Krylov, characteristic matrix, winding number, Floquet modes |
 //! | `limits` | one cut, one speed, charts, cells, derivatives, spread; the interface [`Method`] |
 //! | `frequency` | loops of receptances: characteristic loci, Nyquist counts |
 //! | `methods` | one file per method |

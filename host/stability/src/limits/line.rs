@@ -266,17 +266,30 @@ impl<S: Spectrum> Scan<S> {
 
     fn finish(mut self, start: i32, depth_mm: f64) -> SpeedLine {
         let crossings = std::mem::take(&mut self.crossings);
+        let deepest_m = depth_mm * 1e-3;
+        let mut without_error = Vec::new();
         let switches = crossings
             .iter()
-            .map(|DirectedCrossing { crossing, outward }| Switch {
-                depth_mm: crossing.depth_m * 1e3,
-                error_mm: Some(1e3 * self.error_m(crossing, *outward, depth_mm * 1e-3)),
-                kind: StabilityLoss::of(crossing.multiplier),
-                gain: !outward,
-                chatter_hz: self.spectrum.chatter_hz(crossing),
+            .map(|DirectedCrossing { crossing, outward }| {
+                let error_m = self
+                    .error_m(crossing, *outward, deepest_m)
+                    .unwrap_or_else(|reason| {
+                        without_error.push(reason.to_string());
+                        deepest_m
+                    });
+                Switch {
+                    depth_mm: crossing.depth_m * 1e3,
+                    error_mm: Some(1e3 * error_m),
+                    kind: StabilityLoss::of(crossing.multiplier),
+                    gain: !outward,
+                    chatter_hz: self.spectrum.chatter_hz(crossing),
+                }
             })
             .collect();
-        SpeedLine::of_switches(self.rpm, depth_mm, start, switches)
+        SpeedLine {
+            without_error,
+            ..SpeedLine::of_switches(self.rpm, depth_mm, start, switches)
+        }
     }
 
     /// Error of the depth of a crossing, m: the distance at which |μ| of its branch differs from 1 by more than the
@@ -284,14 +297,15 @@ impl<S: Spectrum> Scan<S> {
     ///
     /// The first try is that error divided by d|μ|/dw; the distance doubles until |μ| confirms it. `deepest_m` if no
     /// distance does.
-    fn error_m(&mut self, crossing: &Crossing, outward: bool, deepest_m: f64) -> f64 {
+    ///
+    /// # Errors
+    /// The error of the multiplier, or its derivative over the depth, cannot be computed.
+    fn error_m(&mut self, crossing: &Crossing, outward: bool, deepest_m: f64) -> Result<f64, StabilityError> {
         let Crossing { multiplier, depth_m } = *crossing;
-        let (Some(error), Some(slope)) = (
-            self.spectrum.error(crossing),
-            self.spectrum.sensitivity(multiplier, depth_m),
-        ) else {
-            return deepest_m;
-        };
+        let error = self.spectrum.error(crossing)?;
+        let slope = self.spectrum.sensitivity(multiplier, depth_m).ok_or_else(|| {
+            self.broke_down(depth_m, "the Floquet multiplier has no derivative over the depth")
+        })?;
         let mut reach_m = 1.01 * error / (multiplier.conj() * slope).re.abs() + ROOT * depth_m;
         while reach_m < deepest_m {
             let sides = [(-reach_m, outward), (reach_m, !outward)];
@@ -310,11 +324,11 @@ impl<S: Spectrum> Scan<S> {
                 }
             };
             if sides.into_iter().all(&mut is_beyond) {
-                return reach_m;
+                return Ok(reach_m);
             }
             reach_m *= 2.0;
         }
-        deepest_m
+        Ok(deepest_m)
     }
 }
 

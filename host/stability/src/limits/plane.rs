@@ -91,8 +91,8 @@ impl Linearized {
             .filter(|_| slopes.iter().any(|slope| slope.angle != 0.0));
         let chatter_hz = chatter_hz.map(|hz| {
             let period_s = self.problem.tooth_period_s(rpm);
-            // The product ωτ of chatter frequency and tooth period is the angle of the multiplier or its negative,
-            // modulo 2π; derivatives refer to the angle above the real axis.
+            // The product ωτ of chatter frequency and tooth period is the angle of the Floquet multiplier or its
+            // negative, modulo 2π; derivatives refer to the angle above the real axis.
             let sign = if (hz * period_s).fract() > 0.5 { -1.0 } else { 1.0 };
             let per_angle = sign / (TAU * period_s);
             (

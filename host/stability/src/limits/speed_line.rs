@@ -65,6 +65,9 @@ pub struct SpeedLine {
     /// empty if the method finds limits without multipliers.
     #[serde(skip)]
     pub(crate) largest: Vec<f64>,
+    /// For each switch whose error cannot be computed, and is therefore stated as the last depth, the reason.
+    #[serde(skip)]
+    pub without_error: Vec<String>,
 }
 
 impl SpeedLine {
@@ -106,6 +109,7 @@ impl SpeedLine {
             switches,
             spread: None,
             largest: Vec::new(),
+            without_error: Vec::new(),
         }
     }
 }

@@ -618,6 +618,7 @@ fn two_stable_orbits_are_not_surely_stable() {
         switches: Vec::new(),
         spread: None,
         largest: Vec::new(),
+        without_error: Vec::new(),
     };
     assert_eq!(entries::surely_stable(&line, 4.0), [[0.0, 2.0], [3.0, 4.0]]);
     let entries = entries::unstable(&line, 4.0);

@@ -11,8 +11,8 @@ use crate::problem::linear::Problem;
 use crate::problem::period::check_length;
 use crate::spectrum::collocated::Collocated;
 
-/// Collocation over one tooth period; limits and multipliers are refined with the characteristic matrix. The default
-/// method.
+/// Collocation over one tooth period; limits and Floquet multipliers (characteristic multipliers) are refined with the
+/// characteristic matrix. The default method.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Collocation {
     /// Milling problem with equal pitch.

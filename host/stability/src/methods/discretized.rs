@@ -126,7 +126,7 @@ impl<D: Discretization> Method for Discretized<D> {
             MapSpectrum::new(
                 deepest_m,
                 |depth_m| self.discretization.map(&self.pitched, &mesh, depth_m),
-                |multiplier, depth_m| self.error(rpm, depth_m * 1e3, multiplier).ok(),
+                |multiplier, depth_m| self.error(rpm, depth_m * 1e3, multiplier),
             )
         })
     }

@@ -5,7 +5,7 @@ use std::rc::Rc;
 use num_complex::Complex64;
 
 use crate::criteria::{LEAST_ERROR, MESH_ROOM};
-use crate::error::{Breakdown, NO_DOMINANT, StabilityError};
+use crate::error::{Breakdown, NO_DOMINANT, NO_FINER, StabilityError};
 use crate::limits::bounds::{check_depth, check_speed};
 use crate::limits::line::line_of;
 use crate::limits::method::Method;
@@ -26,6 +26,25 @@ use crate::spectrum::revolution_map::RevolutionMap;
 pub struct RevolutionCollocation {
     /// Milling problem of the method, with equal or unequal pitch.
     pub pitched: Pitched,
+}
+
+impl RevolutionCollocation {
+    /// Error of the multiplier at a limit: [`error`] from the nearest multiplier on the fine mesh.
+    fn limit_error(&self, rpm: f64, depth_m: f64, multiplier: Complex64) -> Result<f64, StabilityError> {
+        let depth_mm = depth_m * 1e3;
+        let broke_down = |cause: Breakdown| cause.at(rpm, depth_mm, NO_DOMINANT);
+        let finer = Revolution::new(&self.pitched, rpm, depth_m, Fineness::FINE)
+            .and_then(|finer| RevolutionMap::new(Rc::new(finer), depth_m))
+            .ok_or_else(|| broke_down(Breakdown::NoSolution))?;
+        let finer = Dominant::any(&finer).map_err(broke_down)?;
+        let nearest =
+            map_spectrum::nearest(&finer.eigenvalues, multiplier).ok_or(StabilityError::BrokeDown {
+                rpm,
+                depth_mm,
+                what: NO_FINER,
+            })?;
+        Ok(error(multiplier, nearest))
+    }
 }
 
 impl Method for RevolutionCollocation {
@@ -66,12 +85,7 @@ impl Method for RevolutionCollocation {
             MapSpectrum::new(
                 deepest_m,
                 move |depth_m| RevolutionMap::new(revolution.clone()?, depth_m),
-                |multiplier, depth_m| {
-                    let finer = Revolution::new(&self.pitched, rpm, depth_m, Fineness::FINE)?;
-                    let finer = Dominant::any(&RevolutionMap::new(Rc::new(finer), depth_m)?).ok()?;
-                    let nearest = map_spectrum::nearest(&finer.eigenvalues, multiplier)?;
-                    Some(error(multiplier, nearest))
-                },
+                |multiplier, depth_m| self.limit_error(rpm, depth_m, multiplier),
             )
         })
     }

@@ -144,6 +144,7 @@ impl Branch {
             switches,
             spread: None,
             largest: Vec::new(),
+            without_error: Vec::new(),
         }
     }
 }

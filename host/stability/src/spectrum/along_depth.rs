@@ -4,7 +4,7 @@ use num_complex::Complex64;
 
 use super::crossing::Crossing;
 use super::root::Root;
-use crate::error::Breakdown;
+use crate::error::{Breakdown, StabilityError};
 
 /// Floquet multipliers of one method at one spindle speed, as functions of the axial depth.
 pub(crate) trait Spectrum {
@@ -39,7 +39,9 @@ pub(crate) trait Spectrum {
     /// Chatter frequency at a crossing of the unit circle by a multiplier, Hz.
     fn chatter_hz(&self, crossing: &Crossing) -> Option<f64>;
 
-    /// Error estimate of the multiplier at a crossing, as an absolute value; `None` if the computation on a finer mesh
-    /// finds no multiplier near it.
-    fn error(&mut self, crossing: &Crossing) -> Option<f64>;
+    /// Error estimate of the multiplier at a crossing, as an absolute value.
+    ///
+    /// # Errors
+    /// The computation on a finer mesh fails, or finds no multiplier near that of the crossing.
+    fn error(&mut self, crossing: &Crossing) -> Result<f64, StabilityError>;
 }

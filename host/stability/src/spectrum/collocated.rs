@@ -9,7 +9,7 @@ use super::crossing::Crossing;
 use super::period_map;
 use super::root::Root;
 use crate::criteria::{LEAST_ERROR, MESH_ROOM, SCANNED, SCANNED_SHARE};
-use crate::error::Breakdown;
+use crate::error::{Breakdown, NO_FINER, StabilityError};
 use crate::problem::linear::Problem;
 use crate::problem::period::{Period, Resolution};
 
@@ -78,14 +78,20 @@ impl Spectrum for Collocated<'_> {
 
     /// Error of a multiplier at a crossing: its change between the working and the finer mesh, times a safety factor,
     /// as for a single cut.
-    fn error(&mut self, crossing: &Crossing) -> Option<f64> {
+    fn error(&mut self, crossing: &Crossing) -> Result<f64, StabilityError> {
         let Crossing { multiplier, depth_m } = *crossing;
         let (problem, rpm, deepest_m) = (self.problem, self.rpm, self.deepest_m);
         let finer = self.finer.get_or_insert_with(|| {
             let period = Period::new(problem, rpm, 2.0 * deepest_m, Resolution::FINE);
             Characteristic::new(&period, 2.0 * deepest_m)
         });
-        let fine = finer.multiplier_near(multiplier, depth_m, 0.05, &mut self.workspace)?;
-        Some((MESH_ROOM * (fine - multiplier).norm()).max(LEAST_ERROR))
+        let fine = finer
+            .multiplier_near(multiplier, depth_m, 0.05, &mut self.workspace)
+            .ok_or(StabilityError::BrokeDown {
+                rpm,
+                depth_mm: depth_m * 1e3,
+                what: NO_FINER,
+            })?;
+        Ok((MESH_ROOM * (fine - multiplier).norm()).max(LEAST_ERROR))
     }
 }

@@ -1,13 +1,15 @@
 //! Floquet multipliers (characteristic multipliers) of methods with an explicit period map, along the axial depth.
 
 use num_complex::Complex64;
+use quietcut_numerics::Stop;
+use quietcut_numerics::newton::Newton;
 
 use super::along_depth::Spectrum;
 use super::crossing::Crossing;
 use super::krylov::{Dominant, LinearMap};
 use super::stability_loss::StabilityLoss;
 use crate::criteria::MAPPED;
-use crate::error::Breakdown;
+use crate::error::{Breakdown, StabilityError};
 
 /// Depth step of the difference quotient dμ/dw, as a share of the largest depth. Its truncation error, and the rounding
 /// of multipliers divided by the step, are then both near 1e-6. Derivatives serve as predictions only.
@@ -37,7 +39,9 @@ pub(crate) struct MapSpectrum<F, E> {
     known: Option<MultipliersAtDepth>,
 }
 
-impl<M: PeriodMap, F: Fn(f64) -> Option<M>, E: Fn(Complex64, f64) -> Option<f64>> MapSpectrum<F, E> {
+impl<M: PeriodMap, F: Fn(f64) -> Option<M>, E: Fn(Complex64, f64) -> Result<f64, StabilityError>>
+    MapSpectrum<F, E>
+{
     /// Floquet multipliers of period maps for axial depths up to `deepest_m`.
     pub(crate) fn new(deepest_m: f64, map: F, error: E) -> Self {
         Self {
@@ -74,7 +78,7 @@ pub(crate) fn nearest(multipliers: &[Complex64], guess: Complex64) -> Option<Com
         .min_by(|p, q| (p - guess).norm().total_cmp(&(q - guess).norm()))
 }
 
-impl<M: PeriodMap, F: Fn(f64) -> Option<M>, E: Fn(Complex64, f64) -> Option<f64>> Spectrum
+impl<M: PeriodMap, F: Fn(f64) -> Option<M>, E: Fn(Complex64, f64) -> Result<f64, StabilityError>> Spectrum
     for MapSpectrum<F, E>
 {
     fn multipliers(&mut self, depth_m: f64) -> Result<Vec<Complex64>, Breakdown> {
@@ -103,35 +107,35 @@ impl<M: PeriodMap, F: Fn(f64) -> Option<M>, E: Fn(Complex64, f64) -> Option<f64>
     /// Newton's method for |μ| = 1 along the branch. Its derivative is a difference quotient, so that the last step is not applied:
     /// the crossing is the depth at which the multiplier was computed.
     fn crossing_near(&mut self, guess: Crossing, low_m: f64, high_m: f64) -> Option<Crossing> {
-        let (mut depth_m, mut expected) = (guess.depth_m, guess.multiplier);
-        // Newton's method in the depth for |μ| = 1 along the branch of this multiplier.
-        for _ in 0..20 {
-            let multiplier = self.nearest(expected, depth_m)?;
-            let slope = self.sensitivity(multiplier, depth_m)?;
-            let outward = (multiplier.conj() * slope).re / multiplier.norm();
-            let step_m = (1.0 - multiplier.norm()) / outward;
-            if !step_m.is_finite() {
-                return None;
-            }
-            if step_m.abs() < 1e-9 * high_m {
-                let kind = StabilityLoss::of(multiplier);
-                let on_circle = multiplier / multiplier.norm();
-                return (low_m..=high_m).contains(&depth_m).then_some(Crossing {
-                    depth_m,
-                    multiplier: match kind {
-                        StabilityLoss::Hopf => Complex64::new(on_circle.re, on_circle.im.abs()),
-                        StabilityLoss::Flip | StabilityLoss::Fold => Complex64::from(on_circle.re.signum()),
-                    },
-                });
-            }
-            expected = multiplier + slope * step_m;
-            depth_m += step_m;
-            let margin_m = 0.5 * (high_m - low_m);
-            if !(low_m - margin_m..=high_m + margin_m).contains(&depth_m) || depth_m < 0.0 {
-                return None;
-            }
-        }
-        None
+        let margin_m = 0.5 * (high_m - low_m);
+        let allowed_m = (low_m - margin_m).max(0.0)..=high_m + margin_m;
+        let (mut expected, mut last) = (guess.multiplier, guess);
+        // The unknown is the depth as a share of the larger depth.
+        Newton::new(20, 1e-9)
+            .with_least_size(1.0)
+            .solve(guess.depth_m / high_m, |share: &f64| {
+                let depth_m = share * high_m;
+                if !allowed_m.contains(&depth_m) {
+                    return Err(Stop::LeftDomain);
+                }
+                let multiplier = self.nearest(expected, depth_m).ok_or(Stop::GivenUp)?;
+                let slope = self.sensitivity(multiplier, depth_m).ok_or(Stop::GivenUp)?;
+                let outward = (multiplier.conj() * slope).re / multiplier.norm();
+                let step_m = (1.0 - multiplier.norm()) / outward;
+                last = Crossing { depth_m, multiplier };
+                expected = multiplier + slope * step_m;
+                Ok(-step_m / high_m)
+            })
+            .converged()?;
+        let Crossing { depth_m, multiplier } = last;
+        let on_circle = multiplier / multiplier.norm();
+        (low_m..=high_m).contains(&depth_m).then_some(Crossing {
+            depth_m,
+            multiplier: match StabilityLoss::of(multiplier) {
+                StabilityLoss::Hopf => Complex64::new(on_circle.re, on_circle.im.abs()),
+                StabilityLoss::Flip | StabilityLoss::Fold => Complex64::from(on_circle.re.signum()),
+            },
+        })
     }
 
     fn chatter_hz(&self, crossing: &Crossing) -> Option<f64> {
@@ -141,7 +145,7 @@ impl<M: PeriodMap, F: Fn(f64) -> Option<M>, E: Fn(Complex64, f64) -> Option<f64>
         map.chatter_hz(multiplier, &dominant.vector(multiplier)?)
     }
 
-    fn error(&mut self, crossing: &Crossing) -> Option<f64> {
+    fn error(&mut self, crossing: &Crossing) -> Result<f64, StabilityError> {
         (self.error)(crossing.multiplier, crossing.depth_m)
     }
 }

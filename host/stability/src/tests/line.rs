@@ -1,5 +1,12 @@
 //! Stated errors of limits: against multipliers from Taylor series, and for discretizations against the default method.
 
+use num_complex::Complex64;
+
+use crate::error::{Breakdown, NO_SOLUTION};
+use crate::limits::line::line_of;
+use crate::spectrum::along_depth::Spectrum;
+use crate::spectrum::collocated::Collocated;
+use crate::spectrum::crossing::Crossing;
 use crate::tests::taylor::{Series, largest_abs};
 use crate::tests::{problem, random_case, rpm_of};
 use crate::*;
@@ -186,4 +193,53 @@ fn errors_leave_depths_undecided_only_at_the_ends_of_stable_intervals() {
     // The Hopf pair crosses at 1 and 2 mm, where the flip has already made the cut unstable: those errors leave nothing
     // undecided.
     assert_eq!(line.undecided_mm, [[0.0, 0.1 + 0.2], [3.0 - 0.2, 3.3 + 0.2]]);
+}
+
+/// Spectrum whose finer mesh always fails.
+struct WithoutFinerMesh<'a>(Collocated<'a>);
+
+impl Spectrum for WithoutFinerMesh<'_> {
+    fn multipliers(&mut self, depth_m: f64) -> Result<Vec<Complex64>, Breakdown> {
+        self.0.multipliers(depth_m)
+    }
+
+    fn multiplier_near(&mut self, guess: Complex64, depth_m: f64, reach: f64) -> Option<Complex64> {
+        self.0.multiplier_near(guess, depth_m, reach)
+    }
+
+    fn sensitivity(&mut self, multiplier: Complex64, depth_m: f64) -> Option<Complex64> {
+        self.0.sensitivity(multiplier, depth_m)
+    }
+
+    fn crossing_near(&mut self, guess: Crossing, low_m: f64, high_m: f64) -> Option<Crossing> {
+        self.0.crossing_near(guess, low_m, high_m)
+    }
+
+    fn chatter_hz(&self, crossing: &Crossing) -> Option<f64> {
+        self.0.chatter_hz(crossing)
+    }
+
+    fn error(&mut self, crossing: &Crossing) -> Result<f64, StabilityError> {
+        Err(Breakdown::TooManyMultipliers.at(1200.0, 1e3 * crossing.depth_m, NO_SOLUTION))
+    }
+}
+
+#[test]
+fn a_limit_without_an_error_keeps_the_reason() {
+    let problem = problem("kuka-kr90-acetal");
+    let known = line(&problem, 1200.0, 6.0, 40).unwrap();
+    assert!(!known.switches.is_empty() && known.without_error.is_empty());
+    let found = line_of(1200.0, 6.0, 40, |deepest_m| {
+        WithoutFinerMesh(Collocated::new(&problem, 1200.0, deepest_m))
+    })
+    .unwrap();
+    assert_eq!(found.switches.len(), known.switches.len());
+    assert_eq!(found.without_error.len(), found.switches.len());
+    for (switch, reason) in found.switches.iter().zip(&found.without_error) {
+        assert_eq!(switch.error_mm, Some(6.0));
+        assert!(
+            reason.contains("1200 rev/min") && reason.contains("nearly one size"),
+            "{reason}"
+        );
+    }
 }
