@@ -86,11 +86,12 @@ pub struct SampleClockState {
     next_sequence: u32,
     /// Number of samples in the block before the newest one.
     block_samples: u32,
-    /// Number of samples since the start in which an axis was clipped.
+    /// Number of samples with a clipped axis since the sample clock was started or reset.
     clipped: u32,
-    /// Number of lost samples since the start, without those of gaps whose length is unknown.
+    /// Number of lost samples since the sample clock was started or reset, without those of gaps whose length is
+    /// unknown.
     lost: u32,
-    /// Number of gaps in the stream of samples since the start.
+    /// Number of gaps in the stream of samples since the sample clock was started or reset.
     gaps: u32,
 }
 
@@ -196,17 +197,18 @@ impl SampleClockState {
         self.line.map(|line| Hertz(1e9 / line.period_ns()))
     }
 
-    /// Number of clipped samples since the start.
+    /// Number of samples with a clipped axis since the sample clock was started or reset.
     pub fn clipped(&self) -> u32 {
         self.clipped
     }
 
-    /// Number of lost samples since the start, without those of gaps whose length is unknown.
+    /// Number of lost samples since the sample clock was started or reset, without those of gaps whose length is
+    /// unknown.
     pub fn lost(&self) -> u32 {
         self.lost
     }
 
-    /// Number of gaps in the stream of samples since the start.
+    /// Number of gaps in the stream of samples since the sample clock was started or reset.
     pub fn gaps(&self) -> u32 {
         self.gaps
     }

@@ -144,7 +144,8 @@ pub const DEPTH_MARGIN: f32 = 0.1;
 /// closely.
 pub const SPEED_BAND: f32 = 0.01;
 
-/// Factor by which the quiet depth at another speed must exceed that at the present speed to be advised.
+/// Factor by which the quiet depth (stable with margin) at another spindle speed must exceed that at the present speed
+/// for the other speed to be advised.
 ///
 /// A change of both speed and depth must gain at least as much depth as [`DEPTH_MARGIN`].
 pub const BETTER: f32 = 1.1;

@@ -47,7 +47,7 @@ pub struct EventClockState {
     bias_ns: f32,
     /// Number of consecutive outliers.
     outliers: u8,
-    /// Number of time stamps observed since the start.
+    /// Number of time stamps observed since the estimator was started.
     observations: u32,
 }
 
@@ -185,7 +185,7 @@ impl EventClockState {
         self.period_ns
     }
 
-    /// Number of time stamps observed since the start.
+    /// Number of time stamps observed since the estimator was started.
     pub fn observations(&self) -> u32 {
         self.observations
     }

@@ -103,7 +103,7 @@ impl Model {
         self.registers[usize::from(address)]
     }
 
-    /// Sets a fault of the sensor before sampling starts.
+    /// Sets a fault of the modelled sensor before it starts to sample.
     pub(crate) fn break_with(&mut self, fault: Fault) {
         self.fault = fault;
         self.set_defaults();

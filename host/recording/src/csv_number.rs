@@ -13,7 +13,7 @@ pub(super) enum End {
 /// the number of bytes up to and including the separator, and the separator.
 #[inline]
 pub(super) fn number(text: &[u8]) -> Option<(f64, usize, End)> {
-    // Fast path: a number without blanks and quotes.
+    // Fast path: most numbers have no blanks or quotes around them.
     if let Ok((value, length)) = fast_float2::parse_partial::<f64, _>(text) {
         match &text[length..] {
             [b',', ..] => return Some((value, length + 1, End::Field)),

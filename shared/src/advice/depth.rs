@@ -42,8 +42,8 @@ impl QuietSpeedSearch<'_> {
         best.map(|(rpm, depth_mm)| (Rpm(rpm), Millimeters(depth_mm)))
     }
 
-    /// The spindle speeds at which the upper bound of the quiet depth exceeds `to_beat_mm`, in descending order of the
-    /// bound.
+    /// The spindle speeds at which the upper bound of the quiet depth (stable with margin) exceeds `to_beat_mm`, in
+    /// descending order of the bound.
     fn candidates(&self, speed: Rpm, to_beat_mm: f32) -> Vec<Candidate, CANDIDATE_SPEEDS> {
         let mut candidates: Vec<Candidate, CANDIDATE_SPEEDS> = Vec::new();
         let (low_rpm, high_rpm) = self.known_rpm;
@@ -76,15 +76,15 @@ impl QuietSpeedSearch<'_> {
         }
     }
 
-    /// The next spindle speed at which the quiet depth is bounded: the next speed of the lobe table, or half a speed
-    /// band further, whichever is nearer.
+    /// The next spindle speed at which the quiet depth (stable with margin) is bounded: the next speed of the lobe
+    /// table, or half a speed band further, whichever is nearer.
     fn next_point(&self, rpm: f32, end_rpm: f32) -> f32 {
         let (_, cell_end_rpm) = self.cell_at(Direction::Faster, rpm, end_rpm);
         f32::min(rpm * (1.0 + 0.5 * SPEED_BAND), cell_end_rpm)
     }
 
-    /// Upper bound in mm of the quiet depth at a spindle speed, from the entries of the lobe table at this speed or at
-    /// its two neighbours in the table.
+    /// Upper bound in mm of the quiet depth (stable with margin) at a spindle speed, from the entries of the lobe table
+    /// at this speed or at its two neighbours in the table.
     fn possible_mm(&self, rpm: f32) -> f32 {
         let index = self.table.speeds_up_to(Rpm(rpm)).saturating_sub(1);
         let is_on_grid = self.table.speed(index) == Some(Rpm(rpm));
@@ -133,8 +133,8 @@ impl QuietSpeedSearch<'_> {
     }
 }
 
-/// Inserts a candidate speed in descending order of its depth bound. Of candidates whose speeds lie within one speed
-/// band, only the best is kept.
+/// Inserts a candidate speed in descending order of its bound of the quiet depth (stable with margin). Of candidates
+/// whose speeds lie within one speed band, only the best is kept.
 fn insert(candidates: &mut Vec<Candidate, CANDIDATE_SPEEDS>, new: Candidate, speed: Rpm) {
     let is_better = |a: &Candidate, b: &Candidate| {
         let is_nearer = ratio(Rpm(a.rpm), speed) < ratio(Rpm(b.rpm), speed);
@@ -160,12 +160,13 @@ fn insert(candidates: &mut Vec<Candidate, CANDIDATE_SPEEDS>, new: Candidate, spe
     let _ = candidates.insert(place, new);
 }
 
-/// Minimum of the upper bounds of the quiet depth over a speed band that moves along the spindle speed.
+/// Minimum of the upper bounds of the quiet depth (stable with margin) over a speed band that moves along the spindle
+/// speed.
 #[derive(Default)]
 struct Window {
-    /// Pairs (speed in rev/min, upper bound of the quiet depth in mm), ascending in both. A bound is removed once a
-    /// later bound is smaller. If the list is full, the newest bound is dropped: the minimum is then too large, which
-    /// is still an upper bound.
+    /// Pairs (spindle speed in rev/min, upper bound in mm of the quiet depth, which is stable with margin), ascending
+    /// in both. A bound is removed once a later bound is smaller. If the list is full, the newest bound is dropped: the
+    /// minimum is then too large, which is still an upper bound.
     bounds: Deque<(f32, f32), 32>,
 }
 

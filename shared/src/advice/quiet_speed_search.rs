@@ -163,8 +163,8 @@ impl<'t> QuietSpeedSearch<'t> {
         )
     }
 
-    /// The next speed to check within a cell of the lobe table: its middle, its end, or one [`QUIET_SPEED_STEP`]
-    /// further, whichever comes first.
+    /// The next spindle speed to check within a cell of the lobe table (between two of its speeds): the middle of the
+    /// cell, its end, or one [`QUIET_SPEED_STEP`] further, whichever comes first.
     pub(super) fn next_rpm(&self, direction: Direction, rpm: f32, index: usize, cell_end_rpm: f32) -> f32 {
         let step = rpm * (1.0 + direction.sign() * QUIET_SPEED_STEP);
         let ends = self.table.speed(index).zip(self.table.speed(index + 1));

@@ -18,7 +18,7 @@ pub enum TableError {
     },
     /// The bytes do not begin with the magic number of a lobe table.
     Magic {
-        /// The first four bytes that were found; a lobe table begins with [`MAGIC`](super::format::MAGIC).
+        /// The first four bytes of the given data; a lobe table begins with [`MAGIC`](super::format::MAGIC).
         found: [u8; 4],
     },
     /// The lobe table has a schema that this code does not know.
@@ -30,7 +30,7 @@ pub enum TableError {
     },
     /// The table length that the header states differs from the number of bytes.
     Length {
-        /// Length of the table that the header states, in bytes.
+        /// Length of the lobe table that its header states, in bytes.
         header: u32,
         /// Bytes found.
         found: u32,
@@ -46,7 +46,7 @@ pub enum TableError {
     Arrays {
         /// The length in bytes that the counts in the description of the table imply.
         needed: u64,
-        /// The actual length in bytes of the table.
+        /// The actual length in bytes of the lobe table.
         found: u32,
     },
     /// The name of the case in the table is too long or not UTF-8.

@@ -19,8 +19,8 @@ pub struct Report {
     pub judgement: Judgement,
     /// The advice on speed and depth; `None` if the spindle speed is unknown.
     pub advice: Option<Advice>,
-    /// Number of clipped acceleration samples since the start.
+    /// Number of clipped acceleration samples since the signal chain was started or reset.
     pub clipped: u32,
-    /// Number of lost acceleration samples since the start.
+    /// Number of lost acceleration samples since the signal chain was started or reset.
     pub lost: u32,
 }

@@ -82,7 +82,7 @@ pub enum FrameError {
     OutOfOrder {
         /// The expected sequence number.
         expected: u16,
-        /// The sequence number of the frame.
+        /// The sequence number of the frame that arrived.
         found: u16,
     },
 }

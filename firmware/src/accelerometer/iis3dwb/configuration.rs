@@ -37,7 +37,7 @@ impl Range {
     }
 }
 
-/// Filters in the signal path of the sensor.
+/// Low-pass filters in the signal path of the sensor.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Filter {
