@@ -84,7 +84,7 @@ pub struct SampleClockState {
     line: Option<EventClockState>,
     /// Sequence number that the next block of samples should have.
     next_sequence: u32,
-    /// Number of samples in the block before the newest one.
+    /// Number of samples in the block that was processed last.
     block_samples: u32,
     /// Number of samples with a clipped axis since the sample clock was started or reset.
     clipped: u32,

@@ -250,7 +250,7 @@ fn print_events(trial: &Trial, output: Output) -> Result<(), Error> {
     ))
 }
 
-/// Root mean square of the acceleration in the last quarter of full engagement, m/s², along the axis with the largest
+/// Root mean square of the acceleration over the last quarter of full engagement, m/s², along the axis with the largest
 /// value.
 fn largest_vibration(trial: &Trial) -> f64 {
     trial.vibration().into_iter().fold(0.0, f64::max)
