@@ -3,10 +3,10 @@
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
+use super::job::CutScale;
 use super::law::Law;
 use super::machine::{Machine, between, either};
 use super::motion::System;
-use super::process::CutScale;
 
 /// A kind of effect.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]

@@ -1,6 +1,10 @@
 //! Restoring forces in addition to the linear structure.
 
-use super::motion::State;
+/// Largest number of state variables of a structure and its laws.
+pub(crate) const ROOM: usize = 16;
+
+/// State vector: q, q̇ and the internal states of the laws.
+pub(crate) type State = [f64; ROOM];
 
 /// A restoring force f_r in addition to the linear structure: M q̈ + C q̇ + K q + Bᵀf_r = Bᵀ F.
 #[derive(Clone, Copy, Debug)]

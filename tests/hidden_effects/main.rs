@@ -21,6 +21,7 @@ mod chip;
 mod closed_forms;
 mod cut;
 mod equivalences;
+mod job;
 mod law;
 mod machine;
 mod motion;

@@ -8,7 +8,6 @@ use rand_chacha::ChaCha8Rng;
 
 use super::cause::{Cause, EffectKind};
 use super::noise::Whitening;
-use super::rig::Output;
 
 /// Squared distance (χ²) below which two causes cannot be separated.
 const SAME: f64 = 2.0;
@@ -28,6 +27,9 @@ pub(crate) enum Verdict {
     /// Chance decides whether the records show or separate the effect.
     Borderline,
 }
+
+/// Readings by run, sensor and sample.
+pub(crate) type Output = Vec<Vec<Vec<f64>>>;
 
 /// A virtual test or cut in which effects can act.
 pub(crate) trait Lab {

@@ -11,8 +11,8 @@ use rand_chacha::ChaCha8Rng;
 use super::cause::{Cause, NOT_IN_LIBRARY, Scale};
 use super::cut::{CutBench, EVERY_FORCE, EVERY_SENSOR};
 use super::machine::{Machine, between};
-use super::oracle::{Lab, Oracle, Verdict};
-use super::rig::{Bench as RigBench, Output, Rig, Test};
+use super::oracle::{Lab, Oracle, Output, Verdict};
+use super::rig::{Bench as RigBench, Rig, Test};
 use super::sensor::letter;
 
 /// Families of puzzles in the campaign.
