@@ -21,6 +21,8 @@ pub(crate) enum Law {
         power: i32,
         coefficient: f64,
     },
+    /// Quadratic damper: c_2·|v|·v.
+    QuadraticDamper { axis: usize, coefficient: f64 },
     /// Stribeck friction: kinetic·sign(v)·(1 + (breakaway/kinetic − 1)·e^(−(v/v_s)²)); while it sticks, any force within ±breakaway.
     Friction {
         axis: usize,
@@ -95,6 +97,9 @@ impl Law {
                 power,
                 coefficient,
             } => force[axis] = coefficient * v[axis].powi(power),
+            Self::QuadraticDamper { axis, coefficient } => {
+                force[axis] = coefficient * v[axis].abs() * v[axis];
+            }
             Self::Friction {
                 axis,
                 kinetic_n,

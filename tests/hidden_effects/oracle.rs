@@ -42,6 +42,13 @@ pub(crate) trait Lab {
     /// Effects of the library that can act in this test.
     fn kinds(&self) -> Vec<EffectKind>;
 
+    /// The effects among these that families without an effect of their own hide.
+    fn drawn(&self) -> Vec<EffectKind> {
+        let mut kinds = self.kinds();
+        kinds.retain(|kind| *kind != EffectKind::QuadraticDamping);
+        kinds
+    }
+
     /// Names that an effect has in answers about this test.
     fn names(&self, kind: EffectKind) -> &'static [&'static str] {
         kind.names()

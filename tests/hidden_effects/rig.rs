@@ -409,7 +409,8 @@ impl Lab for Bench {
             EffectKind::SensorOffset if self.machine.modal => EffectKind::SensorOffsetByMode,
             kind => kind,
         };
-        STRUCTURAL.map(of_machine).to_vec()
+        let structural = STRUCTURAL.into_iter().map(of_machine);
+        structural.chain([EffectKind::QuadraticDamping]).collect()
     }
 
     fn is_free_decay(&self) -> bool {
