@@ -3,6 +3,7 @@
 
 mod case_keys;
 mod generated;
+mod outputs;
 mod snapshots;
 
 use quietcut_tests::documents::{Block, Handling, PAGES, blocks, dead_ends, missing, root, run};
