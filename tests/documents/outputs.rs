@@ -133,7 +133,7 @@ fn number_length(text: &str, before: Option<char>) -> usize {
 /// The words that differ between runs: the port of the simulated device, the check sum of a table, and the time that a command took.
 fn without_run(line: &str) -> String {
     let mut line = line.to_owned();
-    for (opening, ends) in [("/dev/pts/", " ,"), ("CRC ", ",")] {
+    for (opening, ends) in [("/dev/pts/", " ,"), ("CRC ", ","), ("tooth pass ", ")")] {
         if let Some(at) = line.find(opening) {
             let from = at + opening.len();
             let to = line[from..]
