@@ -8,7 +8,7 @@ use super::plausibility;
 use super::raw::Raw;
 use super::understand::understand;
 use super::understood::{Understood, UnderstoodColumn};
-use super::{Channel, Recording, RecordingError, Sidecar};
+use super::{Channel, Quantity, Recording, RecordingError, Sidecar};
 
 /// A recording in SI units, and the report of how its file was understood.
 #[derive(Clone, Debug, PartialEq)]
@@ -31,7 +31,21 @@ pub(super) fn recording(
     if raw.unnamed_line.is_some() || raw.asks_names {
         require_names(path, &raw, &sidecar, import)?;
     }
-    let meanings = understand(path, &raw.columns, &sidecar, import, known)?;
+    let has_rate = raw.sample_rate_hz.or(raw.worded_rate_hz).is_some();
+    let meanings = understand(path, &raw.columns, &sidecar, import, known).map_err(|error| match error {
+        RecordingError::Doubt {
+            path,
+            sidecar,
+            doubts,
+            lacks_rate,
+        } => RecordingError::Doubt {
+            path,
+            sidecar,
+            doubts,
+            lacks_rate: lacks_rate && !has_rate,
+        },
+        other => other,
+    })?;
     let mut time = None;
     let mut channels: Vec<Channel> = Vec::with_capacity(raw.columns.len());
     let mut columns = Vec::with_capacity(raw.columns.len());
@@ -87,6 +101,12 @@ pub(super) fn recording(
                     return Err(RecordingError::NoSampleRate {
                         path: path.into(),
                         sidecar: Sidecar::path_of(path),
+                        without_unit: channels
+                            .iter()
+                            .filter(|channel| channel.quantity == Quantity::Unknown)
+                            .map(|channel| channel.name.clone())
+                            .filter(|name| Quantity::of_name(name).is_some())
+                            .collect(),
                     });
                 }
             },

@@ -344,8 +344,13 @@ impl<'a> Table<'a> {
     /// Error that names the fault in a row of a text table whose fields are `fields`.
     fn row_error(&self, fields: &[&str]) -> RecordingError {
         if fields.len() != self.columns.len() {
+            let commas = if self.dialect == Dialect::PLAIN && fields.len() > self.columns.len() {
+                "; if numbers have decimal commas, save the file with semicolons between the columns, or with decimal points"
+            } else {
+                ""
+            };
             return self.wrong(format!(
-                "{} values, but the header has {} columns",
+                "{} values, but the header has {} columns{commas}",
                 fields.len(),
                 self.columns.len()
             ));

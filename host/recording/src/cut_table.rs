@@ -77,6 +77,9 @@ const TITLES: [[&str; 2]; 4] = [
     ["chatter [Hz]", "chatter_hz"],
 ];
 
+/// Number of wrong rows that a message names. A choice: more fill a terminal.
+const FAULTS_NAMED: usize = 5;
+
 /// Reads a table of trial cuts; a table without rows gives an empty list.
 ///
 /// # Errors
@@ -108,14 +111,32 @@ pub fn parse(path: &Path, text: &str) -> Result<Vec<TrialCut>, CutTableError> {
         .map_err(|error| wrong(error.position().map_or(1, csv::Position::line), error.to_string()))?
         .clone();
     let places = Places::new(&head).map_err(|what| wrong(line_of(&head), what))?;
-    reader
-        .into_records()
-        .map(|row| {
-            let row = row
-                .map_err(|error| wrong(error.position().map_or(1, csv::Position::line), error.to_string()))?;
-            places.cut(&head, &row).map_err(|what| wrong(line_of(&row), what))
-        })
-        .collect()
+    let mut cuts = Vec::new();
+    // Every wrong row is named at once: a user mends all of them in one go.
+    let mut faults: Vec<(u64, String)> = Vec::new();
+    for row in reader.into_records() {
+        let row =
+            row.map_err(|error| wrong(error.position().map_or(1, csv::Position::line), error.to_string()))?;
+        match places.cut(&head, &row) {
+            Ok(cut) => cuts.push(cut),
+            Err(what) => faults.push((line_of(&row), what)),
+        }
+    }
+    let Some((line, first)) = faults.first() else {
+        return Ok(cuts);
+    };
+    let others: String = faults[1..]
+        .iter()
+        .take(FAULTS_NAMED - 1)
+        .map(|(line, what)| format!("; line {line}: {what}"))
+        .collect();
+    let more = faults.len().saturating_sub(FAULTS_NAMED);
+    let more = if more > 0 {
+        format!("; and {more} more lines")
+    } else {
+        String::new()
+    };
+    Err(wrong(*line, format!("{first}{others}{more}")))
 }
 
 /// Number of the line in the file, from 1, that holds a row of a table of cuts. The position that the CSV parser gives
@@ -258,6 +279,10 @@ mod tests {
             ),
             (format!("{head}900,2,low,hopf\n"), "line 2: chatter_hz = low"),
             (format!("{head}900,2\n"), "line 2: 2 values"),
+            (
+                format!("{head}900,2,,loud\n900,2,,stable\n900,2,,ok\n"),
+                "marginal is needed; line 4: verdict \"ok\"",
+            ),
             (
                 "rpm,depth_mm,verdict\r\n900,1,stable\r\n900,-1,stable\r\n".into(),
                 "line 3: depth_mm = -1",

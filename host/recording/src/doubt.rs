@@ -17,7 +17,7 @@ pub struct Doubt {
 
 /// Message about columns in doubt: what the file does not state, and the option `--map` and the lines of the sidecar
 /// that would state it.
-pub(super) fn doubts_text(doubts: &[Doubt], sidecar: &std::path::Path) -> String {
+pub(super) fn doubts_text(doubts: &[Doubt], lacks_rate: bool, sidecar: &std::path::Path) -> String {
     let what: Vec<&str> = doubts.iter().map(|doubt| doubt.what.as_str()).collect();
     let map: Vec<String> = doubts
         .iter()
@@ -67,8 +67,18 @@ pub(super) fn doubts_text(doubts: &[Doubt], sidecar: &std::path::Path) -> String
             line
         })
         .collect();
+    let (rate, holds, key, no_rate) = if lacks_rate {
+        (
+            " --rate 25600",
+            "names, units and rate",
+            "sample_rate_hz = 25600; ",
+            "; nor does it state the sample rate",
+        )
+    } else {
+        ("", "names and units", "", "")
+    };
     format!(
-        "{}; add --map {map} with the names and units that hold, or these keys to {}: {}",
+        "{}{no_rate}; add --map {map}{rate} with the {holds} that hold, or these keys to {}: {key}{}",
         what.join("; "),
         sidecar.display(),
         lines.join("; ")

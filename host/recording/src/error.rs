@@ -96,7 +96,7 @@ pub enum RecordingError {
         last_s: f64,
     },
     /// The meaning of columns is in doubt: their direction, unit or sensitivity is not stated.
-    #[error("{}: {}", path.display(), doubts_text(doubts, sidecar))]
+    #[error("{}: {}", path.display(), doubts_text(doubts, *lacks_rate, sidecar))]
     Doubt {
         /// The file.
         path: PathBuf,
@@ -104,21 +104,21 @@ pub enum RecordingError {
         sidecar: PathBuf,
         /// The columns in doubt, each with a proposal of what the user could state about it.
         doubts: Vec<Doubt>,
+        /// True if the sample rate is not stated either.
+        lacks_rate: bool,
     },
     /// Neither the recorded file nor its sidecar states the sample rate.
-    #[error(
-        "{}: the sample rate is not given; --rate 25600 with the rate that holds, sample_rate_hz = 25600 in {}, or a column \"t [s]\" is needed",
-        path.display(),
-        sidecar.display()
-    )]
+    #[error("{}: {}", path.display(), no_rate(without_unit, sidecar))]
     NoSampleRate {
         /// The file.
         path: PathBuf,
         /// Sidecar file in which the user could state the sample rate.
         sidecar: PathBuf,
+        /// Names of the channels whose unit is not stated either.
+        without_unit: Vec<String>,
     },
     /// The recording lacks a channel or a setting that the command requires.
-    #[error("{}: it has no {needed}; its channels are {}{}", path.display(), found.join(", "), without_unit(found))]
+    #[error("{}: {}", path.display(), no_channel(needed, found))]
     NoChannel {
         /// The file.
         path: PathBuf,
@@ -129,20 +129,45 @@ pub enum RecordingError {
     },
 }
 
-/// Part of an error message about channels whose unit is unknown, such as `fx [unknown]`: the option that states the
-/// unit.
-fn without_unit(found: &[String]) -> String {
-    let names: Vec<String> = found
+/// Message for a channel that is not there, or whose unit is unknown, such as `fx [unknown]`: the option that states the unit.
+fn no_channel(needed: &str, found: &[String]) -> String {
+    let names: Vec<&str> = found
         .iter()
         .filter_map(|channel| channel.strip_suffix(" [unknown]"))
+        .collect();
+    let channels = found.join(", ");
+    match map_of_units(&names) {
+        None => format!("it has no {needed}; its channels are {channels}"),
+        Some(map) => format!(
+            "it has no {needed} with a unit; its channels are {channels}: the file states no unit for some of them; add {map} with the units \
+             that hold"
+        ),
+    }
+}
+
+/// Message for a sample rate that is not stated; one line of options for all that is missing.
+fn no_rate(without_unit: &[String], sidecar: &std::path::Path) -> String {
+    let names: Vec<&str> = without_unit.iter().map(String::as_str).collect();
+    match map_of_units(&names) {
+        None => format!(
+            "the sample rate is not given; --rate 25600 with the rate that holds, sample_rate_hz = 25600 in {}, or a column \"t [s]\" is needed",
+            sidecar.display()
+        ),
+        Some(map) => format!(
+            "neither the sample rate nor the units of {} are given; add {map} --rate 25600 with the units and the rate that hold, or \
+             sample_rate_hz = 25600 and [channels.{}] with unit to {}",
+            names.join(", "),
+            names[0],
+            sidecar.display()
+        ),
+    }
+}
+
+/// The option `--map` that states a unit for each of the channels; `None` if no channel has a quantity.
+fn map_of_units(names: &[&str]) -> Option<String> {
+    let map: Vec<String> = names
+        .iter()
         .filter_map(|name| Some(format!("{name}={name}:{}", Quantity::of_name(name)?.unit())))
         .collect();
-    if names.is_empty() {
-        String::new()
-    } else {
-        format!(
-            "; the file states no unit for some of them: --map {} with the units that hold",
-            names.join(",")
-        )
-    }
+    (!map.is_empty()).then(|| format!("--map {}", map.join(",")))
 }

@@ -115,6 +115,15 @@ pub struct RecordedChannel {
     pub anti_aliasing: Option<bool>,
 }
 
+/// True for the text of a case: it has a section that no sidecar has.
+fn is_case(text: &str) -> bool {
+    text.parse::<toml::Table>().is_ok_and(|table| {
+        ["structure", "tool", "material"]
+            .iter()
+            .any(|section| table.get(*section).is_some_and(toml::Value::is_table))
+    })
+}
+
 impl Sidecar {
     /// Description of the channel with a standard name such as `ax`, also if the file calls it by another name; `None`
     /// if the sidecar has no description of it.
@@ -141,6 +150,15 @@ impl Sidecar {
             return Ok(Self::default());
         }
         let text = crate::file::read_text(&path)?;
+        if is_case(&text) {
+            return Err(RecordingError::Content {
+                path: path.clone(),
+                what: format!(
+                    "this is a case, not the sidecar of {}, although it has the sidecar's name; rename one of the two",
+                    recording.display()
+                ),
+            });
+        }
         let sidecar: Self = toml::from_str(&text).map_err(|error| {
             let offset = error.span().map_or(0, |span| span.start);
             RecordingError::Line {

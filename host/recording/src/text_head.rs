@@ -140,6 +140,9 @@ fn columns_before(
         let fields = dialect.fields(line.text);
         width == 1 || fields.len() > 1 || names(dialect, line.text, width).is_some()
     };
+    if let Some((line, what)) = ambiguous_commas(dialect, width, before, first) {
+        return Err((line, what));
+    }
     if let Some((last, earlier)) = before.split_last()
         && is_row(last)
     {
@@ -148,6 +151,14 @@ fn columns_before(
             .iter()
             .filter(|field| dialect.number(field).is_some())
             .count();
+        if numbers > 0 && numbers == fields.len() {
+            return Err((
+                last.number,
+                format!(
+                    "{numbers} numbers, but the line after it has {width}: every row needs a number for every column"
+                ),
+            ));
+        }
         if numbers > 0 {
             let text = fields
                 .iter()
@@ -186,6 +197,39 @@ fn columns_before(
         return Ok(Some(head_columns(&titles, None)));
     }
     Ok(None)
+}
+
+/// Fault of a table with commas between the columns and commas in its numbers: its rows have more fields than the row of names.
+///
+/// A decimal comma splits a number in two, so that a row has at most twice as many fields as names.
+fn ambiguous_commas(dialect: Dialect, width: usize, before: &[&Line], first: &Line) -> Option<(u64, String)> {
+    if dialect.separator != Separator::Comma {
+        return None;
+    }
+    let titles = before.iter().rev().find_map(|line| {
+        let fields = dialect.fields(line.text);
+        let is_title = |field: &&str| !field.is_empty() && dialect.number(field).is_none();
+        fields.iter().all(is_title).then_some(fields.len())
+    })?;
+    // Empty fields at the end of a row come from trailing commas.
+    let filled = |line: &Line| {
+        let fields = dialect.fields(line.text);
+        fields.iter().filter(|field| !field.is_empty()).count()
+    };
+    let rows = before
+        .iter()
+        .filter(|line| dialect.count_of_numbers(line.text).is_some());
+    let row = rows.copied().chain([first]).find(|line| filled(line) > titles)?;
+    (titles > 1 && width > titles && width <= 2 * titles).then(|| {
+        (
+            row.number,
+            format!(
+                "{} numbers between commas, but the row of names has {titles} columns: a comma seems to be both the decimal mark and the \
+                 separator, which cannot be told apart; save the file with semicolons or tabs between the columns, or with decimal points",
+                filled(row)
+            ),
+        )
+    })
 }
 
 /// Decodes UTF-8, or Latin-1 if the bytes are no UTF-8; an incomplete UTF-8 character at the end of `bytes` is dropped.
@@ -401,5 +445,20 @@ mod tests {
     fn text_among_the_first_numbers_is_no_name() {
         let (line, what) = head(b"t,fx\n0,abc\n1,2\n2,3\n").unwrap_err();
         assert!(line == 2 && what.contains("abc"), "{what}");
+    }
+
+    #[test]
+    fn decimal_commas_between_commas_are_named() {
+        for text in [
+            "t [s],fx [N],ax [g]\n0,-0,5,1\n0,1,1,5,2,5\n0,2,2,5,3,5\n",
+            "t [s],fx [N],ax [g]\n0,0,0,5,1,5\n0,1,1,5,2,5\n0,2,2,5,3,5\n",
+        ] {
+            let (line, what) = head(text.as_bytes()).unwrap_err();
+            for word in ["decimal mark", "semicolons", "3 columns"] {
+                assert!(line == 2 && what.contains(word), "{text}: {line}, {what}");
+            }
+        }
+        // Trailing commas are no decimal commas.
+        assert!(head(b"t,fx\n0,1,\n1,2,\n").is_ok());
     }
 }

@@ -81,6 +81,8 @@ pub(super) fn understand(
             path: path.into(),
             sidecar: Sidecar::path_of(path),
             doubts: found,
+            lacks_rate: import.rate_hz.or(sidecar.sample_rate_hz).is_none()
+                && !meanings.iter().any(|meaning| meaning.name == "t"),
         })
     }
 }
@@ -193,8 +195,8 @@ fn unit_text(unit: Unit) -> String {
     }
 }
 
-/// Meaning of one column, that is the channel that it becomes. A column without a standard name, which its words or its
-/// unit show to be a force or a motion, is added to `doubts` if its direction, sign, unit or sensitivity is uncertain.
+/// Meaning of one column, that is the channel that it becomes; a column whose direction, unit or sensitivity is not
+/// stated is added to `doubts`.
 fn meaning(
     path: &Path,
     column: &RawColumn,

@@ -135,10 +135,24 @@ const UNITS: &[(&str, Quantity, f64)] = &[
 
 /// Error for a unit that is not in the table of units; the message lists the known ones.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("unit \"{found}\"; known are {}", known())]
+#[error("the unit \"{found}\" is not known{}; known are {}", meant(found), known())]
 pub struct UnknownUnit {
     /// Text of the unknown unit, as the file or the user states it.
     pub found: String,
+}
+
+/// Message part: the units that differ from the unknown one only in the case of their letters.
+fn meant(found: &str) -> String {
+    let near: Vec<String> = UNITS
+        .iter()
+        .filter(|(name, ..)| !name.is_empty() && name.eq_ignore_ascii_case(found))
+        .map(|(name, ..)| format!("\"{name}\""))
+        .collect();
+    if near.is_empty() {
+        String::new()
+    } else {
+        format!(", {} is meant perhaps", near.join(" or "))
+    }
 }
 
 fn known() -> String {
