@@ -31,3 +31,16 @@ pub(crate) const PITCH_SUM_DEG: f64 = 0.01;
 
 /// Largest number of teeth of a tool in a case; a larger one is taken for a typing error. Large face mills have some 40 teeth. Unfounded.
 pub(crate) const TEETH_MAX: i64 = 64;
+
+/// Range of tool diameters in a case, mm; outside, the unit is taken for wrong. Micro end mills have 5 µm, the largest face mills 600 mm.
+pub(crate) const DIAMETER_MM: [f64; 2] = [1e-3, 1e3];
+
+/// Largest feed per tooth in a case, mm. High-feed milling reaches 4 mm; a feed in µm is hundreds. The value between is a choice.
+pub(crate) const FEED_PER_TOOTH_MAX_MM: f64 = 20.0;
+
+/// Largest cutting coefficient in a case, MPa. Hardened steel and superalloys at thin chips reach some 10⁴; a coefficient in Pa is 10⁸ and
+/// more. The value between is a choice.
+pub(crate) const COEFFICIENT_MAX_MPA: f64 = 1e6;
+
+/// Largest spindle speed in the limits of a case, rev/min. Air-bearing spindles reach 300 000. A choice above them.
+pub(crate) const SPEED_MAX_RPM: f64 = 1e6;

@@ -11,6 +11,7 @@ use std::path::Path;
 use toml::Spanned;
 
 use super::file::{CaseFile, Number};
+use super::sections::Section;
 use super::{Case, CaseError, Deviation, Parameter, Posture};
 
 impl Case {
@@ -75,11 +76,17 @@ fn case(path: &Path, text: &str) -> Result<Case, CaseError> {
 
 fn syntax(path: &Path, text: &str, error: &toml::de::Error) -> CaseError {
     let line = line_of(text, error.span().map_or(0, |span| span.start));
+    let mut message = error.message().trim().replace('\n', ", ");
+    if message.starts_with("missing field")
+        && let Some(lacks) = Section::at(text, line).and_then(|section| section.lacks(text))
+    {
+        message = lacks;
+    }
     CaseError::Syntax {
         path: path.into(),
         line,
         source_line: text.lines().nth(line - 1).unwrap_or("").trim().into(),
-        message: error.message().trim().replace('\n', ", "),
+        message,
     }
 }
 
@@ -132,6 +139,27 @@ impl Check<'_> {
 
     fn positive(&self, value: &Number, key: &str) -> Result<f64, CaseError> {
         self.number(value, key, |x| x > 0.0, "a number greater than 0")
+    }
+
+    /// A number within `[low, high]`; a larger one names the smaller unit that was probably meant, a number of `factor` units.
+    fn sized(
+        &self,
+        value: &Number,
+        key: &str,
+        [low, high]: [f64; 2],
+        (unit, factor, smaller): (&str, f64, &str),
+    ) -> Result<f64, CaseError> {
+        let number = *value.get_ref();
+        let within = format!("a number from {low} to {high} ({unit})");
+        let expected = if number.is_finite() && number.abs() > high {
+            format!(
+                "{within}, such as {} if the value was in {smaller},",
+                number / factor
+            )
+        } else {
+            within
+        };
+        self.number(value, key, |x| (low..=high).contains(&x), &expected)
     }
 
     fn finite(&self, value: &Number, key: &str) -> Result<f64, CaseError> {

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use quietcut_recording::file::FileError;
 
+use super::sections::Section;
 use crate::effects::EffectError;
 
 /// A case file that cannot be used. Every message names the file.
@@ -49,7 +50,7 @@ pub enum CaseError {
         error: EffectError,
     },
     /// A missing table that the task requires.
-    #[error("{}: there is no [{section}]; {what_for}", path.display())]
+    #[error("{}: there is no [{section}]; {what_for}{}", path.display(), keys_of(section))]
     MissingSection {
         /// The file.
         path: PathBuf,
@@ -68,4 +69,9 @@ pub enum CaseError {
         /// The reason why the computation cannot treat the extension, and a remedy.
         reason: String,
     },
+}
+
+/// Message part: the required keys of a missing section, with units and lines to paste.
+fn keys_of(section: &str) -> String {
+    Section::of(section).map_or_else(String::new, |section| format!("; {}", section.whole()))
 }

@@ -11,6 +11,7 @@ mod file;
 mod limits;
 mod parameter_value;
 mod posture;
+mod sections;
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;

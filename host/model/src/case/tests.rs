@@ -130,7 +130,7 @@ const WRONG: [(&str, &str, usize, &[&str]); 18] = [
         "feed_per_tooth_mm = 0.1",
         "",
         17,
-        &["missing field `feed_per_tooth_mm`"],
+        &["[cut] lacks feed_per_tooth_mm (mm)", "\n  feed_per_tooth_mm = "],
     ),
     (
         "mass = [[1.0, 0.0], [0.0, 1.0]]",

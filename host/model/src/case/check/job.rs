@@ -3,16 +3,20 @@
 use toml::Spanned;
 
 use super::Check;
-use crate::case::file::{CutFile, LimitsFile, MaterialFile, PostureFile};
+use crate::case::file::{CutFile, LimitsFile, MaterialFile, Number, PostureFile};
 use crate::case::{CaseError, MachineLimits, Parameter, Posture};
+use crate::criteria::{COEFFICIENT_MAX_MPA, FEED_PER_TOOTH_MAX_MM, SPEED_MAX_RPM};
 use crate::milling::{Cut, Material};
 
 impl Check<'_> {
     pub(super) fn material(&mut self, file: &MaterialFile) -> Result<Material, CaseError> {
         let material = Material {
-            ktc_mpa: self.positive(&file.ktc_mpa, "material.ktc_mpa")?,
-            krc_mpa: self.finite(&file.krc_mpa, "material.krc_mpa")?,
-            kac_mpa: self.finite(&file.kac_mpa, "material.kac_mpa")?,
+            ktc_mpa: {
+                self.positive(&file.ktc_mpa, "material.ktc_mpa")?;
+                self.coefficient(&file.ktc_mpa, "material.ktc_mpa")?
+            },
+            krc_mpa: self.coefficient(&file.krc_mpa, "material.krc_mpa")?,
+            kac_mpa: self.coefficient(&file.kac_mpa, "material.kac_mpa")?,
             kte_n_per_mm: self.finite_or(&file.kte_n_per_mm, "material.kte_n_per_mm", 0.0)?,
             kre_n_per_mm: self.finite_or(&file.kre_n_per_mm, "material.kre_n_per_mm", 0.0)?,
             kae_n_per_mm: self.finite_or(&file.kae_n_per_mm, "material.kae_n_per_mm", 0.0)?,
@@ -26,12 +30,26 @@ impl Check<'_> {
         Ok(material)
     }
 
+    fn coefficient(&self, value: &Number, key: &str) -> Result<f64, CaseError> {
+        let size = [-COEFFICIENT_MAX_MPA, COEFFICIENT_MAX_MPA];
+        self.sized(value, key, size, ("MPa", 1e6, "Pa"))
+    }
+
     pub(super) fn cut(&mut self, file: &CutFile) -> Result<Cut, CaseError> {
+        let (start, exit) = (*file.start_deg.get_ref(), *file.exit_deg.get_ref());
+        let expected = if start > exit {
+            format!(
+                "an angle from 0 to below 180, and below exit_deg: a tooth enters at start_deg and leaves at exit_deg; start_deg = {exit} and \
+                 exit_deg = {start} if the two are swapped"
+            )
+        } else {
+            "an angle from 0 to below 180".into()
+        };
         let start_deg = self.number(
             &file.start_deg,
             "cut.start_deg",
             |x| (0.0..180.0).contains(&x),
-            "an angle from 0 to below 180",
+            &expected,
         )?;
         let exit_deg = self.number(
             &file.exit_deg,
@@ -39,11 +57,11 @@ impl Check<'_> {
             |x| x > start_deg && x <= 180.0,
             &format!("an angle above cut.start_deg ({start_deg}) and up to 180"),
         )?;
-        let feed_per_tooth_mm = self.number(
+        let feed_per_tooth_mm = self.sized(
             &file.feed_per_tooth_mm,
             "cut.feed_per_tooth_mm",
-            |x| x >= 0.0,
-            "a feed of 0 or more",
+            [0.0, FEED_PER_TOOTH_MAX_MM],
+            ("mm", 1e3, "µm"),
         )?;
         let feed_direction_deg = self.finite_or(&file.feed_direction_deg, "cut.feed_direction_deg", 0.0)?;
         self.deviation(&file.start_deg_std, "cut.start_deg", Parameter::Start)?;
@@ -71,8 +89,8 @@ impl Check<'_> {
         let rpm_max = self.number(
             &file.rpm_max,
             "limits.rpm_max",
-            |x| x > rpm_min,
-            &format!("a speed above limits.rpm_min ({rpm_min})"),
+            |x| x > rpm_min && x <= SPEED_MAX_RPM,
+            &format!("a speed above limits.rpm_min ({rpm_min}) and up to {SPEED_MAX_RPM} rev/min"),
         )?;
         let power_w = match &file.power_w {
             Some(power) => Some(self.positive(power, "limits.power_w")?),

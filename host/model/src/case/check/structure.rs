@@ -208,11 +208,20 @@ impl Check<'_> {
     fn mode(&mut self, file: &ModeFile, index: usize, size: usize) -> Result<Mode, CaseError> {
         let key = |name: &str| format!("structure.mode[{}].{name}", index + 1);
         let frequency_hz = self.positive(&file.frequency_hz, &key("frequency_hz"))?;
+        let percent = *file.damping_ratio.get_ref();
+        let expected = if (1.0..100.0).contains(&percent) {
+            format!(
+                "a damping ratio from 0 to below 1, such as {} for {percent} %,",
+                0.01 * percent
+            )
+        } else {
+            "a damping ratio from 0 to below 1".into()
+        };
         let damping_ratio = self.number(
             &file.damping_ratio,
             &key("damping_ratio"),
             |x| (0.0..1.0).contains(&x),
-            "a damping ratio from 0 to below 1",
+            &expected,
         )?;
         let left = self.shape(&file.left, &key("left"), size)?;
         let right = self.shape(&file.right, &key("right"), size)?;

@@ -5,7 +5,7 @@ use toml::Spanned;
 use super::Check;
 use crate::case::file::ToolFile;
 use crate::case::{CaseError, Parameter};
-use crate::criteria::{PITCH_SUM_DEG, TEETH_MAX};
+use crate::criteria::{DIAMETER_MM, PITCH_SUM_DEG, TEETH_MAX};
 use crate::milling::{Runout, Tool};
 
 impl Check<'_> {
@@ -24,7 +24,9 @@ impl Check<'_> {
             "an angle above 0 and up to 90",
         )?;
         let diameter_mm = match &file.diameter_mm {
-            Some(diameter) => Some(self.positive(diameter, "tool.diameter_mm")?),
+            Some(diameter) => {
+                Some(self.sized(diameter, "tool.diameter_mm", DIAMETER_MM, ("mm", 1e3, "µm"))?)
+            }
             None => None,
         };
         self.deviation(
