@@ -155,3 +155,49 @@ pub(crate) const LEAST_PEAK: f64 = 2e-3;
 /// Largest damping ratio with which a pole of a vector fit counts as a mode. The peak of a pole with more damping does
 /// not stand out of its neighbours: its half-power bandwidth is more than half its frequency. Unfounded.
 pub(crate) const LARGEST_DAMPING_RATIO: f64 = 0.3;
+
+// Plausibility of a test
+
+/// Smallest ratio of the effective numbers of samples of force and response from which the two may be swapped. In a test with a hammer the
+/// response rings longer than the force acts, which is a ratio below 1. The distance from 1 is a choice.
+pub(crate) const PULSE_SHORTER: f64 = 3.0;
+
+/// Smallest share of the energy of a hammer's pulses in one sign: a hammer pushes and does not pull. Filters ring by some percent, a choice.
+pub(crate) const ONE_SIGN: f64 = 0.95;
+
+/// Smallest ratio of the mean powers after and before a pulse of a signal that rings because of it. Without a cause the ratio is 1; a choice.
+pub(crate) const RINGS_AFTER: f64 = 3.0;
+
+/// Share of the energy of a channel in one line at 50 or 60 Hz from which the hum of the mains is larger than the signal: one half.
+pub(crate) const HUM_SHARE: f64 = 0.5;
+
+/// Smallest factor of a spike of one sample over the next largest sample. The largest of 10⁷ Gaussian samples is within a factor of 2 of the
+/// next largest; a choice above.
+pub(crate) const SPIKE_ABOVE: f64 = 3.0;
+
+/// Largest neighbour of a spike of one sample, as a fraction of the spike. The neighbours of a pulse that is sampled with fewer than three
+/// samples are larger. A choice.
+pub(crate) const SPIKE_NEIGHBOURS: f64 = 0.05;
+
+/// Coherence below which noise has more energy than the response to the force: γ² = S/(S + N) with S = N.
+pub(crate) const UNRELATED: f64 = 0.5;
+
+/// Coherence at the peak of a receptance below which the whole response is unrelated to the force, if its median is below [`UNRELATED`].
+/// Unrelated signals exceed it with a probability of 0.2⁴ per line with five averages.
+pub(crate) const UNRELATED_PEAK: f64 = 0.8;
+
+/// Mean of the sine of the phase of a drive-point receptance, weighted with |H|², above which it has the sign of an inverted sensor. A
+/// passive drive point has none above 0, −1 at a resonance and 0 at frequencies without damping. A choice.
+pub(crate) const INVERTED_PHASE: f64 = 0.2;
+
+/// Range of plausible peaks of receptances, m/N. The most compliant structures that are tapped, thin walls, reach 10⁻³ at resonance; the stiffest
+/// have 10⁻¹⁰ statically. A decade more on the soft side, two on the stiff; a choice.
+pub(crate) const PLAUSIBLE_RECEPTANCE: [f64; 2] = [1e-12, 1e-2];
+
+/// Power of a line of a periodic force over the median of its neighbourhood. The largest of 64 independent exponential powers of a random
+/// force exceeds 50 medians with a probability of 64·2⁻⁵⁰.
+pub(crate) const LINE_ABOVE_NEIGHBOURS: f64 = 50.0;
+
+/// Smallest share of the energy of a force in single lines that makes it periodic. A random force has none, the force of a steady cut all but its
+/// noise. A choice.
+pub(crate) const SHARE_OF_LINES: f64 = 0.9;

@@ -4,9 +4,6 @@
 //! and standard deviation; estimators H1, H2 and their mean, [`Estimator`]); [`FrfTable`] holds receptances in m/N and reads and writes
 //! CSV and UFF 58, and reads the text tables of other programs; [`Interpolation`] evaluates a table between its lines.
 //!
-//! "The thesis" in this crate is *Chatter Vibrations in Robotic Milling Considering Structural Nonlinearity*, a doctoral
-//! thesis of the University of Victoria; its equation numbers are given as "thesis eq. 5.16".
-//!
 //! ```
 //! use std::f64::consts::TAU;
 //! use std::path::Path;
@@ -57,6 +54,7 @@ mod table_file;
 mod table_found;
 mod table_uff;
 mod test_channels;
+mod test_plausibility;
 mod tool_tip;
 mod window;
 

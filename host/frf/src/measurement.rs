@@ -26,6 +26,7 @@ use super::exponential_window::without_exponential_window;
 use super::measurement_settings::MeasurementSettings;
 use super::table::{Frf, FrfTable};
 use super::test_channels::TestChannels;
+use super::test_plausibility;
 use quietcut_model::structure::Direction;
 use quietcut_recording::Recording;
 use recording_group::{MeasuredEntry, MeasuredGroup, receptances};
@@ -72,6 +73,14 @@ pub fn measure(recordings: &[Recording], settings: &MeasurementSettings) -> Resu
         let excitation = settings
             .excitation
             .unwrap_or_else(|| Excitation::of(&channels.recording.sidecar));
+        if matches!(excitation, Excitation::Random | Excitation::Hammer)
+            && let Some(what) = test_plausibility::swapped(&channels)
+        {
+            return Err(FrfError::Content {
+                path: channels.recording.path.clone(),
+                what,
+            });
+        }
         let same = groups.iter_mut().find(|(other, members)| {
             members[0].force_directions() == channels.force_directions()
                 && members[0].response_kinds() == channels.response_kinds()
@@ -102,6 +111,11 @@ pub fn measure(recordings: &[Recording], settings: &MeasurementSettings) -> Resu
             ),
         });
     }
+    let doubts: Vec<String> = groups
+        .iter()
+        .flat_map(|(excitation, members)| members.iter().map(|member| (*excitation, member)))
+        .flat_map(|(excitation, channels)| test_plausibility::of_channels(excitation, channels))
+        .collect();
     let measured = groups
         .iter()
         .map(|(excitation, members)| measure_group(*excitation, members, settings))
@@ -110,6 +124,9 @@ pub fn measure(recordings: &[Recording], settings: &MeasurementSettings) -> Resu
         .first()
         .map_or(Path::new(""), |recording| &recording.path);
     let mut measurement = merged(path, measured)?;
+    measurement.warnings.extend(doubts);
+    let of_table = test_plausibility::of_table(&measurement.table);
+    measurement.warnings.extend(of_table);
     let slowest_hz = recordings
         .iter()
         .map(|recording| 0.5 * recording.sample_rate_hz)

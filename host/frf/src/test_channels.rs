@@ -1,7 +1,7 @@
 //! Selection of the force and response channels of a recording.
 
 use quietcut_model::structure::Direction;
-use quietcut_recording::{Channel, Quantity, Recording, RecordingError};
+use quietcut_recording::{Channel, Quantity, Recording, RecordingError, Sidecar};
 
 use super::FrfError;
 
@@ -119,7 +119,11 @@ fn forces(
     let inputs = recording.sidecar.input.as_deref();
     for name in inputs.unwrap_or_default() {
         let channel = recording.channel(name).ok_or_else(|| {
-            FrfError::Recording(recording.lacks(format!("channel \"{name}\" that input names")))
+            let sidecar = Sidecar::path_of(&recording.path);
+            FrfError::Recording(recording.lacks(format!(
+                "channel \"{name}\" that input in {} names",
+                sidecar.display()
+            )))
         })?;
         if channel.quantity != Quantity::Force {
             return Err(FrfError::Content {

@@ -1,0 +1,350 @@
+//! Plausibility of the recordings of a test: force and response that are swapped, hum of the mains, spikes, clipping, a force that is a set of
+//! lines, and receptances that no drive point has.
+
+use std::f64::consts::TAU;
+
+use realfft::RealFftPlanner;
+
+use quietcut_recording::{Channel, ChannelSummary, Quantity, RecordedCut, TestKind};
+
+use super::criteria::{
+    HUM_SHARE, INVERTED_PHASE, LINE_ABOVE_NEIGHBOURS, ONE_SIGN, PLAUSIBLE_RECEPTANCE, PULSE_SHORTER,
+    RINGS_AFTER, SHARE_OF_LINES, SPIKE_ABOVE, SPIKE_NEIGHBOURS, UNRELATED, UNRELATED_PEAK,
+};
+use super::excitation::Excitation;
+use super::table::FrfTable;
+use super::test_channels::TestChannels;
+
+/// Description of a force and a response whose names or columns are swapped; `None` if nothing speaks for it.
+///
+/// A hammer's force is short pulses of one sign that come first, and the response rings after them. If the channel that is called a force
+/// rings longer than a response that is pulses of one sign, and rings after these pulses rather than before, the two are swapped.
+pub(super) fn swapped(channels: &TestChannels<'_>) -> Option<String> {
+    let [(_, force)] = channels.forces[..] else {
+        return None;
+    };
+    let response = channels
+        .responses
+        .iter()
+        .map(|response| response.channel)
+        .chain(accelerations(channels))
+        .find(|response| are_swapped(&force.samples, &response.samples))?;
+    Some(format!(
+        "{f} and {r} seem to be swapped: {r} has short pulses of one sign, as the force of a hammer, and {f} rings after them, as a response; \
+         correct the head, or add --map {f}={r}:{unit_r},{r}={f}:N with the units that hold",
+        f = force.name,
+        r = response.name,
+        unit_r = response.quantity.unit(),
+    ))
+}
+
+/// Acceleration channels of the recording, also those that another response of their direction replaces.
+fn accelerations<'a>(channels: &TestChannels<'a>) -> impl Iterator<Item = &'a Channel> {
+    channels
+        .recording
+        .channels
+        .iter()
+        .filter(|channel| channel.quantity == Quantity::Acceleration)
+}
+
+fn are_swapped(force: &[f64], response: &[f64]) -> bool {
+    let Some((at, peak)) = largest(response) else {
+        return false;
+    };
+    let is_shorter = PULSE_SHORTER * effective_samples(response) < effective_samples(force);
+    if !is_shorter || spike(response).is_some() {
+        return false;
+    }
+    // Samples near the noise have any sign: only those above a fifth of the peak count.
+    let (mut one, mut all) = (0.0, 0.0);
+    for sample in response.iter().filter(|sample| sample.abs() > 0.2 * peak.abs()) {
+        all += sample * sample;
+        if sample * peak > 0.0 {
+            one += sample * sample;
+        }
+    }
+    let span = (effective_samples(force) as usize).clamp(1, force.len());
+    let energy = |from: usize, to: usize| -> f64 {
+        let mean = force.iter().sum::<f64>() / force.len() as f64;
+        force[from..to]
+            .iter()
+            .map(|sample| (sample - mean).powi(2))
+            .sum::<f64>()
+            / (to - from).max(1) as f64
+    };
+    let (before, after) = (
+        energy(at.saturating_sub(span), at),
+        energy(at, (at + span).min(force.len())),
+    );
+    // A pulse at the very start has nothing before it.
+    let rings_after = at < span / 4 || after > RINGS_AFTER * before;
+    one > ONE_SIGN * all && rings_after
+}
+
+/// Largest sample, with its sign, and its index.
+fn largest(samples: &[f64]) -> Option<(usize, f64)> {
+    let at = (0..samples.len()).max_by(|&a, &b| samples[a].abs().total_cmp(&samples[b].abs()))?;
+    (samples[at] != 0.0).then_some((at, samples[at]))
+}
+
+/// Effective number of samples over which the energy of a signal is spread, (Σx²)²/Σx⁴.
+fn effective_samples(samples: &[f64]) -> f64 {
+    let mean = samples.iter().sum::<f64>() / samples.len().max(1) as f64;
+    let (mut second, mut fourth) = (0.0, 0.0);
+    for sample in samples {
+        let power = (sample - mean).powi(2);
+        second += power;
+        fourth += power * power;
+    }
+    if fourth > 0.0 {
+        second * second / fourth
+    } else {
+        0.0
+    }
+}
+
+/// Warnings about the channels of one recording.
+pub(super) fn of_channels(excitation: Excitation, channels: &TestChannels<'_>) -> Vec<String> {
+    let rate = channels.recording.sample_rate_hz;
+    let start_s = channels.recording.start_s;
+    let forces = channels.forces.iter().map(|(_, channel)| *channel);
+    let responses = channels.responses.iter().map(|response| response.channel);
+    let mut warnings = Vec::new();
+    for channel in forces.chain(responses) {
+        let name = &channel.name;
+        let clipped = ChannelSummary::of(channel, rate, start_s).clipped;
+        if clipped > 0 {
+            warnings.push(format!(
+                "{name} is clipped: {clipped} samples stay at its largest or smallest value; receptances from it are wrong: record again with \
+                 a larger range of the sensor, or leave the part out with --from-s or --until-s"
+            ));
+        }
+        if let Some(at) = spike(&channel.samples) {
+            warnings.push(format!(
+                "{name} has a spike of one sample at {:.4} s, far above all others: a fault of cable or converter; leave it out with --from-s \
+                 or --until-s, or mend the sample",
+                start_s + at as f64 / rate
+            ));
+        }
+    }
+    let is_periodic = excitation == Excitation::Random && has_lines(channels, &mut warnings);
+    let by_tone = matches!(excitation, Excitation::Sweep | Excitation::StepSine);
+    if !is_periodic && !by_tone {
+        warnings.extend(hum(channels));
+    }
+    warnings
+}
+
+/// Warning about a force that consists of lines, as in a cut; true if it does.
+fn has_lines(channels: &TestChannels<'_>, warnings: &mut Vec<String>) -> bool {
+    let sidecar = &channels.recording.sidecar;
+    let shares = channels
+        .forces
+        .iter()
+        .map(|(_, force)| share_of_lines(&force.samples));
+    let share = shares.fold(1.0, f64::min);
+    if share < SHARE_OF_LINES {
+        return false;
+    }
+    let is_cut = sidecar.kind == Some(TestKind::Cutting)
+        || sidecar.cut.is_some_and(|cut| cut != RecordedCut::default())
+        || channels.recording.channel("tacho").is_some();
+    let remedy = if is_cut {
+        "an ordinary cut shows nothing between the tooth passings, where these receptances are noise: compare the cut with a case by quietcut \
+         diagnose CASE REC, or look for chatter by quietcut replay REC"
+    } else {
+        "between its lines nothing is excited, and the receptances there are noise: for a stepped sine say --excitation step-sine, for a cut \
+         use quietcut diagnose CASE REC or quietcut replay REC"
+    };
+    warnings.push(format!(
+        "the force has no impact and is no broad-band force, but periodic: {:.0} % of its energy is in single lines; {remedy}",
+        100.0 * share
+    ));
+    true
+}
+
+/// Longest record whose spectrum is searched for lines, samples; a choice.
+const LONGEST: usize = 1 << 17;
+
+/// Share of the energy of a signal in lines that stand out of their neighbourhood, without its mean.
+fn share_of_lines(samples: &[f64]) -> f64 {
+    // The length of the transform is a power of two.
+    let length = match samples.len().min(LONGEST) {
+        0..=255 => return 0.0,
+        length => 1 << length.ilog2(),
+    };
+    let first = (samples.len() - length) / 2;
+    let part = &samples[first..first + length];
+    let mean = part.iter().sum::<f64>() / length as f64;
+    let plan = RealFftPlanner::new().plan_fft_forward(length);
+    let mut input: Vec<f64> = part
+        .iter()
+        .enumerate()
+        .map(|(k, sample)| (sample - mean) * 0.5 * (1.0 - (TAU * k as f64 / length as f64).cos()))
+        .collect();
+    let mut spectrum = plan.make_output_vec();
+    if plan.process(&mut input, &mut spectrum).is_err() {
+        return 0.0;
+    }
+    let power: Vec<f64> = spectrum.iter().map(|line| line.norm_sqr()).collect();
+    let total: f64 = power.iter().sum();
+    let mut is_line = vec![false; power.len()];
+    for at in 2..power.len().saturating_sub(2) {
+        let is_peak = power[at] >= power[at - 1] && power[at] > power[at + 1];
+        if !is_peak || power[at] < 1e-6 * total {
+            continue;
+        }
+        let mut around: Vec<f64> = (at.saturating_sub(NEIGHBOURS)..(at + NEIGHBOURS).min(power.len()))
+            .filter(|line| line.abs_diff(at) > MAIN_LOBE)
+            .map(|line| power[line])
+            .collect();
+        around.sort_by(f64::total_cmp);
+        let median = around.get(around.len() / 2).copied().unwrap_or(0.0);
+        if power[at] > LINE_ABOVE_NEIGHBOURS * median {
+            is_line[at.saturating_sub(MAIN_LOBE)..=(at + MAIN_LOBE).min(power.len() - 1)].fill(true);
+        }
+    }
+    let in_lines: f64 = power
+        .iter()
+        .zip(&is_line)
+        .filter(|(_, is_line)| **is_line)
+        .map(|(power, _)| power)
+        .sum();
+    if total > 0.0 { in_lines / total } else { 0.0 }
+}
+
+/// Lines on both sides that form the neighbourhood of a line; a choice.
+const NEIGHBOURS: usize = 32;
+
+/// Lines on both sides of a peak that belong to it with a Hann window.
+const MAIN_LOBE: usize = 2;
+
+/// Warning about hum of the mains that carries most of the energy of a channel.
+fn hum(channels: &TestChannels<'_>) -> Vec<String> {
+    let rate = channels.recording.sample_rate_hz;
+    let forces = channels.forces.iter().map(|(_, channel)| *channel);
+    let responses = channels.responses.iter().map(|response| response.channel);
+    forces
+        .chain(responses)
+        .filter_map(|channel| {
+            let (share, hertz) = [50.0, 60.0]
+                .into_iter()
+                .filter(|hertz| 2.0 * hertz < rate)
+                .map(|hertz| (share_near(&channel.samples, rate, hertz), hertz))
+                .max_by(|a, b| a.0.total_cmp(&b.0))?;
+            (share > HUM_SHARE).then(|| {
+                format!(
+                    "{name} is mostly hum of the mains: {:.0} % of its energy is at {hertz} Hz; check cable, shield and earthing of the sensor, \
+                     and do not use receptances near {hertz} Hz and its multiples",
+                    100.0 * share,
+                    name = channel.name
+                )
+            })
+        })
+        .collect()
+}
+
+/// Largest share of the energy of a signal in one sine within 0.2 Hz of `hertz`. The mains stay within that in normal operation.
+fn share_near(samples: &[f64], rate: f64, hertz: f64) -> f64 {
+    let samples = &samples[..samples.len().min(LONGEST)];
+    let count = samples.len() as f64;
+    let mean = samples.iter().sum::<f64>() / count.max(1.0);
+    let energy: f64 = samples.iter().map(|sample| (sample - mean).powi(2)).sum();
+    if energy <= 0.0 || samples.len() < 16 {
+        return 0.0;
+    }
+    // Half the distance of independent lines: the loss between two steps is below 10 %.
+    let step = 0.5 * rate / count;
+    let steps = (0.2 / step).ceil().clamp(0.0, 40.0) as i32;
+    (-steps..=steps)
+        .map(|index| {
+            let turn = TAU * (hertz + f64::from(index) * 0.2 / f64::from(steps.max(1))) / rate;
+            let (mut re, mut im) = (0.0, 0.0);
+            // Rotation by a constant angle replaces a sine for each sample.
+            let (sin, cos) = turn.sin_cos();
+            let (mut c, mut s) = (1.0, 0.0);
+            for sample in samples {
+                re += (sample - mean) * c;
+                im += (sample - mean) * s;
+                (c, s) = (c * cos - s * sin, s * cos + c * sin);
+            }
+            2.0 * (re * re + im * im) / count / energy
+        })
+        .fold(0.0, f64::max)
+}
+
+/// Index of a spike: one sample far above all others, whose neighbours are small.
+fn spike(samples: &[f64]) -> Option<usize> {
+    let mut sorted: Vec<f64> = samples.to_vec();
+    let middle = sorted.len().checked_sub(1)? / 2;
+    let (_, rest, _) = sorted.select_nth_unstable_by(middle, f64::total_cmp);
+    let rest = *rest;
+    let size = |at: usize| samples.get(at).map_or(0.0, |sample| (sample - rest).abs());
+    let at = (0..samples.len()).max_by(|&a, &b| size(a).total_cmp(&size(b)))?;
+    let peak = size(at);
+    let neighbours = size(at + 1).max(at.checked_sub(1).map_or(0.0, size));
+    let others = (0..samples.len())
+        .filter(|other| *other != at)
+        .map(size)
+        .fold(0.0, f64::max);
+    (peak > 0.0 && neighbours < SPIKE_NEIGHBOURS * peak && others < peak / SPIKE_ABOVE && others > 0.0)
+        .then_some(at)
+}
+
+/// Warnings about measured receptances: a drive point that feeds energy in, a response that the force does not cause, sizes of no machine.
+pub(super) fn of_table(table: &FrfTable) -> Vec<String> {
+    let frequency_hz = table.frequency_hz();
+    let mut warnings = Vec::new();
+    for entry in table.entries() {
+        let name = entry.name();
+        let size = |line: usize| entry.receptance[line].norm();
+        let Some(peak) = (0..entry.receptance.len()).max_by(|&a, &b| size(a).total_cmp(&size(b))) else {
+            continue;
+        };
+        // The mean of the sine of the phase, weighted with |H|²: −1 at the resonances of a passive drive point.
+        let (imaginary, power) = entry.receptance.iter().fold((0.0, 0.0), |(sum, all), h| {
+            (sum + h.im * h.norm(), all + h.norm_sqr())
+        });
+        let phase = if power > 0.0 { imaginary / power } else { 0.0 };
+        let coherence = entry.coherence.as_ref().map(|coherence| {
+            let mut sorted = coherence.clone();
+            sorted.sort_by(f64::total_cmp);
+            (coherence[peak], sorted[sorted.len() / 2])
+        });
+        let is_unrelated =
+            coherence.is_some_and(|(at_peak, median)| at_peak < UNRELATED_PEAK && median < UNRELATED);
+        if let Some((at_peak, median)) = coherence.filter(|_| is_unrelated) {
+            warnings.push(format!(
+                "H{name}: little of the response comes from the force: its coherence is {at_peak:.2} at the peak and {median:.2} in the median; check the \
+                 sensor in {} (dead, loose, wrong channel), the cable, and the length of the record",
+                entry.response
+            ));
+        } else if entry.response == entry.force && phase > INVERTED_PHASE {
+            warnings.push(format!(
+                "H{name} has the sign of an inverted sensor: its imaginary part is positive at {:.3} Hz, where a drive point takes up energy \
+                 and has a negative one; if force and sensor sit at one point, one of them points against its axis: add --map \
+                 COLUMN=-NAME for it (such as --map a{axis}=-a{axis})",
+                frequency_hz[peak],
+                axis = entry.response
+            ));
+        }
+        let [low, high] = PLAUSIBLE_RECEPTANCE;
+        if !is_unrelated && !(low..=high).contains(&size(peak)) && size(peak) > 0.0 {
+            let (is, than) = if size(peak) > high {
+                ("large", "above")
+            } else {
+                ("small", "below")
+            };
+            let bound = if size(peak) > high { high } else { low };
+            warnings.push(format!(
+                "H{name} is implausibly {is}: its peak is {} µm/N, {than} {} µm/N; check the units and sensitivities of force and response",
+                1e6 * size(peak),
+                1e6 * bound
+            ));
+        }
+    }
+    warnings
+}
+
+#[cfg(test)]
+mod tests;
