@@ -2,7 +2,24 @@
 
 #![allow(clippy::expect_used)]
 
-use quietcut_tests::command::{cases, folder, quietcut, verbs};
+use quietcut_tests::command::{cases, folder, quietcut};
+
+const VERBS: [&str; 14] = [
+    "demo",
+    "look",
+    "identify",
+    "diagnose",
+    "plan",
+    "simulate",
+    "frf",
+    "lobes",
+    "table",
+    "upload",
+    "info",
+    "working-point",
+    "monitor",
+    "replay",
+];
 
 /// The commands under "Example:" in the help of a verb.
 fn examples(verb: &str) -> Vec<Vec<String>> {
@@ -23,12 +40,12 @@ fn examples(verb: &str) -> Vec<Vec<String>> {
 fn help_lists_every_verb() {
     let help = quietcut(folder().path(), &["help"]);
     assert_eq!(help.status, Some(0));
-    let listed = verbs();
-    for verb in ["setup", "next", "diagnose", "lobes", "monitor"] {
-        assert!(listed.iter().any(|known| known == verb), "{verb}: {listed:?}");
-    }
-    assert!(listed.len() >= 16, "{listed:?}");
-    for verb in &listed {
+    for verb in VERBS {
+        assert!(
+            help.stdout.contains(&format!("\n  {verb} ")),
+            "{verb}: {}",
+            help.stdout
+        );
         assert!(!examples(verb).is_empty(), "{verb}");
     }
 }
@@ -42,7 +59,7 @@ fn bad_usage_has_status_2() {
     run(&["info"]).refused(&["<PORT>"]);
     run(&["lobes", "a.toml", "--rpm", "600-2400", "--depth-mm", "1:2:3"])
         .refused(&["600-2400", "first:last:count"]);
-    run(&["lobes", "a.toml", "--rpm", "600:2400", "--depth-mm", "1:2:3"])
+    run(&["lobes", "a.toml", "--rpm", "600:2400:9:9", "--depth-mm", "1:2:3"])
         .refused(&["--rpm", "first:last:count"]);
     let working_point = |depth, feed| {
         let cut = ["--start", "90", "--exit", "180", "--feed", feed];
@@ -122,9 +139,8 @@ fn the_same_seed_cuts_the_same_file_and_it_replays() {
 #[test]
 fn examples_run() {
     // The verbs run in parallel. The examples of one verb run in order, because later ones use files of earlier ones.
-    let verbs = verbs();
     std::thread::scope(|scope| {
-        for verb in &verbs {
+        for verb in VERBS {
             scope.spawn(move || {
                 let folder = folder();
                 let there = folder.path().join("tests/cases");

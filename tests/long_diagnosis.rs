@@ -1,5 +1,5 @@
 //! Computing time of a diagnosis of four records of 60 s at 2 kHz. This command prints it in s: `cargo test --release -p
-//! quietcut-tests --test long_diagnosis -- --ignored --nocapture --test-threads 1`.
+//! quietcut-tests --test long_diagnosis -- --ignored --nocapture`.
 #![allow(clippy::expect_used)]
 
 use std::path::Path;
@@ -75,10 +75,7 @@ fn diagnose(test: &str, common: &[&str], differing: [&[&str]; 4], cause: &str) {
         name: &format!("long-diagnosis-{test}"),
         title: &format!("Long diagnosis, {test}"),
         command: "cargo test --release -p quietcut-tests --test long_diagnosis -- --ignored --nocapture --test-threads 1",
-        seeds: &format!(
-            "0 to 3, one for each record; processor cores: {}",
-            std::thread::available_parallelism().map_or(1, usize::from)
-        ),
+        seeds: "none",
     }
     .record(&[(
         format!("time for four records of 60 s at 2 kHz with {cause}"),
@@ -90,7 +87,7 @@ fn diagnose(test: &str, common: &[&str], differing: [&[&str]; 4], cause: &str) {
 
 #[test]
 #[ignore = "a measurement on a machine that does nothing else"]
-fn computing_time_of_cuts() {
+fn of_cuts() {
     let common = [
         "--depth-mm",
         "0.4",
@@ -143,7 +140,7 @@ const CUBIC: [&str; 4] = [
 
 #[test]
 #[ignore = "a measurement on a machine that does nothing else"]
-fn computing_time_of_a_shaker() {
+fn of_a_shaker() {
     diagnose(
         "tones",
         &[&TONES[..], &CUBIC].concat(),
@@ -154,7 +151,7 @@ fn computing_time_of_a_shaker() {
 
 #[test]
 #[ignore = "a measurement on a machine that does nothing else"]
-fn computing_time_of_a_shaker_while_the_machine_drifts() {
+fn of_a_shaker_while_the_machine_drifts() {
     let drift = ["--effect", "drift.relative_rate_per_s=5e-4"];
     diagnose(
         "tones-and-drift",
@@ -166,7 +163,7 @@ fn computing_time_of_a_shaker_while_the_machine_drifts() {
 
 #[test]
 #[ignore = "a measurement on a machine that does nothing else"]
-fn computing_time_of_sweeps() {
+fn of_sweeps() {
     diagnose(
         "sweeps",
         &[&SWEEP[..], &CUBIC].concat(),

@@ -45,3 +45,27 @@ fn the_tone_is_found_in_the_measured_cut_and_nothing_alarming_before() {
         }
     }
 }
+
+#[test]
+fn one_object_a_line_holds_what_one_object_holds() {
+    let folder = folder();
+    let case = quietcut_tests::command::cases().join("kuka-kr90-acetal.toml");
+    let made = format!(
+        "simulate {} --rpm 1045 --depth-mm 2 --seconds 4 --out cut.csv",
+        case.display()
+    );
+    let arguments: Vec<&str> = made.split_whitespace().collect();
+    assert_eq!(quietcut(folder.path(), &arguments).status, Some(0));
+    let whole = quietcut(folder.path(), &["replay", "cut.csv", "--json"]).json();
+    let lines = quietcut(folder.path(), &["replay", "cut.csv", "--json-lines"]);
+    assert_eq!(lines.status, Some(0), "{lines:?}");
+    let lines: Vec<serde_json::Value> = lines
+        .stdout
+        .lines()
+        .map(|line| serde_json::from_str(line).unwrap())
+        .collect();
+    let (last, verdicts) = lines.split_last().unwrap();
+    assert_eq!(whole["verdicts"].as_array().unwrap(), verdicts);
+    assert_eq!(whole["summary"], last["summary"]);
+    quietcut(folder.path(), &["replay", "cut.csv", "--json", "--json-lines"]).refused(&["--json-lines"]);
+}

@@ -144,7 +144,7 @@ fn what_is_missing_is_named_with_the_option_that_gives_it() {
         let change = |word: &&'static str| if *word == old { new } else { *word };
         SETUP.iter().map(change).collect()
     };
-    quietcut(folder, &with("600:2400", "600")).refused(&["--rpm 600", "LOW:HIGH"]);
+    quietcut(folder, &with("600:2400", "600")).refused(&["--rpm 600", "first:last"]);
     quietcut(folder, &with("6.35", "20")).refused(&["--down-milling-mm 20", "12.7"]);
     quietcut(
         folder,

@@ -60,3 +60,11 @@ pub(crate) const SAME_SPEED: f64 = 0.01;
 /// Ratio of the largest to the smallest vibration amplitude in the records from which on the report draws missing
 /// stiffness and damping over the amplitude. Unfounded.
 pub(crate) const AMPLITUDE_RATIO: f64 = 1.2;
+
+/// Range of plausible static stiffnesses at the tool, N/m; outside, `lobes` warns of a wrong unit or scale. Slender tools and compliant
+/// robots have 10⁵ and more, the stiffest spindles some 10⁸; a decade or more on both sides is a choice.
+pub(crate) const PLAUSIBLE_STIFFNESS: [f64; 2] = [1e4, 1e10];
+
+/// Smallest plausible dynamic stiffness at a resonance of the tool, N/m; below it, `lobes` warns of a wrong unit or scale. A static stiffness of
+/// 10⁵ N/m with a damping ratio of 1 % has twice as much.
+pub(crate) const LEAST_DYNAMIC_STIFFNESS: f64 = 1e3;

@@ -10,6 +10,7 @@ use crate::diagnose::lobes::{baseline_lobes, lobes};
 use crate::diagnose::{DiagnoseError, Diagnosis, Options, Stage, diagnose_watched, recorded_cuts};
 use crate::recording::Recording;
 use crate::report::diagnosis::diagnosis_page;
+use crate::report::digits::significant;
 use crate::report::lobes_change::{sentences, trial_cut_counts};
 use crate::trial_cuts::{self, TrialCut};
 
@@ -26,7 +27,7 @@ pub struct Args {
     #[arg(value_name = "REC", required = true)]
     recordings: Vec<PathBuf>,
     /// Folder to write: extended.toml (the extended case), diagnosis.json and report.html.
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", value_parser = folder)]
     out: Option<PathBuf>,
     /// Trial cuts, a CSV file with the columns rpm [rev/min], depth [mm] and outcome (stable, chatter, marginal): compared
     /// with the stability that the case and the extended case predict.
@@ -70,6 +71,18 @@ pub fn run(args: Args) -> Result<(), Error> {
         write(folder, &case.name, &diagnosis, extended.as_deref())?;
     }
     args.output.answer_with(&understood, &diagnosis, text(&diagnosis))
+}
+
+/// Parses the name of the folder to write; the ending of a file is refused.
+fn folder(text: &str) -> Result<PathBuf, String> {
+    let path = PathBuf::from(text);
+    match crate::file::ending(&path).as_str() {
+        "html" | "json" | "toml" | "csv" | "svg" if !path.is_dir() => Err(format!(
+            "a folder is needed, which gets report.html, diagnosis.json and, if a cause is found, extended.toml; such as {}",
+            path.with_extension("").display()
+        )),
+        _ => Ok(path),
+    }
 }
 
 /// Adds stability limits to the diagnosis: those of the case and of the extended case, or only those of the case if the
@@ -150,8 +163,10 @@ fn text(diagnosis: &Diagnosis) -> String {
         for (key, figure) in &cause.parameters {
             let [low, high] = figure.ci90;
             lines.push(format!(
-                "    {key} = {:.5e}, 90 % interval {low:.5e} to {high:.5e}",
-                figure.value
+                "    {key} = {}, 90 % interval {} to {}",
+                significant(figure.value, 6),
+                significant(low, 6),
+                significant(high, 6)
             ));
         }
     }

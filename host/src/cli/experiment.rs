@@ -23,7 +23,8 @@ pub(super) struct Experiment {
     /// Direction of the excitation force of a vibration test. Default: the first direction of the structure.
     #[arg(long, value_name = "x|y|z")]
     direction: Option<Direction>,
-    /// Frequencies in Hz: the steps of step-sine, the first and last frequency of a sweep, or the tones of a shaker.
+    /// Frequencies in Hz, first:last:count or first:last: the steps of step-sine, the first and last frequency of a sweep, or the
+    /// tones of a shaker.
     #[arg(long, value_name = "R", value_parser = Range::positive, allow_negative_numbers = true)]
     frequency_hz: Option<Range>,
     /// Force in N: amplitude of a sine, peak of an impact, or static force before a free decay. With commas: the levels of

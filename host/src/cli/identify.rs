@@ -3,6 +3,7 @@
 mod answer;
 mod args;
 mod checks;
+mod comments;
 mod cutting;
 mod joints;
 mod methods;
@@ -17,6 +18,7 @@ use super::Error;
 use super::output::keep_inputs;
 use super::segment::Recorded;
 use crate::case::Case;
+use crate::report::digits::significant;
 use answer::IdentifyOutput;
 pub use args::Args;
 use args::Method;
@@ -52,6 +54,11 @@ pub fn run(args: Args) -> Result<(), Error> {
     };
     if let Some(path) = &args.out {
         let text = answer.case(path, other.as_ref())?;
+        let before = path.exists().then(|| crate::file::read_text(path)).transpose()?;
+        let text = match &before {
+            Some(before) => comments::kept(before, &text),
+            None => text,
+        };
         crate::file::write(path, text.as_bytes())?;
         answer.case = Some(path.clone());
     }
@@ -69,15 +76,20 @@ fn sections(path: &Path) -> Result<toml::Table, Error> {
         .map_err(|error| Error::input(format!("{}: {error}", path.display())))
 }
 
+/// Significant digits of identified parameters in the text output; JSON and case files keep all. A choice.
+const DIGITS: usize = 6;
+
 fn text(answer: &IdentifyOutput) -> String {
     let mut lines = Vec::new();
     for model in &answer.models {
         for (key, figure) in &model.parameters {
             let [low, high] = figure.ci90;
             lines.push(format!(
-                "{}{key} = {:.5e}, 90 % interval {low:.5e} to {high:.5e}",
+                "{}{key} = {}, 90 % interval {} to {}",
                 model.label(),
-                figure.value
+                significant(figure.value, DIGITS),
+                significant(low, DIGITS),
+                significant(high, DIGITS)
             ));
         }
     }

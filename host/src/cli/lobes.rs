@@ -5,17 +5,17 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
+use super::lobes_spread::{intervals, percentiles};
 use super::method::MethodChoice;
 use super::varied::{self, Varied};
-use super::{Error, Output, Range, lobes_cells};
+use super::{Endings, Error, Output, Range, lobes_cells, lobes_csv, plausible_structure};
 use crate::case::Case;
 use crate::file;
+use crate::report::digits::significant;
 use crate::report::lobe_chart::{Column, lobe_chart};
 use crate::report::marks::Mark;
 use crate::report::page::{figure, page};
-use crate::stability::{
-    Chart, CutStability, Label, LimitSpread, Method, Resolution, SpeedLine, Uncertainty, chart,
-};
+use crate::stability::{Chart, CutStability, Label, Method, Resolution, SpeedLine, Uncertainty, chart};
 use crate::trial_cuts::{self, Calls, TrialCut};
 
 /// Computes stability limits over the spindle speed, or the dominant Floquet multiplier at given points.
@@ -27,40 +27,41 @@ pub struct Args {
     /// The case file: structure, tool, material, cut.
     #[arg(value_name = "CASE")]
     case: PathBuf,
-    /// Spindle speeds in rev/min, first:last:count.
-    #[arg(long, value_name = "R", value_parser = Range::positive, requires = "depth_mm", required_unless_present = "at")]
+    /// Spindle speeds in rev/min, first:last:count or first:last (61 speeds).
+    #[arg(long, value_name = "R", value_parser = Range::positive)]
     rpm: Option<Range>,
-    /// Axial depths in mm, first:last:count. Limits are searched from depth 0 to the last, in steps no wider than these.
-    #[arg(long, value_name = "R", value_parser = Range::non_negative, requires = "rpm")]
+    /// Axial depths in mm, first:last:count or first:last (61 depths). Limits are searched from depth 0 to the last, in steps no
+    /// wider than these.
+    #[arg(long, value_name = "R", value_parser = Range::non_negative)]
     depth_mm: Option<Range>,
     #[command(flatten)]
     method: MethodChoice,
     /// Compute the dominant Floquet multiplier and its error at every speed and depth, instead of the limits.
-    #[arg(long, requires = "rpm")]
+    #[arg(long)]
     cells: bool,
     #[command(flatten)]
     varied: Varied,
     /// Ignore the standard deviations of the case (keys that end in _std): compute only the limits of the nominal parameters.
-    #[arg(long, requires = "rpm")]
+    #[arg(long)]
     nominal: bool,
     /// Compute the probability of a stable cut at every speed and depth from the standard deviations of the case.
-    #[arg(long, requires = "rpm", conflicts_with_all = ["nominal", "cells"])]
+    #[arg(long, conflicts_with_all = ["nominal", "cells"])]
     probability: bool,
     /// Trial cuts, a CSV file with the columns rpm [rev/min], depth [mm] and outcome (stable, chatter, marginal), or the table
     /// that identify --method inverse-stability reads. The chart shows them, and wrong predictions are counted.
-    #[arg(long, value_name = "FILE", requires = "rpm", conflicts_with = "cells")]
+    #[arg(long, value_name = "FILE", conflicts_with = "cells")]
     cuts: Option<PathBuf>,
     /// Compute the limits at the given speeds only. Without this option further speeds are added where limits bend, so that
     /// straight lines between all speeds are right to 1 % in depth or 0.1 % in speed; methods that need seconds per speed add
     /// none.
-    #[arg(long, requires = "rpm", conflicts_with = "cells")]
+    #[arg(long, conflicts_with = "cells")]
     no_refine: bool,
     /// Seed of the random parameters that are drawn from the standard deviations.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// Chart or table to write; the ending sets the format: svg, html, csv or json.
-    #[arg(long, value_name = "FILE", requires = "rpm")]
-    out: Option<PathBuf>,
+    /// Chart or table to write; the ending sets the format: svg, html, csv or json. May be repeated.
+    #[arg(long, value_name = "FILE", value_parser = Endings(&["svg", "html", "csv", "json"]).parser())]
+    out: Vec<PathBuf>,
     /// Working point at which to compute the dominant Floquet multiplier: spindle speed in rev/min and axial depth in
     /// mm, as RPM,MM; may be repeated.
     #[arg(long, value_name = "RPM,MM", conflicts_with = "rpm", value_parser = working_point)]
@@ -76,9 +77,48 @@ struct PointsOutput {
     points: Vec<CutStability>,
 }
 
+impl Args {
+    /// Refuses options without the ranges or points that they need; one message names all that is missing.
+    fn check(&self) -> Result<(), Error> {
+        let has_range = self.rpm.is_some() || self.depth_mm.is_some();
+        let missing: Vec<&str> = [
+            (self.rpm.is_none(), "--rpm 900:1200:31 (rev/min)"),
+            (self.depth_mm.is_none(), "--depth-mm 0.1:4:40 (mm)"),
+        ]
+        .into_iter()
+        .filter_map(|(is_missing, option)| is_missing.then_some(option))
+        .collect();
+        let of_chart = [
+            (self.cells, "--cells"),
+            (self.nominal, "--nominal"),
+            (self.probability, "--probability"),
+            (self.cuts.is_some(), "--cuts"),
+            (self.no_refine, "--no-refine"),
+            (!self.out.is_empty(), "--out"),
+        ];
+        let needs_chart = of_chart
+            .iter()
+            .find(|(given, _)| *given)
+            .map(|(_, option)| *option);
+        if missing.is_empty() || (!self.at.is_empty() && !has_range && needs_chart.is_none()) {
+            return Ok(());
+        }
+        let missing = missing.join(" and ");
+        Err(Error::input(match needs_chart {
+            Some(option) => format!("{option} belongs to a chart, which needs {missing} with your ranges"),
+            None if has_range => format!("a chart needs {missing} with your range too"),
+            None => format!(
+                "a chart needs {missing} with your ranges; single points need --at RPM,MM, such as --at 1045,2"
+            ),
+        }))
+    }
+}
+
 /// Runs the verb.
 pub fn run(args: Args) -> Result<(), Error> {
+    args.check()?;
     let case = Case::read(&args.case).map_err(Error::input)?;
+    plausible_structure::warn(&case);
     args.method.announce()?;
     if let (Some(variation), Some(rpm), Some(depth_mm)) = (args.varied.variation(), args.rpm, args.depth_mm) {
         return varied::run(&case, &args.method, &variation, rpm, depth_mm, args.output);
@@ -87,7 +127,7 @@ pub fn run(args: Args) -> Result<(), Error> {
     match (args.rpm, args.depth_mm) {
         (Some(rpm), Some(depth_mm)) if args.cells => {
             let grid = (rpm, depth_mm);
-            lobes_cells::run(&case, method.as_ref(), grid, args.out, args.output)
+            lobes_cells::run(&case, method.as_ref(), grid, &args.out, args.output)
         }
         (Some(rpm), Some(depth_mm)) => {
             let maker = |case: &Case| args.method.on(case).map_err(|error| error.to_string());
@@ -109,7 +149,7 @@ pub fn run(args: Args) -> Result<(), Error> {
                 method.as_ref(),
                 uncertainty.as_ref(),
                 request,
-                args.out,
+                &args.out,
                 args.output,
             )
         }
@@ -131,16 +171,25 @@ fn run_points(method: &dyn Method, at: &[(f64, f64)], output: Output) -> Result<
         // Writing to a String cannot fail.
         let _ = write!(
             text,
-            "\n{} rev/min, {} mm: {}, |Floquet multiplier| = {:.6} ± {:.0e} ({}{chatter})",
+            "\n{} rev/min, {} mm: {}, |Floquet multiplier| = {} ± {} ({}{chatter})",
             point.rpm,
             point.depth_mm,
             point.verdict.name(),
-            point.multiplier_abs,
-            point.error,
+            modulus(point.multiplier_abs),
+            significant(point.error, 1),
             point.kind.name(),
         );
     }
     output.answer(&PointsOutput { label, points }, text)
+}
+
+/// Modulus of a Floquet multiplier: six decimals, or seven digits of a large one.
+fn modulus(value: f64) -> String {
+    if value < 1e3 {
+        format!("{value:.6}")
+    } else {
+        significant(value, 7)
+    }
 }
 
 /// Speeds, depths, probability option and trial cuts of a stability chart.
@@ -166,7 +215,7 @@ fn run_chart(
     method: &dyn Method,
     uncertainty: Option<&Uncertainty<'_>>,
     request: ChartRequest,
-    out: Option<PathBuf>,
+    out: &[PathBuf],
     output: Output,
 ) -> Result<(), Error> {
     let ChartRequest {
@@ -196,11 +245,11 @@ fn run_chart(
         };
         chart = chart.with_spread(uncertainty, deepest_mm, &cells_mm)?;
     }
-    for warning in error_warning(&chart) {
+    if let Some(warning) = error_warning(&chart) {
         tracing::warn!("{}: {warning}", case.path.display());
     }
     let calls = cuts.as_deref().map(|cuts| Calls::new(method, cuts)).transpose()?;
-    if let Some(path) = &out {
+    for path in out {
         let marks: Vec<Mark> = cuts.iter().flatten().map(Mark::from).collect();
         write_chart(case, &chart, deepest_mm, &marks, path)?;
     }
@@ -215,7 +264,7 @@ fn run_chart(
             calls.wrong, calls.cuts, calls.missed_chatter, calls.false_alarms, calls.undecided
         );
     }
-    if let Some(path) = &out {
+    for path in out {
         let _ = write!(text, "\n{}", path.display());
     }
     let answer = LobesOutput {
@@ -301,28 +350,10 @@ fn resolution_as_text(chart: &Chart, resolution: &Resolution) -> String {
     text
 }
 
-/// 5, 50 and 95 % percentiles of the first stability limit as text, mm; `beyond` is the text for a limit deeper than
-/// the largest computed depth.
-fn percentiles(spread: &LimitSpread, beyond: &str) -> [String; 3] {
-    let percentiles = spread.limit_percentiles_mm;
-    [percentiles.low, percentiles.median, percentiles.high].map(|depth_mm| depth_or(depth_mm, beyond))
-}
-
-/// 90 % confidence interval of each percentile of the first stability limit as text, mm.
-fn intervals(spread: &LimitSpread, beyond: &str) -> [[String; 2]; 3] {
-    let intervals = spread.limit_percentiles_ci90_mm;
-    let intervals = [intervals.low, intervals.median, intervals.high];
-    intervals.map(|interval| interval.map(|end| depth_or(end, beyond)))
-}
-
-fn depth_or(depth_mm: Option<f64>, beyond: &str) -> String {
-    depth_mm.map_or_else(|| beyond.into(), |depth_mm| format!("{depth_mm:.4}"))
-}
-
 fn write_chart(case: &Case, chart: &Chart, depth_mm: f64, marks: &[Mark], path: &Path) -> Result<(), Error> {
     let text = match file::ending(path).as_str() {
         "json" => serde_json::to_string(chart).map_err(Error::other)?,
-        "csv" => as_csv(chart)?,
+        "csv" => lobes_csv::as_csv(chart)?,
         "svg" => picture(case, chart, depth_mm, marks)?,
         "html" => as_page(case, chart, depth_mm, marks)?,
         _ => {
@@ -378,7 +409,7 @@ fn row(line: &SpeedLine) -> maud::Markup {
             td { (format!("{:.1}", line.rpm)) }
             @if let Some(limit) = line.first_limit {
                 td { (format!("{:.4}", limit.depth_mm)) }
-                td { @if let Some(error_mm) = limit.error_mm { (format!("{error_mm:.0e}")) } }
+                td { @if let Some(error_mm) = limit.error_mm { (significant(error_mm, 1)) } }
                 td { (limit.kind.name()) }
                 td { @if let Some(hz) = limit.chatter_hz { (format!("{hz:.2}")) } }
             } @else {
@@ -394,83 +425,10 @@ fn row(line: &SpeedLine) -> maud::Markup {
     }
 }
 
-/// Stability chart as CSV with one row per change of stability over depth; a speed without any change has one row with
-/// only its speed.
-fn as_csv(chart: &Chart) -> Result<String, Error> {
-    let mut writer = csv::Writer::from_writer(Vec::new());
-    let mut header = vec![
-        "rpm [rev/min]",
-        "depth [mm]",
-        "kind",
-        "gain",
-        "chatter [Hz]",
-        "first",
-        "error [mm]",
-        "undecided_from [mm]",
-        "undecided_to [mm]",
-    ];
-    if chart.speeds.iter().any(|line| line.spread.is_some()) {
-        header.extend(["limit_5 [mm]", "limit_50 [mm]", "limit_95 [mm]"]);
-        // Lower and upper end of the 90 % confidence interval of each percentile of the first stability limit.
-        header.extend(["limit_5_from [mm]", "limit_5_to [mm]"]);
-        header.extend(["limit_50_from [mm]", "limit_50_to [mm]"]);
-        header.extend(["limit_95_from [mm]", "limit_95_to [mm]"]);
-    }
-    writer.write_record(&header).map_err(Error::other)?;
-    let spread_columns = header.len() - 9;
-    for line in chart.lines() {
-        let rpm = line.rpm.to_string();
-        let mut spread: Vec<String> = line
-            .spread
-            .iter()
-            .flat_map(|spread| {
-                let ends = intervals(spread, "").into_iter().flatten();
-                percentiles(spread, "").into_iter().chain(ends)
-            })
-            .collect();
-        // Spindle speeds that were added between the requested ones have no percentiles of the limit.
-        spread.resize(spread_columns, String::new());
-        let spread = spread.iter().map(String::as_str);
-        if line.switches.is_empty() {
-            let row = [rpm.as_str(), "", "", "", "", "", "", "", ""];
-            writer
-                .write_record(row.into_iter().chain(spread.clone()))
-                .map_err(Error::other)?;
-        }
-        for switch in &line.switches {
-            let first = line
-                .first_limit
-                .is_some_and(|limit| limit.depth_mm == switch.depth_mm);
-            // The interval of axial depths around this change of stability in which the method cannot decide.
-            let undecided = line
-                .undecided_mm
-                .iter()
-                .find(|[from, to]| (*from..=*to).contains(&switch.depth_mm));
-            let number = |value: Option<f64>| value.map_or_else(String::new, |value| value.to_string());
-            let row = [
-                rpm.as_str(),
-                &switch.depth_mm.to_string(),
-                switch.kind.name(),
-                &switch.gain.to_string(),
-                &number(switch.chatter_hz),
-                &first.to_string(),
-                &number(switch.error_mm),
-                &number(undecided.map(|interval| interval[0])),
-                &number(undecided.map(|interval| interval[1])),
-            ];
-            writer
-                .write_record(row.into_iter().chain(spread.clone()))
-                .map_err(Error::other)?;
-        }
-    }
-    let bytes = writer.into_inner().map_err(Error::other)?;
-    String::from_utf8(bytes).map_err(Error::other)
-}
-
 /// Parses `RPM,MM` into spindle speed in rev/min and axial depth in mm.
 fn working_point(text: &str) -> Result<(f64, f64), String> {
     let (rpm, depth_mm) = text
-        .split_once(',')
+        .split_once([',', ':'])
         .ok_or_else(|| format!("`{text}` is not of the form RPM,MM, such as 1045,2"))?;
     Ok((super::positive(rpm)?, super::non_negative(depth_mm)?))
 }

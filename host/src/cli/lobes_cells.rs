@@ -16,15 +16,15 @@ pub(super) fn run(
     case: &Case,
     method: &dyn Method,
     (rpm, depth_mm): (Range, Range),
-    out: Option<PathBuf>,
+    out: &[PathBuf],
     output: Output,
 ) -> Result<(), Error> {
     let chart = cell_chart(method, &rpm.values(), &depth_mm.values())?;
-    if let Some(path) = &out {
+    for path in out {
         write(case, &chart, path)?;
     }
     let mut text = counts_text(&chart);
-    if let Some(path) = &out {
+    for path in out {
         // Writing to a String cannot fail.
         let _ = write!(text, "\n{}", path.display());
     }

@@ -9,6 +9,7 @@ use super::segment::StatedColumns;
 use super::{Error, Output};
 use crate::frf::FrfTable;
 use crate::recording::{ChannelSummary, Import, Imported, Recording, Segment, Sidecar, Understood, envelope};
+use crate::report::digits::significant;
 
 /// Shows how a file is understood: channels, units, sample rate, peaks, clipping, dropouts, and the sidecar that states them.
 #[derive(Debug, clap::Args)]
@@ -81,6 +82,7 @@ pub fn run(args: Args) -> Result<(), Error> {
     };
     let mut text = String::new();
     for path in &args.files {
+        refuse_other_kinds(path)?;
         if FrfTable::is_table(path)? {
             let table = table(path, &import)?;
             text += &table.text();
@@ -118,6 +120,19 @@ pub fn run(args: Args) -> Result<(), Error> {
         }
     }
     args.output.answer(&answer, text.trim_end())
+}
+
+/// Refuses files of quietcut that are neither recordings nor tables of frequency response functions, with the command that shows them.
+fn refuse_other_kinds(path: &Path) -> Result<(), Error> {
+    let what = match crate::file::ending(path).as_str() {
+        "qct" => format!("a lobe table; quietcut table --show {} shows it", path.display()),
+        "toml" => format!(
+            "a case or the sidecar of a recording; quietcut lobes {} --at RPM,MM checks a case, and look shows a sidecar with its recording",
+            path.display()
+        ),
+        _ => return Ok(()),
+    };
+    Err(Error::input(format!("{}: {what}", path.display())))
 }
 
 fn table(path: &Path, import: &Import) -> Result<TableOutput, Error> {
@@ -160,10 +175,10 @@ impl TableOutput {
         for receptance in &self.receptances {
             let _ = writeln!(
                 text,
-                "  H{}: largest receptance {:.4} µm/N at {:.3} Hz{}",
+                "  H{}: largest receptance {} µm/N at {} Hz{}",
                 receptance.name,
-                1e6 * receptance.peak_m_per_n,
-                receptance.peak_hz,
+                significant(1e6 * receptance.peak_m_per_n, 5),
+                significant(receptance.peak_hz, 5),
                 if receptance.has_coherence {
                     ""
                 } else {
@@ -240,11 +255,11 @@ impl RecordOutput {
             };
             let _ = writeln!(
                 text,
-                "  {}: peak {} {unit}, RMS {} {unit}, mean {} {unit}",
+                "  {}: peak {}, RMS {}, mean {}",
                 summary.channel,
-                shown(summary.peak),
-                shown(summary.rms),
-                shown(summary.mean)
+                shown(summary.peak, unit),
+                shown(summary.rms, unit),
+                shown(summary.mean, unit)
             );
             let _ = writeln!(text, "    {}", picture(&channel.samples));
             if summary.constant {
@@ -253,7 +268,7 @@ impl RecordOutput {
             if summary.clipped > 0 {
                 let _ = writeln!(
                     text,
-                    "    clipped: {} samples stay at the largest or smallest value",
+                    "    clipped: {} samples stay at the largest or smallest value; record again with a larger range of the sensor",
                     summary.clipped
                 );
             }
@@ -275,17 +290,21 @@ impl RecordOutput {
     }
 }
 
-/// Formats a number with four significant digits.
-fn shown(value: f64) -> String {
-    let size = value.abs();
-    if size == 0.0 {
-        "0".into()
-    } else if (1e-3..1e5).contains(&size) {
-        let digits = (3 - size.log10().floor() as i32).clamp(0, 6) as usize;
-        format!("{value:.digits$}")
-    } else {
-        format!("{value:.3e}")
-    }
+/// A number with its unit, four significant digits, and a prefix of the unit where the number is small or large.
+fn shown(value: f64, unit: &str) -> String {
+    // Prefixes belong to units that carry them in practice.
+    let takes_prefix = matches!(unit, "m" | "N" | "V" | "m/s" | "m/s^2" | "Pa");
+    let (factor, prefix) = match value.abs() {
+        _ if !takes_prefix => (1.0, ""),
+        size if size == 0.0 || (1e-1..1e4).contains(&size) => (1.0, ""),
+        size if size >= 1e4 => (1e-3, "k"),
+        size if size >= 1e-4 => (1e3, "m"),
+        size if size >= 1e-7 => (1e6, "µ"),
+        _ => (1e9, "n"),
+    };
+    format!("{} {prefix}{unit}", significant(value * factor, 4))
+        .trim_end()
+        .into()
 }
 
 /// Picture of the envelope of a channel, drawn with block characters in one line.
@@ -303,14 +322,15 @@ mod tests {
 
     #[test]
     fn numbers_have_four_digits_and_pictures_the_width_of_a_terminal() {
-        for (value, text) in [
-            (812.34, "812.3"),
-            (0.001_234_1, "0.001234"),
-            (12_345.6, "12346"),
-            (1e-9, "1.000e-9"),
-            (0.0, "0"),
+        for (value, unit, text) in [
+            (812.34, "N", "812.3 N"),
+            (0.001_234_1, "m", "1.234 mm"),
+            (12_345.6, "m/s^2", "12.35 km/s^2"),
+            (1e-9, "m", "1.000 nm"),
+            (0.001_234_1, "", "0.001234"),
+            (0.0, "N", "0 N"),
         ] {
-            assert_eq!(shown(value), text);
+            assert_eq!(shown(value, unit), text);
         }
         assert_eq!(picture(&vec![1.0; 1000]).chars().count(), WIDTH);
         assert!(picture(&[0.0, 1.0, 0.0, -1.0]).contains('█'));

@@ -10,6 +10,7 @@ use crate::criteria::COARSE_TABLE;
 use crate::frf::{FrfTable, ImportedTable, Interpolation};
 use crate::orbit::collocation_of;
 use crate::recording::{ColumnMap, Import};
+use crate::report::digits::significant;
 use crate::stability::{
     Collocation, CubicTerms, Fdm, FrequencyProblem, FullDiscretization, Method, ModeCoupling, MultiFrequency,
     Nyquist, Pitched, Problem, RevolutionCollocation, Sdm, SdmOrder, SemiDiscretization, Zoa, after,
@@ -245,11 +246,11 @@ fn warn_of_table(table: &FrfTable) -> Result<(), Error> {
             && first.im.abs() > first.re
         {
             tracing::warn!(
-                "{file}: h{} at its first line, {hz} Hz, is {:.2e}{:+.2e}i m/N, not close to a static compliance: a mode may lie \
+                "{file}: h{} at its first line, {hz} Hz, is {} µm/N with an imaginary part of {} µm/N, not close to a static compliance: a mode may lie \
                  below the table",
                 entry.name(),
-                first.re,
-                first.im,
+                significant(1e6 * first.re, 3),
+                significant(1e6 * first.im, 3),
             );
         }
     }

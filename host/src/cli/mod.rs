@@ -13,6 +13,8 @@ pub mod identify;
 pub mod info;
 pub mod lobes;
 mod lobes_cells;
+mod lobes_csv;
+mod lobes_spread;
 pub mod look;
 mod method;
 mod milling_rig;
@@ -21,7 +23,9 @@ pub mod next;
 mod number;
 mod output;
 pub mod plan;
+mod plausible_structure;
 pub mod port;
+mod postures;
 mod progress;
 mod range;
 pub mod replay;
@@ -37,11 +41,12 @@ use std::io::IsTerminal;
 use std::panic;
 use std::process::ExitCode;
 
+use clap::error::ErrorKind;
 use clap::{ArgAction, Parser, Subcommand};
 
 pub use error::Error;
 pub use number::{angle, count, finite, non_negative, positive};
-pub use output::Output;
+pub use output::{Endings, Output, StreamedOutput};
 pub use range::Range;
 
 /// Detects chatter, names its kind, and finds a stable spindle speed.
@@ -82,7 +87,16 @@ pub fn main() -> ExitCode {
         eprintln!("quietcut: a fault in quietcut itself, please report it: {fault}");
     }));
     // clap ends the process itself: exit status 2 for wrong usage, 0 for help.
-    let cli = Cli::parse();
+    let cli = Cli::try_parse().unwrap_or_else(|error| {
+        let given: Vec<String> = std::env::args().collect();
+        match dashed_value(&given).filter(|_| error.kind() == ErrorKind::UnknownArgument) {
+            Some(tip) => {
+                eprintln!("error: {tip}");
+                std::process::exit(2);
+            }
+            None => error.exit(),
+        }
+    });
     log_to_stderr(cli.verbose);
     if let Err(error) = leave_nothing_half_written(&cli.verb) {
         tracing::warn!("Ctrl-C may leave a half-written file aside: {error}");
@@ -101,6 +115,25 @@ pub fn main() -> ExitCode {
         // The panic hook has already printed the message of the panic.
         Err(_) => ExitCode::from(1),
     }
+}
+
+/// Message for the first value of an option that begins with a dash, such as `--rpm -900:1200:7`, which the parser takes for an option.
+fn dashed_value(given: &[String]) -> Option<String> {
+    let is_value = |text: &str| {
+        let mut letters = text.chars();
+        letters.next() == Some('-')
+            && letters
+                .next()
+                .is_some_and(|next| next.is_ascii_digit() || next == '.')
+    };
+    let pair = given
+        .windows(2)
+        .find(|pair| pair[0].starts_with("--") && !pair[0].contains('=') && is_value(&pair[1]))?;
+    Some(format!(
+        "{option} {value}: a value that begins with a dash is written behind an equals sign: {option}={value}",
+        option = pair[0],
+        value = pair[1]
+    ))
 }
 
 /// Exit status of the process after Ctrl-C, by the convention of shells: 128 plus the signal number 2.

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use quietcut_core::protocol::{Reports, Subscription};
 
 use super::port::PortArgs;
-use super::{Error, Output, positive};
+use super::{Error, StreamedOutput, positive};
 use crate::device::{Client, Event};
 use crate::report::answer::VerdictLog;
 use crate::report::words;
@@ -22,7 +22,7 @@ pub struct Args {
     #[arg(long, value_name = "T", value_parser = positive, allow_negative_numbers = true)]
     seconds: Option<f64>,
     #[command(flatten)]
-    output: Output,
+    output: StreamedOutput,
 }
 
 /// Time between two printed lines while the verdict of the device does not change: a choice, short enough to show that
@@ -57,25 +57,27 @@ pub fn run(args: Args) -> Result<(), Error> {
             client.lost_frames()
         );
     }
-    args.output.answer(&log, &log.summary)
+    args.output.end(&[], &log, &log.summary)
 }
 
 /// Prints each report of the device whose verdict or advice differs from the previous one, and the unchanged state
 /// every [`UNCHANGED_LINE_PERIOD`], until `is_over` returns true.
-fn listen(client: &mut Client, output: Output, is_over: impl Fn() -> bool) -> Result<VerdictLog, Error> {
+fn listen(
+    client: &mut Client,
+    output: StreamedOutput,
+    is_over: impl Fn() -> bool,
+) -> Result<VerdictLog, Error> {
     let mut log = VerdictLog::default();
     let mut printed = Instant::now();
     while !is_over() {
         let Some(Event::Report(report)) = client.next_event(EVENT_TIMEOUT)? else {
             continue;
         };
-        let is_change = log.take(&report).is_some();
-        if is_change || printed.elapsed() >= UNCHANGED_LINE_PERIOD {
-            output.line(if is_change {
-                words::line(&report)
-            } else {
-                words::state(&report)
-            })?;
+        if let Some(change) = log.take(&report) {
+            output.event(change, words::line(&report))?;
+            printed = Instant::now();
+        } else if printed.elapsed() >= UNCHANGED_LINE_PERIOD {
+            output.line(words::state(&report))?;
             printed = Instant::now();
         }
     }

@@ -2,7 +2,7 @@
 
 use std::fmt::Display;
 use std::io::{self, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
@@ -24,6 +24,42 @@ pub(super) fn keep_inputs<'a>(inputs: impl IntoIterator<Item = &'a Path>, out: &
             input.display()
         ))),
         None => Ok(()),
+    }
+}
+
+/// Endings that an output file may have; they set its format.
+#[derive(Clone, Copy, Debug)]
+pub struct Endings(pub &'static [&'static str]);
+
+impl Endings {
+    /// Parser of the path of an output file, for clap.
+    pub fn parser(self) -> impl Fn(&str) -> Result<PathBuf, String> + Clone + Send + Sync {
+        move |text| self.checked(text)
+    }
+
+    /// The path, if it has one of the endings.
+    ///
+    /// # Errors
+    /// Another ending; the message states the allowed ones and a name that would be right.
+    pub fn checked(self, text: &str) -> Result<PathBuf, String> {
+        let path = PathBuf::from(text);
+        let ending = crate::file::ending(&path);
+        if self.0.contains(&ending.as_str()) {
+            return Ok(path);
+        }
+        let listed = match self.0 {
+            [one] => format!(".{one}"),
+            [others @ .., last] => {
+                let others: Vec<String> = others.iter().map(|ending| format!(".{ending}")).collect();
+                format!("{} or .{last}", others.join(", "))
+            }
+            [] => String::new(),
+        };
+        let right = path.with_extension(self.0.first().copied().unwrap_or_default());
+        Err(format!(
+            "the ending of the file sets its format: {listed} is needed, such as {}",
+            right.display()
+        ))
     }
 }
 
@@ -64,6 +100,64 @@ impl Output {
             self.answer(&WithUnderstood { object, understood }, text)
         }
     }
+}
+
+/// Output format of a verb that goes on: text, one JSON object at the end, or one JSON object a line.
+#[derive(Clone, Copy, Debug, Default, clap::Args)]
+pub struct StreamedOutput {
+    #[command(flatten)]
+    output: Output,
+    /// Print one JSON object a line: every change of verdict or advice when it happens, and the summary at the end.
+    #[arg(long, conflicts_with = "json")]
+    json_lines: bool,
+}
+
+impl StreamedOutput {
+    /// Prints what has just happened: the JSON of `object` with `--json-lines`, nothing with `--json`, else `text`.
+    pub fn event(self, object: &impl Serialize, text: impl Display) -> Result<(), Error> {
+        if self.json_lines {
+            print(&serde_json::to_string(object).map_err(Error::other)?)
+        } else {
+            self.output.line(text)
+        }
+    }
+
+    /// Prints a line of text that has no JSON.
+    pub fn line(self, text: impl Display) -> Result<(), Error> {
+        if self.json_lines {
+            Ok(())
+        } else {
+            self.output.line(text)
+        }
+    }
+
+    /// Prints the end: with `--json-lines` an object with `summary` and, if a file had to be interpreted, `understood`; else as
+    /// [`Output::answer_with`].
+    pub(super) fn end(
+        self,
+        understood: &[Understood],
+        object: &impl Serialize,
+        summary: &(impl Serialize + Display),
+    ) -> Result<(), Error> {
+        if self.json_lines {
+            self.json_lines_end(understood, summary)
+        } else {
+            self.output.answer_with(understood, object, summary)
+        }
+    }
+
+    fn json_lines_end(self, understood: &[Understood], summary: &impl Serialize) -> Result<(), Error> {
+        let object = LastLine { summary, understood };
+        print(&serde_json::to_string(&object).map_err(Error::other)?)
+    }
+}
+
+/// Last line of `--json-lines`.
+#[derive(Serialize)]
+struct LastLine<'a, T> {
+    summary: &'a T,
+    #[serde(skip_serializing_if = "<[Understood]>::is_empty")]
+    understood: &'a [Understood],
 }
 
 /// The result of a verb, and how the files of its recordings were understood.

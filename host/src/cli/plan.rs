@@ -3,7 +3,7 @@
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-use super::{Error, Output, Range, positive, progress};
+use super::{Endings, Error, Output, Range, positive, progress};
 use crate::case::Case;
 use crate::file;
 use crate::plan::{Means, Plan, Prior, Request, Step, Test, WithoutDerivative, plan};
@@ -22,10 +22,11 @@ pub struct Args {
     /// The case file: structure, tool, material, cut.
     #[arg(value_name = "CASE")]
     case: PathBuf,
-    /// Spindle speeds in rev/min, first:last:count.
+    /// Spindle speeds in rev/min, first:last:count or first:last (61 speeds).
     #[arg(long, value_name = "R", value_parser = Range::positive)]
     rpm: Range,
-    /// Axial depths in mm, first:last:count. Limits are searched from depth 0 to the last, in steps no wider than these.
+    /// Axial depths in mm, first:last:count or first:last (61 depths). Limits are searched from depth 0 to the last, in steps no
+    /// wider than these.
     #[arg(long, value_name = "R", value_parser = Range::non_negative)]
     depth_mm: Range,
     /// Required width of the 90 % interval of every stability limit, in percent of the limit.
@@ -38,9 +39,9 @@ pub struct Args {
     assumed: Assumed,
     #[command(flatten)]
     tests: Tests,
-    /// Chart or page to write; the ending sets the format: svg or html.
-    #[arg(long, value_name = "FILE")]
-    out: Option<PathBuf>,
+    /// Chart or page to write; the ending sets the format: svg or html. May be repeated.
+    #[arg(long, value_name = "FILE", value_parser = Endings(&["svg", "html"]).parser())]
+    out: Vec<PathBuf>,
     #[command(flatten)]
     output: Output,
 }
@@ -110,11 +111,11 @@ pub fn run(args: Args) -> Result<(), Error> {
     for warning in derivative_warnings(&found.without_derivative) {
         tracing::warn!("{}: {warning}", args.case.display());
     }
-    if let Some(path) = &args.out {
+    for path in &args.out {
         write(&case, &found, request.depth_mm, path)?;
     }
     let mut output_text = text(&found);
-    if let Some(path) = &args.out {
+    for path in &args.out {
         let _ = write!(output_text, "\n{}", path.display());
     }
     args.output.answer(&found, output_text)

@@ -1,6 +1,6 @@
 //! The PORT argument, and the description of a device in outputs: lobe table, memory slots, working point.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use quietcut_core::protocol::{Info, Slot, TableSummary};
 use quietcut_core::working_point::WorkingPoint;
@@ -25,6 +25,11 @@ impl PortArgs {
     /// Name of the device's port, as given on the command line.
     pub fn name(&self) -> &str {
         &self.port
+    }
+
+    /// File that holds the memory of the simulated device, if it is given.
+    pub(super) fn state(&self) -> Option<&Path> {
+        self.state.as_deref()
     }
 
     /// Opens the port and starts the protocol with the device.

@@ -1,10 +1,10 @@
-//! Ranges of evenly spaced values on the command line, written `first:last:count`.
+//! Ranges on the command line: evenly spaced values `first:last:count` or `first:last`, and bands `first:last`.
 
 use std::str::FromStr;
 
 use super::number::finite;
 
-/// Evenly spaced values from `first` to `last`, both included; written `first:last:count`, or one number alone.
+/// Evenly spaced values from `first` to `last`, both included; written `first:last:count`, `first:last`, or one number alone.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Range {
     first: f64,
@@ -16,6 +16,9 @@ impl Range {
     /// Upper bound of the number of values in a range, a choice: more values than a chart can show indicate a typing
     /// error.
     const MAX_COUNT: usize = 1_000_000;
+
+    /// Number of values of `first:last` without a count. A choice: steps of a sixtieth are fine in a chart.
+    pub const DEFAULT_COUNT: usize = 61;
 
     /// First value of the range.
     pub fn first(&self) -> f64 {
@@ -80,47 +83,89 @@ impl Range {
     }
 }
 
+/// Form of a range, for messages.
+const FORM: &str = "first:last or first:last:count, such as 600:2400 or 600:2400:91";
+
+/// Numbers of a range as it is written: first, last and count. Commas in place of colons are read too.
+fn parts(text: &str) -> Result<(f64, Option<f64>, Option<usize>), String> {
+    let separator = if text.contains(':') { ':' } else { ',' };
+    let parts: Vec<&str> = text.split(separator).map(str::trim).collect();
+    let number = |part: &str| {
+        finite(part).map_err(|_| {
+            let meant = meant(text).map_or_else(String::new, |meant| format!("; write {meant}"));
+            format!("`{text}` is not a number and not of the form {FORM}{meant}")
+        })
+    };
+    match parts[..] {
+        [one] => Ok((number(one)?, None, None)),
+        [first, last] => Ok((number(first)?, Some(number(last)?), None)),
+        [first, last, count] => {
+            let (first, last) = (number(first)?, number(last)?);
+            let count = count
+                .parse()
+                .ok()
+                .filter(|count| (1..=Range::MAX_COUNT).contains(count))
+                .ok_or_else(|| {
+                    format!(
+                        "`{text}`: the count `{count}` is not a whole number from 1 to {}; {FORM}",
+                        Range::MAX_COUNT
+                    )
+                })?;
+            Ok((first, Some(last), Some(count)))
+        }
+        _ => Err(format!("`{text}` is not of the form {FORM}")),
+    }
+}
+
+/// The range that was probably meant by `600-2400`, `600..2400` or `600 2400`.
+fn meant(text: &str) -> Option<String> {
+    ["..", "-", " ", ";", "/"].into_iter().find_map(|separator| {
+        let ends: Vec<&str> = text
+            .split(separator)
+            .map(str::trim)
+            .filter(|end| !end.is_empty())
+            .collect();
+        let are_numbers = ends.iter().all(|end| finite(end).is_ok());
+        (matches!(ends.len(), 2 | 3) && are_numbers).then(|| ends.join(":"))
+    })
+}
+
+/// Parses both ends of a band, `first:last` in ascending order; `first,last` is read too.
+pub(super) fn ends(text: &str) -> Result<[f64; 2], String> {
+    let example = "two numbers first:last in ascending order are needed, such as 10:30";
+    match parts(text).map_err(|_| {
+        let meant = meant(text).map_or_else(String::new, |meant| format!("; write {meant}"));
+        format!("`{text}`: {example}{meant}")
+    })? {
+        (first, Some(last), None) if first < last => Ok([first, last]),
+        (_, _, Some(_)) => Err(format!("`{text}`: a band has no count; {example}")),
+        _ => Err(format!("`{text}`: {example}")),
+    }
+}
+
+/// Parses both ends of a band of numbers of 0 or more.
+pub(super) fn non_negative_ends(text: &str) -> Result<[f64; 2], String> {
+    let [first, last] = ends(text)?;
+    if first >= 0.0 {
+        Ok([first, last])
+    } else {
+        Err(format!("`{text}` is not possible: no value may be below 0"))
+    }
+}
+
 impl FromStr for Range {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let parts: Vec<&str> = text.split(':').collect();
-        match parts[..] {
-            [one] => {
-                let value = finite(one).map_err(|_| {
-                    format!(
-                        "`{text}` is neither a number nor of the form first:last:count, such as 600:2400:91"
-                    )
-                })?;
-                Ok(Self {
-                    first: value,
-                    last: value,
-                    count: 1,
-                })
-            }
-            [first, last, count] => {
-                let (first, last) = (finite(first)?, finite(last)?);
-                let count = count
-                    .parse()
-                    .ok()
-                    .filter(|count| (1..=Self::MAX_COUNT).contains(count))
-                    .ok_or_else(|| {
-                        format!(
-                            "the count `{count}` is not a whole number from 1 to {}",
-                            Self::MAX_COUNT
-                        )
-                    })?;
-                if (count == 1) != (first == last) {
-                    return Err(format!(
-                        "`{text}`: {count} value(s) cannot go from {first} to {last}; first:last:count, such as 600:2400:91"
-                    ));
-                }
-                Ok(Self { first, last, count })
-            }
-            _ => Err(format!(
-                "`{text}` is not of the form first:last:count, such as 600:2400:91"
-            )),
+        let (first, last, count) = parts(text)?;
+        let last = last.unwrap_or(first);
+        let count = count.unwrap_or(if first == last { 1 } else { Self::DEFAULT_COUNT });
+        if (count == 1) != (first == last) {
+            return Err(format!(
+                "`{text}`: {count} value(s) cannot go from {first} to {last}; first:last:count, such as 600:2400:91"
+            ));
         }
+        Ok(Self { first, last, count })
     }
 }
 
@@ -151,11 +196,39 @@ mod tests {
     #[test]
     fn invalid_ranges_are_refused() {
         for text in [
-            "", "1:2", "1:2:0", "1:2:-3", "1:2:1", "1:1:2", "a:2:3", "1:2:3:4", "1:2:2.5",
+            "", "1:2:0", "1:2:-3", "1:2:1", "1:1:2", "a:2:3", "1:2:3:4", "1:2:2.5",
         ] {
             assert!(text.parse::<Range>().is_err(), "{text}");
         }
         assert!(Range::positive("0:2:3").is_err());
         assert!(Range::positive("1:2:3").is_ok());
+    }
+
+    #[test]
+    fn one_form_serves_ranges_and_bands() {
+        let range = |text: &str| {
+            text.parse::<Range>()
+                .map(|range| (range.first, range.last, range.count))
+        };
+        assert_eq!(range("10:30"), Ok((10.0, 30.0, Range::DEFAULT_COUNT)));
+        assert_eq!(range("10,30,5"), range("10:30:5"));
+        assert_eq!(
+            (ends("10:30"), ends("10,30")),
+            (Ok([10.0, 30.0]), Ok([10.0, 30.0]))
+        );
+        for (text, words) in [
+            ("700-2000", "write 700:2000"),
+            ("700..2000", "write 700:2000"),
+            ("fast", "not a number"),
+            ("10:30:5:1", "first:last:count"),
+        ] {
+            let said = range(text).unwrap_err();
+            assert!(said.contains(words) && said.contains("600:2400:91"), "{said}");
+        }
+        for text in ["10", "30:10", "10:30:5", "10:10", "low:high"] {
+            assert!(ends(text).unwrap_err().contains("10:30"), "{text}");
+        }
+        assert!(ends("10-30").unwrap_err().contains("write 10:30"));
+        assert!(non_negative_ends("-1:3").is_err());
     }
 }

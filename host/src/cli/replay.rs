@@ -10,9 +10,9 @@ use quietcut_core::protocol::{Reports, Subscription};
 use quietcut_core::units::Degrees;
 
 use super::segment::RecordedSegment;
-use super::{Error, Output, angle, count, positive};
+use super::{Error, StreamedOutput, angle, count, positive};
 use crate::device::{self, Client, Event};
-use crate::recording::{RecordingError, Sensed, SpindleSettings};
+use crate::recording::{RecordingError, Sensed, Sidecar, SpindleSettings};
 use crate::report::answer::VerdictLog;
 use crate::report::words;
 
@@ -34,7 +34,7 @@ pub struct Args {
     /// Spindle speed in rev/min; overrides the speed of the recording, and a recorded tachometer is then ignored.
     #[arg(long, value_name = "N", value_parser = positive, allow_negative_numbers = true)]
     rpm: Option<f64>,
-    /// Number of teeth, if the recording does not state it.
+    /// Number of teeth, if the recording does not state it. Another number than that of the sidecar is refused.
     #[arg(long, value_name = "N", value_parser = count, allow_negative_numbers = true)]
     teeth: Option<NonZeroU8>,
     /// Feed direction in degrees from the machine's x towards its y, for lobe tables with layers of several directions.
@@ -43,7 +43,7 @@ pub struct Args {
     #[command(flatten)]
     segment: RecordedSegment,
     #[command(flatten)]
-    output: Output,
+    output: StreamedOutput,
 }
 
 impl Args {
@@ -62,6 +62,15 @@ pub fn run(args: Args) -> Result<(), Error> {
             recorded.recordings.len()
         )));
     };
+    let stated = recording.sidecar.cut.and_then(|cut| cut.teeth);
+    if let (Some(teeth), Some(stated)) = (args.teeth, stated)
+        && u32::from(teeth.get()) != stated
+    {
+        return Err(Error::input(format!(
+            "--teeth {teeth}: {} states cut.teeth = {stated}; leave --teeth out, or correct the sidecar",
+            Sidecar::path_of(&args.recording).display()
+        )));
+    }
     let speed = SpindleSettings {
         rpm: args.rpm,
         teeth: args.teeth.map(NonZeroU8::get),
@@ -86,8 +95,7 @@ pub fn run(args: Args) -> Result<(), Error> {
         Some(port) => on_device(&args, port, &sensed, table.as_deref())?,
         None => on_host(&args, &sensed, table.as_deref())?,
     };
-    args.output
-        .answer_with(&recorded.understood, &log, format_args!("{}", log.summary))
+    args.output.end(&recorded.understood, &log, &log.summary)
 }
 
 /// Runs the signal chain of the device on a recording, on this computer.
@@ -112,8 +120,8 @@ fn on_host(args: &Args, sensed: &Sensed, table: Option<&[u8]>) -> Result<Verdict
             table.as_ref(),
             sensed.working_point.as_ref(),
         );
-        if log.take(&report).is_some() {
-            args.output.line(words::line(&report))?;
+        if let Some(change) = log.take(&report) {
+            args.output.event(change, words::line(&report))?;
         }
     }
     Ok(log)
@@ -169,9 +177,9 @@ fn feed_recording(args: &Args, client: &mut Client, sensed: &Sensed) -> Result<V
             }
         }
         if let Some(report) = last
-            && log.take(&report).is_some()
+            && let Some(change) = log.take(&report)
         {
-            args.output.line(words::line(&report))?;
+            args.output.event(change, words::line(&report))?;
         }
     }
     Ok(log)

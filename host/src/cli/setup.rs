@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
+use super::range::non_negative_ends;
 use super::{Error, Output, angle, count, finite, positive};
 use crate::case::Case;
 use crate::file;
@@ -93,8 +94,8 @@ struct Given {
     /// Feed per tooth in mm.
     #[arg(long, value_name = "F", value_parser = positive)]
     feed_per_tooth_mm: Option<f64>,
-    /// Lowest and highest spindle speed in rev/min, LOW:HIGH. Advice stays between them.
-    #[arg(long, value_name = "LOW:HIGH")]
+    /// Lowest and highest spindle speed in rev/min, FIRST:LAST. Advice stays between them.
+    #[arg(long, value_name = "FIRST:LAST")]
     rpm: Option<String>,
     /// Power of the spindle in W.
     #[arg(long, value_name = "W", value_parser = positive)]
@@ -318,7 +319,7 @@ impl Given {
             (
                 self.rpm.is_none(),
                 "--rpm",
-                "Lowest and highest spindle speed in rev/min, LOW:HIGH",
+                "Lowest and highest spindle speed in rev/min, FIRST:LAST",
             ),
         ];
         all.into_iter()
@@ -420,17 +421,15 @@ fn material_of(name: &str) -> Result<MaterialAnswer, String> {
     ))
 }
 
-/// Parses LOW:HIGH, rev/min.
+/// Parses `first:last`, rev/min.
 fn speeds(text: &str) -> Result<(f64, f64), Error> {
     let wrong = || {
         Error::input(format!(
-            "--rpm {text}: two speeds LOW:HIGH in rev/min are needed, such as 600:12000"
+            "--rpm {text}: two speeds first:last in rev/min are needed, the lower first, such as 600:12000"
         ))
     };
-    let (low, high) = text.split_once(':').ok_or_else(wrong)?;
-    let (low, high) = (
-        positive(low).map_err(|_| wrong())?,
-        positive(high).map_err(|_| wrong())?,
-    );
-    if low < high { Ok((low, high)) } else { Err(wrong()) }
+    match non_negative_ends(text) {
+        Ok([low, high]) if low > 0.0 => Ok((low, high)),
+        _ => Err(wrong()),
+    }
 }

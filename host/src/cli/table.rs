@@ -7,7 +7,7 @@ use quietcut_core::lobes::{IntervalKind, IntervalSlopes, LobeTable};
 use serde::Serialize;
 
 use super::method::case_after;
-use super::{Error, Output, Range};
+use super::{Endings, Error, Output, Range};
 use crate::case::Case;
 use crate::file;
 use crate::lobe_table::{TableRequest, build_table};
@@ -22,9 +22,9 @@ pub struct Args {
     #[arg(value_name = "CASE", required_unless_present = "show", requires = "out")]
     cases: Vec<PathBuf>,
     /// Lobe table to write.
-    #[arg(long, value_name = "FILE.qct", requires = "cases")]
+    #[arg(long, value_name = "FILE.qct", value_parser = Endings(&["qct"]).parser(), requires = "cases")]
     out: Option<PathBuf>,
-    /// Spindle speeds in rev/min, first:last:count. Only the ends are used; the speeds between them are chosen adaptively.
+    /// Spindle speeds in rev/min, first:last or first:last:count. Only the ends are used; the speeds between them are chosen adaptively.
     /// Default: the speed limits of the machine, else the range of the lobes.
     #[arg(long, value_name = "R", value_parser = Range::positive, requires = "cases")]
     rpm: Option<Range>,

@@ -1,11 +1,13 @@
 //! `quietcut working-point`: sets the working point of the cut on the device.
 
+use std::path::PathBuf;
+
 use quietcut_core::units::{Degrees, Millimeters};
 use quietcut_core::working_point::WorkingPoint;
 use serde::Serialize;
 
 use super::port::{PortArgs, WorkingPointAnswer, feed_direction_text};
-use super::{Error, Output, angle, positive};
+use super::{Error, Output, angle, positive, postures};
 use crate::report::answer::number;
 
 /// Sets the working point of the cut on the device; without it, advice states the working point that it assumes.
@@ -34,6 +36,10 @@ pub struct Args {
     /// Posture of the robot: index of the posture in the lobe table.
     #[arg(long, value_name = "N", default_value_t = 0)]
     posture: u8,
+    /// The lobe table on the device: the posture must be one of its postures. Default: the table in the file of --state. A
+    /// device does not send its table back.
+    #[arg(long, value_name = "FILE.qct")]
+    table: Option<PathBuf>,
     #[command(flatten)]
     output: Output,
 }
@@ -61,7 +67,23 @@ pub fn run(args: Args) -> Result<(), Error> {
         feed_per_tooth: Millimeters(args.feed as f32),
         posture: args.posture,
     };
-    let (mut client, _) = args.port.connect()?;
+    let table = args.table.as_deref().map(crate::file::read).transpose()?;
+    let known = match (&table, &args.table) {
+        (Some(bytes), Some(path)) => Some(postures::of_table(path, bytes)?),
+        _ => args.port.state().and_then(postures::of_state),
+    };
+    postures::check(args.posture, known.as_deref())?;
+    let (mut client, info) = args.port.connect()?;
+    if known.is_none() && args.posture > 0 {
+        match &info.table {
+            Some(table) => tracing::warn!(
+                "--posture {}: whether the lobe table on the device ({} layers) has this posture cannot be asked; give --table FILE.qct to check it",
+                args.posture,
+                table.layers
+            ),
+            None => tracing::warn!("--posture {}: there is no lobe table on the device", args.posture),
+        }
+    }
     client.set_working_point(Some(point))?;
     // The working point is read back from the device, so that the output states the one that the device uses.
     let point = client.status()?.working_point;

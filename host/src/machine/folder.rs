@@ -5,7 +5,11 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
+use quietcut_core::lobes::LobeTable;
+
 use crate::case::{Case, CaseError};
+use crate::frf::FrfTable;
+use crate::recording::{Import, Recording, cut_table};
 
 /// File name extensions of recordings.
 const RECORDINGS: [&str; 10] = [
@@ -75,13 +79,69 @@ pub struct MachineFolder {
     pub extended: Option<DatedFile>,
     /// `diagnosis/report.html`, the report of `diagnose`.
     pub diagnosis: Option<DatedFile>,
+    /// Files that cannot be read, each with the reason.
+    pub broken: Vec<BrokenFile>,
+}
+
+/// A file of the folder that cannot be read.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct BrokenFile {
+    /// Kind of the file.
+    pub kind: FileKind,
+    /// Path, with the folder of the machine as the user gave it.
+    pub path: PathBuf,
+    /// Message of the reader; it names the file.
+    pub reason: String,
+}
+
+/// Kinds of files whose content is checked.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FileKind {
+    /// Recording of taps or of a cut.
+    Recording,
+    /// Table of receptances.
+    Receptances,
+    /// Table of tried cuts.
+    TriedCuts,
+    /// Lobe table of the device.
+    LobeTable,
+}
+
+/// Reads every file and keeps those that cannot be read.
+fn broken<'a>(files: impl Iterator<Item = (FileKind, &'a DatedFile)>) -> Vec<BrokenFile> {
+    files
+        .filter_map(|(kind, DatedFile { path, .. })| {
+            let read = match kind {
+                FileKind::Recording => Recording::import_all(path, &Import::default())
+                    .map(drop)
+                    .map_err(|error| error.to_string()),
+                FileKind::Receptances => FrfTable::import(path, &Import::default())
+                    .map(drop)
+                    .map_err(|error| error.to_string()),
+                FileKind::TriedCuts => cut_table::read(path).map(drop).map_err(|error| error.to_string()),
+                FileKind::LobeTable => crate::file::read(path)
+                    .map_err(|error| error.to_string())
+                    .and_then(|bytes| {
+                        LobeTable::parse(&bytes)
+                            .map(drop)
+                            .map_err(|error| format!("{}: this is no lobe table: {error}", path.display()))
+                    }),
+            };
+            Some(BrokenFile {
+                kind,
+                path: path.clone(),
+                reason: read.err()?,
+            })
+        })
+        .collect()
 }
 
 impl MachineFolder {
     /// Lists the files in the folder of a machine and reads its case.
     ///
     /// # Errors
-    /// The folder cannot be read, or `case.toml` is wrong.
+    /// The folder cannot be read, or `case.toml` is wrong. A recording or table that cannot be read is no error: see
+    /// [`MachineFolder::broken`].
     pub fn read(path: &Path) -> Result<Self, FolderError> {
         if path.is_file() {
             return Err(FolderError::File { path: path.into() });
@@ -102,7 +162,7 @@ impl MachineFolder {
             }
             None => None,
         };
-        Ok(Self {
+        let mut folder = Self {
             path: path.to_path_buf(),
             case,
             taps: list("taps", &RECORDINGS)?,
@@ -113,7 +173,22 @@ impl MachineFolder {
             table: dated(path.join("table.qct")),
             extended: dated(path.join("diagnosis/extended.toml")),
             diagnosis: dated(path.join("diagnosis/report.html")),
-        })
+            broken: Vec::new(),
+        };
+        let recordings = folder.taps.iter().chain(&folder.cuts);
+        folder.broken = broken(
+            recordings
+                .map(|file| (FileKind::Recording, file))
+                .chain(
+                    folder
+                        .receptances
+                        .iter()
+                        .map(|file| (FileKind::Receptances, file)),
+                )
+                .chain(folder.tried.iter().map(|file| (FileKind::TriedCuts, file)))
+                .chain(folder.table.iter().map(|file| (FileKind::LobeTable, file))),
+        );
+        Ok(folder)
     }
 }
 

@@ -6,6 +6,6 @@ mod material_table;
 mod next_step;
 
 pub use case_text::{Answers, Immersion, MaterialAnswer, case_text};
-pub use folder::{FolderError, MachineFolder};
+pub use folder::{BrokenFile, FileKind, FolderError, MachineFolder};
 pub use material_table::{MaterialRange, RANGES};
 pub use next_step::{NextStep, next_step};

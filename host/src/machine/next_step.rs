@@ -5,7 +5,7 @@ use std::time::SystemTime;
 
 use serde::Serialize;
 
-use super::folder::{DatedFile, MachineFolder};
+use super::folder::{BrokenFile, DatedFile, FileKind, MachineFolder};
 
 /// Next useful command for a machine, with its reason.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -41,6 +41,24 @@ pub fn next_step(folder: &MachineFolder) -> NextStep {
             "a case file says which machine, tool, material and cut this is; everything else needs it",
         );
     };
+    if let Some(BrokenFile { kind, path, reason }) = folder.broken.first() {
+        let file = quoted(path);
+        let (command, what) = match kind {
+            FileKind::Recording | FileKind::Receptances => (
+                format!("quietcut look {file}"),
+                "the command shows how the file is understood; mend the file as its message says, or remove it",
+            ),
+            FileKind::TriedCuts => (
+                format!("quietcut lobes {case} {} --cuts {file}", ranges(folder)),
+                "mend the table as the message says; the command then counts the cuts that are predicted wrong",
+            ),
+            FileKind::LobeTable => (
+                format!("quietcut table {case} --out {file}"),
+                "the command builds the table anew",
+            ),
+        };
+        return step(command, &format!("a file cannot be read: {reason}; {what}"));
+    }
     let newest = |files: &[DatedFile]| files.iter().map(|file| file.changed).max();
     let (taps, receptances) = (newest(&folder.taps), newest(&folder.receptances));
     if taps > receptances {
@@ -215,7 +233,16 @@ fn state(folder: &MachineFolder) -> Vec<String> {
             )
         }
     };
-    vec![
+    let broken = folder.broken.iter().map(|file| {
+        format!(
+            "{} cannot be read",
+            file.path
+                .strip_prefix(&folder.path)
+                .unwrap_or(&file.path)
+                .display()
+        )
+    });
+    let mut state = vec![
         case,
         count(&folder.taps, "recordings in taps/"),
         count(&folder.receptances, "tables in frf/"),
@@ -224,7 +251,9 @@ fn state(folder: &MachineFolder) -> Vec<String> {
         count(&folder.cuts, "recordings in cuts/"),
         has(&folder.tried, "table of tried cuts (tried.csv)"),
         has(&folder.diagnosis, "diagnosis (diagnosis/report.html)"),
-    ]
+    ];
+    state.extend(broken);
+    state
 }
 
 fn list(files: &[DatedFile]) -> String {

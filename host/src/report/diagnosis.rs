@@ -3,6 +3,7 @@
 use maud::{Markup, html};
 
 use super::PictureError;
+use super::digits::significant;
 use super::lobes_change::{picture, section, trial_cut_counts};
 use super::page::page;
 use super::residual_pictures::{file_name, pictures};
@@ -110,7 +111,7 @@ fn prediction_error_table(diagnosis: &Diagnosis) -> Markup {
                 tr {
                     td { (file_name(&view.record)) }
                     td { (view.channel) }
-                    td { (format!("{measured:.3e} {}", view.unit)) }
+                    td { (format!("{} {}", significant(measured, 4), view.unit)) }
                     td { (percent(residual / measured.max(f64::MIN_POSITIVE))) }
                     td { @if view.left.is_empty() { "–" } @else { (percent(left / measured.max(f64::MIN_POSITIVE))) } }
                     td { (percent(view.deviation / measured.max(f64::MIN_POSITIVE))) }

@@ -25,7 +25,7 @@ pub fn sentences(lobes: &Lobes) -> Vec<String> {
     }
     if let Some(calls) = lobes.calls {
         all.push(format!(
-            "of {} trial cuts the case predicts {} wrong ({} missed chatter, {} false alarms), the extended case {} ({} and {})",
+            "of {} cuts, tried and recorded, the case predicts {} wrong ({} missed chatter, {} false alarms), the extended case {} ({} and {})",
             calls.before.cuts,
             calls.before.wrong,
             calls.before.missed_chatter,
@@ -107,7 +107,7 @@ fn limit(
 pub fn trial_cut_counts(chart: &Chart) -> String {
     let calls = chart.calls();
     format!(
-        "of {} trial cuts the case predicts {} wrong ({} missed chatter, {} false alarms); {} are undecided",
+        "of {} cuts, tried and recorded, the case predicts {} wrong ({} missed chatter, {} false alarms); {} are undecided",
         calls.cuts, calls.wrong, calls.missed_chatter, calls.false_alarms, calls.undecided
     )
 }

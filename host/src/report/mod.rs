@@ -4,6 +4,7 @@ pub mod answer;
 pub mod cell_map;
 pub mod comparison;
 pub mod diagnosis;
+pub mod digits;
 pub mod frf_chart;
 pub mod lobe_chart;
 pub mod lobes_change;

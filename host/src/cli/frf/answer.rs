@@ -8,6 +8,7 @@ use serde::Serialize;
 use super::args::{Args, Method};
 use crate::frf::{FrfTable, Measurement, ModeRatio, RecordingGroup};
 use crate::identify::student::NINETY_PERCENT;
+use crate::report::digits::significant;
 
 /// Output of `quietcut frf --json`.
 #[derive(Serialize)]
@@ -120,13 +121,18 @@ impl FrfOutput {
             // Writing to a String cannot fail.
             let _ = write!(
                 text,
-                "\nH{}: {:.4} µm/N at {:.3} Hz",
+                "\nH{}: {} µm/N at {} Hz",
                 receptance.name,
-                1e6 * value,
-                receptance.peak_hz
+                significant(1e6 * value, 5),
+                significant(receptance.peak_hz, 5)
             );
             let _ = match ci90 {
-                Some([from, to]) => write!(text, ", 90 % interval {:.4} to {:.4}", 1e6 * from, 1e6 * to),
+                Some([from, to]) => write!(
+                    text,
+                    ", 90 % interval {} to {}",
+                    significant(1e6 * from, 5),
+                    significant(1e6 * to, 5)
+                ),
                 None => write!(text, ", no interval from so few impacts"),
             };
             if let Some(coherence) = &receptance.coherence {

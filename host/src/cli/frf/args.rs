@@ -2,8 +2,9 @@
 
 use std::path::PathBuf;
 
+use crate::cli::range::non_negative_ends;
 use crate::cli::segment::RecordedSegment;
-use crate::cli::{Output, finite, positive};
+use crate::cli::{Endings, Output, finite, positive};
 use crate::file;
 use crate::frf::{Estimator, Excitation, HammerWindows, MeasurementSettings, Window};
 
@@ -30,8 +31,8 @@ pub struct Args {
     #[arg(long, value_enum)]
     pub(super) excitation: Option<ExcitationKind>,
     /// First and last frequency of the estimated receptances, in Hz.
-    #[arg(long, value_name = "FIRST:LAST", value_parser = band)]
-    pub(super) band_hz: Option<(f64, f64)>,
+    #[arg(long, value_name = "FIRST:LAST", value_parser = non_negative_ends)]
+    pub(super) band_hz: Option<[f64; 2]>,
     /// Distance between the frequency lines of the receptances, in Hz. Default: for each force, that of eight segments
     /// of a record of random excitation, or of eight averaged lines of a sweep.
     #[arg(long, value_name = "D", value_parser = positive, allow_negative_numbers = true)]
@@ -109,33 +110,14 @@ pub(super) enum FileFormat {
 
 impl OutputFile {
     fn parse(text: &str) -> Result<Self, String> {
-        let path = PathBuf::from(text);
-        let ending = file::ending(&path);
-        let format = match ending.as_str() {
-            "csv" => FileFormat::Csv,
+        let path = Endings(&["csv", "uff", "unv", "svg", "html"]).checked(text)?;
+        let format = match file::ending(&path).as_str() {
             "uff" | "unv" => FileFormat::Uff,
             "svg" => FileFormat::Svg,
             "html" => FileFormat::Html,
-            _ => {
-                return Err(format!(
-                    "`{text}` ends in \"{ending}\"; csv, uff, svg or html is needed"
-                ));
-            }
+            _ => FileFormat::Csv,
         };
         Ok(Self { path, format })
-    }
-}
-
-fn band(text: &str) -> Result<(f64, f64), String> {
-    let wrong = || format!("`{text}` is no band; two frequencies are needed, such as 10:30");
-    let (first, last) = text.split_once(':').ok_or_else(wrong)?;
-    let (first, last) = (finite(first)?, finite(last)?);
-    if 0.0 <= first && first < last {
-        Ok((first, last))
-    } else {
-        Err(format!(
-            "`{text}` is not possible: the first frequency must be 0 or more, and the last greater"
-        ))
     }
 }
 
@@ -170,7 +152,7 @@ impl Args {
                 WindowName::Hamming => Window::Hamming,
                 WindowName::Rectangular => Window::Rectangular,
             },
-            band_hz: self.band_hz,
+            band_hz: self.band_hz.map(|[first, last]| (first, last)),
             channels: self.channel.clone(),
             hammer: HammerWindows {
                 segment_s: None,

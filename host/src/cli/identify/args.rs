@@ -5,14 +5,15 @@ use std::path::PathBuf;
 use clap::ValueEnum;
 
 use super::mode_options::ModeOptions;
+use crate::cli::range::{ends, non_negative_ends};
 use crate::cli::segment::RecordedSegment;
-use crate::cli::{Error, Output, finite, non_negative, positive};
+use crate::cli::{Endings, Output, finite, non_negative, positive};
 use crate::identify::law::NonlinearTerm;
 
 /// Identifies structural or cutting parameters with 90 % intervals from recordings, and reports the misfit.
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Example:\n  quietcut simulate tests/cases/kuka-kr90-y17-low.toml --experiment step-sine --frequency-hz 16.6:17.9:14 --force-n 1.8,5.8,9.5 --dwell-s 30 --sample-rate-hz 128 --noise-percent 1 --out measured.csv\n  quietcut identify measured.csv --method harmonic-balance --out found.toml\n  quietcut identify measured.csv --method hfrf\n  quietcut identify measured.csv --method linearity\n  quietcut simulate tests/cases/kuka-kr90-acetal.toml --rpm 900 --depth-mm 1 --seconds 3 --out cut.csv\n  quietcut identify cut.csv --method force-coefficients --out material.toml\n  quietcut simulate tests/cases/six-joint-robot.toml --experiment hammer --direction x --force-n 800 --impacts 3 --spacing-s 6 --noise-percent 1 --out blows-x.csv\n  quietcut simulate tests/cases/six-joint-robot.toml --experiment hammer --direction y --force-n 800 --impacts 3 --spacing-s 6 --noise-percent 1 --out blows-y.csv\n  quietcut identify blows-x.csv blows-y.csv --method joints --start tests/cases/six-joint-robot.toml --band-hz 2,60 --out robot.toml\n  quietcut simulate tests/cases/kuka-kr90-acetal.toml --experiment hammer --direction x --force-n 300 --sample-rate-hz 512 --noise-percent 0.1 --out tap-x.csv\n  quietcut simulate tests/cases/kuka-kr90-acetal.toml --experiment hammer --direction y --force-n 300 --sample-rate-hz 512 --noise-percent 0.1 --out tap-y.csv\n  quietcut frf tap-x.csv tap-y.csv --band-hz 10:30 --out frf.csv\n  quietcut identify frf.csv --method modes --stabilization poles.svg --case tests/cases/kuka-kr90-acetal.toml --out modes.toml"
+    after_help = "Example:\n  quietcut simulate tests/cases/kuka-kr90-y17-low.toml --experiment step-sine --frequency-hz 16.6:17.9:14 --force-n 1.8,5.8,9.5 --dwell-s 30 --sample-rate-hz 128 --noise-percent 1 --out measured.csv\n  quietcut identify measured.csv --method harmonic-balance --out found.toml\n  quietcut identify measured.csv --method hfrf\n  quietcut identify measured.csv --method linearity\n  quietcut simulate tests/cases/kuka-kr90-acetal.toml --rpm 900 --depth-mm 1 --seconds 3 --out cut.csv\n  quietcut identify cut.csv --method force-coefficients --out material.toml\n  quietcut simulate tests/cases/six-joint-robot.toml --experiment hammer --direction x --force-n 800 --impacts 3 --spacing-s 6 --noise-percent 1 --out blows-x.csv\n  quietcut simulate tests/cases/six-joint-robot.toml --experiment hammer --direction y --force-n 800 --impacts 3 --spacing-s 6 --noise-percent 1 --out blows-y.csv\n  quietcut identify blows-x.csv blows-y.csv --method joints --start tests/cases/six-joint-robot.toml --band-hz 2:60 --out robot.toml\n  quietcut simulate tests/cases/kuka-kr90-acetal.toml --experiment hammer --direction x --force-n 300 --sample-rate-hz 512 --noise-percent 0.1 --out tap-x.csv\n  quietcut simulate tests/cases/kuka-kr90-acetal.toml --experiment hammer --direction y --force-n 300 --sample-rate-hz 512 --noise-percent 0.1 --out tap-y.csv\n  quietcut frf tap-x.csv tap-y.csv --band-hz 10:30 --out frf.csv\n  quietcut identify frf.csv --method modes --stabilization poles.svg --case tests/cases/kuka-kr90-acetal.toml --out modes.toml"
 )]
 pub struct Args {
     /// Recordings; for modes also a table of receptances; for inverse-stability a table of cuts with the columns
@@ -24,7 +25,7 @@ pub struct Args {
     #[arg(long, value_name = "NAME")]
     pub(super) method: Method,
     /// Case file to write.
-    #[arg(long, value_name = "CASE.toml")]
+    #[arg(long, value_name = "CASE.toml", value_parser = Endings(&["toml"]).parser())]
     pub(super) out: Option<PathBuf>,
     /// Nonlinear terms of the restoring force that harmonic-balance and joints identify.
     #[arg(
@@ -57,8 +58,8 @@ pub struct Args {
     pub(super) mass_kg: Option<f64>,
     /// Frequency band in Hz of restoring-force, joints, modes and output-only. output-only requires it; the default of
     /// restoring-force is the band where the motion exceeds its noise.
-    #[arg(long, value_name = "LOW,HIGH", value_delimiter = ',', num_args = 1, value_parser = non_negative)]
-    pub(super) band_hz: Vec<f64>,
+    #[arg(long, value_name = "FIRST:LAST", value_parser = non_negative_ends)]
+    pub(super) band_hz: Option<[f64; 2]>,
     /// Width of the slices of the restoring-force surface, as a fraction of the largest velocity or displacement.
     #[arg(long, value_name = "SHARE", default_value_t = 0.01, value_parser = positive, allow_negative_numbers = true)]
     pub(super) slice: f64,
@@ -90,8 +91,8 @@ pub struct Args {
     #[arg(long, value_name = "D", default_value_t = 0.0, value_parser = finite, allow_negative_numbers = true)]
     pub(super) feed_direction_deg: f64,
     /// For force-coefficients: start and end of full engagement, in s. Default: detected in the measured force.
-    #[arg(long, value_name = "FROM,TO", value_delimiter = ',', num_args = 1, value_parser = finite)]
-    pub(super) cut_s: Vec<f64>,
+    #[arg(long, value_name = "FIRST:LAST", value_parser = ends)]
+    pub(super) cut_s: Option<[f64; 2]>,
     /// Case whose tool, material, cut and limits are copied into the written case. Default: the case of --start.
     #[arg(long, value_name = "CASE", requires = "out")]
     pub(super) case: Option<PathBuf>,
@@ -142,15 +143,4 @@ pub(super) enum SurfaceTerm {
     CubicDamping,
     CoulombFriction,
     Offset,
-}
-
-/// Lower and upper frequency of the option `--band-hz`, Hz; `None` without the option.
-pub(super) fn band(args: &Args) -> Result<Option<[f64; 2]>, Error> {
-    match args.band_hz[..] {
-        [] => Ok(None),
-        [low, high] if low < high => Ok(Some([low, high])),
-        _ => Err(Error::input(
-            "--band-hz: two frequencies are needed, the lower first, as in 5,60",
-        )),
-    }
 }

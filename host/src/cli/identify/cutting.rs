@@ -12,15 +12,6 @@ use crate::recording::Recording;
 use crate::simulate::effect::EffectName;
 
 pub(super) fn force_coefficients(args: &Args, recordings: &[Recording]) -> Result<IdentifyOutput, Error> {
-    let full_cut_s = match args.cut_s[..] {
-        [] => None,
-        [from, to] if from < to => Some([from, to]),
-        _ => {
-            return Err(Error::input(
-                "--cut-s: two times are needed, the earlier first, as in 0.5,3",
-            ));
-        }
-    };
     if args.edge_angle_deg > 90.0 {
         return Err(Error::input(format!(
             "--edge-angle-deg {}: an angle above 0 and up to 90 is needed",
@@ -30,7 +21,7 @@ pub(super) fn force_coefficients(args: &Args, recordings: &[Recording]) -> Resul
     let setup = Setup {
         edge_angle_deg: args.edge_angle_deg,
         feed_direction_deg: args.feed_direction_deg,
-        full_cut_s,
+        full_cut_s: args.cut_s,
     };
     let tests = recordings
         .iter()

@@ -6,7 +6,7 @@ use clap::ValueEnum;
 
 use super::Error;
 use super::answer::{EstimatedJoint, Figure, IdentifyOutput};
-use super::args::{Args, band};
+use super::args::Args;
 use super::methods::settling;
 use crate::case::Case;
 use crate::criteria::{DIFFERENT_LEVELS, LARGEST_JOINT_MISFIT, SAME_POSTURE_DEG};
@@ -188,7 +188,7 @@ fn slowest_decay(robot: &Robot, postures: &[AtPosture]) -> Result<f64, Error> {
 /// Identifies stiffness and damping of robot joints from receptances at several postures.
 fn from_receptances(args: &Args, start: &Robot, postures: &[AtPosture]) -> Result<JointFit, Error> {
     let settings = MeasurementSettings {
-        band_hz: band(args)?.map(|[low, high]| (low, high)),
+        band_hz: args.band_hz.map(|[low, high]| (low, high)),
         ..MeasurementSettings::default()
     };
     let mut warnings = Vec::new();

@@ -17,6 +17,7 @@ use crate::identify::ncma::{Curve, Map};
 use crate::identify::steady::{Settling, slowest_decay, steady};
 use crate::identify::steady_fit::{Data, Fit, FitError};
 use crate::recording::Recording;
+use crate::report::digits::significant;
 use crate::structure::Direction;
 
 pub(super) fn harmonic_balance(args: &Args, recordings: &[Recording]) -> Result<IdentifyOutput, Error> {
@@ -221,7 +222,15 @@ pub(super) fn ncma(args: &Args, recordings: &[Recording]) -> Result<IdentifyOutp
                 .chunks(degree + 1)
                 .map(|polynomial| {
                     let powers = polynomial.iter().zip((0..=degree).rev());
-                    let terms: Vec<String> = powers.map(|(c, power)| format!("{c:+.4e} F^{power}")).collect();
+                    let terms: Vec<String> = powers
+                        .map(|(c, power)| {
+                            format!(
+                                "{}{} F^{power}",
+                                if *c < 0.0 { "" } else { "+" },
+                                significant(*c, 5)
+                            )
+                        })
+                        .collect();
                     format!("({})", terms.join(" "))
                 })
                 .collect();

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::super::positive;
+use super::super::{Endings, positive};
 
 /// Options of `--method modes`: model order, number of modes, stabilization diagram.
 #[derive(Debug, clap::Args)]
@@ -15,7 +15,7 @@ pub(super) struct ModeOptions {
     #[arg(long, value_name = "N", default_value_t = 24, value_parser = clap::value_parser!(u16).range(5..=80))]
     pub(super) order: u16,
     /// Stabilization diagram to write; the ending sets the format: svg or html.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", value_parser = Endings(&["svg", "html"]).parser())]
     pub(super) stabilization: Option<PathBuf>,
     /// Frequency resolution in Hz of the receptances that are estimated from recordings, like the option of frf.
     #[arg(long, value_name = "D", value_parser = positive, allow_negative_numbers = true)]

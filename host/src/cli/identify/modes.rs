@@ -7,7 +7,7 @@ use maud::html;
 
 use super::Error;
 use super::answer::{ComplexFigure, ComplexMode, Figure, IdentifyOutput};
-use super::args::{Args, band};
+use super::args::Args;
 use crate::frf::{
     Estimator, FrfError, FrfTable, ImportedTable, MeasurementSettings, RecordSpectra, measure, record_spectra,
 };
@@ -24,7 +24,7 @@ pub(super) fn modes(args: &Args, understood: &mut Vec<Understood>) -> Result<Ide
         ending(path)?;
     }
     let source = source(args, understood)?;
-    let band_hz = band(args)?;
+    let band_hz = args.band_hz;
     let refused =
         |error: modes::ModesError| Error::input(format!("{}: {error}", source.table.path().display()));
     let data = Receptances::new(&source.table, source.deviation.as_deref(), band_hz).map_err(refused)?;
@@ -102,7 +102,7 @@ fn source(args: &Args, understood: &mut Vec<Understood>) -> Result<Source, Error
         } else {
             Estimator::H1
         },
-        band_hz: band(args)?.map(|[low, high]| (low, high)),
+        band_hz: args.band_hz.map(|[low, high]| (low, high)),
         ..MeasurementSettings::default()
     };
     let measurement = measure(&recordings, &settings)?;

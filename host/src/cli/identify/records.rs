@@ -2,7 +2,7 @@
 
 use super::Error;
 use super::answer::{Figure, IdentifyOutput, Slices};
-use super::args::{Args, SurfaceTerm, band};
+use super::args::{Args, SurfaceTerm};
 use crate::identify::case_file::Estimate;
 use crate::identify::law::NonlinearTerm;
 use crate::identify::periodic_fit::{self, Period};
@@ -105,7 +105,7 @@ pub(super) fn restoring_force(args: &Args, recordings: &[Recording]) -> Result<I
         motion,
         quantity,
     } = force_and_motion(recording)?;
-    let band_hz = band(args)?;
+    let band_hz = args.band_hz;
     let options = Options {
         terms: args.surface.iter().map(|term| term.term()).collect(),
         mass_kg: args.mass_kg,

@@ -21,11 +21,11 @@ pub(super) fn output_only(args: &Args, recordings: &[Recording]) -> Result<Ident
             recordings.len()
         )));
     };
-    let band_hz = match args.band_hz[..] {
-        [low, high] if 0.0 < low && low < high && high < 0.5 * recording.sample_rate_hz => [low, high],
+    let band_hz = match args.band_hz {
+        Some([low, high]) if 0.0 < low && low < high && high < 0.5 * recording.sample_rate_hz => [low, high],
         _ => {
             return Err(Error::input(format!(
-                "--band-hz: two frequencies below half the sample rate of {} Hz are needed, the lower first, as in 5,60",
+                "--band-hz: two frequencies below half the sample rate of {} Hz are needed, the lower first, as in 5:60",
                 recording.sample_rate_hz
             )));
         }

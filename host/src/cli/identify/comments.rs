@@ -1,0 +1,78 @@
+//! Comments of a case that is written anew: they stay where their sections and keys stay.
+
+use toml_edit::{DocumentMut, Item, Table};
+
+/// The text of a case with new values, and with the comments, the order and the blank lines of the text that it replaces.
+///
+/// Sections and keys that the new text lacks are removed with their comments. Without comments, or if one of the texts is not TOML, the
+/// new text stays as it is.
+pub(super) fn kept(before: &str, after: &str) -> String {
+    let has_comment = before.lines().any(|line| line.contains('#'));
+    let (Ok(mut case), Ok(values)) = (before.parse::<DocumentMut>(), after.parse::<DocumentMut>()) else {
+        return after.into();
+    };
+    if !has_comment {
+        return after.into();
+    }
+    merge(case.as_table_mut(), values.as_table());
+    let merged = case.to_string();
+    // The values decide: a text that does not hold exactly the new ones is not written.
+    let same = |text: &str| text.parse::<toml::Table>().ok();
+    if same(&merged) == same(after) {
+        merged
+    } else {
+        after.into()
+    }
+}
+
+/// Gives `table` the keys and values of `values`; keys that stay keep their comments.
+fn merge(table: &mut Table, values: &Table) {
+    let gone: Vec<String> = table
+        .iter()
+        .map(|(key, _)| key.to_owned())
+        .filter(|key| !values.contains_key(key))
+        .collect();
+    for key in gone {
+        table.remove(&key);
+    }
+    for (key, value) in values.iter() {
+        match (table.get_mut(key), value) {
+            (Some(Item::Table(inner)), Item::Table(new)) => merge(inner, new),
+            (Some(Item::Value(old)), Item::Value(new)) => {
+                let decor = old.decor().clone();
+                *old = new.clone();
+                *old.decor_mut() = decor;
+            }
+            (Some(old), new) => *old = new.clone(),
+            (None, new) => {
+                table.insert(key, new.clone());
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn comments_stay_with_their_keys_and_sections() {
+        let before = "# My mill.\nname = \"old\" # the big one\n\n# Four teeth.\n[tool]\nteeth = 4\nedge_angle_deg = 90.0 # square\n";
+        let after = "name = \"new\"\n\n[structure]\nkind = \"modes\"\n\n[[structure.mode]]\nfrequency_hz = 17.0\n\n[tool]\nteeth = 4\nedge_angle_deg = 45.0\n";
+        let text = kept(before, after);
+        for words in [
+            "# My mill.",
+            "# the big one",
+            "# Four teeth.",
+            "45.0 # square",
+            "\"new\"",
+            "frequency_hz = 17.0",
+        ] {
+            assert!(text.contains(words), "{words}: {text}");
+        }
+        let table = |text: &str| text.parse::<toml::Table>().unwrap();
+        assert_eq!(table(&text), table(after));
+        assert_eq!(kept("name = \"old\"\n", after), after);
+        assert_eq!(kept("# no TOML [\n", after), after);
+    }
+}
