@@ -66,7 +66,7 @@ fn table() {
         command: &format!(
             "QUIETCUT_SEEDS={seeds} cargo test --release -p quietcut-tests --test detector_rates -- --ignored --nocapture"
         ),
-        seeds: &format!("{seeds} per line"),
+        seeds: &format!("0 to {} for each line", seeds - 1),
     }
     .record(&figures);
     check(&rates);

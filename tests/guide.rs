@@ -2,8 +2,11 @@
 #![allow(clippy::expect_used, clippy::panic)]
 
 use std::fs;
+use std::path::Path;
+use std::process::Command;
 
-use quietcut_tests::documents::{root, run};
+use quietcut_tests::command::binary;
+use quietcut_tests::documents::{Block, blocks, root, run};
 
 #[test]
 fn the_guide_leads_to_a_stable_cut() {
@@ -36,6 +39,45 @@ fn the_guide_leads_to_a_stable_cut() {
     let drawn = fs::read_to_string(folder.path().join("host/pictures/lobes.svg")).expect("a picture");
     let kept = fs::read_to_string(root().join("host/pictures/lobes.svg")).expect("the picture of the README");
     assert_same_picture(&drawn, &kept);
+    run_examples(folder.path());
+}
+
+/// Runs the example programs with the command lines of the page, in a folder with the files of the page.
+fn run_examples(folder: &Path) {
+    let records = folder.join("records");
+    fs::create_dir(&records).expect("a folder can be made");
+    for name in ["runout.csv", "runout.toml"] {
+        fs::copy(folder.join(name), records.join(name)).expect("the page wrote a recording");
+    }
+    let mut printed = String::new();
+    for block in blocks("host/GUIDE.md") {
+        let Block::Commands { commands, .. } = block else {
+            continue;
+        };
+        for (line, command) in commands {
+            let Some(words) = command.strip_prefix("cargo run --release -p quietcut --example ") else {
+                continue;
+            };
+            let mut words = words.split_whitespace().filter(|word| *word != "--");
+            let name = words.next().expect("the name of an example");
+            let program = binary().with_file_name("examples").join(name);
+            let output = Command::new(&program)
+                .args(words)
+                .current_dir(folder)
+                .output()
+                .unwrap_or_else(|error| panic!("{error}: cargo build --release -p quietcut --examples"));
+            assert!(output.status.success(), "{line}: {command}: {output:?}");
+            printed += &String::from_utf8_lossy(&output.stdout);
+        }
+    }
+    for said in [
+        "1045 rev/min, 2 mm: |Floquet multiplier|",
+        "Hyy: ",
+        "1 recordings: Cause",
+        "with firmware",
+    ] {
+        assert!(printed.contains(said), "{said}: {printed}");
+    }
 }
 
 /// Asserts that two pictures have the same words in the same order, and numbers that differ by at most one hundredth of a point.

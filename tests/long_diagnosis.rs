@@ -1,5 +1,5 @@
 //! Computing time of a diagnosis of four records of 60 s at 2 kHz. This command prints it in s: `cargo test --release -p
-//! quietcut-tests --test long_diagnosis -- --ignored --nocapture`.
+//! quietcut-tests --test long_diagnosis -- --ignored --nocapture --test-threads 1`.
 #![allow(clippy::expect_used)]
 
 use std::path::Path;
@@ -75,7 +75,10 @@ fn diagnose(test: &str, common: &[&str], differing: [&[&str]; 4], cause: &str) {
         name: &format!("long-diagnosis-{test}"),
         title: &format!("Long diagnosis, {test}"),
         command: "cargo test --release -p quietcut-tests --test long_diagnosis -- --ignored --nocapture --test-threads 1",
-        seeds: "none",
+        seeds: &format!(
+            "0 to 3, one for each record; processor cores: {}",
+            std::thread::available_parallelism().map_or(1, usize::from)
+        ),
     }
     .record(&[(
         format!("time for four records of 60 s at 2 kHz with {cause}"),
@@ -87,7 +90,7 @@ fn diagnose(test: &str, common: &[&str], differing: [&[&str]; 4], cause: &str) {
 
 #[test]
 #[ignore = "a measurement on a machine that does nothing else"]
-fn of_cuts() {
+fn computing_time_of_cuts() {
     let common = [
         "--depth-mm",
         "0.4",
@@ -140,7 +143,7 @@ const CUBIC: [&str; 4] = [
 
 #[test]
 #[ignore = "a measurement on a machine that does nothing else"]
-fn of_a_shaker() {
+fn computing_time_of_a_shaker() {
     diagnose(
         "tones",
         &[&TONES[..], &CUBIC].concat(),
@@ -151,7 +154,7 @@ fn of_a_shaker() {
 
 #[test]
 #[ignore = "a measurement on a machine that does nothing else"]
-fn of_a_shaker_while_the_machine_drifts() {
+fn computing_time_of_a_shaker_while_the_machine_drifts() {
     let drift = ["--effect", "drift.relative_rate_per_s=5e-4"];
     diagnose(
         "tones-and-drift",
@@ -163,7 +166,7 @@ fn of_a_shaker_while_the_machine_drifts() {
 
 #[test]
 #[ignore = "a measurement on a machine that does nothing else"]
-fn of_sweeps() {
+fn computing_time_of_sweeps() {
     diagnose(
         "sweeps",
         &[&SWEEP[..], &CUBIC].concat(),

@@ -4,7 +4,8 @@ use std::collections::BTreeSet;
 use std::fmt::Write;
 use std::fs;
 
-use quietcut_tests::documents::{assert_generated, files, root, text};
+use quietcut_tests::documents::{Block, assert_generated, blocks, files, root, text};
+use quietcut_tests::emulator::command_line;
 use serde_json::Value;
 
 /// The first sentence at the head of a source file.
@@ -101,11 +102,11 @@ fn the_page_of_validation_has_every_result() {
         };
         let of = |key: &str| result[key].as_str().unwrap_or("not recorded").trim().to_owned();
         let (title, command) = (of("title"), of("command"));
-        // Campaigns write the compiler. Figures without it were taken from the README of the stated commit.
+        // Campaigns write the compiler. Figures without it are older than the code that writes them.
         let commit = match result["compiler"].as_str() {
             Some(compiler) => format!("Commit {}, compiler {compiler}", of("commit")),
             None => format!(
-                "Stated in the README of commit {}, compiler not recorded",
+                "Not run on this tree: as stated in the README of commit {}, compiler not recorded",
                 of("commit")
             ),
         };
@@ -140,6 +141,54 @@ fn the_wiring_table_is_that_of_the_board() {
     let board = rows(&text("firmware/src/bin/nucleo_g474re/main.rs"));
     assert!(board.len() >= 8, "{board:?}");
     assert_eq!(rows(&text("firmware/README.md")), board);
+}
+
+/// The emulator's command line in `firmware/README.md` is the one with which the tests start it.
+#[test]
+fn the_command_line_of_the_emulator_is_that_of_the_tests() {
+    let commands = blocks("firmware/README.md")
+        .into_iter()
+        .filter_map(|block| match block {
+            Block::Commands { commands, .. } => Some(commands),
+            Block::File { .. } => None,
+        });
+    let (_, command) = commands
+        .flatten()
+        .find(|(_, command)| command.starts_with("qemu-system-arm"))
+        .expect("the command line of the emulator");
+    let words: Vec<_> = command.split_whitespace().collect();
+    let wanted = command_line("target/thumbv7em-none-eabihf/firmware/qemu_mps2");
+    assert_eq!(words, wanted);
+}
+
+/// Every setting that a test or script reads stands in `tests/README.md`, and none that nothing reads.
+#[test]
+fn the_page_of_tests_lists_every_setting() {
+    let settings = |text: &str| -> BTreeSet<String> {
+        text.match_indices("QUIETCUT_")
+            .map(|(at, _)| {
+                let is_of_name = |c: char| c.is_ascii_uppercase() || c == '_';
+                text[at..].chars().take_while(|c| is_of_name(*c)).collect()
+            })
+            .collect()
+    };
+    let folders = ["host", "shared", "firmware", "tests"];
+    let read: BTreeSet<String> = folders
+        .iter()
+        .flat_map(|folder| {
+            files(&root().join(folder), &|path| {
+                path.extension().is_none_or(|ending| ending == "rs")
+            })
+        })
+        .flat_map(|path| settings(&fs::read_to_string(path).unwrap_or_default()))
+        .filter(|name| name != "QUIETCUT_")
+        .collect();
+    let page = text("tests/README.md");
+    let table: String = page
+        .lines()
+        .filter(|line| line.starts_with("| `QUIETCUT_"))
+        .collect();
+    assert_eq!(settings(&table), read);
 }
 
 /// The members of the workspace with the crates of the project that each uses, in the order of the layers.

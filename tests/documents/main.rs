@@ -3,6 +3,7 @@
 
 mod case_keys;
 mod generated;
+mod outputs;
 mod snapshots;
 
 use quietcut_tests::documents::{Block, Handling, PAGES, blocks, dead_ends, missing, root, run};
@@ -39,6 +40,24 @@ fn commands_that_no_test_runs_name_what_exists() {
         }
     }
     assert!(wrong.is_empty(), "{wrong:#?}");
+}
+
+#[test]
+fn filters_of_campaigns_select_tests_of_their_target() {
+    let missing_of = |command: &str| missing(Handling::Campaign, command);
+    let right =
+        "cargo test --release -p quietcut-identify --lib -- --ignored --nocapture coverage_of_output_only";
+    assert!(missing_of(right).is_empty());
+    for wrong in [
+        right.replace("identify", "stability"),
+        right.replace("--ignored ", ""),
+        right.replace("output_only", "outputs_only"),
+        "cargo test --release -p quietcut-tests --test detector_rates -- --ignored coverage_of_output_only"
+            .into(),
+        "cargo test --release -p quietcut-stability --lib coverage_of_output_only -- --ignored".into(),
+    ] {
+        assert_eq!(missing_of(&wrong).len(), 1, "{wrong}");
+    }
 }
 
 #[test]

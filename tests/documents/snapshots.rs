@@ -4,7 +4,7 @@
 
 use std::fmt::Write;
 
-use quietcut_tests::command::{Outcome, folder, quietcut};
+use quietcut_tests::command::{Outcome, folder, quietcut, verbs};
 use quietcut_tests::documents::assert_generated;
 
 fn snapshot(name: &str, arguments: &[&str], outcome: &Outcome) -> String {
@@ -18,26 +18,11 @@ fn snapshot(name: &str, arguments: &[&str], outcome: &Outcome) -> String {
     text
 }
 
-/// The verbs that the help lists.
-fn verbs() -> Vec<String> {
-    let help = quietcut(folder().path(), &["help"]);
-    help.stdout
-        .lines()
-        .skip_while(|line| *line != "Commands:")
-        .skip(1)
-        .take_while(|line| !line.is_empty())
-        .filter_map(|line| line.strip_prefix("  "))
-        .filter_map(|line| line.split_whitespace().next())
-        .filter(|verb| !verb.starts_with('-') && *verb != "help")
-        .map(str::to_owned)
-        .collect()
-}
-
 #[test]
 fn help_of_every_verb_is_as_reviewed() {
     let folder = folder();
     let verbs = verbs();
-    assert!(verbs.len() >= 13, "{verbs:?}");
+    assert!(verbs.len() >= 16, "{verbs:?}");
     let whole = quietcut(folder.path(), &["help"]);
     let text = snapshot("help", &["help"], &whole);
     assert_generated("tests/snapshots/help.txt", None, &text);
@@ -99,12 +84,31 @@ fn shapes_of_json_answers_are_as_reviewed() {
         "identify cut.csv --method force-coefficients --out material.toml",
         "simulate case.toml --experiment hammer --force-n 300 --sample-rate-hz 512 --impacts 3 --out tap.csv",
         "frf tap.csv --band-hz 10:30 --out frf.csv",
+        "look cut.csv",
+        "plan case.toml --rpm 900:1000:2 --depth-mm 0:6:20 --width-percent 40",
+        "simulate case.toml --rpm 900 --depth-mm 1 --seconds 6 --sample-rate-hz 500 --ideal --measure displacement --noise-percent 1 --effect runout=15 --out runout.csv",
+        "diagnose case.toml runout.csv",
+        "setup mill --teeth 2 --diameter-mm 12.7 --ktc-mpa 119 --krc-mpa 20.2 --kac-mpa 39.3 --down-milling-mm 6.35 --feed-per-tooth-mm 0.15 --rpm 600:2400",
+        "next mill",
+        "working-point simulated --depth-mm 2 --start 90 --exit 180 --feed 0.15",
     ] {
         let arguments: Vec<_> = line.split(' ').chain(["--json"]).collect();
         let answer = quietcut(folder.path(), &arguments).json();
         writeln!(text, "$ quietcut {}", arguments.join(" ")).expect("a string grows");
         shape(&answer, 0, &mut text);
         text.push('\n');
+    }
+    // The verdicts of a device depend on time: only their keys are compared.
+    let line = "monitor simulated --seconds 1.5 --json";
+    let arguments: Vec<_> = line.split(' ').collect();
+    let answer = quietcut(folder.path(), &arguments).json();
+    writeln!(text, "$ quietcut {line}").expect("a string grows");
+    for (name, value) in [
+        ("verdicts", &answer["verdicts"][0]),
+        ("summary", &answer["summary"]),
+    ] {
+        let keys: Vec<_> = value.as_object().expect("an object").keys().cloned().collect();
+        writeln!(text, "  {name}: {}", keys.join(", ")).expect("a string grows");
     }
     assert_generated("tests/snapshots/json-shapes.txt", None, &text);
 }

@@ -43,7 +43,8 @@ fn texts(cause: &Cause, machine: &Machine, rig: &Rig) -> Vec<String> {
 
 #[test]
 fn structural_effects_agree_with_the_library() {
-    for kind in STRUCTURAL.into_iter().chain([EffectKind::SensorOffsetByMode]) {
+    let others = [EffectKind::SensorOffsetByMode, EffectKind::QuadraticDamping];
+    for kind in STRUCTURAL.into_iter().chain(others) {
         let mut compared = 0;
         for seed in 0..40 {
             let mut random = ChaCha8Rng::seed_from_u64(seed);

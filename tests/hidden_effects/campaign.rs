@@ -308,6 +308,22 @@ impl Report {
         }
     }
 
+    /// Seeds whose answer contains the effect `name` although it is not hidden, with the hidden effects and the answer.
+    pub(crate) fn naming(&self, name: &str) -> Vec<String> {
+        let wrong = self
+            .findings
+            .iter()
+            .filter(|f| f.said.names().contains(name) && !f.hidden.contains(&name));
+        wrong
+            .map(|f| format!("{}: {} said {}", f.seed, f.hidden_label(), f.said.label()))
+            .collect()
+    }
+
+    /// Number of diagnoses that state an interval of a true parameter.
+    pub(crate) fn with_intervals(&self) -> usize {
+        self.findings.iter().filter(|f| f.covered[1] > 0).count()
+    }
+
     /// Share of right answers, among answers that name a cause with a confidence of 0.9 or more.
     pub(crate) fn confident(&self) -> Share {
         self.share(|f| {
@@ -363,6 +379,36 @@ impl fmt::Display for Share {
     }
 }
 
+impl Report {
+    /// The shares of the family, with their names.
+    fn shares(&self) -> [(&'static str, Share); 9] {
+        [
+            ("right, separable and above 3× noise", self.separable()),
+            ("one of the two first, the same", self.one_of_two_first()),
+            ("exact set, equivalent", self.equivalent()),
+            ("none, nothing to be seen", self.invisible()),
+            ("right, separable and below 3× noise", self.weak()),
+            ("right or none, the same", self.weak_not_wrong()),
+            ("truth in the 90 % interval", self.covered()),
+            ("right of those with confidence ≥ 0.9", self.confident()),
+            ("energy cut by ≥ 80 %", self.energy()),
+        ]
+    }
+
+    /// The shares of the family that have cases, as figures of the campaign.
+    pub(crate) fn figures(&self) -> Vec<(String, String)> {
+        let shares = self.shares().into_iter().filter(|(_, share)| share.all > 0);
+        shares
+            .map(|(what, share)| {
+                (
+                    format!("{}: {what}", self.family.name()),
+                    share.to_string().trim().to_owned(),
+                )
+            })
+            .collect()
+    }
+}
+
 impl fmt::Display for Report {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(out, "== {}: {} seeds", self.family.name(), self.findings.len())?;
@@ -388,17 +434,7 @@ impl fmt::Display for Report {
         {
             writeln!(out, "  {finding}")?;
         }
-        for (what, share) in [
-            ("right, separable and above 3× noise", self.separable()),
-            ("one of the two first, the same", self.one_of_two_first()),
-            ("exact set, equivalent", self.equivalent()),
-            ("none, nothing to be seen", self.invisible()),
-            ("right, separable and below 3× noise", self.weak()),
-            ("right or none, the same", self.weak_not_wrong()),
-            ("truth in the 90 % interval", self.covered()),
-            ("right of those with confidence ≥ 0.9", self.confident()),
-            ("energy cut by ≥ 80 %", self.energy()),
-        ] {
+        for (what, share) in self.shares() {
             if share.all > 0 {
                 writeln!(out, "  {what}: {share}")?;
             }

@@ -3,10 +3,10 @@
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
+use super::job::CutScale;
 use super::law::Law;
 use super::machine::{Machine, between, either};
 use super::motion::System;
-use super::process::CutScale;
 
 /// A kind of effect.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -20,6 +20,7 @@ pub(crate) enum EffectKind {
     CubicStiffness,
     QuadraticStiffness,
     CubicDamping,
+    QuadraticDamping,
     SofteningHardening,
     CoulombFriction,
     Backlash,
@@ -51,7 +52,8 @@ pub(crate) enum EffectKind {
     SensorSquare,
 }
 
-/// Effects of the library that tests of structures can hide.
+/// Effects of the library that tests of structures can hide. [`EffectKind::QuadraticDamping`] has a family of its own, so that the draws of
+/// the other families stay.
 pub(crate) const STRUCTURAL: [EffectKind; 17] = [
     EffectKind::Mass,
     EffectKind::Stiffness,
@@ -131,6 +133,7 @@ impl EffectKind {
             Self::CubicStiffness => &["cubic-stiffness"],
             Self::QuadraticStiffness => &["quadratic-stiffness"],
             Self::CubicDamping => &["cubic-damping"],
+            Self::QuadraticDamping => &["quadratic-damping"],
             Self::SofteningHardening => &["softening-hardening"],
             Self::CoulombFriction => &["coulomb-friction"],
             Self::Backlash => &["backlash"],
@@ -249,6 +252,7 @@ impl EffectKind {
             Self::Backlash => [0.15, 0.35, 0.6].map(|gap| vec![gap, 0.1]).to_vec(),
             Self::Hysteresis => [0.1, 0.3].map(|z| vec![0.05, z]).to_vec(),
             Self::CoulombFriction => vec![vec![0.2]],
+            Self::QuadraticDamping => vec![vec![0.02]],
             Self::ForceCoefficients | Self::EdgeForce => vec![vec![0.02, 0.02]],
             Self::ForceExponent => vec![vec![0.1, 1.0]],
             Self::Runout => vec![vec![0.1, 1.0], vec![0.1, 4.0]],
@@ -301,6 +305,7 @@ impl Cause {
             EffectKind::CubicStiffness => vec![("k3_n_per_m3", 0.1 * s[0] * k / peak.powi(2))],
             EffectKind::QuadraticStiffness => vec![("k2_n_per_m2", 0.1 * s[0] * k / peak)],
             EffectKind::CubicDamping => vec![("c3_ns3_per_m3", 0.5 * s[0] * c / speed.powi(2))],
+            EffectKind::QuadraticDamping => vec![("c2_ns2_per_m2", 0.5 * s[0] * c / speed)],
             EffectKind::SofteningHardening => {
                 let k3 = -0.1 * s[0] * k / peak.powi(2);
                 vec![
@@ -403,6 +408,10 @@ impl Cause {
             EffectKind::CubicDamping => system.add(Law::Damper {
                 axis,
                 power: 3,
+                coefficient: value,
+            }),
+            EffectKind::QuadraticDamping => system.add(Law::QuadraticDamper {
+                axis,
                 coefficient: value,
             }),
             EffectKind::CoulombFriction => system.add(Law::Friction {

@@ -3,23 +3,10 @@
 use std::cell::Cell;
 use std::f64::consts::TAU;
 
-use super::motion::{State, System, interpolated};
+use super::job::Job;
+use super::law::State;
+use super::motion::{System, interpolated};
 use super::process::Process;
-
-/// Tool, material and engagement of the baseline.
-#[derive(Clone, Debug)]
-pub(crate) struct Job {
-    pub(crate) teeth: usize,
-    pub(crate) edge_angle_deg: f64,
-    pub(crate) diameter_mm: f64,
-    /// Tangential, radial and axial cutting coefficient, MPa.
-    pub(crate) cutting_mpa: [f64; 3],
-    /// Tangential, radial and axial edge coefficient, N/mm.
-    pub(crate) edge_n_per_mm: [f64; 3],
-    pub(crate) start_deg: f64,
-    pub(crate) exit_deg: f64,
-    pub(crate) feed_mm: f64,
-}
 
 /// Working point of one cut.
 #[derive(Clone, Debug)]

@@ -12,13 +12,13 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
 use super::cause::{Cause, EffectKind, PROCESS, Scale};
-use super::chip::{Chips, Job, Run};
+use super::chip::{Chips, Run};
+use super::job::{CutScale, Job};
 use super::machine::{Machine, between};
 use super::motion::interpolated;
 use super::motion::{Path, System};
-use super::oracle::Lab;
-use super::process::{CutScale, Process};
-use super::rig::Output;
+use super::oracle::{Lab, Output};
+use super::process::Process;
 use super::sensor::{Sensor, letter, noisy, read_by};
 
 /// Cuts of a machine, with the sensors that record them.

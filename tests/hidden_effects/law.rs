@@ -1,6 +1,10 @@
 //! Restoring forces in addition to the linear structure.
 
-use super::motion::State;
+/// Largest number of state variables of a structure and its laws.
+pub(crate) const ROOM: usize = 16;
+
+/// State vector: q, q̇ and the internal states of the laws.
+pub(crate) type State = [f64; ROOM];
 
 /// A restoring force f_r in addition to the linear structure: M q̈ + C q̇ + K q + Bᵀf_r = Bᵀ F.
 #[derive(Clone, Copy, Debug)]
@@ -17,6 +21,8 @@ pub(crate) enum Law {
         power: i32,
         coefficient: f64,
     },
+    /// Quadratic damper: c_2·|v|·v.
+    QuadraticDamper { axis: usize, coefficient: f64 },
     /// Stribeck friction: kinetic·sign(v)·(1 + (breakaway/kinetic − 1)·e^(−(v/v_s)²)); while it sticks, any force within ±breakaway.
     Friction {
         axis: usize,
@@ -91,6 +97,9 @@ impl Law {
                 power,
                 coefficient,
             } => force[axis] = coefficient * v[axis].powi(power),
+            Self::QuadraticDamper { axis, coefficient } => {
+                force[axis] = coefficient * v[axis].abs() * v[axis];
+            }
             Self::Friction {
                 axis,
                 kinetic_n,

@@ -3,13 +3,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::law::{Branch, Law, signs};
-
-/// Largest number of state variables of a structure and its laws.
-const ROOM: usize = 16;
-
-/// State vector: q, q̇ and the internal states of the laws.
-pub(crate) type State = [f64; ROOM];
+use super::law::{Branch, Law, ROOM, State, signs};
 
 /// A force along x, y, z, N, as a function of time, displacement and velocity.
 pub(crate) type Force<'a> = dyn Fn(f64, [f64; 3], [f64; 3]) -> [f64; 3] + 'a;

@@ -8,7 +8,6 @@ use rand_chacha::ChaCha8Rng;
 
 use super::cause::{Cause, EffectKind};
 use super::noise::Whitening;
-use super::rig::Output;
 
 /// Squared distance (χ²) below which two causes cannot be separated.
 const SAME: f64 = 2.0;
@@ -29,6 +28,9 @@ pub(crate) enum Verdict {
     Borderline,
 }
 
+/// Readings by run, sensor and sample.
+pub(crate) type Output = Vec<Vec<Vec<f64>>>;
+
 /// A virtual test or cut in which effects can act.
 pub(crate) trait Lab {
     /// Readings of all sensors without noise while `causes` act.
@@ -39,6 +41,13 @@ pub(crate) trait Lab {
 
     /// Effects of the library that can act in this test.
     fn kinds(&self) -> Vec<EffectKind>;
+
+    /// The effects among these that families without an effect of their own hide.
+    fn drawn(&self) -> Vec<EffectKind> {
+        let mut kinds = self.kinds();
+        kinds.retain(|kind| *kind != EffectKind::QuadraticDamping);
+        kinds
+    }
 
     /// Names that an effect has in answers about this test.
     fn names(&self, kind: EffectKind) -> &'static [&'static str] {

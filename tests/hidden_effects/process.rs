@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use super::cause::{Cause, EffectKind, Scale};
-use super::chip::Job;
+use super::job::{CutScale, Job};
 use super::machine::Machine;
 
 /// The cutting process changed by causes.
@@ -63,21 +63,6 @@ impl Process {
             }
         }
         process
-    }
-}
-
-/// Scales of the parameters of causes in the cutting process.
-#[derive(Clone, Debug)]
-pub(crate) struct CutScale {
-    pub(crate) job: Job,
-    pub(crate) depth_mm: f64,
-    pub(crate) rpm: f64,
-}
-
-impl CutScale {
-    /// Cutting speed, m/s.
-    pub(crate) fn cutting_speed(&self) -> f64 {
-        std::f64::consts::PI * 1e-3 * self.job.diameter_mm * self.rpm / 60.0
     }
 }
 

@@ -8,11 +8,11 @@ use rand::seq::IndexedRandom;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::cause::{Cause, NOT_IN_LIBRARY, Scale};
+use super::cause::{Cause, EffectKind, NOT_IN_LIBRARY, Scale};
 use super::cut::{CutBench, EVERY_FORCE, EVERY_SENSOR};
 use super::machine::{Machine, between};
-use super::oracle::{Lab, Oracle, Verdict};
-use super::rig::{Bench as RigBench, Output, Rig, Test};
+use super::oracle::{Lab, Oracle, Output, Verdict};
+use super::rig::{Bench as RigBench, Rig, Test};
 use super::sensor::letter;
 
 /// Families of puzzles in the campaign.
@@ -26,13 +26,15 @@ pub(crate) enum Family {
     Nothing,
     NotInLibrary,
     TwoEffects,
+    /// Tests of structures with quadratic damping.
+    QuadraticDamping,
     /// Cuts in chatter. The oracle does not treat them: in a growing motion every trajectory contains more information on the machine than
     /// a fit can extract. Of rates, only that of answers with high confidence is required.
     Chatter,
 }
 
 impl Family {
-    pub(crate) const ALL: [Self; 9] = [
+    pub(crate) const ALL: [Self; 10] = [
         Self::Shaker,
         Self::Sweep,
         Self::FreeDecay,
@@ -41,6 +43,7 @@ impl Family {
         Self::Nothing,
         Self::NotInLibrary,
         Self::TwoEffects,
+        Self::QuadraticDamping,
         Self::Chatter,
     ];
 
@@ -55,6 +58,7 @@ impl Family {
             Self::Nothing => "nothing-hidden",
             Self::NotInLibrary => "not-in-library",
             Self::TwoEffects => "two-effects",
+            Self::QuadraticDamping => "quadratic-damping",
             Self::Chatter => "chatter",
         }
     }
@@ -266,9 +270,10 @@ fn hide(family: Family, bench: &dyn Lab, random: &mut ChaCha8Rng) -> Option<Vec<
     let (kinds, count) = match family {
         Family::Nothing => return Some(Vec::new()),
         Family::NotInLibrary => (NOT_IN_LIBRARY.to_vec(), 1),
-        Family::TwoEffects => (bench.kinds(), 2),
+        Family::QuadraticDamping => (vec![EffectKind::QuadraticDamping], 1),
+        Family::TwoEffects => (bench.drawn(), 2),
         Family::Chatter if random.random::<f64>() < 0.2 => return Some(Vec::new()),
-        _ => (bench.kinds(), 1),
+        _ => (bench.drawn(), 1),
     };
     let mut hidden: Vec<Cause> = Vec::new();
     while hidden.len() < count {

@@ -12,7 +12,7 @@ use super::cause::{Cause, EffectKind, STRUCTURAL, Scale};
 use super::machine::{Machine, between};
 use super::motion::{Path, System, first_order, interpolated};
 use super::noise::Whitening;
-use super::oracle::Lab;
+use super::oracle::{Lab, Output};
 use super::sensor::{Sensor, letter, noisy, read_by, sensors};
 use super::signal::signal;
 
@@ -68,9 +68,6 @@ impl Run {
         (most / self.force_n.len().max(1) as f64).sqrt()
     }
 }
-
-/// Readings by run, sensor and sample.
-pub(crate) type Output = Vec<Vec<Vec<f64>>>;
 
 impl Rig {
     /// Draws a test of `machine`, with directions driven one by one and together, at two or three levels.
@@ -412,7 +409,8 @@ impl Lab for Bench {
             EffectKind::SensorOffset if self.machine.modal => EffectKind::SensorOffsetByMode,
             kind => kind,
         };
-        STRUCTURAL.map(of_machine).to_vec()
+        let structural = STRUCTURAL.into_iter().map(of_machine);
+        structural.chain([EffectKind::QuadraticDamping]).collect()
     }
 
     fn is_free_decay(&self) -> bool {

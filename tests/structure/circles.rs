@@ -91,6 +91,20 @@ fn small_crate(files: &[(&str, &str)]) -> (tempfile::TempDir, PathBuf) {
     (folder, root)
 }
 
+/// The images of the firmware, the support library of the tests, and tests of several files are read too.
+#[test]
+fn programs_and_tests_of_several_files_have_roots() {
+    let roots: Vec<PathBuf> = all().iter().flat_map(|member| member.roots()).collect();
+    for end in [
+        "firmware/src/bin/nucleo_g474re/main.rs",
+        "firmware/src/bin/qemu_mps2/main.rs",
+        "tests/support/lib.rs",
+        "tests/hidden_effects/main.rs",
+    ] {
+        assert!(roots.iter().any(|root| root.ends_with(end)), "{end}: {roots:?}");
+    }
+}
+
 #[test]
 fn a_circle_is_found_through_a_parent_that_hands_names_on() {
     let (_folder, root) = small_crate(&[

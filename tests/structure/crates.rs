@@ -74,7 +74,7 @@ const LAYERS: [(&str, &[&str]); 13] = [
             "quietcut-diagnose",
         ],
     ),
-    ("quietcut-testkit", &["quietcut-model"]),
+    ("quietcut-testkit", &["quietcut-model", "quietcut-numerics"]),
     (
         "quietcut-tests",
         &["quietcut", "quietcut-core", "quietcut-firmware"],
@@ -100,14 +100,25 @@ impl Member {
         }
     }
 
-    /// The root files of the crate's library and programs.
+    /// The root files of the crate's library and programs, the library first, and of its tests that consist of several files.
     pub(crate) fn roots(&self) -> Vec<PathBuf> {
         let source = self.folder.join("src");
-        ["lib.rs", "main.rs"]
+        let mut roots = vec![source.join("lib.rs"), source.join("main.rs")];
+        let programs = std::fs::read_dir(source.join("bin"))
             .into_iter()
-            .map(|name| source.join(name))
-            .filter(|path| path.exists())
-            .collect()
+            .flatten()
+            .flatten();
+        for program in programs.map(|entry| entry.path()) {
+            roots.extend([program.join("main.rs"), program]);
+        }
+        let path_of = |target: &toml::Value| Some(self.folder.join(target.get("path")?.as_str()?));
+        roots.extend(self.manifest.get("lib").and_then(path_of));
+        let tests = self.manifest.get("test").and_then(toml::Value::as_array);
+        let tests = tests.into_iter().flatten().filter_map(path_of);
+        roots.extend(tests.filter(|path| path.ends_with("main.rs")));
+        roots.retain(|path| path.is_file());
+        roots.sort_by_key(|path| !path.ends_with("lib.rs"));
+        roots
     }
 
     /// The crates of the workspace on which the crate depends, without dev-dependencies.

@@ -163,3 +163,18 @@ pub fn start_on<S: AsRef<OsStr>>(folder: &Path, arguments: &[S], stderr: impl In
 pub fn quietcut<S: AsRef<OsStr>>(folder: &Path, arguments: &[S]) -> Outcome {
     start(folder, arguments).finish()
 }
+
+/// The verbs that the help lists.
+pub fn verbs() -> Vec<String> {
+    let help = quietcut(folder().path(), &["help"]);
+    help.stdout
+        .lines()
+        .skip_while(|line| *line != "Commands:")
+        .skip(1)
+        .take_while(|line| !line.is_empty())
+        .filter_map(|line| line.strip_prefix("  "))
+        .filter_map(|line| line.split_whitespace().next())
+        .filter(|verb| !verb.starts_with('-') && *verb != "help")
+        .map(str::to_owned)
+        .collect()
+}

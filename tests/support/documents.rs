@@ -6,7 +6,7 @@
 //! |---|---|
 //! | `sh` | runs in a test, line by line, in a temporary folder that holds `tests/cases` and `host/pictures/cuts.csv` |
 //! | `sh build` | compiles or runs the whole project: its packages, targets and scripts must exist |
-//! | `sh campaign` | takes minutes to hours: its packages, targets and test names must exist |
+//! | `sh campaign` | takes minutes to hours: its packages and targets must exist, and its filters must select tests of its target |
 //! | `sh hardware` | requires a device: its verbs and options must exist |
 //! | `csv NAME`, `toml NAME` | is the file NAME for the commands that follow |
 //! | any other language | is output or a sketch, and is not checked |
@@ -38,7 +38,7 @@ pub enum Handling {
     Run,
     /// Packages, targets and scripts exist.
     Build,
-    /// Packages, targets and names of tests must exist.
+    /// Packages and targets exist, and the filters select tests of the target.
     Campaign,
     /// Verbs and options exist.
     Hardware,
@@ -229,22 +229,94 @@ fn missing_of_cargo(handling: Handling, words: &[&str]) -> Vec<String> {
             missing.push(format!("{} {}", pair[0], pair[1]));
         }
     }
-    if handling == Handling::Campaign {
-        let code = sources(".rs");
-        let mut takes_value = false;
-        for word in of_tests {
-            let is_value = std::mem::replace(&mut takes_value, *word == "--test-threads");
-            let names_a_test = |text: &String| {
-                text.lines()
-                    .any(|line| line.trim_start().starts_with("fn ") && line.contains(word))
-                    || text.contains(&format!("mod {word}"))
-            };
-            if !word.starts_with('-') && !is_value && !code.iter().any(|(_, text)| names_a_test(text)) {
-                missing.push(format!("a test {word}"));
+    if handling == Handling::Campaign && own.first() == Some(&"test") {
+        let is_ignored = of_tests.contains(&"--ignored");
+        let tests = tests_of(own, is_ignored);
+        let has_values = ["-p", "--package", "--test", "--test-threads", "--skip"];
+        let own_filters = own.iter().skip(1).zip(own);
+        let filters = own_filters.chain(of_tests.iter().zip([&"--"].into_iter().chain(of_tests)));
+        for (word, before) in filters {
+            if word.starts_with('-') || has_values.contains(before) {
+                continue;
             }
+            if !tests.iter().any(|test| test.contains(*word)) {
+                missing.push(format!("a test {word} of {}", own.join(" ")));
+            }
+        }
+        if tests.is_empty() {
+            missing.push(format!("a test of {}", own.join(" ")));
         }
     }
     missing
+}
+
+/// The tests of the package and target that the `words` of a command select, ignored or not, as the test harness names them: modules
+/// and function, joined by `::`.
+fn tests_of(words: &[&str], is_ignored: bool) -> Vec<String> {
+    let value_of = |option: &str| {
+        let at = words.iter().position(|word| *word == option)?;
+        words.get(at + 1).copied()
+    };
+    let name_line = format!("name = \"{}\"", value_of("-p").unwrap_or_default());
+    let manifests = sources("Cargo.toml");
+    let Some((path, manifest)) = manifests
+        .iter()
+        .find(|(_, text)| text.lines().any(|line| line == name_line))
+    else {
+        return Vec::new();
+    };
+    let package = path.parent().expect("a manifest lies in a folder");
+    let folder = match value_of("--test") {
+        None => package.join("src"),
+        Some(target) => {
+            // The manifest names the file of a test in the line below its name.
+            let name_line = format!("name = \"{target}\"");
+            let mut lines = manifest.lines().skip_while(|line| *line != name_line);
+            let path = lines
+                .nth(1)
+                .and_then(|line| line.split('"').nth(1))
+                .unwrap_or_default();
+            let file = package.join(path);
+            if !file.ends_with("main.rs") {
+                return tests_in(&file, "", is_ignored);
+            }
+            file.parent().expect("a file lies in a folder").to_path_buf()
+        }
+    };
+    let code = files(&folder, &|path| {
+        path.extension().is_some_and(|ending| ending == "rs")
+    });
+    code.iter()
+        .flat_map(|file| {
+            let below = file.strip_prefix(&folder).unwrap_or(file).with_extension("");
+            let modules: Vec<_> = below
+                .iter()
+                .filter_map(|part| part.to_str())
+                .filter(|part| !["lib", "main", "mod"].contains(part))
+                .collect();
+            tests_in(file, &(modules.join("::") + "::"), is_ignored)
+        })
+        .collect()
+}
+
+/// The tests of a file, ignored or not, each behind `prefix`.
+fn tests_in(file: &Path, prefix: &str, is_ignored: bool) -> Vec<String> {
+    let text = fs::read_to_string(file).unwrap_or_default();
+    let (mut test, mut ignored) = (false, false);
+    let mut found = Vec::new();
+    for line in text.lines().map(str::trim_start) {
+        if line == "#[test]" {
+            (test, ignored) = (true, false);
+        } else if line.starts_with("#[ignore") {
+            ignored = true;
+        } else if let Some(name) = line.strip_prefix("fn ") {
+            if test && ignored == is_ignored {
+                found.push(format!("{prefix}{}", name.split('(').next().unwrap_or(name)));
+            }
+            test = false;
+        }
+    }
+    found
 }
 
 /// The files of the repository that satisfy a condition, without built files.

@@ -118,23 +118,9 @@ impl<'m> Emulator<'m> {
         let directory = TempDir::with_prefix("quietcut-emulator-").expect("a temporary folder");
         let listen = |name| UnixListener::bind(directory.path().join(name)).expect("a socket");
         let (link, spindle) = (listen("link"), listen("spindle"));
-        let path = |name| directory.path().join(name).display().to_string();
         let mut command = qemu(&image);
         command
-            .args(["-M", "mps2-an386,memory-backend=psram", "-object"])
-            .arg(format!(
-                "memory-backend-file,id=psram,size={MEMORY_BYTES},mem-path={},share=on",
-                memory.path().display()
-            ))
-            .args([
-                "-chardev",
-                &format!("socket,id=link,path={}", path("link")),
-                "-serial",
-                "chardev:link",
-            ])
-            .args(["-serial", &format!("file:{}", path("log"))])
-            .args(["-chardev", &format!("socket,id=spindle,path={}", path("spindle"))])
-            .args(["-serial", "chardev:spindle"])
+            .args(board_options(&memory.path(), directory.path()))
             .args(options)
             .stdout(Stdio::null());
         let mut process = spawn(command);
@@ -403,11 +389,52 @@ pub fn count_instructions() -> BTreeMap<String, u64> {
         .collect()
 }
 
+/// Options of QEMU for every image: no window, semihosting, and the image itself behind the last one.
+const FOR_IMAGES: [&str; 7] = [
+    "-display",
+    "none",
+    "-monitor",
+    "none",
+    "-semihosting-config",
+    "enable=on,target=native",
+    "-kernel",
+];
+
+/// Options of QEMU for the board: its memory in a file, and link, log and virtual spindle as files of `folder`.
+fn board_options(memory: &Path, folder: &Path) -> Vec<String> {
+    let path = |name: &str| folder.join(name).display().to_string();
+    let memory = memory.display();
+    [
+        "-M",
+        "mps2-an386,memory-backend=psram",
+        "-object",
+        &format!("memory-backend-file,id=psram,size={MEMORY_BYTES},mem-path={memory},share=on"),
+        "-chardev",
+        &format!("socket,id=link,path={}", path("link")),
+        "-serial",
+        "chardev:link",
+        "-serial",
+        &format!("file:{}", path("log")),
+        "-chardev",
+        &format!("socket,id=spindle,path={}", path("spindle")),
+        "-serial",
+        "chardev:spindle",
+    ]
+    .map(str::to_owned)
+    .into()
+}
+
+/// The command line that starts the board with this image, with all files in the current folder.
+pub fn command_line(image: &str) -> Vec<String> {
+    let of_image = ["qemu-system-arm"].into_iter().chain(FOR_IMAGES).chain([image]);
+    let options = board_options(Path::new("memory.bin"), Path::new(""));
+    of_image.map(str::to_owned).chain(options).collect()
+}
+
 fn qemu(image: &Path) -> Command {
     let mut command = Command::new("qemu-system-arm");
     command
-        .args(["-display", "none", "-monitor", "none"])
-        .args(["-semihosting-config", "enable=on,target=native", "-kernel"])
+        .args(FOR_IMAGES)
         .arg(image)
         .stdin(Stdio::null())
         .stderr(Stdio::piped());

@@ -20,6 +20,9 @@
 //! - `next_test`: the experiment that separates confounded candidate models.
 //!
 //! `baseline` and `motion` stand before `records` because a `Record` holds the prediction of the baseline along the motion.
+//!
+//! "The thesis" in this crate is *Chatter Vibrations in Robotic Milling Considering Structural Nonlinearity*, a doctoral
+//! thesis of the University of Victoria; its equation numbers are given as "thesis eq. 5.16".
 
 mod baseline;
 mod candidates;

@@ -4,6 +4,9 @@
 //! and standard deviation; estimators H1, H2 and their mean, [`Estimator`]); [`FrfTable`] holds receptances in m/N and reads and writes
 //! CSV and UFF 58, and reads the text tables of other programs; [`Interpolation`] evaluates a table between its lines.
 //!
+//! "The thesis" in this crate is *Chatter Vibrations in Robotic Milling Considering Structural Nonlinearity*, a doctoral
+//! thesis of the University of Victoria; its equation numbers are given as "thesis eq. 5.16".
+//!
 //! ```
 //! use std::f64::consts::TAU;
 //! use std::path::Path;

@@ -136,8 +136,8 @@ pub(crate) const LARGEST_MISFIT: f64 = 1.3;
 /// peak. Two points at the peak have nearly one frequency and phase, so that noise determines their damping. Unfounded.
 pub(crate) const LARGEST_PAIRED_RECEPTANCE: f64 = 0.98;
 
-/// Share of the force power that lies within the band of a fit to the periods of a multisine. The motion is measured
-/// and integrated within that band. Unfounded.
+/// Share of the force power below the frequency up to which the first guess of a fit to the periods of a multisine uses
+/// force and motion. Above it the derivatives of the measured motion are noise. Unfounded.
 pub(crate) const FORCE_BAND_SHARE: f64 = 0.99;
 
 /// Fewest force levels at a frequency for higher-order FRF: H₁, H₃ and H₅ are three unknowns.

@@ -11,6 +11,9 @@
 //!
 //! [`case_file`] writes what was identified as a case file.
 //!
+//! "The thesis" in this crate is *Chatter Vibrations in Robotic Milling Considering Structural Nonlinearity*, a doctoral
+//! thesis of the University of Victoria; its equation numbers are given as "thesis eq. 5.16".
+//!
 //! ```
 //! use std::path::Path;
 //!

@@ -4,6 +4,9 @@
 //! [`milling::Tool`], [`milling::Material`] and [`milling::Cut`], [`Dynamics`] (first-order equation of motion), [`Effects`] (terms of the
 //! restoring force, of the cutting force, of spindle and sensors that a case may have beyond the linear model).
 //!
+//! "The thesis" in this crate is *Chatter Vibrations in Robotic Milling Considering Structural Nonlinearity*, a doctoral
+//! thesis of the University of Victoria; its equation numbers are given as "thesis eq. 5.16".
+//!
 //! ```
 //! use std::path::Path;
 //!

@@ -223,6 +223,17 @@ fn a_given_speed_replaces_the_tachometer() {
 
 #[test]
 fn nan_samples_are_refused_with_channel_and_time_or_left_out() {
+    for (value, of_csv, of_wav) in [
+        (f32::NAN, "nan", "NaN"),
+        (f32::INFINITY, "inf", "inf"),
+        (f32::NEG_INFINITY, "-inf", "-inf"),
+    ] {
+        check_non_finite(value, of_csv, of_wav);
+    }
+}
+
+/// Checks that a WAV file and a text table with this sample are refused as a whole and where a segment contains it.
+fn check_non_finite(value: f32, of_csv: &str, of_wav: &str) {
     let folder = Folder::new();
     let path = folder.0.path().join("a.wav");
     let spec = hound::WavSpec {
@@ -232,18 +243,18 @@ fn nan_samples_are_refused_with_channel_and_time_or_left_out() {
         sample_format: hound::SampleFormat::Float,
     };
     let mut writer = hound::WavWriter::create(&path, spec).unwrap();
-    for sample in [0.5_f32, 0.1, 0.25, 0.2, 0.0, f32::NAN, 0.75, 0.4] {
+    for sample in [0.5_f32, 0.1, 0.25, 0.2, 0.0, value, 0.75, 0.4] {
         writer.write_sample(sample).unwrap();
     }
     writer.finalize().unwrap();
-    let csv = "t [s],ch1 [V],ch2 [V]\n0,0.5,0.1\n0.1,0.25,0.2\n0.2,0,nan\n0.3,0.75,0.4\n";
-    let csv = folder.file("b.csv", csv);
+    let csv = format!("t [s],ch1 [V],ch2 [V]\n0,0.5,0.1\n0.1,0.25,0.2\n0.2,0,{of_csv}\n0.3,0.75,0.4\n");
+    let csv = folder.file("b.csv", &csv);
     for (path, place) in [
-        (&path, "\"ch2\": sample 3 at 0.2 s is NaN"),
-        (&csv, "line 4: \"nan\" in column \"ch2\""),
+        (&path, format!("\"ch2\": sample 3 at 0.2 s is {of_wav}")),
+        (&csv, format!("line 4: \"{of_csv}\" in column \"ch2\"")),
     ] {
         let said = Recording::read(path).unwrap_err().to_string();
-        assert!(said.contains(place) && said.contains("--until-s"), "{said}");
+        assert!(said.contains(&place) && said.contains("--until-s"), "{said}");
         let before = Segment {
             from_s: None,
             until_s: Some(0.2),
@@ -257,8 +268,11 @@ fn nan_samples_are_refused_with_channel_and_time_or_left_out() {
         let said = Recording::read_segment(path, whole).unwrap_err().to_string();
         assert!(said.contains("sample 3"), "{said}");
     }
-    // The sample rate cannot be computed from NaN time stamps.
-    let said = folder.refusal("c.csv", "t [s],ax [m/s^2]\n0,1\n0.1,2\nnan,3\n0.3,4\n");
+    // The sample rate cannot be computed from such time stamps.
+    let said = folder.refusal(
+        "c.csv",
+        &format!("t [s],ax [m/s^2]\n0,1\n0.1,2\n{of_csv},3\n0.3,4\n"),
+    );
     assert!(said.contains("line 4"), "{said}");
 }
 

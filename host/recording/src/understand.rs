@@ -195,8 +195,8 @@ fn unit_text(unit: Unit) -> String {
     }
 }
 
-/// Meaning of one column, that is the channel that it becomes; a column whose direction, unit or sensitivity is not
-/// stated is added to `doubts`.
+/// Meaning of one column, that is the channel that it becomes. A column without a standard name, which its words or its
+/// unit show to be a force or a motion, is added to `doubts` if its direction, sign, unit or sensitivity is uncertain.
 fn meaning(
     path: &Path,
     column: &RawColumn,

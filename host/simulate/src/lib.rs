@@ -7,6 +7,9 @@
 //! Main types: [`VirtualCut`] describes a cut of a case, [`Model`] is its equation of motion, [`DenseStep`] the motion over one step with dense
 //! output, [`rig::Rig`] a test with shaker, hammer or free decay, [`Recorder`] the recording of a cut.
 //!
+//! "The thesis" in this crate is *Chatter Vibrations in Robotic Milling Considering Structural Nonlinearity*, a doctoral
+//! thesis of the University of Victoria; its equation numbers are given as "thesis eq. 5.16".
+//!
 //! ```
 //! use std::path::Path;
 //!

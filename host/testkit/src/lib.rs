@@ -1,4 +1,5 @@
-//! Support for tests of several crates: the project's cases, the folder of measured recordings, and the files of campaign results.
+//! Support for tests of several crates: the project's cases, the folder of measured recordings, rates that are claimed, and
+//! the files of campaign results.
 //!
 //! A dev-dependency only. It depends on `quietcut-model` and the crates below, so that these cannot use it in their tests.
 //!
@@ -8,6 +9,7 @@
 //! ```
 #![allow(clippy::expect_used, clippy::panic)]
 
+pub mod rates;
 pub mod results;
 
 use std::path::PathBuf;

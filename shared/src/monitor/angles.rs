@@ -10,7 +10,7 @@ pub(super) struct Angles {
     first: Turns,
     /// Increment of the spindle angle per sensor sample, in 2⁻³² revolutions.
     per_sample: u64,
-    /// Standard deviation of the spindle angle, in tooth periods.
+    /// Standard deviation of the error of the spindle angle as the tachometer gives it, in tooth periods.
     pub(super) deviation: f32,
     /// Sensor samples per tooth period.
     pub(super) samples_per_tooth: f32,

@@ -8,7 +8,7 @@ use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::pipe::Pipe;
 use embedded_io::{ErrorType, Read, ReadReady, Write, WriteReady};
 
-use crate::WORK;
+use crate::work::WORK;
 
 /// Capacity in bytes of the queue from host to device: 22 ms of bytes at 921 600 baud, the time of a page erase.
 static RECEIVED: Pipe<CriticalSectionRawMutex, 2048> = Pipe::new();

@@ -21,6 +21,7 @@ mod event_timer;
 mod link_line;
 mod sensor;
 mod table_flash;
+mod work;
 
 use cortex_m_rt::exception;
 use defmt_rtt as _;
@@ -34,8 +35,6 @@ use embassy_stm32::time::Hertz;
 use embassy_stm32::usart::{self, Uart};
 use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_stm32::{Config, bind_interrupts, dma, interrupt, peripherals};
-use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
-use embassy_sync::signal::Signal;
 use embassy_time::{Delay, Duration, with_timeout};
 use embedded_hal_bus::spi::ExclusiveDevice;
 use heapless::Vec;
@@ -53,6 +52,7 @@ use crate::event_timer::EDGES;
 use crate::link_line::LinkLine;
 use crate::sensor::{BLOCKS, MAX_BLOCKS};
 use crate::table_flash::TableFlash;
+use crate::work::WORK;
 
 bind_interrupts!(struct Irqs {
     LPUART1 => usart::InterruptHandler<peripherals::LPUART1>;
@@ -70,9 +70,6 @@ const WATCHDOG_MICROSECONDS: u32 = 2_000_000;
 /// Longest sleep of the main loop if no event wakes it.
 const LONGEST_SLEEP: Duration = Duration::from_millis(500);
 
-/// Signal that wakes the main loop: a block of samples has arrived, bytes have arrived, or the line accepts bytes
-/// again.
-static WORK: Signal<CriticalSectionRawMutex, ()> = Signal::new();
 static IO_EXECUTOR: InterruptExecutor = InterruptExecutor::new();
 
 /// Memory for the state of the signal chain, which the device resets. A value with all bits zero takes no space in the

@@ -15,8 +15,8 @@ use quietcut_firmware::accelerometer::Accelerometer;
 use quietcut_firmware::accelerometer::iis3dwb::Iis3dwb;
 use quietcut_firmware::acquisition::Acquisition;
 
-use crate::WORK;
 use crate::event_timer::{self, RISE};
+use crate::work::WORK;
 
 /// The board's accelerometer.
 pub(crate) type Sensor =

@@ -105,8 +105,8 @@ pub struct Gain {
     /// Share of the held-out residual energy above the noise that the extension explains: 1 − (E_after − n)/(E_before − n), with energies
     /// in units of the noise and n compared values; at least −1.
     pub residual_energy_removed: f64,
-    /// 90 % interval of `residual_energy_removed` over draws of the noise, at least −1: there the extension doubles the residual energy.
-    /// The interval is wide if the held-out residual is close to noise.
+    /// 90 % interval of `residual_energy_removed`, from the variance of both residual energies by the noise. It ends at −1, where the extension
+    /// doubles the residual energy above the noise. It is wide if the held-out residual is close to the noise.
     pub ci90: [f64; 2],
 }
 

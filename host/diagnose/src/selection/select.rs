@@ -224,7 +224,8 @@ fn inflation(regression: &Regression) -> f64 {
     (regression.left_by_all() / free + sampling).max(1.0)
 }
 
-/// Selects among single causes, pairs and triples. More causes are tried only if fewer leave a residual above the noise.
+/// Selects among single causes, then pairs, then triples. The search goes on while the residual is above the noise or resembles a further
+/// cause, and while two causes with one parameter each may replace one cause with more parameters.
 pub(crate) fn select(
     criteria: &SelectionCriteria<'_>,
     library: &mut Library,

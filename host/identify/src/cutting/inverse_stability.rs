@@ -94,7 +94,7 @@ pub struct InverseMode {
     pub frequency_hz: Posterior,
     /// Damping ratio.
     pub damping_ratio: Posterior,
-    /// Static stiffness of this mode alone in its softest direction, N/m.
+    /// Static stiffness of this mode alone along the axis (x, y or z) in which it is softest, N/m.
     pub stiffness_n_per_m: Posterior,
     /// Static stiffness of the mode in the first guess, N/m.
     pub start_stiffness_n_per_m: f64,

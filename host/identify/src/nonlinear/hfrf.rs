@@ -111,10 +111,11 @@ pub fn higher_order(response: &Response) -> Option<HigherOrder> {
     })
 }
 
-/// Parameters m, c, k, k3, c3 from thesis eqs 5.16 and 5.17 over all frequencies.
+/// Fits m, c and k to 1/H₁ and k3 and c3 to H₃/(H₁³H₁*), each by linear least squares over all frequencies (thesis eqs 5.16
+/// and 5.17).
 ///
 /// # Errors
-/// Too few levels or frequencies.
+/// Fewer than two frequencies have three or more force levels; or a regression is singular.
 pub fn fit(responses: &[Response]) -> Result<HfrfFit, HfrfError> {
     let estimates: Vec<HigherOrder> = responses.iter().filter_map(higher_order).collect();
     if estimates.len() < 2 {

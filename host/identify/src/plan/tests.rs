@@ -15,6 +15,7 @@ use quietcut_model::structure::FirstOrder;
 use quietcut_simulate::STANDARD_GRAVITY;
 use quietcut_stability::{Plane, Variable};
 use quietcut_testkit::case;
+use quietcut_testkit::rates::assert_share;
 
 fn request(speeds_rpm: &[f64], depth_mm: f64, width: f64) -> Request {
     Request {
@@ -290,7 +291,13 @@ fn shares(errors: &[f64]) -> [f64; 2] {
     [inside, ratio]
 }
 
-fn check([inside, ratio]: [f64; 2], draws: u64) {
+/// Checks the limits at each speed, whose errors are independent from machine to machine, and those at all speeds together.
+fn check(errors: &[f64], [inside, ratio]: [f64; 2], speeds_rpm: &[f64], draws: u64) {
+    for (index, rpm) in speeds_rpm.iter().enumerate() {
+        let of_speed = errors.iter().skip(index).step_by(speeds_rpm.len());
+        let hits = of_speed.filter(|error| error.abs() <= 1.0).count();
+        assert_share(&format!("limit at {rpm} rev/min"), 0.9, hits, draws as usize);
+    }
     // The errors of one machine are correlated: they count as one. The tolerance is three standard deviations of a share, and of a
     // standard deviation.
     let n = draws as f64;
@@ -300,9 +307,10 @@ fn check([inside, ratio]: [f64; 2], draws: u64) {
 
 #[test]
 fn planned_intervals_cover_the_limits_of_a_few_machines() {
-    let (plan, errors) = campaign(&[800.0, 1200.0, 1700.0], 0.12, 16);
+    let speeds = [800.0, 1200.0, 1700.0];
+    let (plan, errors) = campaign(&speeds, 0.12, 16);
     assert!(plan.reached && !plan.tests.is_empty());
-    check(shares(&errors), 16);
+    check(&errors, shares(&errors), &speeds, 16);
 }
 
 /// Run with `cargo test --release -p quietcut-identify --lib plan -- --ignored --nocapture`.
@@ -328,7 +336,7 @@ fn planned_intervals_cover_the_limits_of_many_machines() {
             format!("{:.3}", found[1]),
         ),
     ]);
-    check(found, 400);
+    check(&errors, found, &speeds, 400);
 }
 
 /// Cost of the cheapest of all sets of up to three tests that reach the width.

@@ -13,7 +13,7 @@ pub enum JointParameter {
     CubicStiffness(usize),
     /// Cubic damping of a joint, N m s³/rad³.
     CubicDamping(usize),
-    /// Mass of the last link, which carries tool and payload, kg.
+    /// Mass of the last link including the tool and the payload on it, kg.
     Payload,
 }
 

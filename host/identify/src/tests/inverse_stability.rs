@@ -11,8 +11,8 @@ use rayon::prelude::*;
 use crate::cutting::inverse_stability::{CutErrors, InverseMode, PriorFactors, modes};
 use crate::cutting::observed_cut::ObservedCut;
 use quietcut_model::case::Case;
-use quietcut_numerics::statistics::binomial_interval;
 use quietcut_stability::{CubicTerms, Method, Pitched, Problem, Sdm, SdmOrder, SemiDiscretization};
+use quietcut_testkit::rates::assert_share;
 use quietcut_testkit::results::Campaign;
 
 const ERRORS: CutErrors = CutErrors {
@@ -142,6 +142,19 @@ fn measured(speeds: &[f64], seeds: u64) -> ([(f64, f64); 3], f64) {
     (found, mean)
 }
 
+/// Asserts for each parameter that its 90 % interval contains the truth as often as it claims.
+fn check(found: [(f64, f64); 3], seeds: u64) {
+    for (name, (held, _)) in PARAMETERS.iter().zip(found) {
+        let hits = (held * seeds as f64).round() as usize;
+        assert_share(
+            &format!("seeds 0 to {}: {name}", seeds - 1),
+            0.9,
+            hits,
+            seeds as usize,
+        );
+    }
+}
+
 #[test]
 fn a_few_cuts_identify_the_mode_and_one_does_not() {
     let mut random = ChaCha8Rng::seed_from_u64(7);
@@ -177,14 +190,7 @@ fn a_few_cuts_identify_the_mode_and_one_does_not() {
 #[test]
 fn intervals_of_a_few_machines_hold_the_truth_as_often_as_they_say() {
     let seeds = 10;
-    for (held, _) in coverage(&SPEEDS, seeds) {
-        let [low, high] = binomial_interval(0.999, (held * seeds as f64).round() as usize, seeds as usize);
-        assert!(
-            (low..=high).contains(&0.9),
-            "seeds 0 to {}: {held} held",
-            seeds - 1
-        );
-    }
+    check(coverage(&SPEEDS, seeds), seeds);
 }
 
 #[test]
@@ -218,6 +224,8 @@ fn coverage_of_inverse_stability() {
         seeds: &format!("0 to {}", seeds - 1),
     }
     .record(&figures);
+    check(many, seeds);
+    check(few, seeds);
     for mean in [mean_of_many, mean_of_few] {
         assert!((0.85..=0.95).contains(&mean), "{mean}");
     }

@@ -2,6 +2,7 @@
 //!
 //! The oracle simulates the tool-space matrices of thesis eq. 3.14, which exist for non-singular wrists; the fit uses joint angles.
 
+use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 use std::path::Path;
 
@@ -20,6 +21,7 @@ use quietcut_recording::{Quantity, Recording};
 use quietcut_simulate::rig::{Noise, Rig, Signal};
 use quietcut_stability::{CubicTerms, Problem, line};
 use quietcut_testkit::case;
+use quietcut_testkit::rates::{assert_pooled_share, assert_share};
 use quietcut_testkit::results::Campaign;
 use quietcut_testkit::robot;
 
@@ -217,6 +219,64 @@ fn unseen(fit: &JointFit, random: &mut ChaCha8Rng, machine: fn(&Robot) -> Struct
     (largest, held)
 }
 
+/// For each parameter of the fit: whether its 90 % interval contains the truth.
+fn held_joints(fit: &JointFit) -> impl Iterator<Item = (String, bool)> {
+    fit.parameters.iter().enumerate().map(|(index, parameter)| {
+        let off = (parameter.value(&fit.robot) / parameter.value(&robot())).ln();
+        let half = NINETY_PERCENT * fit.covariance[(index, index)].sqrt();
+        (parameter.name(), off.abs() <= half)
+    })
+}
+
+/// The parameter whose intervals are too narrow, as the page of limitations says: its estimate is 1 to 2 % low.
+const TOO_NARROW: &str = "joint 6 damping_nms_per_rad";
+
+/// Numbers of fits and of these with the truth in the 90 % interval of each joint parameter and of the peaks at unseen postures.
+#[derive(Default)]
+struct Coverage {
+    largest: f64,
+    fits: usize,
+    peaks: usize,
+    joints: BTreeMap<String, usize>,
+}
+
+impl Coverage {
+    /// Counts over the robots of these seeds, of which `machine` makes the structure.
+    fn of(seeds: std::ops::Range<u64>, machine: fn(&Robot) -> Structure) -> Self {
+        let mut coverage = Self::default();
+        for seed in seeds {
+            let (fit, mut random) = trained(seed, false, machine);
+            let (off, peaks) = unseen(&fit, &mut random, machine);
+            coverage.largest = coverage.largest.max(off);
+            coverage.fits += 1;
+            coverage.peaks += peaks;
+            for (name, held) in held_joints(&fit) {
+                *coverage.joints.entry(name).or_default() += usize::from(held);
+            }
+        }
+        coverage
+    }
+
+    /// Asserts the error of the peaks and that the 90 % intervals hold the truth as often as they claim. The three peaks of one posture
+    /// are correlated: each posture counts as one draw.
+    fn check(&self) {
+        assert!(self.largest < 0.03, "{}", self.largest);
+        let share = self.peaks as f64 / (30 * self.fits) as f64;
+        assert_pooled_share("peaks at unseen postures", 0.9, share, 10 * self.fits);
+        for (name, held) in self.joints.iter().filter(|(name, _)| *name != TOO_NARROW) {
+            assert_share(name, 0.9, *held, self.fits);
+        }
+    }
+}
+
+/// A seeded slice of the campaign.
+#[test]
+fn intervals_of_a_few_robots_hold_the_truth_as_often_as_they_say() {
+    let coverage = Coverage::of(10..16, tool_space);
+    println!("{:?}, peaks {}", coverage.joints, coverage.peaks);
+    coverage.check();
+}
+
 #[test]
 fn peaks_at_unseen_postures_are_within_three_percent() {
     for (seed, payload) in [(1, false), (2, true)] {
@@ -278,23 +338,11 @@ fn coverage_of_joints() {
         .unwrap_or(20);
     type Machine = fn(&Robot) -> Structure;
     let machines: [(&str, Machine); 2] = [("without", tool_space), ("with", sagged)];
-    let (mut figures, mut worst) = (Vec::new(), 0.0_f64);
+    let (mut figures, mut found) = (Vec::new(), Vec::new());
     for (name, machine) in machines {
-        let (mut largest, mut held, mut joints) = (0.0_f64, 0, 0);
-        for seed in 0..seeds {
-            let (fit, mut random) = trained(seed, false, machine);
-            let (off, of_peaks) = unseen(&fit, &mut random, machine);
-            largest = largest.max(off);
-            held += of_peaks;
-            joints += (0..fit.parameters.len())
-                .filter(|index| {
-                    let off = (fit.parameters[*index].value(&fit.robot)
-                        / fit.parameters[*index].value(&robot()))
-                    .ln();
-                    off.abs() <= NINETY_PERCENT * fit.covariance[(*index, *index)].sqrt()
-                })
-                .count();
-        }
+        let coverage = Coverage::of(0..seeds, machine);
+        let (largest, held) = (coverage.largest, coverage.peaks as u64);
+        let joints: usize = coverage.joints.values().sum();
         println!(
             "seeds 0 to {}, {name} gravity: peaks at unseen postures within {:.2} %, {:.1} % of {} held, joints {:.1} % of {}",
             seeds - 1,
@@ -304,7 +352,6 @@ fn coverage_of_joints() {
             100.0 * joints as f64 / (12 * seeds) as f64,
             12 * seeds
         );
-        worst = worst.max(largest);
         let share = |held: u64, all: u64| format!("{:.1} % of {all}", 100.0 * held as f64 / all as f64);
         figures.extend([
             (
@@ -313,13 +360,18 @@ fn coverage_of_joints() {
             ),
             (
                 format!("90 % intervals of these peaks that hold the truth, {name} gravity"),
-                share(held as u64, 30 * seeds),
+                share(held, 30 * seeds),
             ),
             (
                 format!("90 % intervals of joint parameters that hold the truth, {name} gravity"),
                 share(joints as u64, 12 * seeds),
             ),
+            (
+                format!("of these the intervals of {TOO_NARROW}"),
+                share(coverage.joints[TOO_NARROW] as u64, seeds),
+            ),
         ]);
+        found.push(coverage);
     }
     Campaign {
         name: "robot-joints",
@@ -330,7 +382,7 @@ fn coverage_of_joints() {
         seeds: &format!("0 to {} for each machine", seeds - 1),
     }
     .record(&figures);
-    assert!(worst < 0.03, "{worst}");
+    found.iter().for_each(Coverage::check);
 }
 
 #[test]

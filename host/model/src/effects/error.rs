@@ -47,7 +47,8 @@ pub enum EffectError {
         /// Description of the possible values.
         needed: &'static str,
     },
-    /// A direction that the structure does not have, or one that must be given.
+    /// A direction of an effect that cannot be used: for example one that the structure does not have, a rotation instead of an axis, or
+    /// none although the structure has several.
     #[error("effect `{name}`: {what}; the structure has the directions {directions}")]
     Direction {
         /// The effect.

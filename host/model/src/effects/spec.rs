@@ -148,7 +148,8 @@ pub enum Treatment {
     ProcessOfSpeed,
     /// A smooth restoring force: it is linearized about the forced periodic orbit.
     Smooth,
-    /// A power law of the chip thickness or process damping: the cutting force is linearized about the forced chip thickness.
+    /// The cutting force has either a power law of the chip thickness, linearized about the chip thickness by the feed alone, or process
+    /// damping, which is linear in the velocity.
     ChipLaw,
     /// A restoring force that is not smooth. Stability computations replace it by its equivalent stiffness and damping at the amplitude of
     /// the forced periodic orbit.

@@ -157,6 +157,32 @@ fn channels_in_rows_match_a_time_vector() {
 }
 
 #[test]
+fn nan_and_infinite_samples_are_refused_with_channel_and_time_or_left_out() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.mat");
+    for (value, word) in [
+        (f64::NAN, "NaN"),
+        (f64::INFINITY, "inf"),
+        (f64::NEG_INFINITY, "-inf"),
+    ] {
+        let bytes = file(&[
+            matrix_element("t", 6, 1, 4, 9, &doubles(&[0.0, 0.1, 0.2, 0.3])),
+            matrix_element("ch", 6, 1, 4, 9, &doubles(&[1.0, 2.0, value, 4.0])),
+        ]);
+        std::fs::write(&path, bytes).unwrap();
+        let said = crate::Recording::read(&path).unwrap_err().to_string();
+        let place = format!("\"ch\": sample 3 at 0.2 s is {word}");
+        assert!(said.contains(&place) && said.contains("--until-s"), "{said}");
+        let before = crate::Segment {
+            from_s: None,
+            until_s: Some(0.2),
+        };
+        let read = crate::Recording::read_segment(&path, before).unwrap();
+        assert_eq!(read.channel("ch").unwrap().samples, [1.0, 2.0]);
+    }
+}
+
+#[test]
 fn a_constant_channel_is_read_and_a_decompression_bomb_refused() {
     let zeros = |count: usize| {
         let matrix = matrix_element("a", 6, 1, count as i32, 2, &vec![0; count]);

@@ -263,8 +263,8 @@ impl Gap<'_> {
 }
 
 impl Gap<'_> {
-    /// True if the gap between two speeds is wider than [`TONGUE_GAP`] and a tongue of instability shows beside one of
-    /// these speeds.
+    /// True if a tongue of instability may lie between two speeds: their gap is wider than [`TONGUE_GAP`], and at one of
+    /// them |μ| over the depth has a maximum closely below 1.
     fn may_hide_a_tongue(&self) -> bool {
         self.right.rpm > self.left.rpm * (1.0 + TONGUE_GAP)
             && [self.left, self.right]

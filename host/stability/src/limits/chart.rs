@@ -60,8 +60,8 @@ pub struct Refinement {
     /// Largest difference between a limit and the straight line between the limits at neighbouring speeds up to which
     /// no speed is added, as a share of the largest depth.
     pub tolerance: f64,
-    /// Least distance between neighbouring speeds of the chart, relative to the speed; no speed is added between closer
-    /// ones.
+    /// Least distance of an added speed from its neighbours in the chart, relative to the speed: a gap narrower than twice
+    /// this gets no further speed.
     pub least_step: f64,
     /// Number of speeds of the chart from which no further round of refinement begins.
     pub most_speeds: usize,

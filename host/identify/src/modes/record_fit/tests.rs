@@ -11,11 +11,11 @@ use super::*;
 use crate::modes::{Options, Receptances, identify};
 use quietcut_frf::{Estimator, MeasurementSettings, measure, record_spectra};
 use quietcut_model::structure::{Form, Mode};
-use quietcut_numerics::statistics::binomial_interval;
 use quietcut_recording::{Channel, Quantity, Recording, Sidecar, TestKind};
 use quietcut_simulate::rig::Noise;
 use quietcut_simulate::{Entry, Pores, Recorder, TachometerModel, VirtualCut};
 use quietcut_testkit::case;
+use quietcut_testkit::rates::assert_share;
 use quietcut_testkit::results::Campaign;
 
 const RATE_HZ: f64 = 1024.0;
@@ -233,6 +233,14 @@ impl Tally {
         );
         share
     }
+
+    /// Asserts for each parameter that its 90 % intervals contain the truth as often as they claim.
+    fn check(&self, what: &str) {
+        for (name, values) in &self.rows {
+            let inside = values.iter().filter(|z| z.abs() < 1.644_85).count();
+            assert_share(&format!("{what}: {name}"), 0.9, inside, values.len());
+        }
+    }
 }
 
 #[test]
@@ -275,6 +283,7 @@ fn unmeasured_forces_do_not_count_as_noise_of_measured_forces() {
     }
     let share = tally.covered("seeds 100 to 107");
     assert!(share > 0.8, "{share}");
+    tally.check("unmeasured forces");
 }
 
 #[test]
@@ -350,16 +359,7 @@ fn porous(foams: u64, seeds: u64) -> Tally {
 /// parameter.
 #[test]
 fn intervals_of_modes_from_a_porous_cut_hold_the_truth_as_often_as_they_say() {
-    let tally = porous(1, 6);
-    for (name, errors) in &tally.rows {
-        let inside = errors.iter().filter(|error| error.abs() < 1.644_85).count();
-        let [low, high] = binomial_interval(0.999, inside, errors.len());
-        assert!(
-            (low..=high).contains(&0.9),
-            "{name}: {inside} of {}",
-            errors.len()
-        );
-    }
+    porous(1, 6).check("porous");
 }
 
 #[test]
@@ -367,7 +367,8 @@ fn intervals_of_modes_from_a_porous_cut_hold_the_truth_as_often_as_they_say() {
 fn coverage_of_modes_from_porous_milling_and_speed_sweeps() {
     let seeds = std::env::var("QUIETCUT_SEEDS").map_or(100, |text| text.parse().unwrap());
     let truth = table_7_1();
-    let mut pooled = vec![porous(4, seeds).covered("porous")];
+    let porous = porous(4, seeds);
+    let mut pooled = vec![porous.covered("porous")];
     let mut sweeps = Tally::default();
     let clean = [[68.4, 109.8], [138.6, 180.0], [0.0, 41.4]]
         .map(|immersion| cut(180.0, [390.0, 750.0], immersion, None));
@@ -379,7 +380,20 @@ fn coverage_of_modes_from_porous_milling_and_speed_sweeps() {
         sweeps.add(off(&found, &truth));
     }
     pooled.push(sweeps.covered("speed sweep"));
-    let figures: Vec<_> = ["porous cuts", "speed sweeps in three immersions"]
+    // Forces that are nearly dependent leave too narrow intervals: their share is recorded, and claimed nowhere.
+    let mut dependent = Tally::default();
+    for seed in 0..seeds {
+        let recording = noisy(&record(&truth, SECONDS, seed, 0.0), 2.0, seed);
+        let (_, found, _) = identified(&[recording], BAND_HZ, RESOLUTION_HZ, Estimator::H1);
+        dependent.add(off(&found, &truth));
+    }
+    pooled.push(dependent.covered("nearly dependent forces"));
+    let names = [
+        "porous cuts",
+        "speed sweeps in three immersions",
+        "records whose forces are nearly dependent, with 2 % noise",
+    ];
+    let figures: Vec<_> = names
         .iter()
         .zip(&pooled)
         .map(|(name, share)| {
@@ -398,7 +412,9 @@ fn coverage_of_modes_from_porous_milling_and_speed_sweeps() {
         seeds: &format!("0 to {}; noise with the standard deviation of 1 % of each channel", seeds - 1),
     }
     .record(&figures);
-    for share in pooled {
-        assert!((0.85..0.95).contains(&share), "{share}");
+    porous.check("porous");
+    sweeps.check("speed sweep");
+    for share in &pooled[..2] {
+        assert!((0.85..0.95).contains(share), "{share}");
     }
 }
