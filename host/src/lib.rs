@@ -1,6 +1,50 @@
 //! The library behind the `quietcut` command: command line, device client, demonstration and report pages.
 //!
-//! It re-exports the library crates of the workspace (recording, model, frf, simulate, stability, identify, diagnose).
+//! It re-exports the library crates of the workspace (recording, model, frf, simulate, stability, identify, diagnose). Its own modules are
+//! what no library crate knows: [`cli`] parses arguments and prints answers, [`report`] draws pictures and
+//! pages, [`device`] speaks with a monitor over a serial port, [`demo`] shows the monitor without a machine, [`machine`] keeps the folder of a
+//! machine that is set up.
+//!
+//! The stability limit of a case at one spindle speed:
+//!
+//! ```
+//! use quietcut::case::Case;
+//! use quietcut::stability::{Collocation, CubicTerms, Method, Problem};
+//!
+//! let text = r#"
+//! [structure]
+//! kind = "matrices"
+//! directions = ["x"]
+//! mass = [[0.0399]]
+//! damping = [[5.516]]
+//! stiffness = [[1.348e6]]
+//! [tool]
+//! teeth = 2
+//! edge_angle_deg = 90.0
+//! [material]
+//! ktc_mpa = 600.0
+//! krc_mpa = 200.0
+//! kac_mpa = 0.0
+//! kte_n_per_mm = 0.0
+//! kre_n_per_mm = 0.0
+//! kae_n_per_mm = 0.0
+//! [cut]
+//! start_deg = 90.0
+//! exit_deg = 180.0
+//! feed_per_tooth_mm = 0.1
+//! "#;
+//! let case = Case::parse("one-mode.toml".as_ref(), text)?;
+//! let method = Collocation {
+//!     problem: Problem::new(&case, CubicTerms::Refuse)?,
+//! };
+//! // Depths up to 5 mm at 10 000 rev/min, in 40 steps.
+//! let line = method.line(10_000.0, 5.0, 40)?;
+//! let limit = line.first_limit.ok_or("stable up to 5 mm")?;
+//! assert!(limit.depth_mm > 0.0 && limit.chatter_hz > Some(0.0));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! No library crate knows the command line, a terminal or a picture; mathematics of vibration and cutting does not stand here.
 
 pub use quietcut_diagnose as diagnose;
 pub use quietcut_frf as frf;

@@ -1,4 +1,6 @@
 //! Shared code of the integration tests: paths of command, cases and measured data, firmware images, emulator.
+//!
+//! It has no examples, and doc tests are off: only the tests of this package use it.
 // A helper function that fails must fail the test that calls it.
 #![allow(clippy::expect_used, clippy::panic)]
 

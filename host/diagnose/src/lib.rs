@@ -23,6 +23,51 @@
 //!
 //! "The thesis" in this crate is *Chatter Vibrations in Robotic Milling Considering Structural Nonlinearity*, a doctoral
 //! thesis of the University of Victoria; its equation numbers are given as "thesis eq. 5.16".
+//!
+//! The entry is [`diagnose`]. A baseline of one mode, and a sweep of a machine whose spring softens with the displacement:
+//!
+//! ```
+//! use std::path::Path;
+//!
+//! use quietcut_diagnose::answer::Outcome;
+//! use quietcut_diagnose::{Options, diagnose};
+//! use quietcut_model::case::Case;
+//! use quietcut_model::structure::Direction;
+//! use quietcut_simulate::Effects;
+//! use quietcut_simulate::rig::{Noise, Rig, Signal};
+//!
+//! let text = r#"
+//! [structure]
+//! kind = "matrices"
+//! directions = ["x"]
+//! mass = [[188.0]]
+//! damping = [[305.0]]
+//! stiffness = [[2260000.0]]
+//! "#;
+//! let baseline = Case::parse(Path::new("baseline.toml"), text)?;
+//! let sweep = Signal::Sweep {
+//!     first_hz: 10.0,
+//!     last_hz: 25.0,
+//!     amplitude_n: 60.0,
+//!     seconds: 20.0,
+//! };
+//! let mut rig = Rig::new(Direction::X, sweep, 256.0);
+//! rig.effects = Effects::parse(["cubic-stiffness=-1e12"])?;
+//! let (mut recording, _) = rig.record(baseline.structure()?, Path::new("sweep.csv"))?;
+//! // Noise of 1 % on force, displacement and acceleration.
+//! let noise = Noise { relative: 0.01, ..Noise::default() };
+//! noise.add(&mut recording, 1);
+//!
+//! let diagnosis = diagnose(&baseline, &[recording], &Options::default())?;
+//! assert_eq!(diagnosis.outcome, Outcome::Cause);
+//! let cause = &diagnosis.causes[0];
+//! assert_eq!(cause.name, "cubic-stiffness");
+//! assert!((cause.parameters["k3_n_per_m3"].value / -1e12 - 1.0).abs() < 0.02);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! This crate reads no command line and prints nothing. It identifies no parameter of a case that has no recording beside it; that is for
+//! the crate `identify`.
 
 mod baseline;
 mod candidates;

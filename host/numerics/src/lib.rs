@@ -12,6 +12,21 @@
 //! | [`dormand_prince`] | one step of an integration in time |
 //! | [`statistics`] | quantiles of the usual distributions |
 //!
+//! ```
+//! use nalgebra::{DMatrix, DVector};
+//! use quietcut_numerics::least_squares::LinearProblem;
+//! use quietcut_numerics::statistics::NINETY_PERCENT;
+//!
+//! // A straight line through (0, 1), (1, 3) and (2, 5).
+//! let columns = DMatrix::from_row_slice(3, 2, &[1.0, 0.0, 1.0, 1.0, 1.0, 2.0]);
+//! let values = DVector::from_row_slice(&[1.0, 3.0, 5.0]);
+//! let fit = LinearProblem::new(&columns, &values).solve()?;
+//! assert!((fit.parameters[1] - 2.0).abs() < 1e-12);
+//! // The 90 % interval of a normal variable is ±1.645 standard deviations.
+//! assert!((NINETY_PERCENT - 1.645).abs() < 1e-3);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
 //! Arguments and results are matrices of `nalgebra`. The number of iterations is bounded everywhere, and a result states why an iteration
 //! stopped.
 //!
