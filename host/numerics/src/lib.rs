@@ -4,7 +4,7 @@
 //! |---|---|
 //! | [`eigenvalues`] | eigenvalues of real, complex, symmetric and companion matrices |
 //! | [`singular_values`] | decomposition A = U Σ Vᵀ |
-//! | [`least_squares`] | linear, robust, from normal equations, nonlinear |
+//! | [`least_squares`] | linear, from normal equations, nonlinear |
 //! | [`newton`] | Newton's method for numbers and vectors |
 //! | [`roots`] | bisection, regula falsi, golden section |
 //! | [`crossing`] | the first zero crossing within a time step |

@@ -22,9 +22,9 @@ use super::factored::Factored;
 /// ```
 #[derive(Clone, Copy, Debug)]
 pub struct LinearProblem<'a> {
-    pub(super) matrix: &'a DMatrix<f64>,
-    pub(super) right: &'a DVector<f64>,
-    pub(super) weights: Option<&'a DVector<f64>>,
+    matrix: &'a DMatrix<f64>,
+    right: &'a DVector<f64>,
+    weights: Option<&'a DVector<f64>>,
     prior: Option<[&'a DVector<f64>; 2]>,
 }
 

@@ -1,9 +1,8 @@
-//! Least squares: linear, robust, from normal equations, and nonlinear.
+//! Least squares: linear, from normal equations, and nonlinear.
 //!
 //! | problem | entry | method |
 //! |---|---|---|
 //! | min ‖W(A x − b)‖² + ‖P(x − x₀)‖² | [`LinearProblem`] | column scaling, Householder QR with column pivoting |
-//! | min Σ ρ(rᵢ) with outliers | [`LinearProblem::solve_robust`] | iteratively reweighted, Huber or Tukey |
 //! | min ‖x‖ of all x of least ‖A x − b‖ | [`MinimumNorm`] | singular value decomposition |
 //! | min ‖A x + B y − b‖² without x | [`eliminated`] | column scaling, Householder QR |
 //! | AᴴA x = Aᴴb that was summed | [`NormalEquations`] | diagonal scaling, Cholesky |
@@ -18,14 +17,12 @@ mod levenberg_marquardt;
 mod linear;
 mod minimum_norm;
 mod normal_equations;
-mod robust;
 
 pub use elimination::eliminated;
 pub use levenberg_marquardt::{Damping, LevenbergMarquardt, Minimum, NormalSums, Objective};
 pub use linear::{LinearFit, LinearProblem};
 pub use minimum_norm::{MinimumNorm, Tolerance};
 pub use normal_equations::{Idle, NormalEquations, invert_normal_equations, solve_normal_equations};
-pub use robust::{Loss, RobustFit};
 
 /// Error of a least-squares problem.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
