@@ -47,7 +47,6 @@ const ROOMS: &[(&str, &[&str])] = &[
         &[
             "criteria",
             "least_squares",
-            "student",
             "modes",
             "dwells",
             "nonlinear",

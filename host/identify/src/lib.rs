@@ -55,7 +55,6 @@ pub mod modes;
 pub mod nonlinear;
 pub mod plan;
 pub mod robot;
-pub mod student;
 
 pub use ambient::subspace;
 pub use cutting::{chip, force_coefficients, force_test, inverse_stability, observed_cut};

@@ -18,8 +18,7 @@ use rayon::prelude::*;
 
 use super::recording::Ambient;
 use crate::criteria::{AMBIENT_BLOCKS, LARGEST_AMBIENT_DAMPING, SAME_MODE};
-use crate::student::NINETY_PERCENT;
-use crate::student::ninety_percent;
+use quietcut_numerics::statistics::{NINETY_PERCENT, student_ninety_percent};
 
 /// A mode from ambient vibration with standard deviations; the half-width of its 90 % intervals is 1.645 standard
 /// deviations.
@@ -238,7 +237,7 @@ impl Record {
             })
             .collect::<Result<_, AmbientError>>()?;
         let count = self.of_blocks.len() as f64;
-        let few = ninety_percent(self.of_blocks.len() - 1) / NINETY_PERCENT;
+        let few = student_ninety_percent(self.of_blocks.len() - 1) / NINETY_PERCENT;
         let modes = poles
             .iter()
             .map(|pole| {

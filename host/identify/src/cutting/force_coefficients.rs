@@ -19,9 +19,8 @@ use crate::criteria::{LARGEST_LAST_STEP, LEAST_METHOD_DIFFERENCE, SAME_FEED};
 use crate::cutting::chip::{Chip, chips};
 use crate::cutting::force_test::CuttingTest;
 use crate::cutting::prepared_test::{Prepared, prepared};
-use crate::student::NINETY_PERCENT;
-use crate::student::ninety_percent;
 use quietcut_model::milling::Runout;
+use quietcut_numerics::statistics::{NINETY_PERCENT, student_ninety_percent};
 
 /// Keys of the force coefficients in a case: three cutting coefficients in MPa, three edge coefficients in N/mm.
 pub const KEYS: [&str; 6] = [
@@ -490,5 +489,5 @@ pub fn runout(fit: &Fit) -> Option<Runout> {
 fn few(revolutions: usize, parameters: usize) -> f64 {
     let count = revolutions as f64;
     let taken = count / (count - parameters as f64).max(1.0);
-    taken.sqrt() * ninety_percent(revolutions.saturating_sub(1)) / NINETY_PERCENT
+    taken.sqrt() * student_ninety_percent(revolutions.saturating_sub(1)) / NINETY_PERCENT
 }

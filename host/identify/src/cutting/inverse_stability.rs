@@ -26,8 +26,8 @@ use crate::criteria::{
 use crate::cutting::observed_cut::ObservedCut;
 use crate::modes::IdentifiedMode;
 use crate::modes::shape::{normalize, rank_one};
-use crate::student::NINETY_PERCENT;
 use quietcut_model::structure::{Direction, FirstOrder, Mode};
+use quietcut_numerics::statistics::NINETY_PERCENT;
 use quietcut_stability::{Problem, StabilityError, point};
 
 /// Width of the prior distribution of the modal parameters: for each kind, the largest factor, up or down, from the

@@ -14,7 +14,7 @@ use quietcut_numerics::least_squares::{LinearProblem, invert_normal_equations};
 
 use crate::criteria::{BAND_SIGNAL_TO_NOISE, LEAST_SLICE_SAMPLES, SAMPLES_PER_TERM};
 use crate::nonlinear::spectrum::{Spectral, band_of, dominant_frequency_hz};
-use crate::student::NINETY_PERCENT;
+use quietcut_numerics::statistics::NINETY_PERCENT;
 use quietcut_recording::Quantity;
 
 /// A term of a force law f(q, q̇, q̈) along one direction q.

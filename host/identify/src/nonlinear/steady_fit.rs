@@ -15,8 +15,8 @@ use crate::least_squares::{Normal, Spread, minimum};
 use crate::nonlinear::harmonic_balance::{Grid, Problem, Solution};
 use crate::nonlinear::law::Law;
 use crate::nonlinear::whitening::OutputMap;
-use crate::student::NINETY_PERCENT;
 use quietcut_model::structure::Direction;
+use quietcut_numerics::statistics::NINETY_PERCENT;
 
 /// Result of a fit of an equation of motion to dwells of steady motion.
 #[derive(Clone, Debug)]

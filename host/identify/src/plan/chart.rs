@@ -4,7 +4,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use quietcut_numerics::statistics::sample_quantile;
 
 use crate::criteria::NEVER_LOWEST;
-use crate::student::NINETY_PERCENT;
+use quietcut_numerics::statistics::NINETY_PERCENT;
 use quietcut_stability::Basis;
 use quietcut_stability::{Linearized, Plane, SpeedLine, StabilityError};
 

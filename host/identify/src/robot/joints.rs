@@ -19,10 +19,9 @@ use rayon::prelude::*;
 pub use super::joint_parameter::JointParameter;
 use crate::criteria::{GUESSED_STIFFNESS_RATIO, LEAST_RELATIVE_ERROR, NEARLY_STATIC};
 use crate::least_squares::FitError;
-use crate::student::NINETY_PERCENT;
-use crate::student::ninety_percent;
 use quietcut_frf::FrfTable;
 use quietcut_model::structure::Robot;
+use quietcut_numerics::statistics::{NINETY_PERCENT, student_ninety_percent};
 
 /// Receptances at one posture.
 #[derive(Clone, Debug)]
@@ -346,7 +345,7 @@ fn finish(robot: Robot, parameters: Vec<JointParameter>, normal: &Normal) -> Res
     let inverse = invert_normal_equations(&normal.sums.matrix)
         .ok_or_else(|| JointFitError::Undetermined("all parameters".into()))?;
     let count = normal.entries as f64;
-    let few = ninety_percent(normal.entries.saturating_sub(1)) / NINETY_PERCENT;
+    let few = student_ninety_percent(normal.entries.saturating_sub(1)) / NINETY_PERCENT;
     let taken = count / (count - parameters.len() as f64).max(1.0);
     let scatter = &inverse * &normal.scatter * &inverse * (taken * few * few);
     Ok(JointFit {

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 
 use crate::ambient::Ambient;
 use crate::ambient::subspace::{AmbientError, modes};
-use crate::student::NINETY_PERCENT;
+use quietcut_numerics::statistics::NINETY_PERCENT;
 use quietcut_recording::{Channel, Quantity, RecordedCut, Recording, Sidecar, TestKind};
 use quietcut_testkit::rates::{assert_least_share, assert_share};
 use quietcut_testkit::results::Campaign;

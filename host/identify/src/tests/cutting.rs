@@ -6,8 +6,8 @@ use rayon::prelude::*;
 
 use crate::cutting::force_coefficients::{ForceCoefficientError, KEYS, fit, runout};
 use crate::cutting::force_test::{CuttingTest, Setup};
-use crate::student::NINETY_PERCENT;
 use quietcut_model::case::Case;
+use quietcut_numerics::statistics::NINETY_PERCENT;
 use quietcut_recording::Recording;
 use quietcut_simulate::rig::Noise;
 use quietcut_simulate::{Entry, Recorder, TachometerModel, VirtualCut};

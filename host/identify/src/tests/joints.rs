@@ -13,10 +13,10 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
 use crate::robot::joints::{JointFit, PostureFrf, fit};
-use crate::student::NINETY_PERCENT;
 use quietcut_frf::{MeasurementSettings, measure};
 use quietcut_model::case::Case;
 use quietcut_model::structure::{Direction, FirstOrder, Form, Matrices, Robot, Structure};
+use quietcut_numerics::statistics::NINETY_PERCENT;
 use quietcut_recording::{Quantity, Recording};
 use quietcut_simulate::rig::{Noise, Rig, Signal};
 use quietcut_stability::{CubicTerms, Problem, line};

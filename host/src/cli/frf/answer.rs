@@ -7,8 +7,8 @@ use serde::Serialize;
 
 use super::args::{Args, Method};
 use crate::frf::{FrfTable, Measurement, ModeRatio, RecordingGroup};
-use crate::identify::student::NINETY_PERCENT;
 use crate::report::digits::significant;
+use quietcut_numerics::statistics::NINETY_PERCENT;
 
 /// Output of `quietcut frf --json`.
 #[derive(Serialize)]

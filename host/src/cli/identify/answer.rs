@@ -12,9 +12,9 @@ use crate::identify::linearity::Verdict;
 use crate::identify::modes::{ChannelNoise, ModalModel, Rejected};
 use crate::identify::ncma::Map;
 use crate::identify::reciprocity::Reciprocity;
-use crate::identify::student::NINETY_PERCENT;
 use crate::identify::sweep::Comparison;
 use crate::structure::Direction;
+use quietcut_numerics::statistics::NINETY_PERCENT;
 
 /// Output of `quietcut identify` for any method; a field that the method does not compute stays empty.
 #[derive(Debug, Default, Serialize)]

@@ -17,9 +17,9 @@ use crate::identify::dwell::Dwell;
 use crate::identify::joints::{self, JointParameter, PostureFrf};
 use crate::identify::law::NonlinearTerm;
 use crate::identify::steady::{Settling, steady};
-use crate::identify::student::NINETY_PERCENT;
 use crate::recording::{Recording, TestKind};
 use crate::structure::{Direction, Form, Robot, Structure};
+use quietcut_numerics::statistics::NINETY_PERCENT;
 
 /// Recordings at one posture of the robot.
 struct AtPosture {
