@@ -18,6 +18,8 @@
 //! damped modes whose frequencies add up to a multiple of the tooth-passing frequency become unstable in a narrow
 //! tongue, which may end within a gap. A line beside it shows a maximum of |μ| over the depth: a gap beside such a line is
 //! halved down to [`TONGUE_GAP`].
+//!
+//! Lobe tables are refined by another rule, [`Chart::refined`]; the head of its file says why.
 
 use super::chart::{Chart, chart};
 use super::method::Method;

@@ -1,4 +1,12 @@
 //! Stability charts: the line of every spindle speed, by any method.
+//!
+//! Two refinements in speed exist, since a table and a chart ask for different things. [`Chart::refined`] serves lobe tables:
+//! the device interpolates between the stored speeds, so that each gap is tested at its middle, against one tolerance in
+//! depth, until the table has its size. [`Chart::with_lines_between`] serves charts that are drawn: its tolerance is relative
+//! to the limit, a steep limit may be off in speed instead, and regions within a gap must be found although no limit at its
+//! ends shows them. It predicts all this from neighbouring gaps and from |μ| of every line, which costs no line for a gap
+//! that is straight. Under that rule the smallest limit would set the number of speeds of a table, not its size; a chart that
+//! is tested at middles alone would miss regions within a gap.
 
 use rayon::prelude::*;
 use serde::Serialize;
