@@ -12,6 +12,7 @@
 
 use nalgebra::{DMatrix, DVector, Matrix3};
 use num_complex::Complex64;
+use quietcut_numerics::least_squares::{Idle, NormalEquations};
 use rayon::prelude::*;
 
 use crate::baseline::dynamic_stiffness;
@@ -272,8 +273,8 @@ fn effective_force(study: &Study<'_>, record: &Record) -> [Vec<Complex64>; 3] {
                 normal[(i, i)] += Complex64::from(vanishing * vanishing);
             }
             let mut whole = [Complex64::ZERO; 3];
-            if let Some(solved) = normal.lu().solve(&left) {
-                let added = h.adjoint() * solved;
+            if let Some(equations) = NormalEquations::new(&normal, 0.0, Idle::Refuse) {
+                let added = h.adjoint() * equations.solve(&left);
                 for i in 0..size {
                     whole[axes[i]] = force[i] + added[i];
                 }

@@ -4,6 +4,7 @@
 //! are whitened. Their inner products (Gram matrices) then give the fit of any set of regressors.
 
 use nalgebra::{DMatrix, DVector};
+use quietcut_numerics::least_squares::{Idle, NormalEquations};
 use rayon::prelude::*;
 
 use crate::criteria::RELATIVE_ERROR_OF_CUTS;
@@ -151,20 +152,12 @@ impl Regression {
         columns.retain(|column| column.iter().any(|value| *value != 0.0));
         let size = columns.len();
         columns.push(residual);
-        let mut gram = products(&columns, 0);
-        let whole = gram[(size, size)];
-        let right = gram.view((0, size), (size, 1)).clone_owned();
-        let scale = DVector::from_fn(size, |i, _| gram[(i, i)].sqrt());
-        let mut gram = gram.view_mut((0, 0), (size, size)).clone_owned();
-        for i in 0..size {
-            for j in 0..size {
-                gram[(i, j)] /= scale[i] * scale[j];
-            }
-            gram[(i, i)] += SOFTENED;
-        }
-        let right = right.column(0).component_div(&scale);
-        match gram.cholesky() {
-            Some(factor) => (whole - factor.solve(&right).dot(&right)).max(0.0),
+        let products = products(&columns, 0);
+        let whole = products[(size, size)];
+        let gram = products.view((0, 0), (size, size)).into_owned();
+        let right = products.view((0, size), (size, 1)).column(0).into_owned();
+        match NormalEquations::new(&gram, SOFTENED, Idle::Refuse) {
+            Some(equations) => (whole - equations.explained(&right)).max(0.0),
             None => whole,
         }
     }
@@ -415,10 +408,6 @@ impl Regression {
 
     /// Solution and inverse of the normal equations of the regression columns `columns`, with the right side `right` in the same order;
     /// `None` if the columns are dependent or zero.
-    ///
-    /// The equations are scaled and solved here, not in `quietcut-numerics`: a search starts from the solution, and another rounding of the
-    /// start shifts its end by 3e-5 of the half-width, as a change of the last digit of one sample does. The recorded answers hold the
-    /// result to 1e-6.
     fn normal(
         &self,
         subset: Subset,
@@ -426,31 +415,18 @@ impl Regression {
         ridge: f64,
         right: &[f64],
     ) -> Option<(Vec<f64>, DMatrix<f64>)> {
-        let products = self.products(subset);
         let size = columns.len();
-        let scale: Vec<f64> = columns
-            .iter()
-            .map(|column| products.square(*column).sqrt())
-            .collect();
-        if scale.iter().any(|scale| !(*scale > 0.0 && scale.is_finite())) {
-            return None;
-        }
-        let mut gram = DMatrix::from_fn(size, size, |i, j| {
-            self.product(subset, columns[i], columns[j]) / (scale[i] * scale[j])
-        });
-        for i in 0..size {
-            gram[(i, i)] += ridge;
-        }
-        let right = DVector::from_fn(size, |i, _| right[i] / scale[i]);
-        let factor = gram.cholesky()?;
-        let solution = factor.solve(&right);
-        let mut covariance = factor.inverse();
-        for i in 0..size {
-            for j in 0..size {
-                covariance[(i, j)] /= scale[i] * scale[j];
+        let gram = DMatrix::from_fn(size, size, |i, j| {
+            // The equations use only the lower triangle.
+            if i < j {
+                0.0
+            } else {
+                self.product(subset, columns[i], columns[j])
             }
-        }
-        Some(((0..size).map(|i| solution[i] / scale[i]).collect(), covariance))
+        });
+        let equations = NormalEquations::new(&gram, ridge, Idle::Refuse)?;
+        let solution = equations.solve(&DVector::from_column_slice(right));
+        Some((solution.as_slice().to_vec(), equations.inverse()))
     }
 
     /// χ² of the baseline's residual on a subset of segments after subtracting the regression columns `columns` times these `coefficients`.

@@ -3,12 +3,16 @@
 use std::borrow::Cow;
 
 use nalgebra::{DMatrix, DVector};
+use quietcut_numerics::least_squares::{Idle, NormalEquations};
 
 use crate::baseline::{Baseline, derivatives};
 use crate::signal::dot::dot;
 use crate::signal::grid::Grid;
 use quietcut_recording::Quantity;
 use quietcut_simulate::effect::Pickup;
+
+/// Ridge on the unit diagonal of the normal equations: rounding of the responses, which are products of many matrices.
+const ROUNDING: f64 = 1e-12;
 
 /// Free decays of the baseline in each channel of a record, and the initial state.
 #[derive(Clone, Debug, Default)]
@@ -85,27 +89,14 @@ impl Decays {
                 right[i] += weight * dot(&columns[i], residual);
                 for j in 0..=i {
                     gram[(i, j)] += weight * dot(&columns[i], &columns[j]);
-                    gram[(j, i)] = gram[(i, j)];
                 }
             }
         }
         // The initial value of a state variable that no channel observes stays zero.
-        let scale: Vec<f64> = (0..order).map(|i| gram[(i, i)].sqrt()).collect();
-        for i in 0..order {
-            for j in 0..order {
-                let by = scale[i] * scale[j];
-                gram[(i, j)] = if by > 0.0 { gram[(i, j)] / by } else { 0.0 };
-            }
-            gram[(i, i)] += 1e-12;
-            right[i] = if scale[i] > 0.0 { right[i] / scale[i] } else { 0.0 };
-        }
-        let found = gram.cholesky().map(|factor| factor.solve(&right));
-        self.start = (0..order)
-            .map(|i| match &found {
-                Some(found) if scale[i] > 0.0 => found[i] / scale[i],
-                _ => 0.0,
-            })
-            .collect();
+        self.start = match NormalEquations::new(&gram, ROUNDING, Idle::Hold) {
+            Some(equations) => equations.solve(&right).as_slice().to_vec(),
+            None => vec![0.0; order],
+        };
     }
 
     /// Free decays of a channel from unit initial states, set to zero at the samples that are not compared.

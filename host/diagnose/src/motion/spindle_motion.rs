@@ -2,7 +2,8 @@
 
 use std::f64::consts::TAU;
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+use quietcut_numerics::least_squares::{LinearProblem, eliminated};
 
 use crate::criteria::{LARGEST_MODULATION, LEAST_MODULATION_F_RATIO, LEAST_TACHOMETER_EDGES};
 use crate::error::DiagnoseError;
@@ -211,31 +212,23 @@ fn deviation(
     variance: f64,
 ) -> [f64; 3] {
     let step_hz = 1e-4 * frequency_hz;
-    let times = |along: f64, across: f64, frequency_hz: f64| -> Vec<f64> {
-        let omega = TAU * frequency_hz;
-        let of = |t: f64| along * (1.0 - (omega * t).cos()) / omega + across * (omega * t).sin() / omega;
-        spindle_motions
-            .iter()
-            .flat_map(|spindle_motion| without_line(&spindle_motion.edges_s, of))
-            .collect()
-    };
     let (along, across) = (found.along, found.across);
-    let columns = [
-        times(1.0, 0.0, frequency_hz),
-        times(0.0, 1.0, frequency_hz),
-        times(along, across, frequency_hz + step_hz)
-            .iter()
-            .zip(times(along, across, frequency_hz - step_hz))
-            .map(|(above, below)| (above - below) / (2.0 * step_hz))
-            .collect(),
-    ];
-    let products = Matrix3::from_fn(|i, j| columns[i].iter().zip(&columns[j]).map(|(a, b)| a * b).sum());
-    let Some(covariance) = products
-        .try_inverse()
-        .map(|inverse: Matrix3<f64>| inverse * variance)
-    else {
+    let modulation = |frequency_hz: f64, t: f64| {
+        let [c, s] = modulation_s(frequency_hz, t);
+        along * c + across * s
+    };
+    let slopes = |t: f64| {
+        let [c, s] = modulation_s(frequency_hz, t);
+        let above = modulation(frequency_hz + step_hz, t);
+        let below = modulation(frequency_hz - step_hz, t);
+        [c, s, (above - below) / (2.0 * step_hz)]
+    };
+    let matrix = without_lines(spindle_motions, slopes);
+    let right = DVector::zeros(matrix.nrows());
+    let Ok(fit) = LinearProblem::new(&matrix, &right).solve() else {
         return [f64::INFINITY; 3];
     };
+    let covariance = Matrix3::from_fn(|i, j| fit.covariance[(i, j)] * variance);
     let delta = along.hypot(across);
     let of_delta = Vector3::new(along / delta, across / delta, 0.0);
     let of_phase = Vector3::new(-across, along, 0.0) / (delta * delta);
@@ -254,56 +247,56 @@ struct ModulationFit {
 }
 
 fn fit_modulation(spindle_motions: &[&SpindleMotion], frequency_hz: f64) -> ModulationFit {
-    let omega = TAU * frequency_hz;
-    // Inner products of the functions (1 − cos ωt)/ω, sin(ωt)/ω and t at the tachometer edges, each without its linear trend in every
-    // record.
-    let mut products = [[0.0; 3]; 3];
-    for spindle_motion in spindle_motions {
-        let columns = [
-            without_line(&spindle_motion.edges_s, |t| (1.0 - (omega * t).cos()) / omega),
-            without_line(&spindle_motion.edges_s, |t| (omega * t).sin() / omega),
-            without_line(&spindle_motion.edges_s, |t| t),
-        ];
-        for (row, a) in products.iter_mut().zip(&columns) {
-            for (product, b) in row.iter_mut().zip(&columns) {
-                *product += a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-            }
-        }
-    }
-    let [[cc, cs, ct], [_, ss, st], [_, _, without]] = products;
-    let determinant = cc * ss - cs * cs;
-    let (along, across) = if determinant > 1e-12 * cc * ss {
-        (
-            -(ct * ss - st * cs) / determinant,
-            -(st * cc - ct * cs) / determinant,
-        )
-    } else {
-        (0.0, 0.0)
-    };
-    ModulationFit {
-        along,
-        across,
-        left: without + along * ct + across * st,
-        without,
+    let equations = without_lines(spindle_motions, |t| {
+        let [c, s] = modulation_s(frequency_hz, t);
+        [c, s, -t]
+    });
+    let (matrix, right) = (
+        equations.columns(0, 2).into_owned(),
+        equations.column(2).into_owned(),
+    );
+    let without = right.norm_squared();
+    match LinearProblem::new(&matrix, &right).solve() {
+        Ok(fit) => ModulationFit {
+            along: fit.parameters[0],
+            across: fit.parameters[1],
+            left: fit.sum_of_squares,
+            without,
+        },
+        // The two components are linearly dependent at the edges.
+        Err(_) => ModulationFit {
+            along: 0.0,
+            across: 0.0,
+            left: without,
+            without,
+        },
     }
 }
 
-/// Values of the function `of` at the tachometer edge times, without their linear trend in the number of the edge.
-fn without_line(edges_s: &[f64], of: impl Fn(f64) -> f64) -> Vec<f64> {
-    let values: Vec<f64> = edges_s.iter().map(|t| of(*t)).collect();
-    let count = values.len() as f64;
-    let mean = values.iter().sum::<f64>() / count;
-    let middle = 0.5 * (count - 1.0);
-    let (mut kk, mut kv) = (0.0, 0.0);
-    for (k, value) in values.iter().enumerate() {
-        kk += (k as f64 - middle).powi(2);
-        kv += (k as f64 - middle) * (value - mean);
-    }
-    values
+/// Lead of the spindle at time `t`, s, per unit of δ cos ψ and of δ sin ψ: (1 − cos ωt)/ω and sin(ωt)/ω.
+fn modulation_s(frequency_hz: f64, t: f64) -> [f64; 2] {
+    let omega = TAU * frequency_hz;
+    [(1.0 - (omega * t).cos()) / omega, (omega * t).sin() / omega]
+}
+
+/// Least-squares equations of the three columns `of` at the edge times, after elimination of a straight line in the number of the edge
+/// from each record.
+fn without_lines(spindle_motions: &[&SpindleMotion], of: impl Fn(f64) -> [f64; 3]) -> DMatrix<f64> {
+    let equations: Vec<DMatrix<f64>> = spindle_motions
         .iter()
-        .enumerate()
-        .map(|(k, value)| value - mean - kv / kk * (k as f64 - middle))
-        .collect()
+        .map(|spindle_motion| {
+            let edges_s = &spindle_motion.edges_s;
+            let middle = 0.5 * (edges_s.len() as f64 - 1.0);
+            let rows = edges_s.iter().enumerate().map(|(k, t)| {
+                let [first, second, third] = of(*t);
+                [1.0, k as f64 - middle, first, second, third]
+            });
+            eliminated(DMatrix::from_row_iterator(edges_s.len(), 5, rows.flatten()), 2)
+        })
+        .collect();
+    let count = equations.iter().map(DMatrix::nrows).sum();
+    let rows = equations.iter().flat_map(DMatrix::row_iter);
+    DMatrix::from_row_iterator(count, 3, rows.flat_map(|row| [row[0], row[1], row[2]]))
 }
 
 #[cfg(test)]
