@@ -68,7 +68,7 @@ pub(crate) fn questions(command: &Path, tests: &Path, full: bool) -> Result<Vec<
     all.extend(limits(tests)?);
     all.extend(recordings(tests)?);
     all.extend(tables());
-    all.extend(seeded_diagnoses());
+    all.extend(seeded_diagnoses(tests)?);
     all.retain(|question| full || !ONLY_FULL.contains(&question.group.as_str()));
     Ok(all)
 }
@@ -237,33 +237,25 @@ fn tables() -> Vec<Question> {
     vec![Question::new("tables", &lines), Question::new("tables", &[cells])]
 }
 
-/// Diagnoses of simulated sweeps with one hidden effect: 10 effects, 4 seeds each.
-fn seeded_diagnoses() -> Vec<Question> {
-    let effects = [
-        "--effect cubic-stiffness=-5e12 --effect cubic-stiffness.direction=x",
-        "--effect cubic-stiffness=5e12 --effect cubic-stiffness.direction=x",
-        "--effect cubic-stiffness=-2e12 --effect cubic-stiffness.direction=x",
-        "--effect cubic-damping=1e8 --effect cubic-damping.direction=x",
-        "--effect quadratic-stiffness=1e9 --effect quadratic-stiffness.direction=x",
-        "--effect coulomb-friction=2 --effect coulomb-friction.direction=x",
-        "--effect sensor-gain=1.1",
-        "--effect sensor-delay=0.001",
-        "--effect backlash=1e-5 --effect backlash.direction=x",
-        "",
-    ];
+/// Folder of the cases and recordings of the seeded diagnoses, as an argument of the command.
+const SEEDED: &str = "tests/data/answers/seeded";
+
+/// Diagnoses of the puzzles that `tests/hidden_effects` wrote: a case NAME.toml with its recordings NAME-0.csv, NAME-1.csv and so on.
+fn seeded_diagnoses(tests: &Path) -> Result<Vec<Question>, String> {
+    let folder = tests.join("data/answers/seeded");
+    let recordings = names(&folder, ".csv")?;
     let mut found = Vec::new();
-    for effect in effects {
-        for seed in 1..=4 {
-            found.push(Question::new(
-                "seeded-diagnoses",
-                &[
-                    format!(
-                        "simulate tests/cases/kuka-kr90-full.toml --experiment sweep --direction x --frequency-hz 10:25:2 --force-n 20 --noise-percent 1 --seed {seed} {effect} --out measured.csv"
-                    ),
-                    "diagnose tests/cases/kuka-kr90-full.toml measured.csv --json".to_owned(),
-                ],
-            ));
+    for case in names(&folder, ".toml")? {
+        if recordings.contains(&case) {
+            // The sidecar of a recording.
+            continue;
         }
+        let mut line = format!("diagnose {SEEDED}/{case}.toml");
+        let of_case = |name: &&String| name.rsplit_once('-').is_some_and(|(start, _)| start == case);
+        for recording in recordings.iter().filter(of_case) {
+            line += &format!(" {SEEDED}/{recording}.csv");
+        }
+        found.push(Question::new("seeded-diagnoses", &[line + " --json"]));
     }
-    found
+    Ok(found)
 }

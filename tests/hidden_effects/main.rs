@@ -38,6 +38,7 @@ use puzzle::{Family, Puzzle};
 use quietcut::diagnose::{Options, diagnose};
 use quietcut_testkit::rates::{assert_least_share, assert_pooled_share};
 use quietcut_testkit::results::Campaign;
+use rayon::prelude::*;
 use serde_json::Value;
 
 /// The answer of the diagnosis; an error is an outcome of its own. Case and recordings are kept if `QUIETCUT_KEEP` names a folder.
@@ -236,4 +237,36 @@ fn campaign() {
     }
     .record(&figures);
     assert!(failed.is_empty(), "{failed:?}");
+}
+
+/// Seeds of the puzzles in `tests/answers --full`, 40 in all. They have few samples, so that their recordings can be committed: 6 to 8 seeds
+/// of a family with one hidden effect, fewer of cuts, which are longer.
+const ANSWERED: [(Family, &[u64]); 9] = [
+    (Family::Shaker, &[0, 1, 3, 17, 28, 31, 33, 34]),
+    (Family::Sweep, &[0, 3, 4, 16, 17, 22]),
+    (Family::FreeDecay, &[0, 1, 2, 3, 4, 8, 16, 26]),
+    (Family::CuttingWithForce, &[2, 5]),
+    (Family::CuttingWithoutForce, &[2, 5, 19]),
+    (Family::Nothing, &[0, 1, 14, 17]),
+    (Family::NotInLibrary, &[3, 7, 11]),
+    (Family::TwoEffects, &[2, 3, 5, 7009]),
+    (Family::Chatter, &[54, 55]),
+];
+
+/// Writes the cases and recordings of `tests/answers --full` to the folder that `QUIETCUT_KEEP` names.
+#[test]
+#[ignore = "writes the recordings of seeded diagnoses: see tests/README.md"]
+fn recordings_of_the_answers() {
+    let folder = std::env::var_os("QUIETCUT_KEEP").unwrap();
+    let folder = std::path::Path::new(&folder);
+    let text = std::env::var("QUIETCUT_FAMILY").unwrap_or_default();
+    for (family, seeds) in ANSWERED {
+        if family.name().contains(&text) {
+            seeds.par_iter().for_each(|seed| {
+                let puzzle = Puzzle::draw(family, *seed);
+                puzzle.keep_short(folder);
+                println!("{} {seed}: {} samples", family.name(), puzzle.samples());
+            });
+        }
+    }
 }

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use quietcut::case::Case;
-use quietcut::recording::Recording;
+use quietcut::recording::{Channel, Quantity, Recording, Sidecar};
 use rand::seq::IndexedRandom;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -73,6 +73,9 @@ pub(crate) struct Hidden {
     pub(crate) places: Vec<String>,
 }
 
+/// Significant digits of the samples that [`Puzzle::keep_short`] writes: their rounding is 15 times below the least noise.
+const DIGITS: usize = 5;
+
 /// One puzzle: that of a seed of a family.
 pub(crate) struct Puzzle {
     pub(crate) family: Family,
@@ -117,6 +120,66 @@ impl Puzzle {
         std::fs::write(folder.join(name.replace(".toml", ".hidden")), hidden).unwrap();
         for recording in &self.recordings {
             recording.write(&folder.join(&recording.path)).unwrap();
+        }
+    }
+
+    /// Number of samples of all channels of all recordings.
+    pub(crate) fn samples(&self) -> usize {
+        let channels = self.recordings.iter().flat_map(|recording| &recording.channels);
+        channels.map(|channel| channel.samples.len()).sum()
+    }
+
+    /// Writes case and recordings to a folder in few bytes: samples with [`DIGITS`] digits, and the sample rate in the sidecar instead of
+    /// a column of times. The head of the case names the hidden effects.
+    pub(crate) fn keep_short(&self, folder: &Path) {
+        let name = format!("{}-{}.toml", self.family.name(), self.seed);
+        let hidden = self
+            .hidden
+            .iter()
+            .map(|hidden| {
+                format!(
+                    "# hidden: {} {:?} {:?}\n",
+                    hidden.name, hidden.places, hidden.values
+                )
+            })
+            .collect::<String>();
+        std::fs::write(folder.join(name), hidden + &self.case_text).unwrap();
+        for recording in &self.recordings {
+            let title = |channel: &Channel| match channel.quantity {
+                Quantity::Unknown => channel.name.clone(),
+                quantity => format!("{} [{}]", channel.name, quantity.unit()),
+            };
+            let mut text = recording.channels.iter().map(title).collect::<Vec<_>>().join(",");
+            text.push('\n');
+            for sample in 0..recording.len() {
+                let number = |channel: &Channel| {
+                    let rounded: f64 = format!("{:.*e}", DIGITS - 1, channel.samples[sample])
+                        .parse()
+                        .unwrap();
+                    let (plain, exponent) = (rounded.to_string(), format!("{rounded:e}"));
+                    if exponent.len() < plain.len() {
+                        exponent
+                    } else {
+                        plain
+                    }
+                };
+                text.push_str(
+                    &recording
+                        .channels
+                        .iter()
+                        .map(number)
+                        .collect::<Vec<_>>()
+                        .join(","),
+                );
+                text.push('\n');
+            }
+            let path = folder.join(&recording.path);
+            std::fs::write(&path, text).unwrap();
+            let sidecar = Sidecar {
+                sample_rate_hz: Some(recording.sample_rate_hz),
+                ..recording.sidecar.clone()
+            };
+            sidecar.write_beside(&path).unwrap();
         }
     }
 
