@@ -5,13 +5,13 @@
 //! cases of `tests/cases` alone. Tolerances of pure numerics (the last step of Newton's method, rounding, sizes of
 //! matrices) stand where they are used.
 
-/// Least error of a Floquet multiplier that is ever stated, relative to max(1, |μ|). Independent computations confirm
-/// multipliers to this accuracy (`tests/multipliers.rs`: references good to 2e-8). Collocation itself settles at 1e-10
-/// and below.
+/// Least stated error of a Floquet multiplier, relative to max(1, |μ|); methods that step through the period state at
+/// least 1e-9 instead. Independent computations confirm multipliers to this accuracy (`tests/multipliers.rs`:
+/// references good to 2e-8). Collocation itself settles at 1e-10 and below.
 pub const LEAST_ERROR: f64 = 1e-7;
 
-/// Least error stated for a multiplier from the collocated map that Newton's method on the characteristic matrix did
-/// not confirm, relative to max(1, |μ|). It is ten times the residual 1e-7 at which Krylov spaces settle.
+/// Least stated error of a multiplier from the collocated map that Newton's method on the characteristic matrix did not
+/// confirm, relative to max(1, |μ|). It is ten times the residual 1e-7 at which Krylov spaces settle.
 pub(crate) const UNCONFIRMED: f64 = 1e-6;
 
 /// Factor in the stated error of a multiplier on its change from the working to the finer mesh. The change is the error
@@ -29,13 +29,14 @@ pub(crate) const STEP_ROUNDING: f64 = 1e-9;
 
 // Multipliers of a period map.
 
-/// Least |μ| of the Floquet multipliers that collocation computes at each depth of a scan. It lies below
-/// [`LINE_FOLLOWED`], above which the scan follows multipliers; the margin between the two is unfounded.
+/// Least |μ| of the Floquet multipliers that collocation computes at each depth of a scan; where [`SCANNED_SHARE`] of
+/// the largest is smaller, that bound holds. It lies below [`LINE_FOLLOWED`], above which the scan follows multipliers;
+/// the margin between the two is unfounded.
 pub(crate) const SCANNED: f64 = 0.25;
 
-/// Least |μ|, as a share of the largest, of the multipliers that collocation computes at a depth where all lie below
-/// [`SCANNED`]. It lies below [`CELL_FOLLOWED`], above which cell charts follow multipliers; the margin between the two
-/// is unfounded.
+/// Least |μ|, as a share of the largest, of the multipliers that collocation computes at a depth where this share lies
+/// below [`SCANNED`]. It lies below [`CELL_FOLLOWED`], above which cell charts follow multipliers; the margin between
+/// the two is unfounded.
 pub(crate) const SCANNED_SHARE: f64 = 0.3;
 
 /// Least |μ| of the multipliers that a method with an explicit period map computes. It lies below [`LINE_FOLLOWED`],
@@ -46,8 +47,8 @@ pub(crate) const MAPPED: f64 = 0.25;
 /// [`MAPPED`]. If none is larger, those above half the largest are computed.
 pub(crate) const KRYLOV_ANY: f64 = 0.25;
 
-/// Largest number of eigenvalues that are candidates for the dominant one if all are small. More than that many of
-/// nearly one size are the cluster near zero of a compact period map. Unfounded.
+/// Largest number of eigenvalues that are candidates for the dominant one, on the coarse mesh or if all are small. More
+/// than that many of nearly one size are the cluster near zero of a compact period map. Unfounded.
 pub(crate) const CROWD: usize = 24;
 
 /// Least |μ| of a Floquet multiplier that is taken from the transition matrix Φ(w) alone, which omits the surface of
@@ -55,10 +56,10 @@ pub(crate) const CROWD: usize = 24;
 /// 1e-6, from which Newton's method starts.
 pub(crate) const GROWN: f64 = 1e6;
 
-/// Largest entry of a period map, relative to max(1, |μ|) of its largest eigenvalue, at which the eigenvalues are
-/// trusted. Rounding of the map is then at most 1e-9 of that eigenvalue, which its condition number multiplies. Maps
-/// with larger entries are so far from normal that rounding may move their eigenvalues, and a winding number is used.
-/// The value is unfounded.
+/// Largest entry of a period map, or of its projection on a Krylov space, relative to max(1, |μ|) of its largest
+/// eigenvalue, at which the eigenvalues are trusted. Rounding of the map is then at most 1e-9 of that eigenvalue, which
+/// its condition number multiplies. Maps with larger entries are so far from normal that rounding may move their
+/// eigenvalues, and a winding number is used. The value is unfounded.
 pub(crate) const NORMAL: f64 = 1e7;
 
 /// Largest number of elements in a tooth period on the working mesh. The fastest motion turns by five radians in an
@@ -85,8 +86,8 @@ pub(crate) const KAPPA_MAX: f64 = 20.0;
 pub(crate) const WOUND: f64 = 0.25;
 
 /// Radii at which the winding number is counted in turn, as relative distances beyond the largest |μ| found (or beyond
-/// [`WOUND`]): a count of zero shows that no larger multiplier exists. The last distance is the stated error of the
-/// search; the sequence is unfounded.
+/// [`WOUND`]): a count of zero shows that no multiplier lies beyond the radius. The distance of the smallest radius
+/// with a count of zero enters the stated error; the sequence is unfounded.
 pub(crate) const MARGINS: [f64; 5] = [2.8, 0.3, 0.05, 0.01, 2e-3];
 
 /// Relative distances beyond the largest multiplier found that follow [`MARGINS`]. They are used while the radius lies
@@ -146,8 +147,8 @@ pub(crate) const TOUCHING: f64 = 0.3;
 /// 1 % that a chart states.
 pub(crate) const CHART_DEPTH: f64 = 0.01;
 
-/// Least relative gap between two speeds of a chart, and the error in speed of a steep limit: 0.1 %, the accuracy to which a
-/// spindle holds its speed.
+/// Largest relative gap between two speeds of a chart that is never divided, and the accepted error in speed of a steep
+/// limit: 0.1 %, the accuracy to which a spindle holds its speed.
 pub(crate) const CHART_SPEED: f64 = 1e-3;
 
 /// Least number of lines of a chart per lobe. A lobe is the distance in speed over which the number of vibrations in a
@@ -220,8 +221,8 @@ pub(crate) const SHALLOWEST_SEARCH: f64 = 0.25;
 /// searched at once. Unfounded.
 pub(crate) const WORTH_SEARCHING_NEAR: f64 = 0.7;
 
-/// Number of batches of 64 machines for the probability that a cell is stable: 256 machines, whose share has a standard
-/// error of √(0.25/256) = 3 % at most.
+/// Least number of batches of 64 machines for the probability that a cell is stable: 256 machines, whose share has a
+/// standard error of √(0.25/256) = 3 % at most.
 pub(crate) const BATCHES_OF_CELLS: u32 = 4;
 
 // Loops of receptances.
@@ -230,8 +231,8 @@ pub(crate) const BATCHES_OF_CELLS: u32 = 4;
 /// the frequency grid is refined about it. A peak of noise costs computing time only. Unfounded.
 pub(crate) const PEAK_SHARE: f64 = 0.01;
 
-/// Damping ratio of a mode below which its receptance counts as infinite, so that methods from receptances refuse the
-/// case. Unfounded.
+/// Damping ratio of a mode up to which, negative ones included, its receptance counts as infinite, so that methods from
+/// receptances refuse the case. Unfounded.
 pub(crate) const UNDAMPED: f64 = 1e-9;
 
 /// Relative difference in depth up to which limits of two computations count as the same limit. The computations differ
@@ -240,12 +241,12 @@ pub(crate) const UNDAMPED: f64 = 1e-9;
 pub(crate) const SAME_LIMIT: f64 = 0.1;
 
 /// Largest relative change of a limit by doubling the harmonics at which no more are added. Doubling divides the
-/// truncation error by four or more, so that the limits with the doubled number err by a third of the change.
+/// truncation error by four or more, so that the limits with the doubled number err by a third of the change at most.
 pub(crate) const HARMONICS_SETTLED_LIMIT: f64 = 1e-4;
 
 /// Largest relative change of a Floquet multiplier by doubling the harmonics at which no more are added. Doubling
 /// divides the truncation error by four or more, so that the multiplier with the doubled number errs by a third of the
-/// change.
+/// change at most.
 pub(crate) const HARMONICS_SETTLED_MULTIPLIER: f64 = 1e-6;
 
 /// Relative difference in depth up to which a limit with twice the number of harmonics counts as the same limit as one
@@ -258,7 +259,8 @@ pub(crate) const SAME_WITH_TWICE_HARMONICS: f64 = 0.1;
 /// rounding and far below the width of a resonance; it is unfounded.
 pub(crate) const REAL_END_OFFSET: f64 = 1e-5;
 
-/// Largest number of halvings of a frequency interval in which two characteristic loci cannot be told apart. Unfounded.
+/// Largest number of halvings of a frequency interval in which characteristic loci are not straight or cannot be told
+/// apart; twice as many where a solution along a locus is sought. Unfounded.
 pub(crate) const LOCUS_LEVELS: u32 = 16;
 
 /// Largest deviation of a characteristic locus, at the middle of a frequency interval, from the straight line between
@@ -338,7 +340,7 @@ pub(crate) const EQUIVALENT_FOLLOWED: f64 = 0.5;
 pub(crate) const EQUIVALENT_SAMPLES_MIN: usize = 32;
 
 /// Damping constant that stands for sticking friction, in units of k/ω with the static stiffness k of the axis and the
-/// frequency ω of the slowest mode. A force at ω then moves the axis by a twentieth of the static deflection.
+/// frequency ω of the slowest mode. A force at ω then moves the sticking axis by a twentieth of the static deflection.
 /// Unfounded.
 pub(crate) const STICKING_DAMPER: f64 = 20.0;
 
@@ -362,7 +364,7 @@ pub(crate) const LAYERS_MAX: usize = 12;
 pub(crate) const LAYER_PROBES: usize = 16;
 
 /// Difference between a limit and the straight line between the neighbouring entries of a lobe table, as a share of the
-/// largest depth, beyond which a speed is added. Unfounded.
+/// largest depth, beyond which a speed, feed or feed direction is added. Unfounded.
 pub(crate) const TABLE_TOLERANCE: f64 = 0.003;
 
 /// Least number of speeds at which the table is checked between two entries. With two, one lies where the error of a
@@ -370,13 +372,14 @@ pub(crate) const TABLE_TOLERANCE: f64 = 0.003;
 /// of that value.
 pub(crate) const LEAST_CHECKS: f64 = 2.0;
 
-/// Largest distance between the spindle speeds at which a lobe table is checked between two of its speeds, relative to
-/// the speed. Unfounded; `lobe_table/accuracy_tests.rs` holds it for tables with four speeds over a factor of three.
+/// Largest distance between the spindle speeds at which a lobe table is first checked between two of its speeds,
+/// relative to the speed. Unfounded; `lobe_table/accuracy_tests.rs` holds it for tables with four speeds over a factor
+/// of three.
 pub(crate) const CHECK_STEP: f64 = 0.01;
 
 /// Disagreement between lobe table and method between two speeds of the table, as a share of the table's tolerance,
-/// beyond which further speeds are checked there. A smooth limit that passed refinement errs by a quarter of the
-/// tolerance at most, since the gap was halved after the check; twice as much means a corner.
+/// beyond which more speeds are checked there. A smooth limit that passed refinement errs by a quarter of the tolerance
+/// at most, since the gap was halved after the check; twice as much means a corner.
 pub(crate) const SUSPECT: f64 = 0.5;
 
 /// Factor by which the largest disagreement between lobe table and method in a gap must grow with a doubling of its

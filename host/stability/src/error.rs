@@ -38,7 +38,7 @@ pub enum StabilityError {
         /// Feature of the case that the method does not cover, and what to do instead.
         what: &'static str,
     },
-    /// A mode has no damping, so that its receptance is infinite.
+    /// A mode has no damping, so that its receptance is infinite, or negative damping.
     #[error(
         "a mode of {frequency_hz:.4} Hz has no damping: its receptance is infinite there; damping is needed, or a method \
          that does not go through receptances"
@@ -58,7 +58,7 @@ pub enum StabilityError {
     /// A table of frequency response functions is invalid.
     #[error(transparent)]
     Frf(#[from] FrfError),
-    /// The table of receptances ends at a frequency at which the loop gain is still 1 or more.
+    /// The table of receptances ends at a frequency at which the loop gain at the requested depth is still 1 or more.
     #[error(
         "depths from {deepest_mm:.3} mm on cannot be judged, and {depth_mm} mm was asked for: the frequency response \
          functions end at {last_hz} Hz, where the gain of the loop then reaches 1; measure to higher frequencies, or ask \
@@ -67,7 +67,7 @@ pub enum StabilityError {
     EndsEarly {
         /// Requested axial depth, mm.
         depth_mm: f64,
-        /// Largest axial depth for which the table of receptances suffices, mm.
+        /// Axial depth up to which the table of receptances suffices, mm.
         deepest_mm: f64,
         /// Last frequency of the table of receptances, Hz.
         last_hz: f64,
@@ -160,8 +160,7 @@ pub(crate) enum Breakdown {
 
 impl From<EigenvalueError> for Breakdown {
     fn from(cause: EigenvalueError) -> Self {
-        // A matrix that is not finite comes from equations over a period without a finite solution: that reason is
-        // stated.
+        // A matrix that is not finite comes from equations without a finite solution: that reason is stated.
         match cause {
             EigenvalueError::NotFinite { .. } => Self::NoSolution,
             _ => Self::Eigenvalues(cause),
@@ -170,8 +169,8 @@ impl From<EigenvalueError> for Breakdown {
 }
 
 impl Breakdown {
-    /// Error at a spindle speed (rev/min) and an axial depth (mm); `no_solution` says which equations have no finite
-    /// solution.
+    /// Error at a spindle speed (rev/min) and an axial depth (mm); `no_solution` is its text if a system of equations
+    /// has no finite solution.
     pub(crate) fn at(self, rpm: f64, depth_mm: f64, no_solution: &'static str) -> StabilityError {
         let what = match self {
             Self::NoSolution => no_solution,

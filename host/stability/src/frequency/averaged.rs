@@ -129,8 +129,8 @@ impl OpenLoop for AveragedLoop<'_> {
     }
 
     fn real_end(&self) -> Result<Option<RealEnd>, Breakdown> {
-        // At ω = 0 the characteristic loci with regeneration are 0. Without regeneration they are real there:
-        // eigenvalues of the static compliance times α₀.
+        // At ω = 0 the characteristic loci with regeneration are 0. Without regeneration they are the eigenvalues of H̃
+        // α₀ at ω = 0, a real matrix: real, or in conjugate pairs that belong to no fold.
         if self.delay_s.is_some() {
             return Ok(None);
         }

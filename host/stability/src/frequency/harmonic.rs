@@ -17,9 +17,10 @@ use quietcut_numerics::eigenvalues;
 ///
 /// Ω is the tooth-passing frequency; α_k and β_k are the harmonics of the coefficients. e^{−(s+ipΩ)τ} is the same for
 /// all p, so that κ multiplies the whole matrix. At s = iΩ/2 the frequencies are symmetric about 0: a multiplier −1 is
-/// a real eigenvalue there, and the loop is real. The range of s from 0 to iΩ/2, with its conjugate, suffices, since
-/// roots repeat with iΩ. Forces jump where a tooth enters or leaves, so that α_k falls as 1/k and H as 1/k². Truncation
-/// changes limits as 1/K³, and as 1/K² for a structure whose residues do not sum to zero.
+/// a real eigenvalue there, and a unitary transformation makes the loop matrix real. The range of s from 0 to iΩ/2,
+/// with its conjugate, suffices, since roots repeat with iΩ. Forces jump where a tooth enters or leaves, so that α_k
+/// falls as 1/k and H as 1/k². Truncation changes limits as 1/K³, and as 1/K² for a structure whose residues do not sum
+/// to zero.
 pub(crate) struct HarmonicLoop<'a> {
     problem: &'a FrequencyProblem,
     /// Tooth-passing frequency Ω, rad/s.
@@ -76,8 +77,8 @@ impl<'a> HarmonicLoop<'a> {
         self.harmonics
     }
 
-    /// Limits from every second line of a table, for the error of limits from all lines; `None` without a table. If they
-    /// cannot be computed the list is empty, and limits have no stated error.
+    /// Limits from every second line of a table, for the error of limits from all lines; `None` without a table, or if
+    /// fewer than four lines remain. If they cannot be computed the list is empty, and limits have no stated error.
     pub(crate) fn thinned_limits(&self, depth_m: f64) -> Option<Vec<AxisCrossing>> {
         let problem = self.problem.thinned()?;
         let thinned = HarmonicLoop {

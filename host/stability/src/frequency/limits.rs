@@ -27,7 +27,8 @@ pub(crate) struct AxisCrossing {
 /// All crossings of the imaginary axis up to an axial depth (m), by depth.
 ///
 /// # Errors
-/// Receptances are infinite, a result is not finite, or an eigenvalue iteration fails.
+/// Receptances are infinite, a result is not finite, an eigenvalue iteration fails, or a crossing is not found in an
+/// interval in which a locus changes sides of the real axis.
 pub(crate) fn limits(open_loop: &impl OpenLoop, depth_m: f64) -> Result<Vec<AxisCrossing>, Breakdown> {
     let floor = depth_m.recip();
     let mut grid = open_loop.grid(floor)?;
@@ -85,7 +86,7 @@ pub(crate) fn limits(open_loop: &impl OpenLoop, depth_m: f64) -> Result<Vec<Axis
 ///
 /// The zeros of D are the roots, its poles the poles of the structure. Along the line Re s = `sigma` from the real axis
 /// to infinity the argument of D grows by π (P − N) for P poles and N roots right of the line, conjugates included.
-/// `None` if the line meets a root, or if the table cannot be continued to it.
+/// `None` if the number cannot be told, for example since the line meets a root or passes close to one.
 pub(crate) fn unstable_roots(open_loop: &impl OpenLoop, depth_m: f64, sigma: f64) -> Option<i32> {
     let grid = open_loop.grid(depth_m.max(1e-9).recip()).ok()?;
     let determinant = |omega: f64| {
@@ -105,8 +106,8 @@ pub(crate) fn unstable_roots(open_loop: &impl OpenLoop, depth_m: f64, sigma: f64
         .then_some(open_loop.problem().poles_right_of(sigma) - rounded as i32)
 }
 
-/// Error estimate of a limit, m: the change with other computations (every second line of a table, another number of
-/// harmonics), and at least [`LEAST_ERROR`] of the depth. `None` if another computation lacks the limit.
+/// Error estimate of a limit, m: the sum of its changes with other computations (every second line of a table, another
+/// number of harmonics), plus [`LEAST_ERROR`] of the depth. `None` if another computation lacks the limit.
 fn error_m(limit: &AxisCrossing, others: &[Vec<AxisCrossing>]) -> Option<f64> {
     others.iter().try_fold(LEAST_ERROR * limit.depth_m, |sum, other| {
         let changes = other

@@ -32,9 +32,9 @@ pub(crate) struct Crossing {
 pub(crate) trait Loci: Fn(f64) -> Result<Vec<Complex64>, Breakdown> {}
 impl<F: Fn(f64) -> Result<Vec<Complex64>, Breakdown>> Loci for F {}
 
-/// Samples characteristic loci on a frequency grid, so densely that every locus of at least `floor` can be told from
-/// the others between two samples and is nearly straight: its middle deviates from the straight line by at most `bend`
-/// × [`LOCUS_BEND`] of its size.
+/// Samples characteristic loci on a frequency grid, so densely that every locus of at least `floor` is nearly straight
+/// between two samples and can be told from the others where that matters. Its middle deviates from the straight line
+/// by at most `bend` × [`LOCUS_BEND`] of its size. An interval is halved at most [`LOCUS_LEVELS`] times.
 ///
 /// # Errors
 /// Those of the function `loci`.
@@ -61,7 +61,7 @@ pub(crate) fn trace(loci: &impl Loci, grid: &[f64], floor: f64, bend: f64) -> Re
 }
 
 /// Adds frequency samples between two samples until every characteristic locus is straight and told apart from the
-/// others.
+/// others, or until the halvings are used up.
 fn divide(
     sample: &impl Fn(f64) -> Result<Sample, Breakdown>,
     low: &Sample,
@@ -117,7 +117,7 @@ fn is_straight(low: &Sample, middle: &Sample, high: &Sample, (floor, bend): (f64
 }
 
 /// True if a characteristic locus that moves by `travel` cannot be confused with another, or if confusion has no effect
-/// because the locus is far from the positive real axis.
+/// because one of the two is far from the positive real axis.
 fn is_alone(sample: &Sample, index: usize, travel: f64) -> bool {
     let value = sample.values[index];
     let is_near_axis = |value: Complex64| value.re > -travel && value.im.abs() <= 2.0 * travel;
@@ -171,13 +171,12 @@ pub(crate) fn steps(samples: &[Sample]) -> impl Iterator<Item = Step> {
         .flat_map(|pair| steps_between(&pair[0], &pair[1]))
 }
 
-/// Collects the solutions that `solve` finds on every step of every characteristic locus between neighbouring frequency
-/// samples.
+/// Solutions that `solve` finds on every step of every characteristic locus between neighbouring frequency samples.
 ///
 /// If `solve` fails on a step because two close loci were exchanged, the interval is halved and solved again.
 ///
 /// # Errors
-/// Those of the function `loci`, or `solve` fails however short the interval.
+/// Those of the function `loci`, or `solve` still fails after 2 × [`LOCUS_LEVELS`] halvings.
 pub(crate) fn solve_steps<T>(
     loci: &impl Loci,
     samples: &[Sample],
@@ -214,8 +213,8 @@ fn solve_between<T>(
     Ok(found)
 }
 
-/// Crossings of the positive real axis by characteristic loci of at least `floor`, largest value first, each accurate
-/// to 1e-12 of its value.
+/// Crossings of the positive real axis by characteristic loci of at least `floor`, largest value first. The imaginary
+/// part at a crossing is at most 1e-12 of the size of the locus, or 1e-9 where rounding of the frequency forbids more.
 ///
 /// # Errors
 /// As [`solve_steps`].
@@ -265,8 +264,8 @@ pub(crate) struct LocusPoint {
 
 /// Zero of the residual between two points of a locus with residuals of opposite sign: the frequency, and the locus
 /// there. `at` returns all loci at a frequency with their residuals; the one nearest to the straight line is used.
-/// Regula falsi, until the residual is below the tolerance. `None` if the residual jumps over zero, since
-/// two loci were then exchanged.
+/// Regula falsi, until the residual is below the tolerance. `None` if it does not get there: if the residual jumps over
+/// zero, two loci were exchanged.
 pub(crate) fn zero(
     low: LocusPoint,
     high: LocusPoint,
@@ -295,8 +294,8 @@ pub(crate) fn zero(
     None
 }
 
-/// Increase of the argument of a function over a grid, rad. Intervals are halved until the argument changes by less
-/// than π/5 in each half.
+/// Increase of the argument of a function over a grid, rad. Intervals are halved, at most twenty times, until the
+/// argument changes by less than π/5 in each half.
 ///
 /// `None` if the function returns `None` or vanishes.
 pub(crate) fn argument_increase(function: &impl Fn(f64) -> Option<Complex64>, grid: &[f64]) -> Option<f64> {
@@ -326,7 +325,7 @@ fn argument_increase_between(
         return None;
     }
     // Twenty halvings reach a millionth of the grid interval: if the argument of the function still changes by π/5, the
-    // function has a zero on the path.
+    // function has a zero on or next to the path.
     if first.abs().max(second.abs()) < ARGUMENT_CHANGE * PI || level == 20 {
         return Some(first + second);
     }

@@ -40,17 +40,18 @@ pub(crate) trait OpenLoop: Sync {
     /// H is infinite, a result is not finite, or the eigenvalue iteration fails.
     fn eigenvalues(&self, s: Complex64, floor: f64) -> Result<Vec<Complex64>, Breakdown>;
 
-    /// Determinant det(I − (κα − β)H): its zeros are the roots, its poles the poles of the structure.
+    /// Determinant det(I − (κα − β)H): its zeros are the roots, its poles the poles of the structure. `None` if it is
+    /// not finite.
     fn determinant(&self, s: Complex64, kappa: Complex64) -> Option<Complex64>;
 
-    /// End of the frequency range at which the characteristic loci are real; `None` if there is none.
+    /// End of the frequency range at which characteristic loci other than 0 are real; `None` if there is none.
     ///
     /// # Errors
     /// As [`eigenvalues`](Self::eigenvalues).
     fn real_end(&self) -> Result<Option<RealEnd>, Breakdown>;
 
-    /// Frequency grid from 0, rad/s, that resolves every resonance and ends where no characteristic locus reaches
-    /// `floor`, 1/m.
+    /// Frequency grid from 0, rad/s, that resolves every resonance. It ends at half the tooth-passing frequency for
+    /// periodic coefficients, otherwise where no characteristic locus beyond reaches `floor`, 1/m.
     ///
     /// # Errors
     /// The receptance H is infinite.
@@ -78,8 +79,8 @@ pub(crate) trait OpenLoop: Sync {
     }
 }
 
-/// Frequency grid from 0 to `end`, rad/s, ascending: dense within the half bandwidth of each resonance, then with
-/// growing distances from it.
+/// Frequency grid from 0 to `end`, rad/s, ascending: steps of half the half bandwidth up to twice the half bandwidth
+/// from each resonance, growing steps beyond.
 pub(crate) fn around(resonances: &[Resonance], end: f64) -> Vec<f64> {
     let mut grid = vec![0.0, end];
     for Resonance { omega, width } in resonances {

@@ -50,7 +50,7 @@ impl FrequencyProblem {
     /// Builds the frequency-domain problem of a modelled structure.
     ///
     /// # Errors
-    /// A mode has zero or negative damping, so that its receptance is infinite or meaningless.
+    /// A mode has zero, almost zero or negative damping, so that its receptance is infinite or meaningless.
     pub fn of_model(problem: &Problem) -> Result<Self, StabilityError> {
         let poles = problem.structure.poles();
         if let Some(pole) = poles.iter().find(|pole| pole.re >= -UNDAMPED * pole.norm()) {
@@ -85,7 +85,8 @@ impl FrequencyProblem {
         60.0 / (rpm * self.teeth as f64)
     }
 
-    /// Receptance matrix H(s), m/N; rows are displacements, columns forces; s in rad/s. `None` if s is a pole.
+    /// Receptance matrix H(s), m/N; rows are displacements, columns forces; s in rad/s. `None` if s is a pole of the
+    /// modelled structure.
     pub(crate) fn transfer(&self, s: Complex64) -> Option<Matrix3<Complex64>> {
         match &self.receptance {
             Receptance::Model(structure, _) => structure.transfer(s),
@@ -109,8 +110,8 @@ impl FrequencyProblem {
         }
     }
 
-    /// Frequency-domain problem with every second line of its FRF table only; `None` for a modelled structure, or if
-    /// too few lines remain.
+    /// Frequency-domain problem with every second line of its FRF table and the last line only; `None` for a modelled
+    /// structure, or if too few lines remain.
     pub(crate) fn thinned(&self) -> Option<Self> {
         let Receptance::Table(interpolation) = &self.receptance else {
             return None;
@@ -192,7 +193,7 @@ impl FrequencyProblem {
     }
 }
 
-/// Peaks of a table of receptances higher than [`PEAK_SHARE`] times the highest, with their half bandwidth.
+/// Peaks of a table of receptances of at least [`PEAK_SHARE`] times the highest, with their half bandwidth.
 ///
 /// Peaks due to noise are harmless and only cost computing time.
 fn peaks(interpolation: &Interpolation) -> Vec<Resonance> {

@@ -22,12 +22,14 @@ pub(crate) const NO_ROOT: &str = "the rightmost root cannot be found from recept
 
 /// Rightmost root s, 1/s, with Im s ≥ 0, at an axial depth, m.
 ///
-/// First, roots are continued from depth 0, where they are poles of the structure. Then loci are traced along lines Re
-/// s = σ: if one passes near 1/w, its linear continuation away from the line predicts a root, which is then solved for.
-/// The rightmost root found is verified by counting the roots to its right.
+/// First, the poles of a modelled structure are the starting values of roots. Then loci are traced along lines Re s =
+/// σ: if one passes near 1/w, its linear continuation away from the line predicts a root, which is then solved for. The
+/// rightmost root found is verified by counting the roots to its right; with a table of receptances, by counting the
+/// unstable roots only.
 ///
 /// # Errors
-/// No root is verified; the reason is that of the last line Re s = σ along which loci could not be traced.
+/// No root is verified; the reason is that of the last line Re s = σ along which loci could not be traced, if there is
+/// one.
 pub(crate) fn rightmost(open_loop: &impl OpenLoop, depth_m: f64) -> Result<Complex64, Breakdown> {
     let decay = open_loop
         .problem()
@@ -65,8 +67,8 @@ pub(crate) fn rightmost(open_loop: &impl OpenLoop, depth_m: f64) -> Result<Compl
     Err(reason)
 }
 
-/// Rightmost of the loop's roots that are continued from the poles of the structure at depth 0; `None` if there is
-/// none.
+/// Rightmost of the loop's roots found with the poles of the modelled structure as starting values; `None` if none is
+/// found.
 fn from_poles(open_loop: &impl OpenLoop, depth_m: f64) -> Option<Complex64> {
     open_loop
         .problem()
@@ -116,7 +118,8 @@ fn from_line(
     Ok(best)
 }
 
-/// True if the loop has no root to the right of the given one, that is with a larger real part.
+/// True if the loop has no root to the right of the given one, that is with a larger real part. With a table of
+/// receptances: true if unstable roots exist only if the given one is unstable, and it is so only if they exist.
 fn is_rightmost(open_loop: &impl OpenLoop, depth_m: f64, root: Complex64, decay: f64) -> bool {
     // The roots are counted to the right of a line Re s = const that lies slightly right of the given root.
     let sigma = root.re + 1e-3 * (root.re.abs() + 1e-3 * decay);
@@ -128,8 +131,8 @@ fn is_rightmost(open_loop: &impl OpenLoop, depth_m: f64, root: Complex64, decay:
     unstable_roots(open_loop, depth_m, 0.0).is_some_and(|unstable| (unstable > 0) == (root.re > 0.0))
 }
 
-/// Characteristic loci κλ/w at a complex exponent s off the imaginary axis as well, 1/m, of absolute value `floor` and
-/// above.
+/// Characteristic loci κλ/w at a complex exponent s off the imaginary axis as well, 1/m: those of absolute value
+/// `floor` and above, and possibly smaller ones.
 fn loci_at(open_loop: &impl OpenLoop, s: Complex64, floor: f64) -> Result<Vec<Complex64>, Breakdown> {
     let regeneration = open_loop.regeneration(s);
     let size = regeneration.norm();
@@ -191,8 +194,9 @@ pub(crate) fn polish(open_loop: &impl OpenLoop, depth_m: f64, guess: Complex64) 
 
 /// Dominant Floquet multiplier of a loop with averaged coefficients.
 ///
-/// With a table of receptances the stated error is the change of the multiplier when every second line is omitted.
-/// Cubic interpolation through all lines errs by a sixteenth of that where lines are dense, and by no more elsewhere.
+/// With a table of receptances the stated error contains the change of the multiplier when every second line is
+/// omitted, infinite if no root is found then. Cubic interpolation through all lines errs by a sixteenth of that where
+/// lines are dense, and by no more elsewhere.
 ///
 /// # Errors
 /// The root cannot be found or verified, or lies outside the measured frequencies.
@@ -228,7 +232,7 @@ pub(crate) fn averaged_point(
     ))
 }
 
-/// Stability of a cut from its dominant multiplier and the error of that multiplier.
+/// Stability of a cut from its dominant multiplier and the error of that multiplier, to which [`LEAST_ERROR`] is added.
 pub(crate) fn point_of(
     rpm: f64,
     depth_mm: f64,

@@ -12,12 +12,12 @@
 //!
 //! A region of stability or of chatter that lies within one gap changes no limit at either end. It is found from the
 //! largest Floquet multiplier (characteristic multiplier) |μ|: at each step in depth, the same extrapolations of ln|μ|
-//! bound its extremum within the gap. A gap in which |μ| may reach 1 is halved as well. All this requires speeds that are
-//! close compared with the lobes, which repeat when the number of vibrations in a tooth period changes by one: gaps are
-//! first divided so that each lobe has [`LINES_OF_LOBE`] lines, and so that none is wider than [`CHART_GAP`]. Two lightly
-//! damped modes whose frequencies add up to a multiple of the tooth-passing frequency become unstable in a narrow
-//! tongue, which may end within a gap. A line beside it shows a maximum of |μ| over the depth: a gap beside such a line is
-//! halved down to [`TONGUE_GAP`].
+//! estimate its extremum within the gap. A gap in which |μ| may cross 1 and return is halved as well. All this requires
+//! speeds that are close compared with the lobes, which repeat when the number of vibrations in a tooth period changes
+//! by one: gaps are first divided so that each lobe has [`LINES_OF_LOBE`] lines, and so that none is wider than
+//! [`CHART_GAP`]. Two lightly damped modes whose frequencies add up to a multiple of the tooth-passing frequency become
+//! unstable in a narrow tongue, which may end within a gap. A line beside it shows a maximum of |μ| over the depth: a
+//! gap beside such a line is halved down to [`TONGUE_GAP`].
 //!
 //! Lobe tables are refined by another rule, [`Chart::refined`]; the head of its file says why.
 
@@ -32,7 +32,8 @@ use crate::error::StabilityError;
 use crate::spectrum::verdict::Verdict;
 
 impl Chart {
-    /// Adds lines at further speeds until straight lines between all of them draw the limits: see [`Resolution`].
+    /// Adds lines at further speeds until straight lines between all of them draw the limits, or until
+    /// [`CHART_LINES_MAX`] lines are added: see [`Resolution`].
     ///
     /// `samples` is the number of steps in depth that the requested lines have, `teeth` the number of teeth of the tool.
     /// The result does not depend on the number of threads.
@@ -50,8 +51,8 @@ impl Chart {
         lines.sort_by(|a, b| a.rpm.total_cmp(&b.rpm));
         lines.dedup_by(|a, b| a.rpm == b.rpm);
         let asked = lines.len();
-        // Added speeds have fewer steps in depth than the requested ones. These are steps of the requested ones too, so
-        // that |μ| of both can be compared.
+        // Added speeds have at most as many steps in depth as the requested ones. Their steps are steps of the
+        // requested ones too, so that |μ| of both can be compared.
         let stride = stride(samples);
         for line in &mut lines {
             line.largest = line.largest.iter().step_by(stride).copied().collect();
@@ -82,7 +83,8 @@ impl Chart {
     }
 
     /// Verdict that the chart draws at a spindle speed and an axial depth: from the straight lines between the two
-    /// neighbouring speeds, or from these speeds alone over an unresolved gap. `None` outside the speeds of the chart.
+    /// neighbouring speeds, or, over an unresolved gap, the verdict in which both speeds agree. `None` outside the
+    /// speeds of the chart.
     pub fn verdict(&self, rpm: f64, depth_mm: f64) -> Option<Verdict> {
         let lines = self.lines();
         let right = lines.partition_point(|line| line.rpm < rpm);
@@ -120,7 +122,8 @@ impl Chart {
     }
 }
 
-/// Largest divisor of the number of steps in depth that leaves [`CHART_SAMPLES_MIN`] steps; 1 if there are fewer steps.
+/// Largest divisor of the number of steps in depth that leaves at least [`CHART_SAMPLES_MIN`] steps; 1 if there are
+/// fewer steps.
 fn stride(samples: usize) -> usize {
     (1..=samples / CHART_SAMPLES_MIN)
         .rev()
@@ -143,7 +146,7 @@ fn contains(intervals: &[[f64; 2]], depth_mm: f64) -> bool {
 }
 
 /// Spindle speeds at which a gap between two speeds of a chart is to be divided, rev/min; none if straight lines draw
-/// the limits in it, or if it has the least width.
+/// the limits in it and it is narrow enough for its lobes, or if it is at most [`CHART_SPEED`] wide.
 fn speeds_within(lines: &[SpeedLine], right: usize, teeth: usize) -> Vec<f64> {
     let (left, right_line) = (&lines[right - 1], &lines[right]);
     let width = right_line.rpm / left.rpm - 1.0;
@@ -158,7 +161,7 @@ fn speeds_within(lines: &[SpeedLine], right: usize, teeth: usize) -> Vec<f64> {
     } else {
         2.0
     };
-    // The gap is divided into intervals of at least the least width [`CHART_SPEED`], which bounds their number.
+    // The intervals are at least half as wide as [`CHART_SPEED`], which bounds their number.
     let parts = parts.min((width / CHART_SPEED).ceil()) as usize;
     let step_rpm = (right_line.rpm - left.rpm) / parts as f64;
     (1..parts).map(|part| left.rpm + step_rpm * part as f64).collect()
@@ -178,8 +181,8 @@ fn coarsest(left: &SpeedLine, right: &SpeedLine, teeth: usize) -> f64 {
     (1.0 / (LINES_OF_LOBE * vibrations(left).max(vibrations(right)))).min(CHART_GAP)
 }
 
-/// True if straight lines over the gap draw every stable interval, and if no region of stability or of chatter can lie
-/// within the gap.
+/// True if straight lines over the gap draw every stable interval, and if no sign shows of a region of stability or of
+/// chatter within the gap.
 fn is_drawn(lines: &[SpeedLine], right: usize) -> bool {
     let gap = Gap {
         before: right.checked_sub(2).map(|index| &lines[index]),
@@ -252,8 +255,8 @@ impl Gap<'_> {
             }
             let side = if a > 0.0 { 1.0 } else { -1.0 };
             let misses = self.misses(self.before.and_then(log), a, b, self.after.and_then(log));
-            // If |μ| bends towards the unit circle within the gap, both extrapolations err in the direction away from
-            // the circle.
+            // If |μ| bends towards the unit circle within the gap, |μ| at each end lies farther from the circle than
+            // the extrapolation predicts.
             let Some(bulge) = kink_between(misses.map(|miss| miss.map(|miss| (side * miss).max(0.0)))) else {
                 return false;
             };

@@ -1,9 +1,9 @@
 //! Cells at one speed: the dominant Floquet multiplier (characteristic multiplier) at many depths from samples at few.
 //!
 //! All multipliers are computed at a few depths only. Between two of them each multiplier that may be dominant is
-//! interpolated by a cubic in depth through both ends with their derivatives. One Newton step on the characteristic
-//! matrix at the middle gives the error of the cubic there. If it is too large, or if multipliers cannot be told apart,
-//! the interval is halved, down to single cells.
+//! interpolated by a cubic in depth through both ends with their derivatives. One or two Newton steps on the
+//! characteristic matrix at the middle cell give the error of the cubic there. If it is too large, or if multipliers
+//! cannot be told apart, the interval is halved, down to single cells.
 
 use num_complex::Complex64;
 
@@ -17,12 +17,12 @@ use crate::spectrum::along_depth::Spectrum;
 use crate::spectrum::root::Root;
 use crate::spectrum::verdict::Verdict;
 
-/// Number of depth intervals of a cell chart at whose ends all multipliers are computed first. If there are fewer
-/// cells, all are computed directly. A choice.
+/// Largest number of depth intervals of a cell chart at whose ends all multipliers are computed first. If there are no
+/// more cells than this, all are computed directly. A choice.
 const INTERVALS: usize = 10;
 
 /// Share of the largest depth of a cell chart for which the first mesh of the period is built. Each further mesh covers
-/// twice the depth of the one before.
+/// twice the depth of the one before, or more if the next cell lies deeper, but no more than the largest depth.
 const FIRST_SHARE: f64 = 0.125;
 
 /// Implements [`Method::cells`] for a method with a spectrum. `spectrum` returns the multipliers at this spindle speed,
@@ -80,8 +80,8 @@ pub(crate) fn cells_of<S: Spectrum>(
 struct Sample {
     index: usize,
     depth_m: f64,
-    /// Floquet multipliers with their derivatives dμ/dw; `None` if one of them lacks a derivative, so that cells next
-    /// to this depth cannot be interpolated.
+    /// Floquet multipliers with their derivatives dμ/dw; `None` if Newton's method fails for one of them or it lacks a
+    /// derivative, so that cells next to this depth cannot be interpolated.
     roots: Option<Vec<Root>>,
 }
 
@@ -217,7 +217,7 @@ impl<S: Spectrum> Column<S> {
         };
         self.cells[index] = Cell::exact(middle.largest());
         // Stated error of interpolated cells: twice the error of the cubic in depth, although the quartic corrects it.
-        // Far outside the unit circle, where depth intervals are wide, four times that error.
+        // Far outside the unit circle, where depth intervals are wide, four times the error of the cubic.
         let error = if least > CELL_FAR {
             4.0 * worst
         } else {
@@ -269,9 +269,11 @@ impl<S: Spectrum> Column<S> {
 enum Followed {
     /// All multipliers were followed between the two depths, and the cells there are filled.
     Filled,
-    /// The interpolants of the multipliers err too much; the multipliers at the middle of the depth interval are known.
+    /// The interpolants of the multipliers err too much, or an undecided cell could not be computed directly; the
+    /// multipliers at the middle cell are known.
     Bent(Sample),
-    /// Multipliers at the two depths could not be paired, or two interpolants led to one multiplier.
+    /// Multipliers at the two depths could not be paired, Newton's method failed at the middle cell, or two
+    /// interpolants led to one multiplier.
     Lost,
 }
 
@@ -287,8 +289,8 @@ fn middle_of(low: &Sample, high: &Sample) -> usize {
     (low.index + high.index) / 2
 }
 
-/// Interpolants of all multipliers that may be dominant between two sampled depths; `None` if the multipliers cannot be
-/// paired.
+/// Interpolants of all multipliers that may be dominant between two sampled depths; `None` if a multiplier without a
+/// partner may be dominant, or if one lacks a derivative.
 fn curves(low: &Sample, high: &Sample) -> Option<Vec<Curve>> {
     let step_m = high.depth_m - low.depth_m;
     let mut free = high.roots.clone()?;

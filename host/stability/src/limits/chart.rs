@@ -31,8 +31,8 @@ pub struct Chart {
     /// limits; empty if not requested or not needed.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub refined: Vec<SpeedLine>,
-    /// Accuracy of the limits between the speeds of the chart; `None` if no lines were added between the requested
-    /// ones.
+    /// Accuracy of the limits between the speeds of the chart; `None` if no lines between the requested ones were
+    /// requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub resolution: Option<Resolution>,
     /// Depths of cells, mm, at which every line of the chart states the share of drawn machines that are stable; empty
@@ -65,8 +65,8 @@ pub fn chart<M: Method + ?Sized>(
 /// Refinement of a chart in spindle speed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Refinement {
-    /// Largest difference between a limit and the straight line between the limits at neighbouring speeds up to which
-    /// no speed is added, as a share of the largest depth.
+    /// Largest difference between a limit at the middle of a gap between two speeds and the straight line between the
+    /// limits at both, as a share of the largest depth, up to which the halves of the gap are not divided.
     pub tolerance: f64,
     /// Least distance of an added speed from its neighbours in the chart, relative to the speed: a gap narrower than twice
     /// this gets no further speed.
@@ -76,7 +76,7 @@ pub struct Refinement {
 }
 
 impl Chart {
-    /// Adds the spread of the limit to every line: see [`Uncertainty::spread`].
+    /// Adds the spread of the limit to every line at a requested speed: see [`Uncertainty::spread`].
     ///
     /// The result does not depend on the number of threads.
     ///
@@ -100,8 +100,8 @@ impl Chart {
         Ok(self)
     }
 
-    /// Adds speeds where limits bend, where the kind of stability loss changes, and where islands begin or end. Speeds
-    /// must be ascending.
+    /// Adds one speed in every gap that is wide enough, and further ones where limits bend, where the kind of stability
+    /// loss changes, and where islands begin or end. Speeds must be ascending.
     ///
     /// # Errors
     /// As [`Method::line`].
@@ -112,8 +112,8 @@ impl Chart {
         refinement: Refinement,
     ) -> Result<Self, StabilityError> {
         let tolerance_mm = refinement.tolerance * depth_mm;
-        // Every gap between two speeds is tested once; later rounds divide only gaps whose middle deviated from the
-        // straight line.
+        // The first round halves every gap between two speeds that is wide enough; later rounds halve only the halves
+        // of a gap whose middle deviated from the straight line.
         let mut open: Vec<bool> = vec![true; self.speeds.len().saturating_sub(1)];
         while open.iter().any(|&is_open| is_open) && self.speeds.len() < refinement.most_speeds {
             let middles: Vec<f64> = self

@@ -21,7 +21,7 @@ use crate::spectrum::stability_loss::StabilityLoss;
 /// the depth of the one before.
 const FIRST_SHARE: f64 = 0.125;
 
-/// Relative error of the depth of a crossing on a given mesh, at which Newton's method stops.
+/// Relative error of the depth of a crossing on a given mesh, due to the tolerance of Newton's method.
 const ROOT: f64 = 1e-9;
 
 /// All crossings of the unit circle from depth 0 to `depth_mm`, sampled at `samples` equal steps and finer where
@@ -30,10 +30,12 @@ const ROOT: f64 = 1e-9;
 /// Crossings are computed with the characteristic matrix, to about 1e-9 relative. Between samples each multiplier near
 /// the circle is followed with its derivative. If the cubic through both ends may reach the circle and return, or if a
 /// multiplier cannot be followed, the interval is halved, up to 12 times. At every sample the number of multipliers
-/// outside must agree with the crossings found.
+/// outside must agree with the crossings found. Where it does not after 12 halvings, one crossing is found by bisection
+/// on that number.
 ///
 /// # Errors
-/// Speed or depth out of range, or a computation that leaves the range of numbers.
+/// Speed or depth out of range, too many vibrations in a tooth period, or a computation that breaks down, for example
+/// because it leaves the range of numbers.
 pub fn line(problem: &Problem, rpm: f64, depth_mm: f64, samples: usize) -> Result<SpeedLine, StabilityError> {
     check_length(problem, rpm, depth_mm)?;
     line_of(rpm, depth_mm, samples, |deepest_m| {
@@ -146,8 +148,8 @@ impl<S: Spectrum> Scan<S> {
         })
     }
 
-    /// Floquet multiplier with its derivative dμ/dw. Near the unit circle Newton's method refines it first, so that it
-    /// certainly counts on the right side of the circle.
+    /// Floquet multiplier with its derivative dμ/dw. Near the unit circle Newton's method, if it converges, refines it
+    /// first, so that it counts on the right side of the circle.
     fn root(&mut self, coarse: Complex64, depth_m: f64) -> Root {
         let spectrum = &mut self.spectrum;
         let multiplier = if (coarse.norm() - 1.0).abs() < LINE_POLISHED {
@@ -189,8 +191,8 @@ impl<S: Spectrum> Scan<S> {
         Ok(found)
     }
 
-    /// Follows each multiplier near the unit circle between two sampled depths; `None` if one cannot be followed or may
-    /// touch the circle in between.
+    /// Follows each multiplier near the unit circle between two sampled depths; `None` if one cannot be followed, may
+    /// touch the circle in between, or crosses it at a depth that is not found.
     fn follow(&mut self, low: &Sample, high: &Sample) -> Option<Vec<DirectedCrossing>> {
         let step_m = high.depth_m - low.depth_m;
         let mut free: Vec<Root> = high.roots.clone();
@@ -227,8 +229,8 @@ impl<S: Spectrum> Scan<S> {
         })
     }
 
-    /// Bisects a depth interval on the number of multipliers outside the unit circle, where the interval is too short
-    /// to follow multipliers.
+    /// Bisects a depth interval on the number of multipliers outside the unit circle, where multipliers cannot be
+    /// followed even over this short interval. Finds one crossing, or none if the number is the same at both ends.
     fn by_halving(&mut self, low: &Sample, high: &Sample) -> Result<Vec<DirectedCrossing>, StabilityError> {
         let (mut low, mut high) = (low.clone(), high.clone());
         if low.outside() == high.outside() {
@@ -292,11 +294,11 @@ impl<S: Spectrum> Scan<S> {
         }
     }
 
-    /// Error of the depth of a crossing, m: the distance at which |μ| of its branch differs from 1 by more than the
-    /// error of the multiplier, on both sides.
+    /// Error of the depth of a crossing, m: a distance at which |μ| of its branch differs from 1 by at least the error
+    /// of the multiplier, on both sides.
     ///
-    /// The first try is that error divided by d|μ|/dw; the distance doubles until |μ| confirms it. `deepest_m` if no
-    /// distance does.
+    /// The first try is slightly more than that error divided by d|μ|/dw; the distance doubles until |μ| confirms it.
+    /// `deepest_m` if no distance does.
     ///
     /// # Errors
     /// The error of the multiplier, or its derivative over the depth, cannot be computed.
