@@ -149,7 +149,7 @@ fn is_same_advice(a: Option<&AdviceAnswer>, b: Option<&AdviceAnswer>) -> bool {
         (None, None) => true,
         (Some(a), Some(b)) => {
             let near = (a.rpm - b.rpm).abs() <= SAME_SPEED * a.rpm;
-            // Two advices to keep cutting are equal whatever speed is measured; other advice is equal if speed and
+            // Two answers that advise to keep cutting are equal whatever speed is measured; others are equal if speed and
             // depth are.
             let same_target = a.action == "keep" || (near && a.depth_mm == b.depth_mm);
             a.action == b.action && a.source == b.source && same_target
