@@ -1,4 +1,5 @@
-//! Loop with averaged directional coefficients: one frequency, no dependence on the phase of the period (eqs 3.8–3.12).
+//! Loop with averaged directional coefficients: one frequency, no dependence on the phase of the period (thesis eqs
+//! 3.8–3.12).
 
 use nalgebra::{DMatrix, Matrix3, Vector3};
 use num_complex::Complex64;

@@ -34,15 +34,16 @@ pub trait Method: Sync {
     /// Dominant Floquet multiplier at a spindle speed (rev/min) and an axial depth (mm), with its error.
     ///
     /// The error is the numerical error with respect to the full linear problem, if the method converges to it. For a
-    /// method of order p in its step it is the change with half the step, times 2^p/(2^p − 1) and a safety factor.
-    /// Effects that the method neglects are not included.
+    /// method of order p in its step it is estimated from the changes with half and a quarter of the step (Richardson),
+    /// times a safety factor. Effects that the method neglects are not included.
     ///
     /// # Errors
-    /// Speed not positive, depth negative, or a computation that leaves the range of numbers.
+    /// Speed not positive, depth negative, or a computation that breaks down, for example because it leaves the range
+    /// of numbers or of measured frequencies.
     fn point(&self, rpm: f64, depth_mm: f64) -> Result<CutStability, StabilityError>;
 
     /// All crossings of the unit circle from depth 0 to `depth_mm`, sampled at `samples` equal steps and finer where
-    /// needed.
+    /// needed. Methods that do not scan the depth ignore `samples`.
     ///
     /// # Errors
     /// As [`point()`](Self::point).

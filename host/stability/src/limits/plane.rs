@@ -44,7 +44,7 @@ impl Linearized {
     /// Linearizes the delay problem of a case along its uncertain variables.
     ///
     /// # Errors
-    /// The linear part of the case is not covered, or that of a case varied to either side is not valid.
+    /// The linear part of the case is not covered, or the cases varied along a variable are not valid on both sides.
     pub fn new(case: &Case, variables: &[Variable]) -> Result<Self, StabilityError> {
         let problem = Problem::new(case, CubicTerms::LeaveOut)?;
         let tangents = variables.iter().map(|variable| {
@@ -70,7 +70,7 @@ impl Linearized {
         Ok(Self { problem, tangents })
     }
 
-    /// Losses of stability at one spindle speed, each linearized over the uncertain variables, the first limit first. A
+    /// Crossings out of the unit circle at one spindle speed, each linearized over the uncertain variables, by depth. A
     /// limit without derivative has the reason.
     pub fn planes(&self, line: &SpeedLine) -> Vec<Result<Plane, StabilityError>> {
         let losses = line.switches.iter().filter(|switch| !switch.gain);

@@ -22,14 +22,16 @@ pub struct CutStability {
     pub rpm: f64,
     /// Axial depth, mm.
     pub depth_mm: f64,
-    /// Dominant Floquet multiplier over one tooth period; of a conjugate pair the one above the real axis.
+    /// Dominant Floquet multiplier over one tooth period, or over the revolution with unequal teeth; of a conjugate
+    /// pair the one above the real axis.
     #[serde(serialize_with = "as_pair")]
     pub multiplier: Complex64,
     /// Absolute value |μ| of the dominant multiplier.
     pub multiplier_abs: f64,
-    /// Error estimate of the multiplier, from a second, finer collocation. If the period map is not reliable, it is at
-    /// least the distance from |μ| to the radius beyond which a winding number counts no multiplier, since a larger
-    /// multiplier may lie between. If no multiplier above 0.25 was found then, it is that radius itself.
+    /// Error estimate of the multiplier: see [`Method::point`](crate::Method::point). Collocation over the tooth period
+    /// takes it from a second, finer mesh. If its period map is not reliable, it is at least the distance from |μ| to
+    /// the radius beyond which a winding number counts no multiplier, since a larger multiplier may lie between. If no
+    /// multiplier above 0.25 was found then, it is that radius itself.
     pub error: f64,
     /// Verdict from |μ| and its error. It is also unstable if this multiplier certainly lies outside the unit circle,
     /// even if a larger one may exist.
@@ -72,7 +74,8 @@ fn as_pair<S: serde::Serializer>(value: &Complex64, serializer: S) -> Result<S::
 /// Dominant multiplier of a cut at a spindle speed (rev/min) and an axial depth (mm).
 ///
 /// # Errors
-/// Speed not positive, depth negative, or a computation that leaves the range of numbers.
+/// Speed not positive, depth negative, too many vibrations in a tooth period, or a computation that breaks down, for
+/// example because it leaves the range of numbers.
 pub fn point(problem: &Problem, rpm: f64, depth_mm: f64) -> Result<CutStability, StabilityError> {
     check_speed(rpm)?;
     check_depth(depth_mm)?;
@@ -114,7 +117,7 @@ pub fn point(problem: &Problem, rpm: f64, depth_mm: f64) -> Result<CutStability,
 struct Solution {
     multiplier: Complex64,
     error: f64,
-    /// Working mesh of the tooth period on which the multiplier was computed.
+    /// Working mesh of the tooth period.
     period: Period,
     /// Verdict on the cut, if it is more certain than |μ| and its error show; otherwise `None`.
     verdict: Option<Verdict>,
@@ -169,7 +172,7 @@ fn confirmed(problem: &Problem, rpm: f64, depth_m: f64, rough: &ScannedMultiplie
 }
 
 /// Dominant Floquet multiplier of a cut from the period maps on the working and a finer mesh, for multipliers too small
-/// for Newton's method.
+/// for Newton's method, and if all else fails.
 fn of_maps(problem: &Problem, rpm: f64, depth_m: f64, rough: &ScannedMultipliers) -> Option<Solution> {
     let kappa_m = rough.kappa_m.min(KAPPA_MAX * depth_m);
     let largest = |resolution, share| {

@@ -117,7 +117,7 @@ impl Basis {
 
     /// Draws `count` points (a power of 2) of the standard normal distribution: stratified in `count` slices of equal
     /// probability along the first basis vector, a Hammersley set along the first two, Latin hypercube along the
-    /// others, with random shifts.
+    /// others, with random shifts along all but the first.
     ///
     /// Along the first vector the points of 2, 4, 8 … batches (numbered from 0) interleave.
     pub fn points(&self, count: u32, seed: u64, stream: u64, batch: u32) -> Vec<DVector<f64>> {

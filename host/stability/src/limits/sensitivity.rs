@@ -139,7 +139,7 @@ impl<'a> Sensitivity<'a> {
     /// Derivatives of one of the stability switches found by [`line`](crate::line()).
     ///
     /// # Errors
-    /// The switch does not belong to this problem: there is no Floquet mode for it.
+    /// The switch is a fold or does not belong to this problem: there is no Floquet mode for it.
     pub fn new(problem: &'a Problem, rpm: f64, switch: &Switch) -> Result<Self, StabilityError> {
         let broke_down = StabilityError::BrokeDown {
             rpm,

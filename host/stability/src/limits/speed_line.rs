@@ -53,7 +53,8 @@ pub struct SpeedLine {
     /// them.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub bistable_mm: Vec<[f64; 2]>,
-    /// Limit at which stability is first lost at this spindle speed; `None` if it is not lost up to the last depth.
+    /// Limit at which stability is first lost at this spindle speed; `None` if no stable interval ends before the last
+    /// depth.
     pub first_limit: Option<Limit>,
     /// Every crossing of the unit circle by a multiplier, by depth, including those while another multiplier is
     /// outside.

@@ -59,8 +59,8 @@ impl<'a> Uncertainty<'a> {
     pub fn new(case: &'a Case, method_of: &'a MethodOfCase<'a>, seed: u64) -> Option<Self> {
         let variables = Variable::of_case(case);
         (!variables.is_empty()).then(|| Self {
-            // Without derivatives of the limits draws are not stratified: more of them are needed, and the result holds
-            // as well.
+            // Without derivatives of the limits the first draws are not stratified along the directions in which limits
+            // move: more of them are needed, and the result holds as well.
             linear: Linearized::new(case, &variables).ok(),
             case,
             method_of,
@@ -72,7 +72,7 @@ impl<'a> Uncertainty<'a> {
     /// Spread of the first limit over drawn machines at one spindle speed, searched up to `depth_mm`, and the share of
     /// stable machines at `cells_mm`.
     ///
-    /// The result depends only on the seed and the speed.
+    /// The result depends on the seed and the speed, not on the number of threads.
     ///
     /// # Errors
     /// The line of a machine cannot be computed, or more than a fifth of the machines are not physical.

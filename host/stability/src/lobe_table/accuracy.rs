@@ -138,7 +138,8 @@ impl<'a> Checks<'a> {
         Ok(())
     }
 
-    /// Checks suspect gaps of the table at more speeds, until the largest disagreement stops growing.
+    /// Checks suspect gaps of the table at more speeds, until the largest disagreement grows by no more than
+    /// [`CHECK_GROWTH`], at most [`ROUNDS`] times.
     ///
     /// # Errors
     /// The method cannot compute a line.
@@ -270,8 +271,9 @@ impl<'a> Checks<'a> {
     ///
     /// Error in depth: the largest distance by which stable depths of the table lie beyond limits of the method. In
     /// gaps where the table is cautious by no more than twice the tolerance, that distance counts as well. The result
-    /// is multiplied by [`TABLE_ROOM`], plus the rounding of the entries. Error in speed: the largest width of a gap,
-    /// together with its neighbours, in which the table is cautious by more than twice the tolerance.
+    /// is multiplied by [`TABLE_ROOM`], plus the rounding of the entries. Error in speed: the largest width, relative
+    /// to the speed, of a gap together with its neighbours in which the table at a layer is cautious by more than twice
+    /// the tolerance; such gaps half way between layers do not count.
     pub(super) fn stated(&self, table: &LobeTable<'_>, tolerance_mm: f64) -> InterpolationError {
         let (mut depth, mut speed) = (0.0_f64, 0.0_f64);
         for (index, checked) in self.checked_layers.iter().enumerate() {

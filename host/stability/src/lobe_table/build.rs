@@ -15,8 +15,8 @@ use crate::limits::speeds::{default_speeds, spaced};
 use quietcut_model::case::Case;
 
 /// Target size of a table, bytes: a quarter of a slot of the board, so that refinement, which stops only after
-/// exceeding it, stays within the slot. A speed takes 4 bytes, plus 2 in each layer, plus 8 for each of one or two
-/// unstable intervals.
+/// exceeding it, stays within the slot. A speed takes 4 bytes, plus 2 in each layer, plus 8, and its derivatives, for
+/// each of one or two unstable intervals.
 const BYTES: usize = 32 * 1024;
 
 /// Default number of speeds of a lobe table before refinement. A choice.
@@ -37,15 +37,17 @@ pub struct BuiltTable {
 
 /// Builds a lobe table with one layer per case, feed and feed direction.
 ///
-/// Speeds are added until every limit differs from the straight line between its neighbours by less than 0.3 % of the
-/// largest depth, or until the table has its target size; feeds and directions likewise. Then every gap between speeds
-/// is checked against the method at two more speeds, and at up to 23 if these disagree with the table, in every layer
-/// and half way between layers. If the table is too deep there, on flanks too steep for its speeds, the surrounding
-/// entries become as shallow as the gap; see [`InterpolationError`] for the stated error. Depths with two stable
-/// orbits, which only nonlinear cases have, count as unstable.
+/// Speeds are added until every limit half way between two speeds differs from the straight line between them by at
+/// most 0.3 % of the largest depth, until they lie too close for more, or until the table has its target size. Feeds
+/// and directions are added likewise, up to a number of layers. Then every gap between speeds is checked against the
+/// method at two more speeds or more, and at further ones if these disagree with the table, in every layer and half way
+/// between layers. If the table is too deep there, on flanks too steep for its speeds, the surrounding entries become
+/// as shallow as the gap; see [`InterpolationError`] for the stated error. Depths with two stable orbits, which only
+/// nonlinear cases have, count as unstable.
 ///
 /// # Errors
-/// No case, cases of different tools, two layers for the same cut, or a case whose stability cannot be computed.
+/// No case, different numbers of teeth, a request that does not fit a case, two layers for the same cut, or a case
+/// whose stability cannot be computed.
 pub fn build_table(cases: &[Case], request: &TableRequest) -> Result<BuiltTable, BuildError> {
     let first = cases.first().ok_or(BuildError::NoCase)?;
     let asked = layers::table_layers(cases, request)?;

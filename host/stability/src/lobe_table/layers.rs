@@ -347,7 +347,7 @@ fn divisions(cases: &[Case], request: &TableRequest) -> Result<Vec<Division>, Bu
 
 /// Adds feeds and feed directions between the requested ones. It stops when the first limits half way between two
 /// layers differ from the mean of both by less than `tolerance_mm` at the probe speeds, or when the number of layers is
-/// exhausted.
+/// exhausted. Directions too far apart for interpolation are divided in any case.
 pub(super) fn refined(
     cases: &[Case],
     request: &TableRequest,
@@ -396,7 +396,7 @@ struct Axis {
 
 impl Axis {
     /// Feeds or directions of the layers, ascending: the given ones, and others between them until the limits half way
-    /// agree with the mean of both sides.
+    /// agree with the mean of both sides or the number of layers is exhausted.
     fn filled(
         &self,
         values: &[f64],

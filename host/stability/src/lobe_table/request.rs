@@ -6,7 +6,7 @@ pub struct TableRequest {
     /// Lowest and highest spindle speed of the table, rev/min. Default: the speed limits of the spindle if the case has
     /// them, otherwise 1/2 to 5 tooth passings per vibration period of the most flexible mode.
     pub rpm: Option<(f64, f64)>,
-    /// Largest axial depth of the table, mm. Default: four times the lowest limit.
+    /// Largest axial depth of the table, mm. Default: four times the lowest limit, or 500 mm if no limit is found.
     pub depth_mm: Option<f64>,
     /// Feeds per tooth, mm, one layer each; more are added between them where limits bend. Default: the feed of each
     /// case. Without axial-depth modulation and nonlinear effects limits do not depend on the feed, and one layer holds

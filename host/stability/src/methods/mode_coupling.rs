@@ -28,8 +28,8 @@ impl ModeCoupling {
     /// Sets up the mode-coupling criterion for a problem given by its receptances.
     ///
     /// # Errors
-    /// The structure has a single mode, or does not move in both directions that change the chip thickness, so that
-    /// modes cannot couple.
+    /// The structure has fewer than two modes (peaks of a table of receptances), or does not move in both feed and
+    /// normal direction, so that modes cannot couple.
     pub fn new(problem: FrequencyProblem) -> Result<Self, StabilityError> {
         let [feed, normal, _] = problem.moves();
         let has_modes = problem.resonances().len() >= 2;

@@ -16,18 +16,20 @@ use crate::limits::point::CutStability;
 use crate::limits::speed_line::SpeedLine;
 use crate::spectrum::stability_loss::StabilityLoss;
 
-/// Largest number K of harmonics of the tooth-passing frequency: a limit on computing time. A choice.
+/// Number K of harmonics of the tooth-passing frequency at about which its doubling stops: a limit on computing time. A
+/// choice.
 const HARMONICS_MAX: usize = 400;
 
 /// Multi-frequency solution on modelled or measured receptances.
 ///
 /// The harmonic transfer matrix contains harmonics from −K−1 to K of the tooth-passing frequency and includes flips. If
-/// K is not set, it is doubled until the limits settle.
+/// K is not set, it is doubled until the result settles.
 #[derive(Clone, Debug)]
 pub struct MultiFrequency {
     /// Receptances and cutting process.
     pub problem: FrequencyProblem,
-    /// Number K of harmonics of the tooth-passing frequency; `None` doubles K until the limits settle.
+    /// Number K of harmonics of the tooth-passing frequency; `None` doubles K until the limits or the multiplier
+    /// settle.
     pub harmonics: Option<usize>,
 }
 
@@ -111,8 +113,8 @@ impl Method for MultiFrequency {
         true
     }
 
-    /// Computes the dominant multiplier with twice the harmonics; its error is the change from the single to the
-    /// doubled number.
+    /// Computes the dominant multiplier with 2K + 1 harmonics, and doubles further until it settles if K is not set.
+    /// Its error contains the change by the last doubling.
     fn point(&self, rpm: f64, depth_mm: f64) -> Result<CutStability, StabilityError> {
         check_speed(rpm)?;
         check_depth(depth_mm)?;

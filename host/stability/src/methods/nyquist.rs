@@ -19,13 +19,15 @@ use crate::limits::speed_line::SpeedLine;
 ///
 /// With averaged coefficients (K = 0) the line s = iω from 0 to infinity suffices, and the criterion is exact for the
 /// averaged cut. With K > 0 the coefficients are periodic: s runs from 0 to iΩ/2, with the determinant of the harmonic
-/// transfer matrix with harmonics up to K (Wereley & Hall); the only error is truncation. Between every two limits the
-/// number of unstable roots is verified by a count that does not use the loci.
+/// transfer matrix with harmonics up to K (Wereley & Hall); the only error beside that of a table is truncation.
+/// Between every two limits, and behind the last, the number of unstable roots is verified by a count that does not use
+/// the loci, unless the interval is too short.
 #[derive(Clone, Debug)]
 pub struct Nyquist {
     /// Receptances and cutting process.
     pub problem: FrequencyProblem,
-    /// Highest harmonic K of the directional coefficients; 0 uses their average.
+    /// Highest harmonic K of the vibration in the harmonic transfer matrix; 0 uses averaged directional coefficients
+    /// instead.
     pub harmonics: usize,
 }
 
@@ -33,7 +35,8 @@ impl Nyquist {
     /// Number of unstable roots at a spindle speed (rev/min) and an axial depth (mm); a complex pair counts as 2.
     ///
     /// # Errors
-    /// Speed not positive, depth negative, depth at a limit, or infinite receptances.
+    /// Speed not positive, depth negative, a table of receptances that ends too early for this depth, or roots that
+    /// cannot be counted, for example at a limit.
     pub fn unstable_roots(&self, rpm: f64, depth_mm: f64) -> Result<i32, StabilityError> {
         check_speed(rpm)?;
         check_depth(depth_mm)?;
@@ -60,8 +63,8 @@ impl Nyquist {
     }
 }
 
-/// Limits up to an axial depth. Between every two of them a count of unstable roots must agree with the crossings of
-/// the loci.
+/// Limits up to an axial depth. Between every two of them, and behind the last, a count of unstable roots must agree
+/// with the crossings of the loci.
 fn confirmed(
     open_loop: &impl OpenLoop,
     rpm: f64,
@@ -80,7 +83,8 @@ fn confirmed(
         let count = limit.kind.count();
         outside += if limit.outward { count } else { -count };
         let next_m = found.get(index + 1).map_or(depth_m, |next| next.depth_m);
-        // Two limits closer than 1e-6 of the depth leave no interval between them in which roots could be counted.
+        // Two limits closer than 1e-6 of the last depth, or a limit that close to it, leave no interval in which roots
+        // could be counted.
         if next_m - limit.depth_m < 1e-6 * depth_m {
             continue;
         }

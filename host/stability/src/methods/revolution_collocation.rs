@@ -91,8 +91,9 @@ impl Method for RevolutionCollocation {
     }
 }
 
-/// Error estimate of the fine multiplier: [`MESH_ROOM`] times the change from the coarse to the fine mesh. The coarse
-/// mesh errs by far more than the fine one, so that the change bounds the error of the latter.
+/// Error estimate of a multiplier on either mesh: [`MESH_ROOM`] times the change from the coarse to the fine mesh, and
+/// at least [`LEAST_ERROR`]. The coarse mesh errs by far more than the fine one, so that the change is about its error
+/// and bounds that of the fine one.
 fn error(coarse: Complex64, fine: Complex64) -> f64 {
     (MESH_ROOM * (coarse - fine).norm()).max(LEAST_ERROR * fine.norm().max(1.0))
 }

@@ -7,9 +7,9 @@ use crate::criteria::STEP_ROOM;
 /// Error estimate |error| of a multiplier from a method of order p in its step, from the results with half and a
 /// quarter of the step (Richardson).
 ///
-/// By the leading term, the error is 2^{kp}/(2^{kp} − 1) times the change after k halvings. The larger of the estimates
-/// for k = 1 and 2 is used, since terms may cancel after one halving, times three, since the order holds for small
-/// steps only. The result is at least `least` (rounding), relative to max(1, |μ|).
+/// By the leading term, the error with the whole step is 2^{kp}/(2^{kp} − 1) times the change after k halvings. The
+/// larger of the estimates for k = 1 and 2 is used, since terms may cancel after one halving, times three, since the
+/// order holds for small steps only. The result is at least `least` (rounding), relative to max(1, |μ|).
 pub(crate) fn step_error(
     whole: Complex64,
     half: Complex64,

@@ -27,10 +27,12 @@ const CLOSED: f64 = 1e-11;
 ///
 /// At a chatter frequency ω each eigenvalue λ of H̃ α₀ with Re(1/λ) > 0 gives one depth, w = |1/λ|²/(2 Re(1/λ)), and
 /// one speed for every lobe k: ωτ = π − 2 arg(1/λ) + 2πk. All eigenvalues are used, in two directions or three; edge
-/// and feed terms (eqs 3.6–3.12) are in H̃. At a given speed the chatter frequencies are those that fulfil the phase
-/// condition for some k. The eigenvalues do not depend on the speed and are traced along the frequency once per chart.
+/// and feed terms (thesis eqs 3.6–3.12) are in H̃. At a given speed the chatter frequencies are those that fulfil the
+/// phase condition for some k. The eigenvalues do not depend on the speed and are traced along the frequency once per
+/// chart.
 ///
-/// The approximation is exact for the averaged cut; for the periodic one it neglects flips.
+/// The approximation is exact for the averaged cut; for the periodic one it neglects the harmonics of the coefficients,
+/// and with them flips.
 #[derive(Clone, Debug)]
 pub struct Zoa {
     /// Receptances and cutting process.
@@ -52,7 +54,8 @@ impl Zoa {
         )
     }
 
-    /// The same method with every second line of its table of receptances only; `None` for a modelled structure.
+    /// The same method with every second line of its table of receptances and the last one only; `None` for a modelled
+    /// structure, or if too few lines remain.
     fn thinned(&self) -> Option<Self> {
         let problem = self.problem.thinned()?;
         Some(Self { problem })

@@ -8,7 +8,8 @@ use std::collections::VecDeque;
 use nalgebra::{DMatrix, DVector};
 use quietcut_numerics::least_squares::{MinimumNorm, Tolerance};
 
-/// Singular values of the matrix of residuals G(z) − z below this share of the largest are dropped as rounding.
+/// Singular values of the matrix of differences of residuals G(z) − z below this share of the largest are dropped as
+/// rounding.
 const RANK: f64 = 1e-10;
 
 /// Last iterations of a fixed-point iteration, from which the next iterate is accelerated.
@@ -19,7 +20,7 @@ pub(super) struct Anderson {
 }
 
 impl Anderson {
-    /// Acceleration that stores `depth` iterations.
+    /// Acceleration from the last iteration and up to `depth` earlier ones.
     pub(super) fn new(depth: usize) -> Self {
         Self {
             depth,

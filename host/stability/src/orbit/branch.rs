@@ -56,7 +56,7 @@ pub struct Branch {
 pub enum Extent {
     /// To the first loss of stability along the branch, which suffices for a limit.
     FirstLoss,
-    /// To the last requested depth, through folds of the branch.
+    /// To the last requested depth, through folds of the branch, or back to depth 0.
     Whole,
 }
 
@@ -116,8 +116,8 @@ impl Branch {
 
     /// The branch as a line of a stability chart.
     ///
-    /// The first limit is the first loss of stability along the branch. A depth is stable if some forced orbit there is
-    /// stable.
+    /// The first limit is the first loss of stability along a branch that begins stable. A depth is stable if some
+    /// forced orbit there is stable.
     pub fn speed_line(&self) -> SpeedLine {
         let switches: Vec<Switch> = self
             .events

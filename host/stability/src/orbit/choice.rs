@@ -18,7 +18,7 @@ use quietcut_model::case::Case;
 /// cutting coefficients of each spindle speed if they depend on it.
 ///
 /// # Errors
-/// A feature that no collocation method treats.
+/// The case lacks a section, is not valid, or has a feature that no collocation method treats.
 pub fn collocation_of(case: &Case) -> Result<Box<dyn Method>, StabilityError> {
     Ok(if depends_on_speed(case) {
         Box::new(AtEachSpeed::new(case, collocation_of)?)

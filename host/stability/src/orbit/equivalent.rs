@@ -34,14 +34,14 @@ use quietcut_model::RestoringForce;
 use quietcut_model::case::Case;
 use quietcut_model::effects::{ALL, Treatment};
 
-/// Largest change of the equivalent springs in an iteration, in units of the static stiffness, at which springs and
-/// orbit count as agreeing.
+/// Largest change of the equivalent springs in an iteration, in their [`Units`] or relative to the largest spring if
+/// that is above 1, at which springs and orbit count as agreeing.
 const SETTLED: f64 = 1e-7;
 
 /// Largest number of iterations in which equivalent springs and orbit are computed from each other. A choice.
 const ROUNDS: usize = 200;
 
-/// Number of iterations of springs and orbit that Anderson acceleration stores. A choice.
+/// Number of earlier iterations of springs and orbit that Anderson acceleration stores. A choice.
 const REMEMBERED: usize = 5;
 
 /// Width to which the depth interval around a crossing of the unit circle by a multiplier is narrowed, relative to the
@@ -104,7 +104,7 @@ impl EquivalentProblem {
     /// Builds the stability problem of a case with friction, backlash or hysteresis.
     ///
     /// # Errors
-    /// As [`ForcedProblem::new`], or the structure has no mass at the tool.
+    /// As [`ForcedProblem::new`], or the structure has no mass at the tool, or the teeth have runout or unequal pitch.
     pub fn new(case: &Case) -> Result<Self, StabilityError> {
         let mut rest = case.clone();
         for spec in ALL
@@ -426,7 +426,7 @@ impl Method for EquivalentProblem {
         "collocation about the forced orbit, with equivalent stiffness and damping of non-smooth forces"
     }
 
-    /// Evaluates the branch of orbits reached when the depth grows from 0. The error is the distance to the multiplier
+    /// Evaluates the orbit that is reached when the depth grows from 0. The error is the distance to the multiplier
     /// with the stiffness and damping that a small disturbance sees.
     fn point(&self, rpm: f64, depth_mm: f64) -> Result<CutStability, StabilityError> {
         check_speed(rpm)?;

@@ -21,10 +21,12 @@ use crate::spectrum::stability_loss::StabilityLoss;
 /// choice.
 const STEPS_MAX: usize = 1000;
 
-/// Follows the forced orbits at one spindle speed from depth 0 until the depth exceeds `depth_mm` or returns to 0.
+/// Follows the forced orbits at one spindle speed from depth 0 until the depth reaches `depth_mm` or returns to 0; with
+/// [`Extent::FirstLoss`] at most until stability is lost.
 ///
 /// # Errors
-/// The branch cannot be followed further with the shortest step.
+/// The branch cannot be followed further with the shortest step, or takes too many steps; or no preceding tooth cuts
+/// the surface in front of some tooth.
 pub fn follow_depth(
     problem: &ForcedProblem,
     rpm: f64,
@@ -50,7 +52,7 @@ pub(super) struct Dominant {
     pub(super) chatter_hz: Option<f64>,
 }
 
-/// Dominant Floquet multiplier about the forced orbit at a depth, from the working mesh and from one twice as fine.
+/// Dominant Floquet multiplier about the forced orbit at a depth, from the working mesh and from a finer one.
 pub(super) fn multiplier_at(
     problem: &ForcedProblem,
     rpm: f64,
@@ -99,8 +101,8 @@ fn dominant_of<M: PeriodMap>(map: M, rpm: f64, depth_mm: f64) -> Result<[Dominan
     Ok([at(map)?, at(finer)?])
 }
 
-/// Norm of the orbit's state at the start of the period at a depth, without cubic terms: the unit of the state along a
-/// branch.
+/// Norm of the orbit's state at the start of the period at a depth, from the equation linearized about rest at depth 0:
+/// the unit of the state along a branch.
 pub(super) fn size_at(map: &impl PeriodMap, depth_m: f64) -> f64 {
     let rest = Orbit::rest(map);
     let linear = map
@@ -305,7 +307,8 @@ impl<M: PeriodMap> Follower<M> {
     }
 
     /// Error of the depth of a crossing, m: the change of depth along the branch that moves the multiplier by its error
-    /// to either side, plus the change of the depth on a finer mesh. `None` if it cannot be computed.
+    /// to either side, plus [`ORBIT_ROOM`] times the change of the depth on a finer mesh. `None` if it cannot be
+    /// computed, or if the multiplier hardly moves along the branch.
     fn error_m(&self, at: &Sample, root: Complex64) -> Option<f64> {
         let order = self.map.problem().order();
         let finer = Follower {

@@ -16,7 +16,7 @@ use quietcut_model::milling::{EdgeAngle, Immersion};
 use quietcut_model::structure::{CubicForce, FirstOrder};
 use quietcut_model::{ChipLaw, MotionState, ProcessDamping, RestoringForce};
 
-/// Equation of the forced orbit, eqs 6.1 and 3.6 in first-order form:
+/// Equation of the forced orbit, thesis eqs 6.1 and 3.6 in first-order form:
 ///
 ///   ẋ = A x + B F(t, x) − N(x),   u = C x.
 ///
@@ -55,7 +55,8 @@ pub struct ForcedProblem {
 pub(super) struct Uneven {
     /// Linear delay problem with the revolution as its period.
     pub(super) pitched: Pitched,
-    /// Increase of the chip thickness of each tooth by the radius difference to the preceding tooth (runout), m.
+    /// Increase of the chip thickness of each tooth, m: the radius difference to the preceding tooth (runout) times the
+    /// sine of the edge angle.
     pub(super) runout_m: Vec<f64>,
 }
 
@@ -149,7 +150,9 @@ impl ForcedProblem {
     /// Builds the forced problem of a case, whose solutions are forced periodic orbits.
     ///
     /// # Errors
-    /// As [`Problem::new`], except that cubic terms are accepted. Friction, backlash and hysteresis are refused;
+    /// As [`Problem::new`], except that cubic terms are accepted. Process damping and smooth restoring forces are
+    /// refused without a mass at the tool, a chip law for teeth with unequal pitch or runout, and unequal pitch on a
+    /// linear structure. Friction, backlash and hysteresis are refused too;
     /// [`EquivalentProblem`](super::EquivalentProblem) treats them.
     pub fn new(case: &Case) -> Result<Self, StabilityError> {
         if is_not_smooth(case) {

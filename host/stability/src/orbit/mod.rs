@@ -4,8 +4,8 @@
 //! differential equation under feed and edge forces. Its multipliers are those of the delay equation linearized about
 //! it.
 //!
-//! With unequal pitch, or with runout, the orbit has the period of the revolution. The previously cut surface acts on
-//! it, and it solves the delay equation itself.
+//! With unequal pitch, or with runout, the orbit of a nonlinear structure has the period of the revolution. The
+//! previously cut surface acts on it, and it solves the delay equation itself.
 
 mod anderson;
 mod branch;

@@ -12,7 +12,7 @@ use quietcut_numerics::quadrature::Gauss;
 /// Reason why no forced periodic orbit was found.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum OrbitError {
-    /// Newton's method did not converge.
+    /// Newton's method did not converge, or the branch of orbits cannot be followed further.
     #[error("no periodic orbit was found near the guess at {depth_mm} mm: the iteration does not settle")]
     NoConvergence {
         /// Axial depth, mm.
@@ -24,7 +24,8 @@ pub enum OrbitError {
         /// Axial depth of the fold, mm.
         depth_mm: f64,
     },
-    /// The equations of the periodic orbit are singular, at a fold or a branch point.
+    /// The equations of the periodic orbit, or those linearized about it, cannot be solved, for example at a fold or a
+    /// branch point.
     #[error("the equations of the periodic orbit are singular at {depth_mm} mm")]
     Singular {
         /// Axial depth, mm.
@@ -128,11 +129,12 @@ pub(super) struct SubintervalNodes<'a> {
     pub(super) gauss: &'a Gauss,
 }
 
-/// Predicted size of the next Newton step, relative to the orbit, below which the iteration stops. Newton steps shrink
-/// as e' = C e², so that two successive steps e and e' predict the next one: C e'² = e'³/e².
+/// Size of a Newton step, or predicted size of the next one, relative to the orbit, below which the iteration stops.
+/// Newton steps shrink as e' = C e², so that two successive steps e and e' predict the next one: C e'² = e'³/e².
 const SETTLED: f64 = 1e-12;
 
-/// Size of a Newton step, relative to the orbit, above which the size of the next step is not predicted yet. A choice.
+/// Size of the preceding Newton step, relative to the orbit, from which on the size of the next step is not predicted
+/// yet. A choice.
 const NEAR: f64 = 1e-3;
 
 /// Map of a forced problem over a period at one spindle speed on one mesh; forced orbits are its fixed points.

@@ -9,14 +9,15 @@ use crate::criteria::{DISTURBANCE, DISTURBANCE_PERIODS};
 use quietcut_model::RestoringForce;
 use quietcut_model::path::{SampledMotion, restoring_along, restoring_from};
 
-/// Number of samples of the orbit in each subinterval of the mesh, for forces of friction, backlash and hysteresis.
+/// Mean number of samples of the orbit in a subinterval of the mesh, for forces of friction, backlash and hysteresis.
 /// Over a subinterval the fastest motion rotates by a few radians. A choice.
 const PER_SUBINTERVAL: usize = 128;
 
 /// Least number of samples of the orbit in a period for the forces of friction, backlash and hysteresis. A choice.
 const LEAST: usize = 1024;
 
-/// Largest number of periods in which terms with internal states must reach a closed hysteresis loop. A choice.
+/// Number of periods after which the hysteresis loop of a term with internal states is taken as closed at the latest. A
+/// choice.
 const PERIODS: usize = 64;
 
 /// Change of an internal state over a period, relative to the largest displacement of the orbit, at which a hysteresis
@@ -108,9 +109,11 @@ impl Samples {
         }
     }
 
-    /// Restoring force of a term along the orbit over one period, N, once its hysteresis loop is closed.
+    /// Restoring force of a term along the orbit over one period, N, once its hysteresis loop is closed, or after
+    /// [`PERIODS`] periods.
     ///
-    /// An internal state is the fixed point of its map over a period, by the secant method.
+    /// The internal states are the fixed point of their map over a period, found by repetition; for a single state,
+    /// secant steps shorten it.
     fn force_n(&self, term: &dyn RestoringForce) -> [Vec<f64>; 3] {
         if term.states() == 0 {
             return restoring_along(term, &self.motion(1, 0, |_| [0.0; 2]));
@@ -203,8 +206,8 @@ pub(super) fn equivalent(
 }
 
 /// Incremental spring and damper that a small disturbance of a given frequency (Hz) sees on the orbit, by axis: the
-/// parts of the force change in phase with its displacement and with its velocity. An axis that sticks in `springs`
-/// also sticks for the disturbance.
+/// parts of the force change in phase with its displacement and with its velocity. An axis that sticks or is at rest
+/// keeps its spring from `springs`.
 pub(super) fn incremental(
     terms: &[Box<dyn RestoringForce>],
     samples: &Samples,
