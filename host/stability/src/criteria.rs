@@ -47,8 +47,9 @@ pub(crate) const MAPPED: f64 = 0.25;
 /// [`MAPPED`]. If none is larger, those above half the largest are computed.
 pub(crate) const KRYLOV_ANY: f64 = 0.25;
 
-/// Largest number of eigenvalues that are candidates for the dominant one, on the coarse mesh or if all are small. More
-/// than that many of nearly one size are the cluster near zero of a compact period map. Unfounded.
+/// Largest number of eigenvalues that are candidates for the dominant one: of the collocated map over a tooth period
+/// always, of other maps if all are small. More than that many of nearly one size are the cluster near zero of a
+/// compact period map. Unfounded.
 pub(crate) const CROWD: usize = 24;
 
 /// Least |μ| of a Floquet multiplier that is taken from the transition matrix Φ(w) alone, which omits the surface of
@@ -57,9 +58,9 @@ pub(crate) const CROWD: usize = 24;
 pub(crate) const GROWN: f64 = 1e6;
 
 /// Largest entry of a period map, or of its projection on a Krylov space, relative to max(1, |μ|) of its largest
-/// eigenvalue, at which the eigenvalues are trusted. Rounding of the map is then at most 1e-9 of that eigenvalue, which
-/// its condition number multiplies. Maps with larger entries are so far from normal that rounding may move their
-/// eigenvalues, and a winding number is used. The value is unfounded.
+/// eigenvalue, at which the eigenvalues are trusted. Rounding of the map is then at most 1e-9 of the same base; the
+/// condition number of the eigenvalue multiplies it. Maps with larger entries are so far from normal that rounding may
+/// move their eigenvalues, and a winding number is used. The value is unfounded.
 pub(crate) const NORMAL: f64 = 1e7;
 
 /// Largest number of elements in a tooth period on the working mesh. The fastest motion turns by five radians in an
@@ -388,5 +389,5 @@ pub(crate) const CHECK_GROWTH: f64 = 1.2;
 
 /// Factor of the stated depth error on the largest disagreement at the checked speeds. Two checks of a smooth limit see
 /// 85 % of its largest error at least, and doubling stops at a growth by 1.2 ([`CHECK_GROWTH`]): together 1.2/0.85 =
-/// 1.4. Held by `lobe_table/accuracy_tests.rs` at 1000 random speeds per table.
+/// 1.4. Held by `lobe_table/accuracy_tests.rs` at 999 of 1000 random speeds per table.
 pub(crate) const TABLE_ROOM: f64 = 1.5;

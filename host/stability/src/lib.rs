@@ -6,11 +6,11 @@
 //!
 //! lie inside the unit circle. Here x are the states of the structure, F the cutting force, u the displacement of the
 //! tool, w the axial depth, K the cutting coefficient K_tc, α the directional coefficients, φ the immersion angle, β
-//! the coefficients of edge and feed forces under axial-depth modulation, and τ the tooth period. With this sign of the
-//! force every cut is stable at a sufficiently small w. Equation numbers in this crate are those of the thesis
+//! the coefficients of edge and feed forces under axial-depth modulation, and τ the tooth period. Without β a cut is
+//! stable at a sufficiently small w if the structure is damped. Equation numbers in this crate are those of the thesis
 //! *Chatter Vibrations in Robotic Milling Considering Structural Nonlinearity* (University of Victoria), from which the
-//! cases `kuka-*` and `staubli-*` come. The default method collocates the map over one
-//! period; others are interchangeable behind [`Method`].
+//! cases `kuka-*` and `staubli-*` come. The default method collocates the map over one period; others are
+//! interchangeable behind [`Method`].
 //!
 //! Main types: [`Problem`] is the linear delay equation of a case. A [`Method`] computes from it the stability of one cut
 //! ([`CutStability`]) or all limits at one speed ([`SpeedLine`]). [`chart()`] does so at many speeds, and

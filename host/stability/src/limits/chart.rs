@@ -35,8 +35,8 @@ pub struct Chart {
     /// requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub resolution: Option<Resolution>,
-    /// Depths of cells, mm, at which every line of the chart states the share of drawn machines that are stable; empty
-    /// if not requested.
+    /// Depths of cells, mm, at which every line at a requested speed states the share of drawn machines that are
+    /// stable; empty if not requested.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub cells_mm: Vec<f64>,
 }

@@ -289,7 +289,8 @@ impl<'a> Checks<'a> {
         }
         InterpolationError {
             depth: Millimeters((TABLE_ROOM * depth + f64::from(table.depth_step().0)) as f32),
-            // A stated relative error in speed of 1 would be no bound; refinement never leaves a gap that wide.
+            // A stated relative error in speed of 1 would be no bound, so that a smaller one is stated. Only a table of
+            // few speeds over a wide range has such gaps.
             speed: speed.min(0.999) as f32,
         }
     }

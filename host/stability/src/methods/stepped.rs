@@ -1,7 +1,7 @@
 //! Map of one period in time steps, x_{i+1} = P_i x_i + Σ_j R_ij y_j with y = C x at earlier steps; shared by
 //! semi-discretization and full discretization.
 //!
-//! Only displacements of the delayed state act. The matrix of the period map is never formed: a step updates n states
+//! Only displacements of the delayed state act. The period map is applied without its matrix: a step updates n states
 //! and appends one displacement to those before.
 
 use nalgebra::{DMatrix, DVector, Matrix3};
