@@ -29,8 +29,8 @@ pub(crate) const STEP_ROUNDING: f64 = 1e-9;
 
 // Multipliers of a period map.
 
-/// Least |μ| of the Floquet multipliers that collocation computes at each depth of a scan; where [`SCANNED_SHARE`] of
-/// the largest is smaller, that bound holds. It lies below [`LINE_FOLLOWED`], above which the scan follows multipliers;
+/// Least |μ| of the Floquet multipliers that collocation computes at each depth of a scan, unless [`SCANNED_SHARE`] of
+/// the largest is less and takes its place. It lies below [`LINE_FOLLOWED`], above which the scan follows multipliers;
 /// the margin between the two is unfounded.
 pub(crate) const SCANNED: f64 = 0.25;
 
@@ -154,8 +154,8 @@ pub(crate) const CHART_SPEED: f64 = 1e-3;
 
 /// Least number of lines of a chart per lobe. A lobe is the distance in speed over which the number of vibrations in a
 /// tooth period changes by one, and the multiplier rotates once. Three lines then lie in each quarter of a revolution,
-/// so that the parabola through them bends as the limit does. `tests/between_speeds.rs` checks two thousand random
-/// points of random machines.
+/// so that the parabola through them bends as the limit does. `tests/between_speeds.rs` checks nearly three thousand
+/// random points of random machines.
 pub(crate) const LINES_OF_LOBE: f64 = 12.0;
 
 /// Largest gap between two speeds of a chart, relative to the speed. A region of stability or of chatter that is wider
@@ -314,8 +314,8 @@ pub(crate) const ZOA_BEND: f64 = 0.1;
 pub(crate) const VELOCITY_JUMP: f64 = 1e-6;
 
 /// Longest step along a branch of forced orbits: the norm of the relative changes of depth and orbit, with the largest
-/// depth of the branch and the norm of the orbit at that depth as bases. Unfounded: a branch up and down takes about a
-/// hundred steps.
+/// depth of the branch and the norm of the linearized orbit's start at that depth as bases. Unfounded: a branch up and
+/// down takes about a hundred steps.
 pub(crate) const BRANCH_STEP_MAX: f64 = 1.0 / 30.0;
 
 /// Shortest step along a branch of forced orbits, in the units of [`BRANCH_STEP_MAX`]. In steps up to twice this length

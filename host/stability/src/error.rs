@@ -11,7 +11,8 @@ use quietcut_numerics::eigenvalues::EigenvalueError;
 /// Reason why stability cannot be computed.
 #[derive(Debug, thiserror::Error)]
 pub enum StabilityError {
-    /// The case lacks a section, or has an extension that linear stability cannot treat.
+    /// The case cannot be used, for example because it lacks a section, or has an extension that linear stability
+    /// cannot treat.
     #[error(transparent)]
     Case(#[from] CaseError),
     /// The matrices or modes of the structure are invalid.
