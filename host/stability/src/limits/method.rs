@@ -25,8 +25,8 @@ pub trait Method: Sync {
         None
     }
 
-    /// True if one spindle speed takes seconds to compute. A chart then has lines at the requested speeds only, unless
-    /// the user asks for more.
+    /// True if one spindle speed takes seconds to compute. The command `lobes` then adds no lines between the requested
+    /// speeds.
     fn takes_seconds(&self) -> bool {
         false
     }
