@@ -11,7 +11,7 @@ use quietcut_numerics::least_squares::{
 /// Reason why an equation of motion cannot be fitted to dwells of steady motion.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum FitError {
-    /// There are too few dwells for the number of parameters of the equation of motion.
+    /// There are too few usable dwells for the number of parameters of the equation of motion.
     #[error(
         "{found} dwells with motion in every direction are too few for {parameters} parameters; at least {needed} are needed"
     )]
@@ -43,7 +43,8 @@ pub enum FitError {
     NotConverged(f64),
 }
 
-/// Normal equations summed over dwells, from the whitened residual r of each dwell and its derivative S by the parameters.
+/// Normal equations summed over dwells, from the whitened residual r of each dwell and the derivative S of its whitened
+/// prediction by the parameters.
 pub(super) struct Normal {
     /// Σ SᵀS and Σ Sᵀr.
     sums: NormalSums,

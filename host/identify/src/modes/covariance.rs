@@ -76,8 +76,9 @@ fn meat(jacobian: &[DMatrix<Complex64>], left: &[DVector<Complex64>], lags: usiz
     meat
 }
 
-/// Upper left block of [N Gᵀ; G 0]⁻¹, with the normal matrix N and the gradients G of the constraints. The constraints
-/// fix the scale and phase of the left and right shape of each mode, which the data do not determine.
+/// Upper left block of [N Gᵀ; G 0]⁻¹, with the normal matrix N and the gradients G of the constraints. The right shape
+/// of a mode can be multiplied by any complex factor if the left one is divided by it. The data do not determine this
+/// factor; the constraints fix it.
 pub(super) fn constrained_inverse(
     fit: &PoleResidue,
     shared: &[(usize, usize)],

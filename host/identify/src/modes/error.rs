@@ -1,4 +1,4 @@
-//! Reasons why no modes are identified from receptances.
+//! Reasons why no modes are identified from receptances or records.
 
 use quietcut_frf::rational_fit::RationalFitError;
 use quietcut_numerics::eigenvalues::EigenvalueError;
@@ -9,7 +9,7 @@ pub enum ModesError {
     /// No modal model can be fitted to the data; the text states the reason.
     #[error("{0}")]
     Data(String),
-    /// No pole of the band is stable over the model orders.
+    /// No pole in the band is stable over the model orders, or none of the stable poles is a mode after refinement.
     #[error(
         "no pole is stable over the model order from {from_hz:.2} to {to_hz:.2} Hz ({rejected} poles were rejected); a band with a resonance, or better receptances, are needed"
     )]
@@ -29,7 +29,7 @@ pub enum ModesError {
         /// Number of requested modes.
         wanted: usize,
     },
-    /// The modal fit with this number of modes does not converge.
+    /// The modal fit with this number of modes does not converge, or the data do not determine its parameters.
     #[error("the fit of {0} modes does not converge; fewer modes or another band are needed")]
     NotConverged(usize),
     /// The poles of the LSCF model with a common denominator cannot be computed.

@@ -44,9 +44,10 @@ use crate::criteria::{LEAST_RESIDUE_SIGNIFICANCE, OVERDAMPED};
 /// Options of the modal identification.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Options {
-    /// Highest model order of the stabilization diagram.
+    /// Highest model order of the stabilization diagram; few frequency lines allow only a lower one.
     pub highest_order: usize,
-    /// Number of modes to identify: the strongest stable poles are taken; `None` takes all stable poles.
+    /// Number of stable poles to fit, the strongest ones; `None` takes all stable poles. Poles that are spurious after
+    /// refinement are removed.
     pub modes: Option<usize>,
 }
 
@@ -61,8 +62,7 @@ impl Default for Options {
 
 /// Identifies the modes of measured receptances: poles, stabilization over the model order, and refinement.
 ///
-/// # Errors
-/// Too few lines, no stable pole or fewer than wanted, a fit that does not converge.
+/// # Errors See [`ModesError`].
 pub fn identify(data: &Receptances, options: &Options) -> Result<ModalModel, ModesError> {
     let stabilization = stabilization::stabilize(data, options.highest_order)?;
     let mut rejected = stabilization.rejected();

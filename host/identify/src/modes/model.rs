@@ -23,10 +23,11 @@ pub struct ModalModel {
     /// For each pair of response and force direction: the compliance of the modes above the band, m/N, and the inertia term of the
     /// modes below it, the coefficient of 1/s², in 1/kg.
     pub outside: Vec<(Direction, Direction, [f64; 2])>,
-    /// NRMSE of the fitted receptances; each receptance has equal weight.
+    /// NRMSE of the fitted receptances, each with equal weight; after a fit to whole records, of the responses in the
+    /// records.
     pub fit_error: f64,
-    /// χ² per degree of freedom of the residual of the fitted receptances: near 1 if the residual is noise. `None` if
-    /// the data state no variance.
+    /// χ² per degree of freedom of the fitted receptances, or of the fitted records: near 1 if the residual is noise.
+    /// `None` if receptances are fitted whose variance is not stated.
     pub misfit: Option<f64>,
     /// Poles of every model order.
     pub stabilization: Stabilization,
@@ -36,8 +37,8 @@ pub struct ModalModel {
     pub warnings: Vec<String>,
 }
 
-/// Warnings about a poor modal fit, and about modal parameters that receptances with the line spacing `spacing_hz`
-/// determine poorly.
+/// Warnings about a poor modal fit, and about modal parameters that data with the line spacing `spacing_hz` determine
+/// poorly.
 pub(super) fn warnings(spacing_hz: f64, model: &ModalModel) -> Vec<String> {
     let mut warnings = Vec::new();
     if model.fit_error > LARGEST_FIT_ERROR {

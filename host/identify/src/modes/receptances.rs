@@ -21,9 +21,11 @@ pub struct Receptances {
     /// The receptances, m/N.
     pub values: Vec<Vec<Complex64>>,
     /// Standard deviation of the real part, equal to that of the imaginary part, of every receptance at every
-    /// frequency, m/N. If only coherence is measured, it is correct up to a common factor.
+    /// frequency, m/N. It is averaged over neighbouring lines. If only coherence is measured, it is correct up to a
+    /// common factor; if neither is known, it is a fixed fraction of the RMS of the receptance.
     pub deviation: Vec<Vec<f64>>,
-    /// True if the data state standard deviations of the receptances; false if coherence gives only relative ones.
+    /// True if the data state standard deviations of the receptances; false if they follow from coherence up to a
+    /// factor, or are not known.
     pub has_deviation: bool,
 }
 
@@ -32,11 +34,11 @@ pub struct Receptances {
 const NEIGHBOURS: usize = 4;
 
 impl Receptances {
-    /// The receptances of a table between `band_hz[0]` and `band_hz[1]`, Hz.
+    /// The receptances of a table between `band_hz[0]` and `band_hz[1]`, Hz, inclusive; `None` takes all above 0 Hz.
     ///
     /// `deviation` holds the standard deviation of |H| of every value, as [`quietcut_frf::Measurement`] states it.
-    /// Without it, the coherence of each response gives the relative standard deviation over the lines, and the
-    /// residual of the fit gives its scale.
+    /// Without it, the coherence of each response gives the relative standard deviation over the lines; without
+    /// coherence it is equal at all lines. The residual of the fit then gives its scale.
     ///
     /// # Errors
     /// Too few lines in the band, a receptance that is zero throughout or that is missing.

@@ -35,7 +35,7 @@ const SETTLED: f64 = 1e-10;
 const ROUNDS: usize = 3;
 
 /// Weighted least-squares fit of modes to receptances from `start`, with weights updated from the residual; `None` if
-/// it does not converge.
+/// it does not converge or the data do not determine the parameters.
 pub(super) fn refine(data: &Receptances, start: PoleResidue) -> Option<Refined> {
     let mut weights = Weights::of(&data.deviation);
     let mut fit = least_squares(data, &weights, start)?;
@@ -150,7 +150,7 @@ impl Refined {
         let of_right = variance(at, mode.right.len());
         let of_left = variance(at + 2 * mode.right.len(), mode.left.len());
         // Standard deviation of the residue matrix right·leftᵀ; its variance is |right|²·var(left) +
-        // |left|²·var(right).
+        // |left|²·var(right), without the correlation of the two shapes.
         let deviation = (right * of_left + left * of_right).sqrt();
         if deviation > 0.0 {
             (right * left).sqrt() / deviation

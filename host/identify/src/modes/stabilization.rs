@@ -58,7 +58,8 @@ pub struct Stabilization {
     pub selected: Vec<Complex64>,
     /// Poles of the highest model order in the band whose damping is not positive, rad/s.
     unstable: Vec<Complex64>,
-    /// Chains of stable poles that are too short or too weak for a mode: the pole of each, rad/s, and the reason.
+    /// Chains of poles that are no modes: too weak, or too short although they reach the highest order. The pole of
+    /// each, rad/s, and the reason.
     discarded: Vec<(Complex64, String)>,
 }
 
@@ -80,8 +81,8 @@ impl Stabilization {
 /// Computes the poles of the models of order 1 to `highest_order`, or to the highest order that the number of lines
 /// allows, and selects the stable ones.
 ///
-/// # Errors
-/// The number of lines or `highest_order` allows too few model orders, or an iteration exceeds its bound.
+/// # Errors The number of lines or `highest_order` allows too few model orders, or the poles or residues cannot be
+/// computed.
 pub(super) fn stabilize(data: &Receptances, highest_order: usize) -> Result<Stabilization, ModesError> {
     let lines = data.frequency_hz.len();
     let highest = highest_order.min((lines - 1) / 3);

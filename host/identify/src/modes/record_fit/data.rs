@@ -21,7 +21,8 @@ pub(super) struct Data<'a> {
     /// For each record: the index in the right shape of each response channel, and the index in the left shape of each
     /// force channel.
     pub(super) axes: Vec<(Vec<usize>, Vec<usize>)>,
-    /// Angular frequency at the middle of the band, rad/s, by which s is divided in the polynomials of the transients.
+    /// Mean angular frequency of the lines of all records, rad/s, by which s is divided in the polynomials of the
+    /// transients.
     pub(super) omega: f64,
 }
 

@@ -37,7 +37,8 @@ impl Equations {
     }
 }
 
-/// Normal equations of a record for the structure and its own transient; `None` if they are singular.
+/// Normal equations of a record for the structure and its own transient; `None` if they are singular or the residual's
+/// covariance is not positive definite.
 pub(super) fn equations(
     data: &Data<'_>,
     record: usize,
@@ -99,7 +100,7 @@ fn eliminated(gram: &DMatrix<f64>, structure: usize, transient: usize) -> Option
 }
 
 /// Contribution of the uncertainty of the estimated forces to the normal matrix Re(Jᴴ J), for forces with the
-/// covariance P = V_f − V_f Hᴴ C⁻¹ H V_f.
+/// covariance P = V_f − V_f Gᴴ C⁻¹ G V_f, where G = sⁿ H.
 pub(super) fn of_force_noise(
     data: &Data<'_>,
     record: usize,

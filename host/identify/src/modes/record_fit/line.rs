@@ -9,8 +9,8 @@ use super::unknowns::{SMOOTH, Unknowns};
 use super::variances::Variances;
 use crate::modes::shape;
 
-/// Residual of the responses and estimated forces of a record at one frequency line. Directions without a channel are
-/// zero with unit variance.
+/// Residual of the responses and estimated forces of a record at one frequency line. Missing responses are zero with
+/// unit variance, missing forces zero without noise.
 pub(super) struct Line {
     pub(super) s: Complex64,
     /// FRF matrix sⁿ H, with the number n of time derivatives that each response measures; rows responses, columns
@@ -108,8 +108,8 @@ pub(super) fn gain(data: &Data<'_>, record: usize, unknowns: &Unknowns, s: Compl
     gain
 }
 
-/// Powers (s/is₀)ʲ iʲ at s that make up the polynomial of the transient, with the middle s₀ of the band. They are
-/// alternately real and imaginary, as the transform of a real signal requires.
+/// Powers (s/ω₀)ʲ that make up the polynomial of the transient, with the mean angular frequency ω₀ of the lines. They
+/// are alternately real and imaginary, as the transform of a real signal requires.
 pub(super) fn powers(data: &Data<'_>, s: Complex64) -> [Complex64; SMOOTH] {
     std::array::from_fn(|j| (s / data.omega).powi(j as i32))
 }

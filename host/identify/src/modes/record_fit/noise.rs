@@ -22,9 +22,9 @@ const STEPS: usize = 10;
 /// Smallest factor by which one scoring step may multiply a noise variance. A choice that damps the iteration.
 const SHRINK: f64 = 0.1;
 
-/// Number of frequency lines in each band over which the spectral matrix of the forces is averaged. With this number
-/// the smallest eigenvalue of the sample covariance of three noise channels is rarely below [`EIGENVALUE`] times the
-/// variance (Marchenko and Pastur: (1 − √(3/64))² = 0.61).
+/// Least number of frequency lines in each band over which the spectral matrix of the forces is averaged; a record with
+/// fewer lines has one band. With this number the smallest eigenvalue of the sample covariance of three noise channels
+/// is rarely below [`EIGENVALUE`] times the variance (Marchenko and Pastur: (1 − √(3/64))² = 0.61).
 const BAND: usize = 64;
 /// Lower bound of the smallest eigenvalue of a sample covariance of noise over [`BAND`] lines, relative to the noise
 /// variance; below the expected 0.61.
@@ -34,7 +34,8 @@ const EIGENVALUE: f64 = 0.5;
 /// the rounding error.
 const RIDGE: f64 = 1e-12;
 
-/// Start value of the noise variance of a force, relative to the mean square of its transform in the band. A choice.
+/// Smallest start value of the noise variance of a force, relative to the mean square of its transform in the band. A
+/// choice.
 const FORCE_START: f64 = 1e-6;
 
 /// Start values of the noise variances of a record: the whole residual is attributed to noise of the responses.
@@ -79,7 +80,8 @@ fn mean_square(lines: &[Complex64]) -> f64 {
     lines.iter().map(|line| line.norm_sqr()).sum::<f64>() / lines.len().max(1) as f64
 }
 
-/// Updates the noise variances of a record. Returns the largest relative change of the residual covariance.
+/// Updates the noise variances of a record. Returns the largest relative change of the residual covariance over every
+/// 16th line.
 pub(super) fn update(data: &Data<'_>, record: usize, unknowns: &Unknowns, variances: &mut Variances) -> f64 {
     let before = variances.clone();
     let responses = variances.responses.len();
@@ -175,9 +177,9 @@ fn scored(normal: &DMatrix<f64>, right: &DVector<f64>, current: &[f64], bounds: 
 }
 
 /// Divides the apparent noise of each force into measurement noise and unmeasured forces. The variance V_f of the
-/// measurement noise is the noise plateau of the force spectrum, or else the largest one for which S_ff − V_f is
-/// positive definite, with the spectral matrix S_ff of the forces. The rest is unmeasured force that acts on the
-/// structure.
+/// measurement noise is at most the apparent noise. It is the noise plateau of the force spectrum, if there is one;
+/// else it is the fraction of the apparent noise, common to all forces, that the smallest eigenvalue of the spectral
+/// matrix of the forces allows in every band. The rest is unmeasured force that acts on the structure.
 fn divide(data: &Data<'_>, record: usize, unknowns: &Unknowns, variances: &mut Variances) {
     let spectra = &data.records[record];
     let count = spectra.frequency_hz.len();

@@ -16,7 +16,7 @@ pub(super) struct Unknowns {
 }
 
 /// Transient of one record in each of its responses p: T_p(s) = Σ_r c_pr/(s − λ_r) + conjugate at the conjugate pole +
-/// Σ_j a_pj (s/i s₀)ʲ iʲ. The poles λ_r are those of the structure, s₀ is the middle of the band.
+/// Σ_j a_pj (s/ω₀)ʲ. The poles λ_r are those of the structure, ω₀ is the mean angular frequency of the lines.
 #[derive(Clone)]
 pub(super) struct Transient {
     /// Residues c_pr of the transient, by response and mode.

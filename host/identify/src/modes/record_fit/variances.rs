@@ -4,7 +4,7 @@ use nalgebra::Matrix3;
 use num_complex::Complex64;
 use serde::Serialize;
 
-/// Estimated noise of a channel.
+/// Estimated noise of a channel; for a force it includes unmeasured forces.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ChannelNoise {
     /// Name of the recording.
