@@ -16,7 +16,7 @@ pub enum Nonlinearity {
     QuadraticStiffness,
     /// Cubic damping c3·v³.
     CubicDamping,
-    /// Springs k3·x³ + k5·x⁵ with coefficients of opposite sign: softening turns into hardening, or the reverse.
+    /// Spring k3·x³ + k5·x⁵; with coefficients of opposite sign softening turns into hardening, or the reverse.
     SofteningHardening,
     /// Coulomb friction fc·sign(v).
     CoulombFriction,

@@ -16,9 +16,9 @@ pub struct Region {
 /// Regions in which the response amplitude X(F) is linear, at constant frequency under a slowly changing force
 /// amplitude F, and the forces at which X jumps (thesis Fig. 4.8).
 ///
-/// `points` are (F, X) in the order of measurement. A region is split in two if two lines reduce the sum of squared
-/// residuals by much more than noise does. The response jumps where two neighbouring lines differ by more than the
-/// noise and a share of X.
+/// `points` are pairs (F, X) in any order. A region is split in two if two lines reduce the sum of squared residuals by
+/// much more than noise does. The response jumps where two neighbouring lines differ by more than six standard
+/// deviations of the noise and more than 5 % of X.
 pub fn regions(points: &[(f64, f64)]) -> (Vec<Region>, Vec<f64>) {
     let mut sorted = points.to_vec();
     sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -57,8 +57,8 @@ pub fn regions(points: &[(f64, f64)]) -> (Vec<Region>, Vec<f64>) {
             let at = 0.5 * (sorted[pair[0].1 - 1].0 + sorted[pair[1].0].0);
             let value = |[level, slope]: [f64; 2]| level + slope * at;
             let miss = (value(pair[1].2) - value(pair[0].2)).abs();
-            // A jump exceeds the noise of X, and 5 % of X, which is more than a smooth curve changes between two
-            // windows.
+            // A jump exceeds six standard deviations of the noise of X, and 5 % of X, which is more than the curvature
+            // of a smooth response gives between two neighbouring lines.
             (miss > JUMP_DEVIATIONS * noise && miss > JUMP_SHARE * value(pair[0].2).abs()).then_some(at)
         })
         .collect();

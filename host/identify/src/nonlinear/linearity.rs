@@ -1,9 +1,10 @@
 //! Tests whether a structure is linear, and which kind of nonlinearity it has (thesis section 4.2, as tests with error rates).
 //!
-//! *Force-level dependence* and *homogeneity*: the dynamic stiffness F/X of a linear structure at one frequency does not depend on
-//! the force level. The change with the level is fitted by the describing function of each candidate kind. A kind is named only if
-//! it reduces the sum of squares by much more than chance does. *Harmonics*: the response of a linear structure at 2ω and 3ω is
-//! within the noise and within the response to the harmonics of the force.
+//! *Force-level dependence* and *homogeneity*: the dynamic stiffness F/X of a linear structure at one frequency does
+//! not depend on the force level. The change with the level is fitted by the describing function of each candidate
+//! kind. A kind is named if it reduces the sum of squares by much more than chance does; a quadratic spring is named if
+//! the second harmonic is significant. *Harmonics*: the response of a linear structure at 2ω and 3ω is within the noise
+//! and within the response to the harmonics of the force.
 
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
@@ -24,17 +25,18 @@ use crate::nonlinear::homogeneity::line;
 pub struct Verdict {
     /// True if the data are consistent with a linear structure.
     pub linear: bool,
-    /// The kinds of nonlinearity that explain the dependence of the stiffness F/X on the force level, strongest first.
-    /// Empty for a linear structure, and if no kind explains it.
+    /// The kinds of nonlinearity that explain the dependence of the stiffness F/X on the force level, followed by a
+    /// quadratic spring if the second harmonic is significant. Empty if there is none.
     pub kinds: Vec<Nonlinearity>,
     /// χ² per degree of freedom of a linear structure's fit to the stiffnesses F/X of all dwells: near 1 if the
     /// structure is linear.
     pub linear_misfit: f64,
-    /// χ² per degree of freedom of the fit with the named kinds of nonlinearity.
+    /// χ² per degree of freedom of the fit with the kinds of nonlinearity that explain the dependence on the force
+    /// level; without a kind, that of the linear structure.
     pub explained_misfit: f64,
-    /// Largest relative change of the stiffness |F/X| with the force level at one frequency.
+    /// Largest relative change of the stiffness |F/X| between two dwells of one frequency.
     pub level_dependence: f64,
-    /// Second and third harmonics of the response at each force level, as in figures 5.4 (b) and (c) of the thesis.
+    /// Second and third harmonics of the response in each dwell, as in figures 5.4 (b) and (c) of the thesis.
     pub harmonics: Vec<Harmonics>,
 }
 
@@ -56,7 +58,7 @@ pub struct Harmonics {
 /// Reason why the linearity test gives no result.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum LinearityError {
-    /// Every frequency was measured at one force level only.
+    /// No frequency was measured at two levels, that is, at motion amplitudes that differ by more than 5 %.
     #[error(
         "no frequency was measured at two or more force levels ({dwells} dwells were found); a step-sine test at several levels, or a tone of rising force, is needed"
     )]
@@ -321,8 +323,8 @@ fn candidates(base: &LinearModel<'_>, points: &[DwellStiffness]) -> Vec<Candidat
         parameters,
         features: features(kind, parameters, 0.0),
     };
-    // The gap of backlash and the yield displacement of hysteresis are searched from far below the smallest to just
-    // above the largest measured amplitude.
+    // The gap of backlash and the yield displacement of hysteresis are searched from 0.05 times the smallest to 1.5
+    // times the largest measured amplitude.
     let sizes = points.iter().map(|point| point.amplitude);
     let (least, largest) = sizes.fold((f64::INFINITY, 0.0_f64), |(a, b), x| (a.min(x), b.max(x)));
     let with_bend = |kind| {

@@ -70,7 +70,8 @@ impl Map {
     }
 
     /// Fits the map of thesis eq. 4.7 to the points of all forces together by least squares. `None` if there are fewer
-    /// points than coefficients, or no more distinct forces than the degree in F.
+    /// points than coefficients, or if they do not determine the coefficients, for example with no more distinct forces
+    /// than the degree in F.
     pub fn fit(points: &[Linearized], degree: usize, value: impl Fn(&Linearized) -> f64) -> Option<Self> {
         let size = degree + 1;
         let matrix = DMatrix::from_fn(points.len(), 3 * size, |row, column| {
@@ -103,8 +104,8 @@ impl Map {
 }
 
 impl Curve {
-    /// Linearized modes from pairs of points with equal |H| on both sides of the resonance peak, down to the fraction
-    /// `share` of the peak.
+    /// Linearized modes from pairs of points with equal |H| on both sides of the resonance peak, with |H| from the
+    /// fraction `share` to 98 % of the peak.
     ///
     /// Each measured point on one side is paired with an interpolated point on the other. Between points, real and
     /// imaginary part of H are cubics through four of them.
@@ -189,7 +190,7 @@ impl Curve {
 }
 
 /// Mode through two points (ω_j, H_j) of a receptance (thesis eqs 4.5 and 4.6): natural frequency ω_r, rad/s, loss
-/// factor η_r, modal constant A_r + iB_r.
+/// factor η_r, modal constant A_r + iB_r. `None` if the equations are singular or ω_r² is not positive.
 ///
 /// With p = ω_r² and g = η_r ω_r² the two complex equations H_j·(p − ω_j² + i·g) = A + iB are linear in p, g, A, B.
 pub fn two_points(points: [(f64, Complex64); 2]) -> Option<(f64, f64, Complex64)> {

@@ -3,8 +3,8 @@
 //!
 //! The balance Σ θ φ(x) = F, with the coefficients θ of the terms φ, is solved for the periodic displacement x at the
 //! samples of a period, at twice the measured sample rate, so that cubes of the measured band do not alias into it.
-//! Newton's method solves its linear systems iteratively (GMRES, preconditioned by the linear part). The predicted
-//! motion is fitted to the measured one with exact derivatives.
+//! Newton's method solves its linear systems iteratively (GMRES, preconditioned by the linear part and the mean slopes
+//! of the nonlinear terms). The predicted motion is fitted to the measured one with exact derivatives.
 
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -42,15 +42,15 @@ pub struct PeriodicFit {
 /// Reason why the fit of an equation of motion to periods gives no result.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PeriodicError {
-    /// A term of the equation of motion is not smooth in displacement or velocity, such as Coulomb friction.
+    /// A term of the equation of motion is Coulomb friction, which is not smooth, or a constant force.
     #[error(
         "{0} is not smooth: harmonic balance of a multisine takes springs and dampers; use restoring-force"
     )]
     NotSmooth(&'static str),
-    /// The periods differ in their number of samples, or are too short.
+    /// The signals differ in their number of samples, or the periods are too short.
     #[error("periods of one length, at least 16 samples, are needed")]
     Length,
-    /// The terms lack mass, damping or stiffness, without which the equation of motion has no periodic solution.
+    /// The terms lack mass, damping or stiffness; all three are required.
     #[error("mass, damping and stiffness are needed among the terms")]
     NoOscillator,
     /// The harmonic balance or the fit of its coefficients does not converge.
@@ -303,7 +303,8 @@ pub fn fit(periods: &[Period<'_>], rate_hz: f64, terms: &[ForceTerm]) -> Result<
             .map_err(|_| PeriodicError::Undetermined)?;
         theta += &fit.parameters;
         let moved = fit.parameters.component_div(&theta).amax();
-        // The fit has converged: the relative change of every coefficient is below a millionth, far below any interval.
+        // The fit has converged if the relative change of every coefficient is below a millionth, far below any
+        // interval.
         if moved < 1e-6 {
             let (slope, left) = balance.linearized(&theta, &forces, &measured, &mut motions)?;
             let all: f64 = measured.iter().map(|y| dot(y, y)).sum();

@@ -12,7 +12,7 @@ const FINER: usize = 8;
 /// Reason why an equation of motion gives no prediction of the motion.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum ResponseError {
-    /// The law has no mass.
+    /// The law has no mass, or one that is not finite.
     #[error("the law has no mass, so that its motion cannot be predicted")]
     NoMass,
     /// The motion grows without bound.

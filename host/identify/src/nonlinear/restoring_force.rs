@@ -2,10 +2,10 @@
 //!
 //! The force law is fitted by least squares between force and motion *within a band* of frequencies. Force and every
 //! term of the law, nonlinear terms included, pass the same filter: the filtered signals satisfy the same equation, and
-//! noise of derivatives outside the band has no effect. If the law has a spring, the error of the force is weighted by
-//! the receptance of the law and becomes an error of the *motion*, which carries the noise (Sanathanan–Koerner
-//! weighting). One motion channel is sufficient; displacement, velocity and acceleration follow from it by
-//! differentiation or integration.
+//! noise of derivatives outside the band has no effect. If a force acts and the law has a spring, the error of the
+//! force is weighted by the receptance of the law and becomes an error of the *motion*, which carries the noise
+//! (Sanathanan–Koerner weighting). One motion channel is sufficient; displacement, velocity and acceleration follow
+//! from it by differentiation or integration.
 
 use std::f64::consts::TAU;
 
@@ -98,9 +98,10 @@ pub struct Options {
     pub terms: Vec<ForceTerm>,
     /// Given moving mass, kg; `None` if the fit determines it. Required for a record without force.
     pub mass_kg: Option<f64>,
-    /// Frequency band of the fit, Hz; `None` takes the band in which the measured motion exceeds its noise.
+    /// Frequency band of the fit, Hz; `None` takes the band in which the measured motion exceeds its noise. If the
+    /// motion is integrated, the band starts at a quarter of the dominant frequency at least.
     pub band_hz: Option<[f64; 2]>,
-    /// Duration that is left out of the fit at each end of the record, s.
+    /// Duration that is left out of the fit at each end of the record, s; at most a quarter of the record is left out.
     pub trim_s: f64,
 }
 

@@ -1,8 +1,9 @@
 //! Derivatives, integrals and filters of whole records by the discrete Fourier transform.
 //!
-//! A record is not periodic. The straight line through its ends is subtracted, and the remaining signal is continued by
-//! point reflection about its end, so that value and slope are continuous. At both ends of the result an error remains,
-//! over about one period of the lowest frequency; callers leave these ends out.
+//! A record is not periodic. For a band from 0 Hz the straight line through its ends is subtracted, and the remaining
+//! signal is continued by point reflection about its end, so that value and slope are continuous. For a higher band the
+//! record is mirrored at its ends. At both ends of the result an error remains, over about one period of the lowest
+//! frequency; callers leave these ends out.
 
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -99,8 +100,8 @@ impl Spectral {
     }
 
     /// The record within `band_hz`, differentiated `order` times over time, or integrated for a negative order. With a
-    /// band from 0 Hz the level and slope of the record are kept. With a band from above 0 Hz the lower band edge is
-    /// gradual, and the record is mirrored at its ends.
+    /// band from 0 Hz the straight line through the ends of the record is kept, but not in integrals. With a band from
+    /// above 0 Hz the lower band edge is gradual, and the record is mirrored at its ends.
     pub fn derivative(&self, samples: &[f64], order: i32, band_hz: [f64; 2]) -> Vec<f64> {
         let nyquist = 0.5 * self.rate_hz;
         let filter = |frequency: f64| {
@@ -152,8 +153,8 @@ fn above(frequency: f64, low: f64) -> f64 {
     }
 }
 
-/// Power spectrum of a record averaged over frequency intervals of 1/400 of the sample rate, and the width of these
-/// intervals, Hz.
+/// Power spectrum of a record averaged over frequency intervals of 1/400 of the sample rate, at least three lines, and
+/// the width of these intervals, Hz.
 fn smooth_power(samples: &[f64], rate_hz: f64) -> (Vec<f64>, f64) {
     let length = samples.len();
     // A Hann window reduces the leakage from the ends of the record.

@@ -34,7 +34,8 @@ pub struct Comparison {
     pub misfit: f64,
     /// Largest difference of the receptances, relative to the largest receptance of the first record.
     pub largest_change: f64,
-    /// True if the receptances of both records agree with one linear structure.
+    /// True if the receptances of both records agree with one linear structure within noise, or differ by less than 0.5
+    /// % of the peak.
     pub same: bool,
 }
 
@@ -134,8 +135,8 @@ pub fn compare(a: &Spectra, b: &Spectra) -> Option<Comparison> {
             Some((a.local(frequency)?, b.local(frequency)?))
         })
         .collect();
-    // Noise of the sensor is equal at all lines. The residual of a nonlinear structure near resonance is not noise, so
-    // the noise is the median over the estimates.
+    // Noise of the sensor is taken as equal at all lines. The residual of a nonlinear structure near resonance is not
+    // noise, so the noise is the median over the estimates.
     let median = |of: &dyn Fn(&(Local, Local)) -> f64| {
         let mut values: Vec<f64> = pairs.iter().map(of).collect();
         values.sort_by(f64::total_cmp);
