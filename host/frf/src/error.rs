@@ -14,7 +14,7 @@ pub enum FrfError {
     /// A recording that cannot be read or lacks a required channel.
     #[error(transparent)]
     Recording(RecordingError),
-    /// A line of a CSV or UFF file of an FRF table is malformed.
+    /// A line of a text or UFF file, or its UFF data set, is malformed.
     #[error("{}, line {line}: {what}", path.display())]
     Line {
         /// The file.
@@ -24,7 +24,7 @@ pub enum FrfError {
         /// Description of the fault in the line, and the content expected there.
         what: String,
     },
-    /// A column of an FRF table in a text file has an unknown name or unit.
+    /// A column of an FRF table in a text file has an unknown name, or a unit that is unknown or does not fit.
     #[error("{}, column \"{column}\": {what}", path.display())]
     Column {
         /// The file.
@@ -34,12 +34,12 @@ pub enum FrfError {
         /// Description of the fault in the name or unit of the column, and the name or unit expected there.
         what: String,
     },
-    /// The content of the file or the given values are not a valid table.
+    /// The values are not a valid table, or the content of the files does not allow the requested evaluation.
     #[error("{}: {what}", path.display())]
     Content {
-        /// Path of the file with the invalid table, or a name for the origin of values that are not from a file.
+        /// Path of the file with the fault, or a name for the origin of values that are not from a file.
         path: PathBuf,
-        /// Description of the fault in the table, and the content expected.
+        /// Description of the fault.
         what: String,
     },
 }

@@ -35,7 +35,7 @@ pub(super) struct FrfLine {
     /// was not estimated.
     pub(super) folding: [f64; 3],
     /// Smallest and largest singular value of the force spectra at this line, with each force divided by its root mean
-    /// square.
+    /// square; for the pseudo-inverse, those of the stacked matrices S_ff of all tests, with rows of unit norm.
     pub(super) singular: (f64, f64),
 }
 
@@ -48,12 +48,14 @@ pub(super) struct ChannelCounts {
     pub(super) responses: usize,
 }
 
-/// FRF estimate at every frequency line, except those at which the matrix of the force spectra is singular.
+/// FRF estimate at every frequency line, except those at which a matrix that the estimator inverts is singular.
 ///
 /// All `tests` have the same lines. For several forces, H2 and the mean require equal numbers of responses and forces; the caller checks it.
 ///
 /// Random error (Bendat and Piersol, generalised to H = Σ S_xf,i W_i): var H_pq = Σ_i S_ee,p (W_iᴴ S_ff,i W_i)_qq / n_i, with the residual
-/// spectrum S_ee of the responses and n_i averages of test i. For one force: ε[|H|] = √(1 − γ²) / (|γ| √(2n)).
+/// spectrum S_ee of the responses and n_i averages of test i; the variance of |H| is half of it. S_ee is the power of X − H1 F for every
+/// estimator but the pseudo-inverse, times n/(n − number of forces), n = Σ n_i. For one force and large n:
+/// ε[|H|] = √(1 − γ²) / (|γ| √(2n)).
 pub(super) fn lines(tests: &[CrossSpectra], counts: ChannelCounts, estimator: Estimator) -> Vec<FrfLine> {
     let count = tests.first().map_or(0, |test| test.frequency_hz.len());
     (0..count)

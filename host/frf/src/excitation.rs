@@ -5,9 +5,9 @@ use quietcut_recording::{Sidecar, TestKind};
 /// Kind of excitation; it selects how a record is divided into segments.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Excitation {
-    /// Random excitation, or a cut: overlapping windowed segments (Welch's method).
+    /// Random excitation, or a cut at constant spindle speed: overlapping windowed segments (Welch's method).
     Random,
-    /// Swept sine: one transform of the whole record, averaged over neighbouring lines.
+    /// Swept sine, or a cut with a speed ramp: one transform of the whole record, averaged over neighbouring lines.
     Sweep,
     /// Hammer test: one segment per impact.
     Hammer,
@@ -16,7 +16,7 @@ pub enum Excitation {
 }
 
 impl Excitation {
-    /// Kind of excitation of a recording, from the kind of test that its sidecar names.
+    /// Kind of excitation of a recording, from the kind of test and the speed ramp in its sidecar; random if it names no test.
     pub(super) fn of(sidecar: &Sidecar) -> Self {
         let glides = sidecar.cut.is_some_and(|cut| cut.last_rpm.is_some());
         match sidecar.kind {

@@ -42,7 +42,7 @@ impl FrfUnit {
         }
     }
 
-    /// Converts an FRF value in this unit to receptance, m/N; `None` for mobility and accelerance at 0 Hz, where no receptance follows.
+    /// Converts an FRF value in this unit to receptance, m/N; `None` if the receptance is not finite, as for mobility and accelerance at 0 Hz.
     pub(super) fn receptance(self, value: Complex64, frequency_hz: f64) -> Option<Complex64> {
         let rate = Complex64::new(0.0, TAU * frequency_hz).powi(self.derivatives);
         let receptance = value * self.factor / rate;

@@ -17,7 +17,7 @@ const BEFORE: f64 = 0.01;
 pub struct MeasuredImpact {
     /// Time of the force peak, s, from the start of the record.
     pub time_s: f64,
-    /// Peak force, N, with sign.
+    /// Peak force, N, with sign, from the median of the record.
     pub peak_n: f64,
     /// Largest second force pulse within the segment: delay after the first peak, s, and height as a fraction of that peak; `None` for a single
     /// impact.
@@ -31,8 +31,8 @@ pub struct MeasuredImpact {
 /// Segment length and exponential window of a hammer test.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct HammerWindows {
-    /// Length of the segment of each impact, s; `None` for the greatest length with which the segments of successive
-    /// impacts do not overlap.
+    /// Length of the segment of each impact, s. `None` for the inverse of the frequency resolution or, if none is set, for
+    /// the greatest length with which segments neither overlap nor exceed the record.
     pub segment_s: Option<f64>,
     /// Time constant τ of the exponential window on force and response, s; `None` for no window.
     ///
@@ -53,14 +53,15 @@ pub(super) struct ImpactSegments {
     pub(super) double: Vec<MeasuredImpact>,
     /// Impacts too close to the start or end of the record for a segment, which are not evaluated.
     pub(super) cut_short: Vec<MeasuredImpact>,
-    /// Largest amplitude of a response at the end of a segment, as a fraction of the peak of that response in the segment.
+    /// Largest amplitude of a windowed response at the end of a segment, as a fraction of the peak of that response in the segment.
     pub(super) end_amplitude: f64,
 }
 
-/// Cuts a record into one windowed segment per single impact; double impacts are left out.
+/// Cuts a record into one windowed segment per single impact; double impacts, and impacts without a whole segment in the record, are left out.
 ///
 /// # Errors
-/// The record has several forces, no impact, or only double impacts; or the segments are longer than the record.
+/// The record has several forces, no impact, or no impact with a whole segment; all impacts with a segment are double; or the segments have
+/// fewer than 16 samples.
 pub(super) fn segments(
     channels: &TestChannels<'_>,
     windows: HammerWindows,
@@ -162,8 +163,8 @@ fn end_amplitude(segment: &[f64]) -> f64 {
     }
 }
 
-/// Weight of the force window at a sample: 1 over the force pulse and one pulse width after it, then a half-cosine taper to 0, since the
-/// force signal after the contact is noise only.
+/// Weight of the force window at a sample: 1 over the force pulse and one pulse width after it, with half-cosine tapers to 0 before and
+/// after, each one pulse width long. The pulse width counts as at least four samples. Outside the contact the force signal is noise only.
 fn pulse_weight(impact: &MeasuredImpact, sample: usize) -> f64 {
     let width = (impact.last - impact.first).max(4);
     let outside = if sample < impact.first {
@@ -178,7 +179,7 @@ fn pulse_weight(impact: &MeasuredImpact, sample: usize) -> f64 {
     }
 }
 
-/// Greatest length, in samples, of segments of equal length, one per impact, that do not overlap.
+/// Greatest length, in samples, of segments of equal length, one per impact, that neither overlap nor exceed the end of the record.
 fn longest_segment(impacts: &[MeasuredImpact], samples: usize) -> usize {
     let ends = impacts.iter().skip(1).map(|impact| impact.first).chain([samples]);
     let shortest = impacts
@@ -191,8 +192,8 @@ fn longest_segment(impacts: &[MeasuredImpact], samples: usize) -> usize {
     (shortest as f64 / (1.0 + BEFORE)) as usize
 }
 
-/// Detects all impacts of a hammer in a force signal; pulses within [`BOUNCE_S`] after an impact are its bounces and do
-/// not count.
+/// Detects the impacts of a hammer in a force signal. Pulses that begin within [`BOUNCE_S`] after the begin of an impact
+/// are its bounces and do not count.
 fn impacts(force: &[f64], rate: f64) -> Vec<MeasuredImpact> {
     let middle = median(&mut force.to_vec()).unwrap_or(0.0);
     let noise = noise(force, middle);

@@ -135,7 +135,7 @@ impl Interpolation {
     ///
     /// Each line is predicted from the lines at the distances −3, −1, +1 and +3 line spacings, a cubic with twice the spacing. The error of a
     /// cubic is proportional to the fourth power of the spacing, so that the estimate is 1/16 of the largest prediction error. Measurement
-    /// noise counts as error.
+    /// noise counts as error. The estimate is 0 for tables of fewer than seven lines.
     pub fn error(&self) -> f64 {
         let peak = self.lines.iter().map(largest).fold(0.0, f64::max);
         let count = self.lines.len();

@@ -34,7 +34,7 @@
 //! # Ok::<(), quietcut_frf::FrfError>(())
 //! ```
 //!
-//! Of a structure, this crate uses only the names of its directions: no modal model, no cutting force, no stability.
+//! Of a structure, this crate uses only its directions and the axes of the feed: no modal model, no cutting force, no stability.
 
 mod criteria;
 mod cross_spectra;

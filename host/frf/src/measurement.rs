@@ -56,13 +56,13 @@ pub struct Measurement {
 
 /// Measures receptances, m/N, from recordings.
 ///
-/// Recordings with the same force directions are averaged; recordings with other force directions add columns to the
-/// receptance matrix. Accelerations and velocities are divided by (iω)² and iω. 0 Hz is left out. The damping that an
+/// Recordings with the same force directions, the same measured responses and the same kind of excitation are averaged;
+/// the others add entries to the receptance matrix. Accelerations and velocities are divided by (iω)² and iω. 0 Hz is left out. The damping that an
 /// exponential window adds is removed.
 ///
 /// # Errors
-/// A recording has no force or no response, or is too short for the resolution; the forces are dependent; the
-/// recordings have no common frequencies.
+/// For example: a recording has no force or no response, or is too short for the resolution; the forces are dependent; the
+/// recordings have fewer than half of their frequencies in common.
 pub fn measure(recordings: &[Recording], settings: &MeasurementSettings) -> Result<Measurement, FrfError> {
     let channels = recordings
         .iter()
@@ -244,7 +244,7 @@ fn placeholder() -> Frf {
     }
 }
 
-/// Measures the receptances of one group of recordings with the same forces and excitation.
+/// Measures the receptances of one group of recordings with the same forces, responses and excitation.
 fn measure_group(
     excitation: Excitation,
     members: &[TestChannels<'_>],

@@ -1,8 +1,8 @@
 //! Vector fitting: a sum of modes with common poles fitted to measured receptances.
 //!
 //! The method is that of Gustavsen and Semlyen (1999) with common poles for all functions, where the unknowns of each function are
-//! eliminated separately (Deschrijver and others, 2008). Tool-tip calibration uses its poles and residues, and the fit of complex
-//! modes starts from them.
+//! eliminated separately (Deschrijver and others, 2008). Tool-tip calibration and the removal of an exponential window use its poles and
+//! residues. Fits with poles from other methods use only its residues.
 
 use std::f64::consts::TAU;
 
@@ -16,14 +16,14 @@ use quietcut_numerics::singular_values::SingularValueError;
 /// relocations.
 const ROUNDS: usize = 20;
 
-/// Smallest singular value of the normalized columns of a vector fit's equations; columns below it are linearly
-/// dependent. It is about the rounding error of the sums.
+/// Bound on the singular values of a vector fit's equations, whose receptances or columns are normalized; combinations of
+/// columns with a smaller singular value count as linearly dependent. It is about the rounding error of the sums.
 const DEPENDENT: Tolerance = Tolerance::Absolute(1e-13);
 
 /// Error of fitting a sum of modes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum RationalFitError {
-    /// Fewer equations than unknowns.
+    /// Too few frequencies or nonzero receptances for the number of modes, or no mode.
     #[error("{lines} frequencies and {functions} functions other than zero do not determine {modes} modes")]
     Undetermined {
         /// Number of frequencies.
@@ -51,7 +51,7 @@ pub struct RationalFit {
     pub(crate) poles: Vec<Complex64>,
     /// Residues R_kr, m/(N s): one row for each function, one column for each pole.
     pub residues: Vec<Vec<Complex64>>,
-    /// RMS residual of the fit over all receptances; each residual is divided by the RMS of its receptance.
+    /// RMS residual of the fit over all receptances other than zero; each residual is divided by the RMS of its receptance.
     pub(crate) residual: f64,
 }
 
@@ -73,7 +73,8 @@ impl RationalFit {
 /// Fits `modes` modes with common poles to the receptances `functions`, each with one value per frequency.
 ///
 /// # Errors
-/// There are too few frequencies, or an iteration exceeds its bound.
+/// There are fewer than 2 · `modes` + 4 frequencies, no modes or no receptance other than zero; a value is not finite; or
+/// an iteration exceeds its bound.
 pub(super) fn fit(
     frequency_hz: &[f64],
     functions: &[&[Complex64]],
@@ -112,7 +113,7 @@ fn basis(frequency_hz: f64, poles: &[Complex64], scale: f64) -> Vec<Complex64> {
     row
 }
 
-/// Error of a vector fit with fewer equations than unknowns.
+/// Error of a vector fit whose data do not determine its unknowns.
 fn undetermined(frequency_hz: &[f64], functions: &[&[Complex64]], modes: usize) -> RationalFitError {
     let is_zero = |function: &&&[Complex64]| function.iter().all(|h| h.norm_sqr() == 0.0);
     RationalFitError::Undetermined {
@@ -195,8 +196,8 @@ fn zeros(poles: &[Complex64], c: &DVector<f64>) -> Result<Vec<Complex64>, Eigenv
         .filter(|value| value.im > 0.0)
         .map(|value| Complex64::new(-value.re.abs(), value.im))
         .collect();
-    // A pair of real zeros of σ is not an oscillatory mode; it is replaced by a start value near the upper end of the
-    // band.
+    // A pair of real zeros of σ is not an oscillatory mode; it is replaced by a start value near the highest
+    // previous pole.
     let highest = poles.iter().map(|pole| pole.im).fold(0.0, f64::max);
     while upper.len() < poles.len() {
         let omega = highest * (0.9 + 0.05 * upper.len() as f64);
@@ -208,7 +209,8 @@ fn zeros(poles: &[Complex64], c: &DVector<f64>) -> Result<Vec<Complex64>, Eigenv
 /// Residues of the receptances `functions` for given poles by linear least squares.
 ///
 /// # Errors
-/// There is no frequency, or an iteration exceeds its bound.
+/// There is no frequency, a frequency or pole gives a basis function that is not finite, or an iteration exceeds its
+/// bound.
 pub fn residues(
     frequency_hz: &[f64],
     functions: &[&[Complex64]],

@@ -52,7 +52,7 @@ pub struct RecordSpectra {
 /// which is evaluated in segments.
 ///
 /// # Errors
-/// A recording has no force or no response, or a chosen channel does not exist.
+/// A recording has no force or no response; a chosen channel or an input of the sidecar does not exist; an input is not a force.
 pub fn record_spectra(
     recordings: &[Recording],
     settings: &MeasurementSettings,
@@ -121,7 +121,8 @@ fn of_record(channels: &TestChannels<'_>, band_hz: Option<(f64, f64)>) -> Record
 }
 
 /// Noise plateau of a spectrum: the median over the bands whose mean power exceeds that of the lowest band by at most six standard deviations
-/// (1/√n of the power for n lines). White noise has equal power in all bands, and bands without signal contain nothing else.
+/// (1/√n of the power for n lines); `None` if these bands are too few or have too few lines. White noise has equal power in all bands, and
+/// bands without signal contain nothing else.
 fn plateau(lines: &[Complex64], scale: f64) -> Option<f64> {
     let count = lines.len() / BANDS;
     if count < LINES_PER_BAND_MIN {

@@ -21,8 +21,8 @@ const FORGET: f64 = 3.0;
 /// before the first period is known. A choice.
 const FORGET_S: f64 = 1.0;
 
-/// Number of subsegments of a frequency step in which force and response are demodulated separately, to estimate noise
-/// and settling. A choice.
+/// Smallest number of subsegments in which a frequency step of this many periods or more is demodulated, to estimate noise
+/// and settling; a shorter step has one subsegment per period. A choice.
 const SUBSEGMENTS: usize = 8;
 
 /// Result of one frequency step.
@@ -46,9 +46,10 @@ pub(super) struct FrequencyStep {
 /// All frequency steps of a step-sine record at one level of the force amplitude.
 #[derive(Clone, Debug)]
 pub(super) struct ForceLevel {
-    /// Median of the force amplitudes of the frequency steps, N.
+    /// Median of the force amplitudes of the frequency steps in the first pass at this level, N.
     pub(super) force_n: f64,
-    /// Steps by ascending frequency. Of several steps at one frequency the longest is kept; of steps of about equal length, the last.
+    /// Steps by ascending frequency. Of several steps at one frequency the longest is kept; of steps of about equal length, that of the
+    /// highest measured frequency.
     pub(super) steps: Vec<FrequencyStep>,
 }
 
@@ -57,14 +58,14 @@ pub(super) struct ForceLevel {
 pub(super) struct StepSine {
     /// Force levels in the order of time.
     pub(super) levels: Vec<ForceLevel>,
-    /// Approximate frequencies of the steps that have too few samples per period to be evaluated, Hz.
+    /// Approximate frequencies of the steps that cannot be evaluated, as a rule for too few samples per period, Hz.
     pub(super) unresolved_hz: Vec<f64>,
 }
 
 /// Frequency steps of a record by force level. Frequencies that are repeated at another force form another level.
 ///
 /// # Errors
-/// The record has several forces, or no segment of constant frequency.
+/// The record has several forces, no segment of constant frequency, or too few samples per period in all of them.
 pub(super) fn step_sine(channels: &TestChannels<'_>) -> Result<StepSine, FrfError> {
     let force = channels.only_force("a step-sine test")?;
     let rate = channels.recording.sample_rate_hz;
@@ -119,7 +120,7 @@ pub(super) fn step_sine(channels: &TestChannels<'_>) -> Result<StepSine, FrfErro
 }
 
 /// Divides the frequency steps, in the order of time, into passes through the frequency range: a new pass begins when
-/// the frequency of an earlier step returns.
+/// the frequency of a step before the last one returns.
 fn passes(steps: Vec<FrequencyStep>) -> Vec<Vec<FrequencyStep>> {
     let mut passes: Vec<Vec<FrequencyStep>> = Vec::new();
     for step in steps {
@@ -190,8 +191,8 @@ fn tone_segments(force: &[f64], rate: f64) -> Vec<ToneSegment> {
         }
         while to < periods.len() {
             let now = mean(to);
-            // One deviating excitation period may be noise; two in a row begin a new frequency step; a single long
-            // period is a pause of the sine.
+            // One deviating excitation period may be noise; two in a row, or a slow drift, begin a new frequency step;
+            // a single period with a large deviation is a pause of the sine.
             let off = |k: usize| periods.get(k).map_or(0.0, |period| (period - now).abs());
             let is_off = |k: usize| off(k) > tolerance(now);
             let drift = || (crossings[to] - crossings[to - PERIODS_MIN]) / PERIODS_MIN as f64 - now;
@@ -253,8 +254,8 @@ fn crossings(force: &[f64], rate: f64) -> Vec<f64> {
     crossings
 }
 
-/// Phasor ratios response/force over the settled part of a segment of constant frequency; `None` if the segment has too
-/// few samples per period.
+/// Phasor ratios response/force over the settled part of a segment of constant frequency, or over its second half if it
+/// does not settle; `None` if the segment has too few periods or too few samples per period.
 fn demodulated(
     channels: &TestChannels<'_>,
     force: &[f64],

@@ -39,11 +39,11 @@ impl Frf {
 }
 
 impl FrfTable {
-    /// Creates a table from frequencies and receptances; `path` is the file of the table, used in messages.
+    /// Creates a table from frequencies and receptances; `path` is its file or a name for its origin, used in messages.
     ///
     /// # Errors
-    /// Frequencies are negative or do not ascend; a receptance is not finite, has another length than the frequencies, is of a rotation or is
-    /// given twice; a coherence lies outside 0 to 1.
+    /// There is no frequency or no receptance; frequencies are negative, not finite or do not ascend; a receptance is not finite, has another
+    /// length than the frequencies, is of a rotation or is given twice; a coherence has another length or lies outside 0 to 1.
     pub fn new(path: &Path, frequency_hz: Vec<f64>, entries: Vec<Frf>) -> Result<Self, FrfError> {
         let table = Self {
             path: path.into(),
@@ -109,7 +109,7 @@ impl FrfTable {
         None
     }
 
-    /// File that the table was read from or is written to.
+    /// File that the table was read from, or the origin of its values; used in messages.
     pub fn path(&self) -> &Path {
         &self.path
     }
@@ -119,7 +119,7 @@ impl FrfTable {
         &self.frequency_hz
     }
 
-    /// The receptances of the table, in the order of the file.
+    /// The receptances of the table, in the order in which they were given.
     pub fn entries(&self) -> &[Frf] {
         &self.entries
     }

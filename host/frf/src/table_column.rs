@@ -46,8 +46,8 @@ pub(super) struct Meaning {
     pub(super) directions: Option<(Direction, Direction)>,
     /// Unit of the FRF values in the column, response per force; `None` if the file does not state it.
     pub(super) unit: Option<FrfUnit>,
-    /// Title of the column in lower case without the words for real part, phase and the like; it is equal for all
-    /// columns of one receptance.
+    /// Title of the column in lower case without the words for real part, phase and the like or, for a column with a stated
+    /// name, the directions in this name; it is equal for the two columns of one receptance.
     pub(super) label: String,
     /// Order of the time derivative of displacement that a word of the column title names: 1 for mobility, 2 for
     /// accelerance, otherwise 0.
@@ -66,7 +66,7 @@ impl Meaning {
     }
 }
 
-/// Words that mark a column of frequencies if they occur in its title, in lower case.
+/// Words that mark a column of frequencies without a unit if they occur in its title, in lower case.
 const FREQUENCY: &[&str] = &["frequency", "freq", "frequenz", "frequencies", "hz"];
 
 /// For each part of a complex FRF value, the words that mark it in a column title, in lower case.
@@ -298,7 +298,8 @@ fn directions(label: &[&str]) -> Option<(Direction, Direction)> {
     }
 }
 
-/// True if the column titles are those of an FRF table: one column has frequencies, and one has a part of an FRF.
+/// True if the column titles are those of an FRF table: one begins with `frequency_hz`, or one column has frequencies and
+/// another has a part of an FRF.
 pub(super) fn is_head(titles: &[String]) -> bool {
     let of = |title: &String| {
         let (name, unit) = match title.strip_suffix(']').and_then(|inner| inner.rsplit_once('[')) {

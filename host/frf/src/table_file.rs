@@ -33,13 +33,13 @@ struct Column {
 }
 
 impl FrfTable {
-    /// Reads an FRF table from CSV, or from UFF 58 with the extension uff, unv or bunv.
+    /// Reads an FRF table from a text file, or from UFF 58 with the extension uff, unv or bunv.
     ///
-    /// Units: displacement (m, mm, um, nm), velocity or acceleration per force (N, kN). Mobility and accelerance are converted to receptance.
-    /// A header without unit means m/N. Lines that begin with # are comments.
+    /// Units: displacement, velocity or acceleration per force, such as um/N or g/N. Mobility and accelerance are converted to receptance.
+    /// In a table with the column `frequency_hz`, a header without unit means m/N, and lines that begin with # are comments.
     ///
     /// # Errors
-    /// The file cannot be read; a column has an unknown name or unit, or lacks its real or imaginary part; a value is not a number; the
+    /// For example: the file cannot be read; a column has an unknown name or unit, or lacks its real or imaginary part; a value is not a number; the
     /// frequencies do not ascend.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, FrfError> {
         Self::import(path, &Import::default()).map(|imported| imported.table)
@@ -48,12 +48,11 @@ impl FrfTable {
     /// Reads an FRF table with what the user states about its columns; the result also describes the meaning found for
     /// each column.
     ///
-    /// Text tables of other programs have the extension csv, txt, dat, tsv or asc: real and imaginary part, or
-    /// magnitude (also in dB) and phase.
+    /// Text tables of other programs have real and imaginary part, or magnitude (also in dB) and phase.
     ///
     /// # Errors
-    /// As [`FrfTable::read`]; also if directions or units are not stated. The message names the option that states
-    /// them.
+    /// As [`FrfTable::read`]; also if directions or units are not stated, where the message names the option that states
+    /// them; and if `import` names columns of a file that states them itself, or a column that is not there.
     pub fn import(path: impl AsRef<Path>, import: &Import) -> Result<ImportedTable, FrfError> {
         let path = path.as_ref();
         let ending = quietcut_recording::file::ending(path);
@@ -87,7 +86,7 @@ impl FrfTable {
     /// True if the head of a file is that of an FRF table and not of a recording over time.
     ///
     /// # Errors
-    /// The file cannot be read.
+    /// A text file cannot be read; a UFF file that cannot be read counts as no table.
     pub fn is_table(path: &Path) -> Result<bool, FrfError> {
         let ending = quietcut_recording::file::ending(path);
         match ending.as_str() {

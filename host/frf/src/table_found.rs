@@ -357,7 +357,7 @@ fn phase_unit(values: &[f64]) -> Option<f64> {
 }
 
 /// Coherence of the receptance with the given directions or column label; if the table has one receptance only, its
-/// only coherence.
+/// first coherence.
 fn coherence(
     columns: &[(&TextColumn, Meaning)],
     label: &str,

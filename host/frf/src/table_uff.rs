@@ -223,7 +223,7 @@ impl FrfTable {
     }
 
     /// First frequency and line spacing of an evenly spaced table, Hz, both rounded to seven digits. `None` if they
-    /// miss a frequency of the table by more than 0.001 line spacings.
+    /// miss a frequency of the table by more than 0.001 line spacings, or if the table has one line.
     fn even(&self) -> Option<(f64, f64)> {
         let (&first, &last) = (self.frequency_hz().first()?, self.frequency_hz().last()?);
         let count = self.frequency_hz().len();

@@ -28,13 +28,13 @@ pub(super) struct Response<'a> {
 }
 
 impl<'a> TestChannels<'a> {
-    /// Selects forces and responses; `chosen` restricts them to the named channels.
+    /// Selects forces and responses. If `chosen` names forces, only these count; the same holds for responses.
     ///
-    /// Forces are the channels that the sidecar names as inputs; without that key, all force channels that are not constant. Of several
+    /// Forces are those of fx, fy and fz that the sidecar names as inputs; without that key, those that are not constant. Of several
     /// response channels in one direction, displacement takes precedence over velocity, and velocity over acceleration.
     ///
     /// # Errors
-    /// There is no force or no response; a chosen channel does not exist; an input is not a force.
+    /// There is no force or no response; a chosen channel or an input does not exist; an input is not a force.
     pub(super) fn of(recording: &'a Recording, chosen: &[String]) -> Result<Self, FrfError> {
         let refused = |error: RecordingError| FrfError::Recording(error);
         for name in chosen {

@@ -11,7 +11,8 @@ use super::rational_fit::{RationalFit, RationalFitError, fit};
 use super::{Frf, FrfError, FrfTable};
 use quietcut_model::structure::Direction;
 
-/// Largest number of modes that a vector fit tries for the tool-tip calibration. A choice; vector fitting of more modes
+/// Largest number of modes that a vector fit tries for the tool-tip calibration and for the removal of an exponential
+/// window. A choice; vector fitting of more modes
 /// needs a narrower band.
 const MODES_MAX: usize = 8;
 
@@ -36,7 +37,8 @@ pub struct ModeRatio {
 /// H_TT = H_ST + Σ_r (φ_T/φ_S − 1)_r H_ST,r. For one mode this is thesis eq. (7.14).
 ///
 /// # Errors
-/// The tables have no common receptance or too few lines; a mode has no counterpart in the calibration.
+/// The calibration tables have different frequencies or no common receptance; no mode can be fitted; a mode has no counterpart in the
+/// calibration.
 pub fn calibrate(
     measured: &FrfTable,
     housing: &FrfTable,
@@ -152,7 +154,8 @@ fn ratios(housing: &FrfTable, tip: &FrfTable) -> Result<Vec<ModeRatio>, FrfError
     Ok(ratios)
 }
 
-/// Fits receptances by the smallest number of modes beyond which the residual hardly decreases. If no fit succeeds, the
+/// Fits receptances by the smallest number of modes, up to [`MODES_MAX`], beyond which the residual hardly decreases, or with which it is
+/// small. If no fit succeeds, the
 /// error of the first failed fit is returned.
 pub(super) fn modes(
     frequency_hz: &[f64],

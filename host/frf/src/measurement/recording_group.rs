@@ -19,12 +19,12 @@ pub struct RecordingGroup {
     pub forces: Vec<Direction>,
     /// Kind of excitation.
     pub excitation: Excitation,
-    /// Effective number of independent averages of the spectra of the group.
+    /// Effective number of independent averages of the spectra of the group; 1 for a step-sine test.
     pub averages: f64,
     /// Frequencies left out because the forces of the group are linearly dependent there, Hz.
     pub left_out_hz: Vec<f64>,
-    /// Smallest singular value of the force spectra over all frequencies of the group, each force divided by its root mean square; 1 for a
-    /// single force.
+    /// Smallest singular value of the force spectra over the frequencies of the group that are not left out, each force normalized at each
+    /// frequency; 1 for a single force.
     pub least_singular: f64,
     /// Single impacts (used) and double impacts (left out) of a hammer test; `None` for other excitation.
     pub impacts: Option<(Vec<MeasuredImpact>, Vec<MeasuredImpact>)>,
@@ -47,7 +47,7 @@ pub(super) struct MeasuredEntry {
     pub(super) frf: Frf,
     /// Standard deviation of |H|, m/N.
     pub(super) deviation: Vec<f64>,
-    /// Largest relative error by folding.
+    /// Largest relative error by aliasing at each frequency of the group; 0 except for hammer tests.
     pub(super) folding: Vec<f64>,
 }
 

@@ -67,8 +67,8 @@ pub(super) fn steady(
     ))
 }
 
-/// Number of half-overlapping segments of a random record for each force if no frequency resolution is set. A choice
-/// between random error and resolution.
+/// Number of half-overlapping segments of the shortest random record for each force if no frequency resolution is set,
+/// before the segment length is rounded up for the FFT. A choice between random error and resolution.
 const SEGMENTS_PER_FORCE: usize = 8;
 
 /// Number of neighbouring frequency lines averaged in a swept-sine test for each force if no frequency resolution is

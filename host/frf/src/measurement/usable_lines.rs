@@ -26,7 +26,7 @@ pub(super) fn keep_excited(lines: &mut Vec<FrfLine>, spectra: &[CrossSpectra], c
 }
 
 /// Removes the frequency lines at which the forces are linearly dependent, and lists them in `group`. An error if these
-/// are more than half of all lines.
+/// are more than half of all lines, or if there is no line.
 pub(super) fn independent(
     lines: &mut Vec<FrfLine>,
     group: &mut RecordingGroup,
