@@ -19,8 +19,8 @@
 //! | eigenvectors, symmetric | 1.0, 1.0, 1.2 | 1.7, 1.0, 0.11 |
 //!
 //! faer is not used inside: it would add forty packages, two versions of `equator`, and old versions of `syn` and `thiserror`, which the
-//! rules for dependencies refuse. Up to some twenty parameters of a fit, and maps of some fifty states, it takes between half and twice
-//! our time. Least squares of fifty columns and more would gain: the pivoted QR decomposition of nalgebra is slow there.
+//! rules for dependencies refuse. For ten columns it takes between 0.85 and 2.3 times our time, for eigenvalues of fifty columns
+//! between 0.7 and 1.9 times. Least squares of fifty columns and more would gain: the pivoted QR decomposition of nalgebra is slow there.
 
 #![allow(clippy::expect_used)]
 

@@ -27,7 +27,7 @@ pub struct Gauss {
     pub integrals: DMatrix<f64>,
 }
 
-/// Number of Gauss–Legendre rules that can be cached: those with up to 40 nodes.
+/// Number of places for cached Gauss–Legendre rules, by the number of nodes: 1 to 40; place 0 stays empty.
 const SHARED: usize = 41;
 
 impl Gauss {

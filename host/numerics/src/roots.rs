@@ -1,7 +1,7 @@
 //! Roots and extrema of functions of one real variable: bisection, Newton's method with a bracket, regula falsi, golden section.
 
-/// Narrows the bracket [below, above] of a root by bisection, until it is no wider than `width` or its ends are
-/// neighbouring numbers.
+/// Narrows the bracket [below, above] of a root by bisection, until it is no wider than `width`, or until no number lies
+/// between its ends.
 ///
 /// The condition `is_below` is true at the first end and false at the second; either end may be the larger number. With
 /// `width` 0 the root is found to the last bit.
@@ -32,7 +32,7 @@ pub fn bisection(
     [below, above]
 }
 
-/// Largest number of steps of [`monotone`]. Bisection alone needs 64 to reduce a bracket of 1 to rounding.
+/// Largest number of steps of [`monotone`]. Bisection alone needs about 52 to reduce the bracket to rounding.
 const STEPS_MAX: usize = 100;
 
 /// Root of an increasing function in [low, high] by Newton's method, in which bisection replaces a step that leaves the bracket.
@@ -68,7 +68,7 @@ pub fn monotone([mut low, mut high]: [f64; 2], start: f64, function: impl Fn(f64
 ///
 /// The caller evaluates the function at [`Self::next`] and passes the value to [`Self::narrow`], so that an evaluation
 /// may fail or have further results. The order of convergence is 1.7. If four evaluations have not halved the bracket,
-/// it is bisected.
+/// the next one bisects it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SignChange {
     ends: [[f64; 2]; 2],
@@ -140,7 +140,7 @@ impl SignChange {
 const GOLDEN: f64 = 0.618_033_988_749_894_8;
 
 /// Argument of the minimum of a function with a single minimum in [from, to], by golden-section search (Kiefer, Proc. AMS 4 (1953) 502)
-/// until the bracket is no wider than `width`.
+/// until the bracket is no wider than `width` or reaches rounding.
 ///
 /// Rounding limits the accuracy of the argument to about the square root of the machine precision.
 pub fn minimum([mut from, mut to]: [f64; 2], width: f64, function: impl Fn(f64) -> f64) -> f64 {

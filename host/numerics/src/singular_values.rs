@@ -2,8 +2,8 @@
 
 use nalgebra::{ComplexField, DMatrix, DVector, Dyn, SVD};
 
-/// Largest number of QR iterations per singular value of a matrix; two or three are usual, more end the decomposition
-/// with an error.
+/// Largest number of QR iterations on a matrix, divided by the number of its singular values; two or three are usual,
+/// more end the decomposition with an error.
 const ITERATIONS_PER_VALUE: usize = 100;
 
 /// Error of the singular value decomposition of a matrix.

@@ -26,7 +26,7 @@ pub fn normal_probability(x: f64) -> f64 {
 
 /// Quantile Φ⁻¹ of the standard normal distribution: the number below which the variable stays with the probability `share`; error 1e-12.
 ///
-/// A `share` of 0 or less, or of 1 or more, is replaced by the nearest probability with a finite quantile.
+/// A `share` below 1e-300 or above 1 − 2.2e-16 is replaced by this bound.
 pub fn normal_quantile(share: f64) -> f64 {
     // A double cannot represent probabilities far below 1e-300, nor the difference of a probability from 1 below its
     // rounding.

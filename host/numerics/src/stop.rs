@@ -3,9 +3,9 @@
 /// The reason for which an iterative solver stopped; only [`Stop::Converged`] means that a solution is found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stop {
-    /// The iteration has converged: its last step is below the tolerance.
+    /// The iteration has converged: its last step meets the criterion of convergence.
     Converged,
-    /// No further step improves the solution, however short it is.
+    /// No step that was tried from the last arguments, each with more damping, is accepted.
     Stagnated,
     /// The linear equations of a step are singular.
     Singular,

@@ -5,7 +5,7 @@ use nalgebra::{ComplexField, DMatrix};
 /// Error of an eigenvalue problem.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum EigenvalueError {
-    /// The matrix is not square.
+    /// The matrix is not square, or the matrices of a pencil differ in size.
     #[error("a matrix of {rows} × {columns} has no eigenvalues; it must be square")]
     NotSquare {
         /// Rows.
@@ -13,7 +13,7 @@ pub enum EigenvalueError {
         /// Columns.
         columns: usize,
     },
-    /// An entry of the matrix is infinite or not a number.
+    /// An entry of the matrix, or of its product with a vector, is infinite or not a number.
     #[error(
         "a matrix of {size} × {size} has an entry that is not finite; check the data for gaps, overflow and division by zero"
     )]

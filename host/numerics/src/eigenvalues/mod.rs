@@ -10,8 +10,8 @@
 //! | one eigenvector, a vector of the null space | [`eigenvector`], [`null_vector`]; [`inverse_iteration`] with a solver of one's own | inverse iteration |
 //! | polynomial | [`polynomial_roots`] | companion matrix |
 //!
-//! A matrix with an entry that is not finite, or on which an iteration exceeds its bound, yields an [`EigenvalueError`] that
-//! names the size and the number of iterations. Every function ends, and none panics.
+//! For a matrix with an entry that is not finite, or on which an iteration exceeds its bound, the functions for eigenvalues return an
+//! [`EigenvalueError`] that names the size; those for one eigenvector return `None`. Every function ends, and none panics on square matrices.
 
 mod complex;
 mod error;

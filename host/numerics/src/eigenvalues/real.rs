@@ -38,8 +38,8 @@ pub fn of_real(mut matrix: DMatrix<f64>) -> Result<Vec<Complex64>, EigenvalueErr
     Ok(found)
 }
 
-/// Divisor by which a matrix is scaled before balancing. If squares of its entries would overflow or underflow, which
-/// keeps balancing from ending, it is a power of two near the largest entry; otherwise 1.
+/// Divisor by which a matrix is scaled before balancing. If its `largest` entry is so large or small that squares might
+/// overflow or underflow, which keeps balancing from ending, it is a power of two near this entry; otherwise 1.
 fn unit(largest: f64) -> f64 {
     if (1e-100..1e100).contains(&largest) || largest == 0.0 {
         1.0

@@ -4,8 +4,8 @@ use nalgebra::{Cholesky, ComplexField, DMatrix, DVector, Dyn, SymmetricEigen};
 
 use super::error::{EigenvalueError, size_of};
 
-/// Largest number of QR iterations per eigenvalue of a symmetric matrix; two or three are usual, more end the
-/// computation with an error.
+/// Largest number of QR iterations on a symmetric matrix, divided by the number of its eigenvalues; two or three are
+/// usual, more end the computation with an error.
 const ITERATIONS_PER_EIGENVALUE: usize = 60;
 
 /// Eigenvalues (real) and orthonormal eigenvectors of a real symmetric or Hermitian matrix, unordered.

@@ -84,13 +84,13 @@ pub struct Minimum<P, V> {
 pub struct Damping {
     /// Damping λ of the first step; 0 if the start is near the minimum.
     pub first: f64,
-    /// Factor, below 1, by which λ changes after a step that reduces the sum of squares.
+    /// Factor, below 1, by which λ changes after an accepted step.
     pub shrink: f64,
-    /// Factor, above 1, by which λ changes after a step that increases the sum of squares.
+    /// Factor, above 1, by which λ changes after a rejected step, or if the equations of the step are singular.
     pub growth: f64,
-    /// Smallest λ after a step that reduces the sum of squares; above 0 if the normal matrix N is singular.
+    /// Smallest λ after an accepted step; to be set above 0 if the normal matrix N may be singular.
     pub least: f64,
-    /// Smallest λ after a step that increases the sum of squares.
+    /// Smallest λ after a rejected step.
     pub least_retried: f64,
 }
 
@@ -120,8 +120,8 @@ impl Damping {
     }
 }
 
-/// Damping λ of a Levenberg–Marquardt step below which the next step is not damped, since λ would change the step by a
-/// millionth only.
+/// Damping λ of an accepted Levenberg–Marquardt step below which the next step is not damped if [`Damping::least`] is 0: λ
+/// would change a step by about a millionth only.
 const UNDAMPED: f64 = 1e-6;
 
 /// Settings of the damped Gauss–Newton iteration of Levenberg and Marquardt (Marquardt, J. SIAM 11 (1963) 431).
@@ -179,7 +179,7 @@ impl LevenbergMarquardt {
             for _ in 0..self.trials_max {
                 let Some(step) = self.step(sums, damping) else {
                     // Far from the minimum, the normal matrix may be singular although the data determine the
-                    // parameters: the step is tried with more damping.
+                    // parameters: the step is tried with more damping, unless λ is 1 or more.
                     if damping >= 1.0 {
                         here.stop = Stop::Singular;
                         return Some(here);

@@ -37,7 +37,7 @@ pub struct LinearFit {
     pub covariance: DMatrix<f64>,
     /// Weighted sum of squared residuals Σᵢ wᵢ (aᵢᵀx − bᵢ)², without the term of the prior.
     pub sum_of_squares: f64,
-    /// Number of rows with a weight above zero, minus the number of parameters.
+    /// Number of rows with a weight above zero, minus the number of parameters; 0 if the difference is negative.
     pub degrees_of_freedom: usize,
     /// First pivot of the QR decomposition divided by the last one, for columns scaled to unit length: usually the
     /// condition number within a factor of √n.
@@ -45,7 +45,7 @@ pub struct LinearFit {
 }
 
 impl LinearFit {
-    /// Variance of the noise of a row of weight 1, estimated from the residuals; infinite without degrees of freedom.
+    /// Variance of the noise of a row of weight 1, estimated from the residuals; infinite or NaN without degrees of freedom.
     pub fn variance(&self) -> f64 {
         self.sum_of_squares / self.degrees_of_freedom as f64
     }
@@ -72,7 +72,7 @@ impl<'a> LinearProblem<'a> {
     }
 
     /// This problem with a prior of the parameters: mean x₀ and inverse variances pⱼ ≥ 0, n entries each; a mean of 0
-    /// is ridge regression.
+    /// and equal pⱼ are ridge regression.
     #[must_use]
     pub fn with_prior(self, mean: &'a DVector<f64>, inverse_variances: &'a DVector<f64>) -> Self {
         Self {

@@ -15,7 +15,7 @@ pub struct MinimumNorm {
 }
 
 impl MinimumNorm {
-    /// Decomposes A, m × n; singular values below `tolerance` count as zero.
+    /// Decomposes A, m × n; singular values up to `tolerance` count as zero.
     ///
     /// # Errors
     /// A is empty or not finite, or the iteration exceeds its bound.
@@ -42,7 +42,7 @@ impl MinimumNorm {
     }
 }
 
-/// Bound below which a singular value of a matrix counts as zero, so that the combination of columns that belongs to it
+/// Bound up to which a singular value of a matrix counts as zero, so that the combination of columns that belongs to it
 /// has no effect.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Tolerance {

@@ -2,14 +2,14 @@
 //!
 //! | problem | entry | method |
 //! |---|---|---|
-//! | min ‖W(A x − b)‖² + ‖P(x − x₀)‖² | [`LinearProblem`] | column scaling, Householder QR with column pivoting |
+//! | min ‖√W (A x − b)‖² + ‖√P (x − x₀)‖² | [`LinearProblem`] | column scaling, Householder QR with column pivoting |
 //! | min ‖x‖ of all x of least ‖A x − b‖ | [`MinimumNorm`] | singular value decomposition |
 //! | min ‖A x + B y − b‖² without x | [`eliminated`] | column scaling, Householder QR |
 //! | AᴴA x = Aᴴb that was summed | [`NormalEquations`] | diagonal scaling, Cholesky |
 //! | min ‖r(θ)‖² | [`LevenbergMarquardt`] | Levenberg–Marquardt with the reason to stop |
 //!
 //! The columns of the matrix are scaled to length 1 first, since the parameters of one fit differ by many powers of ten. The rank is
-//! therefore independent of the units of the parameters. Only [`MinimumNorm`] takes the columns as they are.
+//! therefore independent of the units of the parameters. [`MinimumNorm`], and [`eliminated`] for y, take the columns as they are.
 
 mod elimination;
 mod factored;
@@ -48,12 +48,13 @@ pub enum LeastSquaresError {
         "the data determine {rank} of {parameters} parameters; record data of another kind, or leave out the parameters with the indices {undetermined:?}"
     )]
     RankDeficient {
-        /// Number of linearly independent columns.
+        /// Number of linearly independent columns; an upper bound if a column is zero or the rows are fewer than the
+        /// columns.
         rank: usize,
         /// Number of columns.
         parameters: usize,
-        /// Indices, from 0, of the columns of the matrix that depend linearly on the others, as column pivoting selects
-        /// them.
+        /// Indices, from 0, of the columns that are zero; without such, of those that depend linearly on the others, as
+        /// column pivoting selects them. Empty if the rows are fewer than the columns and no column is zero.
         undetermined: Vec<usize>,
     },
 }

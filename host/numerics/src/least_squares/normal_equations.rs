@@ -7,7 +7,7 @@ use nalgebra::{Cholesky, ComplexField, DMatrix, DVector, Dyn};
 pub enum Idle {
     /// A parameter without effect is refused: the equations have no solution.
     Refuse,
-    /// A parameter without effect is fixed at zero, with a covariance of zero.
+    /// A parameter without effect, or whose diagonal entry of N is not finite, is fixed at zero, with a covariance of zero.
     Hold,
 }
 
@@ -38,7 +38,8 @@ impl<T: ComplexField<RealField = f64>> NormalEquations<T> {
     /// diagonal after it is scaled to 1.
     ///
     /// A ridge λ is the damping of the Levenberg–Marquardt method, or regularizes columns of A that are linearly
-    /// dependent within the accuracy √λ. `None` if N is not positive definite or not finite.
+    /// dependent within the accuracy √λ. `None` if N, with the ridge and without the
+    /// parameters that `idle` fixes, is not positive definite or not finite.
     pub fn new(matrix: &DMatrix<T>, ridge: f64, idle: Idle) -> Option<Self> {
         let size = matrix.nrows();
         let mut scale = DVector::zeros(size);
