@@ -15,7 +15,7 @@ use super::{Channel, Quantity, Recording, RecordingError, Sidecar};
 pub struct Imported {
     /// The recording.
     pub recording: Recording,
-    /// Which column became which channel.
+    /// Report of how the file was understood: channels, sample rate, notes and warnings.
     pub understood: Understood,
 }
 
@@ -208,7 +208,8 @@ fn require_names(path: &Path, raw: &Raw, sidecar: &Sidecar, import: &Import) -> 
     })
 }
 
-/// Sample rate (samples per second) and first time (s) of evenly spaced time stamps; uneven stamps are an error.
+/// Sample rate (samples per second) and first time (s) of evenly spaced time stamps. An error if there are fewer than two
+/// stamps, or if they are not finite, do not grow or are uneven.
 fn even_rate(path: &Path, time: &[f64]) -> Result<(f64, f64), RecordingError> {
     let wrong = |what: String| RecordingError::Content {
         path: path.into(),

@@ -29,9 +29,9 @@ pub struct Sensed {
     pub working_point: Option<WorkingPoint>,
     /// Blocks of accelerometer counts, in order of time.
     pub blocks: Vec<Block>,
-    /// Rising tachometer edges, in order.
+    /// Rising tachometer edges, in order; empty without a tachometer, or if the user gives the spindle speed.
     pub edges: Vec<Edge>,
-    /// False if no unit of the acceleration channels is known; amplitudes are then relative, not in m/s².
+    /// False if the unit of an acceleration channel is not known; amplitudes are then relative, not in m/s².
     pub is_calibrated: bool,
 }
 
@@ -47,11 +47,12 @@ pub struct SpindleSettings {
 impl Sensed {
     /// Converts a recording into blocks of counts, tachometer edges and settings.
     ///
-    /// The acceleration channels ax, ay, az are quantized in the smallest range of the sensor that holds them. A single channel of unknown
-    /// unit is scaled by its maximum.
+    /// The acceleration channels ax, ay, az are quantized in the smallest range of the sensor that holds them. Without them, the only channel
+    /// of unknown quantity or voltage is taken for ax. Beyond the largest range, or if a unit is not known, the largest sample sets the scale.
     ///
     /// # Errors
-    /// The recording has no acceleration channel, neither tachometer nor spindle speed, or no number of teeth.
+    /// The recording has no acceleration channel, or several that may be one; neither tachometer nor constant spindle speed; or no number of
+    /// teeth, or more than 255.
     pub fn new(recording: &Recording, speed: SpindleSettings) -> Result<Self, RecordingError> {
         let (axes, is_calibrated) = axes(recording)?;
         let largest = axes
@@ -102,7 +103,8 @@ impl Sensed {
         })
     }
 
-    /// Pairs each block with its tachometer edges: the edges after the previous pair and before the start of the next block.
+    /// Pairs each block with its tachometer edges: the edges after the previous pair and before the start of the next block; the last block
+    /// gets all remaining edges.
     pub fn steps(&self) -> impl Iterator<Item = (&Block, &[Edge])> {
         let mut rest = self.edges.as_slice();
         let ends = self

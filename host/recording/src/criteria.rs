@@ -29,7 +29,7 @@ pub(crate) const DROPOUT_RUN: usize = 32;
 /// run of equal samples is no dropout. Unfounded.
 pub(crate) const AT_REST: f64 = 0.2;
 
-/// Largest correlation error, 1 − r, at which acceleration from one channel and acceleration from another channel are the same motion. With
+/// Largest correlation error, 1 − r, at which two channels of displacement, velocity or acceleration measure the same motion. With
 /// r² the share of common energy, 0.98 leaves 4 % to noise and to the distance between the sensors. Unfounded.
 pub(crate) const SAME_MOTION: f64 = 0.02;
 

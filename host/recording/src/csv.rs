@@ -1,7 +1,7 @@
 //! Reader of text tables: a row of names, then rows of numbers. [`super::text_head`] finds separator, decimal mark and names.
 //!
 //! Files of hundreds of megabytes are read in chunks, without the whole text in memory. Lines that start with `#`, `%` or `//` are comments.
-//! Empty lines are skipped. Numbers may be quoted. Columns without any value are left out.
+//! Empty lines are skipped. Numbers may be quoted. Columns without any value are left out, as are unnamed ones that count the rows.
 
 use std::fs::File;
 use std::io::Read;
@@ -21,7 +21,7 @@ const CHUNK: usize = 1 << 18;
 /// a few kilobytes.
 const HEAD_MAX: usize = 1 << 18;
 
-/// Reads a text table. With `finite`, a NaN or infinite value is an error that names its line.
+/// Reads a text table. With `finite`, a NaN or infinite value, or an empty field in a column with values, is an error that names its line.
 pub(super) fn read(path: &Path, finite: bool) -> Result<Raw, RecordingError> {
     let unreadable = |cause| FileError::Read {
         path: path.into(),
@@ -45,7 +45,8 @@ pub(super) fn read(path: &Path, finite: bool) -> Result<Raw, RecordingError> {
     Ok(raw)
 }
 
-/// Names of the columns of a text table, from the head of the file alone; empty if it has no row of names.
+/// Names of the columns of a text table, with their units in brackets, from the head of the file alone; empty if it has no
+/// row of names or cannot be understood.
 pub(super) fn titles(path: &Path) -> Result<Vec<String>, RecordingError> {
     let unreadable = |cause| FileError::Read {
         path: path.into(),
@@ -155,7 +156,7 @@ struct Gaps {
     line: u64,
 }
 
-/// End of an error message about a row of a text table with text, NaN or infinity: what the user can do.
+/// End of an error message about a row of a text table with NaN or infinity: what the user can do.
 const LEAVE_OUT: &str = "a number is needed; repair the row, or leave it out with --from-s or --until-s";
 
 impl<'a> Table<'a> {
@@ -299,8 +300,8 @@ impl<'a> Table<'a> {
         }
     }
 
-    /// The columns of the text table that have values. A column with values in some rows and empty fields in others is
-    /// an error.
+    /// The columns of the text table that have values, without unnamed ones that count the rows. If values must be finite,
+    /// a column with values in some rows and empty fields in others is an error.
     fn raw(self, head: Head) -> Result<Raw, RecordingError> {
         let mut notes = head.notes;
         let is_unnamed = |name: &str, index: usize| {

@@ -1,4 +1,4 @@
-//! Parser of the number at the start of a line of a CSV file, and the separator after it.
+//! Parser of the number at the start of a field of a CSV file, and the separator after it.
 
 /// Separator after a number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -9,8 +9,9 @@ pub(super) enum End {
     Line,
 }
 
-/// Parses the number at the start of `text`, a part of a CSV line, with optional blanks and quotes. Returns its value,
-/// the number of bytes up to and including the separator, and the separator.
+/// Parses the number at the start of `text`, CSV text from the start of a field on, with optional blanks and quotes.
+/// Returns its value, the number of bytes up to and including the separator, and the separator; `None` if the field is
+/// no number.
 #[inline]
 pub(super) fn number(text: &[u8]) -> Option<(f64, usize, End)> {
     // Fast path: most numbers have no blanks or quotes around them.

@@ -35,7 +35,7 @@ pub(super) fn prepared(path: &Path, recording: &Recording) -> Result<Prepared, R
     })?)
 }
 
-/// Shortest text of a sample value with [`DIGITS`] significant digits.
+/// Shorter text, plain or with exponent, of a sample value rounded to [`DIGITS`] significant digits.
 fn number_text(value: f64) -> String {
     let rounded: f64 = format!("{value:.*e}", DIGITS - 1).parse().unwrap_or(value);
     let plain = rounded.to_string();

@@ -31,8 +31,8 @@ pub struct TrialCut {
     pub depth_mm: f64,
     /// Observed outcome.
     pub outcome: Outcome,
-    /// Measured chatter frequency of the trial cut, Hz; `None` for a stable cut, or if it was not measured. JSON and
-    /// CSV outputs omit this field.
+    /// Measured chatter frequency of the trial cut, Hz; `None` if the outcome is not chatter, or if it was not measured.
+    /// JSON output omits this field.
     #[serde(skip)]
     pub chatter_hz: Option<f64>,
 }
@@ -40,7 +40,7 @@ pub struct TrialCut {
 /// Reason why a table of trial cuts cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum CutTableError {
-    /// The file of the table of cuts does not exist or cannot be read.
+    /// The file of the table of cuts does not exist, cannot be read or is no UTF-8 text.
     #[error(transparent)]
     File(#[from] FileError),
     /// A line is wrong.
@@ -58,8 +58,8 @@ pub enum CutTableError {
     },
 }
 
-/// Words for the outcome of a trial cut in a table of cuts. A kind of stability loss (`hopf`, `period-doubling`) also
-/// means chatter.
+/// Words for the outcome of a trial cut in a table of cuts. `unstable` and a kind of stability loss (`hopf`,
+/// `period-doubling`) also mean chatter.
 const OUTCOMES: [(&str, Outcome); 6] = [
     ("stable", Outcome::Stable),
     ("chatter", Outcome::Chatter),
@@ -83,8 +83,8 @@ const FAULTS_NAMED: usize = 5;
 /// Reads a table of trial cuts; a table without rows gives an empty list.
 ///
 /// # Errors
-/// The file cannot be read, lacks a column or has an unknown one, or a speed, depth, frequency or outcome is not
-/// possible.
+/// The file cannot be read, lacks a column, has one twice or an unknown one; a row has more or fewer values than there are
+/// columns; or a speed, depth, frequency or outcome is not possible.
 pub fn read(path: &Path) -> Result<Vec<TrialCut>, CutTableError> {
     parse(path, &read_text(path)?)
 }
@@ -92,7 +92,7 @@ pub fn read(path: &Path) -> Result<Vec<TrialCut>, CutTableError> {
 /// Reads the text of a table of trial cuts; `path` names the file in error messages.
 ///
 /// # Errors
-/// The errors of [`read`], except that of a missing file.
+/// The errors of [`read`], except that the file cannot be read.
 pub fn parse(path: &Path, text: &str) -> Result<Vec<TrialCut>, CutTableError> {
     let wrong = |line: u64, what: String| CutTableError::Line {
         path: path.into(),

@@ -107,7 +107,7 @@ pub enum RecordingError {
         /// True if the sample rate is not stated either.
         lacks_rate: bool,
     },
-    /// Neither the recorded file nor its sidecar states the sample rate.
+    /// Neither the recorded file nor its sidecar nor the option `--rate` states the sample rate.
     #[error("{}: {}", path.display(), no_rate(without_unit, sidecar))]
     NoSampleRate {
         /// The file.
@@ -163,7 +163,7 @@ fn no_rate(without_unit: &[String], sidecar: &std::path::Path) -> String {
     }
 }
 
-/// The option `--map` that states a unit for each of the channels; `None` if no channel has a quantity.
+/// The option `--map` that states a unit for each of the channels whose name stands for a quantity; `None` if there is none.
 fn map_of_units(names: &[&str]) -> Option<String> {
     let map: Vec<String> = names
         .iter()

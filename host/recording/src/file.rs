@@ -25,7 +25,7 @@ pub enum FileError {
         /// Offset of the first byte that is not UTF-8, counted from the start of the file, from 0.
         offset: usize,
     },
-    /// The file cannot be written: missing folder, no permission, disk full.
+    /// The file cannot be written, for example: missing folder, no permission, disk full.
     #[error("{}: cannot write it: {cause}", path.display())]
     Write {
         /// The file.

@@ -16,16 +16,17 @@ use crate::file::Prepared;
 pub const WRITTEN: [&str; 4] = ["csv", "uff", "unv", "bunv"];
 
 impl Recording {
-    /// Reads a recording (CSV, WAV, MAT or UFF 58) and its sidecar.
+    /// Reads the only recording of a file (text table, WAV, MAT, LabVIEW measurement file, TDMS or UFF 58) and its sidecar.
     ///
     /// # Errors
-    /// The file is missing or malformed; a unit is unknown or contradicts the channel name; time is not evenly spaced; there is no sample
+    /// For example: the file has several records; it is missing or malformed; a unit is unknown or contradicts the channel name; time is not evenly spaced; there is no sample
     /// rate; a sample is NaN or infinite.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, RecordingError> {
         Self::read_segment(path, Segment::default())
     }
 
-    /// Reads a segment of a recording and its sidecar. Samples outside the segment may be NaN or infinite.
+    /// Reads a segment of a recording and its sidecar. Samples outside the segment may be NaN or infinite, except in a LabVIEW measurement
+    /// file.
     ///
     /// # Errors
     /// An error of [`Recording::read`], or a segment that lies outside the recording.
@@ -59,7 +60,8 @@ impl Recording {
     /// Reads all records of a file, or the one that `import` chooses, each as a recording of its own.
     ///
     /// # Errors
-    /// An error of [`Recording::read`], or a record or column that `import` names and the file does not have.
+    /// An error of [`Recording::read`] other than that of several records, or a record or column that `import` names and the
+    /// file does not have.
     pub fn import_all(path: impl AsRef<Path>, import: &Import) -> Result<Vec<Imported>, RecordingError> {
         let path = path.as_ref();
         let ending = crate::file::ending(path);
@@ -116,8 +118,8 @@ impl Recording {
     /// Writes the recording and its sidecar to `path` in the format of the file extension.
     ///
     /// Both files are complete under temporary names before they are renamed, the sidecar first. On an error the
-    /// previous recording stays. Only a machine that fails between the two renames leaves a sidecar whose recording is
-    /// missing or older.
+    /// previous recording stays. If the second rename fails, or the machine between the two, the new sidecar stands beside
+    /// the previous recording or none.
     ///
     /// # Errors
     /// The extension is not one of [`WRITTEN`], or a file cannot be written.

@@ -38,7 +38,7 @@ pub enum Scale {
     Unit(Unit),
     /// Sensitivity of the sensor, for samples in volts: `10.2 mV/g`.
     Sensitivity(Sensitivity),
-    /// Unit of a frequency response function, that is of response per force: `um/N`, `(m/s^2)/N`, `deg`, `dB`.
+    /// Unit of a frequency response function, response per force or decibels: `um/N`, `(m/s^2)/N`, `1/kg`, `dB`.
     Ratio(String),
 }
 
@@ -100,7 +100,7 @@ impl ColumnMap {
     }
 }
 
-/// True if the text is a unit of response per force, such as `um/N`, or decibels.
+/// True if the text is a ratio of two units, such as `um/N`, or `1/kg` or decibels.
 fn is_ratio(text: &str) -> bool {
     let of_force = text.rsplit_once('/').is_some_and(|(response, force)| {
         let is_unit = |text: &str| text.parse::<Unit>().is_ok();

@@ -1,7 +1,7 @@
 //! Recordings: channels with name, unit and sample rate, and the sidecar file that describes the test.
 //!
-//! Sign conventions: a force is the force on the structure. A rising edge of `tacho` is immersion angle 0 of tooth 1. All samples are in
-//! SI units.
+//! Sign conventions: a force is the force on the structure. With one mark per revolution, a rising edge of `tacho` is immersion angle 0 of
+//! tooth 1. Samples are in SI units if their unit is known.
 //!
 //! Main types: [`Recording`] with its [`Channel`]s, [`Sidecar`] (kind of test, cut, posture, names and units of channels), [`Unit`] and
 //! [`Quantity`], [`SpindleAngle`] (spindle angle from the tachometer). Formats: CSV and other text tables, WAV, MAT,
