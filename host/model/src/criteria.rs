@@ -1,7 +1,7 @@
 //! Every threshold by which this crate decides, each with the source of its number.
 //!
-//! A number without a derivation or a campaign behind it is marked "Unfounded". Bounds of the values of a case are physical and stand with
-//! their keys.
+//! A number without a derivation or a campaign behind it is marked "Unfounded". Bounds of the values of a case that are
+//! physical, such as a damping ratio below 1, stand with their keys.
 
 /// Sum of the residues of a structure given by modes, relative to n·max|C|·max|B| with n states, above which its velocity jumps with the force.
 /// The sum is zero if the structure has a mass matrix. Mode shapes with seven digits in the case file leave up to this much: two factors

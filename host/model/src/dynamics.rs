@@ -20,7 +20,8 @@ pub struct Dynamics {
     b: Vec<[f64; 3]>,
     c: [Vec<f64>; 3],
     ca: [Vec<f64>; 3],
-    /// C B, (m/s)/N: jump of the velocity of the tool per jump of the force; zero for a structure given by matrices.
+    /// C B, (m/s)/N: jump of the velocity of the tool per jump of the force; zero but for rounding for a structure with
+    /// a mass matrix.
     cb: [[f64; 3]; 3],
     /// C A B, 1/kg: acceleration of the tool per force.
     cab: [[f64; 3]; 3],
@@ -32,8 +33,8 @@ pub struct Dynamics {
 impl Dynamics {
     /// The equation of motion of `structure`.
     ///
-    /// # Errors
-    /// Mass, damping or stiffness is indefinite.
+    /// # Errors Mass, damping or stiffness is indefinite, the mass matrix has no inverse, or the poles cannot be
+    /// computed.
     pub fn new(structure: &Structure) -> Result<Self, StructureError> {
         let FirstOrder { a, b, c } = structure.first_order()?;
         let order = a.nrows();

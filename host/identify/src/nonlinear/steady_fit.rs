@@ -127,7 +127,8 @@ impl Data<'_> {
     }
 
     /// Whitened residual (measured − predicted motion) of a dwell, and the derivative of the whitened prediction by θ;
-    /// `None` if the equation of motion has no periodic solution near the measured motion.
+    /// `None` if the equation of motion has no periodic solution near the measured motion, if a displacement is not
+    /// measured, or if the covariance is singular.
     fn whitened(&self, dwell: &Dwell, theta: &DVector<f64>) -> Option<(DVector<f64>, DMatrix<f64>)> {
         let solution = self.solve(dwell, theta, &self.displacement(dwell)?)?;
         self.output_map(&self.unit())

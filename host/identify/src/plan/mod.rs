@@ -1,9 +1,10 @@
 //! The fewest tests that narrow the stability limits of a lobe chart to a given width.
 //!
 //! The uncertain parameters of a machine have a normal distribution (`unknowns`). Exact derivatives propagate it to
-//! every limit (`chart`) and give the Fisher information of every test (`candidate`). After a set of tests with the
-//! Fisher information J_t each, Λ = I + Σ J_t is the inverse covariance of the parameters, in units of the prior
-//! standard deviations. `selection` searches for the cheapest set of tests after which all limits are narrow enough.
+//! every limit (`chart`). The Fisher information of every test (`candidate`) follows from these or from central
+//! differences. After a set of tests with the Fisher information J_t each, Λ = I + Σ J_t is the inverse covariance of
+//! the parameters, in units of the prior standard deviations. `selection` searches for the cheapest set of tests after
+//! which all limits are narrow enough.
 
 mod candidate;
 mod chart;
@@ -56,7 +57,7 @@ pub enum PlanError {
     /// The stability of the case at a speed of the chart cannot be computed.
     #[error(transparent)]
     Stability(#[from] StabilityError),
-    /// No speed of the chart has a stability limit that counts, up to the largest depth.
+    /// At no speed of the chart is stability lost up to the largest depth.
     #[error(
         "{case}: at none of the {speeds} speeds is stability lost up to {depth_mm} mm; ask for a greater --depth-mm"
     )]
@@ -68,7 +69,8 @@ pub enum PlanError {
         /// Largest depth of the chart, mm.
         depth_mm: f64,
     },
-    /// The stability limits of the case have no derivatives by the unknown parameters.
+    /// The stability limits of the case have no derivatives by the unknown parameters, no parameter is unknown, or the
+    /// Fisher information of a test cannot be computed.
     #[error("{case}: limits have no derivatives with respect to the unknowns: {what}")]
     NoDerivatives {
         /// Path of the case file.
@@ -119,17 +121,19 @@ pub struct Step {
 pub struct Obstacle {
     /// Width of the limits' 90 % intervals if every candidate test is repeated a thousand times.
     pub at_best: Width,
-    /// The unknown parameters whose exact values would narrow the widest interval of a limit most. Empty if a thousand
-    /// repetitions of every test reach the required width.
+    /// Up to three unknown parameters whose exact values would then narrow the widest interval of a limit most. Empty
+    /// if a thousand repetitions of every test reach the required width.
     pub if_known: Vec<IfKnown>,
 }
 
-/// An unknown parameter, and the width of the widest interval of a limit if its value were exact.
+/// An unknown parameter, and the width of the widest interval of a limit if its value were exact and every candidate
+/// test were repeated a thousand times.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct IfKnown {
     /// Name of the unknown.
     pub name: String,
-    /// Width of the widest 90 % interval of a limit if the unknown parameter were exact, percent of that limit.
+    /// Width of the widest 90 % interval of a limit if the unknown parameter were exact and every candidate test were
+    /// repeated a thousand times, percent of that limit.
     pub widest_percent: f64,
 }
 
@@ -142,7 +146,8 @@ pub struct Plan {
     pub reached: bool,
     /// Total number of cuts and other tests in the plan.
     pub cuts_and_tests: usize,
-    /// Names of the unknown parameters, with their standard deviations in percent if these are assumed.
+    /// Names of the unknown parameters, including differences at standstill and sensor gains, each with its standard
+    /// deviation in percent where it is assumed.
     pub unknowns: Vec<String>,
     /// True if the case states standard deviations of its parameters; otherwise defaults are assumed.
     pub stated: bool,
@@ -169,14 +174,13 @@ pub struct Plan {
 /// Number of repetitions of every candidate test that stands for unlimited repetition. A choice.
 const AT_BEST: f64 = 1000.0;
 
-/// The fewest tests after which the 90 % interval of every stability limit of the chart has the required width; calls
-/// `progress` after each speed.
+/// The fewest tests after which the 90 % interval of every stability limit of the chart has at most the required width,
+/// as far as they are found; calls `progress` after each speed.
 ///
 /// Intervals follow from limits that are linearized in the unknown parameters: they hold for machines whose parameters
 /// lie within a few standard deviations of the case. At each speed the lowest of several lobes counts.
 ///
-/// # Errors
-/// The chart cannot be computed, has no limits, or its limits no derivatives.
+/// # Errors See [`PlanError`].
 pub fn plan(case: &Case, request: &Request, progress: impl Fn() + Sync) -> Result<Plan, PlanError> {
     let basis = Basis::new(case, request, progress)?;
     let selection = Selection::new(&basis.chart, &basis.candidates, request.width);

@@ -1,9 +1,10 @@
-//! The cheapest set of tests that narrows the 90 % interval of every stability limit to the required width.
+//! A search for the cheapest set of tests that narrows the 90 % interval of every stability limit to the required
+//! width.
 //!
 //! Tests are added one by one, each the one that most reduces the excess Σ max(0, (width/required width)² − 1) over the
 //! limits per unit of cost. Then tests are dropped, or exchanged for cheaper ones, as long as the required width stays
 //! reached. A test that brackets a limit costs as many cuts as bisections are needed from the limit's interval before
-//! the test down to the bracket width.
+//! the test down to the bracket width, but at least two.
 
 use nalgebra::DMatrix;
 use rayon::prelude::*;

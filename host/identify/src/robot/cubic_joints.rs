@@ -55,7 +55,8 @@ pub struct CubicJointFit {
 
 /// Fits the joints of a robot, with `start` as the first guess, to steady tones at several postures.
 ///
-/// `terms` are cubic stiffness, cubic damping or both; all dwells have `harmonics` harmonics.
+/// `terms` are cubic stiffness, cubic damping or both; with `payload` the mass of the last link is a parameter, too.
+/// All dwells have `harmonics` harmonics.
 ///
 /// # Errors
 /// See [`JointFitError`].
@@ -245,8 +246,8 @@ impl CubicJointFit {
     /// Predicted motion of the tool at a posture under the force F cos ωt, F in N: its fundamental, m, and the standard
     /// deviation of the magnitude of the fundamental in every direction, m.
     ///
-    /// The motion is the one reached when the force rises slowly from zero. `None` if that branch ends in a jump before
-    /// the given force.
+    /// The motion is the one reached when the force rises slowly from zero. `None` if Newton's method does not follow
+    /// that branch to the given force, for example where it ends in a jump.
     pub fn response(
         &self,
         angles_rad: &[f64],

@@ -203,8 +203,9 @@ impl<'a> Model<'a> {
     }
 
     /// Residual of the tool's motion in a dwell, predicted by the equivalent linearization of the joints at the
-    /// measured amplitudes, and its Jacobian, both weighted with the error of this linearization. That error is
-    /// relative, so off-resonance lines weigh as much as peaks, and the fit converges from a distant start.
+    /// measured amplitudes, and its Jacobian, both weighted with the noise and the error of this linearization. The
+    /// latter is relative, so off-resonance lines weigh about as much as peaks, and the fit converges from a distant
+    /// start.
     pub(super) fn linearized(
         &self,
         placed: &PostureMatrices,

@@ -1,10 +1,11 @@
 //! Stiffness and damping of a robot's joints from receptances at several postures.
 //!
-//! The geometry and inertia of the links are given (drawings, CAD). The mass of the last link, which carries tool and payload, may
-//! be a parameter. The receptance at a posture q₀ is H(ω) = J Z⁻¹ Jᵀ with Z = K + iωC − ω²M(q₀) (thesis eqs 3.14, 3.15, without the
-//! inverse of J). The fit determines the logarithms of the parameters and weights each measured receptance by its standard
-//! deviation. The first guess of the stiffnesses comes from the lowest frequencies, where H = Σ J_j J_jᵀ/k_j is linear in the
-//! compliances 1/k_j. Cubic terms require tests at several force levels: [`cubic_joints`](crate::robot::cubic_joints).
+//! The geometry and inertia of the links are given (drawings, CAD). The mass of the last link, including tool and
+//! payload, may be a parameter. The receptance at a posture q₀ is H(ω) = J Z⁻¹ Jᵀ with Z = K + iωC − ω²M(q₀) (thesis
+//! eqs 3.14, 3.15, without the inverse of J). The fit determines the logarithms of the parameters and weights each
+//! measured receptance by its standard deviation. The first guess of the stiffnesses comes from the lowest frequencies,
+//! where H = Σ J_j J_jᵀ/k_j is linear in the compliances 1/k_j. Cubic terms require tests at several force levels:
+//! [`cubic_joints`](crate::robot::cubic_joints).
 
 use std::f64::consts::TAU;
 
@@ -61,7 +62,7 @@ pub enum JointFitError {
         /// Number of joints of the robot.
         joints: usize,
     },
-    /// The measurements do not determine this joint parameter.
+    /// The measurements do not determine this joint parameter, or all parameters together.
     #[error(
         "the receptances do not determine {0}; postures in which that joint moves the tool, and frequencies up to the modes that it has a part in, are needed"
     )]
@@ -81,7 +82,7 @@ struct PostureMatrices<'a> {
     frf: &'a PostureFrf,
     jacobian: Matrix3xX<f64>,
     payload: Matrix3xX<f64>,
-    /// Mass matrix of the links without the payload, by the joint angles, kg m².
+    /// Mass matrix by the joint angles without the mass of the last link, kg m².
     mass: DMatrix<f64>,
     /// Inverse of the standard deviation of each receptance at each frequency, N/m.
     weights: Vec<Vec<f64>>,
@@ -90,8 +91,8 @@ struct PostureMatrices<'a> {
 struct Normal {
     sums: NormalSums,
     /// Σ g gᵀ over the receptances of all postures, with g the gradient that one receptance contributes; the sandwich
-    /// covariance uses it. The errors of one receptance at different lines are correlated; those of different
-    /// receptances are not.
+    /// covariance uses it. The errors of one receptance at different lines count as correlated, those of different
+    /// receptances as independent.
     scatter: DMatrix<f64>,
     entries: usize,
     sum: f64,
@@ -165,7 +166,8 @@ const SEARCH: LevenbergMarquardt = LevenbergMarquardt {
 /// the width of any interval.
 const LAST_STEP: f64 = 1e-3;
 
-/// Largest change of the logarithm of a joint parameter in one step of the fit: no parameter more than doubles.
+/// Largest change of the logarithm of a joint parameter in one step of the fit: no parameter changes by more than a
+/// factor of two.
 const LARGEST_STEP: f64 = 0.7;
 
 /// Weighted sum of squared residuals of all receptances as a function of the robot's joint parameters.

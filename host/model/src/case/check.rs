@@ -17,9 +17,8 @@ use super::{Case, CaseError, Deviation, Parameter, Posture};
 impl Case {
     /// Reads a case file.
     ///
-    /// # Errors
-    /// The file cannot be read, is not TOML, has an unknown key, lacks a required key, or has a value that no machine, tool or cut can
-    /// have.
+    /// # Errors The file cannot be read, is not TOML, has an unknown key, lacks a required key, has a value that no
+    /// machine, tool or cut can have, or has extensions that are not possible together.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, CaseError> {
         let path = path.as_ref();
         Self::parse(path, &quietcut_recording::file::read_text(path)?)
@@ -141,7 +140,8 @@ impl Check<'_> {
         self.number(value, key, |x| x > 0.0, "a number greater than 0")
     }
 
-    /// A number within `[low, high]`; a larger one names the smaller unit that was probably meant, a number of `factor` units.
+    /// A number within `[low, high]`, in `unit`. The error of a larger number suggests the number divided by `factor`,
+    /// as if it was given in the unit `smaller`.
     fn sized(
         &self,
         value: &Number,

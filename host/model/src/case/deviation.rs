@@ -2,7 +2,8 @@
 
 /// The standard deviation of one parameter, in the unit of that parameter: a key `…_std` of the case.
 ///
-/// The errors of different parameters are independent of one another and normally distributed.
+/// The errors of parameters are normally distributed and independent, except for entries (i, j) and (j, i) of a matrix
+/// with equal values and equal standard deviations: they vary together.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Deviation {
     /// The uncertain parameter.

@@ -34,7 +34,7 @@ pub enum CaseError {
         line: usize,
         /// The key of the refused value with its table, such as `tool.teeth`.
         key: String,
-        /// The refused value, as the case file has it.
+        /// The refused value of the case file, or words for it.
         found: String,
         /// The expected value.
         expected: String,

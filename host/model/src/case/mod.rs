@@ -43,7 +43,7 @@ pub struct Case {
     pub cut: Option<Cut>,
     /// Limits of spindle speed and power of the machine; `None` if the case does not give them.
     pub limits: Option<MachineLimits>,
-    /// Posture of the robot at which the structure was measured.
+    /// Posture of the robot to which the structure belongs.
     pub posture: Posture,
     /// Standard deviations of the parameters of the case (keys `…_std`).
     pub deviations: Vec<Deviation>,

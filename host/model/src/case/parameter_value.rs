@@ -15,8 +15,9 @@ impl Parameter {
 
     /// Adds `by` to the value of the parameter in a case.
     ///
-    /// Start and exit angle are limited to 0 to 180 degrees, since a tooth cuts no chip beyond. Returns false if the case lacks the
-    /// parameter, or if the new value is outside its physical range.
+    /// Start and exit angle are limited to 0 to 180 degrees, since a tooth cuts no chip beyond. Returns false if the
+    /// case lacks the parameter, or if the new value is outside its physical range; the latter case keeps the new
+    /// value.
     pub fn shift(self, case: &mut Case, by: f64) -> bool {
         let Some(value) = self.slot(case) else {
             return false;

@@ -2,12 +2,13 @@
 
 use quietcut_recording::RecordedPosture;
 
-/// Posture of the robot at which the structure was measured.
+/// Posture of the robot to which the structure belongs: where it was measured, or for which it follows from the joints.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Posture {
-    /// Index of the posture, shared by host and device; 0 on a machine tool.
+    /// Index of the posture, shared by host and device; 0 if the case gives none, as for a machine tool.
     pub index: u8,
-    /// Joint angles, degrees, in the order from the base to the tool; empty for a machine tool.
+    /// Joint angles, degrees, in the order from the base to the tool; empty if the case gives none, as for a machine
+    /// tool.
     pub joints_deg: Vec<f64>,
 }
 

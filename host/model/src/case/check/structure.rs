@@ -183,7 +183,8 @@ impl Check<'_> {
         }
     }
 
-    /// Refuses mass, damping and stiffness matrices in a structure of another kind.
+    /// Refuses matrices of mass, damping, stiffness and cubic terms, and their standard deviations, in a structure of
+    /// another kind.
     pub(super) fn no_matrices(&self, table: &StructureFile, expected: &str) -> Result<(), CaseError> {
         let strangers = [
             ("mass", &table.mass),

@@ -1,4 +1,4 @@
-//! Reads the tool from the case file: teeth, their pitch and runout.
+//! Reads the tool from the case file: teeth, edge angle, diameter, pitch and runout.
 
 use toml::Spanned;
 
