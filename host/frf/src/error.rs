@@ -14,12 +14,12 @@ pub enum FrfError {
     /// A recording that cannot be read or lacks a required channel.
     #[error(transparent)]
     Recording(RecordingError),
-    /// A line of a text or UFF file, or its UFF data set, is malformed.
+    /// A line of a text file, or a data set of a UFF file, is malformed.
     #[error("{}, line {line}: {what}", path.display())]
     Line {
         /// The file.
         path: PathBuf,
-        /// Number of the malformed line in the file, from 1.
+        /// Number of the malformed line, or of the first line of the malformed data set, in the file, from 1.
         line: u64,
         /// Description of the fault in the line, and the content expected there.
         what: String,

@@ -53,8 +53,8 @@ pub(super) struct ChannelCounts {
 /// All `tests` have the same lines. For several forces, H2 and the mean require equal numbers of responses and forces; the caller checks it.
 ///
 /// Random error (Bendat and Piersol, generalised to H = Σ S_xf,i W_i): var H_pq = Σ_i S_ee,p (W_iᴴ S_ff,i W_i)_qq / n_i, with the residual
-/// spectrum S_ee of the responses and n_i averages of test i; the variance of |H| is half of it. S_ee is the power of X − H1 F for every
-/// estimator but the pseudo-inverse, times n/(n − number of forces), n = Σ n_i. For one force and large n:
+/// spectrum S_ee of the responses and n_i averages of test i; the variance of |H| is half of it. S_ee is the power of X − H F with H from H1 or
+/// the pseudo-inverse (H2 and the mean take that of H1), times n/(n − number of forces), n = Σ n_i. For one force and large n:
 /// ε[|H|] = √(1 − γ²) / (|γ| √(2n)).
 pub(super) fn lines(tests: &[CrossSpectra], counts: ChannelCounts, estimator: Estimator) -> Vec<FrfLine> {
     let count = tests.first().map_or(0, |test| test.frequency_hz.len());

@@ -192,7 +192,7 @@ fn longest_segment(impacts: &[MeasuredImpact], samples: usize) -> usize {
     (shortest as f64 / (1.0 + BEFORE)) as usize
 }
 
-/// Detects the impacts of a hammer in a force signal. Pulses that begin within [`BOUNCE_S`] after the begin of an impact
+/// Detects the impacts of a hammer in a force signal. Pulses that start within [`BOUNCE_S`] after the start of an impact
 /// are its bounces and do not count.
 fn impacts(force: &[f64], rate: f64) -> Vec<MeasuredImpact> {
     let middle = median(&mut force.to_vec()).unwrap_or(0.0);

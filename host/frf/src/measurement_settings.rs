@@ -10,14 +10,14 @@ use super::window::Window;
 /// Settings of an FRF measurement from recordings.
 #[derive(Clone, Debug)]
 pub struct MeasurementSettings {
-    /// Kind of excitation; `None` takes that of the test named in the sidecar of each recording.
+    /// Kind of excitation of all recordings; `None` takes that of the test in the sidecar of each recording.
     pub excitation: Option<Excitation>,
     /// FRF estimator.
     pub estimator: Estimator,
     /// Frequency resolution (line spacing), Hz. `None` selects eight half-overlapping segments for each force in random excitation, and
-    /// averages over eight lines for each force in a sweep.
+    /// averages over eight lines for each force in a sweep. In a hammer test it sets the segment length if [`HammerWindows`] does not.
     pub resolution_hz: Option<f64>,
-    /// Overlap of the segments, as a fraction of their length.
+    /// Overlap of the segments of random excitation, as a fraction of their length.
     pub overlap: f64,
     /// Time window of the segments of random excitation.
     pub window: Window,

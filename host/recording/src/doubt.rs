@@ -9,7 +9,7 @@ pub struct Doubt {
     pub column: String,
     /// Channel name that is possible.
     pub name: String,
-    /// Proposed unit of the column in doubt; `None` if the file states the unit.
+    /// Proposed unit of the column in doubt; `None` if its unit is stated, or if a sensitivity is proposed.
     pub unit: Option<&'static str>,
     /// Proposed sensitivity of the sensor, if the column in doubt is a voltage; `None` otherwise.
     pub sensitivity: Option<&'static str>,

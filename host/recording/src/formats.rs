@@ -19,8 +19,8 @@ impl Recording {
     /// Reads the only recording of a file (text table, WAV, MAT, LabVIEW measurement file, TDMS or UFF 58) and its sidecar.
     ///
     /// # Errors
-    /// For example: the file has several records; it is missing or malformed; a unit is unknown or contradicts the channel name; time is not evenly spaced; there is no sample
-    /// rate; a sample is NaN or infinite.
+    /// For example: the file has several records; it is missing or malformed; a unit is unknown or contradicts the channel name; time is not
+    /// evenly spaced; there is no sample rate; a sample is NaN or infinite.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, RecordingError> {
         Self::read_segment(path, Segment::default())
     }

@@ -34,8 +34,8 @@ pub fn of_complex(matrix: DMatrix<Complex64>) -> Result<Vec<Complex64>, Eigenval
 /// of the absolute value.
 ///
 /// For a small matrix, all eigenvalues are computed. For a large one, a Krylov space grows until the eigenvalues above
-/// `floor` no longer change, at most until it is invariant or the whole space. Of a multiple eigenvalue it then
-/// contains one copy, unless rounding splits it.
+/// `floor` no longer change, at most until it is invariant or the whole space. An eigenvalue with several
+/// eigenvectors is then found once, unless rounding repeats it.
 ///
 /// # Errors
 /// The matrix is not square, has an entry that is not finite, or the iteration exceeds its bound.
