@@ -1,11 +1,12 @@
-//! System identification: parameters of structures, materials and robots from recordings, each with a 90 % interval.
+//! System identification: parameters of structures, materials and robots from recordings, each with its standard
+//! deviation or 90 % interval.
 //!
 //! | folder | parameters | tests |
 //! |---|---|---|
 //! | [`modes`] | complex modes with left and right shapes | receptances, whole recordings |
 //! | [`nonlinear`] | cubic, quadratic and friction terms; linearity tests | step-sine dwells ([`dwells`]), multisines, any record |
 //! | [`cutting`] | cutting and edge coefficients, runout; modes from stability limits | cuts with measured force; trial cuts |
-//! | [`robot`] | joint stiffness and damping, payload | receptances or dwells at several postures |
+//! | [`robot`] | joint stiffness, damping and cubic terms, payload | receptances or dwells at several postures |
 //! | [`ambient`] | modes from responses alone (stochastic subspace) | idle spindle, background vibration |
 //! | [`plan`] | none: the fewest tests that narrow the limits of a lobe chart | |
 //!

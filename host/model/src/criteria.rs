@@ -8,8 +8,9 @@
 /// with an error of 5e-7 in each of n products.
 pub(crate) const VELOCITY_JUMP: f64 = 1e-6;
 
-/// Magnitude of a negative eigenvalue of a mass, damping or stiffness matrix, relative to the largest eigenvalue, up to which it counts as
-/// zero, as for a free body. Matrix entries with ten digits shift an eigenvalue by 5e-10 per degree of freedom; the number allows for two.
+/// Magnitude of an eigenvalue of a mass, damping or stiffness matrix with its diagonal scaled to 1, relative to the
+/// largest magnitude, up to which it counts as zero, as for a free body. Matrix entries with ten digits shift an
+/// eigenvalue by 5e-10 per degree of freedom; the number allows for two.
 pub(crate) const ZERO_EIGENVALUE: f64 = 1e-9;
 
 /// Relative distance below which two poles form one mode, because the mode shapes of (nearly) repeated poles are not defined individually. It

@@ -22,7 +22,7 @@ pub struct Candidate {
     /// The pole λ, rad/s.
     pub pole: Complex64,
     /// Height of the pole's resonance peak: norm of its residues, with each receptance normalized by its RMS, divided
-    /// by the decay rate −Re λ; s.
+    /// by the decay rate −Re λ; dimensionless.
     pub height: f64,
     /// True if frequency, damping and shape agree with those of a pole of the previous model order.
     pub is_stable: bool,

@@ -28,7 +28,7 @@ pub struct Linearized {
     pub omega: f64,
     /// Loss factor η_r.
     pub loss_factor: f64,
-    /// Complex modal constant A_r + iB_r of the mode, numerator of its receptance.
+    /// Complex modal constant A_r + iB_r of the mode, 1/kg, numerator of its receptance.
     pub modal_constant: Complex64,
 }
 

@@ -70,8 +70,8 @@ impl Data<'_> {
         self.output_map(&self.unit()).force(dwell, self.grid.width())
     }
 
-    /// Fourier coefficients of the displacement measured in a dwell, one degree of freedom after the other; `None` if
-    /// one of them is not measured.
+    /// Fourier coefficients of the displacement measured in a dwell, with zero mean, one degree of freedom after the
+    /// other; `None` if one of them is not measured.
     fn displacement(&self, dwell: &Dwell) -> Option<DVector<f64>> {
         let width = self.grid.width();
         let mut x = DVector::zeros(self.law.dofs * width);

@@ -1,4 +1,4 @@
-//! The fewest tests that narrow the stability limits of a lobe chart to a given width.
+//! A search for the fewest tests that narrow the stability limits of a lobe chart to a given width.
 //!
 //! The uncertain parameters of a machine have a normal distribution (`unknowns`). Exact derivatives propagate it to
 //! every limit (`chart`). The Fisher information of every test (`candidate`) follows from these or from central
@@ -137,7 +137,8 @@ pub struct IfKnown {
     pub widest_percent: f64,
 }
 
-/// The fewest tests that narrow the stability limits of a chart to the required width, and their effect.
+/// The cheapest set of tests found that narrows the stability limits of a chart to the required width, and its effect.
+/// If no set reaches this width, `obstacle` states the reason.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Plan {
     /// The required width, percent.
@@ -174,8 +175,9 @@ pub struct Plan {
 /// Number of repetitions of every candidate test that stands for unlimited repetition. A choice.
 const AT_BEST: f64 = 1000.0;
 
-/// The fewest tests after which the 90 % interval of every stability limit of the chart has at most the required width,
-/// as far as they are found; calls `progress` after each speed.
+/// The cheapest set of tests found after which the 90 % interval of every stability limit of the chart has at most the
+/// required width. If no set reaches it, the plan contains the tests that narrow the intervals most per cost. Calls
+/// `progress` after each speed.
 ///
 /// Intervals follow from limits that are linearized in the unknown parameters: they hold for machines whose parameters
 /// lie within a few standard deviations of the case. At each speed the lowest of several lobes counts.

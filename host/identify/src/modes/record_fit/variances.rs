@@ -7,7 +7,7 @@ use serde::Serialize;
 /// Estimated noise of a channel; for a force it includes unmeasured forces.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ChannelNoise {
-    /// Name of the recording.
+    /// Path of the recording.
     pub recording: String,
     /// Name of the channel.
     pub channel: String,
