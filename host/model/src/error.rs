@@ -9,7 +9,7 @@ pub enum ModelError {
     /// A structure with an indefinite or singular matrix, or one whose poles cannot be computed.
     #[error(transparent)]
     Structure(#[from] StructureError),
-    /// An effect of a case that does not apply to its structure or cut.
+    /// An effect that does not apply to the structure or the cut.
     #[error(transparent)]
     Effect(#[from] EffectError),
     /// Pitch angles that do not fit the number of teeth, or whose sum is not 360 degrees.

@@ -130,7 +130,7 @@ impl ForceLaw {
         1.0 + self.wear_per_s * t
     }
 
-    /// True if the cutting force or its derivative is discontinuous at loss of contact: with edge force, process damping or an exponent
+    /// True if the cutting force jumps at loss of contact, or its slope there is infinite: with edge force, process damping or an exponent
     /// below 1.
     pub fn jumps_at_contact(&self) -> bool {
         !self.edge.is_zero()

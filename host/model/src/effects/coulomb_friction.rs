@@ -5,7 +5,7 @@
 //!
 //! With a clearance whose contact is soft, the contact is indented by δ before it transmits fc, by Hertz's law for contacts of
 //! non-conforming bodies (Lankarani & Nikravesh, J. Mech. Design 112, 1990; without their damping):
-//! f_r = fc·((|x − w| − g/2)/δ)^1.5 towards w. The tool moves the slider while |x − w| = g/2 + δ.
+//! f_r = fc·((|x − w| − g/2)/δ)^1.5·sgn(x − w) for |x − w| ≥ g/2. The tool moves the slider while |x − w| = g/2 + δ.
 
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -92,7 +92,7 @@ fn describing_function(at: Harmonic) -> [Complex64; 2] {
 /// of the friction.
 ///
 /// # Errors
-/// The key `before` names another effect, or there is no friction.
+/// The key `before` is no word or names another effect, there is no friction, or gap or contact are missing or not possible.
 pub(super) fn take_backlash(all: &mut Vec<Values>) -> Result<(), EffectError> {
     let Some(index) = all
         .iter()
@@ -238,8 +238,8 @@ impl RestoringForce for Friction {
 
     fn next(&self, before: Option<Regime>, at: &MotionState, _: &[f64], holding_n: f64) -> Regime {
         let moving = before.is_none() && at.v[self.axis] != 0.0;
-        // The integrator finds the end of stick, where the holding force equals fc, to rounding only. A relative margin of 1e-9
-        // above rounding makes sure that slip follows.
+        // The integrator finds the end of stick, where the holding force equals fc, only to rounding. At the end of stick the threshold is
+        // therefore fc·(1 − 1e-9), so that slip follows.
         let rounding = if before == Some(STICK) { -1e-9 } else { 0.0 };
         if moving {
             if at.v[self.axis] > 0.0 {

@@ -1,4 +1,4 @@
-//! A channel of motion also reads a fraction p of the motion in another direction (cross-axis sensitivity).
+//! A channel also reads a fraction p of the measured quantity in another direction (cross-axis sensitivity).
 
 use std::sync::Arc;
 

@@ -34,5 +34,5 @@ impl Harmonic {
 }
 
 /// Describing functions N(X, ω) of the terms of a restoring force, each for a unit coefficient. The terms stand in the order of the linear
-/// parameters; the second is zero if the force has only one.
+/// parameters; the second is zero if the force has only one term.
 pub type DescribingFunction = fn(Harmonic) -> [Complex64; 2];

@@ -20,7 +20,7 @@ pub trait Effect: Debug + Send + Sync {
     /// Changes parameters of the structure that a case can also state.
     ///
     /// # Errors
-    /// The structure has no such parameter.
+    /// For example: the structure has no such parameter, or does not have the direction of the effect.
     fn alter_structure(&self, _structure: &mut Structure) -> Result<(), EffectError> {
         Ok(())
     }
@@ -28,7 +28,7 @@ pub trait Effect: Debug + Send + Sync {
     /// Changes the equation of motion of `structure` in a way that no case can state, such as an additional mode.
     ///
     /// # Errors
-    /// The structure does not have the direction of the effect.
+    /// The direction of the effect cannot be used: see [`EffectError::Direction`].
     fn alter_dynamics(&self, _structure: &Structure, _dynamics: &mut Dynamics) -> Result<(), EffectError> {
         Ok(())
     }
@@ -36,7 +36,7 @@ pub trait Effect: Debug + Send + Sync {
     /// Restoring forces that the effect adds to the equation of motion of `structure`.
     ///
     /// # Errors
-    /// The structure does not have the direction of the effect, or its static stiffness is not known.
+    /// The direction of the effect cannot be used (see [`EffectError::Direction`]), or the static stiffness of the structure is not known.
     fn restoring_forces(&self, _structure: &Structure) -> Result<Vec<Box<dyn RestoringForce>>, EffectError> {
         Ok(Vec::new())
     }
@@ -52,6 +52,6 @@ pub trait Effect: Debug + Send + Sync {
     /// Changes the rotation of the spindle.
     fn alter_spindle(&self, _spindle: &mut Spindle) {}
 
-    /// Changes weights, gain, delay or dynamics of a measured channel.
+    /// Changes the reading of a measured channel, for example its weights or its delay.
     fn alter_channel(&self, _channel: &mut Pickup) {}
 }

@@ -5,13 +5,13 @@ use super::{EffectName, nearest};
 /// The fault of an effect.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum EffectError {
-    /// Not `NAME=VALUE`.
+    /// A text without `=`: neither `NAME=VALUE` nor `NAME.KEY=VALUE`.
     #[error("effect `{0}`: NAME=VALUE or NAME.KEY=VALUE is needed, as in {example}=20", example = EffectName::Runout.name())]
     Form(String),
     /// An unknown name.
     #[error("effect `{0}` is not known; {names} is needed", names = nearest::expected(.0, EffectName::ALL.into_iter().map(EffectName::name)))]
     Unknown(String),
-    /// A key that the effect with this name does not have.
+    /// A key that the effect does not have, or does not use beside the other given keys.
     #[error("effect `{name}` has no key `{key}`; it has {known}", name = .effect.name(), known = .effect.spec().keys_in_words())]
     Key {
         /// The effect.
@@ -35,7 +35,7 @@ pub enum EffectError {
         /// The key to give instead.
         key: &'static str,
     },
-    /// A value that is not possible for its parameter, such as a negative damping ratio.
+    /// A value that is not possible for its key, such as a negative damping ratio, or not possible beside the other given values.
     #[error("effect `{name}{dot}{key}`: `{found}` is not possible; {needed} is needed", dot = if .key.is_empty() { "" } else { "." })]
     Value {
         /// The effect.
@@ -58,7 +58,8 @@ pub enum EffectError {
         /// The directions of the structure.
         directions: String,
     },
-    /// A parameter that this kind of structure does not have.
+    /// An effect that this structure does not allow: for example with a parameter that this kind of structure does not have, or if its
+    /// static stiffness is not known.
     #[error("effect `{name}`: {what}")]
     Structure {
         /// The effect.
@@ -66,7 +67,7 @@ pub enum EffectError {
         /// The fault, and the remedy.
         what: String,
     },
-    /// An effect that the cut of the case does not allow.
+    /// An effect that requires a quantity of the tool or the cut that is not given.
     #[error("effect `{name}`: {what}")]
     Cut {
         /// The effect.
@@ -83,7 +84,7 @@ pub enum EffectError {
 }
 
 impl EffectError {
-    /// Name of the effect and key that are at fault; `None` if they are not known.
+    /// Name of the effect and key that are at fault; the key is empty if no single key is known to be. `None` if the effect is not known.
     pub fn location(&self) -> Option<(&str, &str)> {
         match self {
             Self::Form(_) => None,

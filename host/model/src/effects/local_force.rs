@@ -22,7 +22,7 @@ pub(super) struct LocalForce {
     pub(super) slopes: fn([f64; 2], f64, f64) -> [f64; 2],
     /// True if a derivative of the force law jumps where the velocity is zero.
     pub(super) bends_at_rest: bool,
-    /// Direction of the force; `None` if the structure has only one direction.
+    /// Direction of the force; `None` means the only axis of the structure.
     pub(super) direction: Option<Direction>,
 }
 

@@ -5,7 +5,7 @@
 pub struct Parameter {
     /// Key of the parameter in cases and answers; empty if only the command line has the parameter, as the VALUE of the effect.
     pub key: &'static str,
-    /// Unit of the parameter; empty for words and for dimensionless numbers.
+    /// Unit of the parameter; empty for words, switches and dimensionless numbers.
     pub unit: &'static str,
     /// Type of the value: number, word or switch.
     pub kind: ValueKind,

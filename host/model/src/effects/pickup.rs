@@ -10,16 +10,16 @@ use super::FirstOrderSection;
 pub struct Pickup {
     /// Name of the channel, such as `ax`, `y` or `fx`.
     pub name: String,
-    /// The measured quantity: force, displacement, velocity or acceleration.
+    /// The measured quantity, such as force, displacement, velocity or acceleration.
     pub quantity: Quantity,
     /// Weights of the machine's x, y and z in the reading, gain included.
     pub weights: [f64; 3],
-    /// For each mode of a structure given by modes: ratio of the motion of the sensor to that of the tool. Empty if the sensor moves with the
-    /// tool.
+    /// For each mode of a structure given by modes: ratio of the motion of the sensor to that of the tool. Empty if no mode has
+    /// a ratio of its own.
     pub modes: Vec<f64>,
-    /// Delay of the reading behind the motion, s.
+    /// Delay of the reading behind the measured quantity, s.
     pub delay_s: f64,
-    /// Dynamics of the sensor: sections of its transfer function, in series. Empty if the reading follows the motion at once.
+    /// Dynamics of the sensor: sections of its transfer function, in series. Empty for an ideal sensor.
     pub sections: Vec<FirstOrderSection>,
 }
 

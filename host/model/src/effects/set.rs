@@ -17,8 +17,8 @@ impl Effects {
     /// Effects from `NAME=VALUE` and `NAME.KEY=VALUE`, in any order.
     ///
     /// # Errors
-    /// A text of another form, an unknown name or key, or a value that is not possible. Drift and wear by VALUE, since the length of the
-    /// recording is not known: see [`Self::parse_over`].
+    /// A text of another form, an unknown name or key, a missing key, or a value that is not possible. Drift and wear by VALUE, since the
+    /// length of the recording is not known: see [`Self::parse_over`].
     pub fn parse<'a>(texts: impl IntoIterator<Item = &'a str>) -> Result<Self, EffectError> {
         Self::parse_over(texts, None)
     }
@@ -27,7 +27,7 @@ impl Effects {
     /// over the whole recording.
     ///
     /// # Errors
-    /// As [`Self::parse`].
+    /// As [`Self::parse`]; drift and wear by VALUE only if `record_s` is `None`.
     pub fn parse_over<'a>(
         texts: impl IntoIterator<Item = &'a str>,
         record_s: Option<f64>,
@@ -55,7 +55,7 @@ impl Effects {
     /// The effect of one table `[extension.NAME]`.
     ///
     /// # Errors
-    /// An unknown extension, an unknown key, or a value that is not possible.
+    /// An unknown extension, an unknown or missing key, or a value that is not possible.
     pub fn of_extension(name: &str, table: &toml::Table) -> Result<Self, EffectError> {
         Self::build(vec![extension(name, table)?])
     }
@@ -63,7 +63,7 @@ impl Effects {
     /// The effects of several tables `[extension.NAME]`; a backlash may be in series with the friction of another table.
     ///
     /// # Errors
-    /// An unknown extension, an unknown key, or a value that is not possible.
+    /// An unknown extension, an unknown or missing key, or a value that is not possible.
     pub fn of_extensions<'a>(
         tables: impl IntoIterator<Item = (&'a str, &'a toml::Table)>,
     ) -> Result<Self, EffectError> {
@@ -113,7 +113,7 @@ impl Effects {
     /// The equation of motion of `structure` with these effects, and the restoring forces that they add.
     ///
     /// # Errors
-    /// An effect that is not possible for this structure, or an indefinite structure.
+    /// An effect that is not possible for this structure, or a structure that is refused: see [`ModelError::Structure`].
     pub fn dynamics(
         &self,
         structure: &Structure,
@@ -154,7 +154,7 @@ impl Effects {
         spindle
     }
 
-    /// The pickup (weights, gain, delay) of a channel with the changes of these effects.
+    /// The pickup of a channel with the changes of these effects.
     pub fn pickup(&self, mut channel: Pickup) -> Pickup {
         for effect in &self.0 {
             effect.alter_channel(&mut channel);

@@ -39,7 +39,7 @@ pub struct EffectSpec {
     pub example: &'static str,
     /// Describing function of the effect's restoring force; `None` for an effect without one, or without a closed form of it.
     pub describing_function: Option<DescribingFunction>,
-    /// Builds the effect from the given values and removes from them those that it uses; a key left over is unknown to the effect.
+    /// Builds the effect from the given values and removes from them those that it uses; a key left over is an error.
     pub(super) build: fn(&mut Values) -> Result<Arc<dyn Effect>, EffectError>,
 }
 

@@ -15,7 +15,7 @@ pub enum Value {
     Text(String),
     /// Several words.
     List(Vec<String>),
-    /// Several numbers, one for each direction or mode.
+    /// Several numbers, one for each direction, channel or mode.
     Numbers(Vec<f64>),
 }
 
@@ -36,7 +36,7 @@ impl Value {
         }
     }
 
-    /// Value of a TOML value. `None` for tables, dates, and lists that contain anything but words or anything but numbers.
+    /// Value of a TOML value. `None` for tables, dates, and lists that contain neither only words nor only numbers.
     pub fn of_toml(value: &toml::Value) -> Option<Self> {
         match value {
             toml::Value::Boolean(on) => Some(Self::Number(f64::from(u8::from(*on)))),
@@ -72,7 +72,7 @@ impl Value {
     }
 }
 
-/// The values given for one effect. The effect removes those that it uses, so that unknown keys remain.
+/// The values given for one effect. The effect removes those that it uses, so that unused keys remain.
 #[derive(Clone, Debug)]
 pub struct Values {
     effect: EffectName,
@@ -133,7 +133,7 @@ impl Values {
     /// split.
     ///
     /// # Errors
-    /// The number of values in a list differs from the number of locations.
+    /// The number of values in a list differs from the number of locations, or the list of locations is empty or names one twice.
     pub(super) fn by_location(self) -> Result<Vec<Self>, EffectError> {
         let has_number_per_mode = self
             .effect
@@ -198,7 +198,7 @@ impl Values {
         }
     }
 
-    /// State of an on/off parameter, given by its key or as VALUE of `--effect NAME=VALUE`: true, false, 1 or 0.
+    /// State of an on/off parameter, given by its key or as VALUE of `--effect NAME=VALUE`: 1 or 0; in a case also true or false.
     pub(super) fn switch(&mut self, key: &'static str) -> Result<bool, EffectError> {
         let given = if self.by_key.contains_key("") { "" } else { key };
         match self.by_key.remove(given) {
@@ -220,7 +220,7 @@ impl Values {
         }
     }
 
-    /// Removes the number with this key from the given values and returns it; an error if it is missing.
+    /// Removes the number with this key from the given values and returns it; an error if it is missing or not possible.
     pub(super) fn needed(&mut self, key: &'static str) -> Result<f64, EffectError> {
         self.number(key)?.ok_or_else(|| self.missing(key))
     }
@@ -292,7 +292,7 @@ impl Values {
     /// Checks that the effect has used all given values.
     ///
     /// # Errors
-    /// A key is left that the effect does not have.
+    /// A key is left: the effect does not have it, or does not use it beside the other given keys.
     pub(super) fn finish(self) -> Result<(), EffectError> {
         match self.by_key.into_keys().next() {
             None => Ok(()),

@@ -12,7 +12,7 @@ const NEGLIGIBLE: f64 = 1e-9;
 ///
 /// The tooth-passing period starts when a tooth enters. At phase ψ from 0 to the pitch angle θ, tooth k is at the immersion angle
 /// start + kθ + ψ, and cuts while that angle is below the exit angle. The period therefore has two subintervals: in the first, one
-/// more tooth cuts than in the second. Either subinterval may be empty.
+/// more tooth cuts than in the second. The first subinterval may be empty.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Engagement {
     /// Immersion angle of entry, rad.

@@ -31,7 +31,7 @@ pub struct Runout {
 }
 
 impl Runout {
-    /// Radial runout of tooth `index`, from 0, of `teeth` teeth: its radius minus the mean radius, m.
+    /// Radial runout of tooth `index`, from 0, of `teeth` teeth: its radius minus the radius without runout, m.
     pub fn radial_m(self, index: usize, teeth: usize) -> f64 {
         let angle = self.angle_deg.to_radians() + TAU * index as f64 / teeth as f64;
         1e-6 * self.offset_um * angle.cos()
