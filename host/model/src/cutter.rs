@@ -55,8 +55,9 @@ pub struct Tooth {
 impl Cutter {
     /// The tool in a cut of the axial depth `axial_depth_m`, m.
     ///
-    /// # Errors The tool has no teeth, the number of pitch angles differs from the number of teeth, or their sum is not
-    /// 360 degrees.
+    /// # Errors
+    /// The tool has no teeth, the number of pitch angles differs from the number of teeth, or their sum is not 360
+    /// degrees.
     pub fn new(tool: &Tool, material: &Material, cut: &Cut, axial_depth_m: f64) -> Result<Self, ModelError> {
         let edge = EdgeAngle::new(tool.edge_angle_deg);
         let feed_rad = cut.feed_direction_deg.to_radians();

@@ -33,8 +33,8 @@ pub struct Dynamics {
 impl Dynamics {
     /// The equation of motion of `structure`.
     ///
-    /// # Errors Mass, damping or stiffness is indefinite, the mass matrix has no inverse, or the poles cannot be
-    /// computed.
+    /// # Errors
+    /// Mass, damping or stiffness is indefinite, the mass matrix has no inverse, or the poles cannot be computed.
     pub fn new(structure: &Structure) -> Result<Self, StructureError> {
         let FirstOrder { a, b, c } = structure.first_order()?;
         let order = a.nrows();

@@ -35,7 +35,8 @@ struct Sums {
 /// Poles λ of the models of order 1 to `highest`, rad/s: one list per order. The list of an order with singular
 /// equations is empty.
 ///
-/// # Errors The companion matrix has an entry that is not finite, or its eigenvalue iteration exceeds its bound.
+/// # Errors
+/// The companion matrix has an entry that is not finite, or its eigenvalue iteration exceeds its bound.
 pub(super) fn poles(data: &Receptances, highest: usize) -> Result<Vec<Vec<Complex64>>, EigenvalueError> {
     let [from_hz, to_hz] = data.band_hz();
     let period_s = ARC / (to_hz - from_hz);

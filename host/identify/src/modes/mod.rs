@@ -62,7 +62,8 @@ impl Default for Options {
 
 /// Identifies the modes of measured receptances: poles, stabilization over the model order, and refinement.
 ///
-/// # Errors See [`ModesError`].
+/// # Errors
+/// See [`ModesError`].
 pub fn identify(data: &Receptances, options: &Options) -> Result<ModalModel, ModesError> {
     let stabilization = stabilization::stabilize(data, options.highest_order)?;
     let mut rejected = stabilization.rejected();

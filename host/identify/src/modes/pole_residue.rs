@@ -40,7 +40,8 @@ impl PoleResidue {
     /// Start of the modal fit: residues at the given poles by linear least squares, each residue matrix reduced to rank
     /// one.
     ///
-    /// # Errors The residues cannot be computed, or the singular value decomposition of a residue matrix fails.
+    /// # Errors
+    /// The residues cannot be computed, or the singular value decomposition of a residue matrix fails.
     pub(super) fn start(data: &Receptances, poles: &[Complex64]) -> Result<Self, ModesError> {
         let functions: Vec<&[Complex64]> = data.values.iter().map(Vec::as_slice).collect();
         let fit = residues(&data.frequency_hz, &functions, poles.to_vec())?;

@@ -81,8 +81,8 @@ impl Stabilization {
 /// Computes the poles of the models of order 1 to `highest_order`, or to the highest order that the number of lines
 /// allows, and selects the stable ones.
 ///
-/// # Errors The number of lines or `highest_order` allows too few model orders, or the poles or residues cannot be
-/// computed.
+/// # Errors
+/// The number of lines or `highest_order` allows too few model orders, or the poles or residues cannot be computed.
 pub(super) fn stabilize(data: &Receptances, highest_order: usize) -> Result<Stabilization, ModesError> {
     let lines = data.frequency_hz.len();
     let highest = highest_order.min((lines - 1) / 3);

@@ -182,7 +182,8 @@ const AT_BEST: f64 = 1000.0;
 /// Intervals follow from limits that are linearized in the unknown parameters: they hold for machines whose parameters
 /// lie within a few standard deviations of the case. At each speed the lowest of several lobes counts.
 ///
-/// # Errors See [`PlanError`].
+/// # Errors
+/// See [`PlanError`].
 pub fn plan(case: &Case, request: &Request, progress: impl Fn() + Sync) -> Result<Plan, PlanError> {
     let basis = Basis::new(case, request, progress)?;
     let selection = Selection::new(&basis.chart, &basis.candidates, request.width);

@@ -17,8 +17,9 @@ use super::{Case, CaseError, Deviation, Parameter, Posture};
 impl Case {
     /// Reads a case file.
     ///
-    /// # Errors The file cannot be read, is not TOML, has an unknown key, lacks a required key, has a value that no
-    /// machine, tool or cut can have, or has extensions that are not possible together.
+    /// # Errors
+    /// The file cannot be read, is not TOML, has an unknown key, lacks a required key, has a value that no machine,
+    /// tool or cut can have, or has extensions that are not possible together.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, CaseError> {
         let path = path.as_ref();
         Self::parse(path, &quietcut_recording::file::read_text(path)?)
