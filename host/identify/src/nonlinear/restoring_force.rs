@@ -101,7 +101,8 @@ pub struct Options {
     /// Frequency band of the fit, Hz; `None` takes the band in which the measured motion exceeds its noise. If the
     /// motion is integrated, the band starts at a quarter of the dominant frequency at least.
     pub band_hz: Option<[f64; 2]>,
-    /// Duration that is left out of the fit at each end of the record, s; at most a quarter of the record is left out.
+    /// Duration that is left out of the fit at each end of the record, s; at most a quarter of the
+    /// record at each end.
     pub trim_s: f64,
 }
 

@@ -167,7 +167,7 @@ const SEARCH: LevenbergMarquardt = LevenbergMarquardt {
 const LAST_STEP: f64 = 1e-3;
 
 /// Largest change of the logarithm of a joint parameter in one step of the fit: no parameter changes by more than a
-/// factor of two.
+/// factor of about two.
 const LARGEST_STEP: f64 = 0.7;
 
 /// Weighted sum of squared residuals of all receptances as a function of the robot's joint parameters.
