@@ -12,7 +12,7 @@ pub enum ModelError {
     /// An effect that does not apply to the structure or the cut.
     #[error(transparent)]
     Effect(#[from] EffectError),
-    /// Pitch angles that do not fit the number of teeth, or whose sum is not 360 degrees.
+    /// A tool without teeth, or pitch angles that do not fit the number of teeth or whose sum is not 360 degrees.
     #[error(
         "{teeth} teeth with the pitches {pitch_deg:?} degrees: as many pitches as teeth are needed, with the sum 360"
     )]

@@ -28,7 +28,7 @@ impl SampledMotion {
         self.len() == 0
     }
 
-    /// Largest peak-to-peak displacement of the three axes, m.
+    /// Largest range of the displacement among the three axes, m; each range includes 0.
     pub fn peak_to_peak_m(&self) -> f64 {
         let peak_to_peak = |x: &Vec<f64>| {
             let ends = x
@@ -73,7 +73,8 @@ impl SampledMotion {
     }
 }
 
-/// Catmull–Rom (cubic) interpolation of a signal at `place`, counted in samples; the end samples are repeated.
+/// Catmull–Rom (cubic) interpolation of a signal at `place`, counted in samples; the end samples are repeated as neighbours. Outside the
+/// signal the cubic polynomial of the end is extrapolated.
 pub fn interpolated(samples: &[f64], place: f64) -> f64 {
     let Some(last) = samples.len().checked_sub(1) else {
         return 0.0;
@@ -115,8 +116,8 @@ pub fn restoring_along(restoring_force: &dyn RestoringForce, motion: &SampledMot
     restoring_from(restoring_force, motion, &mut own)
 }
 
-/// Restoring force f_r, N, along `motion` for a force without locked regime; updates the internal states `own` from the first sample to the
-/// last.
+/// Restoring force f_r, N, along `motion` for a force that has internal states or no locked regime; updates the internal states `own` from the
+/// first sample to the last. The holding force is taken as 0.
 pub fn restoring_from(
     restoring_force: &dyn RestoringForce,
     motion: &SampledMotion,

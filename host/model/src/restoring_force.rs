@@ -34,7 +34,7 @@ pub type Regime = u8;
 /// A restoring force f_r, N, along x, y, z in the equation of motion M ẍ + C ẋ + K x + f_r = F.
 ///
 /// A restoring force may have internal states and several regimes, such as stick and slip, in each of which it is smooth. The integrator ends
-/// a step exactly where [`RestoringForce::margin`] falls below zero; [`RestoringForce::next`] then selects the next regime. A
+/// a step where [`RestoringForce::margin`] falls below zero; [`RestoringForce::next`] then selects the next regime. A
 /// [`RestoringForce::locked`] regime keeps one axis at rest, as sticking friction does: f_r then balances all other forces on that axis.
 pub trait RestoringForce: Debug + Send + Sync {
     /// Number of internal states. Each is a displacement in m, which the error control of the integrator assumes.
@@ -57,13 +57,13 @@ pub trait RestoringForce: Debug + Send + Sync {
     /// Restoring force f_r, N, in `regime`, which is not a locked one.
     fn restoring_n(&self, regime: Regime, at: &MotionState, own: &[f64]) -> [f64; 3];
 
-    /// Jacobian of f_r; `None` for a force that is not differentiable everywhere or has internal states.
+    /// Jacobian of f_r; `None` for a force that does not provide it, for example since it has internal states.
     fn slopes(&self, _at: &MotionState) -> Option<Slopes> {
         None
     }
 
     /// Describing function N(X, ω), N/m: under x = X·sin ωt along its axis the fundamental of f_r is N·x, its real part in phase
-    /// with x and its imaginary part in phase with the velocity. `None` where there is no closed form.
+    /// with x and its imaginary part in phase with the velocity. `None` for a force that does not provide it.
     fn describing_function(&self, _amplitude_m: f64, _omega: f64) -> Option<Complex64> {
         None
     }

@@ -1,4 +1,4 @@
-//! Anti-aliasing filter and decimation: removes components above half the sampling rate, which would alias into the band.
+//! Anti-aliasing filter and decimation: attenuates components above half the sampling rate, which would alias into the band.
 
 use std::f64::consts::{PI, TAU};
 

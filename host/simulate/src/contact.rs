@@ -144,7 +144,8 @@ impl<'a> Contact<'a> {
         sum.map(|force| force * cutter.force.wear(t))
     }
 
-    /// Matrix D, N s/m, of the process damping force −D v at the time `t` and displacement `x`; `None` without process damping.
+    /// Matrix D, N s/m, of the process damping force −D v at the time `t` and displacement `x`; `None` without process damping or
+    /// tool diameter.
     pub(super) fn damping_ns_per_m(&self, t: f64, x: [f64; 3]) -> Option<[[f64; 3]; 3]> {
         let cutter = &self.cutting.cutter;
         cutter.force.process_damping?;
@@ -227,7 +228,8 @@ impl<'a> Contact<'a> {
         left - cutter.recession_m(immersion, self.feed_m(tooth, t))
     }
 
-    /// The first time after `t`, s, at which a tooth enters or leaves the engagement arc or the material, or meets a kink of the surface.
+    /// The first time after `t`, s, at which a tooth enters or leaves the engagement arc or the material, or meets a kink of the
+    /// surface, or at which the depth over the traverse has a knot.
     pub(super) fn next_switch_s(&self, t: f64) -> f64 {
         let after = t + self.same_time_s;
         let of_teeth = self.teeth.iter().map(|state| {

@@ -22,7 +22,8 @@ pub struct Cutting {
 /// The earlier vibration that the chip thickness includes (regenerative effect).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Regeneration {
-    /// All earlier tooth passings (multiple regeneration): a tooth that does not reach the surface they left has no force (eqs 6.20 to 6.27).
+    /// All earlier tooth passings (multiple regeneration): a tooth that does not reach the surface they left has no force (thesis
+    /// eqs 6.20 to 6.27).
     AllPasses,
     /// The last tooth passing only; a negative chip thickness gives a negative force. This is the linear delay model of stability charts.
     LastPass,

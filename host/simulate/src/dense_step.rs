@@ -14,14 +14,14 @@ pub struct DenseStep<'a> {
     pub(super) to_s: f64,
 }
 
-/// Motion of the tool and force on it at one instant, in the machine's x, y, z.
+/// Motion of the tool, or at a sensor away from the tool tip, and force on the tool at one instant, in the machine's x, y, z.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Motion {
-    /// Displacement of the tool, m.
+    /// Displacement of the tool or at the sensor, m.
     pub displacement_m: [f64; 3],
-    /// Velocity of the tool, m/s.
+    /// Velocity of the tool or at the sensor, m/s.
     pub velocity_m_per_s: [f64; 3],
-    /// Acceleration of the tool, m/s²; `None` if a step of the force makes the velocity jump, see [`super::Dynamics::velocity_jumps`].
+    /// Acceleration of the tool or at the sensor, m/s²; `None` if a step of the force makes the velocity jump, see [`super::Dynamics::velocity_jumps`].
     pub acceleration_m_per_s2: Option<[f64; 3]>,
     /// Force on the tool, N: cutting force plus external excitation.
     pub force_n: [f64; 3],
@@ -68,7 +68,7 @@ impl DenseStep<'_> {
         self.to_s
     }
 
-    /// The motion of the tool at the time `t`, s, within the integration step.
+    /// The motion of the tool, or at the sensor of `workspace`, at the time `t`, s, within the integration step.
     pub fn motion(&self, t: f64, workspace: &mut Workspace) -> Motion {
         let u = (t - self.from_s) / (self.to_s - self.from_s);
         for (state, quartic) in workspace.state.iter_mut().zip(self.quartics) {

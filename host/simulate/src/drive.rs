@@ -16,8 +16,8 @@ pub trait Drive: Send + Sync {
         f64::INFINITY
     }
 
-    /// The longest integration step that resolves the force, s. While friction sticks, the tool is at rest and error control does not limit
-    /// the step; this length then does.
+    /// The longest integration step that resolves the force, s. While friction sticks or the tool is at rest, error control does not
+    /// limit the step; this length then does.
     fn longest_step_s(&self) -> f64 {
         f64::INFINITY
     }

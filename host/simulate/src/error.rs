@@ -13,7 +13,8 @@ pub enum SimulateError {
         "the tool's diameter is not known, so its way into the workpiece is not: give diameter_mm in [tool], or let the depth grow instead"
     )]
     NoDiameter,
-    /// The displacement of the tool exceeded the bound [`super::Settings::largest_m`].
+    /// The displacement of the tool exceeded the bound [`super::Settings::largest_m`], or no integration step above the rounding of the time
+    /// has an error within the tolerance.
     #[error(
         "at {time_s:.6} s the tool is displaced by {displacement_mm:.3} mm and growing: beyond that the model means nothing (a softening spring has given way, or the cut is so unstable that loss of contact does not bound it)"
     )]
@@ -51,7 +52,7 @@ pub enum SimulateError {
         /// Simulated time at which the run stopped, s.
         time_s: f64,
     },
-    /// A rig drives a direction that the structure does not have.
+    /// A rig drives a direction that the structure does not have, or a rotation.
     #[error("the structure cannot be driven in {direction}: it has no such direction, or it is a rotation")]
     NoDirection {
         /// Direction of the excitation force.

@@ -33,7 +33,7 @@ pub(super) struct Integrator<'a> {
     y: Vec<f64>,
     quartics: Vec<Quartic>,
     displacement: [Quartic; 3],
-    /// Length of the next integration step, s, unless an event shortens it.
+    /// Length of the next integration step, s, unless a stop, an event or a rejection shortens it.
     next_h: f64,
     statistics: Statistics,
     workspace: Workspace,
@@ -428,8 +428,8 @@ impl<'a> Integrator<'a> {
         contact.min(drive).min(end_s)
     }
 
-    /// The longest integration step, s: half the shortest tooth-passing period. The surface in front of a tooth is then known, and no
-    /// change of contact is missed.
+    /// The longest integration step, s: half the shortest tooth-passing period, so that the surface in front of a tooth is known. Without
+    /// a cut it is `end_s`.
     fn longest_step(&self, end_s: f64) -> f64 {
         self.contact
             .as_ref()

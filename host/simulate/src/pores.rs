@@ -12,7 +12,7 @@ use quietcut_model::spindle::Spindle;
 /// harmonics of the tooth-passing frequency, and its three components are not proportional (thesis section 7.2.1).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pores {
-    /// Fraction of the lattice nodes that are pores, 0 to 1.
+    /// Probability that a lattice node is a pore, 0 to 1.
     pub share: f64,
     /// Distance between neighbouring lattice nodes, m.
     pub size_m: f64,
@@ -53,7 +53,7 @@ impl Pores {
         })
     }
 
-    /// A uniform random number from 0 to 1 that depends only on the lattice node (i, j), the seed and the purpose: 0 for the pore, 1 to 3 for the
+    /// A uniform random number in [0, 1) that depends only on the lattice node (i, j), the seed and the purpose: 0 for the pore, 1 to 3 for the
     /// three pressures.
     fn node_chance(&self, i: i64, j: i64, purpose: u64) -> f64 {
         let bits = hashed(self.seed ^ hashed((i as u64) ^ hashed((j as u64) ^ hashed(purpose))));

@@ -43,8 +43,8 @@ impl Reading {
         }
     }
 
-    /// Takes the samples of the channel that lie in the newest integration step. A delay of the sensor places the first samples before t =
-    /// 0, where the tool is at rest at its initial displacement.
+    /// Takes the samples of the channel that lie in the newest integration step. A delay of the sensor, or a mean over the sampling
+    /// interval, places the first values before t = 0, where the tool is at rest at its initial displacement.
     pub fn observe(&mut self, step: &DenseStep<'_>) {
         if self.filter.is_none() && !self.pickup.sections.is_empty() {
             let start = step.motion(step.from_s(), &mut self.workspace);

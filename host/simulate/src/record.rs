@@ -58,7 +58,7 @@ impl Recorder {
 }
 
 impl VirtualCut {
-    /// Simulates the cut and records the [measured](Self::measured) quantities in all directions of the structure, and the tachometer.
+    /// Simulates the cut and records the [measured](Self::measured) quantities along those of x, y and z that the structure has, and the tachometer.
     /// `path` is the path of the recording's file.
     ///
     /// The time base is the true time, so that a sensor with a clock error has its true sampling rate. Forces and displacements are sampled
@@ -178,7 +178,7 @@ impl VirtualCut {
         Ok(sidecar)
     }
 
-    /// Tachometer level, 0 to 1: high for half a pitch of the wheel after each edge. An edge rises over two samples, as after an
+    /// Tachometer level, 0 to 1: high for half the shortest pitch period of the wheel after each edge. An edge rises over two samples, as after an
     /// anti-aliasing filter, so that its midpoint can be interpolated between samples.
     fn level(
         &self,
@@ -231,7 +231,7 @@ struct Sensors {
     samplers: Vec<(Pickup, Sampler)>,
 }
 
-/// True if two channels read the same accelerometer: same quantity, delay and location.
+/// True if two channels read the same accelerometer: same quantity, delay, location and dynamics.
 fn is_one_sensor(a: &Pickup, b: &Pickup) -> bool {
     a.quantity == b.quantity && a.delay_s == b.delay_s && a.modes == b.modes && a.sections == b.sections
 }

@@ -14,9 +14,10 @@ use super::{Direction, Matrices};
 pub struct Indefinite {
     /// Name of the matrix: mass, damping or stiffness.
     pub matrix: &'static str,
-    /// Smallest eigenvalue of the indefinite matrix's symmetric part, in the unit of the matrix.
+    /// Smallest eigenvalue of the indefinite matrix's symmetric part, in the unit of the matrix; NaN if it cannot be computed.
     pub eigenvalue: f64,
-    /// Smallest set of entries whose change makes the matrix definite; empty if one or two changes do not suffice.
+    /// One or two entries whose change makes the matrix definite; empty if neither one reversed sign, nor one larger diagonal entry, nor
+    /// one of each does.
     pub remedy: Vec<Remedy>,
 }
 
@@ -150,7 +151,7 @@ fn smallest_eigenvalue(symmetric: &DMatrix<f64>) -> f64 {
 
 /// Searches for a change of one entry, then of two, that makes the matrix definite: a reversed sign, a larger diagonal entry, or both.
 ///
-/// If entries (i,j), (j,k) and (i,k) have a product of the wrong sign, reversing any one of them suffices. Mass, damping and stiffness of a
+/// If entries (i,j), (j,k) and (i,k) have a product of the wrong sign, reversing any one of them corrects the product. Mass, damping and stiffness of a
 /// mechanism follow from diagonal matrices by the same change of coordinates, so entries whose sign differs from that in the mass matrix
 /// are tried first.
 fn remedy(

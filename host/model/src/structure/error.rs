@@ -6,7 +6,7 @@ use quietcut_numerics::eigenvalues::EigenvalueError;
 
 use super::Indefinite;
 
-/// A structure whose matrices are not those of a passive structure.
+/// A structure that is not passive, or whose equation of motion cannot be solved.
 #[derive(Clone, Debug, PartialEq)]
 pub enum StructureError {
     /// Mass, damping or stiffness matrices that are indefinite.

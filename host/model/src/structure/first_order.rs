@@ -8,7 +8,7 @@ use quietcut_numerics::eigenvalues::{EigenvalueError, of_real};
 
 /// First-order form ẋ = A x + B F, u = C x; F is the force on the tool centre point and u its displacement, along x, y, z.
 ///
-/// All n states are real. From matrices, x = (q, q̇/s) with s the root of ‖M⁻¹K‖, so that all entries of A are frequencies.
+/// All n states are real. From matrices, x = (q, q̇/s) with s the larger of √‖M⁻¹K‖ and ‖M⁻¹C‖, so that all entries of A are frequencies.
 /// From complex modes, x holds real and imaginary part of each modal coordinate η̇ = λη + Ψᴸᵀ F, and u = 2 Re(Ψᴿ η). That is
 /// exact also if the residues do not sum to zero, so that no mass matrix exists.
 /// The structure is rigid in directions that it does not have: zero columns of B, zero rows of C.
@@ -91,7 +91,7 @@ impl Structure {
     /// The structure in first-order form, in the machine's directions, without cubic terms.
     ///
     /// # Errors
-    /// Mass, damping or stiffness is indefinite, or the poles cannot be computed.
+    /// Mass, damping or stiffness is indefinite, the mass matrix has no inverse, or the poles cannot be computed.
     pub fn first_order(&self) -> Result<FirstOrder, StructureError> {
         self.check()?;
         let first_order = match &self.form {
@@ -124,7 +124,7 @@ fn from_second_order(matrices: &Matrices, jacobian: &Matrix3xX<f64>) -> Result<F
         .ok_or(StructureError::SingularMass)?;
     let stiffness = &inverse_mass * &matrices.stiffness;
     let damping = &inverse_mass * &matrices.damping;
-    // Scale s of the velocity states q̇/s, 1/s. A free mass has no natural frequency: its damping rate is the scale, or 1/s without
+    // Scale s of the velocity states q̇/s, 1/s: the larger of √‖M⁻¹K‖ and ‖M⁻¹C‖, or 1/s for a structure without stiffness and
     // damping.
     let scale = match stiffness.norm().sqrt().max(damping.norm()) {
         scale if scale > 0.0 => scale,

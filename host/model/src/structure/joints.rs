@@ -33,7 +33,7 @@ pub struct Joint {
     pub mass_kg: f64,
     /// Centre of mass of the joint's link in the base frame, with all joint angles at zero, m.
     pub center_m: Vector3<f64>,
-    /// Inertia tensor of the link about its centre of mass, kg m².
+    /// Inertia tensor of the link about its centre of mass along the axes of the base frame, with all joint angles at zero, kg m².
     pub inertia_kg_m2: Matrix3<f64>,
 }
 

@@ -4,7 +4,8 @@ use nalgebra::DMatrix;
 
 /// Mass, damping and stiffness matrices in M q̈ + C q̇ + K q + C₃ q̇∘³ + K₃ q∘³ = F, with ∘³ the cube of each element.
 ///
-/// All matrices are square with one row per direction, in SI units: kg, N s/m, N/m, N s³/m³, N/m³.
+/// All matrices are square with one row per direction of the structure, or per joint of a robot, in SI units. The stated units are those
+/// of displacements; for rotations and joint angles moments and radians take the place of forces and metres.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Matrices {
     /// M, kg.

@@ -44,10 +44,10 @@ pub enum Form {
 }
 
 impl Structure {
-    /// Checks that mass, damping and stiffness are definite.
+    /// Checks that the mass matrix is positive definite, and damping and stiffness at least positive semidefinite.
     ///
     /// # Errors
-    /// Indefinite matrices, each with its smallest eigenvalue and the entries that make it indefinite.
+    /// Indefinite matrices, each with its smallest eigenvalue and, if they are found, the entries that make it indefinite.
     pub fn check(&self) -> Result<(), StructureError> {
         let found = match &self.form {
             Form::Matrices(matrices) => definiteness::indefinite(matrices, &self.directions),
