@@ -88,8 +88,8 @@ pub struct SampleClockState {
     block_samples: u32,
     /// Number of samples with a clipped axis since the sample clock was started or reset.
     clipped: u32,
-    /// Number of lost samples since the sample clock was started or reset, without those of gaps whose length is
-    /// unknown.
+    /// Number of lost samples since the sample clock was started or reset. A gap of unknown length counts with the lost
+    /// samples that its following block states.
     lost: u32,
     /// Number of gaps in the stream of samples since the sample clock was started or reset.
     gaps: u32,
@@ -102,7 +102,8 @@ pub enum Continuity {
     Contiguous,
     /// This number of samples is missing between the preceding block and this one.
     Gap(u32),
-    /// The block is the first one, or follows a gap of unknown length.
+    /// The sample clock is started anew: for example, at the first block, or after a gap that is too long or of unknown
+    /// length.
     Restarted,
 }
 
@@ -148,7 +149,7 @@ impl SampleClock {
             block.lost
         } else {
             // The number of samples in lost blocks is unknown. The fitted clock gives it, as long as the standard deviation of
-            // its time is below half a sample period.
+            // its time is at most half a sample period.
             let samples = line.events_to(block.time) - state.block_samples as f32;
             let error_ns2 = line.variance_at_ns2(samples);
             let half_ns = 0.5 * line.period_ns();
@@ -202,8 +203,8 @@ impl SampleClockState {
         self.clipped
     }
 
-    /// Number of lost samples since the sample clock was started or reset, without those of gaps whose length is
-    /// unknown.
+    /// Number of lost samples since the sample clock was started or reset. A gap of unknown length counts with the lost
+    /// samples that its following block states.
     pub fn lost(&self) -> u32 {
         self.lost
     }

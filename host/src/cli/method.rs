@@ -100,7 +100,8 @@ impl MethodChoice {
     /// Builds the chosen stability method for a case.
     ///
     /// # Errors
-    /// The method is not defined for the case, or an option does not belong to the method.
+    /// For example: the method is not defined for the case, an option does not belong to the method, or the table of
+    /// `--frf` cannot be read.
     pub(super) fn on(&self, case: &Case) -> Result<Box<dyn Method>, Error> {
         self.check_options()?;
         let moved;
@@ -178,7 +179,8 @@ impl MethodChoice {
         })
     }
 
-    /// Builds a stability method that uses receptances only; `path` is their file, for error messages.
+    /// Builds a stability method that uses receptances only; `path` is the table or the case
+    /// that gives them, for error messages.
     fn on_receptances(&self, problem: FrequencyProblem, path: &Path) -> Result<Box<dyn Method>, Error> {
         Ok(match self.name() {
             MethodName::Zoa => Box::new(Zoa { problem }),
@@ -240,8 +242,8 @@ fn warn_of_table(table: &FrfTable) -> Result<(), Error> {
         .iter()
         .filter(|entry| entry.response == entry.force)
     {
-        // A direct receptance far below all modes is nearly its positive static compliance. Another phase at the first
-        // frequency line indicates a mode below this line.
+        // A direct receptance far below all modes is nearly its positive static compliance. A phase beyond ±45° at the
+        // first frequency line indicates a mode below this line.
         if let (Some(first), Some(hz)) = (entry.receptance.first(), table.frequency_hz().first())
             && first.im.abs() > first.re
         {

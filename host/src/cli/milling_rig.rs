@@ -128,9 +128,9 @@ pub(super) fn run(
     output.answer(&answer, text)
 }
 
-/// Internal sampling rate of the simulation, Hz: the larger of 1000 times the tooth-passing frequency (teeth enter and
+/// Lower bound of the internal sampling rate of the simulation, Hz: the larger of 1000 times the tooth-passing frequency (teeth enter and
 /// leave suddenly) and three times the rate at which a tooth passes pores, π·D·n/size with tool diameter D, n
-/// revolutions per second and the pore size.
+/// revolutions per second and the pore size. The fastest speed of the cut counts.
 fn fastest_hz(cut: &VirtualCut, case: &Case) -> f64 {
     let revolutions_hz = cut.spindle_rpm.max(cut.last_rpm.unwrap_or(0.0)) / 60.0;
     let tool = case.tool.as_ref();

@@ -1,7 +1,7 @@
 //! The command line: one file per verb, each with its arguments and a `run`.
 //!
 //! Exit status 0: success. Exit status 2: wrong usage or wrong input, with one message on stderr. Exit status 130: interrupted by
-//! Ctrl-C. Exit status 1: any other failure. An output file is complete or unchanged.
+//! Ctrl-C, which ends `monitor` with success. Exit status 1: any other failure. An output file is complete or unchanged.
 
 mod channels;
 pub mod demo;
@@ -117,7 +117,8 @@ pub fn main() -> ExitCode {
     }
 }
 
-/// Message for the first value of an option that begins with a dash, such as `--rpm -900:1200:7`, which the parser takes for an option.
+/// Message for the first value of an option that begins with a dash and a digit or point, such as `--rpm -900:1200:7`: the
+/// parser takes such a value for an option.
 fn dashed_value(given: &[String]) -> Option<String> {
     let is_value = |text: &str| {
         let mut letters = text.chars();
@@ -140,7 +141,7 @@ fn dashed_value(given: &[String]) -> Option<String> {
 const INTERRUPTED: i32 = 130;
 
 /// Makes Ctrl-C remove the unfinished output files and end the process at once, except in the verb `monitor`, which
-/// ends by itself.
+/// handles Ctrl-C itself.
 fn leave_nothing_half_written(verb: &Verb) -> Result<(), ctrlc::Error> {
     if matches!(verb, Verb::Monitor(_)) {
         return Ok(());
@@ -152,8 +153,8 @@ fn leave_nothing_half_written(verb: &Verb) -> Result<(), ctrlc::Error> {
 }
 
 impl Verb {
-    /// Activity that the progress line names while the verb computes; `None` for a verb that shows its own progress or
-    /// finishes at once.
+    /// Activity that the progress line names while the verb computes; `None` for a verb without this line: for example,
+    /// it shows its own progress or finishes at once.
     fn doing(&self) -> Option<&'static str> {
         match self {
             Self::Simulate(_) => Some("simulating"),

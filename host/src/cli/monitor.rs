@@ -25,7 +25,7 @@ pub struct Args {
     output: StreamedOutput,
 }
 
-/// Time between two printed lines while the verdict of the device does not change: a choice, short enough to show that
+/// Least time between two printed lines while verdict and advice of the device do not change: a choice, short enough to show that
 /// the device still answers.
 const UNCHANGED_LINE_PERIOD: Duration = Duration::from_secs(2);
 
@@ -61,7 +61,7 @@ pub fn run(args: Args) -> Result<(), Error> {
 }
 
 /// Prints each report of the device whose verdict or advice differs from the previous one, and the unchanged state
-/// every [`UNCHANGED_LINE_PERIOD`], until `is_over` returns true.
+/// once [`UNCHANGED_LINE_PERIOD`] has passed since the last line, until `is_over` returns true.
 fn listen(
     client: &mut Client,
     output: StreamedOutput,

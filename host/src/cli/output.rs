@@ -1,4 +1,5 @@
-//! Standard output of a verb: text lines, or exactly one JSON object with `--json`.
+//! Standard output of a verb: text lines, exactly one JSON object with `--json`, or one JSON object a line with
+//! `--json-lines`.
 
 use std::fmt::Display;
 use std::io::{self, Write};
@@ -122,7 +123,7 @@ impl StreamedOutput {
         }
     }
 
-    /// Prints a line of text that has no JSON.
+    /// Prints a line of text that has no JSON; prints nothing with `--json` or `--json-lines`.
     pub fn line(self, text: impl Display) -> Result<(), Error> {
         if self.json_lines {
             Ok(())
@@ -160,7 +161,7 @@ struct LastLine<'a, T> {
     understood: &'a [Understood],
 }
 
-/// The result of a verb, and how the files of its recordings were understood.
+/// The result of a verb, and how its files were understood, where they had to be interpreted.
 #[derive(Serialize)]
 struct WithUnderstood<'a, T> {
     #[serde(flatten)]

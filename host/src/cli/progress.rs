@@ -1,6 +1,6 @@
 //! Progress of a verb on a terminal: a line on standard error while it computes.
 //!
-//! The line is removed before anything else is printed. Without a terminal nothing is shown.
+//! The line that `show` draws is removed before results or log messages are printed. Without a terminal nothing is shown.
 
 use std::io::IsTerminal;
 use std::sync::{Mutex, PoisonError};

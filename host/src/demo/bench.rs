@@ -22,7 +22,7 @@ pub enum BenchError {
     /// The cut cannot be simulated.
     #[error(transparent)]
     Cut(#[from] VirtualCutError),
-    /// The device sent no report during a cut.
+    /// The report of the last block of a cut did not arrive in time.
     #[error("the simulated device sent nothing for {} s during a cut", REPORT_TIMEOUT.as_secs())]
     Silent,
 }
@@ -49,7 +49,8 @@ impl Bench {
     /// Starts the device and connects to it over its serial port.
     ///
     /// # Errors
-    /// The operating system has no free pseudo-terminal.
+    /// For example: the case of the cell is invalid, the operating system has no free pseudo-terminal, or the device does
+    /// not answer.
     pub fn new(cell: VirtualCell) -> Result<(Self, Info), DeviceError> {
         let (cuts, queue) = channel();
         let setup = Setup {
@@ -86,7 +87,8 @@ impl Bench {
     /// Simulates one cut and collects the reports of the device.
     ///
     /// # Errors
-    /// The cut cannot be simulated, or the device sends no report for a long time.
+    /// The cut cannot be simulated, the device refuses a request or does not answer, or the report of the last block does
+    /// not arrive.
     pub fn cut(&mut self, rpm: f64, depth_mm: f64) -> Result<Trial, BenchError> {
         let recorded = self.cell.cut(rpm, depth_mm, CUT_SECONDS, self.seed)?;
         let mut trial = Trial {
@@ -139,7 +141,8 @@ impl Bench {
     }
 }
 
-/// Adds one event of the device to the record of a cut; report times are counted from the first report of the cut.
+/// Adds one event of the device to the record of a cut, of spectra and strobes only those of the structure band. Report
+/// times are counted from the first report of the cut.
 fn take(trial: &mut Trial, event: Event, start: &mut Option<Nanoseconds>) {
     match event {
         Event::Spectrum(chunk) => trial.take_spectrum(&chunk),

@@ -215,7 +215,7 @@ fn pictures(trial: &Trial, scale: &CommonScale) -> Result<Markup, PictureError> 
     })
 }
 
-/// Axis with the largest root mean square of the acceleration.
+/// Axis with the largest standard deviation of the acceleration over the last quarter of full engagement.
 fn dominant_axis(trial: &Trial) -> usize {
     let [x, y, z] = trial.vibration();
     if x >= y && x >= z {

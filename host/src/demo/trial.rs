@@ -29,7 +29,7 @@ pub struct Trial {
     pub full_cut_s: [f64; 2],
     /// Acceleration at the sensor during the cut, low-pass filtered to the structure band.
     pub trace: Trace,
-    /// Reports of the device, one for each block; times are counted from the start of the cut.
+    /// Reports of the device, one for each block; times are counted from the first report.
     pub reports: Vec<Report>,
     /// Power spectra of the acceleration in the structure band, as the device sent them.
     pub spectra: Vec<Spectrum>,
@@ -87,7 +87,7 @@ impl Trial {
             .collect()
     }
 
-    /// Latest power spectrum that the device sent during full engagement.
+    /// Latest power spectrum that the device completed before the end of full engagement.
     pub fn spectrum_in_cut(&self) -> Option<&Spectrum> {
         let last = self.last_in_cut()?.sequence;
         self.spectra

@@ -1,5 +1,5 @@
-//! Client of the protocol: it sends one request at a time, repeats it until the reply arrives, and queues the events that the device
-//! sends without a request.
+//! Client of the protocol: it sends one request at a time, repeats it a few times if no reply arrives, and queues the
+//! events that the device sends without a request.
 
 use std::collections::VecDeque;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
@@ -59,7 +59,7 @@ impl Client {
     /// Connects to the device at `port` with the request hello.
     ///
     /// # Errors
-    /// No quietcut device of this protocol version answers.
+    /// The port fails, or no quietcut device of this protocol version answers.
     pub fn connect(port: Box<dyn Port>) -> Result<(Self, Info), DeviceError> {
         // Request numbers start at a new value: a device repeats its last reply for a number that it has just answered.
         let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
@@ -169,7 +169,7 @@ impl Client {
         self.command_within(request, name, REPLY)
     }
 
-    /// Sends a request to which the device replies `Done`, and waits at most `timeout` for each reply.
+    /// Sends a request to which the device replies `Done`, and waits at most `within` after each transmission.
     pub(super) fn command_within(
         &mut self,
         request: &Request,
@@ -197,7 +197,7 @@ impl Client {
         Ok(self.events.pop_front())
     }
 
-    /// Sends a request until its reply arrives; a refusal is an error.
+    /// Sends a request, at most [`ATTEMPTS`] times, until its reply arrives; a refusal is an error.
     pub(super) fn exchange(
         &mut self,
         request: &Request,
@@ -274,7 +274,8 @@ impl Client {
         }
     }
 
-    /// Reads the serial line for at most `timeout`, up to the first frame that concerns the request with this number.
+    /// Reads the serial line once, for at most `timeout`. Returns the frame that concerns the request with this number, if
+    /// one was completed.
     fn receive(&mut self, timeout: Duration, number: Option<u16>) -> Result<Option<ReplyFrame>, DeviceError> {
         // A buffer avoids one system call per byte; all bytes in it are decoded before the reply is returned.
         let mut bytes = [0; 256];

@@ -13,8 +13,9 @@ use crate::working_point::{Limits, Tool, WorkingPoint};
 /// `limits` are intersected with the limits of the table, if it has any. Without chatter the result is [`Action::Keep`].
 /// A point that is unstable in the table is never advised.
 ///
-/// Cost: at most one pass over the entries of the table for this cut, plus the interpolation of the columns at which stability
-/// changes. The search begins at the present speed, so most calls are far cheaper. Call it when an input changes, not for
+/// Cost: the search for a quiet speed passes over the entries of the table for this cut at most once, and begins at the
+/// present speed. If it finds none, the search for a smaller depth passes over the entries again. Both also interpolate
+/// columns of the table. Call it when an input changes, not for
 /// every block.
 pub fn advise(
     judgement: &Judgement,
@@ -90,8 +91,8 @@ struct Cut<'t> {
     at: WorkingPoint,
 }
 
-/// Pairs the lobe table with the working point as set or assumed; an error if the table has no layer for this working
-/// point.
+/// Pairs the lobe table with the working point as set or assumed; an error without a usable table for this tool and
+/// working point.
 fn cut_in_table<'t>(
     judgement: &Judgement,
     speed: Rpm,
@@ -121,7 +122,7 @@ fn cut_in_table<'t>(
 }
 
 /// The working point that advice assumes if none is set: that of the first layer of the lobe table, at the smallest
-/// depth with chatter of the detected kind, else with chatter of any kind.
+/// depth with chatter of the detected kind at the present speed, else with chatter of any kind.
 fn assumed_point(judgement: &Judgement, speed: Rpm, table: &LobeTable<'_>) -> Result<WorkingPoint, Obstacle> {
     let layer = table.layers().next().ok_or(Obstacle::Table(NotKnown::Damaged))?;
     let mut at = WorkingPoint {
@@ -178,7 +179,8 @@ fn by_table(cut: &Cut<'_>, speed: Rpm, range: (f32, f32), keep: Advice) -> Resul
     })
 }
 
-/// Advice from the tooth-passing rule, which skips the speeds that the lobe table calls unstable.
+/// Advice from the tooth-passing rule. Speeds outside the speed range, and speeds that the lobe table calls unstable for
+/// the cut, are skipped.
 fn by_rule(
     judgement: &Judgement,
     tool: &Tool,

@@ -10,9 +10,9 @@ use crate::lobes::{CutLobes, FEW, Interval};
 /// depths within the depth margin around it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Cell {
-    /// The cut is stable at every speed of the cell.
+    /// The cut is stable at every speed of the cell and all depths within the margin.
     Stable,
-    /// The cut is unstable at every speed of the cell.
+    /// The cut is unstable at every speed of the cell, at the depth or at an end of its margin.
     Unstable,
     /// The stability of the cut changes within the cell, or the entries at both ends of the cell do not decide it
     /// without interpolation.
@@ -23,7 +23,8 @@ pub(super) enum Cell {
 /// around it, in all layers of the table from which the cut is interpolated.
 #[derive(Clone, Copy)]
 pub(super) struct Node {
-    /// True if all depths within the margin around the depth of the cut are stable in all layers.
+    /// True if all depths within the margin around the depth of the cut lie within the table and are stable in all
+    /// layers.
     is_stable: bool,
     /// Whether the depths `(1 − DEPTH_MARGIN)·d`, `d` and `(1 + DEPTH_MARGIN)·d`, with the depth d of the cut, are
     /// unstable in every layer.
@@ -31,7 +32,7 @@ pub(super) struct Node {
 }
 
 impl Node {
-    /// Stability of the cut at the speed of the table with index `index` and the depth `depth_mm`. `depth_to_mm` is the
+    /// Stability of the cut at the speed of the table with index `speed_index` and the depth `depth_mm`. `depth_to_mm` is the
     /// largest depth of the table.
     ///
     /// `None` if the entries of the table alone do not decide the stability between this speed and the next one of the

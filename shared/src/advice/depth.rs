@@ -22,10 +22,11 @@ struct Candidate {
 
 impl QuietSpeedSearch<'_> {
     /// The largest quiet depth (stable with margin) up to the depth of the cut, and the spindle speed for it. That is
-    /// the present speed, unless the quiet depth of another speed is larger by the factor [`BETTER`].
+    /// the present speed, unless no depth is quiet there or the quiet depth of another speed is larger by the factor
+    /// [`BETTER`].
     ///
     /// The entries at the grid speeds give an upper bound of the quiet depth at every speed. For the speeds with the
-    /// largest bounds the quiet depth is computed exactly, until no bound exceeds the best quiet depth found.
+    /// largest bounds the quiet depth is computed from interpolated entries, until no bound exceeds the depth to beat.
     pub(super) fn largest_depth(&self, speed: Rpm) -> Option<(Rpm, Millimeters)> {
         let present_mm = self.largest_depth_mm(speed.0, 0.0);
         let mut best = present_mm.map(|depth_mm| (speed.0, depth_mm));
@@ -42,8 +43,8 @@ impl QuietSpeedSearch<'_> {
         best.map(|(rpm, depth_mm)| (Rpm(rpm), Millimeters(depth_mm)))
     }
 
-    /// The spindle speeds at which the upper bound of the quiet depth (stable with margin) exceeds `to_beat_mm`, in
-    /// descending order of the bound.
+    /// Spindle speeds at which the upper bound of the quiet depth (stable with margin) exceeds `to_beat_mm`, in
+    /// descending order of the bound: at most [`CANDIDATE_SPEEDS`], and only one of neighbouring speeds.
     fn candidates(&self, speed: Rpm, to_beat_mm: f32) -> Vec<Candidate, CANDIDATE_SPEEDS> {
         let mut candidates: Vec<Candidate, CANDIDATE_SPEEDS> = Vec::new();
         let (low_rpm, high_rpm) = self.known_rpm;
@@ -77,7 +78,7 @@ impl QuietSpeedSearch<'_> {
     }
 
     /// The next spindle speed at which the quiet depth (stable with margin) is bounded: the next speed of the lobe
-    /// table, or half a speed band further, whichever is nearer.
+    /// table, half of [`SPEED_BAND`] further, or `end_rpm`, whichever is nearest.
     fn next_point(&self, rpm: f32, end_rpm: f32) -> f32 {
         let (_, cell_end_rpm) = self.cell_at(Direction::Faster, rpm, end_rpm);
         f32::min(rpm * (1.0 + 0.5 * SPEED_BAND), cell_end_rpm)
@@ -92,8 +93,8 @@ impl QuietSpeedSearch<'_> {
         largest_possible_mm(&self.cut, indices, self.depth_mm, self.depth_to_mm)
     }
 
-    /// The largest quiet depth (stable with margin) in mm at a spindle speed, if it exceeds `at_least_mm`. All speeds
-    /// of the speed band around it are checked.
+    /// The largest quiet depth (stable with margin) in mm at a spindle speed, if it exceeds `at_least_mm`. The speed band
+    /// around the speed, within the machine's limits, is checked in steps; `None` if it leaves the lobe table.
     fn largest_depth_mm(&self, rpm: f32, at_least_mm: f32) -> Option<f32> {
         let (low_rpm, high_rpm) = self.known_rpm;
         let from_rpm = f32::max(rpm * (1.0 - SPEED_BAND), self.machine_rpm.0);
@@ -133,8 +134,9 @@ impl QuietSpeedSearch<'_> {
     }
 }
 
-/// Inserts a candidate speed in descending order of its bound of the quiet depth (stable with margin). Of candidates
-/// whose speeds lie within one speed band, only the best is kept.
+/// Inserts a candidate speed in descending order of its bound of the quiet depth (stable with margin). Of nearly equal
+/// bounds, that of the speed nearer to the present `speed` comes first. If a candidate within [`SPEED_BAND`] is in the
+/// list, the better of the two is kept.
 fn insert(candidates: &mut Vec<Candidate, CANDIDATE_SPEEDS>, new: Candidate, speed: Rpm) {
     let is_better = |a: &Candidate, b: &Candidate| {
         let is_nearer = ratio(Rpm(a.rpm), speed) < ratio(Rpm(b.rpm), speed);
@@ -156,7 +158,7 @@ fn insert(candidates: &mut Vec<Candidate, CANDIDATE_SPEEDS>, new: Candidate, spe
     if candidates.is_full() && place < candidates.len() {
         candidates.pop();
     }
-    // If the list of candidate speeds is full, the one with the smallest depth bound is dropped.
+    // If the list of candidate speeds is full, the last one in its order is dropped.
     let _ = candidates.insert(place, new);
 }
 
@@ -165,8 +167,8 @@ fn insert(candidates: &mut Vec<Candidate, CANDIDATE_SPEEDS>, new: Candidate, spe
 #[derive(Default)]
 struct Window {
     /// Pairs (spindle speed in rev/min, upper bound in mm of the quiet depth, which is stable with margin), ascending
-    /// in both. A bound is removed once a later bound is smaller. If the list is full, the newest bound is dropped: the
-    /// minimum is then too large, which is still an upper bound.
+    /// in both. A bound is removed once a later bound is not larger. If the list is full, the newest bound is dropped: the
+    /// minimum may then be larger, which is still an upper bound.
     bounds: Deque<(f32, f32), 32>,
 }
 

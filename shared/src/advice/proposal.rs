@@ -31,20 +31,21 @@ pub enum Source {
     ToothPassingRule,
 }
 
-/// The reason why advice does not come from a better source, such as the lobe table.
+/// The reason why advice does not come from a better source, such as the lobe table, or proposes no speed.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Obstacle {
     /// No lobe table is loaded.
     NoTable,
-    /// The lobe table has no entry for the present cut.
+    /// The lobe table cannot be used for the present cut: for example, it has no entry for it, or is damaged.
     Table(NotKnown),
-    /// The lobe table says that the present speed and depth are stable with margin, but the cut chatters: the table is
-    /// wrong here.
+    /// The lobe table says that the present cut is stable, but it chatters: the table is wrong here. Stable means with
+    /// margin at the set depth; without a working point, at every depth.
     Contradicted,
     /// The present spindle speed is not a positive number.
     Speed,
-    /// The lobe table has no depth that is stable with margin at any speed within the limits of the machine.
+    /// The search found no depth, up to that of the cut, that the lobe table calls stable with margin at a speed within
+    /// the limits of the machine.
     NothingStable,
     /// The chatter frequency is unknown; the tooth-passing rule requires it.
     ChatterFrequency,
@@ -61,13 +62,14 @@ pub struct Advice {
     pub action: Action,
     /// Advised spindle speed.
     pub speed: Rpm,
-    /// Advised axial depth. `None` if no working point is set, or if the tooth-passing rule, which has no depths, says to
-    /// reduce the depth.
+    /// Advised axial depth; the set depth if no other is advised. `None` if the tooth-passing rule, which has no depths,
+    /// says to reduce the depth. Without a working point `None`, unless the lobe table proposes a depth.
     pub depth: Option<Millimeters>,
     /// Source of the advice.
     pub source: Source,
-    /// The working point that the advice assumes because none is set; `None` if one is set.
+    /// The working point that the advice assumes because none is set; `None` if one is set or none was assumed.
     pub assumed: Option<WorkingPoint>,
-    /// The reason why the advice does not come from a better source; `None` if it comes from the best one.
+    /// The reason why the advice does not come from a better source, or proposes no speed; `None` without chatter, or if
+    /// the advice comes from the lobe table.
     pub obstacle: Option<Obstacle>,
 }

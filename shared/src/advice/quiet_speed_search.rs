@@ -87,7 +87,8 @@ impl<'t> QuietSpeedSearch<'t> {
     /// The first quiet speed (stable with margin) in this direction from `speed`, if its ratio to `speed` (the larger
     /// over the smaller) is below `limit`.
     ///
-    /// The search steps from cell to cell of the table. Only cells of mixed stability are interpolated.
+    /// The search steps from cell to cell of the table. It interpolates in cells of mixed stability, and at each speed that
+    /// it is about to return.
     fn walk(&self, direction: Direction, speed: Rpm, limit: f32) -> Option<Rpm> {
         let (low_rpm, high_rpm) = self.known_rpm;
         let end_rpm = match direction {
@@ -188,8 +189,8 @@ impl<'t> QuietSpeedSearch<'t> {
     }
 }
 
-/// A run of consecutive spindle speeds at which the cut is stable. A speed is quiet once the run covers the whole speed
-/// band around it.
+/// A run of consecutive spindle speeds at which the cut is stable. A speed is quiet once the run covers the speed
+/// band around it, within the machine's limits.
 struct Run<'q, 't> {
     quiet: &'q QuietSpeedSearch<'t>,
     direction: Direction,
@@ -225,7 +226,7 @@ impl Run<'_, '_> {
         (is_wide && is_known && self.quiet.is_stable(centre_rpm)).then_some(Rpm(centre_rpm))
     }
 
-    /// Checks the speeds of a cell of the lobe table, in which stability changes, one by one. Returns the quiet speed,
+    /// Checks speeds of a cell of the lobe table, in which stability may change, one by one. Returns the quiet speed,
     /// if one is reached in this cell.
     fn check_speeds(&mut self, from_rpm: f32, index: usize, cell_end_rpm: f32) -> Option<Rpm> {
         let mut rpm = from_rpm;
@@ -263,8 +264,8 @@ impl Run<'_, '_> {
         stable_rpm
     }
 
-    /// The speed whose speed band begins at the start of the run of stable speeds. It does not lie before the present
-    /// speed in the direction of the search.
+    /// The first speed that may be quiet: the speed whose speed band begins at the start of the run, or the start itself
+    /// if it is at a limit of the machine. It does not lie before the present speed in the direction of the search.
     fn centre_rpm(&self, start_rpm: f32) -> f32 {
         let machine_rpm = match self.direction {
             Direction::Faster => self.quiet.machine_rpm.0,
