@@ -9,7 +9,7 @@ use quietcut_simulate::SimulateError;
 /// The case or a recording cannot be diagnosed.
 #[derive(Debug, thiserror::Error)]
 pub enum DiagnoseError {
-    /// The case file cannot be used: an entry is missing or wrong.
+    /// The case file cannot be read or used; for example, an entry is missing or wrong.
     #[error(transparent)]
     Case(#[from] CaseError),
     /// A recording cannot be read or lacks a required channel.

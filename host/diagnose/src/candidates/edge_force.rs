@@ -18,7 +18,7 @@ pub(super) const EDGE_FORCE: Coefficients = Coefficients {
         ]
     },
     // Step of a finite difference with respect to an edge coefficient, N/mm: the tangential force per mm of axial depth at a chip thickness
-    // equal to the feed per tooth.
+    // equal to the feed per tooth, but at least 1e-3 N/mm.
     step: |cutter| {
         (1e3 * cutter.feed_per_tooth_m * cutter.force.material().ktc_mpa)
             .abs()

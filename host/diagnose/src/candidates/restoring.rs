@@ -21,10 +21,11 @@ pub(super) struct Restoring {
     pub(super) is_symmetric: bool,
     /// True if the diagnosis also tries this restoring force along all axes with the same coefficients.
     pub(super) everywhere: bool,
-    /// True if the diagnosis also tries this restoring force along all axes with separate coefficients, as in joints of one kind. Such a
-    /// force has no nonlinear parameters.
+    /// True if the diagnosis also tries this restoring force along all driven axes with separate coefficients, as in joints of one kind.
+    /// Such a force has no nonlinear parameters.
     pub(super) each: bool,
-    /// Start values of the restoring force's nonlinear parameters for one axis, from the displacement amplitudes along it in the study.
+    /// Start values of the restoring force's nonlinear parameters for one axis, from the records of the study: for example from the
+    /// displacement amplitudes along this axis.
     pub(super) nonlinear_grid: fn(&Study<'_>, usize) -> Vec<Vec<f64>>,
     /// Bounds of the nonlinear parameters.
     pub(super) bounds: fn(&Study<'_>, usize) -> Vec<[f64; 2]>,
@@ -60,7 +61,7 @@ pub(super) fn largest_m(study: &Study<'_>, axis: usize) -> f64 {
         .fold(0.0, f64::max)
 }
 
-/// The smallest RMS displacement along an axis of any record, m.
+/// The smallest nonzero RMS displacement along an axis in any record, m; infinite if no record has one.
 pub(super) fn smallest_m(study: &Study<'_>, axis: usize) -> f64 {
     study
         .records
@@ -155,7 +156,8 @@ impl Restoring {
         parts
     }
 
-    /// The force of coefficient number `index` with the value 1, along the motion of a record, or the reason why the structure has no such force.
+    /// The force along the motion of a record if coefficient number `index` is 1 and the others are 0, or the reason why the extension cannot
+    /// be applied to the structure.
     fn along(
         &self,
         study: &Study<'_>,

@@ -27,7 +27,8 @@ pub(super) fn channels(study: &Study<'_>) -> Vec<String> {
 }
 
 /// Locations of a sensor error (gain, delay, offset): each motion channel and, if there are several and a force is measured, all of them
-/// with one common value. Empty if the case already has this extension, or if there is neither a measured force nor a second channel.
+/// with one common value. Empty if the case already has this extension, if not all records are compared in the response domain, or if there
+/// is neither a measured force nor a second motion channel.
 pub(super) fn one_or_all(study: &Study<'_>, name: &str) -> Vec<Location> {
     if study.baseline.case.extensions.contains_key(name) {
         return Vec::new();
@@ -59,7 +60,7 @@ pub(super) fn is_at(location: &Location, channel: &Observed) -> bool {
 /// Reading of a channel from the estimated motion, with its spectrum multiplied by `change`(ω).
 ///
 /// The acceleration of a cut jumps when teeth enter and leave, and sampling folds much of it into the band. If a channel of the same
-/// quantity reads only this axis of a cut, its measured reading is used instead of the estimated motion.
+/// quantity, delay and filters reads this axis alone, its measured reading is used instead of the estimated motion.
 pub(super) fn read(
     record: &Record,
     channel: &Observed,

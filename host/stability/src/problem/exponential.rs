@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 
 /// Largest norm ‖At‖ for which the Taylor series of e^{At} is summed directly. Larger arguments are halved until they
-/// lie below it, and the result is squared as often. With 1/2 the truncation error of degree 16 is 2e-20.
+/// do not exceed it, and the result is squared as often. With 1/2 the truncation error of degree 16 is 2e-20.
 const RADIUS: f64 = 0.5;
 
 /// Square matrix A whose exponential e^{At} is computed by a Taylor polynomial of degree 16 with scaling and squaring.

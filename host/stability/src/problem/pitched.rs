@@ -12,8 +12,7 @@ use quietcut_model::case::Case;
 /// unequal pitch the period of the equation is the revolution, otherwise the tooth period.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Pitched {
-    /// Problem with the mean pitch. If pitches differ, only its structure and cutting process are used, not its tooth
-    /// period.
+    /// Problem with the mean pitch. If the period is the revolution, its tooth period is not used.
     pub(crate) problem: Problem,
     /// Angles between the teeth as in [`Tool::pitch_deg`](quietcut_model::milling::Tool), rad; `None` for equal pitch
     /// with the tooth period as period.
@@ -48,7 +47,8 @@ impl Pitched {
         self
     }
 
-    /// True if the pitches of the teeth are unequal, so that there are several delays.
+    /// True if the period of the equation is the revolution: for unequal pitch and, after `over_revolution`, for equal
+    /// pitch too.
     pub fn has_variable_pitch(&self) -> bool {
         self.pitch_rad.is_some()
     }

@@ -206,8 +206,9 @@ impl RevolutionMesh {
     }
 }
 
-/// All times at which the displacement may have a kink (at an entry or exit, or up to `generations` delays later), s,
-/// ascending, with both ends of the period.
+/// Times at which the displacement may have a kink (at an entry or exit, or up to `generations` delays later), s,
+/// ascending, with both ends of the period. A generation with which there would be more than `KINKS_MAX` times is left
+/// out, as are all later ones.
 fn kinks(passages: &ToothPassages, generations: u32) -> Vec<f64> {
     let mut all = passages.switches_s();
     let mut youngest = all.clone();
@@ -234,7 +235,8 @@ fn kinks(passages: &ToothPassages, generations: u32) -> Vec<f64> {
     all
 }
 
-/// Fewest Gauss nodes, from 4 to 40, that interpolate e^{iz} over a phase angle z to a tolerance. The error is z^m/m!
+/// Fewest Gauss nodes, but at least 4, that interpolate e^{iz} over a phase angle z to a tolerance; 40 if fewer do not
+/// reach it. The error is z^m/m!
 /// times the maximum (m!)²/(2m)! of the monic Legendre polynomial on [0, 1].
 fn nodes_for(angle: f64, tolerance: f64) -> usize {
     let mut error = 1.0;

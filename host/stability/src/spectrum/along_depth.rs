@@ -26,7 +26,8 @@ pub(crate) trait Spectrum {
     /// Floquet multiplier near a guess, with its derivative dμ/dw; a real guess gives a real multiplier.
     ///
     /// The guess must be correct to about 1e-4. The error of the result is about the square of that, plus the error of
-    /// the discretized equations. `None` if no multiplier is found.
+    /// the discretized equations. `None` if no multiplier is found within 5 % of |guess|, or if
+    /// `sensitivity` has no derivative for it.
     fn root_near(&mut self, guess: Complex64, depth_m: f64) -> Option<Root> {
         let multiplier = self.multiplier_near(guess, depth_m, 0.05 * guess.norm())?;
         let slope = self.sensitivity(multiplier, depth_m)?;

@@ -25,7 +25,8 @@ impl Root {
     }
 
     /// Removes from `free`, the multipliers one step deeper, the one on the same branch as this multiplier, and returns
-    /// it. Both must be real of equal sign or both complex, and the tangents from both ends must meet half way to
+    /// it. It is the one whose tangent comes closest to that of this multiplier half way. Both must be real of equal sign
+    /// or both complex, and the tangents from both ends must meet half way to
     /// within a quarter of the distance travelled. `None` if there is no such multiplier.
     pub(crate) fn take_next(&self, free: &mut Vec<Self>, step_m: f64) -> Option<Self> {
         let middle = self.multiplier + self.slope * (0.5 * step_m);

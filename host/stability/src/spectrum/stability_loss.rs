@@ -17,7 +17,7 @@ pub enum StabilityLoss {
 }
 
 impl StabilityLoss {
-    /// Kind of stability loss from sign and imaginary part of a multiplier. A real multiplier must have an imaginary
+    /// Kind of stability loss from the imaginary part of a multiplier and the sign of its real part. A real multiplier must have an imaginary
     /// part of exactly 0.
     pub fn of(multiplier: Complex64) -> Self {
         if multiplier.im != 0.0 {
