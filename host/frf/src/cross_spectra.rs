@@ -118,7 +118,7 @@ pub(super) fn averaged(
 }
 
 /// Cross-spectra of whole `signals`, averaged over `width` neighbouring frequency lines. The fraction `taper` of each signal is tapered at
-/// both ends.
+/// each end.
 pub(super) fn smoothed(
     signals: &[&[f64]],
     sample_rate_hz: f64,
@@ -162,7 +162,7 @@ pub(super) fn smoothed(
     }
 }
 
-/// Tukey window: 1 in the middle, half-cosine tapers over the fraction `taper` of the length at both ends.
+/// Tukey window: 1 in the middle, half-cosine tapers over the fraction `taper` of the length at each end.
 fn tukey(length: usize, taper: f64) -> Vec<f64> {
     let ramp = (taper * length as f64).max(1.0);
     (0..length)

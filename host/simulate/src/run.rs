@@ -10,11 +10,12 @@ use super::workpiece_traverse::WorkpieceTraverse;
 impl Model {
     /// Integrates from rest at t = 0 to `end_s`, s; `observe` receives every integration step in the order of time.
     ///
-    /// The local error is controlled (see [`Settings`]). Steps end exactly where a tooth enters or leaves the arc, loses or regains contact,
-    /// and where the surface in front of a tooth has a kink from one of these events.
+    /// The local error is controlled (see [`Settings`]). Steps end where the right-hand side is not smooth: for example where a tooth enters
+    /// or leaves the arc, loses or regains contact, meets a kink of the surface from one of these events, or where friction begins to stick.
     ///
     /// # Errors
-    /// The motion diverges, a tooth can neither keep nor lose contact, or the tool diameter is required and missing.
+    /// The motion diverges, the integration takes too many steps, a tooth can neither keep nor lose contact, no regime of the restoring forces
+    /// is consistent, or the tool diameter is required and missing.
     pub fn run(
         &self,
         end_s: f64,

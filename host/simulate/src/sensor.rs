@@ -26,7 +26,7 @@ const TAPS_PER_SIDE: usize = 32;
 /// the structure with [`Sampler::at_sensor`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Accelerometer {
-    /// Full scale of the accelerometer, g, at ±32 768 counts.
+    /// Full scale of the accelerometer, g, at about ±32 768 counts.
     pub range_g: f64,
     /// Amplitude spectral density of the white noise of each axis, g/√Hz.
     pub noise_g_per_root_hertz: f64,
@@ -38,7 +38,7 @@ pub struct Accelerometer {
     pub stamp_jitter_s: f64,
 }
 
-/// A tachometer wheel on the spindle. Its first edge after the gap, or its only edge, is at the spindle angle 0.
+/// A tachometer wheel on the spindle. An edge, the first one after the gap if there is a gap, is at the spindle angle 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TachometerModel {
     /// Number of positions on the tachometer wheel, and number of missing ones, which form the gap.
@@ -90,7 +90,7 @@ pub struct Sampler {
     delay_s: f64,
     filter: [f64; 2 * TAPS_PER_SIDE + 1],
     workspace: Workspace,
-    /// Number of tool velocities evaluated so far. Velocity k belongs to the time (k − ½) intervals of the oversampled rate.
+    /// Number of tool velocities evaluated so far. Velocity k belongs to the time (k − ½)·`step_s` − `delay_s`.
     taken: usize,
     velocity: [f64; 3],
     /// Dynamics in front of the sensor; they act on the velocity.
@@ -145,7 +145,7 @@ impl Sampler {
         (TAPS_PER_SIDE + 1) as f64 * self.step_s
     }
 
-    /// Takes the acceleration samples that lie in the newest integration step.
+    /// Takes the velocities that lie in the newest integration step, and the acceleration samples that follow from them.
     pub fn observe(&mut self, step: &DenseStep<'_>) {
         loop {
             let t = (self.taken as f64 - 0.5) * self.step_s - self.delay_s;
@@ -197,7 +197,8 @@ impl Sampler {
         self.taken += 1;
     }
 
-    /// The samples so far without noise, m/s²; sample k belongs to the time k divided by the true sampling rate.
+    /// The samples so far without noise, m/s²; sample k belongs to the time k divided by the true sampling rate, minus the
+    /// delay.
     pub fn samples(&self) -> &[[f64; 3]] {
         &self.samples
     }

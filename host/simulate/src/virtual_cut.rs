@@ -29,13 +29,13 @@ pub struct VirtualCut {
     pub seconds: f64,
     /// Entry of the tool into the workpiece, and its exit.
     pub entry: Entry,
-    /// Duration of air cutting before and after the cut, s.
+    /// Duration of air cutting before and after the cut, s; not used with [`Entry::None`].
     pub air_s: f64,
     /// Pores of the workpiece material; `None` for solid material.
     pub pores: Option<Pores>,
-    /// Effects that are added to the case or replace those of its extensions.
+    /// Effects that act after those of the extensions of the case.
     pub effects: Effects,
-    /// Quantities that are recorded besides the tachometer, each in every direction of the structure.
+    /// Quantities that are recorded besides the tachometer, each along those of x, y and z that the structure has.
     pub measured: Vec<Quantity>,
 }
 
@@ -101,7 +101,7 @@ pub enum VirtualCutError {
         seconds: f64,
         /// Duration of air cutting before and after the cut, s.
         air_s: f64,
-        /// Shortest possible duration, s.
+        /// Duration that the virtual cut must exceed, s.
         needed_s: f64,
     },
 }
@@ -136,8 +136,8 @@ impl VirtualCut {
     /// The equation of motion of this cut of `case`.
     ///
     /// # Errors
-    /// The case lacks a section or has an extension that cannot be simulated, the duration is too short, or the tool diameter is required and
-    /// missing.
+    /// The case lacks a section or has an extension that cannot be simulated, the duration is too short, wear makes the cutting force
+    /// negative, or the tool diameter is required and missing.
     pub fn model(&self, case: &Case) -> Result<Model, VirtualCutError> {
         let effects = Effects::of_case(case)?.and(&self.effects);
         let mean_rpm = self.spindle_motion().speed_rad_per_s() * 60.0 / TAU;

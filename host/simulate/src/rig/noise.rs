@@ -11,8 +11,8 @@ use quietcut_recording::{Quantity, Recording};
 /// Standard deviation of the white noise of each channel.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Noise {
-    /// Standard deviation divided by the channel's root mean square, for channels not listed in `absolute`. A tachometer level gets no
-    /// noise.
+    /// Standard deviation divided by the channel's root mean square, for channels not listed in `absolute`. Those with a tachometer
+    /// level get no noise.
     pub relative: f64,
     /// Standard deviation by channel name, in the SI unit of the channel.
     pub absolute: BTreeMap<String, f64>,
