@@ -27,7 +27,7 @@ pub(crate) const SAME_LEVEL: f64 = 0.05;
 /// Ratio of two force amplitudes above which they are different levels of a test, so that cubic terms of joints are fitted. Unfounded.
 pub(crate) const DIFFERENT_LEVELS: f64 = 1.2;
 
-/// Difference of a joint angle up to which two recordings are at the same posture, degrees. Postures stand in sidecars as they were
+/// Difference of a joint angle below which two recordings are at the same posture, degrees. Postures stand in sidecars as they were
 /// commanded, so that only their rounding differs.
 pub(crate) const SAME_POSTURE_DEG: f64 = 1e-3;
 

@@ -56,7 +56,7 @@ impl Range {
         }
     }
 
-    /// Parses `first:last:count`, a range of numbers greater than 0.
+    /// Parses a range of numbers greater than 0, in any of its written forms.
     pub fn positive(text: &str) -> Result<Self, String> {
         let range: Self = text.parse()?;
         if range.first > 0.0 && range.last > 0.0 {
@@ -70,7 +70,7 @@ impl Range {
 }
 
 impl Range {
-    /// Parses `first:last:count`, a range of numbers of 0 or more, not all 0.
+    /// Parses a range of numbers of 0 or more, not all 0, in any of its written forms.
     pub fn non_negative(text: &str) -> Result<Self, String> {
         let range: Self = text.parse()?;
         if range.first >= 0.0 && range.last >= 0.0 && range.first.max(range.last) > 0.0 {

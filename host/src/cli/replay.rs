@@ -128,7 +128,7 @@ fn on_host(args: &Args, sensed: &Sensed, table: Option<&[u8]>) -> Result<Verdict
 }
 
 /// Runs the signal chain of a device on a recording. Afterwards it restores the settings of the device and returns it
-/// to its own sensor.
+/// to its own sensor; an uploaded lobe table stays.
 fn on_device(args: &Args, port: &str, sensed: &Sensed, table: Option<&[u8]>) -> Result<VerdictLog, Error> {
     let (mut client, _) = Client::connect(device::open(port, None)?)?;
     if let (Some(bytes), Some(path)) = (table, &args.table) {
@@ -142,7 +142,7 @@ fn on_device(args: &Args, port: &str, sensed: &Sensed, table: Option<&[u8]>) -> 
         .transpose()?;
     let log = feed_recording(args, &mut client, sensed);
     // The settings of the device are restored even if sending the recording to it failed; the error of sending is
-    // reported first.
+    // then the one reported.
     let restored = client
         .subscribe(Subscription::default())
         .and_then(|()| client.set_working_point(status.working_point))

@@ -224,7 +224,8 @@ struct Question {
 }
 
 impl Given {
-    /// These answers of the user; each that is missing here is taken from `other`.
+    /// These answers of the user; each that is missing here is taken from `other`. Material and immersion are not mixed:
+    /// `other` gives them only if these answers have none.
     fn or(self, other: Self) -> Self {
         let has_material = self.material.is_some() || self.ktc_mpa.is_some();
         let has_cut = self.down_milling_mm.is_some() || self.up_milling_mm.is_some() || self.slot;
@@ -328,7 +329,7 @@ impl Given {
             .collect()
     }
 
-    /// Asks the user one question on the terminal until the answer is valid.
+    /// Asks the user one question on the terminal until the answer is valid; an error if the input ends.
     fn ask(&mut self, question: &Question) -> Result<(), Error> {
         loop {
             eprint!("{}: ", question.question);

@@ -35,7 +35,7 @@ pub enum DeviceError {
         /// Name of the port.
         port: String,
     },
-    /// The line accepts no bytes.
+    /// Sending or receiving on the open line failed, or took too long.
     #[error("{port}: cannot send to the device: {cause}")]
     Line {
         /// Name of the port.

@@ -16,7 +16,7 @@ pub trait Port: Send {
     /// Name of the port for messages.
     fn name(&self) -> &str;
 
-    /// Sends all bytes within `timeout`.
+    /// Sends all bytes; an error if the line accepts none for `timeout`.
     fn send(&mut self, bytes: &[u8], timeout: Duration) -> Result<(), DeviceError>;
 
     /// Reads available bytes, waiting at most `timeout` for the first one; returns their number, 0 if none arrived.

@@ -53,7 +53,7 @@ impl SimulatedDevice {
     /// Starts a device whose virtual spindle plays the received cuts.
     ///
     /// # Errors
-    /// No pseudo-terminal is free, the state file cannot be used, or the number of teeth is too large.
+    /// No pseudo-terminal is free, the state file cannot be used, or the signal chain refuses the number of teeth.
     pub fn start(setup: Setup<'_>, cuts: Receiver<SensedCut>) -> Result<Self, DeviceError> {
         let terminal = PseudoTerminal::new()?;
         let flash = match setup.state {
@@ -149,8 +149,8 @@ struct Machine {
     stop: Arc<AtomicBool>,
 }
 
-/// Clock of the simulated device: the time of its samples if they are faster than real time, else the clock of this
-/// computer.
+/// Clock of the simulated device: the time of its newest sample block at [`Pace::AsFastAsPossible`], else the time since
+/// the start of the device.
 #[derive(Clone)]
 struct SharedClock(Arc<AtomicU64>);
 
@@ -160,7 +160,7 @@ impl Clock for SharedClock {
     }
 }
 
-/// Longest wait of the simulated device for bytes of the host while the virtual spindle stands still: a choice.
+/// Longest wait of the simulated device for the serial line while no block of samples is due: a choice.
 const IDLE: Duration = Duration::from_millis(5);
 
 impl Machine {

@@ -23,10 +23,10 @@ pub struct Uploaded {
 impl Client {
     /// Sends the table and activates it on the device. The device keeps its old table until the new one is complete and checked.
     ///
-    /// After each chunk `progress` gets the number of received bytes and the total number of bytes.
+    /// At the start and after each chunk `progress` gets the number of received bytes and the total number of bytes.
     ///
     /// # Errors
-    /// The device does not answer, refuses the table, or restarts repeatedly.
+    /// For example: the table is invalid, or the device does not answer, refuses the table, or restarts repeatedly.
     pub fn upload(
         &mut self,
         table: &LobeTable<'_>,

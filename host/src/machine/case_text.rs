@@ -67,7 +67,7 @@ pub enum MaterialAnswer {
 pub struct Answers {
     /// Name of the machine and job.
     pub name: String,
-    /// Comments that stand at the head of the case file: machine, holder, sensor, each as the user wrote it.
+    /// Comments that stand at the head of the case file: machine, holder, sensor, each as the user wrote it but on one line.
     pub notes: Vec<(&'static str, String)>,
     /// Number of teeth.
     pub teeth: u8,
@@ -87,7 +87,7 @@ pub struct Answers {
     pub power_w: Option<f64>,
 }
 
-/// Text of a case file from the answers of the user, with a comment for each section. It has no structure: `identify`
+/// Text of a case file from the answers of the user, with comments. It has no structure: `identify`
 /// adds that from tap tests.
 pub fn case_text(answers: &Answers) -> String {
     let mut text = String::new();
@@ -182,7 +182,7 @@ fn write_material(text: &mut String, answers: &Answers) -> std::fmt::Result {
     Ok(())
 }
 
-/// A number as text of a TOML file, rounded to twelve digits so that no rounding error shows.
+/// A number as text of a TOML file, rounded to 13 significant digits so that no rounding error shows.
 fn float(value: f64) -> String {
     let rounded: f64 = format!("{value:.12e}").parse().unwrap_or(value);
     format!("{rounded:?}")

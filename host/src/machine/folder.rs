@@ -1,4 +1,5 @@
-//! Files of one machine: `case.toml`, `taps/`, `frf/`, `cuts/`, `tried.csv`, `table.qct`, `diagnosis/`, each with its age.
+//! Files of one machine: `case.toml`, `taps/`, `frf/`, `cuts/`, `tried.csv`, `lobes.html`, `table.qct`, `diagnosis/`, each with the
+//! time of its last change.
 
 use std::fs;
 use std::io;

@@ -182,7 +182,8 @@ fn is_newer(file: &Option<DatedFile>, than: SystemTime) -> bool {
     file.as_ref().is_some_and(|file| file.changed >= than)
 }
 
-/// Options of the proposed chart: the speed range of the spindle, and depths up to one tool diameter.
+/// Options of the proposed chart: the speed range of the spindle, else that of the lobes; depths up to one tool diameter,
+/// else up to [`DEEPEST_MM`].
 fn ranges(folder: &MachineFolder) -> String {
     let case = folder.case.as_ref().map(|(_, case)| case);
     let speeds = case.and_then(|case| {

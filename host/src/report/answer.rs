@@ -34,7 +34,7 @@ pub struct AdviceAnswer {
     pub action: &'static str,
     /// Advised spindle speed, rev/min.
     pub rpm: f64,
-    /// Advised axial depth, mm; `None` if no working point is set.
+    /// Advised axial depth, mm; `None` if the advice states no depth, for example without a working point.
     pub depth_mm: Option<f64>,
     /// Key of the source of the advice, see [`words::source_key`].
     pub source: &'static str,

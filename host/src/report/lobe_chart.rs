@@ -32,10 +32,11 @@ pub struct Column {
     /// Undecided depths, mm, as ascending intervals in which the modulus of the dominant Floquet multiplier is 1 within
     /// the error of the method.
     pub undecided_mm: Vec<(f64, f64)>,
-    /// First stability limit at this speed; `None` if all depths up to the largest computed one are stable.
+    /// First stability limit at this speed; `None` if none was found up to the largest computed depth.
     pub first_limit: Option<FirstLimit>,
-    /// 5, 50 and 95 % percentiles of the first stability limit at this speed, mm. An entry is `None` if the percentile
-    /// is deeper than the largest computed depth. `None` in all if the case has no standard deviations.
+    /// 5, 50 and 95 % percentiles of the first stability limit at this speed, mm; for an extended case the ends of its 90 %
+    /// interval with the limit between them. An entry is `None` if it is deeper than the largest computed depth. `None`
+    /// in all if no spread of the limit is computed.
     pub percentiles_mm: Option<[Option<f64>; 3]>,
 }
 

@@ -104,7 +104,8 @@ pub(super) fn draw_marks(
     Ok(())
 }
 
-/// Draws a label near the pixel `at` where it does not cover another label: above, below, then farther away.
+/// Draws a label near the pixel `at`: above, below, then farther away, at the first place where it covers no mark and no
+/// other label; above if there is no such place.
 fn draw_label(
     canvas: &Canvas<'_>,
     at: (i32, i32),
@@ -145,7 +146,7 @@ fn draw_label(
     Ok(())
 }
 
-/// Draws an arrow between two pixels that ends 12 pixels before its target.
+/// Draws an arrow between two pixels with a gap of 12 pixels at both ends; draws nothing if they are too close.
 fn draw_arrow(canvas: &Canvas<'_>, from: (i32, i32), to: (i32, i32)) -> Result<(), PictureError> {
     const GAP: f64 = 12.0;
     const HEAD: f64 = 11.0;

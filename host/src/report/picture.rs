@@ -144,7 +144,8 @@ fn tick(value: &f64) -> String {
     }
 }
 
-/// Range of an axis: all finite values plus a margin of 6 % at both ends; −1 to 1 if there are none.
+/// Range of an axis: all finite values plus a margin of 6 % of their range at both ends. For equal values the
+/// margin is half the value; without values the range is −1 to 1.
 pub(super) fn span(values: impl Iterator<Item = f64>) -> std::ops::Range<f64> {
     let (low, high) = values
         .filter(|value| value.is_finite())

@@ -137,8 +137,8 @@ fn spectra(view: &ResidualView, points: usize, last_hz: f64, scale: f64) -> Vec<
             role,
         })
         .collect();
-    // White noise with standard deviation σ in a record of n samples has the expected amplitude 2σ/√n at each frequency
-    // line.
+    // White noise with standard deviation σ in a record of n samples has the root-mean-square amplitude 2σ/√n at each
+    // frequency line.
     let noise = 2.0 * view.deviation / (view.measured.len().max(1) as f64).sqrt();
     if let (Some(&(first, _)), Some(&(last, _))) = (lines[0].points.first(), lines[0].points.last())
         && noise > 0.0
