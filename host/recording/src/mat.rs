@@ -3,10 +3,11 @@
 //! The longer dimension of a matrix is time: the columns of an N × 3 matrix are channels, and the rows of a 3 × N matrix. The columns of a
 //! square matrix are channels. [`records`] finds the records in the variables.
 //!
-//! Format: MathWorks, "MAT-File Format", level 5. Objects, complex, logical and sparse arrays are skipped. Level 7.3 (HDF5) is an error.
+//! Format: MathWorks, "MAT-File Format", level 5. Objects, complex, logical and sparse arrays, and arrays of more than two
+//! dimensions are skipped. Level 7.3 (HDF5) is an error.
 //!
 //! The file is read in chunks and its values are stored only once. The length of the file bounds the allocated memory, whatever sizes its
-//! headers state.
+//! headers state; 64 MiB of values are allowed for any file.
 
 mod records;
 mod source;
@@ -39,8 +40,9 @@ const VALUES_MIN: u64 = 64 << 20;
 /// numbers need a factor of 8, and measured channels compress by a factor below 20: together 160.
 const VALUES_PER_BYTE: u64 = 200;
 
-/// Number of values of a MAT-file for which memory is reserved before they are read, even if the file is shorter. A
-/// choice; it bounds the cost of a header with a false size.
+/// Number of values of a variable for which memory is reserved before they are read, at most, in a MAT-file of fewer
+/// bytes than this; in a longer file it is the length in bytes. A choice; it bounds the cost of a header with a false
+/// size.
 const TRUSTED: u64 = 1 << 16;
 
 /// Code of the data type of a compressed element in a MAT-file (miCOMPRESSED).
@@ -49,12 +51,12 @@ const COMPRESSED: u32 = 15;
 /// Code of the data type of a matrix element in a MAT-file (miMATRIX).
 const MATRIX: u32 = 14;
 
-/// Largest depth to which structures within structures of a MAT-file are read. A choice; recordings have one or two
+/// Largest number of levels of nested structures and cells of a MAT-file that are read. A choice; recordings have one or two
 /// levels.
 const DEPTH_MAX: usize = 6;
 
-/// Largest total number of elements of all structures and cells of a MAT-file. A choice; a record in a structure array
-/// has a few.
+/// Largest total number of field values of all structures and elements of all cells of a MAT-file. A choice; a record in
+/// a structure array has a few fields.
 const ELEMENTS_MAX: usize = 100_000;
 
 /// Reads the records of a MAT-file: one from its vectors and matrices, or one from each of its structures.
@@ -73,7 +75,7 @@ pub(super) fn read(path: &Path) -> Result<Vec<Raw>, RecordingError> {
     records::records(items).map_err(content)
 }
 
-/// Reads all variables of a MAT-file of `length` bytes.
+/// Reads all variables of the supported classes of a MAT-file of `length` bytes.
 fn items(reader: &mut dyn BufRead, length: u64) -> Result<Vec<Item>, String> {
     let mut header = Vec::with_capacity(HEADER);
     reader
@@ -127,7 +129,7 @@ struct ValueMemory {
     file: u64,
     /// Memory that values of the MAT-file may still take, bytes.
     bytes: u64,
-    /// Number of elements of structures and cells of the MAT-file that may still be read.
+    /// Number of field values of structures and elements of cells of the MAT-file that may still be read.
     elements: usize,
 }
 
@@ -146,7 +148,7 @@ impl ValueMemory {
         Ok(())
     }
 
-    /// Counts `count` more elements of structure or cell `name`; an error if the MAT-file has more than
+    /// Counts `count` more field values of structure `name`, or elements of cell `name`; an error if the MAT-file has more than
     /// [`ELEMENTS_MAX`].
     fn take_elements(&mut self, name: &str, count: usize) -> Result<(), String> {
         self.elements = self.elements.checked_sub(count).ok_or_else(|| {
@@ -155,15 +157,15 @@ impl ValueMemory {
         Ok(())
     }
 
-    /// Number of samples per channel for which memory is reserved before the samples of a variable with `channels`
+    /// Largest number of samples per channel for which memory is reserved before the samples of a variable with `channels`
     /// channels are read.
     fn trusted(&self, channels: usize) -> usize {
         usize::try_from(self.file.max(TRUSTED) / channels.max(1) as u64 + 1).unwrap_or(usize::MAX)
     }
 }
 
-/// Decompresses an element of `length` bytes and reads the matrix in it; `None` if it holds no matrix of a supported
-/// class.
+/// Decompresses an element of `length` bytes and reads the matrix in it; `None` if it holds no matrix that is
+/// read.
 fn inflated(source: &mut Source<'_>, length: u64, memory: &mut ValueMemory) -> Result<Option<Item>, String> {
     if length > source.available {
         return Err(source.cut_off(length));
@@ -190,8 +192,8 @@ fn inflated(source: &mut Source<'_>, length: u64, memory: &mut ValueMemory) -> R
     Ok(found)
 }
 
-/// Reads the data of a matrix element `depth` levels inside others; `None` unless it holds a real matrix of two
-/// dimensions, text, a structure or a cell.
+/// Reads the data of a matrix element `depth` levels inside others; `None` unless it holds a real matrix, a text of
+/// at most [`SMALL_MAX`] bytes, or a structure or cell above the depth [`DEPTH_MAX`], with two dimensions.
 fn matrix(source: &mut Source<'_>, memory: &mut ValueMemory, depth: usize) -> Result<Option<Item>, String> {
     // An empty field of a MAT structure is stored as an element without any content.
     if source.available == 0 {

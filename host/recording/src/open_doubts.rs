@@ -7,7 +7,7 @@ use super::raw::RawColumn;
 use super::understood::Basis;
 
 /// First letter of the standard names of channels of a quantity: `f` force, `v` velocity, `a` acceleration, none for
-/// displacement.
+/// displacement and all other quantities.
 pub(super) fn prefix(quantity: Quantity) -> &'static str {
     match quantity {
         Quantity::Force => "f",
@@ -17,7 +17,8 @@ pub(super) fn prefix(quantity: Quantity) -> &'static str {
     }
 }
 
-/// A column of a recorded file whose direction, unit or sensitivity the file does not state.
+/// A column of a recorded file whose channel is in doubt: the file does not state its direction, sign, unit or
+/// sensitivity, or another column is the same channel.
 pub(super) struct Open {
     pub(super) column: String,
     pub(super) quantity: Quantity,
@@ -25,7 +26,7 @@ pub(super) struct Open {
     pub(super) is_negative: bool,
     /// Quantity of the stated unit.
     pub(super) stated: Quantity,
-    /// True if the words of another column name the same channel.
+    /// True if an earlier column already is the channel that the words of this column name.
     pub(super) is_twice: bool,
 }
 
@@ -36,7 +37,8 @@ pub(super) struct Doubts {
 }
 
 impl Doubts {
-    /// Adds each column whose words name a channel that an earlier column already is.
+    /// Adds each column, not yet in doubt, whose words name a channel that an earlier column already is; time is no such
+    /// channel.
     pub(super) fn twice(&mut self, columns: &[RawColumn], meanings: &[Meaning]) {
         for (index, meaning) in meanings.iter().enumerate() {
             let is_open = self.open.iter().any(|open| open.column == columns[index].name);
@@ -54,7 +56,7 @@ impl Doubts {
         }
     }
 
-    /// The columns in doubt, each with a proposed channel name and unit; each direction is proposed only once.
+    /// The columns in doubt, each with a proposed channel name and unit; each name is proposed only once.
     pub(super) fn suggested(&self, meanings: &[Meaning]) -> Vec<Doubt> {
         let mut taken: Vec<String> = meanings.iter().map(|meaning| meaning.name.clone()).collect();
         let mut doubts = Vec::new();

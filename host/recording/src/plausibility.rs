@@ -56,8 +56,8 @@ fn peak(channel: &Channel) -> Option<String> {
 /// Warning if the time derivative of order `order` of motion `lower` agrees with motion `upper` except for a unit
 /// factor such as 9.81 or 1000.
 ///
-/// Differences over 2m samples of `lower` equal weighted sums of `upper` exactly, whatever the signal: for order 2,
-/// x(t+T) − 2x(t) + x(t−T) = ∫ (T − |s|) a(t+s) ds. The longer T, the less the noise of `lower` is amplified; the T
+/// Differences of `lower` over 2T equal weighted integrals of `upper` exactly, whatever the signal: for order 2,
+/// x(t+T) − 2x(t) + x(t−T) = ∫ (T − |s|) a(t+s) ds. Sums over the samples approximate the integrals. The longer T, the less the noise of `lower` is amplified; the T
 /// with the best correlation counts.
 fn contradiction(lower: &Channel, order: u32, upper: &Channel, rate_hz: f64) -> Option<String> {
     let mut best: Option<(f64, f64)> = None;
@@ -91,7 +91,7 @@ fn contradiction(lower: &Channel, order: u32, upper: &Channel, rate_hz: f64) -> 
 }
 
 /// Correlation and amplitude ratio between differences of `lower` over 2·`half` samples and the weighted sums of
-/// `upper` that equal them.
+/// `upper` that approximate them; `None` for up to 8 differences or a constant signal.
 fn compared(lower: &[f64], order: u32, upper: &[f64], half: usize, rate_hz: f64) -> Option<(f64, f64)> {
     let count = lower.len().min(upper.len());
     let step = 1.0 / rate_hz;

@@ -60,7 +60,7 @@ impl Recording {
     /// The segment of the recording with the samples whose indices are in `range`, with its own start times.
     ///
     /// # Panics
-    /// The recording has fewer samples than `range` requires.
+    /// The recording has fewer samples than `range` requires, or `range` starts after its end.
     #[must_use]
     pub fn part(&self, range: Range<usize>) -> Self {
         let channels = self.channels.iter().map(|channel| Channel {

@@ -18,7 +18,11 @@ impl Segment {
         self.from_s.is_none() && self.until_s.is_none()
     }
 
-    /// Cuts the segment out of `recording`; a NaN or infinite sample in the segment is an error.
+    /// Cuts the segment out of `recording`.
+    ///
+    /// # Errors
+    /// A given start or end leaves fewer than two samples; the channels differ in length; or the segment has a NaN or
+    /// infinite sample.
     pub(super) fn of(self, recording: Recording) -> Result<Recording, RecordingError> {
         let (count, rate) = (recording.len(), recording.sample_rate_hz);
         let content = |what: String| RecordingError::Content {

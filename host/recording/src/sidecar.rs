@@ -32,13 +32,13 @@ pub enum TestKind {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Sidecar {
-    /// TestKind of test.
+    /// Kind of the recorded test.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub kind: Option<TestKind>,
     /// Names of the channels that hold the input force (excitation); `None` means all force channels.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub input: Option<Vec<String>>,
-    /// Sample rate, samples per second; required if the file has neither a time column nor a rate of its own.
+    /// Sample rate, samples per second; required if neither the file nor an option states it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sample_rate_hz: Option<f64>,
     /// Parameters of the recorded cut.
@@ -143,7 +143,8 @@ impl Sidecar {
     /// Reads the sidecar of `recording`; the default (empty) sidecar if the file does not exist.
     ///
     /// # Errors
-    /// The file exists but cannot be read, has an unknown key, or a value out of bounds.
+    /// The file exists but cannot be read, is a case, is no valid TOML, has an unknown key, or has a value of a wrong type
+    /// or out of bounds.
     pub fn beside(recording: &Path) -> Result<Self, RecordingError> {
         let path = Self::path_of(recording);
         if !path.exists() {
@@ -171,8 +172,8 @@ impl Sidecar {
         Ok(sidecar)
     }
 
-    /// Checks the bounds of all values in a sidecar: positive rate, speed and teeth, non-negative depth and feed,
-    /// ascending angles, possible tachometer wheels.
+    /// Checks the bounds of the numbers in a sidecar: positive rate, speed and teeth, non-negative depth and feed,
+    /// ascending entry and exit angle within a revolution, finite joint angles, possible tachometer wheels.
     fn check(&self, path: &Path) -> Result<(), RecordingError> {
         let cut = self.cut.unwrap_or_default();
         let positive = [
@@ -264,7 +265,7 @@ impl Sidecar {
     /// Writes these values as the sidecar file beside `recording`.
     ///
     /// # Errors
-    /// The file cannot be written.
+    /// The values cannot be written as TOML, or the file cannot be written.
     pub fn write_beside(&self, recording: &Path) -> Result<(), RecordingError> {
         let text = self.text(recording)?;
         Ok(crate::file::write(&Self::path_of(recording), text.as_bytes())?)
@@ -273,7 +274,7 @@ impl Sidecar {
     /// Writes the sidecar of `recording` to a temporary file, not yet under its final name.
     ///
     /// # Errors
-    /// The file cannot be written.
+    /// The values cannot be written as TOML, or the file cannot be written.
     pub(super) fn prepared_beside(&self, recording: &Path) -> Result<Prepared, RecordingError> {
         let path = Self::path_of(recording);
         let text = self.text(recording)?;

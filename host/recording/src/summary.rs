@@ -25,11 +25,13 @@ pub struct ChannelSummary {
     pub rms: f64,
     /// Mean (DC component).
     pub mean: f64,
-    /// Number of clipped samples of the channel: those in runs of equal samples at its largest or smallest value.
+    /// Number of clipped samples of the channel: those in runs of equal samples at its largest or smallest value, if this
+    /// is far from the median; 0 for a constant channel or a tachometer.
     pub clipped: usize,
     /// True if all samples of the channel are equal.
     pub constant: bool,
-    /// Dropouts of the channel: runs of equal samples although it changes otherwise, each with start and end in s.
+    /// Dropouts of the channel: long runs of equal samples between its extremes although it changes otherwise, each with
+    /// start and excluded end in s.
     pub dropouts_s: Vec<[f64; 2]>,
 }
 

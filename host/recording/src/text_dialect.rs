@@ -36,8 +36,8 @@ impl Dialect {
         let mut fields = Vec::new();
         let mut start = 0;
         let mut is_quoted = false;
-        // A quote without its partner is taken as an ordinary character, so that it does not swallow the rest of the
-        // line.
+        // In a line with an odd number of quotes each quote is an ordinary character, so that an open quote does not
+        // swallow the rest of the line.
         let is_closed = line.matches('"').count().is_multiple_of(2);
         for (at, letter) in line.char_indices() {
             if letter == '"' && is_closed {

@@ -1,6 +1,7 @@
 //! Head of a text table: separator, decimal mark, encoding, names and units of the columns, sample rate, and where the numbers begin.
 //!
-//! The head is found from the numbers: the first line of numbers that is followed by another one, or preceded by a row of as many names.
+//! The head ends at the first line of numbers that is the last line, is followed by one with as many numbers, or is preceded by a row of as
+//! many names.
 
 use super::raw::FoundUnit;
 use super::text_dialect::{Dialect, Separator, bare, blank_fields};
@@ -22,11 +23,12 @@ pub(super) struct Head {
     pub(super) dialect: Dialect,
     /// Columns of the text table with names and units; `None` if the file has no row of names.
     pub(super) columns: Option<Vec<HeadColumn>>,
-    /// Number of columns in the first line of numbers of the text table; 0 if the file has no such line.
+    /// Number of columns in the first line of numbers of the text table; without such a line, number of fields in the
+    /// first line that is no comment, or 0.
     pub(super) width: usize,
     /// Offset of the first line of numbers from the start of the file, bytes.
     pub(super) offset: usize,
-    /// Number of lines before it.
+    /// Number of lines before the first line of numbers.
     pub(super) lines: u64,
     /// Sample rate that a line before the numbers of the text table states, samples per second; `None` if none does.
     pub(super) rate_hz: Option<f64>,
@@ -63,7 +65,8 @@ fn without_marks(line: &str) -> &str {
 /// Finds the head of a text table (names, units, separator) in the first bytes of its file.
 ///
 /// # Errors
-/// Number of the line and description of the fault: text among numbers, or a text in UTF-16.
+/// Number of the line and description of the fault: text among numbers, a line with another count of numbers before the
+/// first row, commas as both separator and decimal mark, or a text in UTF-16.
 pub(super) fn head(bytes: &[u8]) -> Result<Head, (u64, String)> {
     if bytes.starts_with(b"\xff\xfe") || bytes.starts_with(b"\xfe\xff") {
         return Err((1, "the text is UTF-16; save it as UTF-8".into()));
@@ -272,7 +275,8 @@ fn lines<'t>(text: &'t str, bytes: &[u8]) -> Vec<Line<'t>> {
 /// Number of lines that are searched for a decimal comma: a choice, since the first samples may be whole numbers.
 const LINES_FOR_DECIMAL: usize = 200;
 
-/// Separator and decimal mark, found from one line of numbers and the lines after it; `None` if the line has no number.
+/// Separator and decimal mark, found from one line of numbers and the lines after it; `None` if the line holds text or no
+/// number.
 fn dialect(line: &str, lines: &[&Line]) -> Option<Dialect> {
     let with = |separator| Dialect {
         separator,
@@ -305,7 +309,7 @@ fn dialect(line: &str, lines: &[&Line]) -> Option<Dialect> {
     found.count_of_numbers(line).map(|_| found)
 }
 
-/// Titles of the columns in a line of the head, if it has `width` fields; otherwise `None`.
+/// Titles of the columns in a line of the head; `None` if the line cannot be split into `width` titles.
 fn names(dialect: Dialect, line: &str, width: usize) -> Option<Vec<&str>> {
     let fields = dialect.fields(line);
     if fields.len() == width {
@@ -339,7 +343,8 @@ fn names(dialect: Dialect, line: &str, width: usize) -> Option<Vec<&str>> {
     (joined.len() == width).then_some(joined)
 }
 
-/// True if a line of the head is a row of units: every field is empty, in brackets, or a known unit.
+/// True if a line of the head is a row of units: every field is empty, in brackets, or a known unit, and not all are
+/// empty.
 fn is_units(fields: &[&str]) -> bool {
     let is_bracketed = |field: &str| {
         (field.starts_with('(') && field.ends_with(')')) || (field.starts_with('[') && field.ends_with(']'))

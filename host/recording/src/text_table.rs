@@ -47,7 +47,7 @@ impl TextTable {
         })
     }
 
-    /// Names of the columns of a text file, from its head alone; empty if it has none.
+    /// Names of the columns of a text file, from its head alone; empty if it has none or its head cannot be understood.
     ///
     /// # Errors
     /// The file cannot be read.

@@ -84,8 +84,8 @@ impl Understood {
 }
 
 impl Understood {
-    /// A sidecar that states the result of the import: `before` with name, unit and sensitivity of every column that
-    /// was understood by its words or by an option, and with the sample rate if the file does not state it.
+    /// A sidecar that states the result of the import: `before` with name, unit and sensitivity of every column that was
+    /// understood from its words, the sidecar or an option, and with the sample rate if the sidecar or an option gave it.
     #[must_use]
     pub fn sidecar(&self, before: &Sidecar) -> Sidecar {
         let mut sidecar = before.clone();

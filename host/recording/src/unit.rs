@@ -27,7 +27,7 @@ pub enum Quantity {
     Voltage,
     /// Dimensionless number, such as the level of a tachometer signal.
     Level,
-    /// Unknown quantity: neither the file nor the sidecar states a unit.
+    /// Unknown quantity, for example because neither the file nor the user states a unit.
     Unknown,
 }
 
@@ -205,7 +205,7 @@ fn plain(text: &str) -> Option<Unit> {
     of(&plain).or_else(|| of(&respelled(&plain)?))
 }
 
-/// Standard spelling of a unit that is written in another usual way; `None` for an empty text.
+/// Standard spelling of a unit that is written in another usual way; `None` for an unknown spelling.
 fn respelled(text: &str) -> Option<String> {
     let mut plain = text.replace("⁻^2", "^-2").replace(['·', '⋅', '*'], " ");
     // Brackets around a whole unit or around a part of it are removed: (m/s^2), m/(s^2).

@@ -78,7 +78,7 @@ const TACHO: &[&str] = &["tacho", "tachometer", "drehzahlsensor", "keyphasor"];
 /// choice: `kraft` begins `Kraftsensor`, `acc` must not begin `accuracy`.
 const STEM: usize = 5;
 
-/// Words whose presence in a column name means that its other words state no quantity: `cutting speed`, `force error`,
+/// Words whose presence in a column name means that its other words state no quantity or direction: `cutting speed`, `force error`,
 /// and settings that are no signal of a sensor.
 const OTHER: &[&str] = &[
     "speed",
@@ -233,15 +233,16 @@ fn unit_at_end(tokens: &[String], quantity: Quantity) -> Option<Unit> {
             "mps" => "m/s".to_owned(),
             other => other.to_owned(),
         };
-        // A single word x, y or z, or a number, does not parse as a unit.
+        // A direction such as x does not parse as a unit, and a unit of another quantity does not count.
         let unit: Unit = text.parse().ok()?;
         (unit.quantity == quantity).then_some(unit)
     })
 }
 
-/// Splits a column title into name and unit: `name [unit]`, `name (unit)`, `name {unit}`, `name / unit`, `name in unit`.
+/// Splits a column title into name and unit: `name [unit]`, `name (unit)`, `name {unit}`, `name / unit`, `name in unit`,
+/// `name, unit`.
 ///
-/// Square brackets always hold a unit. Other forms count only if the text is a known unit.
+/// Square brackets at the end always hold a unit. Other forms count only if the text is a known unit.
 pub(super) fn name_and_unit(title: &str) -> (&str, Option<&str>) {
     let title = title.trim();
     if let Some((name, unit)) = title.strip_suffix(']').and_then(|inner| inner.rsplit_once('[')) {

@@ -1,7 +1,8 @@
 //! Records in the variables of a MAT-file: vectors beside each other, matrices with a rate, structures, and arrays of structures.
 //!
 //! The variables of the file are one record if vectors or matrices are among them. Otherwise each element of each structure with vectors is a
-//! record of its own: an array of impacts gives as many records. A field that is a structure with one vector and a unit is a channel.
+//! record of its own: an array of impacts gives as many records. Two or more structures side by side that hold one signal each are channels of
+//! one record.
 
 use super::value::{Item, Value, Variable};
 use crate::raw::{FoundUnit, Raw, RawColumn};
@@ -38,7 +39,7 @@ const INTERVALS: &[&str] = &[
 /// Names of the time vector in a MAT structure that holds one channel, in lower case.
 const TIMES: &[&str] = &["t", "time", "zeit", "x"];
 
-/// The records in the variables of a MAT-file; there is at least one.
+/// The records in the variables of a MAT-file; an error if there is none.
 pub(super) fn records(items: Vec<Item>) -> Result<Vec<Raw>, String> {
     let rate = rate(&items);
     let mut found = Vec::new();
@@ -100,7 +101,7 @@ fn collect(items: Vec<Item>, label: Option<String>, outer_hz: Option<f64>, found
     }
 }
 
-/// One record from the variables of `longest` samples; a note names each shorter vector, which is not used.
+/// One record from the variables of `longest` samples; a note names each shorter vector or matrix, which is not used.
 fn record(
     variables: Vec<(Variable, Option<String>)>,
     longest: usize,
@@ -157,7 +158,7 @@ fn rate(items: &[Item]) -> Option<f64> {
 }
 
 /// Units of variables by the name of the variable in lower case, as text variables (`force_unit = 'N'`) or as a
-/// structure `units` with a text field for each variable.
+/// structure `unit` or `units` with a text field for each variable.
 fn units(items: &[Item]) -> Vec<(String, String)> {
     let mut units = Vec::new();
     for item in items {
@@ -183,8 +184,8 @@ fn units(items: &[Item]) -> Vec<(String, String)> {
     units
 }
 
-/// Removes from `structures` those that hold one channel each, and returns the channels: one vector, and the text of
-/// its unit.
+/// If at least two of `structures` hold one channel each, removes these and returns their channels: one vector, and the
+/// text of its unit if there is one.
 fn channels(structures: &mut Vec<(String, Vec<Vec<Item>>)>) -> Vec<(Variable, Option<String>)> {
     // If only one structure holds a single channel, it is left as a record of its own, with the names of its fields.
     let is_channel = |(_, elements): &(String, Vec<Vec<Item>>)| match elements.as_slice() {

@@ -5,8 +5,8 @@ use std::io::{BufRead, ErrorKind, Read, copy, sink};
 /// Number of bytes of a MAT-file that are read at once; a choice. It is a multiple of the size of every number type.
 pub(super) const CHUNK: usize = 1 << 16;
 
-/// Largest length that is accepted for an element of a MAT-file with flags, dimensions or a name, bytes. Valid names
-/// have up to 63 characters; the limit is a choice above that.
+/// Largest length that is accepted for an element of a MAT-file with flags, dimensions, names or a text, bytes. A
+/// choice; it holds 64 field names of 64 bytes.
 pub(super) const SMALL_MAX: u64 = 4096;
 
 /// Size of one number of MAT data type `kind`, bytes; `None` if the data type is not numeric.
@@ -64,7 +64,7 @@ pub(super) fn word(bytes: &[u8], big_endian: bool) -> u32 {
 
 /// Tag of a data element in a MAT-file: data type and length.
 pub(super) struct Tag {
-    /// Code of the data type of the element (miINT8 = 1 … miCOMPRESSED = 15).
+    /// Code of the data type of the element, for example 1 (miINT8) or 16 (miUTF8).
     pub(super) kind: u32,
     /// Length of the data, bytes.
     pub(super) length: u64,
@@ -77,7 +77,7 @@ pub(super) struct Source<'a> {
     pub(super) reader: &'a mut dyn BufRead,
     /// Offset of the next byte.
     pub(super) at: u64,
-    /// Number of bytes that can still be read: at most the rest of the file or of the enclosing element.
+    /// Upper bound of the bytes that can still be read: length of the whole file or element, not reduced by reading.
     pub(super) available: u64,
     pub(super) big_endian: bool,
 }
@@ -139,7 +139,7 @@ impl Source<'_> {
         })
     }
 
-    /// Reads the next element of a MAT-file that holds flags, dimensions or a name: at most [`SMALL_MAX`] bytes.
+    /// Reads the next element of a MAT-file that holds flags, dimensions or names: at most [`SMALL_MAX`] bytes.
     pub(super) fn small(&mut self) -> Result<Vec<u8>, String> {
         let tag = self.tag()?;
         if tag.length > SMALL_MAX {
@@ -157,7 +157,8 @@ impl Source<'_> {
     pub(super) fn text(&mut self, tag: &Tag) -> Result<String, String> {
         let mut codes = Vec::new();
         self.numbers(tag, |code| codes.push(code as u32))?;
-        // MAT data types 16, 1 and 2 hold the bytes of UTF-8; the others hold one code for each letter.
+        // MAT data types 16, 1 and 2 hold the bytes of UTF-8; the others are read as one code for each letter.
+        // Letters that UTF-16 stores as two codes are dropped.
         if matches!(tag.kind, 1 | 2 | 16) {
             let bytes: Vec<u8> = codes.iter().map(|&code| code as u8).collect();
             return Ok(String::from_utf8_lossy(&bytes).into_owned());

@@ -1,7 +1,7 @@
 //! Reader of TDMS files of National Instruments: groups of channels with properties, in segments.
 //!
 //! Format: National Instruments, "TDMS File Format Internal Structure". Each group is a record. `wf_increment` states the sample interval,
-//! `unit_string` the unit. Raw data of DAQmx (unscaled, with a format of its own) is refused; linear scales are applied.
+//! `unit_string` the unit. Raw data of DAQmx (unscaled, with a format of its own) is refused; one linear scale per channel is applied, any other scale is refused.
 //!
 //! Every size is checked against the length of the file before memory is taken.
 

@@ -103,7 +103,7 @@ fn per_value(header: &Header) -> usize {
 
 /// Reads the values of a UFF data set 58 written as text, up to and including its final delimiter, a line `-1`.
 ///
-/// A line `-1` is read as a number if values are still missing and the lines after it do not begin a data set.
+/// A line `-1` is read as a number if values are still missing and the lines after it show that the data set continues.
 pub(super) fn read_text<R: BufRead>(source: &mut Source<R>, header: &Header) -> Result<Data, Fault> {
     let missing = |found: usize, line: u64| {
         let per = per_value(header);
@@ -264,6 +264,7 @@ fn decode(bytes: &[u8], is_big_endian: bool) -> f64 {
 }
 
 /// Reads the delimiter line `-1` that ends a binary UFF data set: on the same line as the data or after empty lines.
+/// The delimiter may be missing at the end of the file.
 fn end_of_binary<R: BufRead>(source: &mut Source<R>) -> Result<(), Fault> {
     match source.peek_filled(0)? {
         None => return Ok(()),

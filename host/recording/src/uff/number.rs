@@ -1,4 +1,4 @@
-//! Parser for numbers in Fortran notation: exponents with E, D or without letter, adjacent fields without blank.
+//! Parser for numbers in Fortran notation: exponents with E, D, Q or without letter, adjacent fields without blank.
 
 /// Parses all numbers of a line and appends them to `values`.
 ///
