@@ -80,7 +80,8 @@ impl<'a> Baseline<'a> {
         poles.iter().any(|pole| pole.norm() <= 1e-9 * largest.max(1e-9))
     }
 
-    /// The longest time constant of the structure, s: the largest −1/Re λ of its poles λ.
+    /// The longest time constant of the structure, s: the largest −1/Re λ of its poles λ, with −Re λ taken as at least 1e-6·|λ| and 1e-9
+    /// 1/s.
     pub(crate) fn slowest_decay_s(&self) -> f64 {
         self.first_order
             .poles()

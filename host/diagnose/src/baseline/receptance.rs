@@ -62,7 +62,8 @@ impl Receptance {
         }
     }
 
-    /// Receptance H(iω) of the baseline, m/N, at ω, rad/s. Zero at a pole on the imaginary axis.
+    /// Receptance H(iω) of the baseline, m/N, at ω, rad/s. The sum leaves out the term of a pole at iω; without a sum over
+    /// poles, H is zero there.
     pub(crate) fn at(&self, omega: f64) -> Matrix3<Complex64> {
         if let Some(whole) = &self.whole {
             return whole.receptance(omega).unwrap_or_else(Matrix3::zeros);
@@ -79,7 +80,7 @@ impl Receptance {
     }
 
     /// Poles λ in the upper half plane that a force along `axis` excites, each with the inverse modal mass 2·Im(λ)·|R| along that axis,
-    /// 1/kg.
+    /// 1/kg. Empty if the receptance has no sum over poles.
     pub(crate) fn modes_along(&self, axis: usize) -> impl Iterator<Item = (Complex64, f64)> {
         let per_mass = move |(pole, residue): &(Complex64, Matrix3<Complex64>)| {
             2.0 * pole.im * residue[(axis, axis)].norm()

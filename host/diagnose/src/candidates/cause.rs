@@ -18,7 +18,7 @@ use quietcut_recording::Quantity;
 /// Where a cause acts.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub(crate) enum Location {
-    /// Location of a cause that acts on the whole machine.
+    /// Location of a cause that acts on the whole machine, or of a sensor error in all channels of motion.
     Everywhere,
     /// Location of a cause that acts along one of the machine's axes (0, 1, 2).
     Axis(usize),
@@ -229,7 +229,8 @@ pub(crate) trait Cause: Send + Sync {
         vec![Vec::new()]
     }
 
-    /// Further start values of the nonlinear parameters, from the residual `_residual` that other causes leave: samples by record and channel.
+    /// Further start values of the nonlinear parameters, from the residual `_residual` that other causes leave: samples by record and
+    /// channel.
     fn nonlinear_grid_beside(
         &self,
         _study: &Study<'_>,
@@ -277,7 +278,7 @@ pub(crate) trait Cause: Send + Sync {
         table
     }
 
-    /// Entries of the cause in the answer, one for each effect name and axis, with parameters and extension table.
+    /// Entries of the cause in the answer, for example one for each effect name, axis or channel, with parameters and extension table.
     fn located_effects(&self, location: &Location, parameters: &[Parameter]) -> Vec<LocatedEffect> {
         vec![LocatedEffect {
             name: self.name(),

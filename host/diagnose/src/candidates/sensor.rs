@@ -59,8 +59,9 @@ pub(super) fn is_at(location: &Location, channel: &Observed) -> bool {
 
 /// Reading of a channel from the estimated motion, with its spectrum multiplied by `change`(ω).
 ///
-/// The acceleration of a cut jumps when teeth enter and leave, and sampling folds much of it into the band. If a channel of the same
-/// quantity, delay and filters reads this axis alone, its measured reading is used instead of the estimated motion.
+/// The acceleration of a cut jumps when teeth enter and leave, and sampling folds much of it into the band. In a cut,
+/// if a channel of the same quantity, delay and filters reads this axis alone, its own reading is used instead of the estimated
+/// displacement.
 pub(super) fn read(
     record: &Record,
     channel: &Observed,

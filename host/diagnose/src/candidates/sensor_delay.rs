@@ -91,7 +91,8 @@ impl Cause for SensorDelayCause {
             .map(|delay| vec![*delay])
     }
 
-    /// The fitted sensor delay. `None` if it differs by a factor above [`ANOTHER_DELAY`] from the delay for which the regressor is computed.
+    /// The fitted sensor delay. `None` if it is not positive, or differs by a factor of at least [`ANOTHER_DELAY`] from the delay
+    /// for which the regressor is computed.
     fn parameters(
         &self,
         _: &Study<'_>,

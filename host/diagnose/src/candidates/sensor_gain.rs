@@ -19,7 +19,7 @@ pub(super) struct SensorGainCause;
 /// Share 1 − 1/g of a sensor gain g at which the finite difference of the change of chip thickness, and so of cutting force, is taken.
 const SMALL_SHARE: f64 = 0.05;
 
-/// The sensor gain g from the fitted share 1 − 1/g; `None` if the share exceeds [`LARGEST_GAIN_SHARE`].
+/// The sensor gain g from the fitted share 1 − 1/g; `None` if the share is not below [`LARGEST_GAIN_SHARE`].
 pub(super) fn factor(coefficients: &[f64]) -> Option<f64> {
     let share = *coefficients.first()?;
     (share < LARGEST_GAIN_SHARE).then(|| 1.0 / (1.0 - share))

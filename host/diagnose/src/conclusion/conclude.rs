@@ -216,8 +216,8 @@ fn confound(diagnosis: &mut Diagnosis, shared: &[&'static str]) {
     diagnosis.equivalent = vec![group];
 }
 
-/// Confidence that a cause is present, 0 to 1. `ahead` is the lead of its candidate model over the best non-equivalent rival; `left` is the
-/// model's residual over the allowed residual.
+/// Confidence that a cause is present, from 0 to [`HIGHEST_CONFIDENCE`]. `ahead` is the lead of its candidate model over the best
+/// non-equivalent rival; `left` is the model's residual over the allowed residual.
 fn confidence(ahead: f64, left: f64) -> f64 {
     let by_rivals = 1.0 / (1.0 + (-(ahead - 0.5 * EQUIVALENT) / CONFIDENCE_WIDTH).exp());
     let by_rest = 1.0 - CONFIDENCE_LOSS * left.clamp(0.0, 1.0).powi(2);

@@ -76,7 +76,7 @@ impl Diagnosis {
     }
 
     /// The text of the extended case: that of the case, with a table `[extension.NAME]` for each acting cause, and the 90 % intervals of
-    /// its parameters as comments. `None` without causes.
+    /// its parameters as comments. `None` if the outcome is neither a cause nor confounded.
     ///
     /// Of confounded candidate models it contains the first.
     pub fn extended_case(&self, case_text: &str) -> Option<String> {

@@ -2,8 +2,9 @@
 //! result.
 //!
 //! A search predicts its records hundreds of times. The first seconds of a random excitation, of impacts or of a cut at one speed contain
-//! nearly the information of a minute, except on changes over the minute. Therefore the answer is accepted only if its residual is as small
-//! in the rest as in the first part. The gain is computed from the rest alone, to which nothing was fitted.
+//! nearly the information of a minute, except on changes over the minute. Therefore the extended case (the
+//! case itself if no cause was found) is accepted only if its residual in the rest is near the noise or a small share of the baseline's.
+//! The gain is computed from the rest alone, to which nothing was fitted.
 
 use crate::baseline::Baseline;
 use crate::conclusion::answer::{Diagnosis, Gain, Outcome, Quality};
@@ -16,15 +17,15 @@ use crate::records::study::Study;
 use quietcut_model::case::Case;
 use quietcut_recording::{Recording, TestKind};
 
-/// Number of samples of all records together in which causes are searched.
+/// Number of samples of all records together in which causes are searched; `PERIODS` and `REVOLUTIONS` may require more.
 const SEARCHED: usize = 32_768;
 /// Smallest length of the first part of a record, in which causes are searched, in periods of the lowest natural frequency.
 const PERIODS: f64 = 60.0;
 /// Smallest length of the first part of a recorded cut, in which causes are searched, in revolutions.
 const REVOLUTIONS: f64 = 24.0;
 
-/// The first part and the rest of each record, if all records are of random forces, of impacts or of cuts at one speed; `None` if the
-/// records are too short to be divided.
+/// The first part and the rest of each record, if all records are of random forces, of impacts or of cuts at one speed; otherwise
+/// `None`. Also `None` if the case has no baseline model, or if the first parts would hold at least [`SHORTENED_SHARE`] of all samples.
 fn beginnings(case: &Case, recordings: &[Recording]) -> Option<[Vec<Recording>; 2]> {
     // A case without baseline model is not reported here: it is refused when the whole records are prepared.
     let lowest_hz = Baseline::new(case).ok()?.lowest_hz()?;
@@ -59,8 +60,8 @@ fn revolutions_s(recording: &Recording) -> Option<f64> {
     }
 }
 
-/// The answer from the first parts of the records, if it holds for the rest too; `None` if not, or if the records are too short to be
-/// divided. The second value is a warning if the first parts or the rest cannot be evaluated on their own.
+/// The answer from the first parts of the records, if it holds for the rest too or leaves the residual unexplained; otherwise `None`, as
+/// for records that are not divided. The second value is a warning if the first parts or the rest cannot be evaluated on their own.
 pub(crate) fn concluded(
     case: &Case,
     recordings: &[Recording],
@@ -81,7 +82,7 @@ pub(crate) fn concluded(
     }
 }
 
-/// The answer from the first parts of the records, if it holds for the rest too.
+/// The answer from the first parts of the records, if it holds for the rest too or leaves the residual unexplained; otherwise `None`.
 ///
 /// # Errors
 /// A first part or a rest cannot be compared alone.

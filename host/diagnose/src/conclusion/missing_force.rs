@@ -46,7 +46,8 @@ pub struct AtAmplitude {
 }
 
 impl MissingForce {
-    /// The missing force that the residual of a channel implies; `None` for a channel of cutting force, or for an axis without motion.
+    /// The missing force that the residual of a channel implies; `None` for a channel of cutting force in the
+    /// response domain, or for an axis without motion.
     pub(crate) fn of(
         baseline: &Baseline<'_>,
         record: &Record,
@@ -107,7 +108,8 @@ impl MissingForce {
     }
 }
 
-/// −residual/receptance along the channel's axis, N, from the bins where the residual exceeds the noise.
+/// −residual/receptance along the channel's axis, N, from the bins in the band of the record where the mean residual power
+/// exceeds `MISSING_FORCE_OVER_NOISE` times the noise power; 1 minus the ratio of the latter to the former is the weight of a bin.
 fn response_over(record: &Record, channel: &Observed, axis: usize, residual: &[f64]) -> Vec<f64> {
     let grid = &record.grid;
     let spectrum = grid.spectrum(residual);

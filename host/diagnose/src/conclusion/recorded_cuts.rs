@@ -8,7 +8,8 @@ use quietcut_model::case::Case;
 use quietcut_recording::{RecordedCut, Recording, Sensed, SpindleSettings, TestKind};
 use quietcut_stability::trial_cuts::{Outcome, TrialCut};
 
-/// The recorded cuts that belong to the chart of a case: with the immersion and feed of the case, and one given speed and depth.
+/// The recorded cuts that belong to the chart of a case: with one given speed and depth, and with the immersion and
+/// feed of the case, as far as the sidecar gives these two.
 /// Behind them one warning for each cut whose outcome cannot be determined, with the reason.
 pub fn recorded_cuts(case: &Case, recordings: &[Recording]) -> (Vec<TrialCut>, Vec<String>) {
     let mut warnings = Vec::new();

@@ -6,7 +6,8 @@ use crate::conclusion::residual_views::ResidualView;
 use crate::signal::grid::Grid;
 use crate::signal::noise::rms;
 
-/// Number of segments of equal length into which a record is divided to find when the residual is largest.
+/// Largest number of segments of equal length (the last may be shorter) into which a record is divided to find when the residual is
+/// largest.
 const SEGMENTS: usize = 40;
 /// Number of spectral lines on each side of the residual's largest line whose energy counts as that of the line.
 const NEAR: usize = 8;
@@ -59,8 +60,8 @@ fn of_channel(view: &ResidualView) -> String {
     )
 }
 
-/// Frequency of the largest spectral line of a residual, Hz, and the share of the residual's energy in the lines near it; `None` for a zero
-/// residual.
+/// Frequency of the largest spectral line of a residual up to the highest frequency of its view, Hz, and the share of the residual's energy
+/// in the lines near it; `None` for a zero or empty residual.
 fn peak(view: &ResidualView, samples: &[f64]) -> Option<(f64, f64)> {
     if samples.is_empty() {
         return None;
@@ -81,7 +82,7 @@ fn segment_length(samples: &[f64]) -> usize {
     samples.len().div_ceil(SEGMENTS).max(1)
 }
 
-/// Residual energy (sum of squared samples) in each of the [`SEGMENTS`] segments of a record.
+/// Energy (sum of squared samples) in each of at most [`SEGMENTS`] segments of a residual or a measured signal.
 fn segment_energies(samples: &[f64]) -> Vec<f64> {
     samples
         .chunks(segment_length(samples))

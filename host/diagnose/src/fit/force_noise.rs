@@ -5,8 +5,9 @@
 //! S is wrong: whether the machine jumps or slips depends on n as much as on the parameters, and the covariance of the fit is far too
 //! small. Let J be the Jacobian in units of the noise and N = JᵀJ: a residual e that n causes shifts the parameters by δ = N⁻¹ Jᵀ e. This
 //! file draws noise n_k, computes e_k = y(f + n_k) − y(f), and subtracts the linear part e'_k = H n_k that N already contains: C = D N⁻¹ D,
-//! D_i² = max(1, 1 + mean_k(δ_ki² − δ'_ki²) / (N⁻¹)_ii). This is a parametric bootstrap with one Gauss–Newton step (Efron and Tibshirani,
-//! An Introduction to the Bootstrap, 1993, ch. 6) and the linear machine as control variate. Intervals only become wider.
+//! D_i² = max(1, 1 + ν/(ν − 2) · mean_k(δ_ki² − δ'_ki²) / (N⁻¹)_ii) with ν ≥ 3 the number of draws that do not diverge. This is a
+//! parametric bootstrap with one Gauss–Newton step (Efron and Tibshirani, An Introduction to the Bootstrap, 1993, ch. 6) and the linear
+//! machine as control variate. Intervals only become wider.
 
 use std::ops::Range;
 
@@ -41,8 +42,8 @@ const STREAM: u64 = 0x666f_7263_6573;
 type Forces = [Vec<f64>; 3];
 
 impl OutputError<'_> {
-    /// The candidate model with its covariance widened by force noise; `None` if no force has noise, if the extended case is linear, or if
-    /// the widening is insignificant.
+    /// The candidate model with its covariance widened by force noise; `None` if no prediction-error fit was made, if no force has noise,
+    /// if the extended case is linear, if its simulation fails, or if the widening is insignificant.
     pub(crate) fn spread(&self, library: &Library, model: &CandidateModel) -> Option<CandidateModel> {
         let simulated = model.simulated.as_ref()?;
         let mut deviations = self
@@ -183,8 +184,8 @@ impl OutputError<'_> {
     }
 }
 
-/// Mean, for each parameter, over the draws of force noise. A draw whose simulation diverged counts as the elementwise maximum of the
-/// others; `None` if all diverged.
+/// Mean of the added variance of each parameter over the draws of force noise. A draw whose simulation diverged counts as the elementwise
+/// maximum of the others; `None` if all diverged.
 fn mean(drawn: &[Option<DVector<f64>>]) -> Option<DVector<f64>> {
     let largest = drawn.iter().flatten().cloned().reduce(|a, b| a.sup(&b))?;
     let sum: DVector<f64> = drawn.iter().map(|draw| draw.as_ref().unwrap_or(&largest)).sum();

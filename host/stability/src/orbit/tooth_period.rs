@@ -21,8 +21,8 @@ use quietcut_numerics::quadrature::Gauss;
 const SUBINTERVAL_ANGLE: f64 = 4.0;
 
 /// Gauss nodes per subinterval. Over the phase angle z = [`SUBINTERVAL_ANGLE`] the local error (m!)²
-/// z^{2m+1}/((2m)!(2m+1)!) is then 5e-11. Halving the angle moves the limits of the robot of chapter 6, with cubic
-/// terms, by less than 1e-10.
+/// z^{2m+1}/((2m)!(2m+1)!) is then 5e-11. Halving the angle moves the limits of the thesis' robot (chapter 6), with
+/// cubic terms, by less than 1e-10.
 const NODES: usize = 9;
 
 /// Subinterval of the tooth period without entry or exit of a tooth.

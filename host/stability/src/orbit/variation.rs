@@ -1,8 +1,9 @@
 //! The delay equation linearized about a forced orbit, in the form of the linear problem, so that the collocated map
 //! and the characteristic matrix apply to orbits as well.
 //!
-//! About the orbit x*(t), ẋ = J(t) x + B Σ (w − z*) cutting·nᵀ(u − u_τ), with J the Jacobian of the orbit equation.
-//! With axial-depth modulation this holds for the whole of eq. 3.6: the depth in the regenerative term is w − z*(t).
+//! About the orbit x*(t), ẋ = J(t) x + B Σ (w − z*) s·cutting·nᵀ(u − u_τ), with J the Jacobian of the orbit equation
+//! and s the slope of the chip law, relative to the linear law. The axial displacement z* acts only with axial-depth
+//! modulation; otherwise the depth in the regenerative term is w.
 
 use nalgebra::DMatrix;
 

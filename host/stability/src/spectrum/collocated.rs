@@ -77,7 +77,7 @@ impl Spectrum for Collocated<'_> {
     }
 
     /// Error of a multiplier at a crossing: its change between the working and the finer mesh, times a safety factor,
-    /// as for a single cut.
+    /// but at least `LEAST_ERROR`.
     fn error(&mut self, crossing: &Crossing) -> Result<f64, StabilityError> {
         let Crossing { multiplier, depth_m } = *crossing;
         let (problem, rpm, deepest_m) = (self.problem, self.rpm, self.deepest_m);

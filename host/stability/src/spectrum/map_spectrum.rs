@@ -69,7 +69,7 @@ impl<M: PeriodMap, F: Fn(f64) -> Option<M>, E: Fn(Complex64, f64) -> Result<f64,
     }
 }
 
-/// Floquet multiplier of a list nearest to a guess; a real guess gives a real multiplier.
+/// Floquet multiplier of a list nearest to a guess: a real one for a real guess, a complex one for a complex guess.
 pub(crate) fn nearest(multipliers: &[Complex64], guess: Complex64) -> Option<Complex64> {
     multipliers
         .iter()
@@ -104,8 +104,8 @@ impl<M: PeriodMap, F: Fn(f64) -> Option<M>, E: Fn(Complex64, f64) -> Result<f64,
         Some((nearest(deeper, own)? - own) / step_m)
     }
 
-    /// Newton's method for |μ| = 1 along the branch. Its derivative is a difference quotient, so that the last step is not applied:
-    /// the crossing is the depth at which the multiplier was computed.
+    /// Newton's method for |μ| = 1 along the branch. Its derivative is a difference quotient, so that the last step is
+    /// not applied: the crossing is the depth at which the multiplier was computed.
     fn crossing_near(&mut self, guess: Crossing, low_m: f64, high_m: f64) -> Option<Crossing> {
         let margin_m = 0.5 * (high_m - low_m);
         let allowed_m = (low_m - margin_m).max(0.0)..=high_m + margin_m;
