@@ -26,7 +26,8 @@ pub(crate) const PULSE_END: f64 = 0.05;
 /// so that it hardly lengthens a pulse.
 pub(crate) const PULSE_END_ABOVE_NOISE: f64 = 2.0;
 
-/// Smallest second force pulse of a hammer that makes an impact a double impact, as a fraction of the first peak. The
+/// Smallest second force pulse of a hammer that makes an impact a double impact, as a fraction of the first peak; the
+/// pulse must also exceed [`PULSE_ABOVE_NOISE`]. The
 /// force window removes the second pulse but not its response, so that a smaller one causes an error of the FRF of up
 /// to this fraction. That 3 % are tolerable is unfounded.
 pub(crate) const SECOND_PULSE: f64 = 0.03;
@@ -54,8 +55,8 @@ pub(crate) const END_AMPLITUDE: f64 = 0.02;
 pub(crate) const DEPENDENT: f64 = 1e-2;
 
 /// Smallest excess of the number of independent averages of the spectra over the number of forces; with less, an FRF
-/// measurement is refused. With as many averages as forces, the coherence is 1 whatever the noise. The half average is
-/// unfounded.
+/// measurement is refused unless it is a hammer test. With as many averages as forces, the coherence is 1 whatever the noise. The half
+/// average is unfounded.
 pub(crate) const SPARE_AVERAGES: f64 = 0.5;
 
 /// Smallest force power of a frequency line that lies within the swept range of a swept sine, as a fraction of the
@@ -74,12 +75,12 @@ pub(crate) const PERIODS_MIN: usize = 8;
 pub(crate) const FREQUENCY_STEP: f64 = 1.5e-3;
 
 /// Smallest deviation of an excitation period from the mean period of its frequency step that begins a new step, in
-/// standard deviations of the periods of the step. Two periods in a row must deviate so far; a Gaussian deviation
-/// exceeds it once in 2 million periods.
+/// robust standard deviations of the first [`PERIODS_MIN`] periods of the step. Two periods in a row must deviate so far; a Gaussian
+/// deviation exceeds it once in 2 million periods.
 pub(crate) const PERIOD_SCATTER: f64 = 5.0;
 
-/// Largest standard deviation of the excitation periods within a frequency step, relative to their mean, as a multiple
-/// of [`FREQUENCY_STEP`]. With a larger one, the frequency of the sine changes and no step begins. Unfounded.
+/// Largest robust standard deviation of the first [`PERIODS_MIN`] excitation periods of a frequency step, relative to
+/// their mean, as a multiple of [`FREQUENCY_STEP`]. With a larger one, the frequency of the sine changes and no step begins. Unfounded.
 pub(crate) const STEADY_SCATTER: f64 = 10.0;
 
 /// Smallest deviation of an excitation period from the mean period of its frequency step that marks a pause of the
@@ -190,14 +191,14 @@ pub(crate) const UNRELATED_PEAK: f64 = 0.8;
 /// passive drive point has none above 0, −1 at a resonance and 0 at frequencies without damping. A choice.
 pub(crate) const INVERTED_PHASE: f64 = 0.2;
 
-/// Range of plausible peaks of receptances, m/N. The most compliant structures that are tapped, thin walls, reach 10⁻³ at resonance; the stiffest
-/// have 10⁻¹⁰ statically. A decade more on the soft side, two on the stiff; a choice.
+/// Range of plausible peaks of receptances, m/N. The most compliant structures that are tapped, thin walls, reach 10⁻³ at resonance; the
+/// stiffest have 10⁻¹⁰ statically. A decade more on the soft side, two on the stiff; a choice.
 pub(crate) const PLAUSIBLE_RECEPTANCE: [f64; 2] = [1e-12, 1e-2];
 
 /// Power of a line of a periodic force over the median of its neighbourhood. The largest of 64 independent exponential powers of a random
 /// force exceeds 50 medians with a probability of 64·2⁻⁵⁰.
 pub(crate) const LINE_ABOVE_NEIGHBOURS: f64 = 50.0;
 
-/// Smallest share of the energy of a force in single lines that makes it periodic. A random force has none, the force of a steady cut all but its
-/// noise. A choice.
+/// Smallest share of the energy of a force in single lines that makes it periodic. A random force has none, the force of a steady cut all
+/// but its noise. A choice.
 pub(crate) const SHARE_OF_LINES: f64 = 0.9;

@@ -116,8 +116,8 @@ pub fn restoring_along(restoring_force: &dyn RestoringForce, motion: &SampledMot
     restoring_from(restoring_force, motion, &mut own)
 }
 
-/// Restoring force f_r, N, along `motion` for a force that has internal states or no locked regime; updates the internal states `own` from the
-/// first sample to the last. The holding force is taken as 0.
+/// Restoring force f_r, N, along `motion` for a force that has internal states or no locked regime; updates the internal states `own` from
+/// the first sample to the last. The holding force is taken as 0.
 pub fn restoring_from(
     restoring_force: &dyn RestoringForce,
     motion: &SampledMotion,

@@ -187,7 +187,8 @@ impl<'a> Contact<'a> {
         cutter.depth_at_m(cutter.depth_m * self.cutting.traverse.depth_share(t), x[2])
     }
 
-    /// Feed, m, during the regenerative delay of `tooth` at the time `t`. The feed axis moves at constant speed even if the spindle speed varies.
+    /// Feed, m, during the regenerative delay of `tooth` at the time `t`. The feed axis moves at constant speed even if the spindle speed
+    /// varies.
     fn feed_m(&self, tooth: &Tooth, t: f64) -> f64 {
         tooth.feed_m * self.cutting.spindle.delay_share(t, tooth.pitch_rad)
     }

@@ -5,12 +5,12 @@
 
 // Loss of contact
 
-/// Thickness below zero at which a chip loses contact, as a fraction of the feed per tooth: a chip whose thickness tends to zero, as in a slot,
-/// must not lose contact by integration errors. Ten times the relative tolerance of the integration, 1e-8, for a vibration as large as the
-/// feed.
+/// Chip thickness below zero at which a tooth loses contact, and above zero at which it regains contact, as a fraction of the feed per
+/// tooth: a chip whose thickness tends to zero, as in a slot, must not lose contact by integration errors. Ten times the relative tolerance
+/// of the integration, 1e-8, for a vibration as large as the feed.
 pub(crate) const CONTACT_TOLERANCE: f64 = 1e-7;
 
-/// Smallest thickness below zero at which a chip loses contact, m, for a cut without feed. Rounding of displacements
+/// Smallest value of [`CONTACT_TOLERANCE`] times the feed per tooth, m, for a cut without feed. Rounding of displacements
 /// up to 1 mm is 2e-19 m; the factor of 5000 is unfounded.
 pub(crate) const CONTACT_TOLERANCE_MIN_M: f64 = 1e-15;
 

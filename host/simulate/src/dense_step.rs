@@ -21,7 +21,8 @@ pub struct Motion {
     pub displacement_m: [f64; 3],
     /// Velocity of the tool or at the sensor, m/s.
     pub velocity_m_per_s: [f64; 3],
-    /// Acceleration of the tool or at the sensor, m/s²; `None` if a step of the force makes the velocity jump, see [`super::Dynamics::velocity_jumps`].
+    /// Acceleration of the tool or at the sensor, m/s²; `None` if a step of the force makes the velocity jump, see
+    /// [`super::Dynamics::velocity_jumps`].
     pub acceleration_m_per_s2: Option<[f64; 3]>,
     /// Force on the tool, N: cutting force plus external excitation.
     pub force_n: [f64; 3],

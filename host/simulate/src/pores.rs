@@ -53,8 +53,8 @@ impl Pores {
         })
     }
 
-    /// A uniform random number in [0, 1) that depends only on the lattice node (i, j), the seed and the purpose: 0 for the pore, 1 to 3 for the
-    /// three pressures.
+    /// A uniform random number in [0, 1) that depends only on the lattice node (i, j), the seed and the purpose: 0 for the pore, 1 to 3 for
+    /// the three pressures.
     fn node_chance(&self, i: i64, j: i64, purpose: u64) -> f64 {
         let bits = hashed(self.seed ^ hashed((i as u64) ^ hashed((j as u64) ^ hashed(purpose))));
         // The upper 53 bits.

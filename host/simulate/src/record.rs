@@ -58,8 +58,8 @@ impl Recorder {
 }
 
 impl VirtualCut {
-    /// Simulates the cut and records the [measured](Self::measured) quantities along those of x, y and z that the structure has, and the tachometer.
-    /// `path` is the path of the recording's file.
+    /// Simulates the cut and records the [measured](Self::measured) quantities along those of x, y and z that the structure has, and the
+    /// tachometer. `path` is the path of the recording's file.
     ///
     /// The time base is the true time, so that a sensor with a clock error has its true sampling rate. Forces and displacements are sampled
     /// at the same instants as the acceleration.
@@ -178,8 +178,8 @@ impl VirtualCut {
         Ok(sidecar)
     }
 
-    /// Tachometer level, 0 to 1: high for half the shortest pitch period of the wheel after each edge. An edge rises over two samples, as after an
-    /// anti-aliasing filter, so that its midpoint can be interpolated between samples.
+    /// Tachometer level, 0 to 1: high for half the shortest pitch period of the wheel after each edge. An edge rises over two samples, as
+    /// after an anti-aliasing filter, so that its midpoint can be interpolated between samples.
     fn level(
         &self,
         tachometer: TachometerModel,

@@ -14,8 +14,8 @@ impl Model {
     /// or leaves the arc, loses or regains contact, meets a kink of the surface from one of these events, or where friction begins to stick.
     ///
     /// # Errors
-    /// The motion diverges, the integration takes too many steps, a tooth can neither keep nor lose contact, no regime of the restoring forces
-    /// is consistent, or the tool diameter is required and missing.
+    /// The motion diverges, the integration takes too many steps, a tooth can neither keep nor lose contact, no regime of the restoring
+    /// forces is consistent, or the tool diameter is required and missing.
     pub fn run(
         &self,
         end_s: f64,

@@ -118,7 +118,8 @@ pub struct SensedCut {
 }
 
 impl VirtualCut {
-    /// A cut of `depth_mm` at constant speed that enters and leaves through the faces of the workpiece, with 0.2 s without contact at each end.
+    /// A cut of `depth_mm` at constant speed that enters and leaves through the faces of the workpiece, with 0.2 s without contact at each
+    /// end.
     pub fn new(spindle_rpm: f64, depth_mm: f64, seconds: f64) -> Self {
         Self {
             spindle_rpm,

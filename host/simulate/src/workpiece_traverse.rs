@@ -57,7 +57,8 @@ impl MaterialWindows {
 }
 
 impl WorkpieceTraverse {
-    /// Time from the first contact with the front face of the workpiece to full engagement at the feed speed, s; the exit through the end face takes as long.
+    /// Time from the first contact with the front face of the workpiece to full engagement at the feed speed, s; the exit through the end
+    /// face takes as long.
     ///
     /// # Errors
     /// The tool has no diameter.

@@ -263,7 +263,8 @@ impl Slider {
         at.x[self.axis] - own[0]
     }
 
-    /// Initial position of the slider: if the tool moves, it trails the tool by `reach_m`; if the tool is at rest, it is taken to be at the tool.
+    /// Initial position of the slider: if the tool moves, it trails the tool by `reach_m`; if the tool is at rest, it is taken to be at the
+    /// tool.
     fn begin(&self, at: &MotionState, own: &mut [f64]) {
         let moving = at.v[self.axis].signum() * f64::from(u8::from(at.v[self.axis] != 0.0));
         own[0] = at.x[self.axis] - self.reach_m * moving;

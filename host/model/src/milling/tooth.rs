@@ -77,8 +77,8 @@ impl EdgeAngle {
         [at.outward[0] * self.sin, at.outward[1] * self.sin, -self.cos]
     }
 
-    /// Position of an edge along the chip thickness, m, at the displacement `x`, m, of a tool whose tooth has the radial runout `radial_m`, m:
-    /// n·x + r·sin γ, thesis eq. 3.1 without feed.
+    /// Position of an edge along the chip thickness, m, at the displacement `x`, m, of a tool whose tooth has the radial runout `radial_m`,
+    /// m: n·x + r·sin γ, thesis eq. 3.1 without feed.
     pub fn reach_m(self, at: Immersion, radial_m: f64, x: [f64; 3]) -> f64 {
         let outward = at.outward[0] * x[0] + at.outward[1] * x[1];
         (outward + radial_m) * self.sin - x[2] * self.cos
@@ -119,7 +119,8 @@ pub struct EdgeForce {
 }
 
 impl EdgeForce {
-    /// Force vector on the tool at an immersion, in the unit of the components: in feed, normal and axial direction, or in the machine's x, y, z, as `at` is given.
+    /// Force vector on the tool at an immersion, in the unit of the components: in feed, normal and axial direction, or in the machine's x,
+    /// y, z, as `at` is given.
     pub fn at(self, at: Immersion) -> [f64; 3] {
         let [x, y] = at.outward;
         [

@@ -36,8 +36,8 @@ impl CubicForce {
         })
     }
 
-    /// Cubic terms on the tool along the machine's x, y and z, in SI units; `None` unless the structure is given by matrices with cubic terms. Rows
-    /// and columns of rotations are left out.
+    /// Cubic terms on the tool along the machine's x, y and z, in SI units; `None` unless the structure is given by matrices with cubic
+    /// terms. Rows and columns of rotations are left out.
     pub fn along_axes(structure: &Structure) -> Option<Self> {
         let super::Form::Matrices(matrices) = &structure.form else {
             return None;

@@ -151,9 +151,9 @@ fn smallest_eigenvalue(symmetric: &DMatrix<f64>) -> f64 {
 
 /// Searches for a change of one entry, then of two, that makes the matrix definite: a reversed sign, a larger diagonal entry, or both.
 ///
-/// If entries (i,j), (j,k) and (i,k) have a product of the wrong sign, reversing any one of them corrects the product. Mass, damping and stiffness of a
-/// mechanism follow from diagonal matrices by the same change of coordinates, so entries whose sign differs from that in the mass matrix
-/// are tried first.
+/// If entries (i,j), (j,k) and (i,k) have a product of the wrong sign, reversing any one of them corrects the product. Mass, damping and
+/// stiffness of a mechanism follow from diagonal matrices by the same change of coordinates, so entries whose sign differs from that in the
+/// mass matrix are tried first.
 fn remedy(
     symmetric: &DMatrix<f64>,
     strict: bool,

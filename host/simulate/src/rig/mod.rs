@@ -28,7 +28,7 @@ pub struct Rig {
     pub drop_ns_per_m: f64,
     /// Sampling rate, Hz.
     pub sample_rate_hz: f64,
-    /// Quantities measured besides the force, each in every direction of the structure.
+    /// Quantities measured besides the force, each along those of x, y and z that the structure has.
     pub measured: Vec<Quantity>,
     /// Effects of structure and sensors that are added to the case.
     pub effects: Effects,
@@ -79,7 +79,8 @@ impl Rig {
     /// Simulates the test from rest at t = 0 and returns the recording without noise; `path` is the path of the recording's file.
     ///
     /// # Errors
-    /// The structure is indefinite or lacks the direction, an effect does not apply to it, or the motion diverges.
+    /// The structure is refused, lacks the direction, or the direction is a rotation; an effect does not apply to the structure; or an error
+    /// of [`Model::run`].
     pub fn record(
         &self,
         structure: &Structure,
