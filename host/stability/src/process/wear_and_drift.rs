@@ -6,12 +6,12 @@ use quietcut_model::Effects;
 use quietcut_model::case::Case;
 use quietcut_model::effects::EffectName;
 
-/// The case after `after_s` seconds of operation, with drift and wear replaced by the stiffness and cutting
-/// coefficients of that moment.
+/// The case after `after_s` seconds of operation, with drift and wear replaced by the stiffness, the cutting coefficients
+/// and the process damping of that moment.
 ///
 /// # Errors
-/// Drift together with an extension of the stiffness, forces or stiffness that have fallen to zero, or an extension
-/// that cannot be applied to the case.
+/// Drift together with an extension of the stiffness, drift in several directions, forces or stiffness that have fallen
+/// to zero, a missing section, or an extension that cannot be applied to the case.
 pub fn after(case: &Case, after_s: f64) -> Result<Case, StabilityError> {
     let not_covered = |what| StabilityError::NotCovered {
         path: case.path.clone(),

@@ -21,7 +21,7 @@ pub(crate) trait PeriodMap: LinearMap {
     fn chatter_hz(&self, multiplier: Complex64, vector: &nalgebra::DVector<Complex64>) -> Option<f64>;
 }
 
-/// All Floquet multipliers of the period map at one axial depth.
+/// All Floquet multipliers μ of the period map at one axial depth with |μ| > `MAPPED`.
 struct MultipliersAtDepth {
     depth_m: f64,
     dominant: Dominant,
@@ -63,7 +63,7 @@ impl<M: PeriodMap, F: Fn(f64) -> Option<M>, E: Fn(Complex64, f64) -> Result<f64,
         self.known.as_mut().ok_or(Breakdown::NoSolution)
     }
 
-    /// Floquet multiplier nearest to a guess at a depth; a real guess gives a real multiplier.
+    /// Floquet multiplier nearest to a guess at a depth: a real one for a real guess, a complex one for a complex guess.
     fn nearest(&mut self, guess: Complex64, depth_m: f64) -> Option<Complex64> {
         nearest(&self.at(depth_m).ok()?.dominant.eigenvalues, guess)
     }
