@@ -118,8 +118,8 @@ impl MethodChoice {
             return self.on_receptances(FrequencyProblem::of_table(case, &table)?, path);
         }
         let needs_collocation = (needs_orbit(case) || depends_on_speed(case)) && !self.linear;
-        // Only collocation handles cubic terms and coefficients that depend on the speed; the other methods refuse them, cubic terms unless
-        // `--linear` removes them.
+        // Only collocation computes limits about a forced orbit, as cubic terms require, and with coefficients that depend on the
+        // speed. The other methods refuse cubic terms unless `--linear` removes them.
         let cubic = if self.linear {
             CubicTerms::LeaveOut
         } else {

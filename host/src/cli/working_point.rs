@@ -93,7 +93,7 @@ pub fn run(args: Args) -> Result<(), Error> {
             args.port.name()
         ))
     })?;
-    // This request comes last, because older firmware rejects requests for the feed direction. The device's earlier
+    // The requests for the feed direction come last, because older firmware rejects them. The device's earlier
     // feed direction is replaced or removed.
     let direction = args.feed_direction_deg.map(|degrees| Degrees(degrees as f32));
     if direction.is_some() || client.feed_direction()?.is_some() {

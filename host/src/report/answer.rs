@@ -21,7 +21,7 @@ pub struct VerdictAnswer {
     pub chatter_hz: Option<f64>,
     /// Probability that the verdict is correct, 0 to 1.
     pub confidence: f64,
-    /// Spindle speed, rev/min; `None` if it is not measured and not set.
+    /// Spindle speed, rev/min; `None` if it is unknown.
     pub spindle_rpm: Option<f64>,
     /// Advice of the device on speed and depth; `None` if there is none.
     pub advice: Option<AdviceAnswer>,
@@ -79,7 +79,8 @@ impl AdviceAnswer {
 /// Log of the changes in a sequence of reports: the output of `replay` and `monitor`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct VerdictLog {
-    /// The first verdict of the sequence, and every later one that differs from the previous one in verdict or advice.
+    /// The first verdict of the sequence, and every later one that differs from the entry before it in verdict or advice.
+    /// A small change of the advised speed does not count.
     pub verdicts: Vec<VerdictAnswer>,
     /// Summary over all reports.
     pub summary: Summary,
@@ -120,7 +121,7 @@ impl fmt::Display for Summary {
 }
 
 impl VerdictLog {
-    /// Adds the next report to the log; returns its verdict if verdict or advice differs from the previous one.
+    /// Adds the next report to the log; returns its verdict if verdict or advice differs from the last entry.
     pub fn take(&mut self, report: &Report) -> Option<&VerdictAnswer> {
         let next = VerdictAnswer::new(report);
         let summary = &mut self.summary;

@@ -174,13 +174,13 @@ fn stroboscopic_map(samples: &[(u32, f64)], what: &str, view: &ResidualView) -> 
     samples_per_tooth("", &quantity, shown, None)
 }
 
-/// Pictures of the stiffness and damping that the case lacks, over the vibration amplitude; `None` if the amplitudes
-/// differ by less than the factor [`AMPLITUDE_RATIO`].
+/// Picture of the stiffness and damping that the case lacks, over the vibration amplitude; `None` with fewer than three
+/// amplitudes, or if they differ by less than the factor [`AMPLITUDE_RATIO`].
 fn over_amplitude(records: &[&MissingForce]) -> Result<Option<String>, PictureError> {
     let rms = |a: &[f64]| (a.iter().map(|x| x * x).sum::<f64>() / a.len().max(1) as f64).sqrt();
     // One point for each amplitude: displacement amplitude in µm; missing stiffness k divided by the static stiffness;
-    // ω·c divided by the static stiffness, with the missing damping c and ω as the ratio of the root mean squares of
-    // velocity and displacement.
+    // ω·c divided by the static stiffness, with the missing damping c and ω as the ratio of the root-mean-square
+    // values of velocity and displacement.
     let mut all: Vec<[f64; 3]> = Vec::new();
     for missing in records.iter().filter(|missing| missing.stiffness > 0.0) {
         let omega = rms(&missing.v) / rms(&missing.x).max(f64::MIN_POSITIVE);

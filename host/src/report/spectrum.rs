@@ -20,7 +20,7 @@ pub struct SpectrumMarks {
 /// Draws amplitudes in m/s² over the ascending frequencies `frequency_hz` (equally many) up to `last_hz` as SVG.
 ///
 /// # Errors
-/// There are fewer than two frequencies, or the drawing library fails.
+/// There are fewer than two frequencies up to `last_hz`, or the drawing library fails.
 pub fn spectrum(
     title: &str,
     frequency_hz: &[f64],

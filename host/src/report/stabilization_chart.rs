@@ -18,7 +18,7 @@ const COLORS: [RGBColor; 6] = [BLUE, ORANGE, QUIET, CHATTER, VIOLET, INK];
 /// Draws stable poles, unstable poles and the selected modes over frequency and model order; below them the magnitude of the
 /// measured receptances (dots) and of the modal model (lines).
 ///
-/// A pole is stable if its frequency, damping and mode shape stay constant from one model order to the next.
+/// A pole is stable if its frequency, damping and mode shape change little from one model order to the next.
 ///
 /// # Errors
 /// The drawing library fails.

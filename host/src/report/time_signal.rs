@@ -18,7 +18,7 @@ pub struct TimeMark {
 
 /// Width and height in pixels of the chart of a signal over time.
 const SIZE: (u32, u32) = (960, 280);
-/// Number of subintervals of the time axis, in each of which the minimum and maximum of the signal are drawn: a choice
+/// Largest number of subintervals of the time axis, in each of which the minimum and maximum of the signal are drawn: a choice
 /// slightly above the width of the picture in pixels.
 const SUBINTERVALS: usize = 1200;
 
@@ -59,7 +59,8 @@ pub fn time_signal(
     })
 }
 
-/// Reduces a signal over time to its minimum and maximum in each subinterval of time, in the order in which they occur.
+/// Reduces a long signal over time to its minimum and maximum in each subinterval of time, in the order in which they
+/// occur; a short signal stays as it is.
 pub(super) fn thinned(t_s: &[f64], values: &[f64]) -> Vec<(f64, f64)> {
     let points: Vec<(f64, f64)> = t_s.iter().copied().zip(values.iter().copied()).collect();
     let length = points.len().div_ceil(SUBINTERVALS).max(1);

@@ -115,8 +115,8 @@ pub fn action(advice: &Advice) -> String {
     }
 }
 
-/// Reason for the advice: its source, the obstacle to a better source, and the assumed working point. `speed` is the measured
-/// spindle speed.
+/// Reason for the advice: its source, the obstacle to a better source, and the assumed working point. `speed` is the spindle
+/// speed of the report.
 pub fn why(advice: &Advice, judgement: &Judgement, speed: Option<Rpm>) -> String {
     let mut parts = vec![source_reason(advice, judgement, speed)];
     if advice.action != Action::Keep {
