@@ -1,7 +1,7 @@
 //! Time-domain simulation: the delay differential equations of milling integrated in time, test rigs, and the sensors that record them.
 //!
 //! The equations are those of thesis chapters 3 and 6. Entry and exit of the teeth are not smoothed: a tooth enters and leaves exactly at its
-//! angles. The chip thickness follows from the surface that *all* earlier tooth passings left (eqs 6.20 to 6.27). A tooth that does not reach
+//! angles. The chip thickness follows from the surface that *all* earlier tooth passings left (thesis eqs 6.20 to 6.27). A tooth that does not reach
 //! the surface has no force.
 //!
 //! Main types: [`VirtualCut`] describes a cut of a case, [`Model`] is its equation of motion, [`DenseStep`] the motion over one step with dense

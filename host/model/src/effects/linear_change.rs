@@ -3,6 +3,7 @@
 //! In a structure given by matrices, the whole matrix M, C or K is scaled by 1 + r; with a direction, only the diagonal entry of
 //! that direction is scaled or replaced. In a structure given by modes, all modes change as if M, C or K were scaled: stiffness
 //! multiplies ω by √(1 + r) and divides ζ and the residues by it; mass divides all three by √(1 + r); damping multiplies ζ by 1 + r.
+//! A structure given by joints is refused.
 
 use std::sync::Arc;
 

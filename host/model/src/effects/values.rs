@@ -198,7 +198,8 @@ impl Values {
         }
     }
 
-    /// State of an on/off parameter, given by its key or as VALUE of `--effect NAME=VALUE`: 1 or 0; in a case also true or false.
+    /// State of an on/off parameter, given by its key or as VALUE of `--effect NAME=VALUE`: 1 or 0. True and
+    /// false of a case are stored as 1 and 0.
     pub(super) fn switch(&mut self, key: &'static str) -> Result<bool, EffectError> {
         let given = if self.by_key.contains_key("") { "" } else { key };
         match self.by_key.remove(given) {
