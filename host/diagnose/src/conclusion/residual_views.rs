@@ -148,7 +148,7 @@ fn left_by(study: &Study<'_>, library: &Library, record: &Record, best: &Candida
         .collect()
 }
 
-/// Instants at which a tooth passes through the angle 0: number of the passing, and time in samples of the record.
+/// Instants at which a tooth of a tool with equal pitch passes through the angle 0: number of the passing from 0, and time in samples.
 fn passes(record: &Record, cut: &RecordedCut) -> Vec<(u32, f64)> {
     let pitch = TAU / cut.cutter.teeth.len().max(1) as f64;
     let rate_hz = record.grid.rate_hz();
