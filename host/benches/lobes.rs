@@ -1,9 +1,9 @@
 //! Computing time of every stability method, per point of a chart and per chart, at equal accuracy of the Floquet multipliers.
 //!
 //! `cargo bench -p quietcut --bench lobes` first prints the number of steps with which each method reaches a relative error of 1e-4 of
-//! |μ| at all points of a coarse chart with |μ| ≤ 2 (μ the largest Floquet multiplier), the time per point and per chart with that number of steps, and the ratio of
-//! that time to the default method's. It then prints the time per stability limit of structures with cubic terms. Criterion then measures
-//! the default method on charts of 200 × 100 cells. All of it runs on one thread.
+//! |μ| at all points of a coarse chart with |μ| ≤ 2 (μ the largest Floquet multiplier), the time per point and per chart with that
+//! number of steps, and the ratio of that time to the default method's. It then prints the time per stability limit of structures with
+//! cubic terms. Criterion then measures the default method on charts of 200 × 100 cells. All of it runs on one thread.
 
 #![allow(missing_docs, clippy::expect_used, clippy::panic)]
 
@@ -103,9 +103,9 @@ fn worst_error(grid: &Grid, size: impl Fn(f64, f64) -> Option<f64>) -> f64 {
         .fold(0.0, f64::max)
 }
 
-/// Number of steps per period with which |μ| reaches [`ACCURACY`] at all chart points, at least 50, else about a tenth more than the smallest such
-/// number; `None` if [`STEPS_MAX`] steps do not reach it. `size` computes |μ| from the number of steps, the speed in rev/min and the depth in mm,
-/// with an error of second order in the step.
+/// Number of steps per period with which |μ| reaches [`ACCURACY`] at all chart points: at least 50, else about a tenth more
+/// than the smallest such number; `None` if [`STEPS_MAX`] steps do not reach it. `size` computes |μ| from the number of steps, the
+/// speed in rev/min and the depth in mm, with an error of second order in the step.
 fn steps_needed(grid: &Grid, size: impl Fn(usize, f64, f64) -> Option<f64>) -> Option<usize> {
     let mut steps = 50;
     while steps <= STEPS_MAX {

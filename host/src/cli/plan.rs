@@ -1,4 +1,4 @@
-//! `quietcut plan`: the smallest set of tests that reduces the uncertainty of the stability limits to a given width.
+//! `quietcut plan`: a search for the smallest set of tests that reduces the uncertainty of the stability limits to a given width.
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
