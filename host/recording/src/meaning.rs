@@ -9,7 +9,7 @@ pub(super) struct Meaning {
     /// Name of the channel.
     pub(super) name: String,
     pub(super) quantity: Quantity,
-    /// Factor from the samples in the file to the SI unit of the channel.
+    /// Factor from the samples in the file to the SI unit of the channel; negative if `is_negative`.
     pub(super) factor: f64,
     /// True if the sensor points against its axis, so that the samples change their sign.
     pub(super) is_negative: bool,

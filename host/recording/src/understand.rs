@@ -29,8 +29,9 @@ struct Stated {
 /// Meaning of every column of a file, that is the channel that it becomes, in the order of `columns`.
 ///
 /// # Errors
-/// A unit is unknown or contradicts the name of its channel; the sidecar or the map names a column that does not exist;
-/// a meaning is in doubt.
+/// A unit is unknown or contradicts the name or the words of its channel; a sensitivity is unknown or given for a column
+/// that is no voltage; the sidecar or the map names a column that does not exist; the map states a unit of frequency
+/// response functions; a meaning is in doubt.
 pub(super) fn understand(
     path: &Path,
     columns: &[RawColumn],
@@ -241,8 +242,8 @@ fn meaning(
     checked(path, column, found)
 }
 
-/// True if the name is a standard channel name: `t`, `fx`, `x`, `vx`, `ax` …, `tacho`, or one of these with a suffix
-/// (`ax_2`).
+/// True if the name is a standard channel name: `t`, `fx`, `x`, `vx`, `ax` …, `tacho`, or one of these with a number as
+/// suffix (`ax_2`).
 fn is_channel_name(name: &str) -> bool {
     let stem = name.split_once('_').map_or(name, |(stem, suffix)| {
         // Only a number may follow: `ax_2` and `ax_7_2` are further sensors of direction x. `a_x` and `x_value` are no
@@ -383,8 +384,8 @@ fn by_words(
     Ok(found)
 }
 
-/// Keeps one time column: of several, the one whose head has the exact name of time; the others become auxiliary
-/// channels.
+/// Makes surplus time columns auxiliary channels: of those that are known only from words, the first stays time, and
+/// none if a head, the sidecar or an option names another column `t`.
 fn prefer_exact_time(meanings: &mut [Meaning]) {
     let is_exact = |meaning: &Meaning| meaning.name == "t" && meaning.from != Basis::Words;
     let has_exact = meanings.iter().any(is_exact);

@@ -259,7 +259,7 @@ fn largest_vibration(trial: &Trial) -> f64 {
 /// Checks the result of the demonstration.
 ///
 /// # Errors
-/// The device did not detect chatter in a cut, gave no advice, or reports chatter in the advised cut.
+/// The device did not detect chatter in a first cut, advised no other speed or depth, or reports chatter in the advised cut.
 fn check(stories: &[Story]) -> Result<(), Error> {
     for Story { first, advised } in stories {
         let cut = format!("{:.0} rev/min, {:.2} mm", first.rpm, first.depth_mm);

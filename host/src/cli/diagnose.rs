@@ -73,7 +73,8 @@ pub fn run(args: Args) -> Result<(), Error> {
     args.output.answer_with(&understood, &diagnosis, text(&diagnosis))
 }
 
-/// Parses the name of the folder to write; the ending of a file is refused.
+/// Parses the name of the folder to write; the ending of an output file, such as `.html`, is refused unless a folder has
+/// that name.
 fn folder(text: &str) -> Result<PathBuf, String> {
     let path = PathBuf::from(text);
     match crate::file::ending(&path).as_str() {
@@ -86,7 +87,7 @@ fn folder(text: &str) -> Result<PathBuf, String> {
 }
 
 /// Adds stability limits to the diagnosis: those of the case and of the extended case, or only those of the case if the
-/// diagnosis extends nothing and trial cuts are given. A failed computation of limits becomes a warning.
+/// diagnosis extends nothing and there are trial cuts or recorded cuts. A failed computation of limits becomes a warning.
 fn add_limits(case: &Case, recordings: &[Recording], cuts: &[TrialCut], diagnosis: &mut Diagnosis) {
     let has_cuts = || !cuts.is_empty() || !recorded_cuts(case, recordings).0.is_empty();
     let found = match diagnosis.extended(case) {

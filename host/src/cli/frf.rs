@@ -51,8 +51,8 @@ pub fn run(args: Args) -> Result<(), Error> {
     args.output.answer_with(&understood, &answer, text)
 }
 
-/// Warns if aliasing (content above half the sample rate, folded into the record) may change the peak of a receptance,
-/// and refuses a relative change above [`LARGEST_FOLDING`].
+/// Warns if aliasing (content above half the sample rate, folded into the record) may change the peak of a receptance by
+/// a ratio above [`SMALL_FOLDING`], and refuses a ratio above [`LARGEST_FOLDING`].
 fn check_folding(measurement: &mut Measurement) -> Result<(), Error> {
     // The error by aliasing is inversely proportional to the spectra of force and response. So |H| divided by this
     // error is largest at the resonance that the impacts excite, and small where the force spectrum vanishes.

@@ -10,8 +10,8 @@ use crate::report::cell_map::cell_map;
 use crate::report::page::{figure, page};
 use crate::stability::{CellChart, Method, Verdict, cell_chart};
 
-/// Computes the Floquet multipliers on the grid, writes them to the file of `--out`, and prints the counts of stable
-/// and unstable points.
+/// Computes the Floquet multipliers on the grid, writes them to each file of `--out`, and prints the counts of stable,
+/// unstable and undecided points.
 pub(super) fn run(
     case: &Case,
     method: &dyn Method,

@@ -190,7 +190,7 @@ impl TableOutput {
     }
 }
 
-/// Width in characters of the picture of a channel: with the name of the channel a line has at most 80.
+/// Largest width in characters of the picture of a channel: with its indentation by four a line has at most 68.
 const WIDTH: usize = 64;
 
 impl RecordOutput {
@@ -290,7 +290,7 @@ impl RecordOutput {
     }
 }
 
-/// A number with its unit, four significant digits, and a prefix of the unit where the number is small or large.
+/// A number with its unit and four significant digits; some units get a prefix where the number is small or large.
 fn shown(value: f64, unit: &str) -> String {
     // Prefixes belong to units that carry them in practice.
     let takes_prefix = matches!(unit, "m" | "N" | "V" | "m/s" | "m/s^2" | "Pa");

@@ -101,7 +101,7 @@ pub struct Header {
 pub(super) const RECORDS: usize = 11;
 
 impl Header {
-    /// Parses the eleven header records of a UFF data set 58.
+    /// Parses the first ten of the eleven header records of a UFF data set 58; the last one is not used.
     ///
     /// # Errors
     /// Index of the faulty record, from 0, and a description of the fault.

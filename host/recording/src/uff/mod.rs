@@ -50,7 +50,7 @@ pub struct DataSet {
 /// Reads all data sets 58 of a UFF file, in order; there is at least one.
 ///
 /// # Errors
-/// The file cannot be read, is not a UFF file, or a data set is damaged; the message names the line and the expected
+/// The file cannot be read, has no data set 58, or a data set is damaged; the message names the line and the expected
 /// content.
 pub fn data_sets(path: &Path) -> Result<Vec<DataSet>, RecordingError> {
     let file = File::open(path).map_err(|cause| FileError::Read {
@@ -310,7 +310,7 @@ impl DataSet {
     }
 
     /// Name of the channel from the header of its data set: a standard name, such as `az` for an acceleration along ±z;
-    /// else the entity name, else the first line of text.
+    /// else the entity name, else the first line of text, else `channel`.
     fn name(&self) -> String {
         let header = &self.header;
         let axis = match header.response.direction.abs() {
@@ -348,7 +348,8 @@ impl DataSet {
     }
 }
 
-/// Unique channel names for UFF data sets: equal names get the node number as suffix, then their position in the file.
+/// Channel names for UFF data sets: equal names get the node number as suffix, and names that are still equal their
+/// position in `sets`.
 fn names(sets: &[DataSet]) -> Vec<String> {
     let plain: Vec<String> = sets.iter().map(DataSet::name).collect();
     let is_twice = |names: &[String], name: &String| names.iter().filter(|other| *other == name).count() > 1;

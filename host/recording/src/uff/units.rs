@@ -100,13 +100,13 @@ pub(super) fn kind(quantity: Quantity) -> i64 {
     }
 }
 
-/// Unit of an axis of a UFF function; `None` if the file does not state it.
+/// Unit of an axis of a UFF function; `None` if the file states no unit that is supported.
 ///
 /// The unit label of the axis takes precedence over the units of the file.
 ///
 /// # Errors
 /// The label is unknown although the specific data type is a supported quantity, or it contradicts the specific data
-/// type.
+/// type. A label of voltage contradicts no type.
 pub fn unit(axis: &Axis, file: FileUnits) -> Result<Option<Unit>, String> {
     let stated = quantity(axis.kind);
     if axis.unit.is_empty() {

@@ -41,7 +41,7 @@ pub(super) struct IdentifyOutput {
     /// of parameters).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) misfit: Option<f64>,
-    /// Number of steady sine responses (dwells) to which the model was fitted.
+    /// Number of steady sine responses (dwells) that the method evaluated.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) dwells: Option<usize>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -59,8 +59,8 @@ pub(super) struct IdentifyOutput {
     pub(super) warnings: Vec<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) case: Option<PathBuf>,
-    /// Content of the case file that `joints` (robot joints) or `inverse-stability` (modes) writes. `None` for a method
-    /// that identifies the parameters of an equation of motion.
+    /// Content of the case file that `joints` (robot joints), `inverse-stability` (modes) or `force-coefficients` (cutting)
+    /// writes; `None` for the other methods.
     #[serde(skip)]
     pub(super) table: Option<toml::Table>,
     /// Modal model of the structure that is written into the case file.

@@ -109,7 +109,7 @@ fn response(dwell: &Dwell) -> Option<(f64, f64)> {
     Some((force.amplitude(1), motion.amplitude(1)))
 }
 
-/// Compares every sine sweep with the first sweep of its direction and quantity. The returned texts name the pairs that
+/// Compares every later sine sweep with the first sweep of its direction and quantity. The returned texts name the pairs that
 /// cannot be compared.
 fn compare_sweeps(sweeps: &[&Recording]) -> Result<(Vec<SweepPair>, Vec<String>), Error> {
     let mut known: Vec<((Direction, Quantity), PathBuf, Spectra)> = Vec::new();

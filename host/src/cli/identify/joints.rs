@@ -165,7 +165,7 @@ fn from_tones(
     })
 }
 
-/// Smallest decay rate ζω of the modes of the robot over all postures, 1/s.
+/// Smallest decay rate ζω of the modes of the robot over all postures, 1/s, but at least 0.001 1/s.
 fn slowest_decay(robot: &Robot, postures: &[AtPosture]) -> Result<f64, Error> {
     let mut slowest = f64::INFINITY;
     for posture in postures {

@@ -10,7 +10,7 @@ use crate::identify::restoring_force::{ForceTerm, Options, Record, Slice, Surfac
 use crate::recording::{Quantity, Recording};
 use crate::structure::Direction;
 
-/// Identifies parameters by harmonic balance of one whole period of each multisine recording.
+/// Identifies parameters by harmonic balance of the last period, of `samples` samples, of each multisine recording.
 pub(super) fn multisine(
     args: &Args,
     recordings: &[Recording],
@@ -111,7 +111,7 @@ pub(super) fn restoring_force(args: &Args, recordings: &[Recording]) -> Result<I
         mass_kg: args.mass_kg,
         band_hz,
         // Duration cut off at both ends of the record, s: two seconds, or a tenth of a record shorter than 20 s. A
-        // choice; it contains several periods of the lowest frequency in the band.
+        // choice; it should contain several periods of the lowest frequency in the band.
         trim_s: (0.1 * recording.len() as f64 / recording.sample_rate_hz).min(2.0),
     };
     let record = Record {
@@ -190,7 +190,8 @@ pub(super) struct ForceAndMotion<'a> {
     pub(super) quantity: Quantity,
 }
 
-/// First direction with a recorded motion and force; without any recorded force, a motion with zero force (free decay).
+/// Force and motion of the first direction that has both, displacement before velocity before acceleration; without any
+/// recorded force, the first motion with zero force (free decay).
 pub(super) fn force_and_motion(recording: &Recording) -> Result<ForceAndMotion<'_>, Error> {
     // A displacement channel has priority: integrating velocity or acceleration to displacement loses the low
     // frequencies.
