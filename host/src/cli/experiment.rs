@@ -181,7 +181,7 @@ fn direction(options: &Experiment, structure: &Structure) -> Result<Direction, S
 }
 
 /// Default sampling rate of a simulated vibration test in Hz: a power of two of at least 20 times the highest excited
-/// frequency, so that the eighth harmonic lies below the Nyquist frequency. An impact of duration T excites up to about
+/// frequency (30 Hz if none is given), so that the eighth harmonic lies below the Nyquist frequency. An impact of duration T excites up to about
 /// 1/T.
 fn default_rate_hz(kind: ExperimentKind, options: &Experiment) -> f64 {
     let highest_hz = match kind {

@@ -1,4 +1,4 @@
-//! Writer of UFF data sets 58, as text or binary, in double precision.
+//! Writer of UFF data sets 58: values as text with 13 digits, or as binary doubles.
 
 use std::io::{self, Write};
 

@@ -55,8 +55,8 @@ struct ReceptanceAnswer {
 #[derive(Serialize)]
 struct PeakEstimate {
     value: f64,
-    /// 90 % interval of the peak magnitude of a receptance; `null` with fewer than three impacts, whose scatter gives
-    /// no standard deviation.
+    /// 90 % interval of the peak magnitude of a receptance; `null` for a hammer test with fewer than three single
+    /// impacts, whose scatter gives no standard deviation.
     ci90: Option<[f64; 2]>,
 }
 

@@ -63,7 +63,7 @@ struct Source {
     table: FrfTable,
     deviation: Option<Vec<Vec<f64>>>,
     warnings: Vec<String>,
-    /// Spectra of the recorded forces and responses; `None` unless each record is one continuous test.
+    /// Spectra of the recorded forces and responses; `None` for a table, or if a record is a hammer or step-sine test.
     records: Option<Vec<RecordSpectra>>,
 }
 
