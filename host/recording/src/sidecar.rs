@@ -126,7 +126,7 @@ fn is_case(text: &str) -> bool {
 
 impl Sidecar {
     /// Description of the channel with a standard name such as `ax`, also if the file calls it by another name; `None`
-    /// if the sidecar has no description of it.
+    /// if the sidecar has no description of it. A description that states the name with a sign (`-ax`) is not found.
     pub fn channel(&self, name: &str) -> Option<&RecordedChannel> {
         let renamed = self
             .channels
