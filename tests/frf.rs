@@ -261,12 +261,15 @@ fn a_band_above_half_the_rate_and_an_output_over_an_input_are_refused() {
     let cut = quietcut(here, &["frf", "hammer.csv", "--band-hz", "12:100000", "--json"]);
     assert_eq!(cut.status, Some(0), "{cut:?}");
     assert!(cut.stderr.contains("half the sample rate"), "{cut:?}");
-    for line in [
-        "frf hammer.csv --band-hz 12:24 --out hammer.csv",
-        "identify hammer.csv --method modes --out ./hammer.csv",
+    for (line, reason) in [
+        ("frf hammer.csv --band-hz 12:24 --out hammer.csv", "overwrite"),
+        (
+            "identify hammer.csv --method modes --out ./hammer.csv",
+            ".toml is needed",
+        ),
     ] {
         let arguments: Vec<&str> = line.split(' ').collect();
-        quietcut(here, &arguments).refused(&["--out", "overwrite", "hammer.csv"]);
+        quietcut(here, &arguments).refused(&["--out", reason, "hammer.csv"]);
     }
     assert_eq!(
         std::fs::read(here.join("hammer.csv")).expect("the recording"),
