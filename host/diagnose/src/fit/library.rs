@@ -14,7 +14,7 @@ use quietcut_model::effects::EffectName;
 pub(crate) struct Candidate {
     /// Index of the candidate's cause in `Library::causes`.
     pub cause: usize,
-    /// Axis, axes or channel in which the candidate's cause acts.
+    /// Location of the candidate's cause, for example an axis or a channel.
     pub location: Location,
     /// Each set of the cause's nonlinear parameters, with the indices of its regression columns.
     pub variants: Vec<(Vec<f64>, Vec<usize>)>,
@@ -122,7 +122,7 @@ impl Library {
     }
 
     /// Regression columns of a cause that acts along each of several axes with separate coefficients, from the columns of the single axes;
-    /// `None` if those of one axis are missing.
+    /// `None` at any other location, or if the columns of one axis are missing.
     fn columns_along_each(
         &self,
         cause: usize,
@@ -242,7 +242,8 @@ impl Library {
         sum
     }
 
-    /// χ² of a candidate model on the held-out segments, with coefficients fitted to the fitted segments.
+    /// χ² of a candidate model on the held-out segments, with coefficients fitted to the fitted segments; χ² of the baseline if that fit is
+    /// not possible.
     pub(crate) fn left_held_out(&self, regression: &Regression, model: &CandidateModel) -> f64 {
         let columns = self.columns_of(model);
         match regression.fit(Subset::Fitted, &columns) {
@@ -293,7 +294,7 @@ impl Library {
     }
 
     /// For each cause of the candidate model: indices of the regression columns that hold derivatives with respect to its nonlinear
-    /// parameters; none if these parameters follow from the coefficients.
+    /// parameters; none if there are no such parameters, if they follow from the coefficients, or if a derivative cannot be computed.
     pub(crate) fn slopes_of(
         &self,
         study: &Study<'_>,
@@ -317,8 +318,8 @@ impl Library {
             .collect()
     }
 
-    /// Adds regression columns with the derivatives of a cause's contribution with respect to its nonlinear parameters, by central
-    /// differences, and returns their indices; `None` if they cannot be computed.
+    /// Adds regression columns with the derivatives of a cause's contribution with respect to its nonlinear parameters, by finite
+    /// differences (central, one-sided at a bound), and returns their indices; `None` if they cannot be computed.
     pub(crate) fn slopes(
         &self,
         study: &Study<'_>,
@@ -409,8 +410,8 @@ impl Library {
         }
     }
 
-    /// Adds a further set of values of a candidate's nonlinear parameters, with its regression columns; `None` if its regressors cannot be
-    /// computed.
+    /// Adds a set of values of a candidate's nonlinear parameters with its regression columns, unless the candidate has it already; `None`
+    /// if its regressors cannot be computed.
     pub(crate) fn add_variant(
         &mut self,
         study: &Study<'_>,
@@ -446,7 +447,7 @@ impl Library {
     }
 }
 
-/// Regressors of a cause by coefficient, record, channel and sample, or the reason why they cannot be computed.
+/// Regressors of a cause by coefficient, record, channel and sample, or the reason why they cannot be computed or are not finite.
 fn columns(
     study: &Study<'_>,
     cause: &dyn Cause,

@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-/// Samples per block of a matrix product, so few that the block of all columns stays in the cache.
+/// Values of each column in one block of a matrix product: 8 KiB per column, so that the block of some hundred columns stays in the cache.
 const BLOCK: usize = 1024;
 
 /// Inner products of the regression columns, over one subset of the records' segments.
@@ -17,7 +17,7 @@ pub(crate) struct Products {
     pub(crate) with_residual: Vec<f64>,
     /// Squared length of the residual.
     pub(crate) residual: f64,
-    /// Number of compared values of the subset, minus those that the projection on free decays and sensor offsets removes.
+    /// Number of values of the subset, minus the skipped samples and one for each projected free decay or sensor offset.
     pub(crate) count: usize,
 }
 

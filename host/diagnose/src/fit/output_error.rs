@@ -1,9 +1,10 @@
 //! Residuals of simulated candidate models, and their Jacobian (output error).
 //!
-//! Regression along the measured motion is biased by the noise in that motion and by aliasing. A simulation has neither: with r(θ) = y −
-//! y_simulated(θ) in units of the noise, Σ r² is minimal at the most likely θ (Ljung, System Identification, 1999, chapter 7). The Jacobian
-//! is computed by finite differences. An unknown initial state of a record is fitted with the parameters. If the start value fits the whole
-//! record poorly, it is first improved on the beginning of the record.
+//! Regression along the measured motion is biased by the noise in that motion and by aliasing. A simulation does not use that motion: with
+//! r(θ) = y − y_simulated(θ) in units of the noise, Σ r² is minimal at the most likely θ (Ljung, System Identification, 1999, chapter 7).
+//! The Jacobian is computed by finite differences. The unknown initial state of a free decay is fitted with the parameters. If the start
+//! values fit the whole records much worse than the regression does, they are first improved on the beginning of each record, unless the
+//! regression is far behind that of the best candidate model.
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -186,7 +187,7 @@ impl<'a> OutputError<'a> {
     }
 
     /// Computes Jᵀ J and Jᵀ r of the simulated candidate model from the Jacobian's `columns`, and adapts the steps of the finite
-    /// differences so that each step changes χ² by about one.
+    /// differences so that, within limits, each step changes χ² by about one near its minimum.
     pub(crate) fn normal(
         &self,
         problem: &mut FitProblem<'_>,
@@ -233,7 +234,8 @@ impl<'a> OutputError<'a> {
         (normal, gradient)
     }
 
-    /// The free parameters of a candidate model and their start values from its linear regression; `None` if these are not physical.
+    /// The free parameters of a candidate model and their start values from its linear regression; `None` if these are not physical or
+    /// cannot be simulated.
     pub(crate) fn problem<'b>(
         &self,
         library: &'b Library,

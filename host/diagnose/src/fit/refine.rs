@@ -61,8 +61,8 @@ fn one(
 /// teeth lose contact.
 const FIXED_POINT_ITERATIONS: usize = 12;
 
-/// Iterates to their fixed point those nonlinear parameters that follow from the fitted coefficients. Where a whole step increases χ², half
-/// a step is tried.
+/// Iterates to their fixed point those nonlinear parameters that follow from the fitted coefficients. If the whole step does not decrease
+/// χ², half a step is tried.
 fn settle(
     study: &Study<'_>,
     library: &mut Library,
@@ -168,7 +168,8 @@ fn search(
     model
 }
 
-/// One Gauss–Newton step in the nonlinear parameters; `None` if it decreases χ² by less than `LEAST_REFINEMENT`.
+/// One Gauss–Newton step in the nonlinear parameters; `None` if it cannot be computed, or does not decrease χ² by more than
+/// `LEAST_REFINEMENT`.
 fn along_slopes(
     study: &Study<'_>,
     library: &mut Library,

@@ -1,4 +1,4 @@
-//! Linear least squares of regressors in units of the noise, with free decays projected out.
+//! Linear least squares of regressors in units of the noise, with free decays and sensor offsets projected out.
 //!
 //! Every record is one segment as a whole, and is also divided into fitted and held-out segments. Residual and regressors of each segment
 //! are whitened. Their inner products (Gram matrices) then give the fit of any set of regressors.
@@ -28,7 +28,7 @@ pub(crate) struct Fit {
     pub coefficients: Vec<f64>,
     /// Covariance of the fitted coefficients for unit-variance noise.
     pub covariance: DMatrix<f64>,
-    /// χ² of the linear fit: residual sum of squares in units of the noise.
+    /// χ² of the fit: residual sum of squares in units of the noise. A prediction-error fit overwrites it and the coefficients.
     pub left: f64,
 }
 
@@ -46,7 +46,7 @@ pub(crate) struct Refit {
 /// The residuals and regression columns of a study, whitened and by segment.
 pub(crate) struct Regression {
     segments: Vec<Segment>,
-    /// Whitened regression columns: by column and segment, the values of the segment's samples.
+    /// Whitened regression columns: by column and segment, the values of the whitened segment.
     columns: Vec<Vec<Vec<f64>>>,
     residuals: Vec<Vec<f64>>,
     /// Inner products of the regression columns over the fitted segments, over the held-out segments and over the whole records.
@@ -85,7 +85,8 @@ impl Regression {
         regression
     }
 
-    /// Recomputes the inner product of each regression column with itself and with the baseline's residual.
+    /// Recomputes the inner products of each regression column with itself and with the baseline's residual, and discards those between
+    /// columns.
     fn sum(&mut self) {
         self.products = std::array::from_fn(|_| Products::default());
         self.complete = 0;
@@ -112,8 +113,8 @@ impl Regression {
         }
     }
 
-    /// Rescales the noise variance of each record so that a fit of all columns leaves the same normalized residual in every record
-    /// (feasible GLS).
+    /// Multiplies the noise variance of each record by its χ² per degree of freedom over the smallest one of all records (feasible GLS). It
+    /// is χ² after a fit of all columns to the record alone; a value below 1 counts as 1.
     ///
     /// In the force domain the residual contains errors of the equations, which differ between records. Without rescaling, least squares
     /// would fit mainly the record that the equations describe worst.
@@ -162,7 +163,8 @@ impl Regression {
         }
     }
 
-    /// Energy Σ (y/σ)² of the measured samples y of all records, σ being the standard deviation of their noise.
+    /// Energy Σ (y/σ)² of the measured samples y of all records, σ being the standard deviation of their noise; free decays and sensor
+    /// offsets are projected out.
     pub(crate) fn signal(&self, study: &Study<'_>) -> f64 {
         let of_segment = |segment: &Segment| {
             let channels = study.records[segment.record].channels.iter();
@@ -242,12 +244,13 @@ impl Regression {
         self.products(subset).residual
     }
 
-    /// Number of compared values over a subset of segments, without those that the projection on free decays and offsets removes.
+    /// Number of values over a subset of segments, minus the skipped samples and one for each projected free decay or sensor offset.
     pub(crate) fn count(&self, subset: Subset) -> usize {
         self.products(subset).count
     }
 
-    /// Prediction error (NRMSE) of the baseline on a subset; all channels have equal weight.
+    /// Prediction error (NRMSE) of the baseline on a subset, relative to the mean square of each channel over its whole record; each
+    /// channel of each segment has equal weight.
     pub(crate) fn nrmse(&self, study: &Study<'_>, subset: Subset) -> f64 {
         let (mut sum, mut count) = (0.0_f64, 0.0_f64);
         for segment in self.segments.iter().filter(|segment| segment.subset == subset) {
@@ -343,8 +346,8 @@ impl Regression {
     }
 
     /// Covariance of a fit whose residual is not unit-variance noise, but an error of the equations with an unknown spectrum: (XᵀX)⁻¹ Xᵀ
-    /// diag(r²/(1 − h)²) X (XᵀX)⁻¹ with h = diag(X (XᵀX)⁻¹ Xᵀ). The values of the spectrum are independent of each other (HC3 of MacKinnon
-    /// and White, 1985).
+    /// diag(r²/(1 − h)²) X (XᵀX)⁻¹ with h = diag(X (XᵀX)⁻¹ Xᵀ). The values of the spectrum are taken as independent of each other (HC3 of
+    /// MacKinnon and White, 1985).
     pub(crate) fn covariance_by_residual(
         &self,
         subset: Subset,
@@ -382,7 +385,7 @@ impl Regression {
             .collect()
     }
 
-    /// χ² after a fit of all columns of the library.
+    /// χ² after a fit of all columns of the library to the whole records; that of the baseline if the fit fails.
     pub(crate) fn left_by_all(&self) -> f64 {
         let whole = self.products(Subset::Whole);
         let all: Vec<usize> = (0..self.columns.len())

@@ -1,4 +1,5 @@
-//! Restarts a prediction-error search that is stuck: near the point where it ended, and from multiples of the start values.
+//! Restarts a prediction-error search that is stuck: with friction near the point where it ended, for free decays from multiples of the
+//! start values.
 
 use crate::criteria::{SEARCH_SETTLED, STUCK};
 use crate::fit::output_error::{LEAST_STEP, OutputError};
@@ -6,8 +7,8 @@ use crate::fit::search::ROUNDS;
 use crate::fit::segment::Segment;
 use crate::fit::unknowns::{FitProblem, FreeParameter, ParameterPoint, SearchResult, energy};
 
-/// Relative changes of one parameter at which a search with friction restarts, counted from the parameter's value at the end of the first
-/// search.
+/// Relative changes of one parameter, up and down from its value at the end of a search with friction. The search restarts from the change
+/// with the smallest χ².
 const NEARBY: [f64; 6] = [5e-4, 1e-3, 2e-3, 4e-3, 8e-3, 0.016];
 /// Factors that multiply the start value of each parameter of the cause where the fit of a free decay restarts; two parameters take every
 /// pair of factors.
@@ -17,7 +18,7 @@ const SIZES: [f64; 6] = [0.1, 0.25, 0.5, 1.0, 2.0, 4.0];
 const MOST_PARAMETERS: usize = 2;
 /// Number of restarts that are searched to the end: those with the smallest χ² on the beginning of each record.
 const COMPLETED: usize = 3;
-/// Iterations of the search from each start on the beginning of each record, which ranks the starts.
+/// Largest number of iterations of the search on the beginning of each record that ranks the starts.
 const RANKING_ROUNDS: usize = 4;
 
 impl OutputError<'_> {
@@ -42,7 +43,8 @@ impl OutputError<'_> {
         found
     }
 
-    /// Restarts the prediction-error search from the best point near its end: χ² is discontinuous where friction begins to slip.
+    /// Restarts the prediction-error search from the best point near its end, if χ² is smaller there: χ² is discontinuous where friction
+    /// begins to slip.
     fn restarted_nearby(
         &self,
         problem: &mut FitProblem<'_>,

@@ -11,7 +11,7 @@ use crate::fit::unknowns::{
     FitProblem, ParameterPoint, RIDGE, SearchResult, at_bounds, energy, predicted, stepped,
 };
 
-/// Largest number of Levenberg–Marquardt iterations of a search.
+/// Largest number of Levenberg–Marquardt iterations of a full search; searches that prepare, rank or check take fewer.
 pub(crate) const ROUNDS: usize = 15;
 
 /// Damping of the search. It never falls to zero, since parameters of a candidate model may depend on each other.
@@ -78,7 +78,8 @@ impl Objective for Search<'_, '_, '_> {
         next.left < now.left && now.left - next.left < SEARCH_SETTLED
     }
 
-    /// Gives up if an iteration leaves more of the lag behind the rival candidate model than the share [`SLOW_CATCHING_UP`].
+    /// Gives up, after two iterations or more, if the lag is positive and the last iteration has left more of it than the share
+    /// [`SLOW_CATCHING_UP`].
     fn gives_up(&self, round: usize, now: &Residuals, before: Option<&Residuals>) -> bool {
         let behind = self.behind(now.left);
         round >= 2
@@ -86,8 +87,8 @@ impl Objective for Search<'_, '_, '_> {
             && before.is_some_and(|before| behind > SLOW_CATCHING_UP * self.behind(before.left))
     }
 
-    /// Gives up if even the linearized model predicts a χ² that lags behind the rival candidate model and exceeds the share
-    /// [`HOPELESS_PREDICTED_SHARE`] of the present χ².
+    /// Gives up, after the first iteration, if even the linearized model predicts a χ² that lags behind the rival candidate model and
+    /// exceeds the share [`HOPELESS_PREDICTED_SHARE`] of the present χ².
     fn gives_up_linearized(&self, round: usize, now: &Residuals, sums: &NormalSums) -> bool {
         let promised = now.left - predicted(&sums.matrix, &sums.gradient);
         round >= 1 && self.behind(promised) > 0.0 && promised > HOPELESS_PREDICTED_SHARE * now.left
@@ -95,8 +96,8 @@ impl Objective for Search<'_, '_, '_> {
 }
 
 impl OutputError<'_> {
-    /// Levenberg–Marquardt search from `start`; `None` if the start cannot be simulated. The search ends early if its χ² stays behind
-    /// `rival`, the χ² that another candidate model has reached.
+    /// Levenberg–Marquardt search from `start`; `None` if the start cannot be simulated or a Jacobian cannot be computed. The search ends
+    /// early if its χ² stays behind `rival`, the χ² that another candidate model has reached.
     pub(crate) fn search(
         &self,
         problem: &mut FitProblem<'_>,

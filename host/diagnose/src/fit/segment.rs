@@ -42,17 +42,18 @@ pub(crate) enum Nuisance {
 /// Names the segments over which a sum (χ², inner product) is taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Subset {
-    /// Segments to which coefficients are fitted.
+    /// Segments to which parameters are fitted for the prediction of the held-out segments.
     Fitted,
-    /// Segments to which no coefficient is fitted.
+    /// Segments on which the prediction by the fit to [`Self::Fitted`] is tested. Only unknown initial states are fitted to them.
     HeldOut,
     /// Whole records, one segment each.
     Whole,
 }
 
-/// Divides each record: the whole, and four segments of a third, a sixth, a third and a sixth of it. The short ones are held out. They
-/// contain other times than the fitted ones and, in a sweep, other frequencies. Of several free decays the last is held out as a whole,
-/// because the end of a decay contains no information.
+/// Divides the compared range of each record: the whole, and four segments of a third, a sixth, a third and a sixth of it. The short ones
+/// are held out. They contain other times than the fitted ones and, in a sweep, other frequencies. In a study of several records a free
+/// decay is not divided, because the end of a decay contains little information: it is held out if it is the last record of the study, and
+/// fitted otherwise.
 pub(crate) fn split(study: &Study<'_>, unknown: impl Fn(&Record) -> Nuisance) -> Vec<Segment> {
     let several = study.records.len() > 1;
     let last = study.records.len().saturating_sub(1);

@@ -37,7 +37,8 @@ pub(crate) struct FitProblem<'a> {
     pub(crate) library: &'a Library,
     pub(crate) choices: &'a [Choice],
     pub(crate) slots: Vec<(FreeParameter, f64)>,
-    /// Smallest step of a finite difference with respect to any free parameter, relative to the parameter.
+    /// Smallest step of a finite difference with respect to a parameter of a cause, relative to that parameter. Initial states have a limit
+    /// of their own.
     pub(crate) least_step: f64,
 }
 
@@ -155,7 +156,7 @@ pub(crate) fn covariance(normal: &DMatrix<f64>) -> Option<DMatrix<f64>> {
 }
 
 /// For each cause of the candidate model: covariance of its parameters for unit-variance noise, with the initial states unknown; zero for a
-/// fixed parameter.
+/// fixed parameter, and throughout if the normal matrix cannot be inverted.
 pub(crate) fn by_choice(slots: &[FreeParameter], found: &SearchResult) -> Vec<DMatrix<f64>> {
     let mut all: Vec<DMatrix<f64>> = found
         .point

@@ -9,7 +9,8 @@ use crate::records::record::Record;
 
 /// Whitening by L⁻¹, with the covariance of the channels at each bin S = diag(σ²) + Σ σ_f² h hᴴ = L Lᴴ. The first part is the noise of the
 /// motion sensors. The second is the response h to noise of the force sensors and to aliased forces, both contained in the noise floor σ_f
-/// of each force; it is correlated between channels.
+/// of each force; it is correlated between channels and absent in the force domain. In a cut near or in chatter, the noise covariance of
+/// its closed loop ([`LoopNoise`]) replaces S.
 #[derive(Default)]
 pub(crate) struct Whitening {
     channels: usize,
