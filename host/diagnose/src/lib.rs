@@ -101,7 +101,8 @@ use records::study::Study;
 /// Finds what the case gets wrong about the recordings, and why.
 ///
 /// # Errors
-/// The case cannot be simulated, or a recording cannot be compared: too short, clipped, or without a required channel.
+/// No recording is given; the case lacks an entry or cannot be simulated; or a recording cannot be compared: for example, it is too short,
+/// clipped, or without a required channel.
 pub fn diagnose(
     case: &Case,
     recordings: &[Recording],
@@ -113,7 +114,8 @@ pub fn diagnose(
 /// [`diagnose`] with a callback at the beginning of each stage.
 ///
 /// # Errors
-/// The case cannot be simulated, or a recording cannot be compared: too short, clipped, or without a required channel.
+/// No recording is given; the case lacks an entry or cannot be simulated; or a recording cannot be compared: for example, it is too short,
+/// clipped, or without a required channel.
 pub fn diagnose_watched(
     case: &Case,
     recordings: &[Recording],

@@ -77,7 +77,7 @@ impl Decays {
         &self.columns[channel][state]
     }
 
-    /// Fits the initial state to `residuals` by least squares, with each channel weighted by one over its `sizes`.
+    /// Fits the initial state to `residuals` by least squares, with the residual of each channel divided by its size in `sizes`.
     pub(crate) fn fit(&mut self, residuals: &[Vec<f64>], sizes: &[f64]) {
         let order = self.start.len();
         let mut gram = DMatrix::<f64>::zeros(order, order);
@@ -112,7 +112,7 @@ impl Decays {
         columns
     }
 
-    /// Subtracts the free decay from the samples of a channel.
+    /// Subtracts the free decay from the compared samples of a channel.
     pub(crate) fn without(&self, channel: usize, samples: &[f64]) -> Vec<f64> {
         let mut without = samples.to_vec();
         for (column, start) in self.compared(channel).iter().zip(&self.start) {
@@ -123,7 +123,7 @@ impl Decays {
         without
     }
 
-    /// Adds the free decay to the samples of a channel.
+    /// Adds the free decay to the compared samples of a channel.
     pub(crate) fn add_to(&self, channel: usize, samples: &mut [f64]) {
         for (column, start) in self.compared(channel).iter().zip(&self.start) {
             for (sample, value) in samples.iter_mut().zip(column) {

@@ -1,4 +1,4 @@
-//! The motion of the spindle and of the teeth in a recorded cut, and free decays.
+//! Spindle angle, chips and cutting force of a recorded cut, and free decays of the structure.
 
 pub(crate) mod chips;
 pub(crate) mod cut_force;

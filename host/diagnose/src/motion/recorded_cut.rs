@@ -15,8 +15,8 @@ use quietcut_recording::Recording;
 use quietcut_simulate::path::SampledMotion;
 use quietcut_simulate::{Cutter, Effects, Spindle};
 
-/// Smallest sin φ of the immersion angle φ at which surfaces of passes before the last are still evaluated. The feed adds f·sin φ to the
-/// chip thickness, so nearer to the ends of a slot a tooth could miss any number of passes.
+/// Smallest sin φ of the immersion angle φ down to which all passes that a vibrating tooth may miss are evaluated. The feed adds f·sin φ to
+/// the chip thickness, so nearer to the ends of a slot a tooth could miss any number of passes.
 const SHALLOW: f64 = 0.1;
 /// Largest number of successive passes for which a tooth may leave the workpiece uncut.
 const MOST_MISSED: usize = 24;
@@ -32,12 +32,12 @@ pub(crate) struct RecordedCut {
     rate_hz: f64,
     /// Number of samples of the record.
     count: usize,
-    /// Number of earlier tooth passes that may have left the present surface, if vibrating teeth miss passes; `None` if it is always the
-    /// last pass.
+    /// Number of earlier tooth passes that may have left the present surface, if vibrating teeth miss passes; `None` if one revolution and
+    /// one pass suffice.
     passes: Option<usize>,
 }
 
-/// Immersion and feed of a recording: from its sidecar, otherwise from the case.
+/// Immersion and feed of a recording: from its sidecar, otherwise from the case. The feed direction is that of the case.
 ///
 /// # Errors
 /// The case has no cut.
@@ -53,10 +53,12 @@ pub(crate) fn cut_of(case: &Case, recording: &Recording) -> Result<Cut, Diagnose
 }
 
 impl RecordedCut {
-    /// The cut of a recording: working point from the sidecar, the rest from the case with its extensions.
+    /// The cut of a recording: speed from the tachometer, depth, immersion and feed from the sidecar, the rest from the case with its
+    /// extensions. Immersion and feed that the sidecar lacks are those of the case.
     ///
     /// # Errors
-    /// No tool, material or cut in the case, no depth in the sidecar, no tachometer in the recording; or an extension that does not apply.
+    /// The case, the sidecar or the tachometer lacks a value that describes the cut; they contradict each other in the number of teeth or
+    /// the speed; or the cut or an extension is not possible.
     pub(crate) fn new(case: &Case, effects: &Effects, recording: &Recording) -> Result<Self, DiagnoseError> {
         let (tool, material, cut) = (case.tool()?, case.material()?, cut_of(case, recording)?);
         let given = recording.sidecar.cut.unwrap_or_default();

@@ -15,12 +15,13 @@ use quietcut_simulate::{Fluctuation, Spindle};
 pub(crate) struct SpindleMotion {
     spindle: Spindle,
     rpm: f64,
-    /// Spindle angle at the beginning of the whole recording, rad. The phase of a speed modulation also starts there.
+    /// Spindle angle at the beginning of the whole recording, rad. The phase of a speed modulation is given at the same time.
     start_rad: f64,
     fluctuation: Option<Fluctuation>,
     /// Time from the beginning of the whole recording to the first sample, s: see [`Recording::since_s`].
     since_s: f64,
-    /// Times at which tooth 1 passes immersion angle 0: edges of the tachometer, s.
+    /// Times, from the beginning of the whole recording, at which tooth 1 passes immersion angle 0: one edge of the tachometer per
+    /// revolution, s.
     edges_s: Vec<f64>,
 }
 
@@ -28,7 +29,7 @@ impl SpindleMotion {
     /// Fits the spindle angle to the tachometer of a recording: constant speed, with the speed modulation of the case if there is one.
     ///
     /// # Errors
-    /// The recording has no tachometer channel, or its tachometer has too few edges.
+    /// The recording has no tachometer channel, or its edges are too few or do not match the wheel.
     pub(crate) fn new(
         recording: &Recording,
         fluctuation: Option<Fluctuation>,
@@ -73,12 +74,12 @@ impl SpindleMotion {
         .fitted()
     }
 
-    /// Least-squares fit of mean speed and start angle to the tachometer edges. The speed modulation depends on the mean speed only through
-    /// its amplitude, so that three iterations converge.
+    /// Least-squares fit of mean speed and start angle to the tachometer edges. The lead that the speed modulation gives the spindle, as a
+    /// time, does not depend on the mean speed, so that the fit is linear and the first iteration is final.
     fn fitted(mut self) -> Self {
         let count = self.edges_s.len() as f64;
         for _ in 0..3 {
-            // At tachometer edge k the spindle angle is 2πk. Minus the speed modulation, the angle is linear in time.
+            // At tachometer edge k the spindle angle is 2πk. It is linear in the time plus the lead of the speed modulation.
             let modulation_s = |t: f64| self.modulation_s(t);
             let times: Vec<f64> = self.edges_s.iter().map(|t| t + modulation_s(*t)).collect();
             let mean_t = times.iter().sum::<f64>() / count;
@@ -137,7 +138,7 @@ impl SpindleMotion {
     }
 }
 
-/// Step of the grid of tried frequencies of a speed modulation, in modulation periods per record duration.
+/// Step of the grid of tried frequencies of a speed modulation, in modulation periods per duration of the longest record.
 const STEP: f64 = 0.2;
 
 /// A speed modulation estimated from tachometer edges.
@@ -149,7 +150,8 @@ pub(crate) struct SpeedModulation {
     pub deviation: [f64; 3],
 }
 
-/// The speed modulation that fits the tachometer edges of all records best; `None` if none is significant.
+/// The speed modulation that fits the tachometer edges of all records best; `None` if the edges are too few, or if it is not significant or
+/// its amplitude too large.
 ///
 /// Edge k is at the time t with k T₀ = t + δ cos ψ·(1 − cos ωt)/ω + δ sin ψ·sin ωt/ω + constant. The equation is linear in all unknowns
 /// except the frequency ω. T₀ and the constant differ between records.
@@ -316,7 +318,7 @@ mod tests {
         .fitted()
     }
 
-    /// A pulse of 4 ms per position of a wheel at 7 rev/s, read as `tacho` from the column `encoder`.
+    /// A pulse over the first half of each position of a wheel at 7 rev/s, read as `tacho` from the column `encoder`.
     fn recording(positions: u16, missing: u16) -> Recording {
         let level = |sample: usize| {
             let turns = 7.0 * (sample as f64 * 1e-4 - 0.05) + 10.0;

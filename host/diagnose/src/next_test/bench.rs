@@ -15,16 +15,17 @@ use quietcut_model::case::Case;
 use quietcut_model::milling::Cut;
 use quietcut_recording::{Channel, Quantity, Recording, TestKind};
 
-/// Largest number of samples per channel of a simulated test that may be proposed.
+/// Largest number of samples per channel in the standard duration of a proposed test. Some tests last longer, up to a factor of four, and
+/// cuts begin with a transient.
 const SAMPLES: f64 = 8192.0;
-/// Smallest and largest duration of a proposed test, in periods of the lowest natural frequency.
+/// Smallest and largest standard duration of a proposed test, in periods of the lowest natural frequency, unless [`SAMPLES`] shortens it.
 const PERIODS: [f64; 2] = [20.0, 60.0];
 /// Samples of a simulated test per period of the highest natural frequency of the baseline.
 const SAMPLES_PER_PERIOD: f64 = 24.0;
 /// Duration of the transient that is simulated before a proposed cut is compared, in multiples of the longest time constant of the
 /// structure.
 const SETTLED: f64 = 12.0;
-/// Largest duration of the simulated transient of a proposed cut, as a multiple of the duration of the cut itself.
+/// Largest duration of the simulated transient of a proposed cut, as a multiple of the standard duration of a test.
 const WAITED: f64 = 4.0;
 
 /// A channel of motion that the records contain.
@@ -35,7 +36,7 @@ pub(super) struct MeasuredChannel {
     deviation: f64,
 }
 
-/// Working point of the first recorded cut.
+/// Working point of the first recorded cut whose sidecar gives speed and depth.
 #[derive(Clone)]
 pub(super) struct CutSoFar {
     pub(super) rpm: f64,
@@ -53,10 +54,11 @@ pub(super) struct Bench<'a> {
     pub(super) modes_hz: [f64; 2],
     /// True if a recorded cut has a channel of force.
     pub(super) has_force: bool,
-    /// Peak force of proposed tests of the structure, N: the largest force in records of such tests. Without such records, the force that
-    /// causes the displacement `largest_m` at the lowest natural frequency.
+    /// Force of level 1 in proposed tests of the structure, N: the largest force in records other than cuts. Without such a force, the one
+    /// that causes the displacement `largest_m` at the lowest natural frequency.
     pub(super) force_n: f64,
-    /// Largest displacement of the tool in the records, m.
+    /// Largest displacement of the tool in the records, m. Peaks of velocity and acceleration are converted at the lowest natural
+    /// frequency.
     pub(super) largest_m: f64,
     /// Standard duration of a proposed test, s.
     pub(super) seconds: f64,
@@ -68,7 +70,7 @@ impl<'a> Bench<'a> {
     /// Prepares the simulation of tests that may be proposed.
     ///
     /// # Errors
-    /// The case cannot be simulated, has no oscillating mode, or the records contain no channel of motion; the error is a sentence.
+    /// The case cannot be simulated, has no oscillating mode, or the records contain no motion; the error is a sentence.
     pub(super) fn new(
         case: &'a Case,
         recordings: &[Recording],
@@ -125,7 +127,8 @@ impl<'a> Bench<'a> {
         compliance(&self.baseline, 0.0)
     }
 
-    /// Standard deviation of each reading's noise: that of the same channel in the records, otherwise an assumed share of the reading.
+    /// Standard deviation of each reading's noise: that of the same channel in the records, otherwise an assumed share of the reading's
+    /// root mean square.
     pub(super) fn deviations(&self, readings: &[SimulatedReading]) -> Vec<f64> {
         let of = |reading: &SimulatedReading| {
             let measured = self

@@ -22,7 +22,7 @@ const LEAST_IMPACT_N: f64 = 1.0;
 pub(super) enum Excitation {
     /// A force on the structure at standstill.
     Rig { direction: Direction, signal: Signal },
-    /// A stable cut.
+    /// A cut. Its stability is not checked, but it is refused if the tool moves much farther than in the records.
     Cut {
         rpm: f64,
         depth_mm: f64,
@@ -36,7 +36,8 @@ pub(super) enum Excitation {
 pub(super) struct Experiment {
     pub(super) excitation: Excitation,
     rate_hz: f64,
-    /// Effort of the test relative to others; the proposal with the least effort is preferred.
+    /// Effort of the test relative to others, without that of additional sensors. Of the proposals that separate the candidate models, the
+    /// one with the least sum of both is preferred.
     pub(super) effort: f64,
 }
 
@@ -106,7 +107,7 @@ fn of_cuts(bench: &Bench<'_>) -> Vec<Experiment> {
     let Some(so_far) = &bench.cut else {
         return Vec::new();
     };
-    // Factors on spindle speed, axial depth, feed per tooth and duration of the recorded cut.
+    // Factors on spindle speed, axial depth and feed per tooth of the recorded cut, and on the standard duration of a test.
     let factors = [
         (1.0, 1.0, 1.0, 1.0),
         (0.8, 1.0, 1.0, 1.0),
@@ -144,7 +145,7 @@ impl Experiment {
     /// Readings of all sensors if `case` is the true machine.
     ///
     /// # Errors
-    /// The experiment cannot be simulated, or the cut moves too far; the error is a sentence.
+    /// The experiment cannot be simulated, or the tool moves too far in a cut; the error is a sentence.
     pub(super) fn readings(&self, bench: &Bench<'_>, case: &Case) -> Result<Vec<SimulatedReading>, String> {
         let mounted = self.recording(bench, case)?;
         // A second sensor next to a mounted one is taken as free of errors, so the sensor extensions of the case are removed for it.

@@ -5,7 +5,7 @@
 pub(super) enum Sensors {
     /// The sensors of the records.
     Mounted,
-    /// The sensors of the records, and a second one at the tool next to each.
+    /// The sensors of the records, and at the tool a second one next to each sensor of motion.
     Second,
     /// The sensors of the records, and a dynamometer.
     Force,

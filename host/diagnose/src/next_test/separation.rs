@@ -34,7 +34,7 @@ pub(super) struct Difference {
     /// min over δ of ‖y_A − y_B − J_B δ‖² + ‖δ‖², or the same with A and B exchanged if that is smaller. Readings y are in standard
     /// deviations of their noise, δ in standard deviations of the parameters.
     pub(super) squared: f64,
-    /// The channel in which the readings predicted by the two candidate models differ most.
+    /// The channel in which the readings of the two candidate models differ most after the fit, in units of its noise.
     pub(super) channel: String,
     /// Root mean square of the two models' difference in that channel after the fit, in standard deviations of the channel's noise.
     pub(super) times_noise: f64,
@@ -142,7 +142,7 @@ pub(super) fn between(bench: &Bench<'_>, one: &Predicted, other: &Predicted, sen
 }
 
 /// Difference between the readings that the candidate model `truth` and the candidate model `model` predict, after the parameters of
-/// `model` are fitted to those of `truth` within their uncertainty.
+/// `model` are fitted to the readings of `truth` within their uncertainty.
 fn difference(bench: &Bench<'_>, truth: &Predicted, model: &Predicted, sensors: Sensors) -> Difference {
     let deviations = bench.deviations(&truth.readings);
     let compared: Vec<usize> = (0..truth.readings.len())

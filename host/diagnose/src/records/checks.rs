@@ -12,7 +12,7 @@ use crate::records::channel::Observed;
 use crate::signal::noise::rms;
 use quietcut_recording::Recording;
 
-/// Refuses a recording that is too short, without a required channel, clipped, or not finite.
+/// Refuses a recording that is too short or without a channel to compare, or has a channel that is clipped, not finite, or zero throughout.
 pub(crate) fn record(
     baseline: &Baseline<'_>,
     recording: &Recording,
@@ -77,11 +77,12 @@ const UNITS: [(f64, f64, &str); 6] = [
     (9.806_65, UNIT_TOLERANCE, "9.81: g for m/s²"),
 ];
 
-/// Refuses a channel whose ratio to the prediction is that of a wrong unit.
+/// Refuses a channel whose ratio to the prediction is outside the range from `FRICTION_RATIO` to `WRONG_UNIT_RATIO` at the same waveform,
+/// or impossible ([`far_off`]).
 ///
 /// `response` is the response to the forces alone that the baseline predicts, `measured` the samples of the channel, `by_noise` the energy
-/// of the response to force-sensor noise. The ratio is the least-squares factor between the first two; it is evaluated only if they
-/// correlate.
+/// of the response to force-sensor noise. The ratio is the absolute least-squares factor from the first to the second; unless impossible,
+/// it is evaluated only if they correlate.
 pub(crate) fn unit(
     path: &std::path::Path,
     name: &str,
@@ -95,7 +96,8 @@ pub(crate) fn unit(
     if own <= LEAST_ENERGY_OVER_FORCE_NOISE * by_noise || whole <= 0.0 {
         return Ok(());
     }
-    // The check uses only the varying part of the predicted response: the response to a constant force says nothing about the vibration.
+    // An impossible ratio is refused only if the varying part of the predicted response exceeds the response to force noise: the response
+    // to a constant force says nothing about the vibration.
     if spread(response).powi(2) * response.len() as f64 > LEAST_ENERGY_OVER_FORCE_NOISE * by_noise {
         far_off(path, name, response, measured)?;
     }
@@ -121,9 +123,9 @@ pub(crate) fn unit(
     ))
 }
 
-/// Result of the unit checks of a cut: success if one channel passes, otherwise the first refusal. If one unit is right, a ratio of another
-/// channel within the limits of [`far_off`] is not a wrong unit: a wrong edge coefficient alone changes a small axial force by a factor of
-/// ten.
+/// Result of the unit checks of a cut: success if one channel passes or none is checked, otherwise the first refusal. If one unit is right,
+/// a ratio of another channel within the limits of [`far_off`] is not a wrong unit: a wrong edge coefficient alone changes a small axial
+/// force by a factor of ten.
 pub(crate) fn unless_one_is_right(
     checked: impl IntoIterator<Item = Result<(), DiagnoseError>>,
 ) -> Result<(), DiagnoseError> {
@@ -135,8 +137,8 @@ pub(crate) fn unless_one_is_right(
 }
 
 /// Refuses a channel whose amplitude differs from its prediction by a factor that no machine reaches, whatever its waveform. Sensor offsets
-/// are removed. A channel is too large if its variation exceeds the prediction including the mean, because evenly pitched teeth in a slot
-/// give almost no variation.
+/// are removed. A channel is too large against the prediction including its mean, because evenly pitched teeth in a slot give almost no
+/// variation; it is too small against the variation of the prediction.
 pub(crate) fn far_off(
     path: &std::path::Path,
     name: &str,
@@ -187,8 +189,9 @@ fn said(likely: Option<&str>) -> String {
     likely.map_or_else(String::new, |meant| format!(" It is about {meant}."))
 }
 
-/// The level at which a channel is clipped: at one end of its range it has many flat tops of at least three equal samples, or a single one
-/// with steep flanks. `None` without clipping.
+/// The level at which a channel is clipped: at one end of its range, unless that is zero, it has at least two flat tops of at least three
+/// equal samples with more than the share `CLIPPED_SHARE` of all samples, or one as short as an impact with steep flanks. `None` without
+/// clipping.
 fn clipped(samples: &[f64]) -> Option<f64> {
     let (low, high) = samples
         .iter()
@@ -226,9 +229,9 @@ fn clipped(samples: &[f64]) -> Option<f64> {
     })
 }
 
-/// True if a flat top no longer than an impact has steep flanks. A smooth peak that is flat over three samples falls by at most ten levels
-/// two samples beside them: a parabola that stays within one level over three samples has a curvature of c ≤ 1 level and falls by 9c up to
-/// there, and rounding adds one level.
+/// True if a flat top as short as an impact has a steep flank on both sides. A smooth peak that is flat over three samples falls by at most
+/// ten levels two samples beside them: a parabola that stays within one level over three samples has a curvature of c ≤ 1 level and falls
+/// by 9c up to there, and rounding adds one level.
 fn has_cliff(samples: &[f64], at: impl Fn(&f64) -> bool, end: f64, resolution: f64) -> bool {
     let (mut first, mut steepest) = (0, 0.0_f64);
     while first < samples.len() {

@@ -13,14 +13,14 @@ use quietcut_recording::{Quantity, Recording};
 /// Number of iterations between cutting force and motion: the force determines the motion, and the motion determines the chip thickness and
 /// so the force.
 const ROUNDS: usize = 4;
-/// Largest number of iterations if a candidate model supplies the motion. They end earlier if the motion is within [`CLOSED_LOOP_SETTLED`]
-/// of the closed-loop prediction.
+/// Largest number of iterations if a candidate model supplies the motion. They end earlier if, away from chatter, the motion is within
+/// [`CLOSED_LOOP_SETTLED`] of the closed-loop prediction.
 const ROUNDS_OF_A_MODEL: usize = 8;
 
 /// Completes the record of a cut: predicts all channels, and corrects the motion by the residual.
 ///
 /// # Errors
-/// The case cannot describe the cut, or the size of a channel is impossible.
+/// The case and the recording do not describe one cut, or the size of a channel is that of a wrong unit.
 pub(super) fn predicted(
     mut record: Record,
     baseline: &Baseline<'_>,
@@ -87,7 +87,7 @@ pub(super) fn predicted(
             check_units(&record)?;
         }
         let off = record.distance_from_closed_loop();
-        // In the first iteration with the motion of a candidate model, the force is still that along the measured motion.
+        // In the first iteration the force is that of the feed alone, and not yet along the motion that a candidate model supplies.
         let is_along = (round > 0 || record.clean.is_none()) && !record.amplifies;
         motion_estimate::learn(&mut record, baseline, &force, is_along.then_some(&slopes));
         if record.clean.is_some() && is_along && off < CLOSED_LOOP_SETTLED {
@@ -100,8 +100,9 @@ pub(super) fn predicted(
     Ok(record)
 }
 
-/// Refuses channels whose size cannot be that of this cut. The first prediction has no motion. Measured forces are close to those by the
-/// feed alone and are compared with them; motion is only checked roughly, because regeneration may amplify it.
+/// Refuses channels whose size cannot be that of this cut. The first prediction is that for a tool that moves by the feed alone. Measured
+/// forces are close to those by the feed alone and are compared with them; motion is only checked roughly, because regeneration may amplify
+/// it.
 fn check_units(record: &Record) -> Result<(), DiagnoseError> {
     let mut forces = Vec::new();
     for (index, channel) in record.channels.iter().enumerate() {

@@ -30,7 +30,8 @@ impl Cutting {
     /// `with_force` is true if forces are measured.
     ///
     /// # Errors
-    /// The case or the recording lacks a value that describes the cut, or an extension does not apply to it.
+    /// The case or the recording lacks a value that describes the cut, they contradict each other, or an extension does not apply to the
+    /// cut.
     pub(super) fn new(
         baseline: &Baseline<'_>,
         recording: &Recording,

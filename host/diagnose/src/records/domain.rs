@@ -7,9 +7,11 @@ use quietcut_recording::{Quantity, Recording, TestKind};
 /// The quantity in which a record is compared with the baseline.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Domain {
-    /// The force F is the input, and motion is compared: y − H·(F − f_r).
+    /// The force F is the input, and motion is compared: y − H·(F − f_r). In a cut the baseline predicts F, and a measured force is
+    /// compared too.
     Response,
-    /// The motion is the input (`input = ["x"]`, or a structure without stiffness), and force is compared: F − (M ẍ + C ẋ + K x + f_r).
+    /// The motion is the input (`input = ["x"]`, or a structure with a rigid-body mode), and force is compared: F − (M ẍ + C ẋ + K x +
+    /// f_r).
     Force,
 }
 

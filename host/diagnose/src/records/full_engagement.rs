@@ -2,9 +2,9 @@
 //!
 //! A case describes a tool at full immersion and depth. Recordings of real cuts begin and end in air, and during entry and exit the tool
 //! crosses a face of the workpiece, where the case does not define the chips. Therefore only the segment with full engagement is compared.
-//! A revolution is in air if its vibration is small both against the other revolutions of the recording and against the response of the
-//! baseline to the feed alone. The second condition is needed because chatter exceeds the response to the feed by far: before chatter has
-//! grown, revolutions are small against later ones without being in air.
+//! A revolution is in air if the vibration of one channel is small both against the other revolutions of the recording and against the
+//! response of the baseline to the feed alone. The second condition is needed because chatter exceeds the response to the feed by far:
+//! before chatter has grown, revolutions are small against later ones without being in air.
 
 use quietcut_numerics::statistics::median;
 use std::borrow::Cow;
@@ -31,11 +31,11 @@ use quietcut_simulate::{Cutter, Spindle, WorkpieceTraverse};
 /// Number of angles per revolution at which the cutting force is evaluated.
 const ANGLES: usize = 512;
 
-/// The recordings, each cut to its segment of full engagement, and one warning for each that was shortened or could not be examined.
-/// Recordings with full engagement throughout, and those of other tests, stay as they are.
+/// The recordings, each cut to its segment of full engagement, and warnings: one for each that is shortened, and one more if its tool has
+/// no diameter. Recordings that show no air, and those of other tests, stay as they are.
 ///
 /// # Errors
-/// A recording has too few revolutions of full engagement.
+/// The case cannot be simulated, or a recording has too few revolutions of full engagement.
 pub(crate) fn in_full_engagement<'a>(
     case: &Case,
     recordings: &'a [Recording],
@@ -88,7 +88,8 @@ struct Engaged {
     has_diameter: bool,
 }
 
-/// The samples of a recorded cut with full engagement; `None` if it contains no air, or if no channel shows air.
+/// The samples of a recorded cut with full engagement; `None` if it is not a cut, lacks a value, shows no air, or never reaches
+/// `ENGAGED_LEVEL`.
 fn engaged(baseline: &Baseline<'_>, recording: &Recording) -> Option<Engaged> {
     if !is_of_a_cut(recording) {
         return None;
@@ -132,7 +133,8 @@ fn engaged(baseline: &Baseline<'_>, recording: &Recording) -> Option<Engaged> {
     })
 }
 
-/// The tool in its cut at the mean spindle speed `rpm`, rev/min; `None` if a required value is missing or wrong, which the preparation of the record reports as an error.
+/// The tool in its cut at the mean spindle speed `rpm`, rev/min; `None` if a required value is missing or wrong, which the preparation of
+/// the record reports as an error.
 fn cutter(baseline: &Baseline<'_>, recording: &Recording, rpm: f64) -> Option<Cutter> {
     let case = baseline.case;
     let depth_mm = recording.sidecar.cut?.axial_depth_mm?;
@@ -310,7 +312,7 @@ impl Levels {
     }
 }
 
-/// Standard deviation of the samples, with the noise variance subtracted.
+/// Standard deviation of the samples, with the noise variance subtracted; 0 if that is larger.
 fn deviation(samples: &[f64], noise: f64) -> f64 {
     let count = samples.len().max(1) as f64;
     let mean = samples.iter().sum::<f64>() / count;
