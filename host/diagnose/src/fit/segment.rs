@@ -30,7 +30,7 @@ pub(crate) struct Segment {
     nuisance: Vec<Vec<f64>>,
 }
 
-/// Unknown contributions that are projected out of a segment.
+/// Unknown contributions that are projected out of a segment; none in the force domain.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Nuisance {
     /// Free decays of the baseline from an unknown initial state, and offsets of sensors.

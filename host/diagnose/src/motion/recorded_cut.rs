@@ -32,8 +32,8 @@ pub(crate) struct RecordedCut {
     rate_hz: f64,
     /// Number of samples of the record.
     count: usize,
-    /// Number of earlier tooth passes that may have left the present surface, if vibrating teeth miss passes; `None` if one revolution and
-    /// one pass suffice.
+    /// Number of earlier tooth passes that may have left the present surface, if vibrating teeth miss passes; `None` for two passes, or one
+    /// revolution and one pass if the teeth differ in radius.
     passes: Option<usize>,
 }
 

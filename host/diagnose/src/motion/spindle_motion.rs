@@ -146,7 +146,7 @@ const STEP: f64 = 0.2;
 pub(crate) struct SpeedModulation {
     /// Relative amplitude δ, frequency f_m and phase ψ of the modulation.
     pub fluctuation: Fluctuation,
-    /// Standard deviations of the speed modulation's δ, f_m in Hz and ψ in rad, from the residual of the tachometer edge times.
+    /// Standard deviations of the errors of the estimated δ, f_m in Hz and ψ in rad, from the residual of the tachometer edge times.
     pub deviation: [f64; 3],
 }
 
@@ -206,7 +206,8 @@ pub(crate) fn speed_modulation(spindle_motions: &[&SpindleMotion]) -> Option<Spe
     })
 }
 
-/// Standard deviations of the speed modulation's δ, f_m in Hz and ψ in rad, if the tachometer edge times scatter with this variance, s².
+/// Standard deviations of the errors of the estimated δ, f_m in Hz and ψ in rad, if the tachometer edge times scatter with `variance`, s²;
+/// infinite if the three are not identifiable.
 fn deviation(
     spindle_motions: &[&SpindleMotion],
     frequency_hz: f64,

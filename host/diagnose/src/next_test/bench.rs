@@ -28,7 +28,7 @@ const SETTLED: f64 = 12.0;
 /// Largest duration of the simulated transient of a proposed cut, as a multiple of the standard duration of a test.
 const WAITED: f64 = 4.0;
 
-/// A channel of motion that the records contain.
+/// A channel of motion that the records contain and the baseline predicts.
 pub(super) struct MeasuredChannel {
     pub(super) name: String,
     quantity: Quantity,

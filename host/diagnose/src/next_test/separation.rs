@@ -22,8 +22,8 @@ pub(super) struct Rival<'a> {
 /// Readings of an experiment under a candidate model.
 pub(super) struct Predicted {
     readings: Vec<SimulatedReading>,
-    /// For each uncertain parameter: readings simulated with the parameter changed by a step, and that step in standard deviations of the
-    /// parameter.
+    /// For each uncertain parameter whose step can be simulated: readings with the parameter changed by the step, and the step in standard
+    /// deviations of the parameter.
     moved: Vec<(Vec<SimulatedReading>, f64)>,
 }
 

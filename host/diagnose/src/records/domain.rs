@@ -16,10 +16,10 @@ pub(crate) enum Domain {
 }
 
 impl Domain {
-    /// The domain (motion or force) in which a recording is compared, from its kind, its input and its channels.
+    /// The domain (motion or force) in which a recording is compared, from its kind, its input and its channels, and from the structure.
     ///
     /// # Errors
-    /// The recording lacks a channel or has no known excitation.
+    /// The recording lacks a required channel, or is an idle record, which has no known excitation.
     pub(super) fn of(baseline: &Baseline<'_>, recording: &Recording) -> Result<Self, DiagnoseError> {
         let has = |quantity: Quantity| {
             recording
