@@ -4,14 +4,14 @@
 //! The residual is computed along the *measured* motion: with H the receptance of the case, F the force and f_r a restoring force that the
 //! case lacks, y − H·F = −H·f_r(x, v) + free decay + noise holds exactly, also for large f_r. A cause contributes one or few regressors
 //! f_r(x, v), and the fit of any set of causes is linear least squares. The few best candidate models are then fitted by prediction error,
-//! which away from chatter does not contain the noise of the measured motion: tests of structures are simulated; a study with a cut is
-//! predicted again with the extended case. Without a cut, records that are compared in force keep the linear fit.
+//! whose regressors, except near chatter, do not contain the noise of the measured motion: tests of structures are simulated; a study with
+//! a cut is predicted again with the extended case. Without a cut, records that are compared in force keep the linear fit.
 //!
 //! Data flows through these rooms from the top to the bottom; a room uses only those above it:
 //!
 //! - `criteria`, `error`, `progress`, `signal`: thresholds; errors, options, stages; transforms and noise floors of sampled signals.
 //! - `baseline`: the model of the case file. It knows no recording.
-//! - `motion`: the kinematics of a recorded cut (spindle angle, tooth passings, chips) and free decays. It knows no `Record`.
+//! - `motion`: spindle angle, chips and cutting force of a recorded cut along a given motion, and free decays. It knows no `Record`.
 //! - `records`: each recording beside what the baseline predicts of it, and the `Study` that holds them. It knows no cause.
 //! - `candidates`: the causes that a baseline may lack, as regressors along the measured motion and as simulations. It fits nothing.
 //! - `fit`: the parameters of one candidate model. It does not compare candidates.

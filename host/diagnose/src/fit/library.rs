@@ -30,7 +30,8 @@ pub(crate) struct Library {
     pub unexamined: Vec<String>,
 }
 
-/// The effects that change the linear structure. All three by one factor scale its dynamic stiffness by that factor.
+/// The effects that change mass, stiffness and damping of the structure. All three by one factor scale its dynamic stiffness by that
+/// factor.
 pub(crate) const OF_DYNAMIC_STIFFNESS: [EffectName; 3] =
     [EffectName::Mass, EffectName::Stiffness, EffectName::Damping];
 

@@ -10,7 +10,7 @@ use crate::fit::unknowns::{FitProblem, FreeParameter, ParameterPoint, SearchResu
 /// Relative changes of one parameter, up and down from its value at the end of a search with friction. The search restarts from the change
 /// with the smallest χ².
 const NEARBY: [f64; 6] = [5e-4, 1e-3, 2e-3, 4e-3, 8e-3, 0.016];
-/// Factors that multiply the start value of each parameter of the cause where the fit of a free decay restarts; two parameters take every
+/// Factors on the start value of each parameter of a single cause, from which the fit of free decays restarts; two parameters take every
 /// pair of factors.
 const SIZES: [f64; 6] = [0.1, 0.25, 0.5, 1.0, 2.0, 4.0];
 /// Largest number of parameters with which a search restarts from multiples of the start values: the number of restarts grows exponentially

@@ -5,7 +5,8 @@
 pub(crate) struct CutForce {
     /// Mean cutting force over each interval of the upsampled grid, N.
     pub mean_n: [Vec<f64>; 3],
-    /// Cutting force at the samples of the record, N, if forces are measured; 0 at samples near the entry or exit of a tooth.
+    /// Cutting force at the samples of the record, N; 0 at samples near the entry or exit of a tooth, and at all samples if no force is
+    /// measured.
     pub sampled_n: [Vec<f64>; 3],
 }
 

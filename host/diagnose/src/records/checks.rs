@@ -66,8 +66,8 @@ pub(crate) fn record(
     Ok(())
 }
 
-/// Ratios by which a wrong unit scales a channel, each with its tolerance as a difference of logarithms, and the words for the unit that
-/// was probably meant.
+/// Ratios by which a wrong unit scales a channel up or down, each with its tolerance as a difference of logarithms, and the words for the
+/// unit that was probably meant.
 const UNITS: [(f64, f64, &str); 6] = [
     (4.448, POUND_TOLERANCE, "4.45: pounds of force for N"),
     (1e3, UNIT_TOLERANCE, "a thousand: mm, kN or g for m, N or kg"),
