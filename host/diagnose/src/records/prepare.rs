@@ -3,7 +3,7 @@
 //! 1. [`opened`]: channels, transforms and transfer functions of a recording that passed its checks.
 //! 2. The prediction of the baseline, and with it the motion: [`response_prediction`] for a test of the structure,
 //!    [`cut_prediction`] for a cut, [`motion_estimate`] if forces are compared.
-//! 3. [`checked`]: a record whose channels have the size that the baseline predicts.
+//! 3. [`checked`], for all but compared forces: refuses a record if the size of its channels shows a wrong unit.
 
 use crate::baseline::Baseline;
 use crate::baseline::dynamic_stiffness;
@@ -20,14 +20,15 @@ use crate::signal::noise::{BANDS, floor_between_impacts, rms, white_floor};
 use quietcut_recording::{Quantity, Recording, TestKind};
 use quietcut_simulate::path::SampledMotion;
 
-/// Smallest oversampling factor of the grid on which a cut's force and motion are computed, because the force jumps when teeth enter and
-/// leave.
+/// Oversampling factor of the grid on which a cut's force and motion are computed. It is high because the force jumps when teeth enter
+/// and leave.
 const FINER_IN_CUTS: usize = 8;
 
 /// Prepares a recording for comparison: a record with the prediction of the baseline.
 ///
 /// # Errors
-/// The recording cannot be compared: too short, clipped, without a required channel, or of a kind without a known excitation.
+/// The recording cannot be compared. It is, for example, too short, clipped, without a required channel, in a wrong unit, or of a kind
+/// without a known excitation.
 pub(super) fn prepare(
     baseline: &Baseline<'_>,
     recording: &Recording,
@@ -68,7 +69,7 @@ fn opened(baseline: &Baseline<'_>, recording: &Recording, known: Known) -> Resul
     let highest_hz = highest_hz(recording);
     let rate_hz = recording.sample_rate_hz;
     // The upsampled grid must represent harmonics of nonlinear restoring forces up to the sixteenth of `highest_hz`, the end of the
-    // measured motion's band: they lie below half the upsampled rate. At most 8 samples per sample are used.
+    // measured motion's band: they lie below half the upsampled rate. The oversampling factor is at most 8 all the same.
     let finer = ((32.0 * highest_hz / rate_hz).ceil() as usize)
         .clamp(if is_cut { FINER_IN_CUTS } else { 1 }, 8)
         .next_power_of_two();
@@ -131,8 +132,8 @@ fn opened(baseline: &Baseline<'_>, recording: &Recording, known: Known) -> Resul
     Ok(record)
 }
 
-/// Returns the record unless the size of a channel cannot be that of the baseline. In a cut only channels of motion are checked here; its
-/// forces were checked in the first prediction.
+/// Returns the record unless the size of a channel shows a wrong unit; a cut is returned if one channel passes. In a cut only channels of
+/// motion are checked here; its forces were checked in the first prediction.
 fn checked(record: Record) -> Result<Record, DiagnoseError> {
     let is_cut = record.kind == Some(TestKind::Cutting);
     let checked = |(index, channel): (usize, &Observed)| {
@@ -163,7 +164,8 @@ fn energy_by_force_noise(record: &Record, channel: usize) -> f64 {
     power.iter().sum::<f64>() / BANDS as f64 * record.grid.count() as f64
 }
 
-/// Forces along the axes of the baseline, N, corrected for the faults of force sensors that the baseline contains.
+/// Measured forces along the axes of the baseline, N, divided by the gains of the force sensors in the baseline; empty along an axis
+/// without force channel.
 fn forces(baseline: &Baseline<'_>, recording: &Recording) -> [Vec<f64>; 3] {
     std::array::from_fn(|axis| {
         let name = ["fx", "fy", "fz"][axis];
@@ -191,7 +193,7 @@ fn floor_n(force_n: &[f64], kind: Option<TestKind>) -> f64 {
     }
 }
 
-/// Values of `at` in a sidecar that mean the tool tip.
+/// Values of `at` in a sidecar, in lower case, that mean the tool tip.
 const TOOL_TIP: [&str; 5] = ["tool-tip", "tool tip", "tip", "tcp", "tool"];
 
 fn elsewhere(recording: &Recording) -> Vec<String> {

@@ -50,14 +50,15 @@ pub(crate) struct Record {
     pub force_n: [Vec<f64>; 3],
     /// Noise floor of each force as a standard deviation of white noise, N: sensor noise and aliased force.
     pub force_deviation_n: [f64; 3],
-    /// Estimated motion of the tool: at each frequency the measured or the predicted displacement, whichever is more certain.
+    /// Estimated motion of the tool: the predicted displacement, corrected at each frequency towards the measured one by its Wiener
+    /// weight. In the force domain: the measured motion.
     pub motion: SampledMotion,
-    /// Spectra of the estimated displacement at the samples of the record, m, continued smoothly beyond both ends. The continuation adds
-    /// only free decays.
+    /// Spectra of the estimated displacement at the samples of the record, m; beyond both ends of the record the displacement is continued
+    /// by reflection and fades out.
     pub displacement: [Vec<Complex64>; 3],
     /// For each channel, in a cut: the estimated motion as this channel reads it, with aliasing, in the unit of the channel.
     pub readings: Vec<Vec<f64>>,
-    /// Frequency below which 99.5 % of the power of each channel of motion lies, Hz.
+    /// Frequency below which 99.5 % of the power of each channel of motion lies, Hz; at least three times the resolution of the record.
     pub highest_hz: f64,
     /// Lowest natural frequency of the baseline, Hz; 0 without oscillating modes.
     pub lowest_hz: f64,
@@ -97,7 +98,7 @@ pub(crate) struct Known {
 }
 
 impl Record {
-    /// Noise variance of a channel by the noise of the force sensors, in bands up to half the sample rate: the mean of σ² |H|² in each.
+    /// Noise variance of a channel from the noise of the force sensors, in bands up to half the sample rate: the mean of σ² |H|² in each.
     pub(super) fn power_by_force_noise(&self, channel: usize) -> [f64; BANDS] {
         let per_band = std::f64::consts::PI * self.grid.rate_hz() / BANDS as f64 / self.grid.omega(1);
         let from = |band: usize| (band as f64 * per_band).round() as usize;
@@ -115,7 +116,8 @@ impl Record {
         })
     }
 
-    /// True if a force acts along `axis`, or if a channel that reads `axis` exceeds its noise.
+    /// True if a force acts along `axis`, or if the RMS of a channel that reads `axis` exceeds `MOVING_OVER_NOISE` standard deviations of its
+    /// noise.
     pub(crate) fn moves(&self, axis: usize) -> bool {
         !self.motion.x[axis].is_empty()
             && (self.channels.iter().any(|channel| {
@@ -238,7 +240,7 @@ impl Record {
     }
 
     /// Accepts the samples `predicted`, which contain no free decay, as prediction of the record: sets samples that are not compared to the
-    /// measured value, adds the best-fitting free decay, and estimates the noise from the residual.
+    /// measured value, adds the best-fitting free decay, and estimates the noise from the residual unless an extended case supplies it.
     pub(crate) fn accept(&mut self, predicted: Vec<Vec<f64>>) {
         for ((channel, mut predicted), skipped) in self.channels.iter_mut().zip(predicted).zip(&self.skipped)
         {
@@ -284,8 +286,8 @@ impl Record {
         self.closed = Some(closed);
     }
 
-    /// Largest root mean square over the channels of the difference between motion and closed-loop prediction, in standard deviations of
-    /// the noise.
+    /// Largest root mean square, over the channels of motion, of [`Self::to_correct`] in the compared samples, in standard deviations of the
+    /// channel's noise. After [`Self::close`] with an extended case it is the step from the prediction to the closed-loop one.
     pub(crate) fn distance_from_closed_loop(&self) -> f64 {
         (0..self.channels.len())
             .filter(|index| self.channels[*index].pickup.quantity != Quantity::Force)

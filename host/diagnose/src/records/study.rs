@@ -21,7 +21,7 @@ impl<'a> Study<'a> {
     /// Compares recordings with the baseline of a case.
     ///
     /// # Errors
-    /// The case cannot be simulated, or a recording cannot be compared.
+    /// No recording is given, the case cannot be simulated, or a recording cannot be compared.
     pub(crate) fn new(case: &'a Case, recordings: &[Recording]) -> Result<Self, DiagnoseError> {
         Self::with(case, recordings, |_| Known::default())
     }
@@ -33,7 +33,7 @@ impl<'a> Study<'a> {
     /// of a candidate model there is no such bias.
     ///
     /// # Errors
-    /// The case cannot be simulated, or a recording cannot be compared.
+    /// No recording is given, the case cannot be simulated, or a recording cannot be compared.
     pub(crate) fn with(
         case: &'a Case,
         recordings: &[Recording],

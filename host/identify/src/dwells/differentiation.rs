@@ -1,4 +1,5 @@
-//! Derivatives and integrals over time of a Fourier series with the coefficients of 1, cos, sin, cos 2 …
+//! Orders of the time derivatives that channels measure, and time integrals of Fourier series with the coefficients of
+//! 1, cos, sin, cos 2 …
 
 use nalgebra::DVector;
 
@@ -14,7 +15,8 @@ pub(crate) fn derivative(quantity: Quantity) -> u8 {
     }
 }
 
-/// Fourier coefficients of the `order`-fold time integral of a series with the coefficients `x`; the mean is dropped.
+/// Fourier coefficients of the `order`-fold time integral of a series with the coefficients `x` and the fundamental
+/// frequency `omega`, rad/s. An integral has zero mean; order 0 keeps the mean of `x`.
 pub(crate) fn undo(x: &DVector<f64>, order: u8, omega: f64) -> DVector<f64> {
     let mut integral = x.clone();
     for _ in 0..order {

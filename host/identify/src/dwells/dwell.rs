@@ -1,5 +1,5 @@
-//! Steady harmonic motion in a recording: segments of constant excitation frequency, and the Fourier coefficients of
-//! all channels with the variance of their noise.
+//! Steady periodic motion in a recording: segments of constant excitation frequency, and the Fourier coefficients of the
+//! force and motion channels with the variance of their noise.
 
 use std::f64::consts::TAU;
 
@@ -21,8 +21,8 @@ pub struct DwellSegment {
     pub frequency_hz: f64,
 }
 
-/// A measured steady periodic motion: Fourier coefficients of all channels over one segment of constant excitation
-/// frequency.
+/// A measured steady periodic motion: Fourier coefficients of the force and motion channels over one segment of constant
+/// excitation frequency.
 #[derive(Clone, Debug)]
 pub struct Dwell {
     /// Fundamental frequency, rad/s.
@@ -36,7 +36,7 @@ pub struct Dwell {
     pub gram_inverse: DMatrix<f64>,
     /// Fourier series of each force channel.
     pub forces: Vec<FourierSeries>,
-    /// Fourier series of each motion channel.
+    /// Fourier series of each motion channel that is not zero throughout.
     pub motions: Vec<FourierSeries>,
 }
 
@@ -76,13 +76,14 @@ pub(crate) fn direction_of(channel: &Channel) -> Option<Direction> {
     direction.parse().ok()
 }
 
-/// Length of the blocks of a step-sine record whose RMS force is compared to find pauses, s.
+/// Length of the blocks of a step-sine record whose RMS force shows pauses, s.
 const BLOCK_S: f64 = 0.1;
 
-/// The segments of `recording` with a constant excitation frequency, found from the force alone.
+/// The segments of `recording` with a constant excitation frequency, found from the force channel with the largest energy. Empty
+/// without a force channel.
 ///
-/// A segment ends where the force pauses or its frequency steps. A step without a pause shows as a change of the time between zero
-/// crossings that exceeds its scatter.
+/// A segment ends where the force pauses or its frequency steps. A step without a pause shows as a change of the local frequency, from
+/// the times of zero crossings, that far exceeds the scatter of that frequency.
 pub fn dwell_segments(recording: &Recording) -> Vec<DwellSegment> {
     let Some(force) = recording
         .channels
@@ -104,7 +105,7 @@ pub fn dwell_segments(recording: &Recording) -> Vec<DwellSegment> {
     let (Some(&quietest), Some(&strongest)) = (sorted.get(sorted.len() / 50), sorted.last()) else {
         return Vec::new();
     };
-    // The threshold of the RMS force of a block lies between the noise and the lowest excitation level.
+    // The threshold of the RMS force of a block shall lie between the noise and the lowest excitation level.
     let threshold = (FORCE_ABOVE_NOISE * quietest)
         .min(FORCE_BELOW_LARGEST[1] * strongest)
         .max(FORCE_BELOW_LARGEST[0] * strongest);
@@ -138,7 +139,8 @@ fn energy(samples: &[f64]) -> f64 {
 /// Number of excitation periods over which the local frequency is estimated in the search for frequency steps.
 const PERIODS: usize = 8;
 
-/// Splits the force samples from `from` on into segments of constant frequency and appends them to `found`.
+/// Splits the force samples from `from` on into segments of constant frequency and appends those of more than
+/// 2 · [`PERIODS`] periods to `found`.
 fn split(samples: &[f64], from: usize, rate_hz: f64, found: &mut Vec<DwellSegment>) {
     let crossings = rising_crossings(samples, from);
     if crossings.len() <= 2 * PERIODS {
@@ -157,8 +159,8 @@ fn split(samples: &[f64], from: usize, rate_hz: f64, found: &mut Vec<DwellSegmen
             begin,
             (begin + (end - begin).max(PERIODS)).min(crossings.len() - 1),
         );
-        // A frequency step exceeds ten times the scatter of the local frequency, and a thousandth of the frequency,
-        // which is less than the step of any test.
+        // A frequency step exceeds ten times the scatter of the local frequency, which is its median change from one
+        // period to the next, and a thousandth of the frequency.
         let stepped =
             end < local.len() && (local[end] - held).abs() > (STEP_SCATTER * scatter).max(STEP_SHARE * held);
         if stepped || end == local.len() {
@@ -170,7 +172,7 @@ fn split(samples: &[f64], from: usize, rate_hz: f64, found: &mut Vec<DwellSegmen
                     frequency_hz: frequency(begin, last),
                 });
             }
-            // The periods in which the frequency step was found contain both frequencies and are skipped.
+            // After a segment, the periods in which the frequency step was found contain both frequencies and are skipped.
             begin = if stepped && last > begin + 2 * PERIODS {
                 end + PERIODS
             } else {
@@ -180,8 +182,8 @@ fn split(samples: &[f64], from: usize, rate_hz: f64, found: &mut Vec<DwellSegmen
     }
 }
 
-/// Fractional sample indices of the rising zero crossings of the force, with hysteresis, so that noise gives no second
-/// crossing.
+/// Fractional sample indices of the rising zero crossings of the force, with a hysteresis of about half its RMS, so that
+/// weaker noise gives no second crossing.
 fn rising_crossings(samples: &[f64], from: usize) -> Vec<f64> {
     let size = (energy(&samples[from.min(samples.len())..]) / samples.len().max(1) as f64).sqrt();
     let mut crossings = Vec::new();
@@ -197,9 +199,10 @@ fn rising_crossings(samples: &[f64], from: usize) -> Vec<f64> {
 }
 
 impl Dwell {
-    /// Fits the periodic motion with `harmonics` harmonics to a segment of a recording; the frequency is refined with all channels.
+    /// Fits the periodic motion with `harmonics` harmonics to a segment of a recording; the frequency is refined with all force and
+    /// motion channels.
     ///
-    /// `None` if the segment has fewer samples than the fit requires, or the recording has no force.
+    /// `None` if the fit is not possible, for example with too few samples in the segment or without a force channel.
     pub fn fit(recording: &Recording, stretch: DwellSegment, harmonics: usize) -> Option<Self> {
         let count = stretch.to.checked_sub(stretch.from)?;
         if count < 4 * (2 * harmonics + 1) {
@@ -216,8 +219,8 @@ impl Dwell {
         let mut omega_variance = f64::INFINITY;
         let mut lines = Vec::new();
         let mut gram_inverse = DMatrix::zeros(0, 0);
-        // Gauss–Newton steps in the excitation frequency. The start is within half the width of a spectral line, where
-        // each step squares the error.
+        // Gauss–Newton steps in the excitation frequency. They converge if the first estimate is within half the width
+        // of a spectral line.
         for round in 0..5 {
             let design = design(count, omega / rate, harmonics);
             gram_inverse = invert_normal_equations(&design.tr_mul(&design))?;
@@ -228,7 +231,7 @@ impl Dwell {
                 let coefficients = &gram_inverse * design.tr_mul(&samples);
                 let residual = &samples - &design * &coefficients;
                 let free = count as f64 - (2 * harmonics + 1) as f64;
-                // The noise variance is at least that of the rounding of the samples.
+                // The noise variance is at least that of an error of 1e-14 of the RMS of the samples, which rounding causes.
                 let variance =
                     (residual.norm_squared() / free).max(1e-28 * samples.norm_squared() / count as f64);
                 if variance > 0.0 {
@@ -308,7 +311,7 @@ fn slope_by_omega(coefficients: &DVector<f64>, design: &DMatrix<f64>, rate_hz: f
     })
 }
 
-/// Pools the noise variance of each channel over all dwells of a recording.
+/// Replaces the noise variance of each channel by its mean over the given dwells, weighted by their numbers of samples.
 pub fn pool_variances(dwells: &mut [Dwell]) {
     type Pick = fn(&mut Dwell) -> &mut Vec<FourierSeries>;
     let picks: [Pick; 2] = [|dwell| &mut dwell.forces, |dwell| &mut dwell.motions];

@@ -17,20 +17,22 @@ pub enum Settling {
     Seconds(f64),
     /// The transient is the first half of the dwell.
     Half,
-    /// The transient ends when a decay e^{−σt} has fallen below the noise; σ is the given decay rate, 1/s.
+    /// The transient ends when a decay e^{−σt}, initially as large as the steady motion, has fallen below the noise of its
+    /// Fourier coefficients; σ is the given decay rate, 1/s.
     Decay(f64),
 }
 
-/// Dwells with steady motion found in recordings, and warnings about skipped dwells.
+/// Dwells with steady motion found in recordings, and warnings, for example about skipped dwells.
 #[derive(Clone, Debug, Default)]
 pub struct Steady {
-    /// The dwells with steady motion.
+    /// Steady parts of the dwells. If the motion of most dwells of a recording still changes, these are included.
     pub dwells: Vec<Dwell>,
     /// Warnings for the user.
     pub warnings: Vec<String>,
 }
 
-/// The steady part of every dwell of every recording, with a Fourier series of `harmonics` harmonics.
+/// The steady parts of the dwells of all recordings, with Fourier series of `harmonics` harmonics. Warnings count the
+/// dwells that are left out.
 pub fn steady(recordings: &[Recording], harmonics: usize, settling: Settling) -> Steady {
     let mut steady = Steady::default();
     for recording in recordings {
@@ -87,14 +89,16 @@ pub fn steady(recordings: &[Recording], harmonics: usize, settling: Settling) ->
 /// Steady part of a dwell, after its transient.
 struct Settled {
     dwell: Dwell,
-    /// True if the dwell is long enough for the transient to decay below the noise, given the damping of the structure.
+    /// False if the dwell is too short for a transient of the given decay rate to fall below the noise. Always true if no
+    /// decay rate is given.
     whole: bool,
-    /// True if the fundamental of every motion channel is the same in both halves of the steady part.
+    /// True if the fundamental of every motion channel is nearly the same in both halves of the part ([`is_still`]), or if
+    /// the user set the length of the transient.
     still: bool,
 }
 
-/// The part of a dwell after its transient. If its motion still changes, its last half or quarter is taken, provided
-/// that it contains at least [`LEAST_DWELL_PERIODS`] periods.
+/// The part of a dwell after its transient; `None` if it is too short. While its motion still changes, the part is halved
+/// to its end, as long as it contains at least [`LEAST_DWELL_PERIODS`] periods.
 fn settled(
     recording: &Recording,
     stretch: DwellSegment,
@@ -135,8 +139,8 @@ fn settled(
     }
 }
 
-/// True if the fundamental of no motion channel changes between the first and the second half of a dwell by more than
-/// its noise.
+/// True if the fundamental of each motion channel changes between the first and the second half of a dwell by less than
+/// the share [`STEADY_CHANGE`], or by less than [`STEADY_DEVIATIONS`] standard deviations of the change.
 fn is_still(recording: &Recording, part: DwellSegment, dwell: &Dwell) -> bool {
     let middle = (part.from + part.to) / 2;
     let halves = [part.from..middle, middle..part.to];
@@ -155,8 +159,8 @@ fn is_still(recording: &Recording, part: DwellSegment, dwell: &Dwell) -> bool {
         // In half of the samples, real and imaginary part of the fundamental each have the variance 4σ²/n, with the
         // noise variance σ² and n samples in the whole dwell; the difference of two halves has twice that.
         let noise = (8.0 * line.variance / dwell.samples as f64).sqrt();
-        // An error of the estimated frequency changes the phase of the motion from the middle of one half to the middle
-        // of the other.
+        // Difference of the two halves that one standard deviation of the estimated frequency causes in a steady motion,
+        // since it turns the phase between their middles. It adds to the noise that the test allows.
         let turned = line.amplitude(1)
             * dwell.omega_variance.sqrt()
             * (0.5 * dwell.samples as f64 / recording.sample_rate_hz);
@@ -182,8 +186,7 @@ fn phasor(samples: &[f64], range: std::ops::Range<usize>, radians_per_sample: f6
     Some(Complex64::new(solution[0], solution[1]))
 }
 
-/// The part of a dwell after its transient, and whether the dwell is long enough for the transient to decay below the
-/// noise.
+/// The part of a dwell after its transient, and [`Settled::whole`]; `None` if the part is too short.
 fn first_settled(
     recording: &Recording,
     stretch: DwellSegment,
@@ -207,8 +210,8 @@ fn first_settled(
         Settling::Half => Some((last(half)?, true)),
         Settling::Decay(rate) => {
             let first = last(half)?;
-            // The transient is assumed to start as large as the steady motion; it must decay to a fifth of the noise of
-            // a Fourier coefficient.
+            // The transient is assumed to start as large as the steady motion. It must decay to the noise of a Fourier
+            // coefficient, divided by `NOISE_OVER_TRANSIENT`.
             let clearest = first
                 .motions
                 .iter()
@@ -223,8 +226,8 @@ fn first_settled(
     }
 }
 
-/// Dwells of a record with constant frequency and slowly changing force: each window of `periods` excitation periods is
-/// one dwell.
+/// Dwells of a record with constant frequency and slowly changing force: consecutive windows of `periods` excitation
+/// periods each. An incomplete window at the end of a segment is left out.
 pub fn windows(recording: &Recording, harmonics: usize, periods: f64) -> Vec<Dwell> {
     let mut dwells = Vec::new();
     for stretch in dwell_segments(recording) {
@@ -243,7 +246,7 @@ pub fn windows(recording: &Recording, harmonics: usize, periods: f64) -> Vec<Dwe
     dwells
 }
 
-/// Smallest decay rate c/(2m) of modes with the given masses, kg, and dampings, N s/m; 1/s. It holds for modes below
+/// Smallest decay rate |c|/(2m) of modes with the given masses, kg, and dampings, N s/m; 1/s. It holds for modes below
 /// critical damping and is bounded to the range from 1e-3 to 2000π.
 pub fn slowest_decay(masses: &[f64], dampings: &[f64]) -> f64 {
     masses

@@ -114,7 +114,8 @@ impl KnownLimit {
     }
 }
 
-/// The linearized stability limits of a chart.
+/// The first stability limits at the speeds of a chart, each linearized in the unknown parameters, for their 90 %
+/// intervals.
 #[derive(Clone, Debug)]
 pub(super) struct KnownChart {
     pub(super) limits: Vec<KnownLimit>,
