@@ -10,23 +10,23 @@ use quietcut_model::effects::EffectName;
 use quietcut_model::milling::Runout;
 use quietcut_model::structure::{Direction, Joint, Mode, Robot};
 
-/// One identified parameter of the equations of motion with its standard deviation.
+/// One identified parameter of a case, of the equations of motion or of the cutting force, with its standard deviation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Estimate {
     /// Key of the parameter in a case: `mass_kg`, `k3_n_per_m3` …
     pub key: &'static str,
     /// Direction of the parameter; two directions for an off-diagonal entry of a matrix and for a coupling.
     pub directions: Vec<Direction>,
-    /// Value, SI.
+    /// Value, in the unit that ends the key.
     pub value: f64,
-    /// Standard deviation of the parameter, in its SI unit.
+    /// Standard deviation of the value, in its unit.
     pub deviation: f64,
 }
 
 /// Reason why an identified model does not fit into a case file.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum CaseFileError {
-    /// The structure lacks a matrix that a case requires: mass, damping or stiffness.
+    /// A required parameter was not identified: the matrix of mass, damping or stiffness, or a cutting coefficient.
     #[error("a case needs {0}, which this method does not give")]
     Missing(&'static str),
     /// Parameters of the same extension were identified in two directions, but a case holds an extension once.
@@ -39,7 +39,7 @@ pub enum CaseFileError {
         "no direction is both driven and measured, so the modes are not those of a tool; drive where the motion is measured"
     )]
     NoDirection,
-    /// The case is not valid TOML.
+    /// The case is not valid TOML, or cannot be written as TOML.
     #[error("the case cannot be written as TOML: {0}")]
     Toml(String),
 }
@@ -52,13 +52,13 @@ fn written(case: &Table) -> Result<String, CaseFileError> {
     toml::to_string(case).map_err(|error| CaseFileError::Toml(error.to_string()))
 }
 
-/// Sections of a case file that do not describe the structural dynamics of the machine.
+/// Sections of a case file about the tool and the cut, which the identification of a structure takes from another case.
 const OTHERS: [&str; 4] = ["tool", "material", "cut", "limits"];
 
-/// Case file `text` whose sections tool, material, cut and limits are replaced by those of the case `other`.
+/// Case file `text` whose sections tool, material, cut and limits are replaced by those that the case `other` has.
 ///
 /// # Errors
-/// The text is not valid TOML.
+/// The text is not valid TOML, or the result cannot be written as TOML.
 pub fn with_sections(text: &str, other: &Table) -> Result<String, CaseFileError> {
     let mut case: Table = text
         .parse()
@@ -74,7 +74,7 @@ pub fn with_sections(text: &str, other: &Table) -> Result<String, CaseFileError>
 /// Text of a case file with the complex modes of `model`, in the directions that are both excited and measured.
 ///
 /// # Errors
-/// No direction is both excited and measured.
+/// No direction is both excited and measured, or a value has no form in TOML.
 pub fn text_of_modes(name: &str, model: &ModalModel) -> Result<String, CaseFileError> {
     let directions = model.directions();
     if directions.is_empty() {
@@ -187,7 +187,7 @@ fn numbers(values: impl Iterator<Item = f64>) -> Value {
     Value::Array(values.map(Value::Float).collect())
 }
 
-/// Table of a case file with force coefficients, number of teeth, and the runout if it was identified.
+/// Table of a case file with force coefficients, number of teeth, edge angle, and the runout if it was identified.
 ///
 /// # Errors
 /// A cutting coefficient is missing.
@@ -235,10 +235,12 @@ fn extension_of(key: &str) -> Option<&'static str> {
     Some(effect.name())
 }
 
-/// Text of a case file with mass, damping, stiffness and cubic terms as matrices, and all other terms as extensions.
+/// Text of a case file with mass, damping, stiffness and cubic terms as matrices, and all other terms as extensions. With
+/// a quintic stiffness, the cubic stiffness is in the same extension.
 ///
 /// # Errors
-/// Mass, damping or stiffness was not identified; or one extension is needed in two directions.
+/// Mass, damping or stiffness was not identified, one extension is needed in two directions, or a value has no form in
+/// TOML.
 pub fn text(name: &str, directions: &[Direction], estimates: &[Estimate]) -> Result<String, CaseFileError> {
     let mut structure = Table::new();
     structure.insert("kind".into(), "matrices".into());

@@ -121,7 +121,7 @@ pub(crate) const NOISE_OVER_TRANSIENT: f64 = 5.0;
 pub(crate) const STEADY_CHANGE: f64 = 1e-3;
 
 /// Change of the fundamental of the motion between the two halves of a dwell up to which the motion is steady, in
-/// standard deviations of the change. Chance exceeds 4 once in ten thousand dwells.
+/// standard deviations of its real or imaginary part. Chance exceeds 4 with a probability of e^(−4²/2) = 3e-4.
 pub(crate) const STEADY_DEVIATIONS: f64 = 4.0;
 
 // Fits to dwells

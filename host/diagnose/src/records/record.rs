@@ -287,7 +287,7 @@ impl Record {
     }
 
     /// Largest root mean square, over the channels of motion, of [`Self::to_correct`] in the compared samples, in standard deviations of the
-    /// channel's noise. After [`Self::close`] with an extended case it is the step from the prediction to the closed-loop one.
+    /// channel's noise. If an extended case supplies the motion, it is the distance of that motion from the prediction along it.
     pub(crate) fn distance_from_closed_loop(&self) -> f64 {
         (0..self.channels.len())
             .filter(|index| self.channels[*index].pickup.quantity != Quantity::Force)

@@ -10,7 +10,7 @@ impl Library {
     ///
     /// A case holds one extension of a name, so that the same cause cannot act twice. Three terms in the displacement along one axis, or
     /// three in the velocity, are the series expansion of an unknown law, and no causes. A time-varying spring counts as a spring.
-    /// Hysteresis, which acts like friction before it slips, counts as friction.
+    /// Hysteresis, which acts like friction before it slips, counts as friction. Causes that share a term are not identifiable together.
     pub(crate) fn may_act_together(&self, some: &[Choice], other: Choice) -> bool {
         let new = self.cause(other.candidate).names();
         let is_new = some.iter().all(|choice| {
@@ -52,8 +52,8 @@ impl Library {
         one.choices.len() == other.choices.len() && one.choices.iter().all(|choice| is_in(choice, other))
     }
 
-    /// True for two causes of which one contains the other, and which are therefore not identifiable together: softening-hardening contains
-    /// a cubic spring, a ratio for each mode of a channel contains its gain.
+    /// True for two causes that share a term at a common location, and are therefore not identifiable together. For example,
+    /// softening-hardening contains a cubic spring, and a ratio for each mode of a channel contains its gain.
     fn share_a_term(&self, one: Choice, other: Choice) -> bool {
         let effect = |choice: Choice| self.cause(choice.candidate).effect();
         if !effect(one).spec().shares_term_with.contains(&effect(other)) {

@@ -7,7 +7,7 @@ use crate::fit::library::Library;
 use crate::fit::regression::Regression;
 use crate::records::study::Study;
 
-/// Number of candidate models of two causes, those with the smallest χ², to which a third cause is added.
+/// Number of candidate models of two causes, the first of the sorted list, to which a third cause is added.
 const PAIRS_KEPT: usize = 24;
 
 /// The candidate models of one cause, for each candidate the best set of nonlinear parameters; best model first.

@@ -1,4 +1,5 @@
-//! Selection of a candidate model: causes are added while their gain exceeds their price.
+//! Selection of a candidate model: a further cause is accepted if it decreases χ² by more than the price of its parameters, explains enough
+//! of the residual, and does not increase the held-out χ².
 
 use crate::criteria::{
     CHANCE, EQUIVALENT, INTERPOLATION_ERROR, LEAST_GAIN, LEAST_SHARE, LEAST_SHARE_BESIDE_ENOUGH,
@@ -27,10 +28,11 @@ const SIMULATED: [usize; CAUSES] = [9, 5, 3];
 pub(crate) struct Selection {
     pub(crate) best: Option<CandidateModel>,
     pub(crate) others: Vec<CandidateModel>,
-    /// Lead of the selected candidate model: its gain (decrease of χ² minus the price of its parameters) minus that of its best rival.
+    /// Lead of the selected candidate model: its gain (decrease of χ² minus the price of its parameters) minus that of its best rival;
+    /// infinite without a rival.
     pub(crate) ahead: f64,
-    /// Gain of the selected candidate model (decrease of χ² minus the price of its parameters) minus that of the best model with fewer
-    /// causes.
+    /// Gain of the selected candidate model (decrease of χ² minus the price of its parameters) minus that of the model selected
+    /// before it with fewer causes, or 0 for the baseline.
     pub(crate) gained: f64,
 }
 
@@ -96,8 +98,8 @@ impl<'a> SelectionCriteria<'a> {
         }
     }
 
-    /// Smallest gain (decrease of χ² minus the price of the parameters) that a further cause must have, including what errors of the
-    /// computation may gain.
+    /// Smallest increase of the gain (decrease of χ² minus the price of the parameters) that a further cause must bring, including what
+    /// errors of the computation may gain.
     pub(crate) fn least_gain(&self, regression: &Regression, fewer_are_enough: bool) -> f64 {
         let noise = regression.count(Subset::Whole) as f64;
         let share = if self.coherent > 0.0 && fewer_are_enough {
@@ -180,7 +182,7 @@ impl<'a> SelectionCriteria<'a> {
             .is_some_and(|more| cost(best) - cost(more) > self.least_gain(regression, true))
     }
 
-    /// True if the candidate model `more` explains at least `LEAST_SHARE` of the residual energy that `fewer` (or the baseline) has above
+    /// True if the candidate model `more` explains more than `LEAST_SHARE` of the residual energy that `fewer` (or the baseline) has above
     /// the noise, or if it has fewer parameters than `fewer`.
     fn explains_enough(
         &self,
@@ -224,8 +226,8 @@ fn inflation(regression: &Regression) -> f64 {
     (regression.left_by_all() / free + sampling).max(1.0)
 }
 
-/// Selects among single causes, then pairs, then triples. The search goes on while the residual is above the noise or resembles a further
-/// cause, and while two causes with one parameter each may replace one cause with more parameters.
+/// Selects among single causes, then pairs, then triples. The search goes on to more causes if the residual is above the noise or resembles
+/// a further cause, or if two causes may replace one cause with more parameters. It ends, for example, if the last cause explains little.
 pub(crate) fn select(
     criteria: &SelectionCriteria<'_>,
     library: &mut Library,
@@ -286,8 +288,8 @@ pub(crate) fn select(
         found.sort_by(|a, b| a.fit.left.total_cmp(&b.fit.left));
         let inflation = criteria.inflation(regression, found.first());
         criteria.sort(regression, &mut found, inflation);
-        // If fewer causes are already sufficient, the fit of more causes is not improved by a new linearization: it could win by errors of
-        // the computation.
+        // If fewer causes are already sufficient, the fit of more causes is not improved by a new linearization before it is selected: it
+        // could win by errors of the computation.
         if !enough {
             criteria.polish(library, regression, &mut found, inflation);
         }
@@ -380,7 +382,7 @@ fn log_best(
     }
 }
 
-/// The candidate model with fewer parameters than `best` that is as good along the measured motion, otherwise `best`: further parameters
+/// The first candidate model with fewer parameters than `best` that is as good along the measured motion, otherwise `best`: further parameters
 /// may only compensate for aliasing. Simulated models do not contain aliasing and are not taken as the simpler one.
 fn simplest(
     criteria: &SelectionCriteria<'_>,

@@ -10,7 +10,8 @@ use crate::fit::library::Library;
 use crate::fit::regression::{Fit, Regression, Subset};
 use crate::records::study::Study;
 
-/// Candidate models of `base` with one further cause, best first. `left` is the residual of `base`, by record and channel.
+/// Candidate models of `base` with one further cause, best first, one for each candidate. `left` is the residual of `base`, by record and
+/// channel.
 pub(crate) fn extended(
     study: &Study<'_>,
     library: &mut Library,
@@ -80,7 +81,7 @@ fn with(
     of(1.0).or_else(|| of(0.0))
 }
 
-/// The candidate model without the cause at index `position`.
+/// The candidate model without the cause at index `position`; its other coefficients and its χ² are not computed anew.
 pub(crate) fn without(library: &Library, model: &CandidateModel, position: usize) -> CandidateModel {
     let mut coefficients = Vec::new();
     for other in (0..model.choices.len()).filter(|other| *other != position) {

@@ -8,8 +8,9 @@ use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
 
 /// Transforms of one record of `count` samples, padded with zeros while the response decays.
 ///
-/// Spectra hold bins 0 … length/2 of the unnormalized transform X_k = Σ x_n e^(−2πikn/length). Signals are band-limited to half the sample
-/// rate, so that the spectrum defines them between samples. An upsampled signal has `finer` samples per sample of the record.
+/// Spectra hold bins 0 … length/2 of the unnormalized transform X_k = Σ x_n e^(−2πikn/length). Signals that are not upsampled are taken as
+/// band-limited to half the sample rate, so that the spectrum defines them between samples. An upsampled signal has `finer` samples per
+/// sample of the record.
 #[derive(Clone)]
 pub(crate) struct Grid {
     count: usize,
@@ -23,8 +24,8 @@ pub(crate) struct Grid {
 }
 
 impl Grid {
-    /// Plans the transforms of `count` samples at `rate_hz`, padded with zeros for about `room_s` seconds (at most three times the record),
-    /// and of signals upsampled by the factor `finer`.
+    /// Plans the transforms of `count` samples at `rate_hz`, padded with zeros for about `room_s` seconds (at least the smaller of the record
+    /// and 4096 samples, at most three times the record), and of signals upsampled by the factor `finer`.
     pub(crate) fn new(count: usize, rate_hz: f64, room_s: f64, finer: usize) -> Self {
         let room = ((room_s * rate_hz) as usize).clamp(count.min(4096), 3 * count.max(1));
         let length = smooth_even(count + room);
@@ -80,7 +81,7 @@ impl Grid {
 
     /// Spectrum of a signal that is continued smoothly beyond both ends of the record: reflected at its end points, and faded out.
     ///
-    /// With this continuation, derivatives (iω)·X are accurate up to the ends of the record.
+    /// With this continuation, derivatives (iω)·X are accurate to a few percent up to the ends of the record.
     pub(crate) fn continued_spectrum(&self, samples: &[f64]) -> Vec<Complex64> {
         let mut padded = vec![0.0; self.length];
         let count = samples.len();
@@ -217,7 +218,7 @@ impl SegmentTransform {
     }
 
     /// Appends to `into` real and imaginary parts of the segment's spectrum at bins 0 … `bins` − 1, scaled so that unit-variance noise has
-    /// unit variance in each part.
+    /// unit variance in each part. The imaginary parts at zero and at half the sample rate are always zero and left out.
     pub(crate) fn bins(&self, samples: &[f64], bins: usize, into: &mut Vec<f64>) {
         let length = samples.len();
         let mut buffer = samples.to_vec();

@@ -1,7 +1,7 @@
 //! Noise floors: the noise variance of a channel, estimated from its residual.
 //!
-//! Sensor noise is assumed white over the band of the record. Any other part of a residual lies above the noise floor in some frequency
-//! bands only, so the other bands show the floor.
+//! Sensor noise is assumed white over the band of the record. Any other part of a residual is assumed to lie above the noise floor in some
+//! frequency bands only, so that the other bands show the floor.
 
 use crate::criteria::{LEAST_RELATIVE_NOISE, LEAST_WHITE_SHARE};
 use crate::signal::grid::SegmentTransform;
@@ -12,8 +12,9 @@ pub(crate) const BANDS: usize = 32;
 
 /// Standard deviation of the white noise in `residual`; `size` is the root mean square of the channel.
 ///
-/// The estimate starts at the lower quartile of the mean periodogram over 32 bands. It is then the mean of all bands within three standard
-/// deviations of it, which are all bands if the residual is noise alone.
+/// The estimate starts at the lower quartile of the mean periodogram over 32 bands. It is then repeatedly the mean of all bands within three
+/// standard deviations of it, which are nearly all bands if the residual is noise alone. It is at least `LEAST_RELATIVE_NOISE` times `size`.
+/// For fewer than 128 samples it is the root mean square.
 pub(crate) fn white_floor(residual: &[f64], size: f64) -> f64 {
     white_floor_beside(residual, size, &[0.0; BANDS])
 }

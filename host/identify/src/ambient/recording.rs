@@ -16,7 +16,7 @@ pub struct Ambient {
     pub names: Vec<String>,
     /// Samples per second.
     pub rate_hz: f64,
-    /// Spindle frequency whose harmonics were removed, Hz; `None` if no speed is known.
+    /// Mean spindle frequency, whose harmonics were removed unless `harmonics_remain`, Hz; `None` if no speed is known.
     pub turn_hz: Option<f64>,
     /// Reason why a recorded tachometer does not give the spindle angle; the stated speed is used instead, if there is one.
     pub tachometer_fault: Option<String>,
@@ -35,12 +35,12 @@ struct Removal {
     harmonics_remain: bool,
 }
 
-/// Smallest number of samples per period of the highest frequency of the band after the decimation of an ambient
-/// record.
+/// Smallest number of samples per period of the highest frequency of the band that the decimation of an ambient record
+/// leaves.
 const PER_PERIOD: f64 = 3.0;
 
 impl Ambient {
-    /// Motion channels of a recording, band-limited to `high_hz`: all accelerations if there are any, else all
+    /// Motion channels of a recording, decimated for the band up to `high_hz`: all accelerations if there are any, else all
     /// velocities, else all displacements.
     ///
     /// `None` if the recording has no motion channel.
@@ -79,7 +79,7 @@ impl Ambient {
 }
 
 /// Removes the mean and all spindle harmonics up to 1.2 `high_hz` by least squares over the record, and trims it to the range in
-/// which the spindle angle is known.
+/// which the spindle angle is known. Nothing is removed if the record is too short to separate the harmonics.
 fn without_harmonics(recording: &Recording, samples: &mut [Vec<f64>], high_hz: f64) -> Removal {
     let cut = recording.sidecar.cut.unwrap_or_default();
     let rate_hz = recording.sample_rate_hz;

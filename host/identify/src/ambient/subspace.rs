@@ -40,7 +40,7 @@ pub struct AmbientModes {
     /// The modes within the band that keep their frequency at a higher model order, by ascending frequency.
     pub modes: Vec<AmbientMode>,
     /// Order of the state-space model: the number of singular values of the Hankel matrix that exceed the scatter
-    /// between blocks.
+    /// between blocks, rounded up to an even number and limited by the size of the matrix.
     pub order: usize,
     /// Number of blocks into which the record was divided; the scatter between them gives the standard deviations.
     pub blocks: usize,
@@ -61,7 +61,7 @@ pub enum AmbientError {
         /// Duration needed, s.
         needed_s: f64,
     },
-    /// No mode in the band exceeds the noise.
+    /// No mode in the band exceeds the noise and keeps its frequency at a higher model order.
     #[error("no mode between {0} and {1} Hz exceeds the noise; record longer, or excite the structure more")]
     NoMode(f64, f64),
     /// The singular values of the covariances cannot be computed.
@@ -72,12 +72,12 @@ pub enum AmbientError {
     Poles(#[from] EigenvalueError),
 }
 
-/// Ratio of the length of a block of an ambient record to the longest lag of its covariances. At this ratio the
+/// Smallest ratio of the length of a block of an ambient record to the longest lag of its covariances. At this ratio the
 /// correlation between neighbouring blocks is negligible.
 const BLOCK_LENGTH: usize = 6;
 
 /// Range of lags of the covariances, in periods of the lowest frequency of the band, that a block column of the Hankel
-/// matrix spans. A choice.
+/// matrix spans, if these are 6 to 60 samples. A choice.
 const PERIODS: f64 = 1.5;
 
 /// Step of the numerical derivative of the poles along the deviation of a block's Hankel matrix from the mean matrix,
@@ -87,7 +87,7 @@ const STEP: f64 = 1e-3;
 /// Identifies the modes of a record of ambient vibration in the frequency band from `low_hz` to `high_hz`.
 ///
 /// # Errors
-/// The record is too short, or no mode exceeds the noise.
+/// See [`AmbientError`]; for example, the record is too short, or no mode exceeds the noise.
 pub fn modes(ambient: &Ambient, [low_hz, high_hz]: [f64; 2]) -> Result<AmbientModes, AmbientError> {
     let rows = ((PERIODS * ambient.rate_hz / low_hz).ceil() as usize).clamp(6, 60);
     let samples = ambient.channels.first().map_or(0, Vec::len);
@@ -173,8 +173,8 @@ fn hankel(channels: &[Vec<f64>], range: std::ops::Range<usize>, rows: usize) -> 
 }
 
 impl Record {
-    /// Model order: the number of singular values of the Hankel matrix that exceed the noise level. It is even, since
-    /// poles come in conjugate pairs.
+    /// Model order: the number of singular values of the Hankel matrix that exceed the noise level, limited by the size of
+    /// the matrix. It is rounded up to an even number, since poles come in conjugate pairs.
     fn order(&self) -> Result<usize, AmbientError> {
         let values = singular_values(self.mean.clone())?;
         // Half the difference between the mean Hankel matrices of the even and of the odd blocks: pure noise, as large

@@ -85,8 +85,9 @@ pub fn chips(test: &CuttingTest, runout_m: &[f64]) -> Vec<Vec<Chip>> {
     chips
 }
 
-/// The machined surface at the immersion angle `phi`: by the cubic through four neighbouring points that one tooth
-/// left, else by a straight line. `place` is the index of the last point before `phi` and only grows.
+/// The machined surface at the immersion angle `phi`: on the cubic through four neighbouring points that one tooth left,
+/// else on the straight line through two, else at the height of one point. `place` is the index of the last point up to
+/// `phi` and only grows. `None` without points.
 fn surface_at(surface: &[SurfacePoint], phi: f64, place: &mut usize) -> Option<SurfacePoint> {
     while *place + 1 < surface.len() && surface[*place + 1].phi <= phi {
         *place += 1;

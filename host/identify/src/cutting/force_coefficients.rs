@@ -3,7 +3,8 @@
 //! At every instant F = Σ a {(K_tc e_t + K_rc e_r + K_ac e_a)(φ) h + (K_te e_t + K_re e_r + K_ae e_a)(φ)/sin γ}, summed
 //! over the engaged teeth, with the axial depth a and the edge angle γ (thesis eqs 3.2 to 3.4). The chip thickness h
 //! comes from [`chips`] and contains the runout of each tooth. The coefficients minimize the squared residual of the
-//! force over all samples; each channel is weighted with its residual variance. The mean-force method (Altintas) serves
+//! force over the revolutions of full engagement, without the samples beside tooth entries and exits; each channel is
+//! weighted with the inverse of its residual variance. The mean-force method (Altintas) serves
 //! for comparison: forces averaged over a revolution are regressed on the feed. Runout and stable vibration do not
 //! affect it as long as every tooth stays in contact. Intervals come from the scatter between revolutions.
 
@@ -41,7 +42,8 @@ pub struct Value {
     pub deviation: f64,
 }
 
-/// Largest Gauss–Newton step of a converged force-coefficient fit, in standard deviations of its parameters. A choice.
+/// Length of a Gauss–Newton step below which a force-coefficient fit stops, in standard deviations of its parameters. A
+/// choice.
 const SETTLED: f64 = 1e-2;
 
 /// Result of the fit: force coefficients from a set of cutting tests.
@@ -50,7 +52,8 @@ pub struct Fit {
     /// Force coefficients from instantaneous forces, in the order of [`KEYS`]; `None` for the axial ones if no axial
     /// force was measured.
     pub coefficients: [Option<Value>; 6],
-    /// Force coefficients from mean forces of revolutions, in the order of [`KEYS`]; `None` if all feeds are equal.
+    /// Force coefficients from mean forces of revolutions, in the order of [`KEYS`]; `None` if all feeds are equal, or if
+    /// mean forces do not determine the coefficients.
     pub averaged: Option<[Option<Value>; 6]>,
     /// Radial offset of the edge of each tooth from the mean of all teeth, m.
     pub runout_m: Vec<Value>,
@@ -58,7 +61,7 @@ pub struct Fit {
     pub relative_error: f64,
     /// Number of revolutions used.
     pub revolutions: usize,
-    /// Number of different feeds per tooth among the tests.
+    /// Number of feeds per tooth among the tests that differ by more than 2 %.
     pub feeds: usize,
     /// Mean feed per tooth of the tests, m.
     pub feed_per_tooth_m: f64,
@@ -75,7 +78,7 @@ pub enum ForceCoefficientError {
         "no fz was measured, and with an edge angle of {0:.1} degrees radial and axial forces act in one direction in the plane of the tool; fz, or a square end mill (90 degrees), is needed"
     )]
     NoAxialForce(f64),
-    /// The cutting tests do not determine the force coefficients.
+    /// There are no cutting tests, or they do not determine the force coefficients.
     #[error(
         "the tests do not determine the coefficients; cuts at two or more feeds, in which teeth cut air now and then, are needed"
     )]
@@ -93,7 +96,7 @@ struct State {
     runout_m: Vec<f64>,
 }
 
-/// Normal equations and squared force residuals of a cutting test, summed over its samples.
+/// Normal equations and squared force residuals, summed over the samples of one or more cutting tests.
 struct Sums {
     matrix: DMatrix<f64>,
     gradient: DVector<f64>,
@@ -314,7 +317,8 @@ impl Fitter<'_> {
             .iter()
             .map(|prepared| {
                 let sums = self.sums_of(prepared, state);
-                // An exact fit would give an infinite weight; the residual variance is at least that of rounding.
+                // An exact fit would give an infinite weight; the residual variance is at least 1e-20 of the mean square
+                // force.
                 let least = 1e-20 * sums.all / sums.samples.max(1) as f64;
                 (sums.left / sums.samples.max(1) as f64).map(|variance| variance.max(least))
             })
@@ -432,7 +436,8 @@ impl Fitter<'_> {
 
 impl Fit {
     /// Keys of the force coefficients whose values from mean forces and from instantaneous forces differ by more than
-    /// the sum of both 90 % half-widths plus 1/20 of the largest coefficient of their kind (cutting or edge).
+    /// the sum of both 90 % half-widths plus 1/20 of the largest coefficient of their kind (cutting or edge). For edge
+    /// coefficients, the force of the mean feed per tooth replaces the largest coefficient if it is larger.
     pub fn apart(&self) -> Vec<&'static str> {
         let averaged = self.averaged.unwrap_or_default();
         let largest = |values: &[Option<Value>]| {
@@ -460,8 +465,8 @@ impl Fit {
 
 /// Offset of the tool axis that explains the radial offsets of the teeth: r_j = e cos(ψ + 2πj/N).
 ///
-/// `None` for one tooth, or if the offset lies within its 90 % interval of zero. Two teeth show only the component of the offset
-/// along the line through them.
+/// `None` for one tooth, or if the offset does not exceed the largest 90 % half-width of a tooth's radial offset. Two
+/// teeth show only the component of the offset along the line through them.
 pub fn runout(fit: &Fit) -> Option<Runout> {
     let teeth = fit.runout_m.len();
     let (mut cosine, mut sine) = (0.0, 0.0);

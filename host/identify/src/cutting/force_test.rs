@@ -31,9 +31,11 @@ pub struct CuttingTest {
     pub force: Vec<Vector3<f64>>,
     /// False if the axial force was not measured; the axial entries of `force` are then 0.
     pub has_axial_force: bool,
-    /// Displacement of the tool at each sample in feed, normal and axial direction, m; `None` where none was measured.
+    /// Displacement of the tool at each sample in feed, normal and axial direction, m, from the measured axes; `None` if
+    /// none was measured.
     pub displacement: Option<Vec<Vector3<f64>>>,
-    /// First sample of full engagement, and the sample after its last one; both bound whole revolutions.
+    /// First sample of full engagement, and the sample after its last one. They bound whole revolutions unless their times
+    /// were set.
     pub full_cut: [usize; 2],
 }
 
@@ -167,8 +169,8 @@ impl CuttingTest {
             let below = |share: f64| sizes.iter().rposition(|size| *size > share * full);
             let (rise, fall) = (above(ENGAGED_SHARE)?, below(ENGAGED_SHARE)?);
             // Revolutions of the entry, in which the mean force grows from a tenth to nine tenths of that in full
-            // engagement. Half as many more are left out after them: with a linear rise, the last tenth would take an
-            // eighth as many.
+            // engagement. Half as many and two more are left out after them: with a linear rise, the last tenth would take
+            // an eighth as many. The exit is treated alike.
             let way_in = rise - above(1.0 - ENGAGED_SHARE)?;
             let way_out = below(1.0 - ENGAGED_SHARE)? - fall;
             let beyond = |way: usize| if way > 0 { way / 2 + 2 } else { 0 };

@@ -6,7 +6,7 @@
 //! has a likelihood of the observed outcomes. The posterior distribution, with a log-uniform prior within
 //! [`PriorFactors`], is sampled by sequential Monte Carlo (Del Moral, Doucet and Jasra 2006). With few cuts the
 //! intervals are wide. If structures in several separate regions of the parameters explain the cuts, the sample
-//! contains all of these regions.
+//! can contain all of these regions.
 
 use std::f64::consts::TAU;
 
@@ -106,7 +106,7 @@ pub enum InverseError {
     /// The first guess has no oscillating mode.
     #[error("the first guess has no oscillating mode with a mode shape")]
     NoModes,
-    /// No structure within the prior agrees with the observed outcomes of the trial cuts.
+    /// Every sampled structure misjudges more than one in twenty of the trial cuts.
     #[error(
         "no structure within the prior explains the cuts: the best one misjudges {0} of {1}; another first guess, or other force coefficients, are needed"
     )]
@@ -119,8 +119,8 @@ pub enum InverseError {
 /// Number of particles of the sequential Monte Carlo sampler, each of which is one structure. A choice.
 const PARTICLES: usize = 192;
 
-/// Effective sample size that one tempering step of the sequential Monte Carlo sampler keeps, as a fraction of the
-/// number of particles. A choice.
+/// Smallest effective sample size that one tempering step of the sequential Monte Carlo sampler leaves, as a fraction of
+/// the number of particles. A choice.
 const EFFECTIVE: f64 = 0.5;
 
 /// Number of Metropolis moves of every particle of the sequential Monte Carlo sampler: after each tempering step but
@@ -262,7 +262,8 @@ impl Family<'_> {
     /// Log-likelihood of the observed outcomes for the structure θ, and the number of trial cuts that the structure
     /// misjudges.
     ///
-    /// Every cut lowers the log-likelihood. Once it has fallen to `least`, the evaluation stops and returns −∞.
+    /// Every cut lowers the log-likelihood. If it has fallen to `least` before the last cut, the evaluation stops and returns
+    /// −∞. It also returns −∞ if the stability of a cut cannot be computed.
     fn likelihood(&self, theta: &[f64], least: f64) -> (f64, usize) {
         let problem = self.problem(theta);
         let mut sum = 0.0;
@@ -309,7 +310,7 @@ impl Family<'_> {
             .all(|(value, half)| value.abs() <= *half)
     }
 
-    /// Draws equally weighted particles from the posterior distribution.
+    /// Draws equally weighted particles, approximately from the posterior distribution.
     fn draw(&self, seed: u64) -> Vec<Vec<f64>> {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let mut particles: Vec<Vec<f64>> = (0..PARTICLES)

@@ -1,4 +1,4 @@
-//! A cutting test with the quantities that do not change while its force coefficients are fitted.
+//! A cutting test with the quantities that the steps of the fit of its force coefficients share.
 
 use std::collections::BTreeSet;
 use std::f64::consts::TAU;
@@ -8,7 +8,7 @@ use nalgebra::Vector3;
 use crate::cutting::force_test::CuttingTest;
 use quietcut_model::milling::{Immersion, Material, RotatingVector, ToothForce};
 
-/// A cutting test with the quantities that do not change while its force coefficients are fitted.
+/// A cutting test with the quantities that the steps of the fit of its force coefficients share.
 pub(super) struct Prepared<'a> {
     pub(super) test: &'a CuttingTest,
     /// Derivatives of the tooth force by the coefficients, as vectors over the immersion angle. `cutting`: N per unit
@@ -19,7 +19,8 @@ pub(super) struct Prepared<'a> {
     /// engaged teeth, so the fit leaves them out.
     pub(super) switching: BTreeSet<usize>,
     pub(super) revolutions: Vec<[usize; 2]>,
-    /// Weight 1/σ² of the force residual in each direction, with its standard deviation σ; 1/N².
+    /// Weight 1/σ² of the force residual in each direction, with its standard deviation σ; 1/N². It is 1 in the first step
+    /// of the fit, and later 0 in the axial direction if the axial coefficients are not fitted.
     pub(super) weights: [f64; 3],
 }
 
