@@ -5,8 +5,8 @@
 
 // Modes from receptances
 
-/// Fewest frequency lines in the band of a modal fit to receptances. The highest model order is a third of the number
-/// of lines; with fewer than 16 lines it does not exceed `LEAST_ORDERS`.
+/// Fewest frequency lines in the band of a modal fit to receptances. The highest model order is at most a third of the
+/// number of lines less one; with fewer than 16 lines it does not exceed `LEAST_ORDERS`.
 pub(crate) const LEAST_LINES: usize = 16;
 
 /// Smallest standard deviation of a receptance value that a modal fit assumes, relative to the RMS of the receptance:
@@ -19,7 +19,7 @@ pub(crate) const LEAST_RELATIVE_DEVIATION: f64 = 1e-5;
 pub(crate) const OVERDAMPED: f64 = 0.5;
 
 /// Norm of the residue matrix of a fitted mode, in standard deviations of the norm, below which the mode is rejected. A
-/// normal variable exceeds three standard deviations with a probability of 0.3 %.
+/// normal variable exceeds three standard deviations in magnitude with a probability of 0.3 %.
 pub(crate) const LEAST_RESIDUE_SIGNIFICANCE: f64 = 3.0;
 
 /// NRMSE of the fitted receptances above which a warning says that the modal model does not fit. Unfounded.
@@ -96,7 +96,7 @@ pub(crate) const FORCE_ABOVE_NOISE: f64 = 3.0;
 pub(crate) const FORCE_BELOW_LARGEST: [f64; 2] = [0.02, 0.3];
 
 /// Change of the local excitation frequency above which a new frequency step begins, in multiples of the scatter of
-/// that frequency. Noise does not reach ten times its scatter.
+/// that frequency: its median change from one period to the next. Noise hardly reaches ten times its scatter.
 pub(crate) const STEP_SCATTER: f64 = 10.0;
 
 /// Relative change of the local excitation frequency above which a new frequency step begins, in records without noise.
@@ -215,7 +215,7 @@ pub(crate) const SWEPT_POWER_SHARE: f64 = 0.1;
 pub(crate) const LEAST_SWEEP_ESTIMATES: f64 = 10.0;
 
 /// Misfit between the receptances of two sweeps, their mean squared difference over its variance, from which they are
-/// not of one linear structure. The misfit of a linear structure reaches about 5, because the variances have nine
+/// not of one linear structure, if the difference also reaches `LEAST_SWEEP_CHANGE`. That of one structure reaches about 5, because the variances have nine
 /// degrees of freedom per line and omit the noise of the force.
 pub(crate) const SWEEP_MISFIT: f64 = 20.0;
 
@@ -256,7 +256,8 @@ pub(crate) const LARGEST_LAST_STEP: f64 = 0.3;
 pub(crate) const SAME_FEED: f64 = 0.02;
 
 /// Smallest reported difference between a force coefficient from mean forces and from instantaneous forces, beyond both
-/// 90 % half-widths, relative to the largest coefficient of its kind. Unfounded.
+/// 90 % half-widths, relative to the largest coefficient of its kind, or for edge coefficients to the force of the mean
+/// feed per tooth if that is larger. Unfounded.
 pub(crate) const LEAST_METHOD_DIFFERENCE: f64 = 0.05;
 
 /// Predicted growth rate ln |μ| of a trial cut, as a multiple of the relative standard deviation of its depth, beyond

@@ -32,7 +32,7 @@ pub(crate) struct Clean {
     deviations: Vec<f64>,
 }
 
-/// One recording with the prediction of the baseline. Rooms after `records` do not change it.
+/// One recording with the prediction of the baseline. Only the folder `records` changes it.
 pub(crate) struct Record {
     /// File of the recording.
     pub path: PathBuf,

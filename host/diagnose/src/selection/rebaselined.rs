@@ -16,8 +16,7 @@ use quietcut_model::case::Case;
 use quietcut_recording::Recording;
 
 /// Candidate models that consist of `base` and one further cause, found with the extended case of `base` as the baseline, best first. Empty
-/// if `base` does not change the poles or mode shapes of the linear structure, because the receptance would be the same, or if the
-/// recordings cannot be compared with the extended case.
+/// if `base` does not change the state matrix of the linear structure, or if the recordings cannot be compared with the extended case.
 pub(crate) fn extended_rebaselined(
     study: &Study<'_>,
     recordings: &[Recording],
