@@ -215,8 +215,8 @@ pub(crate) const SWEPT_POWER_SHARE: f64 = 0.1;
 pub(crate) const LEAST_SWEEP_ESTIMATES: f64 = 10.0;
 
 /// Misfit between the receptances of two sweeps, their mean squared difference over its variance, from which they are
-/// not of one linear structure, if the difference also reaches `LEAST_SWEEP_CHANGE`. That of one structure reaches about 5, because the variances have nine
-/// degrees of freedom per line and omit the noise of the force.
+/// not of one linear structure, if the difference also reaches `LEAST_SWEEP_CHANGE`. The misfit of a linear structure
+/// reaches about 5, because the variances have nine degrees of freedom per line and omit the noise of the force.
 pub(crate) const SWEEP_MISFIT: f64 = 20.0;
 
 /// Largest difference between the receptances of two sweeps, relative to the peak receptance, below which the

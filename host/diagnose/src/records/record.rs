@@ -38,9 +38,9 @@ pub(crate) struct Record {
     pub path: PathBuf,
     /// Kind of the test, from the sidecar.
     pub kind: Option<TestKind>,
-    /// Quantity in which the record is compared: motion or force.
+    /// Domain in which the record is compared: motion, in a cut with the force, or force alone.
     pub domain: Domain,
-    /// Names of the channels whose sensors are not at the tool tip.
+    /// Names of the channels whose sensors are not at the tool tip according to the sidecar.
     pub elsewhere: Vec<String>,
     /// Time and frequency grid of the record, with its transforms.
     pub grid: Grid,

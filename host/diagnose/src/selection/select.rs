@@ -270,7 +270,7 @@ pub(crate) fn select(
             2 => best_pairs(library, study, regression),
             _ => triples(library, study, regression, &pairs),
         };
-        // If candidate models are simulated, pairs and triples keep the nonlinear parameters that were refined for each single cause.
+        // If candidate models are simulated, pairs and triples keep the nonlinear parameters that were refined for the best single causes.
         if size == 1 || criteria.closed.is_none() {
             refine(study, library, regression, &mut found);
         }

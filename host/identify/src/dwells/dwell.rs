@@ -182,7 +182,7 @@ fn split(samples: &[f64], from: usize, rate_hz: f64, found: &mut Vec<DwellSegmen
     }
 }
 
-/// Fractional sample indices of the rising zero crossings of the force, with a hysteresis of about half its RMS, so that
+/// Fractional sample indices of the rising zero crossings of the force, with a hysteresis of at most half its RMS, so that
 /// weaker noise gives no second crossing.
 fn rising_crossings(samples: &[f64], from: usize) -> Vec<f64> {
     let size = (energy(&samples[from.min(samples.len())..]) / samples.len().max(1) as f64).sqrt();

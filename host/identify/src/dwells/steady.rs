@@ -97,8 +97,9 @@ struct Settled {
     still: bool,
 }
 
-/// The part of a dwell after its transient; `None` if it is too short. While its motion still changes, the part is halved
-/// to its end, as long as it contains at least [`LEAST_DWELL_PERIODS`] periods.
+/// The part of a dwell after its transient; `None` if it is too short. While its motion still changes, its last half
+/// replaces it, as long as that contains at least [`LEAST_DWELL_PERIODS`] periods. A length of the transient that the user
+/// set is kept.
 fn settled(
     recording: &Recording,
     stretch: DwellSegment,
