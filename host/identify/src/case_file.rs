@@ -52,7 +52,7 @@ fn written(case: &Table) -> Result<String, CaseFileError> {
     toml::to_string(case).map_err(|error| CaseFileError::Toml(error.to_string()))
 }
 
-/// Sections of a case file about the tool and the cut, which the identification of a structure takes from another case.
+/// Sections of a case file about the tool and the cut, which [`with_sections`] takes from another case.
 const OTHERS: [&str; 4] = ["tool", "material", "cut", "limits"];
 
 /// Case file `text` whose sections tool, material, cut and limits are replaced by those that the case `other` has.

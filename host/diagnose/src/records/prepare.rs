@@ -69,7 +69,7 @@ fn opened(baseline: &Baseline<'_>, recording: &Recording, known: Known) -> Resul
     let highest_hz = highest_hz(recording);
     let rate_hz = recording.sample_rate_hz;
     // The upsampled grid must represent harmonics of nonlinear restoring forces up to the sixteenth of `highest_hz`, the end of the
-    // measured motion's band: they lie below half the upsampled rate. The oversampling factor is at most 8 all the same.
+    // measured motion's band: they lie below half the upsampled rate. The oversampling factor does not exceed 8, even if fewer harmonics fit.
     let finer = ((32.0 * highest_hz / rate_hz).ceil() as usize)
         .clamp(if is_cut { FINER_IN_CUTS } else { 1 }, 8)
         .next_power_of_two();

@@ -50,8 +50,8 @@ pub(crate) struct Record {
     pub force_n: [Vec<f64>; 3],
     /// Noise floor of each force as a standard deviation of white noise, N: sensor noise and aliased force.
     pub force_deviation_n: [f64; 3],
-    /// Estimated motion of the tool: the predicted displacement, corrected at each frequency towards the measured one by its Wiener
-    /// weight. In the force domain: the measured motion.
+    /// Estimated motion of the tool: the predicted displacement, corrected at each frequency towards the measured one by a weight from 0 to
+    /// 1 (Wiener). In the force domain: the measured motion within its band.
     pub motion: SampledMotion,
     /// Spectra of the estimated displacement at the samples of the record, m; beyond both ends of the record the displacement is continued
     /// by reflection and fades out.

@@ -1,5 +1,5 @@
 //! Selection of a candidate model: a further cause is accepted if it decreases χ² by more than the price of its parameters, explains enough
-//! of the residual, and does not increase the held-out χ².
+//! of the residual, and does not increase the held-out χ² beyond chance.
 
 use crate::criteria::{
     CHANCE, EQUIVALENT, INTERPOLATION_ERROR, LEAST_GAIN, LEAST_SHARE, LEAST_SHARE_BESIDE_ENOUGH,

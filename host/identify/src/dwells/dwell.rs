@@ -105,7 +105,7 @@ pub fn dwell_segments(recording: &Recording) -> Vec<DwellSegment> {
     let (Some(&quietest), Some(&strongest)) = (sorted.get(sorted.len() / 50), sorted.last()) else {
         return Vec::new();
     };
-    // The threshold of the RMS force of a block shall lie between the noise and the lowest excitation level.
+    // The threshold of the RMS force of a block is chosen to lie between the noise and the lowest excitation level.
     let threshold = (FORCE_ABOVE_NOISE * quietest)
         .min(FORCE_BELOW_LARGEST[1] * strongest)
         .max(FORCE_BELOW_LARGEST[0] * strongest);

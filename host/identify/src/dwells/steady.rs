@@ -25,7 +25,8 @@ pub enum Settling {
 /// Dwells with steady motion found in recordings, and warnings, for example about skipped dwells.
 #[derive(Clone, Debug, Default)]
 pub struct Steady {
-    /// Steady parts of the dwells. If the motion of most dwells of a recording still changes, these are included.
+    /// Steady parts of the dwells. If the motion of more than half of the dwells of a recording still changes, these dwells
+    /// are included.
     pub dwells: Vec<Dwell>,
     /// Warnings for the user.
     pub warnings: Vec<String>,
@@ -141,7 +142,8 @@ fn settled(
 }
 
 /// True if the fundamental of each motion channel changes between the first and the second half of a dwell by less than
-/// the share [`STEADY_CHANGE`], or by less than [`STEADY_DEVIATIONS`] standard deviations of the change.
+/// the share [`STEADY_CHANGE`], or by less than [`STEADY_DEVIATIONS`] standard deviations of the change's real or
+/// imaginary part.
 fn is_still(recording: &Recording, part: DwellSegment, dwell: &Dwell) -> bool {
     let middle = (part.from + part.to) / 2;
     let halves = [part.from..middle, middle..part.to];
