@@ -137,7 +137,7 @@ fn opened(baseline: &Baseline<'_>, recording: &Recording, known: Known) -> Resul
 fn checked(record: Record) -> Result<Record, DiagnoseError> {
     let is_cut = record.kind == Some(TestKind::Cutting);
     let checked = |(index, channel): (usize, &Observed)| {
-        // A channel along an axis without force is not checked: a small cross-axis sensitivity of its sensor exceeds the predicted motion.
+        // A channel along an axis without force is not checked: a small cross-axis sensitivity of its sensor may exceed the predicted motion.
         let axis = main_axis(channel)?;
         if record.force_n[axis].is_empty() || is_cut && channel.pickup.quantity == Quantity::Force {
             return None;
