@@ -31,8 +31,8 @@ pub struct TrialCut {
     pub depth_mm: f64,
     /// Observed outcome.
     pub outcome: Outcome,
-    /// Measured chatter frequency of the trial cut, Hz; `None` if the outcome is not chatter, or if it was not measured.
-    /// JSON output omits this field.
+    /// Measured chatter frequency of the trial cut, Hz; `None` if the outcome is not chatter, or if it was not
+    /// measured. JSON output never contains this field.
     #[serde(skip)]
     pub chatter_hz: Option<f64>,
 }

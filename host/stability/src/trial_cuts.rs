@@ -13,7 +13,7 @@ pub use quietcut_recording::cut_table::{Outcome, TrialCut, read};
 /// half more than the least number of a chart, 40.
 const SAMPLES: usize = 60;
 
-/// Number of correct and wrong predictions of a method over trial cuts.
+/// Numbers of trial cuts that a method predicts wrongly, and of those that decide nothing.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Calls {
     /// Number of trial cuts.
@@ -56,7 +56,7 @@ impl Calls {
         Ok(Self::of(&calls(method, cuts)?))
     }
 
-    /// Counts correct and wrong predictions over the results of single trial cuts.
+    /// Counts wrong predictions and undecided cuts over the results of single trial cuts.
     pub fn of(calls: &[Call]) -> Self {
         let count = |call: Call| calls.iter().filter(|other| **other == call).count();
         let (missed_chatter, false_alarms) = (count(Call::MissedChatter), count(Call::FalseAlarm));
@@ -93,7 +93,7 @@ impl Call {
 /// Compares predictions with outcomes for each cut, in the order of the cuts, each at its own speed.
 ///
 /// # Errors
-/// As [`Method::lines`].
+/// As [`Method::line`].
 pub fn calls<M: Method + ?Sized>(method: &M, cuts: &[TrialCut]) -> Result<Vec<Call>, StabilityError> {
     let mut speeds_rpm: Vec<f64> = cuts.iter().map(|cut| cut.rpm).collect();
     speeds_rpm.sort_by(f64::total_cmp);
@@ -113,7 +113,7 @@ pub fn calls<M: Method + ?Sized>(method: &M, cuts: &[TrialCut]) -> Result<Vec<Ca
 }
 
 /// Compares the prediction for one cut with its outcome. One of the lines must have the speed of the cut and reach its
-/// depth; otherwise the cut counts as predicted unstable.
+/// depth; otherwise the cut is taken as predicted unstable.
 pub fn call(lines: &[SpeedLine], cut: &TrialCut) -> Call {
     let line = lines.iter().find(|line| line.rpm == cut.rpm);
     let within = |of: fn(&SpeedLine) -> &Vec<[f64; 2]>| {

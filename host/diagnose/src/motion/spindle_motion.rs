@@ -74,12 +74,12 @@ impl SpindleMotion {
         .fitted()
     }
 
-    /// Least-squares fit of mean speed and start angle to the tachometer edges. The lead that the speed modulation gives the spindle, as a
-    /// time, does not depend on the mean speed, so that the fit is linear and the first iteration is final.
+    /// Least-squares fit of mean speed and start angle to the tachometer edges. The angle that the speed modulation adds is proportional to
+    /// the mean speed, so that the angle at an edge is linear in start angle and mean speed.
     fn fitted(mut self) -> Self {
         let count = self.edges_s.len() as f64;
         for _ in 0..3 {
-            // At tachometer edge k the spindle angle is 2πk. It is linear in the time plus the lead of the speed modulation.
+            // At tachometer edge k the spindle angle is 2πk. It is linear in the edge time plus the lead of the speed modulation, s.
             let modulation_s = |t: f64| self.modulation_s(t);
             let times: Vec<f64> = self.edges_s.iter().map(|t| t + modulation_s(*t)).collect();
             let mean_t = times.iter().sum::<f64>() / count;

@@ -1,4 +1,5 @@
-//! Crossings of the imaginary axis by roots of a loop as the axial depth grows, and the number of unstable roots.
+//! Roots of the loop that the cut closes around the structure, with averaged or with periodic directional coefficients:
+//! their crossings of the imaginary axis as the axial depth grows, and the number of unstable ones.
 
 use std::f64::consts::{PI, TAU};
 

@@ -24,14 +24,15 @@ pub struct Problem {
     pub teeth: usize,
 }
 
-/// Treatment of cubic stiffness and damping of a structure.
+/// Treatment of cubic stiffness and damping of a structure, and of extensions with other nonlinear terms.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CubicTerms {
-    /// Cases with cubic terms are refused, since their limits depend on the forced motion.
+    /// Cases with cubic or other nonlinear terms are refused, since their limits depend on the forced motion.
     Refuse,
-    /// Cubic terms of the structure are omitted: the limits are those for vanishing feed.
+    /// Cubic and other smooth nonlinear terms of the structure are omitted: the limits are those for vanishing feed.
+    /// Other nonlinear extensions are refused.
     LeaveOut,
-    /// Cubic terms and other smooth nonlinear effects are left to the caller, who treats them about a forced orbit; the
+    /// Cubic terms and all nonlinear extensions that can be linearized about a forced orbit are left to the caller; the
     /// result is the linear part.
     Kept,
 }
@@ -51,7 +52,8 @@ impl Problem {
     ///
     /// # Errors
     /// A section is missing, the structure is indefinite, or the case has a feature that the equation does not cover:
-    /// variable pitch, cubic or other smooth terms (see `cubic`), or an extension that cannot be treated.
+    /// variable pitch, nonlinear terms that `cubic` refuses, runout together with axial-depth modulation, or an
+    /// extension that cannot be treated.
     pub fn new(case: &Case, cubic: CubicTerms) -> Result<Self, StabilityError> {
         Self::of(case, cubic, cutting(case, cubic.treated())?)
     }
@@ -100,8 +102,8 @@ impl Problem {
 /// Cutting process and number of teeth of a case; the structure is not used.
 ///
 /// # Errors
-/// A section is missing, or the case has variable pitch, an untreated extension, or runout together with axial-depth
-/// modulation.
+/// A section is missing, an extension is wrong, or the case has variable pitch, an untreated extension, or runout
+/// together with axial-depth modulation.
 pub(crate) fn cutting(case: &Case, treated: Treated) -> Result<(Process, usize), StabilityError> {
     if case.tool()?.has_variable_pitch() {
         return Err(StabilityError::NotCovered {

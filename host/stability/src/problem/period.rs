@@ -1,8 +1,9 @@
-//! One tooth period, divided into elements on which collocation is exact to rounding.
+//! One tooth period, divided into elements on which collocation has a chosen accuracy.
 //!
-//! The chip thickness depends only on the displacement along the chip normal: tooth k at immersion φ_k observes p_k =
-//! n(φ_k)ᵀ u, and the preceding tooth observed p_k one period earlier. The state of the delay equation is therefore x
-//! at the start of the period and the values p while teeth cut. The history of all displacements is not needed.
+//! The dynamic chip thickness depends only on the displacement along the chip normal: tooth k at immersion φ_k observes
+//! p_k = n(φ_k)ᵀ u, and the preceding tooth observed p_k one period earlier. The state of the delay equation is
+//! therefore x at the start of the period and the values p while teeth cut. The history of all displacements is not
+//! needed.
 //!
 //! On an element with Gauss nodes t_i, x(t) = e^{At} x₀ + ∫ e^{A(t−s)} B D(s) f(s) ds with f = w (p − p_τ) gives
 //!
@@ -61,11 +62,11 @@ pub(crate) const DECAY_MAX: f64 = 5.0;
 /// Largest number of Gauss nodes in an element: the largest rule that [`Gauss::shared`] keeps.
 const NODES_MAX: u32 = 40;
 
-/// Refuses speeds and depths (mm) at which the motion oscillates too often within a tooth period.
+/// Refuses speeds and depths (mm) at which the motion oscillates or decays too fast to be followed over a tooth period.
 ///
 /// # Errors
-/// [`StabilityError::BrokeDown`] with the reason. Speeds and depths that are not positive pass this check; the methods
-/// refuse them.
+/// [`StabilityError::BrokeDown`] with the reason. This check does not refuse negative speeds and depths; the methods
+/// do.
 pub(crate) fn check_length(problem: &Problem, rpm: f64, depth_mm: f64) -> Result<(), StabilityError> {
     let rate = Rates::new(problem).at(2e-3 * depth_mm) + problem.fastest_decay();
     if rate * problem.tooth_period_s(rpm) > ELEMENTS_MAX * Resolution::WORKING.angle {
@@ -107,8 +108,8 @@ impl Period {
                 flight = exponential.at(duration);
                 continue;
             }
-            // The directional coefficients of the cut are products of two sines of the immersion angle and oscillate at
-            // twice the rotation of the tool.
+            // The directional coefficients of the cut contain products of two sines of the immersion angle, which
+            // oscillate at twice the rotation of the tool.
             let angle = rate * duration + 2.0 * length;
             let decay = problem.fastest_decay() * duration;
             let count = (angle / resolution.angle).max(decay / DECAY_MAX).ceil().max(1.0);
@@ -195,7 +196,8 @@ impl Rates {
 }
 
 /// Fewest Gauss nodes, from 4 to 40, for which a step over the phase angle `angle` has a relative error below
-/// `tolerance`. The error is that of the Padé approximant to e^{iz}: (m!)² z^{2m+1} / ((2m)! (2m+1)!).
+/// `tolerance`; 40 if none suffices. The error is that of the Padé approximant to e^{iz}: (m!)² z^{2m+1} / ((2m)!
+/// (2m+1)!).
 pub(crate) fn degree(angle: f64, tolerance: f64) -> usize {
     // For m = 0 Gauss nodes the error expression is z; each further node multiplies it by z² m² / ((2m)² (4m² − 1)).
     let mut error = angle;

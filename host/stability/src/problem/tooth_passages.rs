@@ -76,7 +76,7 @@ impl ToothPassages {
         let count = pitch_rad.len();
         let period_s = TAU / rad_per_s;
         let mut list = Vec::with_capacity(2 * count);
-        // Tooth j is ahead of tooth 0 by the angle ψ_j = Σ_{k ≤ j} pitch_k; tooth 0 enters at time 0.
+        // Tooth j is ahead of tooth 0 by the angle ψ_j = Σ_{1 ≤ k ≤ j} pitch_k; tooth 0 enters at time 0.
         let mut ahead_rad = 0.0;
         for tooth in 0..count {
             if tooth > 0 {

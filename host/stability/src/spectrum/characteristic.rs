@@ -6,7 +6,7 @@
 //!
 //!   det(Φ(w (1 − 1/μ)) − μ I) = 0
 //!
-//! holds if and only if μ is a Floquet multiplier. Φ is a product over elements of real polynomials in κ.
+//! holds for μ ≠ 0 if and only if μ is a Floquet multiplier. Φ is a product over elements of real polynomials in κ.
 
 use num_complex::Complex64;
 use quietcut_numerics::Stop;
@@ -20,8 +20,8 @@ use crate::problem::period::{Element, Period};
 /// dropped: below rounding.
 const TERM: f64 = 1e-17;
 
-/// Largest |κ|, in units of the depth by which the polynomials are scaled, at which they are evaluated. The 20th power
-/// of 1.5 is 3000, so that 20 terms lose three digits to rounding.
+/// Largest |κ|, in units of the depth by which the polynomials are scaled, at which `root_near` evaluates them. The
+/// 20th power of 1.5 is 3300, so that 20 terms lose three digits to rounding.
 const RADIUS: f64 = 1.5;
 
 /// Largest number of terms of an element's polynomial in κ: a limit on computing time. Elements are so short that far
@@ -131,8 +131,8 @@ impl Characteristic {
         }
     }
 
-    /// Logarithmic derivatives of the characteristic function F = det(Φ − μI) at (μ, w); `None` if F vanishes to
-    /// rounding or a result is not finite.
+    /// Logarithmic derivatives of the characteristic function F = det(Φ − μI) at (μ, w); `None` if Φ − μI is singular
+    /// or a result is not finite.
     pub(crate) fn logarithmic(
         &self,
         multiplier: Complex64,
@@ -188,8 +188,8 @@ impl Characteristic {
     /// Floquet multiplier near a guess, with its derivative dμ/dw, by one Newton step; a real guess gives a real
     /// multiplier.
     ///
-    /// Its error is about the square of that of the guess. `None` if the relative step exceeds 0.01, or if κ is too
-    /// large for the polynomials.
+    /// Its error is about the square of that of the guess. `None` if the relative step is 0.01 or more, if κ is too
+    /// large for the polynomials, or if a result is not finite.
     pub(crate) fn root_near(&self, guess: Complex64, depth_m: f64, work: &mut Workspace) -> Option<Root> {
         // Both logarithmic derivatives of the characteristic function F are infinite at a root of F. Close to it their
         // ratio is smooth, so that they are evaluated at a relative distance of 1e-7.
@@ -225,7 +225,7 @@ impl Characteristic {
     }
 
     /// Crossing of the unit circle near a guess, at a depth between `low_m` and `high_m`, by Newton's method in depth
-    /// and angle of the multiplier. `None` if it does not converge, or leaves the range of depths.
+    /// and angle of the multiplier. `None` if it does not converge, or converges to a depth outside this range.
     pub(crate) fn crossing_near(
         &self,
         guess: Crossing,

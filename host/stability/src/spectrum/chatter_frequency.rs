@@ -10,8 +10,8 @@ use crate::problem::linear::Problem;
 use crate::problem::period::{Period, Rates};
 use quietcut_numerics::eigenvalues::eigenvector;
 
-/// Largest growth of any motion over a part of the period, as a factor on the growth of the Floquet mode over that
-/// part; beyond it the next part begins. The linear system of all parts then loses three digits.
+/// Growth of a motion over a part of the period, as a factor on the growth of the Floquet mode over that part, beyond
+/// which the next part begins. The linear system of all parts then loses three digits.
 const GROWTH: f64 = 1e3;
 
 /// Largest number of unknowns (parts of a period times states) in the linear system for the states at the start of all
@@ -62,7 +62,7 @@ fn free_hz(problem: &Problem, period_s: f64, multiplier: Complex64) -> Option<f6
 }
 
 /// Frequency, Hz, among |Im ln μ + 2πk|/(2πT) at which the motion is largest. `size` gives the norm of the harmonic at
-/// an exponent s with e^{sT} = μ; it is called for ascending s in steps of 2πi/T.
+/// an exponent s with e^{sT} = μ; it is called for ascending Im s in steps of 2π/T. `None` if no `size` is known.
 pub(crate) fn dominant_frequency_hz(
     problem: &Problem,
     depth_m: f64,
@@ -84,8 +84,8 @@ pub(crate) fn dominant_frequency_hz(
         .map(|(_, frequency_hz)| frequency_hz)
 }
 
-/// Force along the Floquet mode times quadrature weight, for every port (cutting tooth at a node), with the time of the
-/// node.
+/// Forces along the Floquet mode times quadrature weight, each with the time of its node. The forces of teeth that cut
+/// at the same node are added.
 fn eigenfunction_forces(
     period: &Period,
     multiplier: Complex64,
@@ -101,8 +101,8 @@ fn eigenfunction_forces(
     let mut seen_from = Vec::with_capacity(period.elements.len());
     let (mut length, share) = (0.0, 1.0 / period.elements.len().max(1) as f64);
     for element in &period.elements {
-        // Ends the part of the period before some motion has grown by the factor `GROWTH` more than the Floquet mode,
-        // whose share of that motion would then be rounding.
+        // Ends the part of the period once some motion has grown by the factor `GROWTH` more than the Floquet mode.
+        // Over a much longer part the share of the mode would be rounding.
         if part.norm() > GROWTH * multiplier.norm().powf(length) {
             parts.push(std::mem::replace(&mut part, identity.clone()));
             length = 0.0;

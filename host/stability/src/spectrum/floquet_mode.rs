@@ -2,8 +2,8 @@
 //!
 //! With G(t) = A + B M(t) C, M = κ Σ cutting·normalᵀ − β over the cutting teeth, and the complex depth κ = w (1 − 1/μ),
 //! the Floquet mode fulfils ẋ = G x with x(τ) = μ x(0). The adjoint fulfils ẏ = −Gᵀ y with y(τ) = l and lᵀΦ = μ lᵀ.
-//! Then lᵀ dΦ r = ∫ yᵀ dG x dt for any change of G: one pair of motions gives the derivatives with respect to all
-//! parameters.
+//! With x(0) = r, lᵀ dΦ r = ∫ yᵀ dG x dt for any small change of G: one pair of motions gives the derivatives with
+//! respect to all parameters.
 //!
 //! Mode and adjoint are computed on subintervals of the period with Gauss nodes, as in
 //! [`period`](crate::problem::period): the free motion of the structure by matrix exponentials, the force by
@@ -81,7 +81,7 @@ struct Basis {
 type Ports = Vec<(Vector3<Complex64>, Vector3<Complex64>)>;
 
 impl FloquetMode {
-    /// Floquet mode and adjoint of a multiplier at an axial depth; `None` if it is not a multiplier, or if numbers
+    /// Floquet mode and adjoint of a multiplier at an axial depth; `None` if a collocation is singular, or if numbers
     /// leave their range.
     pub(crate) fn new(problem: &Problem, rpm: f64, depth_m: f64, multiplier: Complex64) -> Option<Self> {
         let kappa = (Complex64::ONE - multiplier.inv()) * depth_m;
@@ -192,7 +192,8 @@ fn factors(
     Some((forward, adjoint))
 }
 
-/// Divides the period into subintervals over which no motion exceeds the phase angle [`ANGLE`].
+/// Divides the period into subintervals over which the fastest motion rotates by at most [`ANGLE`] and no motion decays
+/// by more than [`DECAY_MAX`], both estimated.
 fn subintervals(problem: &Problem, rpm: f64, kappa_m: f64) -> (Vec<Basis>, Vec<Subinterval>) {
     let engagement = &problem.process.engagement;
     let seconds_per_radian = problem.tooth_period_s(rpm) / engagement.pitch;
@@ -266,7 +267,8 @@ impl Basis {
     }
 }
 
-/// Transition of the Floquet mode from the start of a subinterval to its nodes and to its end.
+/// Transition of the Floquet mode, or of its adjoint in reversed time, from the start of a subinterval to its nodes and
+/// to its end.
 struct MapFactor {
     /// Transition matrix from the start to the end of the subinterval, n × n.
     transition: Matrix,

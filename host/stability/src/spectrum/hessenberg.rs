@@ -19,8 +19,8 @@ pub(crate) struct Shifted {
     pivots: Vec<usize>,
 }
 
-/// Relative distance of the shift from the eigenvalue. Each inverse iteration amplifies the eigenvector by its inverse,
-/// 1e8, and the matrix stays regular.
+/// Relative distance of the shift from an eigenvalue μ ≠ 0. Each inverse iteration multiplies the eigenvector by
+/// 1e8/|μ|, and the matrix stays regular.
 const SHIFT: f64 = 1e-8;
 
 impl Shifted {

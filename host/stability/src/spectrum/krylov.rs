@@ -16,12 +16,12 @@ use quietcut_numerics::eigenvalues::{self, EigenvalueError, eigenvector};
 /// space.
 const BLOCK: usize = 3;
 
-/// Largest dimension of a map for which all eigenvalues are computed from its matrix, which is as fast as block Arnoldi
-/// there.
+/// Largest dimension of a map for which all eigenvalues are computed from its matrix without trying block Arnoldi,
+/// which is not faster there.
 const WHOLE: usize = 90;
 
-/// Number of blocks after which eigenvalues are computed for the first time. They are computed again whenever the space
-/// has grown by a third, and at least by this number of blocks. A choice.
+/// Number of blocks after which eigenvalues are computed for the first time, unless the space is full before. They are
+/// computed again whenever the space has grown by a third, and at least by this number of blocks. A choice.
 const BLOCKS_BEFORE_EIGENVALUES: usize = 10;
 
 /// Residual ‖M v − μ v‖ with ‖v‖ = 1, relative to max(1, |μ|), below which an eigenvalue is accepted: rounding of a map
@@ -43,8 +43,8 @@ const ROUGH_SPACE_MAX: usize = 240;
 /// Largest dimension n of a map of which all eigenvalues are computed: about 10 n³ operations, some ten seconds.
 pub(crate) const WHOLE_MAX: usize = 1200;
 
-/// Norm of a vector after orthogonalization, relative to that before, below which it counts as linearly dependent:
-/// rounding of a map of some hundred steps, far below any residual used.
+/// Norm of a vector after orthogonalization, relative to the norm of its block before, up to which it counts as
+/// linearly dependent: rounding of a map of some hundred steps, far below any residual used.
 const DEPENDENT: f64 = 1e-14;
 
 /// Linear map of ℝⁿ, given by its action on vectors.
@@ -52,11 +52,11 @@ pub(crate) trait LinearMap {
     /// Dimension n.
     fn size(&self) -> usize;
 
-    /// Image of each column, n × columns; `None` if the equations have no solution.
+    /// Image of each column, n × columns; `None` if the equations have no solution or the image is not finite.
     fn apply(&self, columns: &DMatrix<f64>) -> Option<DMatrix<f64>>;
 }
 
-/// Eigenvalues of a linear map above a given size, largest first, with a subspace that contains their eigenvectors.
+/// Selected largest eigenvalues of a linear map, largest first, with a subspace that contains their eigenvectors.
 #[derive(Clone, Debug)]
 pub(crate) struct Dominant {
     /// Eigenvalues of the map; complex ones in exact conjugate pairs.
@@ -71,7 +71,8 @@ impl Dominant {
     /// All eigenvalues of a linear map with |μ| larger than `least`.
     ///
     /// # Errors
-    /// A result is not finite, or the map is large and block Arnoldi does not converge.
+    /// The map gives no image, a result is not finite, the eigenvalues cannot be computed, or the map is large and
+    /// block Arnoldi does not converge.
     pub(crate) fn of(map: &impl LinearMap, least: f64) -> Result<Self, Breakdown> {
         Self::kept(map, &|values| values.retain(|value| value.norm() > least))
     }
@@ -138,7 +139,7 @@ pub(crate) struct Largest {
     pub(crate) norm: f64,
 }
 
-/// Eigenvalues of a linear map larger than `share` times the largest, at most [`CROWD`] of them.
+/// Eigenvalues of a linear map of at least `share` times the size of the largest, at most [`CROWD`] of them.
 ///
 /// # Errors
 /// A result is not finite.
@@ -159,7 +160,8 @@ pub(crate) fn largest(map: &impl LinearMap, share: f64) -> Result<Largest, Break
 /// Eigenvalues of a linear map larger than `least`, or larger than `share` times the largest if that is less; largest
 /// first, with a relative residual of about 1e-7.
 ///
-/// `None` if block Arnoldi does not converge in a space of half the dimension, or if a result is not finite.
+/// `None` if block Arnoldi does not converge in a space of half the dimension or of [`SPACE_MAX`] vectors, or if it
+/// fails.
 pub(crate) fn larger_than(map: &impl LinearMap, least: f64, share: f64) -> Option<Vec<Complex64>> {
     let most = (map.size() / 2).min(SPACE_MAX);
     let found = arnoldi(map, most, ROUGH, &|values| {
@@ -177,7 +179,7 @@ struct ArnoldiResult {
 }
 
 /// Block Arnoldi with full orthogonalization. It stops once the eigenvalues selected by `keep` (from all, largest
-/// first) have converged, or once the space would exceed `most` vectors.
+/// first) have converged, once the map gives no new direction, or once the space would exceed `most` vectors.
 ///
 /// # Errors
 /// A result is not finite.
@@ -245,10 +247,10 @@ fn arnoldi(
     Err(Breakdown::NoSolution)
 }
 
-/// True if every eigenvalue μ has a small residual ‖M v − μ v‖ = ‖K y‖, with K the coupling to the next block and y the
-/// last block of the eigenvector of the projected matrix.
+/// True if every one of the `eigenvalues` μ has a small residual ‖M v − μ v‖ = ‖K y‖, with K the coupling to the next
+/// block and y the last block of the eigenvector of the projected matrix.
 ///
-/// Eigenvalues smaller than the residual count as converged: compact maps have many of them near zero.
+/// Eigenvalues not larger than the allowed `residual` count as converged: compact maps have many of them near zero.
 fn are_settled(
     projected: &DMatrix<f64>,
     coupling: &DMatrix<f64>,
@@ -287,7 +289,7 @@ fn start(size: usize) -> DMatrix<f64> {
 }
 
 /// QR factors of a block; Q omits columns that depend on those before. `scale` is the norm of the block before
-/// orthogonalization: columns below its rounding count as zero.
+/// orthogonalization: columns that orthogonalization reduces below its rounding count as zero.
 fn orthonormal(block: DMatrix<f64>, scale: f64) -> (DMatrix<f64>, DMatrix<f64>) {
     let columns = block.ncols();
     let mut kept: Vec<DVector<f64>> = Vec::with_capacity(columns);

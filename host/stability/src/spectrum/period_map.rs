@@ -11,12 +11,12 @@ use crate::error::Breakdown;
 use crate::problem::period::Period;
 use quietcut_numerics::eigenvalues;
 
-/// Largest size of a period map for which all eigenvalues are computed from its matrix, which is as fast as block
-/// Arnoldi there.
+/// Largest size of a period map for which all eigenvalues are computed from its matrix without trying block Arnoldi,
+/// which is not faster there.
 const WHOLE: usize = 110;
 
-/// Largest size of a period map for which all eigenvalues are computed if block Arnoldi does not converge: about one
-/// second.
+/// Largest size of a period map for which [`largest`] computes all eigenvalues if block Arnoldi does not converge:
+/// about one second.
 const UNSETTLED_WHOLE_MAX: usize = 400;
 
 /// Matrix of the map (x, p_τ) → (x⁺, p) over one tooth period at an axial depth, m.
@@ -86,9 +86,10 @@ pub(crate) struct Candidates {
     pub(crate) is_certain: bool,
 }
 
-/// Floquet multipliers of the collocated map larger than `share` times the largest.
+/// Floquet multipliers of the collocated map of at least `share` times the size of the largest.
 ///
-/// Large maps are treated by block Arnoldi.
+/// Large maps are treated by block Arnoldi, which limits their number. If the largest exceeds [`GROWN`], the result is
+/// from the transition matrix Φ(w).
 ///
 /// # Errors
 /// The collocation equations are singular, or the eigenvalues cannot be computed.
@@ -131,7 +132,7 @@ pub(crate) fn largest(period: &Period, depth_m: f64, share: f64) -> Result<Candi
 }
 
 /// Floquet multipliers of the collocated map larger than `least`, or larger than `share` times the largest if that is
-/// less, largest first. Small maps return smaller multipliers too.
+/// less, largest first. If the map is small, or block Arnoldi does not converge, smaller multipliers are included too.
 ///
 /// Large maps are treated by block Arnoldi, accurate enough to start Newton's method.
 ///
@@ -162,8 +163,8 @@ pub(crate) fn larger_than(
 struct Map<'a> {
     period: &'a Period,
     depth_m: f64,
-    /// LU factors of I − w Q for each subinterval of the tooth-passing period, with the axial depth w and the
-    /// kernel Q, which is the response of the displacements along the chip normals to the regenerative chips, 1/m.
+    /// LU factors of I − w Q for each element of the tooth-passing period, with the axial depth w and the kernel Q,
+    /// which is the response of the displacements along the chip normals to the regenerative chips, 1/m.
     implicit: Vec<LU<f64, Dyn, Dyn>>,
 }
 

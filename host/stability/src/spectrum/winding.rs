@@ -7,8 +7,8 @@
 //!
 //!   G(z) = det(I − z Φ(w (1 − z)))
 //!
-//! is an entire function of z, computed from n × n matrices. Its zeros are 1/μ of all multipliers. The mean of z G'/G
-//! over the circle of radius 1/R is the number of multipliers with |μ| > R.
+//! is an entire function of z, computed from n × n matrices. Its zeros are 1/μ of all multipliers μ ≠ 0. The mean of z
+//! G'/G over the circle of radius 1/R is the number of multipliers with |μ| > R.
 
 use num_complex::Complex64;
 use quietcut_numerics::Stop;
@@ -21,7 +21,7 @@ use crate::criteria::{FINE_MARGINS, MARGINS, WINDING_ERRORS, WOUND};
 /// seconds. A choice.
 const OPERATIONS_MAX: f64 = 3e9;
 
-/// Largest number of points on half of a circle for a winding number: a limit on computing time.
+/// Largest number of points on half of a circle from which a winding number is taken: a limit on computing time.
 const POINTS_MAX: usize = 8192;
 
 /// Largest number of candidate multipliers from which Newton's method starts: a limit on computing time.
@@ -73,7 +73,7 @@ impl<'a> Search<'a> {
     }
 
     /// Number of Floquet multipliers with |μ| larger than a radius; `None` if one lies so close to that circle that the
-    /// largest number of points does not resolve it.
+    /// largest number of points does not resolve it, if evaluations run out, or if a result is not finite.
     pub(crate) fn count_beyond(&mut self, radius: f64) -> Option<usize> {
         use std::f64::consts::PI;
         let at = |angle: f64| Complex64::from_polar(radius.recip(), angle);
