@@ -27,11 +27,11 @@ use quietcut_model::structure::Form;
 use quietcut_recording::Quantity;
 use quietcut_simulate::Effects;
 
-/// Relative change of mass, damping or stiffness in the central differences that give the derivative of the receptance. Their relative
-/// error is about its square, 1e-8; rounding contributes 1e-12/`STEP`.
+/// Relative change of mass, damping or stiffness in the central differences that give the derivative of the receptance (of the dynamic
+/// stiffness if force is compared). Their relative error is about its square, 1e-8; rounding contributes 1e-12/`STEP`.
 const STEP: f64 = 1e-4;
-/// Smallest |H| that is not regularized as nearly vanishing, over the root sum of squares of its modal contributions: ε of this file's head
-/// is this number times that root.
+/// Size of |H| at which it counts as nearly vanishing, over the root sum of squares of its modal contributions: ε of this file's head is
+/// this number times that root.
 const VANISHING: f64 = 0.05;
 
 #[derive(Clone, Copy)]

@@ -25,8 +25,8 @@ pub(super) struct MissingMode;
 
 /// Damping ratios at which the search for a missing mode starts.
 const DAMPING: [f64; 3] = [0.008, 0.025, 0.08];
-/// Number of candidate modes (frequency, damping ratio) that are kept as start values of a missing mode: those with the largest reduction
-/// of χ².
+/// Number of candidate modes (frequency, damping ratio) that are kept as start values of a missing mode: of the peaks of the reduction of
+/// χ² over frequency, the largest.
 const KEPT: usize = 4;
 
 impl Cause for MissingMode {
@@ -168,8 +168,9 @@ impl Cause for MissingMode {
         Ok(vec![Regressor::of_channels(observed)])
     }
 
-    /// Frequency, damping ratio and modal mass of the missing mode. `None` if the baseline has a mode at least as large whose half-power
-    /// bandwidth overlaps with that of the missing mode: the fit then describes a change of the baseline's mode.
+    /// Frequency, damping ratio and modal mass of the missing mode. `None` if the modal mass is not positive, or if the baseline has a
+    /// larger mode whose half-power bandwidth overlaps with that of the missing mode: the fit then describes a change of the baseline's
+    /// mode.
     fn parameters(
         &self,
         study: &Study<'_>,
@@ -284,7 +285,7 @@ fn bins(study: &Study<'_>, axis: usize, left: &[Vec<Vec<f64>>]) -> Vec<Bin> {
 }
 
 /// Reduction of the residual's χ² by a missing mode of this frequency and damping ratio, with the modal mass that fits best; 0 if that mass
-/// is negative.
+/// is not positive.
 fn chi_square_reduction(
     bins: &[Bin],
     free_decays: &[FreeDecay<'_>],

@@ -1,5 +1,5 @@
-//! Candidate causes, one file for each effect. They contain what depends on records: regressors, start values, bounds. Shared parts are in
-//! [`linear_parameter`], [`restoring`], [`process`] and [`sensor`].
+//! Candidate causes, one or two files for each effect. They contain what depends on records: regressors, start values, bounds. Parts that
+//! several causes share are, for example, in [`linear_parameter`], [`restoring`], [`process`] and [`sensor`].
 
 mod axial_depth_modulation;
 mod backlash;
@@ -47,8 +47,8 @@ pub(crate) fn all() -> Vec<Box<dyn Cause>> {
     EffectName::ALL.into_iter().flat_map(of).collect()
 }
 
-/// The forms of a cause that compete under the name of one effect. The match has no wildcard, so that a new effect without candidates does
-/// not compile.
+/// The forms of a cause that compete under the name of one effect. The match has no wildcard, so that a new effect without an entry here
+/// does not compile.
 fn of(effect: EffectName) -> Vec<Box<dyn Cause>> {
     match effect {
         EffectName::Mass => vec![Box::new(mass::CAUSE)],

@@ -1,8 +1,8 @@
 //! A potential shared by two directions: ½·k_xxyy·x²y² or k_xxy·x²y. The restoring force of each direction is its derivative.
 //!
-//! Shows, if both directions move: response at sums and differences of their frequencies; a stiffness of one direction that changes with
-//! the amplitude of the other. Does not show: anything while one direction is at rest. Fit: linear in the coefficient. Source: Nayfeh and
-//! Mook, Nonlinear Oscillations (1979), ch. 6.
+//! Shows, if both directions move: response at sums and differences of multiples of their frequencies; a stiffness of one direction that
+//! changes with the amplitude of the other. Does not show: with x²y², anything while one direction is at rest; with x²y, anything while x
+//! is at rest. Fit: linear in the coefficient. Source: Nayfeh and Mook, Nonlinear Oscillations (1979), ch. 6.
 
 use super::restoring::{Restoring, plain};
 use quietcut_model::effects::EffectName;

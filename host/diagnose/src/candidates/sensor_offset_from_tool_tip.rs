@@ -4,8 +4,8 @@
 //! Shows: a ratio for each mode, without phase. Does not show: other frequencies or damping. Fit: linear in the ratios. Source: mode shapes
 //! of a rigid or flexible body as in Ewins, Modal Testing (2000), ch. 2.
 //!
-//! There is only one ratio, equivalent to a gain of the channel, if one mode moves the axis, if the structure is not given by its modes, or
-//! in a cut, where the chip is computed along the motion of this sensor.
+//! There is only one ratio, equivalent to a gain of the channel, if one mode moves the axis, if the structure is not given by its modes or
+//! by more than nine, if all channels share the error, or in a cut, where the chip is computed along the motion of this sensor.
 
 use super::sensor::one_or_all;
 use super::sensor_gain::{SensorGainCause, factor};

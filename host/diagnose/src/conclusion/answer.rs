@@ -39,13 +39,13 @@ pub struct EstimatedCause {
     pub name: &'static str,
     /// Confidence that the cause is present, from 0 to 1.
     pub confidence: f64,
-    /// Direction x, y or z in which the cause acts, if it acts along one axis.
+    /// Direction x, y or z in which the cause acts, or which the channel also reads, if there is one such axis.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub direction: Option<&'static str>,
     /// The two directions that the cause couples, if it couples two.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub directions: Option<[&'static str; 2]>,
-    /// The channel in which the cause acts, if it is a sensor error.
+    /// The channel in which the cause acts, if it is an error of one sensor.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub channel: Option<String>,
     /// Parameters by key.
@@ -53,16 +53,18 @@ pub struct EstimatedCause {
     /// The table `[extension.NAME]` that adds the cause to a case.
     #[serde(skip)]
     pub extension: toml::Table,
-    /// Index of the cause in the candidate model. A cause along two directions has two entries with the same index.
+    /// Index of the cause in the candidate model. The entries of a cause that has several, for example one for each direction, have the
+    /// same index.
     #[serde(skip)]
     pub choice: usize,
-    /// The table `[extension.NAME]` with parameters at both ends of the 90 % interval along each principal direction of their covariance.
+    /// The table `[extension.NAME]` with parameters at both ends of the 90 % interval along each principal direction of the correlation of
+    /// the fitted parameters.
     #[serde(skip)]
     pub moved: Vec<[toml::Table; 2]>,
 }
 
 impl EstimatedCause {
-    /// Direction, directions or channel of the cause; empty if it has none.
+    /// Channel of the cause, otherwise its direction or directions; empty if it has none of them.
     pub fn location(&self) -> String {
         let directions = self.directions.map(|[one, other]| format!("{one} and {other}"));
         let channel = self.channel.clone();
@@ -103,10 +105,11 @@ pub struct Quality {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Gain {
     /// Share of the held-out residual energy above the noise that the extension explains: 1 − (E_after − n)/(E_before − n), with energies
-    /// in units of the noise and n compared values; at least −1.
+    /// in units of the noise and n compared values; limited to −1 to 1.
     pub residual_energy_removed: f64,
-    /// 90 % interval of `residual_energy_removed`, from the variance of both residual energies by the noise. It ends at −1, where the extension
-    /// doubles the residual energy above the noise. It is wide if the held-out residual is close to the noise.
+    /// 90 % interval of `residual_energy_removed`, from the variance of both residual energies by the noise. It is limited to −1, where the
+    /// extension doubles the residual energy above the noise, and to 1. It is wide if the held-out residual of the baseline is close to the
+    /// noise.
     pub ci90: [f64; 2],
 }
 
@@ -136,7 +139,7 @@ impl Gain {
 pub struct Unexplained {
     /// Share of the baseline's residual energy above the noise that the best candidate model does not explain; 0 if only noise is left.
     pub fraction: f64,
-    /// Channel, frequency and time at which the unexplained residual is largest, in words.
+    /// Channel, frequency and time at which the unexplained residual is largest, in words; `none above noise` if only noise is left.
     #[serde(rename = "where")]
     pub location: String,
     /// A formula that may describe the unexplained restoring force: a guess.
@@ -219,7 +222,7 @@ pub struct Diagnosis {
     pub outcome: Outcome,
     /// Prediction error of the baseline.
     pub baseline: Quality,
-    /// The causes, the most certain first; if they are confounded, those of all candidate models.
+    /// The causes of the best candidate model; if they are confounded, followed by those that equivalent candidate models add.
     pub causes: Vec<EstimatedCause>,
     /// Groups of cause names that the records cannot separate.
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -235,13 +238,14 @@ pub struct Diagnosis {
     /// Effect of the extension on the stability limits; `None` without an extension, or if limits cannot be computed.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lobes: Option<Lobes>,
-    /// Stability lobes of the case with the recorded cuts, if there is no extension.
+    /// Stability lobes of the case with the trial cuts and recorded cuts; `None` with an extension, without such cuts, or if limits cannot
+    /// be computed.
     #[serde(skip)]
     pub baseline_lobes: Option<Chart>,
     /// The experiment that separates confounded candidate models.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub next_test: Option<NextTest>,
-    /// Remarks on the records.
+    /// Remarks, for example on the records or on results that cannot be computed.
     pub warnings: Vec<String>,
     /// The equivalent candidate models, each with the causes that act together: more than one if the outcome is `Confounded`.
     #[serde(skip_serializing_if = "is_single")]
@@ -260,8 +264,8 @@ fn is_single(explanations: &[Vec<EstimatedCause>]) -> bool {
 }
 
 impl Diagnosis {
-    /// Adds the causes of an equivalent candidate model. A cause already listed is skipped: one with the same name or, if `other_locations`
-    /// is true, with the same name and location.
+    /// Adds an equivalent candidate model to `explanations`, if it is new, and its causes to `causes`. A cause already listed is skipped:
+    /// one with the same name or, if `other_locations` is true, with the same name and location.
     pub(crate) fn add_rival(&mut self, causes: Vec<EstimatedCause>, other_locations: bool) {
         for cause in &causes {
             let is_known = self.causes.iter().any(|known| {

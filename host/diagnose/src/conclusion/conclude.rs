@@ -116,7 +116,8 @@ fn answer(
     diagnosis
 }
 
-/// The answer if the baseline is right, with a warning if the held-out segments differ from the others.
+/// The answer if the baseline is right, with a warning if the prediction error is much larger on the whole records than on the held-out
+/// segments.
 fn of_baseline(
     study: &Study<'_>,
     library: &Library,
@@ -217,7 +218,8 @@ fn confound(diagnosis: &mut Diagnosis, shared: &[&'static str]) {
 }
 
 /// Confidence that a cause is present, from 0 to [`HIGHEST_CONFIDENCE`]. `ahead` is the lead of its candidate model over the best
-/// non-equivalent rival; `left` is the model's residual over the allowed residual.
+/// non-equivalent rival; `left` is the share of the residual energy above the noise that the model does not explain, over the allowed
+/// share.
 fn confidence(ahead: f64, left: f64) -> f64 {
     let by_rivals = 1.0 / (1.0 + (-(ahead - 0.5 * EQUIVALENT) / CONFIDENCE_WIDTH).exp());
     let by_rest = 1.0 - CONFIDENCE_LOSS * left.clamp(0.0, 1.0).powi(2);

@@ -1,8 +1,8 @@
 //! A formula for a residual that no known cause explains.
 //!
-//! The missing restoring force along an axis is Σ cᵢ φᵢ(x, v) with few of many terms: products of powers x^i v^j, terms that switch with
-//! the sign of the velocity, and the state z of Bouc–Wen loops with several yield displacements. Forward regression adds the term that
-//! explains most of the residual, as long as Schwarz's criterion n ln χ² + k ln n decreases. The quality of the formula is the share of the
+//! The missing restoring force along an axis is Σ cᵢ φᵢ(x, v) with few of many terms: products of powers x^i v^j, terms with |x|, |v| or
+//! the sign of v, and the state z of Bouc–Wen loops with several yield displacements. Forward regression adds the term that reduces χ²
+//! most, up to four terms and as long as Schwarz's criterion n ln χ² + k ln n decreases. The quality of the formula is the share of the
 //! held-out residual energy that it explains. S. A. Billings, Nonlinear System Identification, 2013, ch. 3 (forward regression); S. L.
 //! Brunton et al., PNAS 113 (2016) 3932 (sparse regression).
 
@@ -60,7 +60,7 @@ enum FormulaTerm {
 }
 
 /// A guessed formula for the unexplained restoring force, with the share of the held-out residual energy that it explains; `None` if that
-/// is less than `LEAST_EXPLAINED_BY_GUESS`.
+/// is less than `LEAST_EXPLAINED_BY_GUESS`, or if no formula is found.
 pub(crate) fn guess(study: &Study<'_>, regression: &mut Regression) -> Option<String> {
     let mut all: Vec<(usize, FormulaTerm, usize)> = Vec::new();
     for axis in study.driven_axes() {
@@ -133,7 +133,7 @@ fn terms(study: &Study<'_>, axis: usize) -> Vec<FormulaTerm> {
 }
 
 /// Contribution of a term of the guessed restoring force to the residual, per unit of its coefficient, by record, channel and sample;
-/// `None` if the structure cannot have the term.
+/// `None` if the structure cannot have the term, or if a value is not finite.
 fn column(study: &Study<'_>, axis: usize, term: FormulaTerm) -> Option<Vec<Vec<Vec<f64>>>> {
     let columns: Vec<Vec<Vec<f64>>> = study
         .records

@@ -14,24 +14,28 @@ use quietcut_stability::{
     default_speeds, needs_orbit, spaced,
 };
 
-/// Number of spindle speeds of a stability chart, unless each limit takes seconds to compute.
+/// Number of evenly distributed spindle speeds of a stability chart, to which those of recorded cuts are added; fewer if each limit takes
+/// seconds to compute.
 const SPEEDS: usize = 41;
 
-/// Number of spindle speeds of a stability chart whose limits take seconds each, as limits about forced orbits over a revolution do.
+/// Number of evenly distributed spindle speeds of a stability chart whose limits take seconds each, as limits about forced orbits over a
+/// revolution do. Those of recorded cuts are added.
 const FEW_SPEEDS: usize = 2;
 
-/// Number of spindle speeds at which [`depth_mm`] searches the lowest stability limit.
+/// Largest number of spindle speeds at which [`depth_mm`] searches the lowest stability limit.
 const COARSE: usize = 12;
 
 /// First axial depth of the search for the lowest stability limit in [`depth_mm`], mm.
 const SHALLOWEST_MM: f64 = 0.01;
-/// Largest axial depth of the search for the lowest stability limit in [`depth_mm`], mm.
+/// Bound of the axial depth in the search for the lowest stability limit in [`depth_mm`], mm; its result if no limit is found.
 const DEEPEST_MM: f64 = 200.0;
 
-/// Largest axial depth of a stability chart without cuts, as a multiple of the lowest stability limit in the speed range.
+/// Largest axial depth of a stability chart without trial cuts, as a multiple of the lowest stability limit found in the speed range. The
+/// chart is deeper if [`BELOW_CUTS`] requires it.
 const DEPTH: f64 = 4.0;
 
-/// Largest axial depth of a stability chart, as a multiple of the axial depth of the deepest trial or recorded cut in it.
+/// Largest axial depth of a stability chart with trial cuts, as a multiple of the axial depth of the deepest trial or recorded cut in it.
+/// Without trial cuts a chart is at least as deep as this.
 const BELOW_CUTS: f64 = 1.2;
 
 /// Stability limit at one spindle speed before and after the extension; `None` if it is above the largest depth of the search.
@@ -110,8 +114,8 @@ pub struct Lobes {
 /// An extended case with parameters at both ends of the 90 % interval along one principal direction of their covariance.
 pub type IntervalEnds = [Case; 2];
 
-/// The stability lobes of a case over the spindle speeds of trial cuts, else around those of recorded cuts, else over the speed range of
-/// the machine.
+/// The stability lobes of a case over the range of the spindle speeds of trial cuts, else around those of recorded cuts, else over the
+/// default speed range of the case.
 ///
 /// # Errors
 /// The case has no tool, material or cut, or its limits cannot be computed.
@@ -353,8 +357,8 @@ fn method(case: &Case, after_s: Option<f64>) -> Result<Box<dyn Method>, Stabilit
     }
 }
 
-/// Spindle speeds of a chart, rev/min: the range of trial cuts, else around that of recorded cuts, else that of the machine. Speeds of
-/// recorded cuts are always among them.
+/// Spindle speeds of a chart, rev/min: the range of trial cuts (widened if it is one speed), else around that of recorded cuts, else the
+/// default range of the case. Speeds of recorded cuts are always among them.
 fn speeds(
     case: &Case,
     cuts: &[TrialCut],
@@ -385,7 +389,8 @@ fn speeds(
     Ok(speeds)
 }
 
-/// Largest axial depth of a chart, mm: a multiple of the lowest limit, which is searched by doubling the depth.
+/// Largest axial depth of a chart, mm: a multiple of the lowest limit, which is searched by doubling the depth; [`DEEPEST_MM`] if none is
+/// found.
 fn depth_mm(method: &dyn Method, speeds_rpm: &[f64]) -> Result<f64, StabilityError> {
     let every = speeds_rpm.len().div_ceil(COARSE).max(1);
     let coarse: Vec<f64> = speeds_rpm.iter().copied().step_by(every).collect();

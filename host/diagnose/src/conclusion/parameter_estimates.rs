@@ -86,8 +86,8 @@ pub(crate) fn parameter_estimates(
     all
 }
 
-/// The causes mass, stiffness and damping, all changed by one factor, if that is equivalent to the sensor gain that `best` holds; otherwise
-/// empty.
+/// The causes mass, stiffness and damping, all changed by one factor, if that is equivalent to the sensor gain or offset that is the only
+/// cause of `best`; otherwise empty.
 pub(crate) fn by_common_factor(
     study: &Study<'_>,
     library: &Library,
@@ -176,7 +176,7 @@ fn figure(value: f64, deviation: f64) -> Figure {
     }
 }
 
-/// The effects of a cause with their parameters at both ends of the 90 % interval along each principal direction of the covariance. A
+/// The effects of a cause with their parameters at both ends of the 90 % interval along each principal direction of their correlation. A
 /// parameter set that is not physical is replaced by the estimate.
 fn moved(
     parts_of: &dyn Fn(&[f64]) -> Option<Vec<LocatedEffect>>,

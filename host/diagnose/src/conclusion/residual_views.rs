@@ -38,7 +38,7 @@ pub struct ResidualView {
     pub left: Vec<f64>,
     /// The restoring force that would explain the residual of the baseline in this channel; `None` if the channel's axis has no motion.
     pub missing: Option<MissingForce>,
-    /// The channel and its residual sampled at the tooth passings of a cut; `None` for other tests.
+    /// The channel and its baseline residual sampled at the tooth passings of a cut; `None` for other tests.
     pub spindle_motion: Option<SpindleMotionView>,
 }
 
@@ -49,9 +49,11 @@ pub struct SpindleMotionView {
     pub rpm: f64,
     /// Number of teeth of the tool.
     pub teeth: usize,
-    /// For each tooth passing through the spindle angle 0: its number, and the measured value of the channel at that instant.
+    /// For each passage of a tooth through immersion angle 0 (teeth taken as equally pitched): its number, and the measured value of the
+    /// channel at that instant.
     pub measured: Vec<(u32, f64)>,
-    /// For each tooth passing through the spindle angle 0: its number, and the residual of the channel at that instant.
+    /// For each passage of a tooth through immersion angle 0 (teeth taken as equally pitched): its number, and the baseline residual of the
+    /// channel at that instant.
     pub residual: Vec<(u32, f64)>,
 }
 
@@ -124,7 +126,7 @@ pub(crate) fn residual_views(
     all
 }
 
-/// Residual of each channel after the candidate model `best` and after the free decay that fits the rest best.
+/// Residual of each channel after the candidate model `best` and, if motion is compared, after the free decay that fits the rest best.
 fn left_by(study: &Study<'_>, library: &Library, record: &Record, best: &CandidateModel) -> Vec<Vec<f64>> {
     let explained = library.explained(study, record, best);
     let left: Vec<Vec<f64>> = record

@@ -65,8 +65,8 @@ const NODES_MAX: u32 = 40;
 /// Refuses speeds and depths (mm) at which the motion oscillates or decays too fast to be followed over a tooth period.
 ///
 /// # Errors
-/// [`StabilityError::BrokeDown`] with the reason. This check does not refuse negative speeds and depths; the methods
-/// do.
+/// [`StabilityError::BrokeDown`] with the reason. The signs of speed and depth are not checked here; the methods refuse
+/// values that are not positive.
 pub(crate) fn check_length(problem: &Problem, rpm: f64, depth_mm: f64) -> Result<(), StabilityError> {
     let rate = Rates::new(problem).at(2e-3 * depth_mm) + problem.fastest_decay();
     if rate * problem.tooth_period_s(rpm) > ELEMENTS_MAX * Resolution::WORKING.angle {
@@ -140,12 +140,12 @@ pub(crate) struct Rates {
     /// Largest magnitude of a pole of the free structure, rad/s.
     poles: f64,
     /// Velocity along the chip normal that the cutting force causes immediately, per displacement along the chip
-    /// normal: nᵀ C B D, 1/s per meter of axial depth. The largest value over the immersion, times the number of
-    /// cutting teeth.
+    /// normal: nᵀ C B D, 1/s per meter of axial depth. The largest magnitude over the immersion, times the largest
+    /// number of cutting teeth.
     direct: f64,
     /// Acceleration along the chip normal that the cutting force causes immediately, per displacement along the chip
-    /// normal: nᵀ C A B D, 1/s² per meter of axial depth. The largest value over the immersion, times the number of
-    /// cutting teeth.
+    /// normal: nᵀ C A B D, 1/s² per meter of axial depth. The largest magnitude over the immersion, times the largest
+    /// number of cutting teeth.
     inertial: f64,
     /// Axial depth, m, at which the cutting force per displacement is as large as the edge and feed force per axial
     /// displacement; 0 without axial-depth modulation.

@@ -62,7 +62,7 @@ fn free_hz(problem: &Problem, period_s: f64, multiplier: Complex64) -> Option<f6
 }
 
 /// Frequency, Hz, among |Im ln μ + 2πk|/(2πT) at which the motion is largest. `size` gives the norm of the harmonic at
-/// an exponent s with e^{sT} = μ; it is called for ascending Im s in steps of 2π/T. `None` if no `size` is known.
+/// an exponent s with e^{sT} = μ; it is called for ascending Im s in steps of 2π/T. `None` if `size` gives no value.
 pub(crate) fn dominant_frequency_hz(
     problem: &Problem,
     depth_m: f64,
