@@ -14,11 +14,11 @@ use quietcut_stability::{
     default_speeds, needs_orbit, spaced,
 };
 
-/// Number of evenly distributed spindle speeds of a stability chart, to which those of recorded cuts are added; fewer if each limit takes
+/// Number of spindle speeds at equal ratios in a stability chart, to which those of recorded cuts are added; fewer if each limit takes
 /// seconds to compute.
 const SPEEDS: usize = 41;
 
-/// Number of evenly distributed spindle speeds of a stability chart whose limits take seconds each, as limits about forced orbits over a
+/// Number of spindle speeds at equal ratios in a stability chart whose limits take seconds each, as limits about forced orbits over a
 /// revolution do. Those of recorded cuts are added.
 const FEW_SPEEDS: usize = 2;
 

@@ -2,8 +2,8 @@
 //!
 //! The dynamic chip thickness depends only on the displacement along the chip normal: tooth k at immersion φ_k observes
 //! p_k = n(φ_k)ᵀ u, and the preceding tooth observed p_k one period earlier. The state of the delay equation is
-//! therefore x at the start of the period and the values p while teeth cut. The history of all displacements is not
-//! needed.
+//! therefore x at the start of the period and the values p of the preceding period while teeth cut. The history of all
+//! displacements is not needed.
 //!
 //! On an element with Gauss nodes t_i, x(t) = e^{At} x₀ + ∫ e^{A(t−s)} B D(s) f(s) ds with f = w (p − p_τ) gives
 //!

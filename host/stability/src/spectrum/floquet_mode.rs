@@ -192,8 +192,8 @@ fn factors(
     Some((forward, adjoint))
 }
 
-/// Divides the period into subintervals over which the fastest motion rotates by at most [`ANGLE`] and no motion decays
-/// by more than [`DECAY_MAX`], both estimated.
+/// Divides the period into subintervals over which the estimated phase angle of the fastest motion is at most
+/// [`ANGLE`], and the largest decay rate times the duration at most [`DECAY_MAX`].
 fn subintervals(problem: &Problem, rpm: f64, kappa_m: f64) -> (Vec<Basis>, Vec<Subinterval>) {
     let engagement = &problem.process.engagement;
     let seconds_per_radian = problem.tooth_period_s(rpm) / engagement.pitch;

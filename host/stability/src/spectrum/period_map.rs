@@ -88,8 +88,8 @@ pub(crate) struct Candidates {
 
 /// Floquet multipliers of the collocated map of at least `share` times the size of the largest.
 ///
-/// Large maps are treated by block Arnoldi, which limits their number. If the largest exceeds [`GROWN`], the result is
-/// from the transition matrix Φ(w).
+/// Large maps are treated by block Arnoldi, which limits the number of multipliers. If the largest exceeds [`GROWN`],
+/// the transition matrix Φ(w) gives all, unless rounding moves its eigenvalues.
 ///
 /// # Errors
 /// The collocation equations are singular, or the eigenvalues cannot be computed.

@@ -35,7 +35,7 @@ const ROOTS_MAX: usize = 12;
 pub(crate) struct LargestMultiplier {
     /// Largest Floquet multiplier found, if larger than [`WOUND`]; of a conjugate pair the upper one.
     pub(crate) multiplier: Option<Complex64>,
-    /// Radius beyond which the winding number counts no multiplier; infinite if no count converged.
+    /// Radius beyond which the winding number counts no multiplier; infinite if no count gives zero.
     pub(crate) radius: f64,
 }
 
@@ -107,7 +107,7 @@ impl<'a> Search<'a> {
     }
 
     /// Floquet multiplier beyond a radius that is not among the known ones, by Newton's method with the known ones
-    /// deflated.
+    /// deflated; `None` if none of the starting values leads to one.
     fn another_beyond(&mut self, radius: f64, known: &[Complex64]) -> Option<Complex64> {
         const ANGLES: usize = 6;
         for share in [0.95, 0.7, 0.3] {
@@ -124,7 +124,8 @@ impl<'a> Search<'a> {
         None
     }
 
-    /// Floquet multiplier μ = 1/z to which Newton's method converges from z = `start`.
+    /// Floquet multiplier μ = 1/z to which Newton's method converges from z = `start`, with the known ones deflated; of
+    /// a conjugate pair the upper one.
     fn newton(&mut self, start: Complex64, known: &[Complex64]) -> Option<Complex64> {
         // The polynomials of the elements in the complex depth w (1 − z) are not valid for larger |z|.
         let is_valid = |z: Complex64| z.is_finite() && z.norm() <= WOUND.recip();
