@@ -9,8 +9,8 @@ use crate::limits::speed_line::SpeedLine;
 
 pub use quietcut_recording::cut_table::{Outcome, TrialCut, read};
 
-/// Number of steps in axial depth at which Floquet multipliers are computed up to the depth of a trial cut. A choice:
-/// half more than the least number of a chart, 40.
+/// Number of equal steps in axial depth, up to the deepest trial cut at a speed, at which Floquet multipliers are
+/// computed; methods refine them where needed. A choice: half more than the least number of a chart, 40.
 const SAMPLES: usize = 60;
 
 /// Numbers of trial cuts that a method predicts wrongly, and of those that decide nothing.

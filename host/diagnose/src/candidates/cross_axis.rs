@@ -1,8 +1,8 @@
 //! A channel that also reads another direction: y = y_t + p·(the other direction), y_t the true value.
 //!
 //! Shows: the motion of the other direction without delay or phase, also if only that direction is driven. Does not show: anything if the
-//! other direction is at rest. A cross receptance would be reciprocal. Fit: linear in p. Source: transverse sensitivity as in McConnell and
-//! Varoto, Vibration Testing (2008).
+//! other direction is at rest. Unlike a cross receptance, it is not reciprocal. Fit: linear in p. Source: transverse sensitivity as in
+//! McConnell and Varoto, Vibration Testing (2008).
 
 use num_complex::Complex64;
 

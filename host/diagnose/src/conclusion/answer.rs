@@ -95,7 +95,8 @@ pub(crate) fn label(causes: &[EstimatedCause]) -> String {
 /// Prediction error of a model.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Quality {
-    /// NRMSE on held-out segments: root mean square of the residual over that of the channel; all channels have equal weight.
+    /// NRMSE on held-out segments: root mean square of the residual over that of the measured channel in its whole record; all channels
+    /// have equal weight.
     pub nrmse_heldout: f64,
     /// NRMSE on the whole records.
     pub nrmse_whole: f64,

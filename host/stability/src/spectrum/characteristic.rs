@@ -6,7 +6,8 @@
 //!
 //!   det(Φ(w (1 − 1/μ)) − μ I) = 0
 //!
-//! holds for μ ≠ 0 if and only if μ is a Floquet multiplier. Φ is a product over elements of real polynomials in κ.
+//! holds for μ ≠ 0 if and only if μ is a Floquet multiplier. Φ is a product over elements of polynomials in κ with real
+//! coefficients, and of the transition of the free flight.
 
 use num_complex::Complex64;
 use quietcut_numerics::Stop;
@@ -16,8 +17,8 @@ use super::crossing::Crossing;
 use super::root::Root;
 use crate::problem::period::{Element, Period};
 
-/// Share of the largest coefficient of an element's polynomial in κ below which a term, and all higher ones, are
-/// dropped: below rounding.
+/// Size of a term of an element's polynomial in κ, as a share of the largest coefficient, below which all higher terms
+/// are dropped: below rounding.
 const TERM: f64 = 1e-17;
 
 /// Largest |κ|, in units of the depth by which the polynomials are scaled, at which `root_near` evaluates them. The

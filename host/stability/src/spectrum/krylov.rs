@@ -59,7 +59,8 @@ pub(crate) trait LinearMap {
 /// Selected largest eigenvalues of a linear map, largest first, with a subspace that contains their eigenvectors.
 #[derive(Clone, Debug)]
 pub(crate) struct Dominant {
-    /// Eigenvalues of the map; complex ones in exact conjugate pairs.
+    /// Eigenvalues of the map; complex ones in exact conjugate pairs, unless [`CROWD`] cuts off the lower one of the
+    /// last pair.
     pub(crate) eigenvalues: Vec<Complex64>,
     /// Orthonormal basis of the subspace, by columns; `None` for the whole space.
     basis: Option<DMatrix<f64>>,
