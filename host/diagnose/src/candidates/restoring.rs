@@ -22,8 +22,8 @@ pub(super) struct Restoring {
     /// True if the diagnosis also tries this restoring force along all axes with the same coefficients.
     pub(super) everywhere: bool,
     /// True if the diagnosis also tries this restoring force with separate coefficients along all driven axes together, as in joints of one
-    /// kind. A driven axis is one along which some record has a force or a motion above the noise. Such a force has no nonlinear
-    /// parameters.
+    /// kind. A driven axis is one along which some record has a force or a motion above the noise. A force that is tried like this has no
+    /// nonlinear parameters.
     pub(super) each: bool,
     /// Start values of the restoring force's nonlinear parameters for one axis, from the records of the study: for example from the
     /// displacement amplitudes along this axis.

@@ -36,7 +36,8 @@ pub struct ResidualView {
     pub residual: Vec<f64>,
     /// Measured samples minus those that the extended case predicts, in the unit of the channel; empty without an extension.
     pub left: Vec<f64>,
-    /// The restoring force that would explain the residual of the baseline in this channel; `None` if the channel's axis has no motion.
+    /// The restoring force that would explain the residual of the baseline in this channel; `None` for a channel of force if motion is
+    /// compared, or if the channel's axis has no motion.
     pub missing: Option<MissingForce>,
     /// The channel and its baseline residual sampled at the tooth passings of a cut; `None` for other tests.
     pub spindle_motion: Option<SpindleMotionView>,

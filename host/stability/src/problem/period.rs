@@ -66,7 +66,7 @@ const NODES_MAX: u32 = 40;
 ///
 /// # Errors
 /// [`StabilityError::BrokeDown`] with the reason. The signs of speed and depth are not checked here; the methods refuse
-/// values that are not positive.
+/// wrong ones.
 pub(crate) fn check_length(problem: &Problem, rpm: f64, depth_mm: f64) -> Result<(), StabilityError> {
     let rate = Rates::new(problem).at(2e-3 * depth_mm) + problem.fastest_decay();
     if rate * problem.tooth_period_s(rpm) > ELEMENTS_MAX * Resolution::WORKING.angle {

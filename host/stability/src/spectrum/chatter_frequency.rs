@@ -11,7 +11,7 @@ use crate::problem::period::{Period, Rates};
 use quietcut_numerics::eigenvalues::eigenvector;
 
 /// Growth of a motion over a part of the period, as a factor on the growth of the Floquet mode over that part, beyond
-/// which the next part begins. The linear system of all parts then loses three digits.
+/// which the next part begins. The linear system of all parts then loses about three digits.
 const GROWTH: f64 = 1e3;
 
 /// Largest number of unknowns (parts of a period times states) in the linear system for the states at the start of all
