@@ -65,8 +65,7 @@ const NODES_MAX: u32 = 40;
 /// Refuses speeds and depths (mm) at which the motion oscillates or decays too fast to be followed over a tooth period.
 ///
 /// # Errors
-/// [`StabilityError::BrokeDown`] with the reason. The signs of speed and depth are not checked here; the methods refuse
-/// wrong ones.
+/// [`StabilityError::BrokeDown`] with the reason. The signs of speed and depth are not checked here, but by the methods.
 pub(crate) fn check_length(problem: &Problem, rpm: f64, depth_mm: f64) -> Result<(), StabilityError> {
     let rate = Rates::new(problem).at(2e-3 * depth_mm) + problem.fastest_decay();
     if rate * problem.tooth_period_s(rpm) > ELEMENTS_MAX * Resolution::WORKING.angle {
