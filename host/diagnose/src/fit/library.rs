@@ -30,8 +30,7 @@ pub(crate) struct Library {
     pub unexamined: Vec<String>,
 }
 
-/// The effects that change mass, stiffness and damping of the structure. All three by one factor scale its dynamic stiffness by that
-/// factor.
+/// The effects that change mass, stiffness and damping of the structure. One factor on all three is a factor on its dynamic stiffness.
 pub(crate) const OF_DYNAMIC_STIFFNESS: [EffectName; 3] =
     [EffectName::Mass, EffectName::Stiffness, EffectName::Damping];
 
