@@ -322,7 +322,8 @@ fn demodulated(
     Some(step)
 }
 
-/// H1 estimate over the subsegments of a frequency step, its coherence, and the standard deviation of |H|.
+/// H1 estimate of H over the subsegments of a frequency step, its coherence, and the standard deviation of the magnitude
+/// of this estimate (not of one subsegment).
 fn averaged(forces: &[Phasor], responses: &[Phasor]) -> (Complex64, f64, f64) {
     let count = forces.len() as f64;
     let pairs = || responses.iter().zip(forces).map(|(x, f)| (x.value, f.value));

@@ -50,8 +50,8 @@ fn is_on_chart(case: &Case, given: &RecordedCut) -> bool {
         )
 }
 
-/// Outcome of a recorded cut: chatter if the device detects it at any time; stable if it reports a verdict without chatter; marginal if it
-/// reports none.
+/// Outcome of a recorded cut: chatter if the device detects it at any time; stable if it reports a stable cut, forced vibration
+/// or runout, and no chatter; marginal otherwise.
 ///
 /// # Errors
 /// The device cannot evaluate the recording; the error is a sentence.
@@ -73,7 +73,7 @@ fn outcome(recording: &Recording, teeth: Option<usize>) -> Result<Outcome, Strin
         match report.judgement.verdict {
             verdict if verdict.is_chatter() => return Ok(Outcome::Chatter),
             Verdict::Stable | Verdict::Forced | Verdict::Runout => detected = Outcome::Stable,
-            // The monitor has no verdict before the entry and after the exit of the tool.
+            // An air cut and an indeterminate verdict say nothing about the stability of the cut.
             _ => {}
         }
     }

@@ -35,7 +35,8 @@ pub(super) struct Spring {
     pub(super) damping: f64,
 }
 
-/// Displacement and velocity of an orbit, sampled at equal time steps over a period, along the machine's axes.
+/// Displacement and velocity of the tool on a forced orbit along the machine's axes, sampled at equal time steps over
+/// one period of the orbit.
 pub(super) struct Samples {
     step_s: f64,
     x: [Vec<f64>; 3],

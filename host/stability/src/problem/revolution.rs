@@ -26,7 +26,8 @@ impl<'a> Revolution<'a> {
         let mesh = RevolutionMesh::new(pitched, rpm, depth_m, fineness, Flight::Whole)?;
         let exponential = Exponential::new(&pitched.problem.structure.a);
         let mut elements: Vec<Element> = Vec::with_capacity(mesh.subintervals.len());
-        // Subintervals between the same two kinks have equal lengths and share the response of the free structure.
+        // Subintervals between the same two kinks of the displacement have equal lengths: the response of the free
+        // structure over one of them serves for all.
         let mut step: Option<(usize, f64, Step<'_>)> = None;
         for subinterval in &mesh.subintervals {
             if subinterval.cutting.is_empty() {

@@ -118,7 +118,8 @@ pub(crate) fn about_orbit(case: &Case) -> Result<AboutOrbit, StabilityError> {
     })
 }
 
-/// Extensions that are not smooth (friction, backlash, hysteresis), on the structure with all other extensions.
+/// Restoring forces of the extensions that are not smooth (friction, backlash, hysteresis), for the structure with its
+/// linear extensions.
 ///
 /// # Errors
 /// An extension cannot be applied to the case.
