@@ -271,7 +271,7 @@ fn check_non_finite(value: f32, of_csv: &str, of_wav: &str) {
     // The sample rate cannot be computed from such time stamps.
     let said = folder.refusal(
         "c.csv",
-        &format!("t [s],ax [m/s^2]\n0,1\n0.1,2\n{of_csv},3\n0.3,4\n"),
+        format!("t [s],ax [m/s^2]\n0,1\n0.1,2\n{of_csv},3\n0.3,4\n"),
     );
     assert!(said.contains("line 4"), "{said}");
 }

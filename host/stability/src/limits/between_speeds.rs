@@ -33,7 +33,7 @@ use crate::spectrum::verdict::Verdict;
 
 impl Chart {
     /// Adds lines at further speeds until straight lines between all of them draw the limits, or until
-    /// [`CHART_LINES_MAX`] lines are added: see [`Resolution`].
+    /// `CHART_LINES_MAX` lines are added: see [`Resolution`].
     ///
     /// `samples` is the number of steps in depth that the requested lines have, `teeth` the number of teeth of the tool.
     /// The result does not depend on the number of threads.

@@ -191,7 +191,7 @@ fn stable_depths_between_the_entries_are_stable_within_the_stated_error() {
     for line in &lines {
         let miss = trial.check(&point(&case, 1.0, 0.15), None, line);
         if miss.cautious_mm > allowed_mm {
-            assert_given_up(&table, line, |depth| point(&case, depth, 0.15), &direct, &mut rng);
+            assert_given_up(&table, line, |depth| point(&case, depth, 0.15), direct, &mut rng);
         }
     }
     trial.report();

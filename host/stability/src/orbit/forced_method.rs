@@ -26,7 +26,7 @@ impl Method for ForcedProblem {
             .map(|_| "teeth that leave the surface within the forced orbit")
     }
 
-    /// Evaluates the orbit that is reached when the depth grows from 0; the error of its multiplier is [`ORBIT_ROOM`]
+    /// Evaluates the orbit that is reached when the depth grows from 0; the error of its multiplier is `ORBIT_ROOM`
     /// times the change with a finer mesh.
     fn point(&self, rpm: f64, depth_mm: f64) -> Result<CutStability, StabilityError> {
         let fail = |cause| broke_down(rpm, depth_mm, cause);
