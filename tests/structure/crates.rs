@@ -183,3 +183,18 @@ fn model_and_stability_open_no_file() {
         }
     }
 }
+
+/// `cargo run` of the README chooses among the programs of all members: one alone may name its program.
+#[test]
+fn cargo_run_starts_the_command() {
+    let named: Vec<String> = all()
+        .iter()
+        .filter_map(|member| {
+            member.manifest["package"]
+                .get("default-run")?
+                .as_str()
+                .map(str::to_owned)
+        })
+        .collect();
+    assert_eq!(named, ["quietcut"]);
+}
