@@ -1,7 +1,9 @@
-//! Acquisition: from the sensor's queue to blocks with sequence number, time stamp, and numbers of clipped and lost samples.
+//! Acquisition: from the sensor's queue to blocks with sequence number, time stamp, and numbers of clipped and lost
+//! samples.
 //!
-//! The device's timer captures the rise of the sensor's watermark line. The line rises when the queue reaches W samples, so the
-//! time belongs to the W-th sample after the last one read. The sensor's true sample period is fitted to these stamps.
+//! The device's timer captures the rise of the sensor's watermark line. The line rises when the queue reaches W
+//! samples, so the time belongs to the W-th sample after the last one read. The sensor's true sample period is fitted
+//! to these stamps.
 
 use quietcut_core::acceleration::{Block, is_clipped};
 use quietcut_core::event_clock::{EventClock, EventClockState};
@@ -15,12 +17,15 @@ pub struct Acquisition<A> {
     accelerometer: A,
     clock: EventClock,
     nominal_period_ns: f32,
-    /// The line fitted to the time stamps of samples; its newest event is sample number [`Self::stamped_sample`].
+    /// The sample clock: sample time as a linear function of the sample number, fitted to the time stamps of the
+    /// watermark line. Its newest event is sample number [`Self::stamped_sample`]. `None` before the first time
+    /// stamp.
     line: Option<EventClockState>,
     stamped_sample: u64,
     /// Number that the next sample read from the sensor has, if no sample is lost.
     next_sample: u64,
-    /// True after a restart of the sensor. The sensor does not count the samples lost during the restart.
+    /// True from a restart of the sensor until the next block, if the sample clock has a time stamp. The sensor does
+    /// not count the samples lost during the restart.
     uncounted: bool,
     /// Number of samples that the last read left in the sensor's queue.
     left: u16,
@@ -256,8 +261,8 @@ mod tests {
                 assert_eq!(u64::from(block.sequence), number);
                 assert_eq!(block.lost, 0);
                 next += block.counts.len() as u64;
-                // Before the period is fitted it errs by 3 % over 63 samples. Later the error is a tick of the timer, and at
-                // most as much from the fitted period.
+                // Before the period is fitted it errs by 3 % over 63 samples. Later the error is a tick of the timer,
+                // and at most as much from the fitted period.
                 let bound_ns = if number < 8 { 75_000 } else { 2 * TICK_NS as i64 };
                 assert!(
                     error_ns.abs() <= bound_ns,
@@ -283,8 +288,8 @@ mod tests {
             assert_eq!(first, next.unwrap_or(first), "turn {turn}");
             next = Some(first + block.counts.len() as u64);
             assert_eq!(block.lost, 0, "turn {turn}");
-            // A block without a stamp of its own is extrapolated over less than a full queue: 20 ms times the relative error of
-            // the period, some 1e-5 after 100 stamps.
+            // A block without a stamp of its own is extrapolated over less than a full queue: 20 ms times the
+            // relative error of the period, some 1e-5 after 100 stamps.
             assert!(error_ns.abs() <= 300, "turn {turn}: {error_ns} ns");
         }
         assert!(behind > 20, "{behind}");
@@ -318,8 +323,8 @@ mod tests {
                     losses += u32::from(block.lost > 0);
                 }
                 next = Some(first + block.counts.len() as u64);
-                // In the worst case the period is known from two stamps 2.4 ms apart, each to a tick: an error of 1.5 µs in 300
-                // ms.
+                // In the worst case the period is known from two stamps 2.4 ms apart, each to a tick: an error of 1.5
+                // µs in 300 ms.
                 assert!(error_ns.abs() <= 3_000, "turn {turn}: {error_ns} ns");
             }
             assert!(losses > 10, "{losses}");

@@ -9,12 +9,12 @@
 //! }
 //! ```
 //!
-//! Only the flash makes the device wait: a request of an upload may take as long as a page erase. A board with a sensor then first
-//! takes all waiting blocks, with only [`flush`](Device::flush) between them, before it [`poll`](Device::poll)s for the next request.
-//! The upload is slower then, but no sample is lost.
+//! Only the flash makes the device wait: a request of an upload may take as long as a page erase. A board with a
+//! sensor then first takes all waiting blocks, with only [`flush`](Device::flush) between them, before it
+//! [`poll`](Device::poll)s for the next request. The upload is slower then, but no sample is lost.
 //!
-//! Requests of the host are done one at a time, in order; see [`quietcut_core::protocol`]. While the host feeds blocks, those of the
-//! sensor are ignored.
+//! Requests of the host are done one at a time, in order; see [`quietcut_core::protocol`]. While the host feeds
+//! blocks, those of the sensor are ignored.
 
 mod outbox;
 
@@ -46,7 +46,7 @@ pub trait Clock {
 pub struct Identity {
     /// Name of the board on which the device runs; at most 24 bytes.
     pub board: &'static str,
-    /// The accelerometer of the board; `None` if the host feeds the samples.
+    /// The accelerometer of the board; `None` if the board has none.
     pub sensor: Option<Sensor>,
 }
 
@@ -75,7 +75,8 @@ pub struct Device<'a, M, C> {
     input: Vec<u8, 64>,
 }
 
-/// The parts of a report whose change makes the report a changed one, which a host that subscribes to changes receives.
+/// Verdict, reason and advice of a report. A host that subscribes to changes receives a report only if one of these
+/// has changed.
 type ReportKey = (Verdict, Reason, Option<Advice>);
 
 /// The session of one host.
@@ -136,8 +137,8 @@ impl<'a, M: TableMemory, C: Clock> Device<'a, M, C> {
         }
     }
 
-    /// Sends as many bytes as the line to the host accepts, and receives until one request is done. Returns true if it
-    /// did anything; the caller then calls it again.
+    /// Sends as many bytes as the line to the host accepts, and receives until a readable frame of the host is
+    /// processed or no further byte can be. Returns true if it did anything; the caller then calls it again.
     ///
     /// # Errors
     /// Reading from or writing to the line fails.
@@ -173,12 +174,14 @@ impl<'a, M: TableMemory, C: Clock> Device<'a, M, C> {
 
     /// Processes bytes from the host. Returns how many of them it has processed.
     ///
-    /// While earlier replies wait to be sent it does not take all bytes; the caller then calls it again with the rest.
+    /// While a reply waits for room in the output queue, or the output queue has no room for two frames, it takes no
+    /// further bytes; the caller then calls it again with the rest.
     pub fn receive(&mut self, bytes: &[u8]) -> usize {
         let mut taken = 0;
         loop {
             self.pump();
-            // The output queue must have room for two frames: the reply to a request, and the refusal of an unreadable frame.
+            // The output queue must have room for two frames: the reply to a request, and the refusal of an
+            // unreadable frame.
             if self.link.room() < 2 || self.outbox.has_reply() {
                 return taken;
             }
@@ -222,7 +225,8 @@ impl<'a, M: TableMemory, C: Clock> Device<'a, M, C> {
         }
     }
 
-    /// Resets the signal chain and discards the messages that wait to be sent.
+    /// Resets the signal chain and the numbers of clipped and lost samples. Discards the held tachometer edges, and
+    /// the messages that wait for room in the output queue to the host.
     fn restart(&mut self) {
         self.state.reset();
         self.outbox.clear();
@@ -384,7 +388,8 @@ impl<'a, M: TableMemory, C: Clock> Device<'a, M, C> {
     }
 }
 
-/// Checks a working point from the host: depth and feed at least 0, entry angle below exit angle.
+/// Checks a working point from the host: axial depth and feed per tooth finite and at least 0, both angles finite,
+/// the entry angle below the exit angle.
 fn checked(point: Option<WorkingPoint>) -> Result<Option<WorkingPoint>, Refusal> {
     let Some(cut) = point else { return Ok(None) };
     let is_length = |mm: f32| mm >= 0.0 && mm.is_finite();

@@ -1,7 +1,7 @@
 //! A model of flash memory with the restrictions of real flash, whose power can be cut.
 //!
-//! It serves tests and the simulated device of the host. An erase sets all bits of a page. A word may be written once after each
-//! erase. Unaligned access, access out of bounds and a second write are errors.
+//! It serves tests and the simulated device of the host. An erase sets all bits of a page. A word may be written once
+//! after each erase. Unaligned writes and erases, access out of bounds, and a second write are errors.
 
 use embedded_storage::nor_flash::{
     ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash, check_erase, check_read, check_write,
@@ -80,9 +80,9 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>, const WRITE: usize, const ERASE: usize> Flash
 
     /// Lets the power fail during a write or an erase, after the next `operations` complete ones.
     ///
-    /// The seed `noise` determines the content after the interruption. An interrupted write leaves the earlier words written,
-    /// one word with a mixture of old and new bits, and the rest unchanged. An interrupted erase leaves any value in every byte
-    /// of the page. All later operations fail.
+    /// The seed `noise` determines the content after the interruption. An interrupted write leaves the earlier words
+    /// written, at most one word with a mixture of old and new bits, and the rest unchanged. An interrupted erase
+    /// leaves any value in every byte of the erased pages. All later writes and erases fail.
     pub fn fail_after(&mut self, operations: u32, noise: u64) {
         // The seed is made non-zero, because a xorshift generator cannot leave the state 0.
         self.power = Power::FailsAfter {

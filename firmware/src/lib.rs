@@ -3,9 +3,11 @@
 //! All code here is generic over embedded-hal, embedded-io and embedded-storage. A board is one folder in `src/bin`.
 //!
 //! Main types:
-//! - [`Acquisition`](acquisition::Acquisition): blocks with time stamps from an [`Accelerometer`](accelerometer::Accelerometer).
+//! - [`Acquisition`](acquisition::Acquisition): blocks with time stamps from an
+//!   [`Accelerometer`](accelerometer::Accelerometer).
 //! - [`Storage`](storage::Storage): two slots for lobe tables that survive a loss of power at any moment.
-//! - [`Device`](device::Device): signal chain, storage and link together. Boards, emulator and the simulated device of the host all use it.
+//! - [`Device`](device::Device): signal chain, storage and link together. Boards, emulator and the simulated device
+//!   of the host all use it.
 //!
 //! ```
 //! use quietcut_core::acceleration::{Block, Sensor};
@@ -40,7 +42,8 @@
 //! assert!(!device.outgoing().is_empty());
 //! ```
 //!
-//! This crate must not know pins or peripherals outside `src/bin`, nor any mathematics of vibration: that is `quietcut-core`.
+//! This crate must not know pins or peripherals outside `src/bin`, nor any mathematics of vibration: that is
+//! `quietcut-core`.
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]
 

@@ -76,7 +76,7 @@ impl Link {
         self.frames
     }
 
-    /// Numbers of refused frames.
+    /// Numbers of refused frames, counted for each reason of the refusal.
     pub fn errors(&self) -> &FrameErrors {
         &self.errors
     }
@@ -86,7 +86,8 @@ impl Link {
         (OUTGOING - self.outgoing.len()) / MAX_FRAME
     }
 
-    /// Appends the frame of a response to the output queue. Returns false if there is no room.
+    /// Appends the frame of a response to the output queue. Returns false if the queue has no room for a frame of the
+    /// largest length, or the response is too large for a frame.
     pub fn send(&mut self, response: &Response) -> bool {
         let mut buffer = [0; MAX_FRAME];
         if self.room() == 0 {

@@ -1,23 +1,25 @@
 //! Simulated signals for the emulated board, in place of sensor and tachometer.
 //!
-//! The emulated board has no sensor bus. Its third serial port receives [`Stimulus`] messages in postcard, framed by COBS with a
-//! closing zero. It answers each with one byte: [`TAKEN`] after the signal chain has processed the message, [`REFUSED`] if
-//! it is unreadable.
+//! The emulated board has no sensor bus. Its third serial port receives [`Stimulus`] messages in postcard, framed by
+//! COBS with a closing zero. The board answers each with one byte: [`TAKEN`] after it has processed the message,
+//! otherwise [`REFUSED`].
 //!
-//! Long recordings use the board's memory instead: the host writes stimuli without frames one after the other, beginning at
-//! [`STORE_OFFSET`], and sends one [`Stimulus::Stored`].
+//! Long recordings use the board's memory instead: the host writes stimuli without frames one after the other,
+//! beginning at [`STORE_OFFSET`], and sends one [`Stimulus::Stored`].
 
 use quietcut_core::acceleration::Block;
 use quietcut_core::tachometer::Edge;
 use serde::{Deserialize, Serialize};
 
-/// Largest length of a framed stimulus in bytes: 64 samples of three axes at 3 bytes each, the head of the block, and the frame.
+/// Largest length of a framed stimulus in bytes: 64 samples of three axes at 3 bytes each, the head of the block, and
+/// the frame.
 pub const MAX_FRAME_BYTES: usize = 640;
 
-/// Answer to a processed stimulus.
+/// Answer byte of the emulated board to a stimulus that it has processed.
 pub const TAKEN: u8 = 0x06;
 
-/// Answer byte to a stimulus that is unreadable or exceeds the board's memory.
+/// Answer byte of the emulated board to a stimulus that is too long, unreadable, exceeds the board's memory, or is
+/// one tachometer edge too many for a block.
 pub const REFUSED: u8 = 0x15;
 
 /// Size in bytes of the emulated flash for lobe tables, at the start of the board's non-volatile memory.
@@ -43,6 +45,6 @@ pub enum Stimulus {
         /// Length of the stored stimuli in bytes, from [`STORE_OFFSET`] on.
         bytes: u32,
     },
-    /// Requests a log entry with the largest stack depth and the processing times of blocks.
+    /// Requests a log entry with the largest stack depth and the processing times of blocks and of polls of the link.
     AskCost,
 }

@@ -1,4 +1,5 @@
-//! Lobe tables in flash. One of two slots always holds a complete table, so that power may fail at any moment.
+//! Lobe tables in flash. After the first upload one of two slots always holds a complete table, so that power may
+//! fail at any moment.
 //!
 //! The memory is divided into two equal slots. A slot is
 //!
@@ -7,14 +8,16 @@
 //!   32 bytes, written last                       one page
 //! ```
 //!
-//! The bytes before the journal are a table as specified in [`quietcut_core::lobes::format`], with a generation number of the
-//! device. At start-up the valid table with the newest generation is in use.
+//! The bytes before the journal are a table as specified in [`quietcut_core::lobes::format`], with a generation
+//! number of the device. At start-up the valid table with the newest generation is in use.
 //!
-//! An upload goes to the slot that is *not* in use, in this order: erase and write page by page, check the CRC and the entries, write the
-//! header. The slot becomes valid with the last word of its header. Until then the old table stays in use.
+//! An upload goes to the slot that is *not* in use, in this order: erase and write page by page, check the CRC, write
+//! the header, check the entries. The last word of its header makes the slot valid, if its entries are. Until then
+//! the old table stays in use.
 //!
-//! The journal stores which table is being uploaded and how many bytes are written. After a loss of power the upload continues
-//! at the last complete page.
+//! The journal stores which table is being uploaded and, page by page (in a large slot after every few pages), how
+//! many bytes are written. After a loss of power the upload continues after the last pages that the journal marks as
+//! written.
 //!
 //! No request erases more than one page, so that the time of a page erase bounds the time of every request.
 

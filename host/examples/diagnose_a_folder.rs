@@ -1,4 +1,4 @@
-//! Diagnosis of a folder of recordings: what the simulation of a case gets wrong about them.
+//! Diagnosis of a folder of recordings: the causes for which the simulation of a case differs from them.
 //!
 //! `cargo run --release -p quietcut --example diagnose_a_folder -- CASE.toml FOLDER`
 
@@ -19,13 +19,14 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// The outcome, the causes with their parameters, and the prediction error before and after, as text.
+/// The outcome of the diagnosis, the causes with their parameters, and the prediction error (NRMSE) on held-out
+/// segments, without and with these causes, as text.
 pub fn causes(case: &Path, folder: &Path) -> Result<String, Box<dyn Error>> {
     let case = Case::read(case)?;
     let mut paths: Vec<_> = std::fs::read_dir(folder)?
         .map(|entry| entry.map(|entry| entry.path()))
         .collect::<Result<_, _>>()?;
-    // The `.toml` files are the sidecars of the recordings, which their readers find themselves.
+    // The `.toml` files are the sidecars of the recordings; `Recording::read` finds them itself.
     paths.retain(|path| path.extension().is_some_and(|ending| ending == "csv"));
     paths.sort();
     let recordings = paths.iter().map(Recording::read).collect::<Result<Vec<_>, _>>()?;

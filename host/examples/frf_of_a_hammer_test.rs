@@ -2,8 +2,8 @@
 //!
 //! `cargo run --release -p quietcut --example frf_of_a_hammer_test -- tap-x.csv tap-y.csv`
 //!
-//! A recording has the columns `t [s]`, `fx [N]` or `fy [N]`, and motions such as `x [m]` or `ax [m/s^2]`; the sidecar beside it says
-//! `kind = "hammer"`.
+//! A recording has the columns `t [s]`, `fx [N]` or `fy [N]`, and motions such as `x [m]` or `ax [m/s^2]`; the sidecar
+//! beside it says `kind = "hammer"`.
 
 use std::error::Error;
 use std::fmt::Write;

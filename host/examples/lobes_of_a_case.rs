@@ -19,15 +19,16 @@ fn main() -> Result<(), Box<dyn Error>> {
 /// The stability limits from 700 to 1300 rev/min as text.
 pub fn limits(case: &Path) -> Result<String, Box<dyn Error>> {
     let case = Case::read(case)?;
-    // `CubicTerms::Refuse` returns an error for a structure with cubic terms, because its limits depend on the forced orbit;
-    // `RevolutionCollocation` treats them.
+    // `CubicTerms::Refuse` returns an error for a structure with cubic terms, because its limits depend on the forced
+    // orbit; `quietcut::orbit::ForcedProblem` computes them.
     let problem = Problem::new(&case, CubicTerms::Refuse)?;
     let mut text = String::new();
 
     let method = Collocation {
         problem: problem.clone(),
     };
-    // Limits at 13 spindle speeds from 700 to 1300 rev/min, searched at axial depths from 0 to 4 mm in 40 steps or more.
+    // Limits at 13 spindle speeds from 700 to 1300 rev/min, searched at axial depths from 0 to 4 mm in 40 steps or
+    // more.
     let chart = chart(&method, &spaced(700.0, 1300.0, 13), 4.0, 40)?;
     for line in &chart.speeds {
         match line.first_limit {

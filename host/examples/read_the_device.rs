@@ -1,6 +1,7 @@
-//! Reading a device: who it is, and what it detects for two seconds.
+//! Reading a device: its name and firmware, and its reports over two seconds.
 //!
-//! `cargo run --release -p quietcut --example read_the_device -- /dev/ttyACM0`; without a port the simulated device answers.
+//! `cargo run --release -p quietcut --example read_the_device -- /dev/ttyACM0`; without a port the simulated device
+//! answers.
 
 use std::error::Error;
 use std::fmt::Write;

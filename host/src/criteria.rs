@@ -1,7 +1,7 @@
 //! Every threshold by which the command decides, each with the source of its number.
 //!
-//! A number without a derivation or a campaign behind it is marked "Unfounded". Sizes of pictures, bounds of options and waiting times
-//! decide nothing about a machine and stay beside the code that uses them.
+//! A number without a derivation or a campaign behind it is marked "Unfounded". Sizes of pictures, bounds of options
+//! and waiting times decide nothing about a machine and stay beside the code that uses them.
 
 // Frequency response functions
 
@@ -20,24 +20,25 @@ pub(crate) const SMALL_FOLDING: f64 = 0.01;
 /// Relative difference of two frequencies up to which they belong to the same step of a step-sine test. Unfounded.
 pub(crate) const SAME_FREQUENCY: f64 = 1e-3;
 
-/// Relative difference of two force amplitudes below which they belong to the same level of a test. Force control of a shaker keeps a
-/// level within 5 %, and levels of a test differ by more. Unfounded.
+/// Relative difference of two force amplitudes below which they belong to the same level of a test. Force control of a
+/// shaker keeps a level within 5 %, and levels of a test differ by more. Unfounded.
 pub(crate) const SAME_LEVEL: f64 = 0.05;
 
-/// Ratio of two force amplitudes above which they are different levels of a test, so that cubic terms of joints are fitted. Unfounded.
+/// Ratio of two force amplitudes above which they are different levels of a test, so that cubic terms of joints are
+/// fitted. Unfounded.
 pub(crate) const DIFFERENT_LEVELS: f64 = 1.2;
 
-/// Difference of a joint angle below which two recordings are at the same posture, degrees. Postures stand in sidecars as they were
-/// commanded, so that only their rounding differs.
+/// Difference of every joint angle below which two recordings are at the same posture, degrees. Postures stand in
+/// sidecars as they were commanded, so that only their rounding differs.
 pub(crate) const SAME_POSTURE_DEG: f64 = 1e-3;
 
-/// χ² per degree of freedom of the receptances of a robot above which the user is warned that the model of its joints does not explain
-/// them: the residual is twice the stated error. Unfounded.
+/// χ² per degree of freedom of the receptances of a robot above which the user is warned that the model of its joints
+/// does not explain them: the residual is twice the stated error. Unfounded.
 pub(crate) const LARGEST_JOINT_MISFIT: f64 = 4.0;
 
 /// Largest prediction error of a nonlinear model that is fitted to higher-order FRFs: (factor, offset). The user is
-/// warned of a bias above factor × the prediction error of the harmonic-balance fit to the same data + offset, as a
-/// share of the measured response. Noise alone makes the two errors equal. Unfounded.
+/// warned of a bias if the prediction error (NRMSE) of the steady responses exceeds factor × that of the
+/// harmonic-balance fit to the same responses + offset. Noise alone makes the two errors equal. Unfounded.
 pub(crate) const BIASED_PREDICTION: (f64, f64) = (2.0, 1e-3);
 
 // Stability
@@ -46,25 +47,26 @@ pub(crate) const BIASED_PREDICTION: (f64, f64) = (2.0, 1e-3);
 /// which the user is warned of a coarse frequency resolution. Unfounded.
 pub(crate) const COARSE_TABLE: f64 = 0.01;
 
-/// Relative change of a stability limit by the extension of a case below which the report states the limit as
-/// unchanged. Floquet multipliers μ are accurate to 1e-7, and ln |μ| changes by about as much as ln of the depth, so
-/// that limits are accurate to about 1e-7; the threshold is ten times that.
+/// Largest relative change of a stability limit over all spindle speeds, by the extension of a case, below which the
+/// report states that no limit changes. Floquet multipliers μ are accurate to 1e-7, and ln |μ| changes by about as much
+/// as ln of the depth, so that limits are accurate to about 1e-7; the threshold is ten times that.
 pub(crate) const UNCHANGED_LIMIT: f64 = 1e-6;
 
 // Reports
 
-/// Relative change of the advised speed up to which the advice counts as unchanged in a log. The tooth-passing rule follows every small
-/// change of the estimated chatter frequency. Unfounded.
+/// Relative change of the advised spindle speed up to which the advice counts as unchanged in the output of `replay`
+/// and `monitor`. The tooth-passing rule follows every small change of the estimated chatter frequency. Unfounded.
 pub(crate) const SAME_SPEED: f64 = 0.01;
 
-/// Ratio of the largest to the smallest vibration amplitude in the records from which on the report draws missing
-/// stiffness and damping over the amplitude. Unfounded.
+/// Ratio of the largest to the smallest vibration amplitude in the recordings from which on the report of a diagnosis
+/// draws the stiffness and damping that the case lacks over the amplitude. Unfounded.
 pub(crate) const AMPLITUDE_RATIO: f64 = 1.2;
 
-/// Range of plausible static stiffnesses at the tool, N/m; outside, `lobes` warns of a wrong unit or scale. Slender tools and compliant
-/// robots have 10⁵ and more, the stiffest spindles some 10⁸; a decade or more on both sides is a choice.
+/// Range of plausible static stiffnesses at the tool, N/m; outside, `lobes` warns of a wrong unit or scale. Slender
+/// tools and compliant robots have 10⁵ and more, the stiffest spindles some 10⁸; a decade or more on both sides is a
+/// choice.
 pub(crate) const PLAUSIBLE_STIFFNESS: [f64; 2] = [1e4, 1e10];
 
-/// Smallest plausible dynamic stiffness at a resonance of the tool, N/m; below it, `lobes` warns of a wrong unit or scale. A static stiffness of
-/// 10⁵ N/m with a damping ratio of 1 % has twice as much.
+/// Smallest plausible dynamic stiffness at a resonance of the tool, N/m; below it, `lobes` warns of a wrong unit or
+/// scale. A static stiffness of 10⁵ N/m with a damping ratio of 1 % gives twice this dynamic stiffness.
 pub(crate) const LEAST_DYNAMIC_STIFFNESS: f64 = 1e3;

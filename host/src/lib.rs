@@ -1,9 +1,9 @@
 //! The library behind the `quietcut` command: command line, device client, demonstration and report pages.
 //!
-//! It re-exports the library crates of the workspace (recording, model, frf, simulate, stability, identify, diagnose). Its own modules are
-//! what no library crate knows: [`cli`] parses arguments and prints answers, [`report`] draws pictures and
-//! pages, [`device`] speaks with a monitor over a serial port, [`demo`] shows the monitor without a machine, [`machine`] keeps the folder of a
-//! machine that is set up.
+//! It re-exports the library crates of the workspace (recording, model, frf, simulate, stability, identify, diagnose).
+//! Its own modules are what no library crate knows: [`cli`] parses arguments and prints answers, [`report`] draws
+//! pictures and pages, [`device`] speaks with a monitor over a serial port, [`demo`] shows the monitor without a
+//! machine, [`machine`] keeps the folder of a machine that is set up.
 //!
 //! The stability limit of a case at one spindle speed:
 //!
@@ -44,7 +44,8 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! No library crate knows the command line, a terminal or a picture; mathematics of vibration and cutting does not stand here.
+//! No library crate parses a command line, prints or draws; the models of vibration and cutting are in the library
+//! crates.
 
 pub use quietcut_diagnose as diagnose;
 pub use quietcut_frf as frf;

@@ -1,5 +1,5 @@
-//! Raw acceleration: blocks of counts with sequence number, time stamp, and numbers of clipped and lost samples. The sample clock of
-//! the sensor is fitted to the time stamps of the device.
+//! Raw acceleration: blocks of counts with sequence number, time stamp, and numbers of clipped and lost samples. The
+//! sample clock of the sensor is fitted to the time stamps of the device.
 
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
@@ -70,8 +70,9 @@ pub fn is_clipped(counts: Counts) -> bool {
 
 /// Estimator of the time of each sample.
 ///
-/// The sensor's clock deviates by up to a few percent, and the device stamps the blocks with jitter. The line `t(n) = a + b·n` is fitted
-/// to the time stamps of the blocks' first samples (n the number of the sample, b the sample period).
+/// The sensor's clock deviates by up to a few percent, and the device stamps the blocks with jitter. The line
+/// `t(n) = a + b·n` is fitted to the time stamps of the blocks' first samples (n the number of the sample, b the
+/// sample period).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SampleClock {
     nominal_period_ns: f32,
@@ -139,8 +140,8 @@ impl SampleClock {
         continuity
     }
 
-    /// Updates the fitted line of the sample clock with the time stamp of a block, if the number of samples lost since
-    /// the preceding block is known.
+    /// Updates the fitted line of the sample clock with the time stamp of a block, if the number of samples lost
+    /// since the preceding block is known or can be estimated.
     fn follow(&self, state: &mut SampleClockState, block: &Block) -> Continuity {
         let Some(line) = &mut state.line else {
             return Continuity::Restarted;
@@ -148,8 +149,8 @@ impl SampleClock {
         let lost = if block.sequence == state.next_sequence {
             block.lost
         } else {
-            // The number of samples in lost blocks is unknown. The fitted clock gives it, as long as the standard deviation of
-            // its time is at most half a sample period.
+            // The number of samples in lost blocks is unknown. The fitted clock gives it, as long as the standard
+            // deviation of its time is at most half a sample period.
             let samples = line.events_to(block.time) - state.block_samples as f32;
             let error_ns2 = line.variance_at_ns2(samples);
             let half_ns = 0.5 * line.period_ns();
@@ -182,18 +183,18 @@ impl SampleClockState {
         }
     }
 
-    /// Fitted time at which sample `n` of the newest block was taken; n counts from 0.
+    /// Fitted time at which sample `n` of the newest block was taken; n counts from 0. `None` before the first block.
     pub fn time_of(&self, n: u32) -> Option<Nanoseconds> {
         self.time_at(n as f32)
     }
 
     /// Fitted time at `samples` sample periods after the first sample of the newest block; fractions and negative
-    /// values are allowed for `samples`.
+    /// values are allowed for `samples`. `None` before the first block.
     pub fn time_at(&self, samples: f32) -> Option<Nanoseconds> {
         self.line.map(|line| line.time_at(samples))
     }
 
-    /// Sample rate of the sensor, fitted to the time stamps of the device's clock.
+    /// Sample rate of the sensor, fitted to the time stamps of the device's clock; `None` before the first block.
     pub fn rate(&self) -> Option<Hertz> {
         self.line.map(|line| Hertz(1e9 / line.period_ns()))
     }

@@ -5,13 +5,14 @@
 //! | tool | to 5 kHz | input rate halved as often as 5 kHz allows; slower inputs are not decimated |
 //! | structure | to 400 Hz | input rate halved to the smallest rate of at least 1 600 Hz |
 //!
-//! Every stage is a symmetric half-band filter: y\[n\] = Σ h\[i\]·x\[2n − i\], i = 0 … 4m − 2, whose odd taps vanish except
-//! the middle one. The taps are a Kaiser-windowed sinc, computed at compile time. Aliases in the flat
-//! band are attenuated by at least 90 dB, the ripple is below 0.001 dB, and the gain at 0 Hz is exactly 1. The bands reach their
-//! upper ends also with a sample clock that is up to 3 % slow.
+//! Every stage is a symmetric half-band filter: y\[n\] = Σ h\[i\]·x\[2n − i\], i = 0 … 4m − 2, whose odd taps vanish
+//! except the middle one. The taps are a Kaiser-windowed sinc, computed at compile time. Aliases in the flat band are
+//! attenuated by at least 90 dB, the ripple is below 0.001 dB, and the gain at 0 Hz is exactly 1. With a sample clock
+//! that is up to 3 % slow the structure band still reaches its upper end, and so does the tool band of the IIS3DWB
+//! (26 667 Hz).
 //!
-//! Samples are fixed-point numbers with [`FRACTION_BITS`] fractional bits per count. A stage sums its products exactly in 64 bits and
-//! rounds once.
+//! Samples are fixed-point numbers with [`FRACTION_BITS`] fractional bits per count. A stage sums its products
+//! exactly in 64 bits and rounds once.
 
 use crate::acceleration::Counts;
 use crate::units::Hertz;
@@ -56,9 +57,11 @@ impl core::fmt::Display for RateOutOfRange {
 
 impl core::error::Error for RateOutOfRange {}
 
-/// Non-zero taps of a half-band filter of length 4·M − 1 on one side of the middle, in Q31, nearest first; the middle tap is ½.
+/// Non-zero taps of a half-band filter of length 4·M − 1 on one side of the middle, in Q31, nearest first; the middle
+/// tap is ½.
 ///
-/// h\[2j+1\] = ±1/(π(2j+1)) times the Kaiser window I₀(β√(1 − r²))/I₀(β), r = (2j+1)/2M, scaled so that all taps sum to 1 exactly.
+/// h\[2j+1\] = ±1/(π(2j+1)) times the Kaiser window I₀(β√(1 − r²))/I₀(β), r = (2j+1)/2M, scaled so that all taps sum
+/// to 1 exactly.
 const fn half_band<const M: usize>(beta: f64) -> [i32; M] {
     let mut ideal = [0.0; M];
     let mut sum = 0.0;
@@ -120,10 +123,11 @@ const EASY_SIDE: usize = 5;
 
 /// Sharp filter, pass band to 0.195 and stop band from 0.305 of its input rate: the last stage before the tool band.
 static SHARP: [i32; SHARP_SIDE] = half_band(10.3);
-/// Medium filter, pass band to 0.13 and stop band from 0.37 of its input rate: the earlier stages before the tool band, and the
-/// last stage before the structure band.
+/// Medium filter, pass band to 0.13 and stop band from 0.37 of its input rate: the earlier stages before the tool
+/// band, and the last stage before the structure band.
 static MEDIUM: [i32; MEDIUM_SIDE] = half_band(10.6);
-/// Easy filter, pass band to 0.065 and stop band from 0.435 of its input rate: all other stages before the structure band.
+/// Easy filter, pass band to 0.065 and stop band from 0.435 of its input rate: all other stages before the structure
+/// band.
 static EASY: [i32; EASY_SIDE] = half_band(11.4);
 
 /// State of one filter stage of the decimation: its last LENGTH input samples. They are stored twice in a row, so that
@@ -152,7 +156,8 @@ impl<const LENGTH: usize> Stage<LENGTH> {
     /// second.
     fn step<const SIDE: usize>(&mut self, taps: &[i32; SIDE], x: Sample) -> Option<Sample> {
         if !self.filled {
-            // The filter starts as if all earlier samples equalled the first one, so that gravity causes no step response.
+            // The filter starts as if all earlier samples equalled the first one, so that gravity causes no step
+            // response.
             self.samples.as_flattened_mut().fill(x);
             self.filled = true;
         }
@@ -236,7 +241,8 @@ impl Default for State {
     }
 }
 
-/// Output of the decimation cascade for one input sample: a sample of the tool band and one of the structure band, each only when due.
+/// Output of the decimation cascade for one input sample: a sample of the tool band and one of the structure band,
+/// each only when due.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Output {
     /// A sample of the tool band, if this input sample completes one.

@@ -1,8 +1,8 @@
 //! Estimator of the time of numbered events from time stamps with jitter.
 //!
-//! Samples of the accelerometer and positions of the tachometer wheel are such events: their rate is nearly constant, their
-//! numbers are exact, their time stamps have jitter. The model is `t(n) = a + b·n`. Recursive least squares with exponential
-//! forgetting estimates `a` and `b`: a stamp that is `memory` observations old has the weight 1/e.
+//! Samples of the accelerometer and positions of the tachometer wheel are such events: their rate is nearly constant,
+//! their numbers are exact, their time stamps have jitter. The model is `t(n) = a + b·n`. Recursive least squares
+//! with exponential forgetting estimates `a` and `b`: a stamp that is `memory` observations old has the weight 1/e.
 
 use serde::{Deserialize, Serialize};
 
@@ -56,8 +56,8 @@ pub struct EventClockState {
 pub enum Observation {
     /// The time stamp agrees with the fitted line.
     Fitted,
-    /// The recent deviations of time stamps from the line have the same sign: the rate of the events is changing. The
-    /// line continues from this stamp with an uncertain period.
+    /// The running mean of the deviations of time stamps from the line is too large for jitter: the rate of the
+    /// events is changing. The line continues from this stamp with the fitted period, which counts as uncertain.
     RateChanged,
     /// The time stamp is an outlier: too far from the line for jitter. The line is updated with a reduced deviation.
     Outlier,
@@ -144,8 +144,9 @@ impl EventClock {
 }
 
 impl EventClockState {
-    /// Updates the variance of the time stamps with the deviation of one stamp from its prediction, scaled so that its
-    /// standard deviation is that of a stamp. Returns true if the recent deviations show a change of the event rate.
+    /// Updates the variance of the time stamps with the deviation of one stamp from its prediction, scaled so that
+    /// its standard deviation is that of a stamp. Returns true if the running mean of the deviations shows a change
+    /// of the event rate.
     ///
     /// The variance is half the mean square of the *differences* of consecutive deviations. During a rate change the
     /// deviations have a bias, which the differences remove.
@@ -196,7 +197,7 @@ impl EventClockState {
     }
 
     /// Variance, in ns², of the fitted time of the event that follows the newest one by `events`. It grows with the
-    /// distance.
+    /// distance to later events.
     pub fn variance_at_ns2(&self, events: f32) -> f32 {
         let [aa, ab, bb] = self.covariance;
         self.variance_ns2 * (aa + events * (2.0 * ab + events * bb))

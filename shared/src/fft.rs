@@ -9,25 +9,28 @@
 //! 4. radix-4 passes with twiddle factors;
 //! 5. the split into the spectrum of the real values.
 //!
-//! **Scaling.** The input is shifted once, as a block, so that its largest value just leaves the headroom that the transform
-//! needs. No later pass depends on the data. A product with a Q31 factor keeps its high word, which halves it. The input of a
-//! radix-4 butterfly that has no factor is halved too. So each radix-4 pass with factors doubles the amplitude of a tone and
-//! keeps the amplitude of white noise, and for every N the largest result is just below 2³¹.
+//! **Scaling.** The input is shifted once, as a block, so that its largest value just leaves the headroom that the
+//! transform needs. No later pass depends on the data. A product with a Q31 factor keeps its high word, which halves
+//! it. The input of a radix-4 butterfly that has no factor is halved too. So each radix-4 pass with factors doubles
+//! the amplitude of a tone and keeps the amplitude of white noise, and for every N the largest result is just below
+//! 2³¹.
 //!
-//! **No overflow.** Let p be the number of radix-4 passes with factors and M = 2^(31+p)/N. The shifted input lies in −M … M − 1.
-//! 1. Every intermediate value of Z, the transform of the packed values, is a sum of some packed values of modulus ≤ √2·M, times
-//!    factors of modulus 1, halved in each pass with factors. The sum of all N/2 gives |Z| ≤ √2·(N/2)·M/2^p = √½·2³¹. Before the
-//!    last pass the bound is half of that, and the sums inside a butterfly have fewer terms than its results.
-//! 2. The split forms Z\[k\] ± Z*\[N/2 − k\], twice the transform of the even or the odd samples. Its real or imaginary part is
-//!    at most 2·(N/2)·M/2^p·c = 2³¹·c, where c is the mean of |cos| over the phases of the samples: 1 for k = 0, which has its
-//!    own formula, and at most √½ for all other k < N/4 (four phases per period).
-//! 3. X\[k\] itself is bounded by 2³¹·√½ for the same reason. Only X\[0\] and X\[N/2\] can reach 2³¹, for a block of −M. These
-//!    two sums saturate.
+//! **No overflow.** Let p be the number of radix-4 passes with factors and M = 2^(31+p)/N. The shifted input lies in
+//! −M … M − 1.
+//! 1. Every intermediate value of Z, the transform of the packed values, is a sum of some packed values of modulus ≤
+//!    √2·M, times factors of modulus 1, halved in each pass with factors. The sum of all N/2 gives |Z| ≤
+//!    √2·(N/2)·M/2^p = √½·2³¹. Before the last pass the bound is half of that, and the sums inside a butterfly have
+//!    fewer terms than its results.
+//! 2. The split forms Z\[k\] ± Z*\[N/2 − k\], twice the transform of the even or the odd samples. Its real or
+//!    imaginary part is at most 2·(N/2)·M/2^p·c = 2³¹·c, where c is the mean of |cos| over the phases of the samples:
+//!    1 for k = 0, which has its own formula, and at most √½ for all other k < N/4 (four phases per period).
+//! 3. X\[k\] itself is bounded by 2³¹·√½ for the same reason. Only X\[0\] and X\[N/2\] can reach 2³¹, for a block of
+//!    −M. These two sums saturate.
 //!
 //! Rounding adds less than 2^(p+3) units to any of these values, far less than the margins in 1 to 3.
 //!
-//! **Cost and accuracy**, 1024 points, on an emulated Cortex-M4F, 16-bit tone between two bins at −1 and −40 dBFS against an exact
-//! transform:
+//! **Cost and accuracy**, 1024 points, on an emulated Cortex-M4F, 16-bit tone between two bins at −1 and −40 dBFS
+//! against an exact transform:
 //!
 //! | | instructions | SNR |
 //! |---|---|---|
@@ -38,8 +41,8 @@
 //! | CMSIS-DSP `arm_rfft_q15`, the same | 44 234 | 47 / 10 dB |
 //! | CMSIS-DSP `arm_rfft_q31`, the same | 87 025 | 139 / 100 dB |
 //!
-//! The test `signal_chain_on_target` counts the instructions of the first two rows and compares them with these figures. Without
-//! `target-cpu=cortex-m4` this transform takes 58 515 instructions.
+//! The test `signal_chain_on_target` counts the instructions of the first two rows and compares them with these
+//! figures. Without `target-cpu=cortex-m4` this transform takes 58 515 instructions.
 
 /// Complex number with integer parts: real, imaginary.
 pub type Complex = [i32; 2];
@@ -226,7 +229,8 @@ fn normalized_first_pass(data: &mut [Complex], bits: i32) -> i32 {
 /// The spectrum of a block of N real values, stored in the memory of the block.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Transform<'a> {
-    /// X\[k\] for k = 1 … N/2 − 1 in units of 2^[`exponent`](Self::exponent); the first entry holds the two real values X\[0\] and X\[N/2\].
+    /// X\[k\] for k = 1 … N/2 − 1 in units of 2^[`exponent`](Self::exponent); the first entry holds the two real
+    /// values X\[0\] and X\[N/2\].
     pub bins: &'a [Complex],
     /// Block exponent: X\[k\] = `bins[k]`·2^exponent.
     pub exponent: i32,

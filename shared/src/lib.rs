@@ -1,8 +1,8 @@
 //! The signal chain of the chatter monitor: from raw acceleration counts to verdict and advice.
 //!
-//! The same code runs on the spindle, in the emulator and on the host, with results that are equal to the bit. It never allocates and never
-//! panics on input. It uses only IEEE basic operations and the functions of [`math`], so that every target computes the
-//! same bits.
+//! The same code runs on the spindle, in the emulator and on the host, with results that are equal to the bit. It
+//! never allocates and never panics on input. It uses only IEEE basic operations and the functions of [`math`], so
+//! that every target computes the same bits.
 //!
 //! ```text
 //! acceleration ─► decimation ─► spectrum ────────┐
@@ -12,7 +12,8 @@
 //! Main types:
 //! - [`Monitor`](monitor::Monitor): the configured signal chain. One [`step`](monitor::Monitor::step) takes a
 //!   [`Block`](acceleration::Block) of samples and returns a [`Report`](monitor::Report).
-//! - [`Judgement`](detector::Judgement): the verdict (air cut, stable, chatter, forced vibration, runout) with reason and confidence.
+//! - [`Judgement`](detector::Judgement): the verdict (air cut, stable, chatter, forced vibration, runout, or
+//!   indeterminate) with reason and confidence.
 //! - [`LobeTable`](lobes::LobeTable): the stability lobes of a machine, read in place from the bytes of a `.qct` file.
 //! - [`Advice`](advice::Advice): the next spindle speed or axial depth.
 //!
@@ -42,8 +43,8 @@
 //! # Ok::<(), quietcut_core::monitor::SettingsError>(())
 //! ```
 //!
-//! This crate knows no pins, buses, files or heap memory, and it computes no stability lobes: it only reads the table that the host
-//! computed.
+//! This crate knows no pins, buses, files or heap memory, and it computes no stability lobes: it only reads the table
+//! that the host computed.
 #![cfg_attr(not(test), no_std)]
 
 pub mod acceleration;

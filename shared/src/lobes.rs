@@ -17,17 +17,19 @@
 //!   same kinds, interval ends and chatter frequencies are interpolated linearly. If they differ (an island begins, the
 //!   kind changes), a depth is unstable if it is unstable in either column.
 //! - *Feed per tooth*: the same rule between the two neighbouring layers. A layer may be valid for a range of feeds.
-//! - *Feed direction*: layers may be valid for one direction only. Between two such directions the same rule applies, if they are at most
-//!   [`FEED_DIRECTION_SPAN`] apart and the feed needs no interpolation. If no direction is set and all layers have the same
-//!   one, that direction is assumed.
-//! - *Immersion and posture*: never interpolated. Immersion angles may differ by [`IMMERSION_TOLERANCE`]; the posture must be equal.
+//! - *Feed direction*: layers may be valid for one direction only. Between two such directions the same rule applies,
+//!   if they are at most [`FEED_DIRECTION_SPAN`] apart and the feed needs no interpolation. If no direction is set
+//!   and all layers have the same one, that direction is assumed.
+//! - *Immersion and posture*: never interpolated. Immersion angles may differ by [`IMMERSION_TOLERANCE`]; the posture
+//!   must be equal.
 //! - *Outside the table*: the result is [`TabulatedStability::NotKnown`] with the reason; nothing is extrapolated.
 //!
-//! A table may contain a bound of its [`InterpolationError`], and the derivatives of its limits by modal parameters and cutting
-//! force ([`LobeTable::slopes`]), from which [`corrected_limit`] follows.
+//! A table may contain a bound of its [`InterpolationError`], and the derivatives of its limits by modal parameters
+//! and cutting force ([`LobeTable::slopes`]), from which [`corrected_limit`] follows.
 //!
 //! Between two grid speeds, linear interpolation exceeds a convex limit b(n) by up to h²·b″/8 (h the speed step, b″ the
-//! second derivative by speed). The speed grid of a table must keep this small against the margin of [`advice`](crate::advice).
+//! second derivative by speed). The speed grid of a table must keep this small against the margin of
+//! [`advice`](crate::advice).
 //!
 //! [`format`] specifies the bytes.
 

@@ -1,10 +1,12 @@
 //! Elementary functions: the only functions of this crate that may approximate.
 //!
-//! Every function consists of IEEE additions, multiplications and divisions in a fixed order, so that it returns the same bits
-//! on every target. Only the sign and payload of a NaN depend on the processor. Each function states its largest error, which a
-//! test checks over the whole domain. One ulp is the distance from the true value to the next `f32` number.
+//! Every function consists of IEEE additions, multiplications and divisions in a fixed order, so that it returns the
+//! same bits on every target. Only the sign and payload of a NaN depend on the processor. Each function states its
+//! largest error, which a test checks over the whole domain. One ulp is the distance from the true value to the next
+//! `f32` number.
 //!
-//! The functions of `libm` used here compute in single precision, because a Cortex-M4F emulates double precision in software.
+//! The functions of `libm` used here compute in single precision, because a Cortex-M4F emulates double precision in
+//! software.
 
 use core::f32::consts::TAU;
 
@@ -22,8 +24,8 @@ pub fn round(x: f32) -> f32 {
 
 /// Square root, within 1 ulp; NaN for negative numbers.
 ///
-/// Newton's iteration from the initial value of micromath's inverse square root takes half the instructions of an integer square
-/// root. Numbers near the ends of the `f32` range, where the iteration would overflow, use libm.
+/// Newton's iteration from the initial value of micromath's inverse square root takes half the instructions of an
+/// integer square root. Numbers near the ends of the `f32` range, where the iteration would overflow, use libm.
 pub fn sqrt(x: f32) -> f32 {
     // The comparison of bit patterns excludes numbers outside the range, and also zero, negative numbers and NaN.
     let smallest = f32::MIN_POSITIVE.to_bits();
@@ -56,8 +58,8 @@ pub fn hypot(x: f32, y: f32) -> f32 {
 
 /// Sine and cosine of an angle in revolutions, within 1.2e-7 for every finite angle.
 ///
-/// The reduction of an angle in revolutions to one revolution is exact, so that the bound does not depend on the size of the
-/// angle.
+/// The reduction of an angle in revolutions to one revolution is exact, so that the bound does not depend on the size
+/// of the angle.
 pub fn sin_cos_turns(turns: f32) -> (f32, f32) {
     let fraction = turns - round(turns);
     let quadrant = round(4.0 * fraction);
@@ -74,7 +76,8 @@ pub fn sin_cos_turns(turns: f32) -> (f32, f32) {
         0 => (sin, cos),
         1 => (cos, -sin),
         -1 => (-cos, sin),
-        // The remaining quadrants, −2 and 2, are half a revolution. A NaN takes this branch too and remains NaN.
+        // The remaining quadrants, −2 and 2, are half a revolution. A NaN becomes quadrant 0, where both results are
+        // NaN.
         _ => (-sin, -cos),
     }
 }
@@ -114,7 +117,8 @@ pub fn exp(x: f32) -> f32 {
     libm::expf(x)
 }
 
-/// A ratio of powers in decibel, within 1e-4 dB. Ratios below the smallest normal `f32` number, and NaN, count as that number.
+/// A ratio of powers in decibel, within 1e-4 dB. Ratios below the smallest normal `f32` number, and NaN, count as
+/// that number.
 pub fn decibel(power_ratio: f32) -> f32 {
     10.0 * log10(power_ratio.max(f32::MIN_POSITIVE))
 }

@@ -1,7 +1,7 @@
 //! The signal chain as one step: takes a block of samples, returns a report.
 //!
-//! Firmware, emulator and host all call [`Monitor::step`]. The data pass through angles and samples, spectra, verdict and
-//! advice, in this order. [`Monitor`] is constant. Everything learned from the blocks is in [`State`].
+//! Firmware, emulator and host all call [`Monitor::step`]. The data pass through angles and samples, spectra, verdict
+//! and advice, in this order. [`Monitor`] is constant. Everything learned from the blocks is in [`State`].
 
 mod angles;
 mod band;

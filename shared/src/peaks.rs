@@ -147,8 +147,8 @@ impl PowerSpectrum<'_> {
         found
     }
 
-    /// Mean square in (m/s²)² of the five bins around a frequency. It equals the mean square of a tone at this frequency, if no
-    /// other tone is within the main lobe of the window.
+    /// Sum of the powers of the five bins around a frequency divided by [`HANN_NOISE_BINS`], in (m/s²)². It equals
+    /// the mean square of a tone at this frequency, if no other tone is within the main lobe of the window.
     pub fn mean_square_near(&self, frequency: Hertz) -> f32 {
         let centre = math::round(frequency.0 / self.bin.0).max(0.0) as usize;
         let lobe = centre.saturating_sub(2)..=centre + 2;
@@ -164,8 +164,8 @@ impl PowerSpectrum<'_> {
 
     /// The strongest tone between two frequencies that is no harmonic of the spindle.
     ///
-    /// A tone counts as harmonic n of the spindle if it lies within n·uncertainty plus one bin of it. A local maximum is skipped if it
-    /// is explained by the window's side lobes of stronger maxima.
+    /// A tone counts as harmonic n of the spindle if it lies within n·uncertainty plus one bin of it. A local maximum
+    /// is skipped if it is explained by the window's side lobes of stronger maxima.
     pub fn dominant_non_harmonic(&self, rotation: Rotation, from: Hertz, to: Hertz) -> Search {
         let Rotation {
             frequency,
@@ -212,8 +212,8 @@ impl PowerSpectrum<'_> {
             .map(|&other| {
                 let (bins, mean_square) = self.interpolate(other);
                 let distance = (k as f32 - bins).abs();
-                // Envelope of the Hann window's transform |sinc(d)/(1 − d²)| at a distance of d bins. Within the main lobe it is
-                // taken as 1.
+                // Envelope of the Hann window's transform |sinc(d)/(1 − d²)| at a distance of d bins. Within the main
+                // lobe it is taken as 1.
                 let envelope = if distance < 2.0 {
                     1.0
                 } else {

@@ -5,12 +5,12 @@
 //! | tool | 1024 | fixed point, [`fft`] |
 //! | structure | 2048 | microfft, single precision |
 //!
-//! **Units.** `power[k]` is in (m/s²)². A tone of amplitude A in the middle of bin k gives A²/2 there, its mean square. White
-//! noise of density S in (m/s²)²/Hz gives S·[`HANN_NOISE_BINS`]·bin width.
+//! **Units.** `power[k]` is in (m/s²)². A tone of amplitude A in the middle of bin k gives A²/2 there, its mean
+//! square. White noise of density S in (m/s²)²/Hz gives S·[`HANN_NOISE_BINS`]·bin width.
 //!
-//! **Window.** Hann, w\[n\] = ½ − ½·cos(2πn/N): equivalent noise bandwidth 1.5 bins, scalloping 1.42 dB, main lobe ±2 bins, first side
-//! lobe −31 dB, falling by 18 dB per octave. It is applied to the spectrum, as X\[k\]/2 − (X\[k−1\] + X\[k+1\])/4: the same
-//! values without a table.
+//! **Window.** Hann, w\[n\] = ½ − ½·cos(2πn/N): equivalent noise bandwidth 1.5 bins, scalloping 1.42 dB, main lobe ±2
+//! bins, first side lobe −31 dB, falling by 18 dB per octave. It is applied to the spectrum, as X\[k\]/2 −
+//! (X\[k−1\] + X\[k+1\])/4: the same values without a table.
 //!
 //! The mean of each block is subtracted first, so that gravity does not reduce the resolution.
 
@@ -79,7 +79,7 @@ impl<const N: usize> Overlap<N> {
             .map(move |sample| sample.get(axis).copied().unwrap_or(0))
     }
 
-    /// Mean of the stored samples of one axis, rounded down to an integer.
+    /// Mean of the stored samples of one axis, rounded towards zero to an integer.
     fn mean(&self, axis: usize) -> i32 {
         (self.axis(axis).map(i64::from).sum::<i64>() / N as i64) as i32
     }

@@ -1,14 +1,17 @@
 //! Resampling at fixed spindle angles, and the synchronous average with its residual.
 //!
-//! A tooth period (one tooth pitch of the spindle) is divided into [`SLOTS`] equal angles. [`Sampler`] converts the samples of a band, which
-//! are equally spaced in time, into one [`ToothPassing`] per tooth period: three axes at each slot. The tooth passings of one tooth, one per
-//! revolution, form a *class*. [`Average`] keeps the mean of each class and splits the signal:
+//! A tooth period (one tooth pitch of the spindle) is divided into [`SLOTS`] equal angles. [`Sampler`] converts the
+//! samples of a band, which are equally spaced in time, into one [`ToothPassing`] per tooth period: three axes at
+//! each slot. The tooth passings of one tooth, one per revolution, form a *class*. [`Average`] keeps the mean of each
+//! class and splits the signal:
 //!
 //! ```text
-//! tooth passing = at rest + forced (same for all teeth) + runout (same for one tooth, sums to 0 over the teeth) + residual
+//! tooth passing = at rest + forced (same for all teeth)
+//!                 + runout (same for one tooth, sums to 0 over the teeth) + residual
 //! ```
 //!
-//! The caller compensates the group delay of preceding filters: each sample comes with the spindle angle at the time that it represents.
+//! The caller compensates the group delay of preceding filters: each sample comes with the spindle angle at the time
+//! that it represents.
 
 use crate::math::sqrt;
 use crate::tachometer::Turns;
@@ -118,8 +121,8 @@ impl Sampler {
         (angle.0 >> 32) * per_turn + part.div_ceil(1 << 32)
     }
 
-    /// Processes the next sample (x, y, z in m/s²) with the spindle angle at the time that it represents. Small steps back of the angle, from a
-    /// correction of the tachometer's estimate, are allowed.
+    /// Processes the next sample (x, y, z in m/s²) with the spindle angle at the time that it represents. Small steps
+    /// back of the angle, from a correction of the tachometer's estimate, are allowed.
     ///
     /// Returns the tooth period that this sample completes. A tooth period must contain at least two samples.
     pub fn step(&self, state: &mut SamplerState, sample: [f32; 3], angle: Turns) -> Option<Passed> {
@@ -371,7 +374,8 @@ pub(crate) fn distance_square(a: &ToothPassing, b: &ToothPassing) -> f32 {
 mod tests {
     use super::*;
 
-    /// Passings of a signal that is a function of the spindle angle in revolutions, with this number of samples per revolution.
+    /// Passings of a signal that is a function of the spindle angle in revolutions, with this number of samples per
+    /// revolution.
     fn sampled(method: Method, samples_per_turn: f64, signal: impl Fn(f64) -> f64) -> std::vec::Vec<Passed> {
         let sampler = Sampler { teeth: 2, method };
         let mut state = SamplerState::new();
@@ -391,8 +395,8 @@ mod tests {
     #[test]
     fn values_and_means_stand_at_their_angles() {
         let tau = std::f64::consts::TAU;
-        // Three cycles per revolution at 100.3 samples per revolution are 33 samples per cycle, which bounds the error of both
-        // methods by 0.3 %.
+        // Three cycles per revolution at 100.3 samples per revolution are 33 samples per cycle, which bounds the
+        // error of both methods by 0.3 %.
         let value = |turns: f64| (tau * 3.0 * turns).sin();
         let mean = |turns: f64| {
             let integral = |t: f64| -(tau * 3.0 * t).cos() / (tau * 3.0);

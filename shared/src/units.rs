@@ -62,8 +62,8 @@ impl Hertz {
 
 /// A point in time on the clock of the device that took the samples, in nanoseconds since its start.
 ///
-/// Samples and tachometer edges are stamped by the same clock. The sensor's own clock deviates by up to a few percent, so its rate
-/// is fitted to this one.
+/// Samples and tachometer edges are stamped by the same clock. The sensor's own clock deviates by up to a few
+/// percent, so its rate is fitted to this one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[serde(transparent)]

@@ -85,12 +85,13 @@ impl<B> From<B> for Error<B> {
     }
 }
 
-/// Driver of one sensor.
+/// Driver of one IIS3DWB accelerometer on an SPI bus.
 pub struct Iis3dwb<S, D> {
     spi: S,
     delay: D,
     configuration: Configuration,
-    /// The 2-bit sample count in the tag of the last word read from the sensor's queue; `None` before the first word.
+    /// The 2-bit sample count in the tag of the last word read from the sensor's queue; `None` before the first word
+    /// after a start of the sensor.
     last_slot: Option<u8>,
 }
 

@@ -1,4 +1,5 @@
-//! A model of the IIS3DWB with its registers and a clock, from the data sheet and AN5444. It shares no code with the driver.
+//! A model of the IIS3DWB with its registers and a clock, from the data sheet and AN5444. It shares no code with the
+//! driver.
 //!
 //! Bus transfers and delays advance the model's clock, so that new samples arrive while the driver reads.
 
@@ -43,8 +44,8 @@ pub(crate) struct Model {
     /// Times at which pin INT1 of the modelled sensor rose.
     pub(crate) rises_ns: Vec<u64>,
     line: bool,
-    /// Times of all samples that went to the modelled queue. The counts x, y, z of a sample encode its index in this
-    /// list.
+    /// Times of all settled samples that went to the modelled queue. The counts x, y, z of such a sample encode its
+    /// index in this list.
     pub(crate) queued_ns: Vec<u64>,
     fault: Fault,
 }
@@ -84,7 +85,8 @@ impl Model {
         Rc::new(RefCell::new(model))
     }
 
-    /// The counts x, y, z of the modelled sample number `index`: they encode the index and differ between the axes.
+    /// The counts x, y, z of the settled sample with this index: `index` modulo 30 000, the negative of that, and
+    /// `index` divided by 30 000.
     pub(crate) fn counts(index: u64) -> Counts {
         let low = (index % 30_000) as i16;
         [low, -low, (index / 30_000) as i16]
@@ -103,13 +105,14 @@ impl Model {
         self.registers[usize::from(address)]
     }
 
-    /// Sets a fault of the modelled sensor before it starts to sample.
+    /// Sets a fault of the modelled sensor. Resets its registers and empties its queue, which also stops the
+    /// sampling.
     pub(crate) fn break_with(&mut self, fault: Fault) {
         self.fault = fault;
         self.set_defaults();
     }
 
-    /// Inverts this bit of every tag that the modelled sensor sends from now on.
+    /// Inverts this bit of every tag that the modelled sensor sends after this call.
     pub(crate) fn break_tags(&mut self, bit: u8) {
         self.fault = Fault::TagBit(bit);
     }
@@ -221,7 +224,8 @@ impl Model {
             self.reset_ends_ns.is_none(),
             "register {address:#04x} is written during a reset"
         );
-        // For each sensor register, the bits that the data sheet defines. Writes must keep all other bits at zero.
+        // For each register that the driver may write, the bits that the data sheet defines. A written value must
+        // keep all other bits at zero.
         let may = match address {
             0x07 => 0xff,
             0x08 => 0b1000_0001,
@@ -258,8 +262,8 @@ impl Model {
         self.update_line();
     }
 
-    /// The register address of the next byte in an SPI transfer after `address`. From the last output byte of the queue
-    /// it wraps to the tag.
+    /// The register address of the next byte in an SPI transfer after `address`. It stays the same if the sensor is
+    /// not set to count addresses up. From the last output byte of the queue it wraps to the tag.
     fn next(&self, address: u8) -> u8 {
         let counts_up = self.registers[0x12] & 0b100 != 0;
         match address {

@@ -23,9 +23,11 @@ pub trait Accelerometer {
     /// Resets and configures the sensor and empties its queue. Returns once the samples have settled.
     fn start(&mut self) -> Result<(), Self::Error>;
 
-    /// Moves samples from the queue to `samples`, oldest first, until the queue is empty or `samples` is full.
+    /// Moves the samples that the sensor's queue holds at the beginning of the read to `samples`, oldest first, until
+    /// `samples` is full.
     ///
-    /// `samples` is cleared first. After an error the state of the queue is unknown, and [`start`](Self::start) is required.
+    /// `samples` is cleared first. After an error the state of the queue is unknown, and [`start`](Self::start) is
+    /// required.
     fn read(&mut self, samples: &mut Vec<Counts, MAX_BLOCK_SAMPLES>) -> Result<Queue, Self::Error>;
 }
 
@@ -37,7 +39,7 @@ pub struct Queue {
     /// True if the sensor's queue has overflowed since the preceding read, so that samples are lost.
     pub overrun: bool,
     /// Number of samples missing between the preceding read and this one; `None` if the sensor does not number its
-    /// samples.
+    /// samples, at the first read after a start, and if this read gives no sample.
     pub gap: Option<Gap>,
 }
 

@@ -8,7 +8,8 @@ use crate::link::Link;
 
 const BANDS: [Band; 2] = [Band::Structure, Band::Tool];
 
-/// Reports, points of the stroboscopic map and spectra that wait to be sent, in this order.
+/// Messages that wait for room in the output queue to the host: a report, points of the stroboscopic map and spectra,
+/// in this order, and a reply before or after all of them.
 ///
 /// Points and spectra stay in the state of the signal chain. Only the progress of their transmission is stored here.
 #[derive(Default)]

@@ -57,7 +57,8 @@ impl<M: TableMemory> Storage<M> {
             _ => None,
         };
         let slots = || (0..SLOTS).filter(|slot| generation(slot).is_some());
-        // Generation numbers of lobe tables wrap at 2³². The newer of two numbers is less than 2³¹ ahead of the other.
+        // Generation numbers of lobe tables wrap at 2³². Table `b` is newer if its number is less than 2³¹ − 1
+        // ahead of that of table `a`.
         slots().reduce(|a, b| match (generation(&a), generation(&b)) {
             (Some(of_a), Some(of_b)) if of_b.wrapping_sub(of_a) < u32::MAX / 2 => b,
             _ => a,

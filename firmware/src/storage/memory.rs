@@ -11,8 +11,8 @@ pub(super) const ERASED: u8 = 0xFF;
 
 /// Memory-mapped flash.
 ///
-/// After a loss of power during a write or an erase, the affected word or page may hold any value. Reading it must not fail: if
-/// the error correction of the memory raises an interrupt, its handler must return.
+/// After a loss of power during a write or an erase, the affected word or page may hold any value. Reading it must
+/// not fail: if the error correction of the memory raises an interrupt, its handler must return.
 pub trait TableMemory: NorFlash {
     /// All bytes of the flash memory, as mapped into the address space.
     fn mapped(&self) -> &[u8];

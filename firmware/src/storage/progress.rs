@@ -30,8 +30,8 @@ pub(super) struct Progress {
 }
 
 impl Progress {
-    /// Resumes an upload. `payload` are the bytes after the header of the table that are already in the slot, up to the
-    /// end of a page.
+    /// Begins or resumes an upload. `payload` are the bytes after the header of the table that are already in the
+    /// slot: none, or those up to the last progress mark of the journal.
     pub(super) fn resumed(slot: usize, header: Header, generation: u32, payload: &[u8]) -> Self {
         let received = (HEADER_LENGTH + payload.len()) as u32;
         let renewed = Header { generation, ..header };

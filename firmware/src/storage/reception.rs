@@ -13,7 +13,8 @@ use super::progress::Progress;
 use super::slots::Storage;
 
 impl<M: TableMemory> Storage<M> {
-    /// The unfinished upload that the journals record, if there is one.
+    /// The unfinished upload that the journal of an empty slot records, if there is one of a known schema that fits
+    /// into the slot.
     pub(super) fn unfinished(&self) -> Option<Progress> {
         let empty = |&slot: &usize| matches!(self.contents_of(slot), Contents::Empty);
         (0..SLOTS).filter(empty).find_map(|slot| {
@@ -26,7 +27,7 @@ impl<M: TableMemory> Storage<M> {
 
     /// Discards the upload into a slot by erasing its journal.
     ///
-    /// An error of the erase is ignored: the slot has no header, so it holds no valid table.
+    /// An error of the erase is ignored: the slot holds no valid table in any case.
     pub(super) fn discard(&mut self, slot: usize) {
         let journal = self.journal(slot).start();
         let _ = self.erase(journal, Self::PAGE);
@@ -76,7 +77,7 @@ impl<M: TableMemory> Storage<M> {
         while upload.erased_to < end {
             let erased = self.erase(start + upload.erased_to, Self::PAGE);
             if upload.erased_to == 0 {
-                // The first page of the slot held the header of the old table, which is now erased.
+                // The first page of the slot held the header of the old table, which this erase has removed.
                 self.examine(upload.slot);
             }
             erased?;

@@ -46,7 +46,7 @@ impl<M: TableMemory> Storage<M> {
         storage
     }
 
-    /// The table in use.
+    /// The lobe table in use; `None` if there is none.
     pub fn table(&self) -> Option<LobeTable<'_>> {
         LobeTable::reopen(self.table_bytes(self.in_use?)?).ok()
     }
@@ -117,8 +117,8 @@ impl<M: TableMemory> Storage<M> {
     /// Receives a chunk of the uploaded lobe table.
     ///
     /// # Errors
-    /// [`Refusal::NoUpload`], [`Refusal::ChunkOffset`]; after [`Refusal::Flash`] the upload must begin again. It then
-    /// resumes at the last complete page.
+    /// [`Refusal::NoUpload`], [`Refusal::ChunkOffset`]; [`Refusal::Flash`] ends the upload, and
+    /// [`begin`](Self::begin) then starts it again from the first byte of the table.
     pub fn chunk(&mut self, offset: u32, data: &[u8]) -> Result<Upload, Refusal> {
         let upload = self.upload.take().ok_or(Refusal::NoUpload)?;
         let (expected, length) = (upload.received, upload.header.length);

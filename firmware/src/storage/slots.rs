@@ -45,7 +45,8 @@ impl<M: TableMemory> Storage<M> {
         self.memory.mapped().get(start..end).unwrap_or_default()
     }
 
-    /// The bytes of the lobe table in a slot, with the length that its header states.
+    /// The bytes of the lobe table in a slot, with the length that its header states; `None` if the header cannot be
+    /// read or states more bytes than the slot has.
     pub(super) fn table_bytes(&self, slot: usize) -> Option<&[u8]> {
         let bytes = self.slot_bytes(slot);
         let header = Header::read(bytes).ok()?;

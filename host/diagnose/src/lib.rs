@@ -1,30 +1,38 @@
-//! Finds what a simulation model of a milling machine gets wrong: the physical causes, their parameters, and the extension of the case that
-//! corrects them.
+//! Finds what a simulation model of a milling machine gets wrong: the physical causes, their parameters, and the
+//! extension of the case that corrects them.
 //!
-//! The residual is computed along the *measured* motion: with H the receptance of the case, F the force and f_r a restoring force that the
-//! case lacks, y − H·F = −H·f_r(x, v) + free decay + noise holds exactly, also for large f_r. A cause contributes one or few regressors
-//! f_r(x, v), and the fit of any set of causes is linear least squares. The few best candidate models are then fitted by prediction error,
-//! whose regressors, except near chatter, do not contain the noise of the measured motion: tests of structures are simulated; a study with
-//! a cut is predicted again with the extended case. Without a cut, records that are compared in force keep the linear fit.
+//! The residual is computed along the measured motion: with H the receptance of the case, F the force and f_r a
+//! restoring force that the case lacks, the reading y of a displacement satisfies y − H·F = −H·f_r(x, v) + free decay +
+//! noise exactly, also for large f_r. A cause contributes one or few regressors f_r(x, v), and the fit of any set of
+//! causes is linear least squares. The few best candidate models are then fitted by prediction error, whose regressors,
+//! except near chatter, do not contain the noise of the measured motion: tests of structures are simulated; a study
+//! with a cut is predicted again with the extended case. Without a cut, records that are compared in force keep the
+//! linear fit.
 //!
-//! Data flows through these rooms from the top to the bottom; a room uses only those above it:
+//! Data flows through these modules from the top to the bottom; a module uses only those above it:
 //!
-//! - `criteria`, `error`, `progress`, `signal`: thresholds; errors, options, stages; transforms and noise floors of sampled signals.
+//! - `criteria`, `error`, `progress`, `signal`: thresholds; errors, options, stages; transforms and noise floors of
+//!   sampled signals.
 //! - `baseline`: the model of the case file. It knows no recording.
-//! - `motion`: spindle angle, chips and cutting force of a recorded cut along a given motion, and free decays. It knows no `Record`.
-//! - `records`: each recording beside what the baseline predicts of it, and the `Study` that holds them. It knows no cause.
-//! - `candidates`: the causes that a baseline may lack, as regressors along the measured motion and as simulations. It fits nothing.
+//! - `motion`: spindle angle, chips and cutting force of a recorded cut along a given motion, and free decays. It knows
+//!   no `Record`.
+//! - `records`: each recording beside what the baseline predicts of it, and the `Study` that holds them. It knows no
+//!   cause.
+//! - `candidates`: the causes that a baseline may lack, as regressors along the measured motion and as simulations. It
+//!   fits nothing.
 //! - `fit`: the parameters of one candidate model. It does not compare candidates.
 //! - `selection`: which candidate model explains the records. It writes no text.
 //! - `conclusion`: parameter estimates, intervals, residual views, gain, effect on the lobes, the answer.
 //! - `next_test`: the experiment that separates confounded candidate models.
 //!
-//! `baseline` and `motion` stand before `records` because a `Record` holds the prediction of the baseline along the motion.
+//! `baseline` and `motion` stand before `records` because a `Record` holds the prediction of the baseline along the
+//! motion.
 //!
-//! "The thesis" in this crate is *Chatter Vibrations in Robotic Milling Considering Structural Nonlinearity*, a doctoral
-//! thesis of the University of Victoria; its equation numbers are given as "thesis eq. 5.16".
+//! "The thesis" in this crate is *Chatter Vibrations in Robotic Milling Considering Structural Nonlinearity*, a
+//! doctoral thesis of the University of Victoria; its equation numbers are given as "thesis eq. 5.16".
 //!
-//! The entry is [`diagnose`]. A baseline of one mode, and a sweep of a machine whose spring softens with the displacement:
+//! The entry is [`diagnose`]. A baseline of one mode, and a sweep of a machine whose spring softens with the
+//! displacement:
 //!
 //! ```
 //! use std::path::Path;
@@ -66,8 +74,8 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! This crate reads no command line and prints nothing. It identifies no parameter of a case that has no recording beside it; that is for
-//! the crate `identify`.
+//! This crate reads no command line and prints nothing. It identifies no parameter of a case that has no recording
+//! beside it; that is for the crate `identify`.
 
 mod baseline;
 mod candidates;
@@ -101,8 +109,8 @@ use records::study::Study;
 /// Finds what the case gets wrong about the recordings, and why.
 ///
 /// # Errors
-/// No recording is given; the case lacks an entry or cannot be simulated; or a recording cannot be compared: for example, it is too short,
-/// clipped, or without a required channel.
+/// No recording is given; the case lacks an entry or cannot be simulated; or a recording cannot be compared: for
+/// example, it is too short, clipped, or without a required channel.
 pub fn diagnose(
     case: &Case,
     recordings: &[Recording],
@@ -114,8 +122,8 @@ pub fn diagnose(
 /// [`diagnose`] with a callback at the beginning of each stage.
 ///
 /// # Errors
-/// No recording is given; the case lacks an entry or cannot be simulated; or a recording cannot be compared: for example, it is too short,
-/// clipped, or without a required channel.
+/// No recording is given; the case lacks an entry or cannot be simulated; or a recording cannot be compared: for
+/// example, it is too short, clipped, or without a required channel.
 pub fn diagnose_watched(
     case: &Case,
     recordings: &[Recording],

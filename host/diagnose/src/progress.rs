@@ -1,4 +1,4 @@
-//! Options of a diagnosis, and its progress.
+//! Options of a diagnosis, and the stages of its progress.
 
 /// Options of a diagnosis.
 #[derive(Clone, Copy, Debug, Default)]

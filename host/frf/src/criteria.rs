@@ -1,12 +1,12 @@
-//! Every threshold by which this crate decides, each with the source of its number.
+//! Thresholds by which this crate decides, each with the source of its number.
 //!
-//! A number without a derivation or a campaign behind it is marked "Unfounded". Window lengths, numbers of segments and bounds of iterations
-//! decide nothing about a recording and stay beside the code that uses them.
+//! A number without a derivation or a campaign behind it is marked "Unfounded" or "a choice". Window lengths, numbers
+//! of segments and bounds of iterations decide nothing about a recording and stay beside the code that uses them.
 
 // Hammer tests
 
-/// Longest time from an impact to a bounce of the hammer, s: a later pulse is an impact of its own. Bounces follow within some 0.1 s,
-/// deliberate strikes after a second or more; the value between is unfounded.
+/// Longest time from an impact to a bounce of the hammer, s: a later pulse is an impact of its own. Bounces follow
+/// within some 0.1 s, deliberate strikes after a second or more; the value between is unfounded.
 pub(crate) const BOUNCE_S: f64 = 0.4;
 
 /// Smallest peak force of an impact of a hammer, as a fraction of the largest force of the recording. Impacts by hand
@@ -55,8 +55,8 @@ pub(crate) const END_AMPLITUDE: f64 = 0.02;
 pub(crate) const DEPENDENT: f64 = 1e-2;
 
 /// Smallest excess of the number of independent averages of the spectra over the number of forces; with less, an FRF
-/// measurement is refused unless it is a hammer test. With as many averages as forces, the coherence is 1 whatever the noise. The half
-/// average is unfounded.
+/// measurement is refused unless it is a hammer test. With as many averages as forces, the coherence is 1 whatever the
+/// noise. The half average is unfounded.
 pub(crate) const SPARE_AVERAGES: f64 = 0.5;
 
 /// Smallest force power of a frequency line that lies within the swept range of a swept sine, as a fraction of the
@@ -75,12 +75,13 @@ pub(crate) const PERIODS_MIN: usize = 8;
 pub(crate) const FREQUENCY_STEP: f64 = 1.5e-3;
 
 /// Smallest deviation of an excitation period from the mean period of its frequency step that begins a new step, in
-/// robust standard deviations of the first [`PERIODS_MIN`] periods of the step. Two periods in a row must deviate so far; a Gaussian
-/// deviation exceeds it once in 2 million periods.
+/// robust standard deviations of the first [`PERIODS_MIN`] periods of the step. Two periods in a row must deviate so
+/// far; a Gaussian deviation exceeds it once in 2 million periods.
 pub(crate) const PERIOD_SCATTER: f64 = 5.0;
 
 /// Largest robust standard deviation of the first [`PERIODS_MIN`] excitation periods of a frequency step, relative to
-/// their mean, as a multiple of [`FREQUENCY_STEP`]. With a larger one, the frequency of the sine changes and no step begins. Unfounded.
+/// their mean, as a multiple of [`FREQUENCY_STEP`]. With a larger one, the frequency of the sine changes and no step
+/// begins. Unfounded.
 pub(crate) const STEADY_SCATTER: f64 = 10.0;
 
 /// Smallest deviation of an excitation period from the mean period of its frequency step that marks a pause of the
@@ -97,12 +98,13 @@ pub(crate) const SUBSEGMENTS_MIN: usize = 4;
 pub(crate) const SUBSEGMENT_SAMPLES_MIN: usize = 5;
 
 /// Largest deviation of the phasor ratio response/force of a subsegment from its mean over the second half of the
-/// frequency step with which the response counts as settled, as a fraction of that mean. Unfounded.
+/// frequency step with which the response counts as settled, as a fraction of that mean. The response may also differ
+/// by noise, see [`SETTLED_NOISE`]. Unfounded.
 pub(crate) const SETTLED: f64 = 2e-3;
 
-/// Largest deviation of the phasor ratio response/force from its mean that noise explains in a settled response, in
-/// standard deviations of the ratio. The error of a phasor is complex and Gaussian: 1 of 8000 subsegments exceeds three
-/// deviations, e⁻⁹.
+/// Largest deviation of the phasor ratio response/force of a subsegment from its mean over the second half of the
+/// frequency step that noise explains in a settled response, in standard deviations of the ratio. The error of a phasor
+/// is complex and Gaussian: 1 of 8000 subsegments exceeds three deviations, e⁻⁹.
 pub(crate) const SETTLED_NOISE: f64 = 3.0;
 
 /// Largest ratio of the median force amplitudes of two passes through the frequency range of a step-sine test that
@@ -113,8 +115,8 @@ pub(crate) const SAME_LEVEL: f64 = 1.05;
 /// that is evaluated, and between the frequency steps of a level without a warning of a varying force. Unfounded.
 pub(crate) const SAME_FORCE: f64 = 1.2;
 
-/// Smallest length of a repeated frequency step with which it replaces the earlier step of the same frequency, as a
-/// fraction of the length of that step. Unfounded.
+/// Smallest length of a repeated frequency step with which it replaces the other step of about the same frequency,
+/// whose measured frequency is lower, as a fraction of the length of that step. Unfounded.
 pub(crate) const REPEATED_STEP: f64 = 0.9;
 
 // Noise plateau of a spectrum
@@ -159,46 +161,52 @@ pub(crate) const LARGEST_DAMPING_RATIO: f64 = 0.3;
 
 // Plausibility of a test
 
-/// Smallest ratio of the effective numbers of samples of force and response from which the two may be swapped. In a test with a hammer the
-/// response rings longer than the force acts, which is a ratio below 1. The distance from 1 is a choice.
+/// Smallest ratio of the effective number of samples of the force to that of the response above which the two may be
+/// swapped. In a test with a hammer the response rings longer than the force acts, which is a ratio below 1. The
+/// distance from 1 is a choice.
 pub(crate) const PULSE_SHORTER: f64 = 3.0;
 
-/// Smallest share of the energy of a hammer's pulses in one sign: a hammer pushes and does not pull. Filters ring by some percent, a choice.
+/// Smallest share of the energy of a hammer's force pulses that lies in samples of one sign: a hammer pushes and does
+/// not pull. Filters ring by some percent, a choice.
 pub(crate) const ONE_SIGN: f64 = 0.95;
 
-/// Smallest ratio of the mean powers after and before a pulse of a signal that rings because of it. Without a cause the ratio is 1; a choice.
+/// Smallest ratio of the mean power of a signal just after a pulse of another channel to that just before it, from
+/// which the signal counts as ringing because of the pulse. Without a cause the ratio is 1; a choice.
 pub(crate) const RINGS_AFTER: f64 = 3.0;
 
-/// Share of the energy of a channel in one line at 50 or 60 Hz from which the hum of the mains is larger than the signal: one half.
+/// Share of the energy of a channel in one sine within 0.2 Hz of 50 or 60 Hz above which the hum of the mains is larger
+/// than the signal: one half.
 pub(crate) const HUM_SHARE: f64 = 0.5;
 
-/// Smallest factor of a spike of one sample over the next largest sample. The largest of 10⁷ Gaussian samples is within a factor of 2 of the
-/// next largest; a choice above.
+/// Smallest factor of a spike of one sample over the next largest sample. The largest of 10⁷ Gaussian samples is within
+/// a factor of 2 of the next largest; a choice above.
 pub(crate) const SPIKE_ABOVE: f64 = 3.0;
 
-/// Largest neighbour of a spike of one sample, as a fraction of the spike. The neighbours of a pulse that is sampled with fewer than three
-/// samples are larger. A choice.
+/// Largest neighbour of a spike of one sample, as a fraction of the spike. The neighbours of a pulse that is sampled
+/// with fewer than three samples are larger. A choice.
 pub(crate) const SPIKE_NEIGHBOURS: f64 = 0.05;
 
 /// Coherence below which noise has more energy than the response to the force: γ² = S/(S + N) with S = N.
 pub(crate) const UNRELATED: f64 = 0.5;
 
-/// Coherence at the peak of a receptance below which the whole response is unrelated to the force, if its median is below [`UNRELATED`].
-/// Unrelated signals exceed it with a probability of 0.2⁴ per line with five averages.
+/// Coherence at the peak of a receptance below which the whole response is unrelated to the force, if its median is
+/// below [`UNRELATED`]. With five averages the coherence of unrelated signals exceeds it with a probability of 0.2⁴ per
+/// line.
 pub(crate) const UNRELATED_PEAK: f64 = 0.8;
 
-/// Mean of the sine of the phase of a drive-point receptance, weighted with |H|², above which it has the sign of an inverted sensor. A
-/// passive drive point has none above 0, −1 at a resonance and 0 at frequencies without damping. A choice.
+/// Mean of the sine of the phase of a drive-point receptance, weighted with |H|², above which it has the sign of an
+/// inverted sensor. A passive drive point has none above 0, −1 at a resonance and 0 at frequencies without damping. A
+/// choice.
 pub(crate) const INVERTED_PHASE: f64 = 0.2;
 
-/// Range of plausible peaks of receptances, m/N. The most compliant structures that are tapped, thin walls, reach 10⁻³ at resonance; the
-/// stiffest have 10⁻¹⁰ statically. A decade more on the soft side, two on the stiff; a choice.
+/// Range of plausible peaks of receptances, m/N. The most compliant structures that are tapped, thin walls, reach 10⁻³
+/// at resonance; the stiffest have 10⁻¹⁰ statically. A decade more on the soft side, two on the stiff; a choice.
 pub(crate) const PLAUSIBLE_RECEPTANCE: [f64; 2] = [1e-12, 1e-2];
 
-/// Power of a line of a periodic force over the median of its neighbourhood. The largest of 64 independent exponential powers of a random
-/// force exceeds 50 medians with a probability of 64·2⁻⁵⁰.
+/// Smallest ratio of the power of a frequency line of a periodic force to the median power of the lines around it. The
+/// largest of 64 independent exponential powers of a random force exceeds 50 medians with a probability of 64·2⁻⁵⁰.
 pub(crate) const LINE_ABOVE_NEIGHBOURS: f64 = 50.0;
 
-/// Smallest share of the energy of a force in single lines that makes it periodic. A random force has none, the force of a steady cut all
-/// but its noise. A choice.
+/// Smallest share of the energy of a force in single lines that makes it periodic. A random force has none, the force
+/// of a steady cut all but its noise. A choice.
 pub(crate) const SHARE_OF_LINES: f64 = 0.9;

@@ -15,7 +15,8 @@ const BATCH: usize = 4;
 /// cross-spectra. A choice: the lines of all channels then fit into the cache of a core.
 const LINES: usize = 256;
 
-/// Cross-spectra S_ab(f) = E[A(f) B*(f)] of all pairs of channels; X = H F then gives S_xf = H S_ff.
+/// Cross-spectra S_ab(f) ∝ E[A(f) B*(f)] of all pairs of channels, as sums over segments or neighbouring lines; X = H F
+/// then gives S_xf = H S_ff.
 ///
 /// The scale is arbitrary but equal for all pairs, since FRFs are ratios of spectra.
 #[derive(Clone, Debug)]
@@ -45,7 +46,7 @@ impl CrossSpectra {
     }
 }
 
-/// Division of a record into windowed segments, over which its cross-spectra are averaged.
+/// Division of a record into windowed segments, over which its cross-spectra are summed.
 #[derive(Clone, Debug)]
 pub(super) struct Segments {
     /// Window weight of each sample of a segment; the number of weights is the segment length.
@@ -60,8 +61,8 @@ pub(super) struct Segments {
 }
 
 impl Segments {
-    /// Overlapping segments of a record of `samples` samples (Welch's method): each has as many samples as `weights` and shares the fraction
-    /// `overlap` of them with the next.
+    /// Overlapping segments of a record of `samples` samples (Welch's method): each has as many samples as `weights`
+    /// and shares the fraction `overlap` of them with the next.
     pub(super) fn overlapping(weights: Vec<f64>, overlap: f64, samples: usize) -> Self {
         let length = weights.len();
         let shift = ((length as f64 * (1.0 - overlap)).round() as usize).clamp(1, length.max(1));
@@ -77,7 +78,8 @@ impl Segments {
     }
 }
 
-/// Cross-spectra of `signals` (all of one length), averaged over their `segments`, at the transform lines `lines`.
+/// Cross-spectra of `signals` (all of one length), summed over their `segments`, at the transform lines `lines` as far
+/// as half the sample rate.
 pub(super) fn averaged(
     signals: &[&[f64]],
     sample_rate_hz: f64,
@@ -117,8 +119,8 @@ pub(super) fn averaged(
     spectra
 }
 
-/// Cross-spectra of whole `signals`, averaged over `width` neighbouring frequency lines. The fraction `taper` of each signal is tapered at
-/// each end.
+/// Cross-spectra of whole `signals` without their means, each summed over successive groups of `width` lines of `band`;
+/// a last group of fewer lines is left out. The fraction `taper` of each signal is tapered at each end.
 pub(super) fn smoothed(
     signals: &[&[f64]],
     sample_rate_hz: f64,
@@ -226,7 +228,8 @@ impl Transform {
         }
     }
 
-    /// Fourier transform of the weighted samples, padded with zeros to the transform length.
+    /// Fourier transform of the weighted samples, with their mean subtracted first if `without_mean`, padded with zeros
+    /// to the transform length.
     fn of(&mut self, samples: &[f64], weights: &[f64], without_mean: bool) -> &[Complex64] {
         let mean = if without_mean {
             samples.iter().sum::<f64>() / samples.len().max(1) as f64

@@ -16,8 +16,8 @@ pub enum Estimator {
     H2,
     /// Mean ½ (H1 + H2), thesis eq. (4.4).
     Mean,
-    /// Pseudo-inverse H = [S_xf,1 S_xf,2 …][S_ff,1 S_ff,2 …]⁺ over several tests (thesis eq. 7.12). The forces of a single test may be
-    /// linearly dependent if those of all tests together are independent.
+    /// Pseudo-inverse H = [S_xf,1 S_xf,2 …][S_ff,1 S_ff,2 …]⁺ over several tests (thesis eq. 7.12). The forces of a
+    /// single test may be linearly dependent if those of all tests together are independent.
     PseudoInverse,
 }
 
@@ -27,12 +27,14 @@ pub(super) struct FrfLine {
     pub(super) frequency_hz: f64,
     /// FRF matrix, rows responses, columns forces; responses as measured, before integration to displacement.
     pub(super) h: Matrix,
-    /// Multiple coherence of each response (thesis eq. 7.10): fraction of the power of the response that is linearly related to the forces.
+    /// Multiple coherence of each response (thesis eq. 7.10): fraction of the power of the response that is linearly
+    /// related to the forces.
     pub(super) coherence: [f64; 3],
-    /// Standard deviation of |H| for each response and force from random errors, in the unit of `h`.
+    /// Standard deviation of the magnitude |H| of the estimate for each response (row) and force (column) from random
+    /// errors, in the unit of `h`.
     pub(super) deviation: [[f64; 3]; 3],
-    /// Largest relative error of the FRF of each response by aliasing of content above half the sample rate; 0 where it
-    /// was not estimated.
+    /// Largest relative error of the FRF of each response by aliasing of content above half the sample rate; 0 except
+    /// for hammer tests.
     pub(super) folding: [f64; 3],
     /// Smallest and largest singular value of the force spectra at this line, with each force divided by its root mean
     /// square; for the pseudo-inverse, those of the stacked matrices S_ff of all tests, with rows of unit norm.
@@ -50,12 +52,13 @@ pub(super) struct ChannelCounts {
 
 /// FRF estimate at every frequency line, except those at which a matrix that the estimator inverts is singular.
 ///
-/// All `tests` have the same lines. For several forces, H2 and the mean require equal numbers of responses and forces; the caller checks it.
+/// All `tests` have the same lines. For several forces, H2 and the mean require equal numbers of responses and forces;
+/// the caller checks it.
 ///
-/// Random error (Bendat and Piersol, generalised to H = Σ S_xf,i W_i): var H_pq = Σ_i S_ee,p (W_iᴴ S_ff,i W_i)_qq / n_i, with the residual
-/// spectrum S_ee of the responses and n_i averages of test i; the variance of |H| is half of it. S_ee is the power of X − H F with H from H1 or
-/// the pseudo-inverse (H2 and the mean take that of H1), times n/(n − number of forces), n = Σ n_i. For one force and large n:
-/// ε[|H|] = √(1 − γ²) / (|γ| √(2n)).
+/// Random error (Bendat and Piersol, generalised to H = Σ S_xf,i W_i): var H_pq = Σ_i S_ee,p (W_iᴴ S_ff,i W_i)_qq /
+/// n_i, with the residual spectrum S_ee of the responses and n_i averages of test i; the variance of |H| is half of it.
+/// S_ee is the power of X − H F with H from H1 or the pseudo-inverse (H2 and the mean take that of H1), times n/(n −
+/// number of forces), n = Σ n_i. For one force and large n: ε[|H|] = √(1 − γ²) / (|γ| √(2n)).
 pub(super) fn lines(tests: &[CrossSpectra], counts: ChannelCounts, estimator: Estimator) -> Vec<FrfLine> {
     let count = tests.first().map_or(0, |test| test.frequency_hz.len());
     (0..count)

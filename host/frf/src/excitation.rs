@@ -16,7 +16,8 @@ pub enum Excitation {
 }
 
 impl Excitation {
-    /// Kind of excitation of a recording, from the kind of test and the speed ramp in its sidecar; random if it names no test.
+    /// Kind of excitation of a recording, from the kind of test and the speed ramp in its sidecar; random for every
+    /// other kind, and if the sidecar names none.
     pub(super) fn of(sidecar: &Sidecar) -> Self {
         let glides = sidecar.cut.is_some_and(|cut| cut.last_rpm.is_some());
         match sidecar.kind {

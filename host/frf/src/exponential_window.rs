@@ -6,10 +6,10 @@
 //!
 //!   H(iω) = H_w(iω) + Σ_r [R_r/(iω − λ_r − 1/τ) − R_r/(iω − λ_r)] + conjugate pairs.
 //!
-//! The sum runs over the poles λ_r and residues R_r fitted to the windowed estimate H_w. The contribution of modes
-//! outside the band is left as it is: it changes little over the distance 1/τ. A relative error of the measured decay
-//! rate σ_w is larger by the factor σ_w/σ for the decay rate σ of the mode itself, and so is that of the peak 1/σ: the
-//! standard deviation of a line grows by the factor |H/H_w|², if this is above 1.
+//! The sum runs over the poles λ_r and residues R_r fitted to the windowed estimate H_w, as far as they count as modes.
+//! The contribution of modes outside the band is left as it is: it changes little over the distance 1/τ. A relative
+//! error of the measured decay rate σ_w is larger by the factor σ_w/σ for the decay rate σ of the mode itself, and so
+//! is that of the peak 1/σ: the standard deviation of a line grows by the factor |H/H_w|², if this is above 1.
 
 use std::f64::consts::TAU;
 
@@ -23,8 +23,8 @@ use super::{Frf, FrfError, FrfTable};
 /// added. The standard deviations `deviation` of its entries are scaled in place.
 ///
 /// # Errors
-/// No mode can be fitted, or no fitted mode has a significant peak; the decay rate of a mode is nearly that of the window
-/// alone, so that the damping of the mode is not identifiable; or a corrected receptance is not finite.
+/// No mode can be fitted, or no fitted mode has a significant peak; the decay rate of a mode is nearly that of the
+/// window alone, so that the damping of the mode is not identifiable; or a corrected receptance is not finite.
 pub(super) fn without_exponential_window(
     table: &FrfTable,
     deviation: &mut [Vec<f64>],

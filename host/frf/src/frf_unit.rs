@@ -10,7 +10,8 @@ use quietcut_recording::{Quantity, Unit};
 /// Directions of displacement and force of a receptance.
 pub(super) type DirectionPair = (Direction, Direction);
 
-/// Unit of an FRF: conversion factor to SI, and order of the time derivative of displacement (0 receptance, 1 mobility, 2 accelerance).
+/// Unit of an FRF: conversion factor to SI, and order of the time derivative of displacement (0 receptance, 1 mobility,
+/// 2 accelerance).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct FrfUnit {
     pub(super) factor: f64,
@@ -42,7 +43,8 @@ impl FrfUnit {
         }
     }
 
-    /// Converts an FRF value in this unit to receptance, m/N; `None` if the receptance is not finite, as for mobility and accelerance at 0 Hz.
+    /// Converts an FRF value in this unit to receptance, m/N; `None` if the receptance is not finite, as for mobility
+    /// and accelerance at 0 Hz.
     pub(super) fn receptance(self, value: Complex64, frequency_hz: f64) -> Option<Complex64> {
         let rate = Complex64::new(0.0, TAU * frequency_hz).powi(self.derivatives);
         let receptance = value * self.factor / rate;

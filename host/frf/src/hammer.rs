@@ -17,10 +17,10 @@ const BEFORE: f64 = 0.01;
 pub struct MeasuredImpact {
     /// Time of the force peak, s, from the start of the record.
     pub time_s: f64,
-    /// Peak force, N, with sign, from the median of the record.
+    /// Peak force, N, with its sign, relative to the median force of the record.
     pub peak_n: f64,
-    /// Largest second force pulse within the segment: delay after the first peak, s, and height as a fraction of that peak; `None` for a single
-    /// impact.
+    /// Largest second force pulse within the segment: delay after the first peak, s, and height as a fraction of that
+    /// peak; `None` for a single impact.
     pub second: Option<(f64, f64)>,
     /// Index of the first sample of the force pulse of this impact in the record.
     first: usize,
@@ -31,13 +31,13 @@ pub struct MeasuredImpact {
 /// Segment length and exponential window of a hammer test.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct HammerWindows {
-    /// Length of the segment of each impact, s. `None` for the inverse of the frequency resolution or, if none is set, for
-    /// the greatest length with which segments neither overlap nor exceed the record.
+    /// Length of the segment of each impact, s. `None` for the inverse of the frequency resolution or, if none is set,
+    /// for the greatest length with which segments neither overlap nor exceed the record.
     pub segment_s: Option<f64>,
     /// Time constant τ of the exponential window on force and response, s; `None` for no window.
     ///
-    /// With e^{−t/τ} on both signals the FRF is exactly H(iω + 1/τ): every pole λ moves to λ − 1/τ. [`measure`](crate::measure)
-    /// removes the damping that the window adds.
+    /// With e^{−t/τ} on both signals the FRF is exactly H(iω + 1/τ): every pole λ moves to λ − 1/τ.
+    /// [`measure`](crate::measure) removes the damping that the window adds.
     pub exponential_s: Option<f64>,
 }
 
@@ -53,15 +53,17 @@ pub(super) struct ImpactSegments {
     pub(super) double: Vec<MeasuredImpact>,
     /// Impacts too close to the start or end of the record for a segment, which are not evaluated.
     pub(super) cut_short: Vec<MeasuredImpact>,
-    /// Largest amplitude of a windowed response at the end of a segment, as a fraction of the peak of that response in the segment.
+    /// Largest amplitude of a windowed response at the end of a segment, as a fraction of the peak of that response in
+    /// the segment.
     pub(super) end_amplitude: f64,
 }
 
-/// Cuts a record into one windowed segment per single impact; double impacts, and impacts without a whole segment in the record, are left out.
+/// Cuts a record into one windowed segment per single impact; double impacts, and impacts without a whole segment in
+/// the record, are left out.
 ///
 /// # Errors
-/// The record has several forces, no impact, or no impact with a whole segment; all impacts with a segment are double; or the segments have
-/// fewer than 16 samples.
+/// The record has several forces, no impact, or no impact with a whole segment; all impacts with a segment are double;
+/// or the segments have fewer than 16 samples.
 pub(super) fn segments(
     channels: &TestChannels<'_>,
     windows: HammerWindows,
@@ -163,8 +165,9 @@ fn end_amplitude(segment: &[f64]) -> f64 {
     }
 }
 
-/// Weight of the force window at a sample: 1 over the force pulse and one pulse width after it, with half-cosine tapers to 0 before and
-/// after, each one pulse width long. The pulse width counts as at least four samples. Outside the contact the force signal is noise only.
+/// Weight of the force window at a sample: 1 over the force pulse and one pulse width after it, with half-cosine tapers
+/// to 0 before and after, each one pulse width long. The pulse width counts as at least four samples. Outside the
+/// contact the force signal is noise only.
 fn pulse_weight(impact: &MeasuredImpact, sample: usize) -> f64 {
     let width = (impact.last - impact.first).max(4);
     let outside = if sample < impact.first {
@@ -179,7 +182,8 @@ fn pulse_weight(impact: &MeasuredImpact, sample: usize) -> f64 {
     }
 }
 
-/// Greatest length, in samples, of segments of equal length, one per impact, that neither overlap nor exceed the end of the record.
+/// Greatest length, in samples, of segments of equal length, one per impact, that neither overlap nor exceed the end of
+/// the record.
 fn longest_segment(impacts: &[MeasuredImpact], samples: usize) -> usize {
     let ends = impacts.iter().skip(1).map(|impact| impact.first).chain([samples]);
     let shortest = impacts
@@ -192,8 +196,8 @@ fn longest_segment(impacts: &[MeasuredImpact], samples: usize) -> usize {
     (shortest as f64 / (1.0 + BEFORE)) as usize
 }
 
-/// Detects the impacts of a hammer in a force signal. Pulses that start within [`BOUNCE_S`] after the start of an impact
-/// are its bounces and do not count.
+/// Detects the impacts of a hammer in a force signal. Pulses that start within [`BOUNCE_S`] after the start of an
+/// impact are its bounces and do not count.
 fn impacts(force: &[f64], rate: f64) -> Vec<MeasuredImpact> {
     let middle = median(&mut force.to_vec()).unwrap_or(0.0);
     let noise = noise(force, middle);
@@ -238,8 +242,8 @@ fn impacts(force: &[f64], rate: f64) -> Vec<MeasuredImpact> {
     impacts
 }
 
-/// Largest second force pulse before sample `end`: delay after the peak of the impact, s, and height as a fraction of that peak. `None` if no
-/// pulse exceeds the threshold of a double impact.
+/// Largest second force pulse before sample `end`: delay after the peak of the impact, s, and height as a fraction of
+/// that peak. `None` if no pulse exceeds the threshold of a double impact.
 fn second_pulse(force: &[f64], impact: &MeasuredImpact, end: usize, rate: f64) -> Option<(f64, f64)> {
     let middle = median(&mut force.to_vec()).unwrap_or(0.0);
     let width = (impact.last - impact.first).max(4);
@@ -253,8 +257,8 @@ fn second_pulse(force: &[f64], impact: &MeasuredImpact, end: usize, rate: f64) -
     (size > threshold).then(|| (delay_s, size / impact.peak_n.abs()))
 }
 
-/// Standard deviation of the force noise: 1.4826 · median absolute deviation from `middle`, which holds for Gaussian noise. Rare impacts do
-/// not affect the median.
+/// Standard deviation of the force noise: 1.4826 · median absolute deviation from `middle`, which holds for Gaussian
+/// noise. Rare impacts do not affect the median.
 fn noise(force: &[f64], middle: f64) -> f64 {
     let mut deviations: Vec<f64> = force.iter().map(|f| (f - middle).abs()).collect();
     1.4826 * median(&mut deviations).unwrap_or(0.0)

@@ -11,13 +11,14 @@ const LINES_MIN: usize = 4;
 
 /// Receptance matrix H(f), m/N, at any frequency, from a table; rows displacement, columns force.
 ///
-/// Between the lines each entry is the cubic through the four nearest lines (Lagrange), equal to the table on its
-/// lines. Near the resonance of a mode with the half bandwidth ζf, the error midway between lines at the spacing Δf is 0.56 (Δf/ζf)⁴ of
-/// the peak: 0.09 % with five lines per half bandwidth, 3.5 % with two. [`Interpolation::error`] estimates it from the table itself.
+/// Between the lines each entry is the cubic through the two nearest lines on each side (Lagrange; at the ends of the
+/// table, through its first or last four lines). It equals the table on its lines. Near the resonance of a mode with
+/// the half bandwidth ζf, the error midway between lines at the spacing Δf is 0.56 (Δf/ζf)⁴ of the peak: 0.09 % with
+/// five lines per half bandwidth, 3.5 % with two. [`Interpolation::error`] estimates it from the table itself.
 ///
-/// Below the first line H is that of stiffness and viscous damping: Re H constant, Im H ∝ f. Above the last line H is that of inertia,
-/// H ∝ f⁻². Both continue the table without a step; their error is the contribution of modes outside the table. H(−f) is the conjugate of
-/// H(f).
+/// Below the first line H is that of stiffness and viscous damping: Re H constant, Im H ∝ f. Above the last line H is
+/// that of inertia, H ∝ f⁻². Both continue the table without a step; their error is the contribution of modes outside
+/// the table. H(−f) is the conjugate of H(f).
 #[derive(Clone, Debug)]
 pub struct Interpolation {
     frequency_hz: Vec<f64>,
@@ -61,7 +62,7 @@ impl Interpolation {
     pub fn band_hz(&self) -> (f64, f64) {
         match self.frequency_hz.as_slice() {
             [first, .., last] => (*first, *last),
-            // This case does not occur, since a table has at least four lines.
+            // A table has at least four lines, so that the other arm always matches.
             _ => (0.0, 0.0),
         }
     }
@@ -91,8 +92,8 @@ impl Interpolation {
 
     /// Receptance matrix H, m/N, at the complex frequency f = s/(2πi), Hz.
     ///
-    /// Off the real axis the cubic of the nearest lines is continued analytically. It is accurate within about one line spacing of the
-    /// axis, or within the distance of the nearest pole if that is smaller.
+    /// Off the real axis the cubic of the nearest lines is continued analytically. It is accurate within about one line
+    /// spacing of the axis, or within the distance of the nearest pole if that is smaller.
     pub fn at(&self, frequency_hz: Complex64) -> Matrix3<Complex64> {
         if frequency_hz.re < 0.0 {
             // H of the conjugate s is the conjugate of H; conjugation of s maps f to −f̄.
@@ -111,7 +112,8 @@ impl Interpolation {
         if frequency_hz.re > last {
             return self.lines[self.lines.len() - 1] * (last / frequency_hz).powi(2);
         }
-        // The four nearest lines: two below the frequency and two at or above it, shifted inwards at the ends of the table.
+        // The four nearest lines: two below the frequency and two at or above it, shifted inwards at the ends of the
+        // table.
         let above = self.frequency_hz.partition_point(|&line| line < frequency_hz.re);
         let from = above.saturating_sub(2).min(self.lines.len() - 4);
         self.cubic([from, from + 1, from + 2, from + 3], frequency_hz)
@@ -133,9 +135,10 @@ impl Interpolation {
 
     /// Estimate of the largest interpolation error, as a fraction of the largest entry of H.
     ///
-    /// Each line is predicted from the lines at the distances −3, −1, +1 and +3 line spacings, a cubic with twice the spacing. The error of a
-    /// cubic is proportional to the fourth power of the spacing, so that the estimate is 1/16 of the largest prediction error. Measurement
-    /// noise counts as error. The estimate is 0 for tables of fewer than seven lines.
+    /// Each line except the first and last three is predicted from the lines at the distances −3, −1, +1 and +3 line
+    /// spacings, a cubic with twice the spacing. The error of a cubic is proportional to the fourth power of the
+    /// spacing, so that the estimate is 1/16 of the largest prediction error. Measurement noise counts as error. The
+    /// estimate is 0 for tables of fewer than seven lines.
     pub fn error(&self) -> f64 {
         let peak = self.lines.iter().map(largest).fold(0.0, f64::max);
         let count = self.lines.len();

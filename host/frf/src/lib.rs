@@ -1,11 +1,13 @@
-//! Frequency response functions: measured from recordings, tabulated in a file, and interpolated between the lines of a table.
+//! Frequency response functions: measured from recordings, tabulated in a file, and interpolated between the lines of a
+//! table.
 //!
-//! Main types: [`measure`] turns recordings of shaker, hammer, sweep or step-sine tests into a [`Measurement`] (receptances with coherence
-//! and standard deviation; estimators H1, H2 and their mean, [`Estimator`]); [`FrfTable`] holds receptances in m/N and reads and writes
-//! CSV and UFF 58, and reads the text tables of other programs; [`Interpolation`] evaluates a table between its lines.
+//! Main types: [`measure`] turns recordings of shaker, hammer, sweep or step-sine tests into a [`Measurement`]
+//! (receptances with coherence and standard deviation; estimators H1, H2, their mean and the pseudo-inverse,
+//! [`Estimator`]); [`FrfTable`] holds receptances in m/N and reads and writes CSV and UFF 58, and reads the text tables
+//! of other programs; [`Interpolation`] evaluates a table between its lines.
 //!
-//! "The thesis" in this crate is *Chatter Vibrations in Robotic Milling Considering Structural Nonlinearity*, a doctoral
-//! thesis of the University of Victoria; its equation numbers are given as "thesis eq. 5.16".
+//! "The thesis" in this crate is *Chatter Vibrations in Robotic Milling Considering Structural Nonlinearity*, a
+//! doctoral thesis of the University of Victoria; its equation numbers are given as "thesis eq. 5.16".
 //!
 //! ```
 //! use std::f64::consts::TAU;
@@ -34,7 +36,8 @@
 //! # Ok::<(), quietcut_frf::FrfError>(())
 //! ```
 //!
-//! Of a structure, this crate uses only its directions and the axes of the feed: no modal model, no cutting force, no stability.
+//! Of a structure, this crate uses only its directions and the axes of the feed: no modal model, no cutting force, no
+//! stability.
 
 mod criteria;
 mod cross_spectra;

@@ -38,7 +38,8 @@ use usable_lines::{independent, keep_excited};
 /// Measured receptances with their statistics.
 #[derive(Clone, Debug)]
 pub struct Measurement {
-    /// Measured receptances with the coherence of each response. With several forces it is the multiple coherence.
+    /// Measured receptances with the coherence of each response, or without it for fewer than three impacts of a
+    /// hammer. With several forces it is the multiple coherence.
     pub table: FrfTable,
     /// Standard deviation of |H| of each entry of the table at each of its frequencies, m/N.
     pub deviation: Vec<Vec<f64>>,
@@ -57,12 +58,12 @@ pub struct Measurement {
 /// Measures receptances, m/N, from recordings.
 ///
 /// Recordings with the same force directions, the same measured responses and the same kind of excitation are averaged;
-/// the others add entries to the receptance matrix. Accelerations and velocities are divided by (iω)² and iω. 0 Hz is left out. The damping that an
-/// exponential window adds is removed.
+/// the others add entries to the receptance matrix. Accelerations and velocities are divided by (iω)² and iω. 0 Hz is
+/// left out. The damping that an exponential window adds is removed.
 ///
 /// # Errors
-/// For example: a recording has no force or no response, or is too short for the resolution; the forces are dependent; the
-/// recordings have fewer than half of their frequencies in common.
+/// For example: a recording has no force or no response, or is too short for the resolution; the forces are dependent;
+/// the recordings have fewer than half of their frequencies in common.
 pub fn measure(recordings: &[Recording], settings: &MeasurementSettings) -> Result<Measurement, FrfError> {
     let channels = recordings
         .iter()
@@ -143,7 +144,7 @@ pub fn measure(recordings: &[Recording], settings: &MeasurementSettings) -> Resu
     Ok(measurement)
 }
 
-/// Refuses a band that begins above half the sample rate of a recording.
+/// Refuses a frequency band to evaluate that begins at or above half the sample rate of a recording.
 fn check_band(recording: &Recording, settings: &MeasurementSettings) -> Result<(), FrfError> {
     let half_hz = 0.5 * recording.sample_rate_hz;
     match settings.band_hz {
@@ -234,7 +235,7 @@ fn merged(path: &Path, measured: Vec<MeasuredGroup>) -> Result<Measurement, FrfE
     Ok(measurement)
 }
 
-/// Receptance with one line, xx = 0, for a table that must not be empty before the measured entries are known.
+/// Receptance h_xx with one line, zero, for a table that must not be empty before the measured entries are known.
 fn placeholder() -> Frf {
     Frf {
         response: Direction::X,
@@ -343,7 +344,8 @@ fn add_folding(lines: &mut [FrfLine], spectra: &[CrossSpectra], tops: &[Vec<f64>
     }
 }
 
-/// Warning of the frequencies without an estimate, where the matrix of the force spectra is singular; `None` if there are none.
+/// Warning of the frequencies without an estimate, where the matrix of the force spectra is singular; `None` if there
+/// are none.
 fn singular_lines(spectra: &[CrossSpectra], lines: &[FrfLine]) -> Option<String> {
     let all_hz = spectra.first().map_or(&[][..], |test| &test.frequency_hz);
     let has_line = |hertz: &f64| lines.iter().any(|line| line.frequency_hz == *hertz);

@@ -14,8 +14,9 @@ pub struct MeasurementSettings {
     pub excitation: Option<Excitation>,
     /// FRF estimator.
     pub estimator: Estimator,
-    /// Frequency resolution (line spacing), Hz. `None` selects eight half-overlapping segments for each force in random excitation, and
-    /// averages over eight lines for each force in a sweep. In a hammer test it sets the segment length if [`HammerWindows`] does not.
+    /// Frequency resolution (line spacing), Hz. `None` selects eight half-overlapping segments for each force in random
+    /// excitation, and averages over eight lines for each force in a sweep. In a hammer test it sets the segment length
+    /// if [`HammerWindows`] does not.
     pub resolution_hz: Option<f64>,
     /// Overlap of the segments of random excitation, as a fraction of their length.
     pub overlap: f64,
@@ -23,7 +24,8 @@ pub struct MeasurementSettings {
     pub window: Window,
     /// First and last frequency to evaluate, Hz; `None` for all frequencies.
     pub band_hz: Option<(f64, f64)>,
-    /// Names of the channels to evaluate; empty for all channels.
+    /// Names of the channels to evaluate. Without the name of a force all forces count, and without that of a response
+    /// all responses.
     pub channels: Vec<String>,
     /// Segment length and exponential window of hammer tests.
     pub hammer: HammerWindows,
@@ -47,7 +49,8 @@ impl Default for MeasurementSettings {
     }
 }
 
-/// Indices of the lines within the band to evaluate, of a transform of `length` samples at the sampling rate `rate`, Hz; 0 Hz is excluded.
+/// Indices of the lines within the band to evaluate, of a transform of `length` samples at the sampling rate `rate`,
+/// Hz; 0 Hz is excluded.
 pub(super) fn band(settings: &MeasurementSettings, rate: f64, length: usize) -> Range<usize> {
     let line = |hertz: f64| hertz * length as f64 / rate;
     match settings.band_hz {

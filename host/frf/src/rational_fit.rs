@@ -1,8 +1,8 @@
 //! Vector fitting: a sum of modes with common poles fitted to measured receptances.
 //!
-//! The method is that of Gustavsen and Semlyen (1999) with common poles for all functions, where the unknowns of each function are
-//! eliminated separately (Deschrijver and others, 2008). Tool-tip calibration and the removal of an exponential window use its poles and
-//! residues. Fits with poles from other methods use only its residues.
+//! The method is that of Gustavsen and Semlyen (1999) with common poles for all functions, where the unknowns of each
+//! function are eliminated separately (Deschrijver and others, 2008). Tool-tip calibration and the removal of an
+//! exponential window use its poles and residues. Fits with poles from other methods use only its residues.
 
 use std::f64::consts::TAU;
 
@@ -16,8 +16,8 @@ use quietcut_numerics::singular_values::SingularValueError;
 /// relocations.
 const ROUNDS: usize = 20;
 
-/// Bound on the singular values of a vector fit's equations, whose receptances or columns are normalized; combinations of
-/// columns with a smaller singular value count as linearly dependent. It is about the rounding error of the sums.
+/// Bound on the singular values of a vector fit's equations, whose receptances or columns are normalized; combinations
+/// of columns with a smaller singular value count as linearly dependent. It is about the rounding error of the sums.
 const DEPENDENT: Tolerance = Tolerance::Absolute(1e-13);
 
 /// Error of fitting a sum of modes.
@@ -47,11 +47,12 @@ pub enum RationalFitError {
 /// A sum of modes H_k(s) = Σ_r R_kr/(s − λ_r) + R*_kr/(s − λ*_r) + d_k + e_k/s², s = iω.
 #[derive(Clone, Debug)]
 pub struct RationalFit {
-    /// Poles λ_r with positive imaginary part, rad/s, by ascending frequency.
+    /// Poles λ_r with positive imaginary part, rad/s; those of a vector fit by ascending imaginary part.
     pub(crate) poles: Vec<Complex64>,
     /// Residues R_kr, m/(N s): one row for each function, one column for each pole.
     pub residues: Vec<Vec<Complex64>>,
-    /// RMS residual of the fit over all receptances other than zero; each residual is divided by the RMS of its receptance.
+    /// RMS residual of the fit over all receptances other than zero; each residual is divided by the RMS of its
+    /// receptance.
     pub(crate) residual: f64,
 }
 
@@ -73,8 +74,8 @@ impl RationalFit {
 /// Fits `modes` modes with common poles to the receptances `functions`, each with one value per frequency.
 ///
 /// # Errors
-/// There are fewer than 2 · `modes` + 4 frequencies, no modes or no receptance other than zero; a value is not finite; or
-/// an iteration exceeds its bound.
+/// There are fewer than 2 · `modes` + 4 frequencies, no modes or no receptance other than zero; a value is not finite;
+/// or an iteration exceeds its bound.
 pub(super) fn fit(
     frequency_hz: &[f64],
     functions: &[&[Complex64]],
@@ -104,7 +105,8 @@ fn pair(s: Complex64, pole: Complex64) -> [Complex64; 2] {
     [a + b, Complex64::i() * (a - b)]
 }
 
-/// Basis functions of an FRF at one frequency: pole pairs, a constant (modes above the band), and 1/s² (modes below the band).
+/// Basis functions of an FRF at one frequency: pole pairs, a constant (modes above the band), and 1/s² (modes below the
+/// band).
 fn basis(frequency_hz: f64, poles: &[Complex64], scale: f64) -> Vec<Complex64> {
     let s = Complex64::new(0.0, TAU * frequency_hz);
     let mut row: Vec<Complex64> = poles.iter().flat_map(|&pole| pair(s, pole)).collect();
@@ -156,8 +158,8 @@ fn relocated(
             matrix[(2 * k, width + own)] = h.re;
             matrix[(2 * k + 1, width + own)] = h.im;
         }
-        // Eliminates the residues of this receptance: the remaining equations have only the unknowns c_n, which all
-        // receptances share.
+        // Eliminates the residues, the constant and the 1/s² term of this receptance: the remaining equations have only
+        // the unknowns c_n, which all receptances share.
         let common = eliminated(matrix, width);
         let count = common.nrows().min(own);
         let at = left.nrows();

@@ -23,11 +23,13 @@ pub struct ChannelLines {
     pub direction: Direction,
     /// Measured quantity.
     pub quantity: Quantity,
-    /// Order of the time derivative of displacement that the channel measures: 0 displacement, 1 velocity, 2 acceleration; 0 for a force.
+    /// Order of the time derivative of displacement that the channel measures: 0 displacement, 1 velocity, 2
+    /// acceleration; 0 for a force.
     pub derivatives: i32,
     /// Root mean square of the channel's samples, SI unit.
     pub root_mean_square: f64,
-    /// Variance of the white noise per sample, SI unit squared, from the noise plateau of the spectrum; `None` if there is no plateau.
+    /// Variance of the white noise of the channel per sample, SI unit squared, from the noise plateau of the spectrum;
+    /// `None` if there is no plateau.
     pub plateau: Option<f64>,
     /// Transform X(f) = Σ x_k e^{−2πi·fk/rate}/√N at each line; white noise of variance σ² per sample has E|X|² = σ².
     pub lines: Vec<Complex64>,
@@ -48,11 +50,12 @@ pub struct RecordSpectra {
     pub responses: Vec<ChannelLines>,
 }
 
-/// Transforms of recordings with continuous excitation: random, cut or swept sine. `None` if a recording is a hammer or step-sine test,
-/// which is evaluated in segments.
+/// Transforms of recordings with continuous excitation: random, cut or swept sine. `None` if a recording is a hammer or
+/// step-sine test, which is evaluated in segments.
 ///
 /// # Errors
-/// A recording has no force or no response; a chosen channel or an input of the sidecar does not exist; an input is not a force.
+/// A recording has no force or no response; a chosen channel or an input of the sidecar does not exist; an input is not
+/// a force.
 pub fn record_spectra(
     recordings: &[Recording],
     settings: &MeasurementSettings,
@@ -120,9 +123,10 @@ fn of_record(channels: &TestChannels<'_>, band_hz: Option<(f64, f64)>) -> Record
     }
 }
 
-/// Noise plateau of a spectrum: the median over the bands whose mean power exceeds that of the lowest band by at most six standard deviations
-/// (1/√n of the power for n lines); `None` if these bands are too few or have too few lines. White noise has equal power in all bands, and
-/// bands without signal contain nothing else.
+/// Noise plateau of a spectrum: the median of the mean powers of those bands whose mean power exceeds that of the
+/// lowest band by at most six standard deviations (1/√n of the lowest power for n lines per band); `None` if these
+/// bands are too few or have too few lines. White noise has equal power in all bands, and bands without signal contain
+/// nothing else.
 fn plateau(lines: &[Complex64], scale: f64) -> Option<f64> {
     let count = lines.len() / BANDS;
     if count < LINES_PER_BAND_MIN {

@@ -33,8 +33,8 @@ pub(super) fn scaled(a: &Matrix, s: f64) -> Matrix {
     a.map(|row| row.map(|entry| entry * s))
 }
 
-/// Inverse of the leading `size` × `size` block by Gauss–Jordan elimination with partial pivoting; `None` if it is singular to working
-/// precision.
+/// Inverse of the leading `size` × `size` block by Gauss–Jordan elimination with partial pivoting; `None` if it is
+/// singular to working precision.
 pub(super) fn inverse(a: &Matrix, size: usize) -> Option<Matrix> {
     let mut left = *a;
     let mut right = ZERO;
@@ -65,10 +65,12 @@ pub(super) fn inverse(a: &Matrix, size: usize) -> Option<Matrix> {
     Some(right)
 }
 
-/// Smallest and largest eigenvalue of D^−½ A D^−½ for the leading `size` × `size` block (`size` ≤ 3) of a positive semidefinite Hermitian
-/// matrix A with diagonal D. Both eigenvalues lie between 0 and `size`; the smallest is 0 if a diagonal entry of A is 0.
+/// Smallest and largest eigenvalue of D^−½ A D^−½ for the leading `size` × `size` block (`size` ≤ 3) of a positive
+/// semidefinite Hermitian matrix A with diagonal D. Both eigenvalues lie between 0 and `size`; the smallest is 0 if a
+/// diagonal entry of A is 0.
 ///
-/// Closed form: with a unit diagonal, μ = λ − 1 solves μ³ − pμ − q = 0 with p = Σ_{i<j} |a_ij|² and q = 2 Re(a_12 a_23 a_31).
+/// Closed form: with a unit diagonal, μ = λ − 1 solves μ³ − pμ − q = 0 with p = Σ_{i<j} |a_ij|² and q = 2 Re(a_12 a_23
+/// a_31).
 pub(super) fn extreme_eigenvalues(a: &Matrix, size: usize) -> (f64, f64) {
     let entry = |i: usize, j: usize| {
         let scale = (a[i][i].re * a[j][j].re).sqrt();

@@ -13,19 +13,19 @@ use super::criteria::{
 };
 use super::test_channels::TestChannels;
 
-/// Decay time of the amplitude with which the force of a step-sine test is tracked, in periods of the excitation. A
-/// choice: more than one period, and less than a frequency step.
+/// Decay time of the tracked amplitude of the force of a step-sine test, in periods of the excitation. A choice: more
+/// than one period, and less than a frequency step.
 const FORGET: f64 = 3.0;
 
-/// Longest decay time of the amplitude with which the force of a step-sine test is tracked, s; also the decay time
-/// before the first period is known. A choice.
+/// Longest decay time of the tracked amplitude of the force of a step-sine test, s; also the decay time before the
+/// first period is known. A choice.
 const FORGET_S: f64 = 1.0;
 
-/// Smallest number of subsegments in which a frequency step of this many periods or more is demodulated, to estimate noise
-/// and settling; a shorter step has one subsegment per period. A choice.
+/// Smallest number of subsegments in which a frequency step of this many periods or more is demodulated, to estimate
+/// noise and settling; a shorter step has one subsegment per period. A choice.
 const SUBSEGMENTS: usize = 8;
 
-/// Result of one frequency step.
+/// Phasor ratios response/force of one frequency step of a step-sine test.
 #[derive(Clone, Debug)]
 pub(super) struct FrequencyStep {
     pub(super) frequency_hz: f64,
@@ -35,11 +35,12 @@ pub(super) struct FrequencyStep {
     pub(super) force_n: f64,
     /// Ratio of the response phasor to the force phasor for each response, (m, m/s or m/s²)/N as measured.
     pub(super) h: Vec<Complex64>,
-    /// Coherence of each response over the subsegments of the step.
+    /// Coherence of each response over the subsegments of the step that are evaluated: the settled ones, or the second
+    /// half.
     pub(super) coherence: Vec<f64>,
-    /// Standard deviation of the magnitude of each response's phasor ratio, in the unit of `h`.
+    /// Standard deviation of the magnitude of each estimate in `h` (not of one subsegment), in its unit.
     pub(super) deviation: Vec<f64>,
-    /// True if the phasor ratios of all responses reached their steady state within the step.
+    /// True if the phasor ratios of all responses reached their steady state by the middle of the step.
     pub(super) is_settled: bool,
 }
 
@@ -48,8 +49,8 @@ pub(super) struct FrequencyStep {
 pub(super) struct ForceLevel {
     /// Median of the force amplitudes of the frequency steps in the first pass at this level, N.
     pub(super) force_n: f64,
-    /// Steps by ascending frequency. Of several steps at one frequency the longest is kept; of steps of about equal length, that of the
-    /// highest measured frequency.
+    /// Steps by ascending frequency. Of several steps at one frequency the longest is kept; of steps of about equal
+    /// length, that of the highest measured frequency.
     pub(super) steps: Vec<FrequencyStep>,
 }
 
@@ -183,7 +184,8 @@ fn tone_segments(force: &[f64], rate: f64) -> Vec<ToneSegment> {
         let spread = scatter(&periods[from..to]);
         let tolerance = |mean: f64| (FREQUENCY_STEP * mean).max(PERIOD_SCATTER * spread);
         let mean = |to: usize| (crossings[to] - crossings[from]) / (to - from) as f64;
-        // The candidate segment must not begin within a frequency change, where periods scatter, nor at a pause, which is one long period.
+        // The candidate segment must not begin within a frequency change, where periods scatter, nor at a pause, which
+        // is one long period.
         let is_pause = |period: &f64| (period - mean(to)).abs() > PAUSE * mean(to);
         if spread > STEADY_SCATTER * FREQUENCY_STEP * mean(to) || periods[from..to].iter().any(is_pause) {
             from += 1;
@@ -225,7 +227,8 @@ fn scatter(periods: &[f64]) -> f64 {
     1.4826 * deviations[deviations.len() / 2]
 }
 
-/// Times, in samples, of the upward crossings of the force through its mean. A hysteresis of a third of the local amplitude rejects noise.
+/// Times, in samples, of the upward crossings of the force through its mean. A hysteresis of a third of the local
+/// amplitude rejects noise.
 fn crossings(force: &[f64], rate: f64) -> Vec<f64> {
     let mean = force.iter().sum::<f64>() / force.len().max(1) as f64;
     let mut forget = FORGET_S * rate;
@@ -255,7 +258,7 @@ fn crossings(force: &[f64], rate: f64) -> Vec<f64> {
 }
 
 /// Phasor ratios response/force over the settled part of a segment of constant frequency, or over its second half if it
-/// does not settle; `None` if the segment has too few periods or too few samples per period.
+/// does not settle; `None` if the segment has too few periods, or a subsegment of it has too few samples.
 fn demodulated(
     channels: &TestChannels<'_>,
     force: &[f64],
@@ -322,8 +325,8 @@ fn demodulated(
     Some(step)
 }
 
-/// H1 estimate of H over the subsegments of a frequency step, its coherence, and the standard deviation of the magnitude
-/// of this estimate (not of one subsegment).
+/// H1 estimate of H over the subsegments of a frequency step, its coherence, and the standard deviation of the
+/// magnitude of this estimate (not of one subsegment).
 fn averaged(forces: &[Phasor], responses: &[Phasor]) -> (Complex64, f64, f64) {
     let count = forces.len() as f64;
     let pairs = || responses.iter().zip(forces).map(|(x, f)| (x.value, f.value));
@@ -343,7 +346,8 @@ fn averaged(forces: &[Phasor], responses: &[Phasor]) -> (Complex64, f64, f64) {
 
 /// First subsegment from which all responses are settled; `None` if the second half is not settled.
 ///
-/// Settled: the phasor ratio differs from its mean over the second half by less than [`SETTLED`] (relative) or [`SETTLED_NOISE`] standard deviations.
+/// Settled: the phasor ratio differs from its mean over the second half by less than [`SETTLED`] (relative) or
+/// [`SETTLED_NOISE`] standard deviations.
 fn settled_from(ratios: &[Vec<Phasor>]) -> Option<usize> {
     let subsegments = ratios.first()?.len();
     let first = |ratio: &Vec<Phasor>| {
@@ -371,7 +375,8 @@ fn refined(force: &[f64], tone: ToneSegment) -> f64 {
         ) else {
             return period;
         };
-        // The phases of all phasors refer to sample 0 of the record. The two halves have equal phases if the period is exact.
+        // The phases of all phasors refer to sample 0 of the record. The two halves have equal phases if the period is
+        // exact.
         let phase_shift = (b.value * a.value.conj()).arg();
         period = 1.0 / (1.0 / period + phase_shift / TAU / half as f64);
     }
@@ -396,7 +401,8 @@ impl Phasor {
     }
 }
 
-/// Complex amplitude X of x_k = Re(X e^{iωk}) + offset + linear drift over samples `first .. first + length`, by least squares.
+/// Complex amplitude X of x_k = Re(X e^{iωk}) + offset + linear drift over samples `first .. first + length`, by least
+/// squares.
 fn phasor(signal: &[f64], first: usize, length: usize, period: f64) -> Option<Phasor> {
     let samples = signal.get(first..first.checked_add(length)?)?;
     let row = |k: usize| {

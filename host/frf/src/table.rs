@@ -1,4 +1,4 @@
-//! A table of frequency response functions: receptances of the tool centre point over frequency.
+//! A table of frequency response functions: receptances between the directions x, y and z over frequency.
 
 use std::path::{Path, PathBuf};
 
@@ -23,7 +23,8 @@ pub struct Frf {
 
 /// Table of receptances at common frequencies.
 ///
-/// Frequencies ascend and are not negative. The table has at least one frequency line and one receptance, and no receptance twice.
+/// Frequencies ascend and are not negative. The table has at least one frequency line and one receptance, and no
+/// receptance twice.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FrfTable {
     path: PathBuf,
@@ -42,8 +43,9 @@ impl FrfTable {
     /// Creates a table from frequencies and receptances; `path` is its file or a name for its origin, used in messages.
     ///
     /// # Errors
-    /// There is no frequency or no receptance; frequencies are negative, not finite or do not ascend; a receptance is not finite, has another
-    /// length than the frequencies, is of a rotation or is given twice; a coherence has another length or lies outside 0 to 1.
+    /// There is no frequency or no receptance; frequencies are negative, not finite or do not ascend; a receptance is
+    /// not finite, has another length than the frequencies, is of a rotation or is given twice; a coherence has another
+    /// length or lies outside 0 to 1.
     pub fn new(path: &Path, frequency_hz: Vec<f64>, entries: Vec<Frf>) -> Result<Self, FrfError> {
         let table = Self {
             path: path.into(),
@@ -124,7 +126,8 @@ impl FrfTable {
         &self.entries
     }
 
-    /// Receptance of displacement in direction `response` due to force in direction `force`; `None` if the table lacks it.
+    /// Receptance of displacement in direction `response` due to force in direction `force`; `None` if the table lacks
+    /// it.
     pub fn entry(&self, response: Direction, force: Direction) -> Option<&Frf> {
         self.entries
             .iter()
@@ -141,7 +144,8 @@ impl FrfTable {
             .collect()
     }
 
-    /// Receptance matrix H at one line, m/N, rows displacement, columns force in x, y, z; entries that the table lacks are zero.
+    /// Receptance matrix H at one line, m/N, rows displacement, columns force in x, y, z; entries that the table lacks
+    /// are zero.
     ///
     /// `None` beyond the last line.
     pub fn line(&self, index: usize) -> Option<Matrix3<Complex64>> {

@@ -44,10 +44,11 @@ pub(super) struct Meaning {
     pub(super) content: Content,
     /// Directions of response and force.
     pub(super) directions: Option<(Direction, Direction)>,
-    /// Unit of the FRF values in the column, response per force; `None` if the file does not state it.
+    /// Unit of the FRF values in the column, response per force; `None` if neither file nor user states it, and for a
+    /// phase.
     pub(super) unit: Option<FrfUnit>,
-    /// Title of the column in lower case without the words for real part, phase and the like or, for a column with a stated
-    /// name, the directions in this name; it is equal for the two columns of one receptance.
+    /// Title of the column in lower case without the words for real part, phase and the like or, for a column with a
+    /// stated name, the directions in this name; it is equal for the two columns of one receptance.
     pub(super) label: String,
     /// Order of the time derivative of displacement that a word of the column title names: 1 for mobility, 2 for
     /// accelerance, otherwise 0.
@@ -298,8 +299,8 @@ fn directions(label: &[&str]) -> Option<(Direction, Direction)> {
     }
 }
 
-/// True if the column titles are those of an FRF table: one begins with `frequency_hz`, or one column has frequencies and
-/// another has a part of an FRF.
+/// True if the column titles are those of an FRF table: one begins with `frequency_hz`, or one column has frequencies
+/// and another has a part of an FRF.
 pub(super) fn is_head(titles: &[String]) -> bool {
     let of = |title: &String| {
         let (name, unit) = match title.strip_suffix(']').and_then(|inner| inner.rsplit_once('[')) {

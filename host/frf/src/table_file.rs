@@ -35,12 +35,13 @@ struct Column {
 impl FrfTable {
     /// Reads an FRF table from a text file, or from UFF 58 with the extension uff, unv or bunv.
     ///
-    /// Units: displacement, velocity or acceleration per force, such as um/N or g/N. Mobility and accelerance are converted to receptance.
-    /// In a table with the column `frequency_hz`, a header without unit means m/N, and lines that begin with # are comments.
+    /// Units: displacement, velocity or acceleration per force, such as um/N or g/N. Mobility and accelerance are
+    /// converted to receptance. In a table with the column `frequency_hz`, a header without unit means m/N, and lines
+    /// that begin with # are comments.
     ///
     /// # Errors
-    /// For example: the file cannot be read; a column has an unknown name or unit, or lacks its real or imaginary part; a value is not a number; the
-    /// frequencies do not ascend.
+    /// For example: the file cannot be read; a column has an unknown name or unit, or lacks its real or imaginary part;
+    /// a value is not a number; the frequencies do not ascend.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, FrfError> {
         Self::import(path, &Import::default()).map(|imported| imported.table)
     }
@@ -51,8 +52,8 @@ impl FrfTable {
     /// Text tables of other programs have real and imaginary part, or magnitude (also in dB) and phase.
     ///
     /// # Errors
-    /// As [`FrfTable::read`]; also if directions or units are not stated, where the message names the option that states
-    /// them; and if `import` names columns of a file that states them itself, or a column that is not there.
+    /// As [`FrfTable::read`]; also if directions or units are not stated, where the message names the option that
+    /// states them; and if `import` names columns of a file that states them itself, or a column that is not there.
     pub fn import(path: impl AsRef<Path>, import: &Import) -> Result<ImportedTable, FrfError> {
         let path = path.as_ref();
         let ending = quietcut_recording::file::ending(path);

@@ -22,7 +22,8 @@ use quietcut_recording::{Import, Sidecar, TextColumn, TextTable};
 pub struct ImportedTable {
     /// The table, receptances in m/N.
     pub table: FrfTable,
-    /// Description of the columns and their meaning in one line; `None` for a table in the format of this program.
+    /// Description of the columns and their meaning in one line; `None` for a CSV table in the format of this program
+    /// and for UFF.
     pub understood: Option<String>,
 }
 
@@ -142,7 +143,7 @@ fn assemble(
     })
 }
 
-/// Pairs the two columns of each response: real and imaginary part, or magnitude and phase.
+/// Pairs the two columns of each receptance: real and imaginary part, or magnitude and phase.
 fn pairs<'a>(path: &Path, columns: &'a [(&'a TextColumn, Meaning)]) -> Result<Vec<Pair<'a>>, FrfError> {
     let mut pairs: Vec<Pair<'a>> = Vec::new();
     for (column, meaning) in columns {

@@ -130,7 +130,8 @@ fn direction(dof: &DegreeOfFreedom, what: &str) -> Result<(Direction, f64), Stri
     Ok((axis, dof.direction.signum() as f64))
 }
 
-/// Conversion factor of an FRF to SI, and order of the time derivative of displacement: 0 receptance, 1 mobility, 2 accelerance.
+/// Conversion factor of an FRF to SI, and order of the time derivative of displacement: 0 receptance, 1 mobility, 2
+/// accelerance.
 fn compliance(set: &DataSet) -> Result<(f64, i32), String> {
     let needed = "receptance (m/N), mobility (m/s/N) or accelerance (m/s^2/N) is needed";
     let (ordinate, denominator) = ratio(set)?;
@@ -146,7 +147,8 @@ fn compliance(set: &DataSet) -> Result<(f64, i32), String> {
     Ok((ordinate.factor / denominator.factor, derivatives))
 }
 
-/// Units of response and force of an FRF. Some programs write both into the unit label of the ordinate, such as `(m/s^2)/N`.
+/// Units of response and force of an FRF. Some programs write both into the unit label of the ordinate, such as
+/// `(m/s^2)/N`.
 fn ratio(set: &DataSet) -> Result<(Unit, Unit), String> {
     let Header {
         ordinate,
@@ -190,8 +192,9 @@ fn is_coherence_of(other: &DataSet, set: &DataSet) -> bool {
 }
 
 impl FrfTable {
-    /// Writes the table to `path` as UFF 58, receptances in m/N, atomically: on an error the previous file stays unchanged. Text keeps thirteen
-    /// digits of receptances and seven of frequencies; binary keeps all digits of receptances.
+    /// Writes the table to `path` as UFF 58, receptances in m/N, atomically: on an error the previous file stays
+    /// unchanged. Text keeps thirteen digits of receptances and seven of frequencies; binary keeps all digits of
+    /// receptances.
     ///
     /// # Errors
     /// The file cannot be written.

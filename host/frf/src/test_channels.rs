@@ -14,7 +14,7 @@ pub(super) struct TestChannels<'a> {
     pub(super) forces: Vec<(Direction, &'a Channel)>,
     /// Response channels, in the order x, y, z.
     pub(super) responses: Vec<Response<'a>>,
-    /// Warnings for the user: of several channels in one direction, only one is used.
+    /// Warnings for the user: of several response channels in one direction, only one is used.
     pub(super) warnings: Vec<String>,
 }
 
@@ -23,15 +23,17 @@ pub(super) struct TestChannels<'a> {
 pub(super) struct Response<'a> {
     pub(super) direction: Direction,
     pub(super) channel: &'a Channel,
-    /// Order of the time derivative of displacement that the channel measures: 0 displacement, 1 velocity, 2 acceleration.
+    /// Order of the time derivative of displacement that the channel measures: 0 displacement, 1 velocity, 2
+    /// acceleration.
     pub(super) derivatives: i32,
 }
 
 impl<'a> TestChannels<'a> {
     /// Selects forces and responses. If `chosen` names forces, only these count; the same holds for responses.
     ///
-    /// Forces are those of fx, fy and fz that the sidecar names as inputs; without that key, those that are not constant. Of several
-    /// response channels in one direction, displacement takes precedence over velocity, and velocity over acceleration.
+    /// Forces are those of fx, fy and fz that the sidecar names as inputs; without that key, those that are not
+    /// constant. Of several response channels in one direction, displacement takes precedence over velocity, and
+    /// velocity over acceleration.
     ///
     /// # Errors
     /// There is no force or no response; a chosen channel or an input does not exist; an input is not a force.

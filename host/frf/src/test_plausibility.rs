@@ -1,5 +1,5 @@
-//! Plausibility of the recordings of a test: force and response that are swapped, hum of the mains, spikes, clipping, a force that is a set of
-//! lines, and receptances that no drive point has.
+//! Plausibility of the recordings of a test: force and response that are swapped, hum of the mains, spikes, clipping, a
+//! force that is a set of lines, and receptances that no drive point has.
 
 use std::f64::consts::TAU;
 
@@ -15,10 +15,12 @@ use super::excitation::Excitation;
 use super::table::FrfTable;
 use super::test_channels::TestChannels;
 
-/// Description of a force and a response whose names or columns are swapped; `None` if nothing speaks for it.
+/// Description of a force and a response whose names or columns are swapped; `None` if nothing speaks for it, or if
+/// there are several forces.
 ///
-/// A hammer's force is short pulses of one sign that come first, and the response rings after them. If the channel that is called a force
-/// rings longer than a response that is pulses of one sign, and rings after these pulses rather than before, the two are swapped.
+/// A hammer's force is short pulses of one sign that come first, and the response rings after them. If the channel that
+/// is called a force rings longer than a response that is pulses of one sign, and rings after these pulses rather than
+/// before, the two are swapped.
 pub(super) fn swapped(channels: &TestChannels<'_>) -> Option<String> {
     let [(_, force)] = channels.forces[..] else {
         return None;
@@ -76,18 +78,19 @@ fn are_swapped(force: &[f64], response: &[f64]) -> bool {
         energy(at.saturating_sub(span), at),
         energy(at, (at + span).min(force.len())),
     );
-    // A pulse at the very start has nothing before it.
+    // For a pulse near the start of the record too few samples precede it for a comparison.
     let rings_after = at < span / 4 || after > RINGS_AFTER * before;
     one > ONE_SIGN * all && rings_after
 }
 
-/// Largest sample, with its sign, and its index.
+/// Index of the sample of largest magnitude, and this sample with its sign; `None` if all samples are zero.
 fn largest(samples: &[f64]) -> Option<(usize, f64)> {
     let at = (0..samples.len()).max_by(|&a, &b| samples[a].abs().total_cmp(&samples[b].abs()))?;
     (samples[at] != 0.0).then_some((at, samples[at]))
 }
 
-/// Effective number of samples over which the energy of a signal is spread, (Σx²)²/Σx⁴.
+/// Effective number of samples over which the energy of a signal is spread, (Σx²)²/Σx⁴ with the deviations x from its
+/// mean.
 fn effective_samples(samples: &[f64]) -> f64 {
     let mean = samples.iter().sum::<f64>() / samples.len().max(1) as f64;
     let (mut second, mut fourth) = (0.0, 0.0);
@@ -135,7 +138,7 @@ pub(super) fn of_channels(excitation: Excitation, channels: &TestChannels<'_>) -
     warnings
 }
 
-/// Warning about a force that consists of lines, as in a cut; true if it does.
+/// Appends a warning if every force consists of single frequency lines, as in a cut; true if so.
 fn has_lines(channels: &TestChannels<'_>, warnings: &mut Vec<String>) -> bool {
     let sidecar = &channels.recording.sidecar;
     let shares = channels
@@ -163,10 +166,11 @@ fn has_lines(channels: &TestChannels<'_>, warnings: &mut Vec<String>) -> bool {
     true
 }
 
-/// Longest record whose spectrum is searched for lines, samples; a choice.
+/// Largest number of samples of a record that are searched for frequency lines (its middle) and for hum (its start); a
+/// choice.
 const LONGEST: usize = 1 << 17;
 
-/// Share of the energy of a signal in lines that stand out of their neighbourhood, without its mean.
+/// Share of the energy of a signal, without its mean, that lies in frequency lines well above the lines around them.
 fn share_of_lines(samples: &[f64]) -> f64 {
     // The length of the transform is a power of two.
     let length = match samples.len().min(LONGEST) {
@@ -213,10 +217,10 @@ fn share_of_lines(samples: &[f64]) -> f64 {
     if total > 0.0 { in_lines / total } else { 0.0 }
 }
 
-/// Lines on both sides that form the neighbourhood of a line; a choice.
+/// Number of lines on each side that form the neighbourhood of a line; a choice.
 const NEIGHBOURS: usize = 32;
 
-/// Lines on both sides of a peak that belong to it with a Hann window.
+/// Number of lines on each side of a peak that belong to it with a Hann window.
 const MAIN_LOBE: usize = 2;
 
 /// Warning about hum of the mains that carries most of the energy of a channel.
@@ -244,7 +248,8 @@ fn hum(channels: &TestChannels<'_>) -> Vec<String> {
         .collect()
 }
 
-/// Largest share of the energy of a signal in one sine within 0.2 Hz of `hertz`. The mains stay within that in normal operation.
+/// Largest share of the energy of a signal in one sine within 0.2 Hz of `hertz`. The mains stay within that in normal
+/// operation.
 fn share_near(samples: &[f64], rate: f64, hertz: f64) -> f64 {
     let samples = &samples[..samples.len().min(LONGEST)];
     let count = samples.len() as f64;
@@ -253,7 +258,8 @@ fn share_near(samples: &[f64], rate: f64, hertz: f64) -> f64 {
     if energy <= 0.0 || samples.len() < 16 {
         return 0.0;
     }
-    // Half the distance of independent lines: the loss between two steps is below 10 %.
+    // Half the distance of independent lines: the amplitude of a sine between two steps is at most 10 % too low, unless
+    // the bound of 40 steps widens them.
     let step = 0.5 * rate / count;
     let steps = (0.2 / step).ceil().clamp(0.0, 40.0) as i32;
     (-steps..=steps)
@@ -273,7 +279,8 @@ fn share_near(samples: &[f64], rate: f64, hertz: f64) -> f64 {
         .fold(0.0, f64::max)
 }
 
-/// Index of a spike: one sample far above all others, whose neighbours are small.
+/// Index of a spike: one sample far above all others, whose neighbours are small, all relative to the median. `None` if
+/// there is no such sample.
 fn spike(samples: &[f64]) -> Option<usize> {
     let mut sorted: Vec<f64> = samples.to_vec();
     let middle = sorted.len().checked_sub(1)? / 2;
@@ -291,7 +298,8 @@ fn spike(samples: &[f64]) -> Option<usize> {
         .then_some(at)
 }
 
-/// Warnings about measured receptances: a drive point that feeds energy in, a response that the force does not cause, sizes of no machine.
+/// Warnings about measured receptances: a drive point that feeds energy in, a response that the force does not cause,
+/// and peaks beyond those of any machine.
 pub(super) fn of_table(table: &FrfTable) -> Vec<String> {
     let frequency_hz = table.frequency_hz();
     let mut warnings = Vec::new();

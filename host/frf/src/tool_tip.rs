@@ -1,8 +1,8 @@
 //! Tool-tip calibration: receptances at the tool tip from a sensor on the spindle housing.
 //!
-//! If spindle, holder and tool move as a rigid body in a mode, the motions of tip T and sensor S have the constant ratio φ_T/φ_S of the
-//! mode shape (thesis eqs 7.13 and 7.14). Two hammer tests with impacts at the tip give this ratio for each mode: one with the sensor at
-//! its position during the cut, one with a sensor at the tip.
+//! If spindle, holder and tool move as a rigid body in a mode, the motions of tip T and sensor S have the constant
+//! ratio φ_T/φ_S of the mode shape (thesis eqs 7.13 and 7.14). Two hammer tests with impacts at the tip give this ratio
+//! for each mode: one with the sensor at its position during the cut, one with a sensor at the tip.
 
 use num_complex::Complex64;
 
@@ -25,20 +25,21 @@ pub struct ModeRatio {
     pub response: Direction,
     /// Mode shape ratio φ_T/φ_S: displacement of the tool tip T over that of the sensor S on the housing.
     pub ratio: f64,
-    /// RMS deviation of the residues at the tip from `ratio` times those at the sensor, relative to this product. A rigid body in a measurement
-    /// with little noise gives a few 0.01.
+    /// RMS deviation of the residues at the tip from `ratio` times those at the sensor, relative to this product. A
+    /// rigid body in a measurement with little noise gives a few 0.01.
     pub misfit: f64,
 }
 
 /// Computes receptances at the tool tip from receptances at a sensor on the housing.
 ///
-/// `housing` and `tip` are the calibration: responses at the sensor and at the tip to forces at the tip. `measured` has responses at the
-/// same sensor. Each mode r of `measured` is fitted and scaled with the ratio of the nearest calibrated mode:
-/// H_TT = H_ST + Σ_r (φ_T/φ_S − 1)_r H_ST,r. For one mode this is thesis eq. (7.14).
+/// `housing` and `tip` are the calibration: responses at the sensor and at the tip to forces at the tip. `measured` has
+/// responses at the same sensor. Each mode r of `measured` is fitted and, for each response direction, scaled with the
+/// ratio of the nearest calibrated mode of that direction: H_TT = H_ST + Σ_r (φ_T/φ_S − 1)_r H_ST,r. For one mode this
+/// is thesis eq. (7.14).
 ///
 /// # Errors
-/// The calibration tables have different frequencies or no common receptance; no mode can be fitted; a mode has no counterpart in the
-/// calibration.
+/// The calibration tables have different frequencies or no common receptance; no mode can be fitted; a mode has no
+/// counterpart in the calibration.
 pub fn calibrate(
     measured: &FrfTable,
     housing: &FrfTable,
@@ -154,9 +155,8 @@ fn ratios(housing: &FrfTable, tip: &FrfTable) -> Result<Vec<ModeRatio>, FrfError
     Ok(ratios)
 }
 
-/// Fits receptances by the smallest number of modes, up to [`MODES_MAX`], beyond which the residual hardly decreases, or with which it is
-/// small. If no fit succeeds, the
-/// error of the first failed fit is returned.
+/// Fits receptances by the smallest number of modes, up to [`MODES_MAX`], beyond which the residual hardly decreases,
+/// or with which it is small. If no fit succeeds, the error of the first failed fit is returned.
 pub(super) fn modes(
     frequency_hz: &[f64],
     functions: &[&[Complex64]],
@@ -227,7 +227,8 @@ mod tests {
 
     use super::*;
 
-    /// FRF table at the tip, or at the sensor if `ratios` are given. Each mode: natural frequency (Hz), damping ratio, mode shape in x and y.
+    /// FRF table at the tip, or at the sensor if `ratios` are given. Each mode: natural frequency (Hz), damping ratio,
+    /// mode shape in x and y.
     fn table(modes: &[(f64, f64, [f64; 2])], ratios: Option<&[f64]>, noise: f64, seed: u64) -> FrfTable {
         let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
         let frequency_hz: Vec<f64> = (0..400).map(|k| 8.0 + 0.05 * f64::from(k)).collect();

@@ -30,9 +30,11 @@ impl Window {
     }
 }
 
-/// Effective number of independent averages of n = `segments` segments whose starts are `shift` samples apart (Welch 1967).
+/// Effective number of independent averages of n = `segments` segments whose starts are `shift` samples apart (Welch
+/// 1967).
 ///
-/// n_eff = n / (1 + 2 Σ_j (1 − j/n) ρ_j²), where ρ_j = Σ_k w_k w_{k+j·shift} / Σ_k w_k² is the correlation of segments j apart.
+/// n_eff = n / (1 + 2 Σ_j (1 − j/n) ρ_j²), where ρ_j = Σ_k w_k w_{k+j·shift} / Σ_k w_k² is the correlation of segments
+/// j apart.
 pub(super) fn effective_averages(weights: &[f64], shift: usize, segments: usize) -> f64 {
     let energy: f64 = weights.iter().map(|w| w * w).sum();
     let mut shared = 0.0;

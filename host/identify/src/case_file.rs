@@ -222,8 +222,8 @@ pub fn cutting(
     Ok(case)
 }
 
-/// Name of the extension of a case that contains the parameter `key`; `None` for a parameter of the matrices of the
-/// structure.
+/// Name of the extension of a case that contains the parameter `key`; `None` for a parameter of the structure's
+/// matrices, cubic ones included.
 fn extension_of(key: &str) -> Option<&'static str> {
     let effect = match key {
         "k2_n_per_m2" => EffectName::QuadraticStiffness,
@@ -235,8 +235,8 @@ fn extension_of(key: &str) -> Option<&'static str> {
     Some(effect.name())
 }
 
-/// Text of a case file with mass, damping, stiffness and cubic terms as matrices, and all other terms as extensions. With
-/// a quintic stiffness, the cubic stiffness is in the same extension.
+/// Text of a case file with mass, damping, stiffness and cubic terms as matrices, and all other terms as extensions.
+/// With a quintic stiffness, the cubic stiffness is in the same extension.
 ///
 /// # Errors
 /// Mass, damping or stiffness was not identified, one extension is needed in two directions, or a value has no form in

@@ -1,12 +1,12 @@
 //! Every threshold by which this crate decides, each with the source of its number.
 //!
-//! A number without a derivation or a campaign behind it is marked "Unfounded". Step sizes, grids and limits of iterations decide nothing
-//! about a record and stay beside the code that uses them.
+//! A number without a derivation or a campaign behind it is marked "Unfounded". Step sizes, grids and limits of
+//! iterations decide nothing about a record and stay beside the code that uses them.
 
 // Modes from receptances
 
-/// Fewest frequency lines in the band of a modal fit to receptances. The highest model order is at most a third of the
-/// number of lines less one; with fewer than 16 lines it does not exceed `LEAST_ORDERS`.
+/// Fewest frequency lines in the band of a modal fit to receptances. With n lines the highest model order is at most
+/// (n−1)/3; with fewer than 16 lines it does not exceed `LEAST_ORDERS`.
 pub(crate) const LEAST_LINES: usize = 16;
 
 /// Smallest standard deviation of a receptance value that a modal fit assumes, relative to the RMS of the receptance:
@@ -57,8 +57,8 @@ pub(crate) const ORDERS_SHARE: f64 = 0.25;
 /// orders of the stabilization diagram. Unfounded.
 pub(crate) const LEAST_ORDERS: usize = 4;
 
-/// Relative difference of frequency or damping of two stable poles up to which they are the same mode, in multiples of
-/// `SAME_FREQUENCY` and `SAME_DAMPING`. Unfounded.
+/// Larger one of the relative differences of frequency and damping ratio of two stable poles up to which they are the
+/// same mode, in multiples of `SAME_FREQUENCY` and `SAME_DAMPING`. Unfounded.
 pub(crate) const SAME_POLE_DISTANCE: f64 = 3.0;
 
 /// Modal assurance criterion between the residues of two stable poles above which they are the same mode. Unfounded.
@@ -111,9 +111,9 @@ pub(crate) const SAME_STEP: f64 = 1e-3;
 /// Fewest excitation periods of the steady part of a dwell. Unfounded.
 pub(crate) const LEAST_DWELL_PERIODS: f64 = 10.0;
 
-/// Standard deviation of a Fourier coefficient of a dwell's motion, relative to the residual transient, from which the
-/// dwell counts as settled. A bias of a fifth of the standard deviation lowers the coverage of a 90 % interval to 89.3
-/// %.
+/// Standard deviation of a Fourier coefficient of a dwell's motion, over the remaining amplitude of its transient, from
+/// which the dwell counts as settled. A bias of a fifth of the standard deviation lowers the coverage of a 90 %
+/// interval to 89.3 %.
 pub(crate) const NOISE_OVER_TRANSIENT: f64 = 5.0;
 
 /// Change of the fundamental of the motion between the two halves of a dwell up to which the motion is steady, relative
@@ -121,7 +121,8 @@ pub(crate) const NOISE_OVER_TRANSIENT: f64 = 5.0;
 pub(crate) const STEADY_CHANGE: f64 = 1e-3;
 
 /// Change of the fundamental of the motion between the two halves of a dwell up to which the motion is steady, in
-/// standard deviations of its real or imaginary part. Chance exceeds 4 with a probability of e^(−4²/2) = 3e-4.
+/// standard deviations of the real or imaginary part of the change. Chance exceeds 4 with a probability of e^(−4²/2) =
+/// 3e-4.
 pub(crate) const STEADY_DEVIATIONS: f64 = 4.0;
 
 // Fits to dwells
@@ -159,8 +160,9 @@ pub(crate) const LEAST_SLICE_SAMPLES: usize = 12;
 /// may cause, relative to the largest response. Unfounded.
 pub(crate) const CURVATURE_SHARE: f64 = 2e-3;
 
-/// Reduction of χ² above which the response amplitude X(F) over the force F is fitted by two lines instead of one.
-/// Chance reaches 25 with a probability of 6e-7; twice that accounts for the choice of the break.
+/// Reduction of χ² above which the response amplitude X(F) over the force F is fitted by two lines instead of one. For
+/// one parameter, chance reaches 25 with a probability of 6e-7; twice that accounts for the choice of the break between
+/// the lines.
 pub(crate) const REGION_EVIDENCE: f64 = 50.0;
 
 /// Fewest measured points of a linear region of the response amplitude over the force: a line has two parameters.
@@ -168,8 +170,8 @@ pub(crate) const REGION_EVIDENCE: f64 = 50.0;
 pub(crate) const LEAST_REGION_POINTS: usize = 6;
 
 /// Difference between two neighbouring lines of the response amplitude X(F), at the force F where they meet, above
-/// which the response jumps; in standard deviations of the noise of X. A normal variable exceeds six with a probability
-/// of 2e-9.
+/// which the response jumps; in standard deviations of the noise of X. A normal variable exceeds six in magnitude with
+/// a probability of 2e-9.
 pub(crate) const JUMP_DEVIATIONS: f64 = 6.0;
 
 /// Difference between two neighbouring lines of the response amplitude X(F), at the force F where they meet, above
@@ -198,8 +200,8 @@ pub(crate) const FORCE_HARMONIC_DEVIATIONS: f64 = 3.0;
 /// of it either way allows for damping, other modes and the next order of the balance. Unfounded.
 pub(crate) const QUADRATIC_STIFFNESS_RATIO: [f64; 2] = [15.0, 45.0];
 
-/// Reduction of χ² per parameter of a describing function above which its kind of nonlinearity is named. Chance reaches
-/// 25 with a probability of 6e-7.
+/// Reduction of χ² per parameter of a describing function above which its kind of nonlinearity is named. For one
+/// parameter, chance reaches 25 with a probability of 6e-7.
 pub(crate) const KIND_EVIDENCE: f64 = 25.0;
 
 /// Residual χ² of a kind of nonlinearity, relative to that of a linear structure, below which the kind explains the
@@ -207,32 +209,35 @@ pub(crate) const KIND_EVIDENCE: f64 = 25.0;
 /// effect, which is 1 % in squares.
 pub(crate) const EXPLAINED_SHARE: f64 = 0.01;
 
-/// Smoothed power of a sweep's force, relative to its maximum, above which a frequency lies within the sweep. Unfounded:
-/// −10 dB.
+/// Smoothed power of a sweep's force, relative to its maximum, above which a frequency lies within the sweep.
+/// Unfounded: −10 dB.
 pub(crate) const SWEPT_POWER_SHARE: f64 = 0.1;
 
-/// Fewest independent receptance estimates in the common band of two sweeps that are compared. Unfounded.
+/// Least width of the common band of two sweeps that are compared, in distances between neighbouring independent
+/// estimates of the receptance. Unfounded.
 pub(crate) const LEAST_SWEEP_ESTIMATES: f64 = 10.0;
 
-/// Misfit between the receptances of two sweeps, their mean squared difference over its variance, from which they are
-/// not of one linear structure, if the difference also reaches `LEAST_SWEEP_CHANGE`. The misfit of a linear structure
-/// reaches about 5, because the variances have nine degrees of freedom per line and omit the noise of the force.
+/// Misfit between the receptances of two sweeps, their mean squared difference over its variance, from which the sweeps
+/// are not of one linear structure, if the difference also reaches `LEAST_SWEEP_CHANGE`. The misfit of a linear
+/// structure reaches about 5, because the variances have nine degrees of freedom per line and omit the noise of the
+/// force.
 pub(crate) const SWEEP_MISFIT: f64 = 20.0;
 
 /// Largest difference between the receptances of two sweeps, relative to the peak receptance, below which the
 /// difference is not significant. Unfounded.
 pub(crate) const LEAST_SWEEP_CHANGE: f64 = 0.005;
 
-/// Excess over 1 of the misfit between the cross receptances H_ij and H_ji up to which a structure is reciprocal, in
-/// standard deviations of a mean of exponential variables. A normal variable exceeds five with a probability of 3e-7.
+/// Excess over 1 of the misfit between the cross receptances H_ij and H_ji, their mean squared difference over its
+/// variance, up to which a structure is reciprocal; in standard deviations of a mean of as many exponential variables
+/// as there are frequencies. A normal variable exceeds five with a probability of 3e-7.
 pub(crate) const RECIPROCAL_DEVIATIONS: f64 = 5.0;
 
-/// Largest difference between the cross receptances H_ij and H_ji, relative to the peak, up to which a structure is
+/// Largest difference between the cross receptances H_ij and H_ji, relative to their peak, up to which a structure is
 /// reciprocal. The position of a shaker and its direction are not more accurate. Unfounded.
 pub(crate) const LEAST_RECIPROCITY_CHANGE: f64 = 0.01;
 
-/// Ratio of signal power to noise power of the motion from which a frequency belongs to the band of a restoring-force
-/// fit. Unfounded.
+/// Ratio of the smoothed power of the motion to its noise power from which a frequency belongs to the band of a
+/// restoring-force fit. Unfounded.
 pub(crate) const BAND_SIGNAL_TO_NOISE: f64 = 1e3;
 
 // Cutting tests
@@ -242,14 +247,14 @@ pub(crate) const BAND_SIGNAL_TO_NOISE: f64 = 1e3;
 /// factor of 1.4, with two by 3.8. Unfounded.
 pub(crate) const LEAST_REVOLUTIONS: usize = 4;
 
-/// Mean force of a revolution, relative to the mean force in full engagement, above which the tool is fully engaged.
-/// Unfounded.
+/// Mean magnitude of the force in a revolution, relative to that in full engagement, above which the tool is fully
+/// engaged. Unfounded.
 pub(crate) const ENGAGED_SHARE: f64 = 0.9;
 
-/// Largest length of the last Gauss–Newton step with which the fit of force coefficients is accepted, in standard
-/// deviations of the parameters. Chips at the edge of contact may change with every step. The parameters then lie
-/// within 0.3 of a standard deviation of a minimum, which adds 4 % to their mean error (√(1 + 0.3²)); the share is
-/// unfounded.
+/// Largest length of the last Gauss–Newton step with which a fit of force coefficients that does not converge is
+/// accepted, in standard deviations of the parameters. Chips at the edge of contact may change with every step. The
+/// parameters then lie within 0.3 of a standard deviation of a minimum, which adds 4 % to their mean error (√(1 +
+/// 0.3²)); the share is unfounded.
 pub(crate) const LARGEST_LAST_STEP: f64 = 0.3;
 
 /// Relative difference of the feeds per tooth of two cutting tests up to which they count as one feed. Unfounded.
@@ -309,17 +314,17 @@ pub(crate) const LINEARIZATION_ERROR: f64 = 0.1;
 
 // Ambient tests
 
-/// Change of the natural frequency of an ambient mode to a higher model order up to which the mode is stable. First
-/// value: relative change, the usual 1 % of stabilization diagrams. Second value: in standard deviations, which chance
-/// exceeds in 0.3 % of cases.
+/// Change of the natural frequency of a mode from ambient vibration, to a higher model order, up to which the mode is
+/// accepted; one of two values suffices. First value: relative change, the usual 1 % of stabilization diagrams. Second
+/// value: in standard deviations, which chance exceeds in 0.3 % of cases.
 pub(crate) const SAME_MODE: (f64, f64) = (0.01, 3.0);
 
 /// Smallest and largest number of blocks into which an ambient record is divided. The smallest number gives the
 /// covariance of the modes eleven degrees of freedom. Unfounded.
 pub(crate) const AMBIENT_BLOCKS: [usize; 2] = [12, 40];
 
-/// Largest damping ratio of a mode from ambient vibration: a pole that decays faster describes the spectrum of the excitation.
-/// Unfounded.
+/// Largest damping ratio of a mode from ambient vibration: a pole that decays faster describes the spectrum of the
+/// excitation. Unfounded.
 pub(crate) const LARGEST_AMBIENT_DAMPING: f64 = 0.3;
 
 // Test plans
@@ -327,8 +332,8 @@ pub(crate) const LARGEST_AMBIENT_DAMPING: f64 = 0.3;
 /// Largest number of tests in a plan of experiments. Unfounded.
 pub(crate) const MOST_TESTS: usize = 30;
 
-/// Smallest reduction, by one more test of a plan, of the excess of the limits' intervals over the wanted width,
-/// relative to that excess. `MOST_TESTS` tests with less reduce it by less than 3 % together.
+/// Smallest reduction, by one more test of a plan, of the excess of the intervals of stability limits over the wanted
+/// width, relative to that excess. `MOST_TESTS` tests with less reduce it by less than 3 % together.
 pub(crate) const LEAST_GAIN: f64 = 1e-3;
 
 /// Distance of a stability lobe above the lowest lobe at a speed, in standard deviations of the difference of their

@@ -43,8 +43,8 @@ pub enum FitError {
     NotConverged(f64),
 }
 
-/// Normal equations summed over dwells, from the whitened residual r of each dwell and the derivative S of its whitened
-/// prediction by the parameters.
+/// Normal equations for the parameters of an equation of motion, summed over dwells, from the whitened residual r of
+/// each dwell and the derivative S of its whitened prediction by the parameters.
 pub(super) struct Normal {
     /// Σ SᵀS and Σ Sᵀr.
     sums: NormalSums,
@@ -183,7 +183,8 @@ impl<F: Fn(&DVector<f64>) -> Normal> Objective for DwellFit<F> {
 }
 
 /// Parameters with the smallest sum of squares over the dwells, by Levenberg–Marquardt steps from `start`. The first
-/// step adds the fraction `damping` to the diagonal of the normal matrix; 0 for a start near the minimum.
+/// step adds the fraction `damping` of the diagonal of the normal matrix to this diagonal; 0 for a start near the
+/// minimum.
 ///
 /// # Errors
 /// See [`FitError`].
@@ -200,11 +201,12 @@ pub(super) fn minimum(
     }
 }
 
-/// Parameters after at most 25 Levenberg–Marquardt steps towards the smallest sum of squares, without the requirement
-/// that they converge.
+/// Parameters after at most 25 Levenberg–Marquardt steps towards the smallest sum of squares over the dwells; the steps
+/// need not converge.
 ///
 /// # Errors
-/// The data do not determine the parameters, or too many dwells have no motion.
+/// The dwells do not determine the parameters, or at more than half of them the equation of motion has no periodic
+/// solution.
 pub(super) fn nearer(
     start: DVector<f64>,
     damping: f64,

@@ -4,16 +4,16 @@
 //! | folder | parameters | tests |
 //! |---|---|---|
 //! | [`modes`] | complex modes with left and right shapes | receptances, whole recordings |
-//! | [`nonlinear`] | cubic, quadratic and friction terms; linearity tests | step-sine dwells ([`dwells`]), multisines, any record |
-//! | [`cutting`] | cutting and edge coefficients, runout; modes from stability limits | cuts with measured force; trial cuts |
+//! | [`nonlinear`] | nonlinear terms; linearity tests | step-sine dwells ([`dwells`]), multisines, any record |
+//! | [`cutting`] | force coefficients, runout; modes from stability limits | cuts with measured force; trial cuts |
 //! | [`robot`] | joint stiffness, damping and cubic terms, payload | receptances or dwells at several postures |
 //! | [`ambient`] | modes from responses alone (stochastic subspace) | idle spindle, background vibration |
 //! | [`plan`] | none: the fewest tests that narrow the limits of a lobe chart | |
 //!
 //! [`case_file`] writes what was identified as a case file.
 //!
-//! "The thesis" in this crate is *Chatter Vibrations in Robotic Milling Considering Structural Nonlinearity*, a doctoral
-//! thesis of the University of Victoria; its equation numbers are given as "thesis eq. 5.16".
+//! "The thesis" in this crate is *Chatter Vibrations in Robotic Milling Considering Structural Nonlinearity*, a
+//! doctoral thesis of the University of Victoria; its equation numbers are given as "thesis eq. 5.16".
 //!
 //! ```
 //! use std::path::Path;

@@ -1,46 +1,51 @@
-//! Every threshold by which this crate decides, each with the source of its number.
+//! Thresholds by which this crate decides, each with the source of its number.
 //!
-//! A number without a derivation or a campaign behind it is marked "Unfounded". Bounds of the values of a case that are
-//! physical, such as a damping ratio below 1, stand with their keys.
+//! A number without a derivation or a campaign behind it is marked "Unfounded" or "a choice". Bounds of the values of a
+//! case that are physical, such as a damping ratio below 1, stand with their keys.
 
-/// Sum of the residues of a structure given by modes, relative to n·max|C|·max|B| with n states, above which its velocity jumps with the force.
-/// The sum is zero if the structure has a mass matrix. Mode shapes with seven digits in the case file leave up to this much: two factors
-/// with an error of 5e-7 in each of n products.
+/// Sum of the residues of a structure given by modes, relative to n·max|C|·max|B| with n states, above which its
+/// velocity jumps with the force. The sum is zero if the structure has a mass matrix. Mode shapes with seven digits in
+/// the case file leave up to this much: two factors with an error of 5e-7 in each of n products.
 pub(crate) const VELOCITY_JUMP: f64 = 1e-6;
 
-/// Magnitude of an eigenvalue of a mass, damping or stiffness matrix with its diagonal scaled to 1, relative to the
-/// largest magnitude, up to which it counts as zero, as for a free body. Matrix entries with ten digits shift an
-/// eigenvalue by 5e-10 per degree of freedom; the number allows for two.
+/// Magnitude of an eigenvalue of a mass, damping or stiffness matrix with its positive diagonal entries scaled to 1,
+/// relative to the largest magnitude, up to which it counts as zero, as for a free body. Matrix entries with ten digits
+/// shift an eigenvalue by 5e-10 per degree of freedom; the number allows for two.
 pub(crate) const ZERO_EIGENVALUE: f64 = 1e-9;
 
-/// Relative distance below which two poles form one mode, because the mode shapes of (nearly) repeated poles are not defined individually. It
-/// lies above the rounding of a double eigenvalue, √(2e-16) ≈ 1.5e-8, and below the spacing of distinct modes. The value between is
-/// unfounded.
+/// Relative distance below which two poles form one mode, because the mode shapes of (nearly) repeated poles are not
+/// defined individually. It lies above the rounding of a double eigenvalue, √(2e-16) ≈ 1.5e-8, and below the spacing of
+/// distinct modes. The value between is unfounded.
 pub(crate) const SAME_POLE: f64 = 1e-6;
 
-/// Largest relative residual ‖A P − λ P‖/(|λ|·‖P‖) for a pole λ with as many mode shapes as its multiplicity, P being the projector on its
-/// modes. Poles that form one mode differ by [`SAME_POLE`]; the factor of ten is margin. Unfounded.
+/// Largest relative residual ‖A P − λ P‖/(|λ|·‖P‖) for a pole λ with as many mode shapes as its multiplicity, P being
+/// the projector on its modes. Poles that form one mode differ by [`SAME_POLE`]; the factor of ten is margin.
+/// Unfounded.
 pub(crate) const DEFECTIVE: f64 = 10.0 * SAME_POLE;
 
-/// Difference of a pitch angle from that of equal pitch, degrees, above which a tool has variable pitch. Case files give angles with a few
-/// digits; a thousandth of a degree changes a delay, and with it the speed of a limit, by about 1e-5 of itself.
+/// Difference of a pitch angle from that of equal pitch, degrees, above which a tool has variable pitch. Case files
+/// give angles with a few digits; a thousandth of a degree changes a delay, and with it the speed of a limit, by about
+/// 1e-5 of itself.
 pub(crate) const VARIABLE_PITCH_DEG: f64 = 1e-3;
 
-/// Largest distance of the sum of the pitch angles of a case from 360°, degrees. Angles with three digits after the point err by 5e-4° each: 20
-/// teeth in sum by 0.01°.
+/// Largest distance of the sum of the pitch angles of a case from 360°, degrees. Angles with three digits after the
+/// point err by 5e-4° each: 20 teeth in sum by 0.01°.
 pub(crate) const PITCH_SUM_DEG: f64 = 0.01;
 
-/// Largest number of teeth of a tool in a case; a larger one is taken for a typing error. Large face mills have some 40 teeth. Unfounded.
+/// Largest number of teeth of a tool in a case; a larger one is taken for a typing error. Large face mills have some 40
+/// teeth. Unfounded.
 pub(crate) const TEETH_MAX: i64 = 64;
 
-/// Range of tool diameters in a case, mm; outside, the unit is taken for wrong. Micro end mills have 5 µm, the largest face mills 600 mm.
+/// Range of tool diameters in a case, mm; outside, the unit is taken for wrong. Micro end mills have 5 µm, the largest
+/// face mills 600 mm.
 pub(crate) const DIAMETER_MM: [f64; 2] = [1e-3, 1e3];
 
-/// Largest feed per tooth in a case, mm. High-feed milling reaches 4 mm; a feed in µm is hundreds. The value between is a choice.
+/// Largest feed per tooth in a case, mm. High-feed milling reaches 4 mm; a feed in µm is hundreds. The value between is
+/// a choice.
 pub(crate) const FEED_PER_TOOTH_MAX_MM: f64 = 20.0;
 
-/// Largest cutting coefficient in a case, MPa. Hardened steel and superalloys at thin chips reach some 10⁴; a coefficient in Pa is 10⁸ and
-/// more. The value between is a choice.
+/// Largest cutting coefficient in a case, MPa. Hardened steel and superalloys at thin chips reach some 10⁴; a
+/// coefficient in Pa is 10⁸ and more. The value between is a choice.
 pub(crate) const COEFFICIENT_MAX_MPA: f64 = 1e6;
 
 /// Largest spindle speed in the limits of a case, rev/min. Air-bearing spindles reach 300 000. A choice above them.

@@ -9,8 +9,8 @@ use crate::milling::{Cut, EdgeAngle, Material, Runout, Tool};
 
 /// The engaged tool in SI units and in the machine's axes.
 ///
-/// Tooth j is at the immersion angle φⱼ = θ + ψⱼ with the spindle angle θ, clockwise from the normal of the feed (thesis Fig. 3.1). A tooth with
-/// larger ψ passes earlier: tooth j cuts the surface left by tooth j + 1.
+/// Tooth j is at the immersion angle φⱼ = θ + ψⱼ with the spindle angle θ, clockwise from the normal of the feed
+/// (thesis Fig. 3.1). A tooth with larger ψ passes earlier: tooth j cuts the surface left by tooth j + 1.
 #[derive(Clone, Debug)]
 pub struct Cutter {
     /// The teeth in the order of their angle ψ on the tool.
@@ -40,7 +40,7 @@ pub struct Cutter {
 pub struct Tooth {
     /// Angle ψ of the tooth on the tool, rad in [0, 2π).
     pub angle_rad: f64,
-    /// Radial runout of the tooth, m: its radius minus the mean radius.
+    /// Radial runout of the tooth, m: its radius minus the radius without runout.
     pub radial_m: f64,
     /// Index of the tooth that passes before this one and left the surface that this one cuts.
     pub ahead: usize,
@@ -117,8 +117,8 @@ impl Cutter {
         Immersion::new(phi_rad).in_machine(self.feed_direction)
     }
 
-    /// Position of the edge of a tooth along the chip-thickness direction, m, at the displacement `x` of the tool, m: thesis eq. 3.1
-    /// without feed.
+    /// Position of the edge of a tooth along the chip-thickness direction, m, at the displacement `x` of the tool, m:
+    /// thesis eq. 3.1 without feed.
     pub fn reach_m(&self, tooth: &Tooth, at: Immersion, x: [f64; 3]) -> f64 {
         self.edge.reach_m(at, tooth.radial_m, x)
     }
@@ -128,7 +128,8 @@ impl Cutter {
         self.edge.recession_m(at, feed_m)
     }
 
-    /// Axial depth of cut, m, for the nominal depth `nominal_m` and the axial displacement `z_m` of the tool; never negative.
+    /// Axial depth of cut, m, at the axial displacement `z_m` of the tool: the nominal depth `nominal_m`, or
+    /// `nominal_m` − `z_m`, but at least 0, if the depth follows the axial vibration.
     pub fn depth_at_m(&self, nominal_m: f64, z_m: f64) -> f64 {
         if self.axial_depth_modulation {
             (nominal_m - z_m).max(0.0)

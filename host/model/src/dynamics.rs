@@ -6,7 +6,8 @@ use crate::criteria::VELOCITY_JUMP;
 use crate::structure::{CubicForce, FirstOrder, Form, Structure, StructureError};
 use quietcut_numerics::dormand_prince::Quartic;
 
-/// Equation of motion ẋ = A x + B F − f₃(x), u = C x: [`FirstOrder`] with the cubic terms f₃ of the structure, if it has any.
+/// Equation of motion ẋ = A x + B F − f₃(x), u = C x: [`FirstOrder`] with the cubic terms f₃ of the structure, if it
+/// has any.
 ///
 /// Axes are the machine's x, y, z; SI units: m, m/s, N. Velocity and acceleration of the tool are u̇ = C ẋ and
 /// ü = C A ẋ. The latter holds where C B = 0, as for all matrices. Complex modes whose residues do not sum to zero have
@@ -51,8 +52,9 @@ impl Dynamics {
             }
             _ => None,
         };
-        // Magnitude of a state at a tool displacement of 1 m: 1/|C| for modes and joints; 1 for matrices, whose states are displacements in
-        // m.
+        // Magnitude of a state at a tool displacement of 1 m: the inverse of the largest |C| of the state for modes and
+        // joints. It is 1 for their states that do not displace the tool, and for matrices, whose states are
+        // displacements in m or rotations in rad.
         let size = |state: usize| {
             let moved = c.column(state).amax();
             match &structure.form {
@@ -85,8 +87,8 @@ impl Dynamics {
         (self.cb, self.cab) = (product(&self.c), product(&self.ca));
     }
 
-    /// Appends the two states of a mode, η̈ + 2ζω η̇ + ω² η = F/m, which the force along `axis` excites and which displaces the tool by η along
-    /// that axis.
+    /// Appends the two states of a mode, η̈ + 2ζω η̇ + ω² η = F/m, which the force along `axis` excites and which
+    /// displaces the tool by η along that axis.
     pub fn add_mode(&mut self, axis: usize, frequency_hz: f64, damping_ratio: f64, modal_mass_kg: f64) {
         let (order, omega) = (self.order, std::f64::consts::TAU * frequency_hz);
         let wider = order + 2;
@@ -112,8 +114,8 @@ impl Dynamics {
         self.note_products();
     }
 
-    /// These equations of motion, but with the motion at a sensor away from the tool as output; see [`FirstOrder::at_sensor`]. Forces still
-    /// act on the tool.
+    /// These equations of motion, but with the motion at a sensor away from the tool as output; see
+    /// [`FirstOrder::at_sensor`]. Forces still act on the tool.
     #[must_use]
     pub fn at_sensor(&self, modes: &[f64]) -> Self {
         let FirstOrder { a, c, .. } = self.first_order().at_sensor(modes);
@@ -141,12 +143,14 @@ impl Dynamics {
         self.order
     }
 
-    /// Magnitude of each state that belongs to a displacement of the tool of 1 m: the scale of the integrator's error control.
+    /// Magnitude of each state that belongs to a displacement of the tool of 1 m: the scale of the integrator's error
+    /// control.
     pub fn sizes(&self) -> &[f64] {
         &self.sizes
     }
 
-    /// True if a jump of the force makes the velocity jump (C B ≠ 0): the acceleration is then an impulse at that instant.
+    /// True if a jump of the force makes the velocity jump (C B ≠ 0): the acceleration is then an impulse at that
+    /// instant.
     pub fn velocity_jumps(&self) -> bool {
         self.velocity_jumps
     }
@@ -156,8 +160,8 @@ impl Dynamics {
         std::array::from_fn(|axis| dot(&self.c[axis], x))
     }
 
-    /// Displacement of the tool within an integration step, m: for each axis a quartic polynomial of the time, from the quartics `x` of the
-    /// states.
+    /// Displacement of the tool within an integration step, m: for each axis a quartic polynomial of the time, from the
+    /// quartics `x` of the states.
     pub fn displacement_quartics(&self, x: &[Quartic]) -> [Quartic; 3] {
         std::array::from_fn(|axis| {
             let mut sum = [0.0; 5];
@@ -206,7 +210,7 @@ impl Dynamics {
         self.cab
     }
 
-    /// Sets the velocity of one axis to zero by an impulse along that axis, as at the onset of stick.
+    /// Sets the velocity of the tool along one axis to zero by an impulse along that axis, as at the onset of stick.
     pub fn halt(&self, axis: usize, x: &mut [f64]) {
         let per_impulse = self.cab[axis][axis];
         if per_impulse > 0.0 {

@@ -6,7 +6,8 @@ use crate::structure::StructureError;
 /// A machine model that cannot be assembled.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ModelError {
-    /// A structure with an indefinite or singular matrix, or one whose poles cannot be computed.
+    /// A structure with an indefinite mass, damping or stiffness matrix, with a singular mass matrix, or whose poles
+    /// cannot be computed.
     #[error(transparent)]
     Structure(#[from] StructureError),
     /// An effect that does not apply to the structure or the cut.

@@ -2,11 +2,12 @@
 
 use crate::milling::{EdgeAngle, EdgeForce, Immersion, Material};
 
-/// Cutting force on an edge of axial depth b at the chip thickness h (thesis eqs 3.2 to 3.4): the tangential, radial and axial components are
-/// F = b·(K_c·h + K_e/sin γ) each. Optional extensions:
+/// Cutting force on an edge of axial depth b at the chip thickness h (thesis eqs 3.2 to 3.4): the tangential, radial
+/// and axial components are F = b·(K_c·h + K_e/sin γ) each. Optional extensions:
 ///
 /// - power law of the chip thickness: K_c·h₀·(h/h₀)^p instead of K_c·h;
-/// - process damping: −(C/V)·b·v_n along the chip thickness, and μ times that force tangentially, against the spindle rotation;
+/// - process damping: −(C/V)·b·v_n along the chip thickness, and μ times that force tangentially, against the spindle
+///   rotation;
 /// - wear: the whole force times 1 + r·t.
 #[derive(Clone, Copy, Debug)]
 pub struct ForceLaw {
@@ -33,7 +34,8 @@ pub struct ChipLaw {
 }
 
 impl ChipLaw {
-    /// Effective chip thickness h₀·(h/h₀)^p, m; odd in h, as in the linear model a negative chip thickness gives a negative force.
+    /// Effective chip thickness h₀·(h/h₀)^p, m; odd in h, as in the linear model a negative chip thickness gives a
+    /// negative force.
     pub fn effective_m(self, thickness_m: f64) -> f64 {
         self.reference_m
             * (thickness_m.abs() / self.reference_m)
@@ -94,13 +96,14 @@ impl ForceLaw {
         }
     }
 
-    /// Cutting force on the tool, N, in the machine's x, y, z at the chip thickness and axial depth, m; without process damping and wear.
+    /// Cutting force on the tool, N, at the chip thickness and axial depth, m, in the axes in which `at` is given;
+    /// without process damping and wear.
     pub fn force_n(&self, at: Immersion, thickness_m: f64, depth_m: f64) -> [f64; 3] {
         self.force_of_n(at, thickness_m, [depth_m; 3])
     }
 
-    /// Cutting force on the tool, N, with a separate effective depth, m, for each component: tangential, towards the tool axis, along the
-    /// tool axis. In solid material the three depths are equal, see [`Self::force_n`].
+    /// Cutting force on the tool, N, with a separate effective depth, m, for each component: tangential, towards the
+    /// tool axis, along the tool axis. In solid material the three depths are equal, see [`Self::force_n`].
     pub fn force_of_n(&self, at: Immersion, thickness_m: f64, depths_m: [f64; 3]) -> [f64; 3] {
         let thickness_m = self
             .chip
@@ -130,8 +133,8 @@ impl ForceLaw {
         1.0 + self.wear_per_s * t
     }
 
-    /// True if the cutting force jumps at loss of contact, or its slope there is infinite: with edge force, process damping or an exponent
-    /// below 1.
+    /// True if the cutting force jumps at loss of contact, or its slope there is infinite: with edge force, process
+    /// damping or an exponent below 1.
     pub fn jumps_at_contact(&self) -> bool {
         !self.edge.is_zero()
             || self.process_damping.is_some()

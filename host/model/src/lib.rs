@@ -1,11 +1,11 @@
 //! The machine model: structure, tool, material and cut of one case, and the effects that may extend it.
 //!
-//! Main types: [`case::Case`] (the case file), [`structure::Structure`] (M, C, K matrices, complex modes or joints of a robot),
-//! [`milling::Tool`], [`milling::Material`] and [`milling::Cut`], [`Dynamics`] (first-order equation of motion), [`Effects`] (terms of the
-//! restoring force, of the cutting force, of spindle and sensors that a case may have beyond the linear model).
+//! Main types: [`case::Case`] (the case file), [`structure::Structure`] (M, C, K matrices, complex modes or joints of a
+//! robot), [`milling::Tool`], [`milling::Material`] and [`milling::Cut`], [`Dynamics`] (first-order equation of
+//! motion), [`Effects`] (deviations of structure, cutting force, spindle and sensors from the linear model of a case).
 //!
-//! "The thesis" in this crate is *Chatter Vibrations in Robotic Milling Considering Structural Nonlinearity*, a doctoral
-//! thesis of the University of Victoria; its equation numbers are given as "thesis eq. 5.16".
+//! "The thesis" in this crate is *Chatter Vibrations in Robotic Milling Considering Structural Nonlinearity*, a
+//! doctoral thesis of the University of Victoria; its equation numbers are given as "thesis eq. 5.16".
 //!
 //! ```
 //! use std::path::Path;
@@ -39,8 +39,8 @@
 //! # Ok::<(), quietcut_model::case::CaseError>(())
 //! ```
 //!
-//! This crate integrates no motion, computes no stability limit and estimates no parameter. Apart from the text of a case file it reads
-//! no file.
+//! This crate integrates no motion, computes no stability limit and estimates no parameter. Apart from the text of a
+//! case file it reads no file.
 
 pub mod case;
 mod criteria;

@@ -1,8 +1,9 @@
-//! Restoring force along a measured motion.
+//! Restoring force along a sampled motion, measured or computed.
 
 use super::{MotionState, Regime, RestoringForce};
 
-/// Displacement and velocity of the tool in the machine's axes, sampled at constant intervals. An axis without motion has empty vectors.
+/// Displacement and velocity of the tool in the machine's axes, sampled at constant intervals. An axis without motion
+/// has empty vectors.
 #[derive(Clone, Debug, Default)]
 pub struct SampledMotion {
     /// Sampling interval, s.
@@ -13,7 +14,8 @@ pub struct SampledMotion {
     pub x: [Vec<f64>; 3],
     /// Velocity of the tool by axis, m/s.
     pub v: [Vec<f64>; 3],
-    /// Noise level of the velocity by axis, m/s: a velocity below it cannot be told from rest.
+    /// Velocity by axis, m/s, below which the tool cannot be told from rest, such as the noise level of a measured
+    /// velocity.
     pub rest_m_per_s: [f64; 3],
 }
 
@@ -51,7 +53,8 @@ impl SampledMotion {
         }
     }
 
-    /// Shifts the motion along an axis to earlier times by `seconds`: sample k gets the value that was `seconds` after it.
+    /// Shifts the motion along an axis to earlier times by `seconds`: sample k gets the value that was `seconds` after
+    /// it.
     pub fn advance(&mut self, axis: usize, seconds: f64) {
         let place = seconds / self.step_s;
         for signal in [&mut self.x[axis], &mut self.v[axis]] {
@@ -73,8 +76,8 @@ impl SampledMotion {
     }
 }
 
-/// Catmull–Rom (cubic) interpolation of a signal at `place`, counted in samples; the end samples are repeated as neighbours. Outside the
-/// signal the cubic polynomial of the end is extrapolated.
+/// Catmull–Rom (cubic) interpolation of a signal at `place`, counted in samples; the end samples are repeated as
+/// neighbours. Outside the signal the cubic polynomial of the end is extrapolated.
 pub fn interpolated(samples: &[f64], place: f64) -> f64 {
     let Some(last) = samples.len().checked_sub(1) else {
         return 0.0;
@@ -93,8 +96,9 @@ pub fn interpolated(samples: &[f64], place: f64) -> f64 {
 
 /// Restoring force f_r, N, in the machine's axes at each sample of `motion`.
 ///
-/// Regimes follow the motion as in a simulation. For dry friction without internal states, f_r is interpolated linearly between the two slip
-/// directions while the velocity is below the noise level [`SampledMotion::rest_m_per_s`].
+/// For dry friction without internal states, f_r is interpolated linearly between its values in the two slip directions
+/// while the speed is below [`SampledMotion::rest_m_per_s`]. The regimes of every other restoring force follow the
+/// motion, see [`restoring_from`].
 pub fn restoring_along(restoring_force: &dyn RestoringForce, motion: &SampledMotion) -> [Vec<f64>; 3] {
     if let Some(axis) = restoring_force.holds().filter(|_| restoring_force.states() == 0) {
         let mut force: [Vec<f64>; 3] = std::array::from_fn(|_| vec![0.0; motion.len()]);
@@ -116,8 +120,8 @@ pub fn restoring_along(restoring_force: &dyn RestoringForce, motion: &SampledMot
     restoring_from(restoring_force, motion, &mut own)
 }
 
-/// Restoring force f_r, N, along `motion` for a force that has internal states or no locked regime; updates the internal states `own` from
-/// the first sample to the last. The holding force is taken as 0.
+/// Restoring force f_r, N, along `motion` for a force that has internal states or no locked regime; updates the
+/// internal states `own` from the first sample to the last. The holding force is taken as 0.
 pub fn restoring_from(
     restoring_force: &dyn RestoringForce,
     motion: &SampledMotion,
@@ -152,7 +156,8 @@ fn regime_at(
     own: &[f64],
 ) -> Regime {
     let mut now = regime.unwrap_or_else(|| restoring_force.next(None, at, own, 0.0));
-    // Between two samples the motion may pass through several regimes of the restoring force; the loop follows at most four changes.
+    // Between two samples the motion may pass through several regimes of the restoring force; the loop follows at most
+    // four changes.
     for _ in 0..4 {
         if restoring_force.margin(now, at, own, 0.0) >= 0.0 {
             break;
@@ -162,7 +167,8 @@ fn regime_at(
     now
 }
 
-/// Integrates the internal states from one sample to the next with two steps of Heun's method; the motion is linear between samples.
+/// Integrates the internal states from one sample to the next with two steps of Heun's method; the motion is linear
+/// between samples.
 fn step(
     restoring_force: &dyn RestoringForce,
     regime: Regime,

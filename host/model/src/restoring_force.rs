@@ -18,8 +18,8 @@ pub struct MotionState {
     pub v: [f64; 3],
 }
 
-/// Jacobian of a restoring force f_r with respect to displacement and velocity of the tool; rows are the components of the force, columns
-/// those of the motion, along x, y, z.
+/// Jacobian of a restoring force f_r with respect to displacement and velocity of the tool; rows are the components of
+/// the force, columns those of the motion, along x, y, z.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Slopes {
     /// ∂f_r/∂x, N/m.
@@ -33,17 +33,18 @@ pub type Regime = u8;
 
 /// A restoring force f_r, N, along x, y, z in the equation of motion M ẍ + C ẋ + K x + f_r = F.
 ///
-/// A restoring force may have internal states and several regimes, such as stick and slip, in each of which it is smooth. The integrator ends
-/// a step where [`RestoringForce::margin`] falls below zero; [`RestoringForce::next`] then selects the next regime. A
-/// [`RestoringForce::locked`] regime keeps one axis at rest, as sticking friction does: f_r then balances all other forces on that axis.
+/// A restoring force may have internal states and several regimes, such as stick and slip, in each of which it is
+/// smooth. The integrator ends a step where [`RestoringForce::margin`] falls below zero; [`RestoringForce::next`] then
+/// selects the next regime. A [`RestoringForce::locked`] regime keeps one axis at rest, as sticking friction does: f_r
+/// then balances all other forces on that axis.
 pub trait RestoringForce: Debug + Send + Sync {
     /// Number of internal states. Each is a displacement in m, which the error control of the integrator assumes.
     fn states(&self) -> usize {
         0
     }
 
-    /// Updates the internal states `own` to the displacement of `at`, if they depend on the path of the displacement only. Returns false if
-    /// they depend on its rate and must be integrated.
+    /// Updates the internal states `own` to the displacement of `at`, if they depend on the path of the displacement
+    /// only. Returns false if they depend on its rate and must be integrated.
     fn follow(&self, _at: &MotionState, _own: &mut [f64]) -> bool {
         false
     }
@@ -51,7 +52,8 @@ pub trait RestoringForce: Debug + Send + Sync {
     /// Limits the internal states `own` to their admissible range, which a long integration step may leave.
     fn confine(&self, _own: &mut [f64]) {}
 
-    /// Sets the internal states `own` at the first sample of a recording, which may begin during a motion; a simulation begins with zeros.
+    /// Sets the internal states `own` at the first sample of a given motion, such as a recording or a periodic orbit,
+    /// in which the tool may already move; a simulation from rest begins with zeros.
     fn begin(&self, _at: &MotionState, _own: &mut [f64]) {}
 
     /// Restoring force f_r, N, in `regime`, which is not a locked one.
@@ -62,8 +64,8 @@ pub trait RestoringForce: Debug + Send + Sync {
         None
     }
 
-    /// Describing function N(X, ω), N/m: under x = X·sin ωt along its axis the fundamental of f_r is N·x, its real part in phase
-    /// with x and its imaginary part in phase with the velocity. `None` for a force that does not provide it.
+    /// Describing function N(X, ω), N/m: under x = X·sin ωt along its axis the fundamental of f_r is N·x, its real part
+    /// in phase with x and its imaginary part in phase with the velocity. `None` for a force that does not provide it.
     fn describing_function(&self, _amplitude_m: f64, _omega: f64) -> Option<Complex64> {
         None
     }
@@ -76,18 +78,20 @@ pub trait RestoringForce: Debug + Send + Sync {
         None
     }
 
-    /// True if `regime` keeps the axis of [`Self::holds`] at rest (stick); [`Self::restoring_n`] is not evaluated in such a regime.
+    /// True if `regime` keeps the axis of [`Self::holds`] at rest (stick); [`Self::restoring_n`] is not evaluated in
+    /// such a regime.
     fn locked(&self, _regime: Regime) -> bool {
         false
     }
 
-    /// Event function of `regime`: negative from the end of the regime on. `holding_n` is the force f_r, N, that keeps the axis at
-    /// rest; 0 without a locked regime.
+    /// Event function of `regime`: negative from the end of the regime on. `holding_n` is the force f_r, N, that keeps
+    /// the axis at rest; 0 without a locked regime.
     fn margin(&self, _regime: Regime, _at: &MotionState, _own: &[f64], _holding_n: f64) -> f64 {
         f64::INFINITY
     }
 
-    /// The regime that holds from now on: the first one (`before` = `None`), or the one that follows the ended regime `before`.
+    /// The regime from the instant `at` on: the first one if `before` is `None`, otherwise the one that follows the
+    /// ended regime `before`.
     fn next(&self, _before: Option<Regime>, _at: &MotionState, _own: &[f64], _holding_n: f64) -> Regime {
         0
     }
@@ -105,10 +109,11 @@ pub fn states(restoring_forces: &[Box<dyn RestoringForce>]) -> usize {
         .sum()
 }
 
-/// Writes ẏ of structure and restoring forces under the external `force`, N, at the time `t`, s, and displacement `x`, m.
+/// Writes ẏ of structure and restoring forces under the external `force`, N, at the time `t`, s, and displacement `x`,
+/// m.
 ///
-/// `y` holds the states of the structure, followed by the internal states of the restoring forces in their order. Returns the force f_r, N,
-/// of sticking axes along x, y, z.
+/// `y` holds the states of the structure, followed by the internal states of the restoring forces in their order.
+/// Returns the force f_r, N, of sticking axes along x, y, z.
 pub fn rate(
     dynamics: &Dynamics,
     restoring_forces: &[Box<dyn RestoringForce>],
@@ -127,8 +132,9 @@ pub fn rate(
     };
     let mut left = minus(force, restoring(restoring_forces, regimes, &at, own_y));
     if dynamics.velocity_jumps() {
-        // For a structure whose velocity depends on the force, and with a restoring force that depends on the velocity, a fixed-point
-        // iteration solves for both. It converges if damping forces are small compared with inertial forces.
+        // For a structure whose velocity depends on the force, and with a restoring force that depends on the velocity,
+        // a fixed-point iteration solves for both. It converges if damping forces are small compared with inertial
+        // forces.
         for _ in 0..40 {
             let before = at.v;
             at.v = dynamics.velocity_under(&y[..order], left);
@@ -186,7 +192,8 @@ fn restoring(
     sum
 }
 
-/// Sets the accelerations of the locked (sticking) axes to zero in `rate`; returns the holding force f_r, N, that does so.
+/// Sets the accelerations of the locked (sticking) axes to zero in `rate`; returns the holding force f_r, N, that does
+/// so.
 fn hold(
     dynamics: &Dynamics,
     restoring_forces: &[Box<dyn RestoringForce>],
@@ -211,7 +218,8 @@ fn hold(
     holding
 }
 
-/// The holding force f_r, N, that makes the accelerations of the `locked` axes zero; `rate` is ẏ without it.
+/// The holding force f_r, N, that makes the accelerations of the `locked` axes zero; `rate` is ẏ without it. Zero if
+/// the velocity jumps with the force.
 pub fn holding_n(dynamics: &Dynamics, locked: [bool; 3], rate: &[f64]) -> [f64; 3] {
     let Some(free) = dynamics.acceleration(rate) else {
         return [0.0; 3];

@@ -6,7 +6,8 @@ use quietcut_numerics::roots::monotone;
 
 /// Spindle motion; at t = 0 the spindle angle is 0 and tooth 1 is at the immersion angle 0.
 ///
-/// The speed is constant, modulated as Ω(t) = Ω₀(1 + δ sin(2πf_m t + ψ)), or changes linearly from one speed to another.
+/// The speed is constant, modulated as Ω(t) = Ω₀(1 + δ sin(2πf_m t + ψ)), or changes linearly from one speed to
+/// another.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Spindle {
     speed_rad_per_s: f64,
@@ -37,8 +38,8 @@ impl LinearSweep {
 
     fn angle_rad(self, t: f64) -> f64 {
         let within = t.clamp(0.0, self.seconds);
-        // Spindle angle within the sweep at the mean of its first and present speed, plus the angle at the constant speed before or after
-        // the sweep.
+        // Spindle angle within the sweep at the mean of its first and present speed, plus the angle at the constant
+        // speed before or after the sweep.
         0.5 * (self.speeds[0] + self.speed(within)) * within + self.speed(t) * (t - within)
     }
 
@@ -90,8 +91,8 @@ impl Spindle {
         }
     }
 
-    /// A spindle whose speed changes linearly from `first_rpm` to `last_rpm`, rev/min, within `seconds`, s; all positive. Its mean speed is
-    /// the arithmetic mean of both.
+    /// A spindle whose speed changes linearly from `first_rpm` to `last_rpm`, rev/min, within `seconds`, s; all
+    /// positive. Its mean speed is the arithmetic mean of both.
     pub fn sweeping(first_rpm: f64, last_rpm: f64, seconds: f64) -> Self {
         let speeds = [first_rpm, last_rpm].map(|rpm| rpm * TAU / 60.0);
         Self {
@@ -150,7 +151,8 @@ impl Spindle {
         }
     }
 
-    /// Time, s, that the spindle took to rotate by the last `angle_rad` before the time `t`; for the pitch angle this is the regenerative delay.
+    /// Time, s, that the spindle took to rotate by the last `angle_rad` before the time `t`; for the pitch angle this
+    /// is the regenerative delay.
     pub fn delay_s(&self, t: f64, angle_rad: f64) -> f64 {
         match self.profile {
             SpeedProfile::Steady => angle_rad / self.speed_rad_per_s,
@@ -189,7 +191,8 @@ impl Spindle {
     }
 }
 
-/// Solves t + lead(t) = `mean_s` for the time t, s, by Newton's method with bisection as safeguard; t + lead(t) increases monotonically.
+/// Solves t + lead(t) = `mean_s` for the time t, s, by Newton's method with bisection as safeguard; t + lead(t)
+/// increases monotonically.
 fn inverse(fluctuation: Fluctuation, mean_s: f64) -> f64 {
     let reach_s = 2.0 * fluctuation.delta.abs() / (TAU * fluctuation.frequency_hz);
     monotone([mean_s - reach_s, mean_s + reach_s], mean_s, |t| {
@@ -214,7 +217,8 @@ mod tests {
                 assert!((spindle.time_s(spindle.angle_rad(t)) - t).abs() < 1e-12);
                 let h = 1e-4;
                 let rate = (spindle.angle_rad(t + h) - spindle.angle_rad(t - h)) / (2.0 * h);
-                // Central difference over a kink of the speed at start and end of the sweep, and rounding of angles of 4000 rad.
+                // Central difference over a kink of the speed at start and end of the sweep, and rounding of angles of
+                // 4000 rad.
                 assert!((rate - spindle.speed_at_rad_per_s(t)).abs() < 1e-4, "{t}");
                 let ([shortest, longest], delay) = (spindle.bounds_s(3.0), spindle.delay_s(t, 3.0));
                 // Rounding of angles of 4000 rad.
@@ -242,7 +246,8 @@ mod tests {
                 assert!((back - t).abs() < 1e-13, "{delta} {t}: {back}");
                 let h = 1e-5;
                 let rate = (spindle.angle_rad(t + h) - spindle.angle_rad(t - h)) / (2.0 * h);
-                // Error of the central difference, δ Ω (2π f_m)² h²/6, and rounding of angles of 300 rad divided by 2e-5 s.
+                // Error of the central difference, δ Ω (2π f_m)² h²/6, and rounding of angles of 300 rad divided by
+                // 2e-5 s.
                 assert!(
                     (rate / spindle.speed_at_rad_per_s(t) - 1.0).abs() < 1e-6,
                     "{rate}"

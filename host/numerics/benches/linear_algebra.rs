@@ -4,9 +4,9 @@
 //! CARGO_TARGET_DIR=target cargo run --release --manifest-path host/numerics/benches/Cargo.toml
 //! ```
 //!
-//! prints, for matrices of 10, 50 and 200 columns, the time of nalgebra and of faer as ratios to ours. A ratio above 1 says that ours is
-//! faster. Each time is the smallest of several runs. Ours includes what the product needs beside the solution: the scaling of the
-//! columns, the rank, the covariance and the checks of the input.
+//! prints, for matrices of 10, 50 and 200 columns, the time of nalgebra and of faer divided by that of this crate. A
+//! ratio above 1 says that this crate is faster. Each time is the smallest of several runs. The time of least squares
+//! in this crate includes the scaling of the columns, the rank, the covariance and the checks of the input.
 //!
 //! Ratios of nalgebra 0.35 and faer 0.24 on one x86-64 core with AVX2:
 //!
@@ -18,9 +18,10 @@
 //! | eigenvalues, complex | 1.8, 2.7, 3.6 | 0.9, 0.7, 0.4 |
 //! | eigenvectors, symmetric | 1.0, 1.0, 1.2 | 1.7, 1.0, 0.11 |
 //!
-//! faer is not used inside: it would add forty packages, two versions of `equator`, and old versions of `syn` and `thiserror`, which the
-//! rules for dependencies refuse. For ten columns it takes between 0.85 and 2.3 times our time, for eigenvalues of fifty columns
-//! between 0.7 and 1.9 times. Least squares of fifty columns and more would gain: the pivoted QR decomposition of nalgebra is slow there.
+//! faer is not used inside: it would add forty packages, two versions of `equator`, and old versions of `syn` and
+//! `thiserror`, which the rules for dependencies refuse. For ten columns it takes between 0.85 and 2.3 times the time
+//! of this crate, for eigenvalues of fifty columns between 0.7 and 1.9 times. Least squares of fifty columns and more
+//! would gain: the pivoted QR decomposition of nalgebra is slow there.
 
 #![allow(clippy::expect_used)]
 
@@ -37,7 +38,8 @@ use quietcut_numerics::least_squares::{Idle, LinearProblem, NormalEquations};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// Numbers of columns of the matrices that are timed: a fit of a few modes, a map of a period, a large map.
+/// Numbers of columns of the matrices that are timed, as in a fit of a few modes, in a map of the state over one
+/// period, and in a large such map.
 const SIZES: [usize; 3] = [10, 50, 200];
 
 /// Least total time of the repeated runs by which one method is timed on one matrix.

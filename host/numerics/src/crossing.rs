@@ -10,8 +10,8 @@ const LOOKED_AT: [f64; 7] = [0.03, 0.12, 0.3, 0.5, 0.7, 0.85, 1.0];
 /// no negative value is detected.
 ///
 /// Detects every interval of negative values that contains one of the evaluated fractions. Between two of them, it
-/// detects an interval that contains the minimum of the parabola through three neighbouring points. A negative value at
-/// u = 0 counts as zero, since the state has just changed there.
+/// detects an interval that contains the minimum of the parabola through three neighbouring points, if that minimum is
+/// below half the middle value. A negative value at u = 0 counts as zero, since the state has just changed there.
 pub fn first_below_zero(f: impl Fn(f64) -> f64) -> Option<f64> {
     let (mut before, mut last) = ((0.0, f64::NAN), (0.0, f(0.0).max(0.0)));
     for u in LOOKED_AT {
@@ -30,8 +30,9 @@ pub fn first_below_zero(f: impl Fn(f64) -> f64) -> Option<f64> {
     None
 }
 
-/// Argument of the minimum of the parabola through three points (u, f), of which the middle one is lowest. `None` if another point is
-/// lower, or if the minimum is above half the middle value, so that f is hardly negative there.
+/// Argument of the minimum of the parabola through three points (u, f), of which the middle one is lowest. `None` if
+/// another point is lower, or if the minimum is above half the middle value, so that f is unlikely to be negative
+/// there.
 fn dip(a: (f64, f64), b: (f64, f64), c: (f64, f64)) -> Option<f64> {
     if a.1.is_nan() || b.1 > a.1 || b.1 > c.1 {
         return None;

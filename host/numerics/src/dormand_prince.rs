@@ -1,8 +1,8 @@
 //! One step of the Dormand–Prince 5(4) method, with its fourth-order interpolant.
 //!
-//! Coefficients and interpolant: Hairer, Nørsett, Wanner, *Solving Ordinary Differential Equations I*, II.5 and
-//! II.6 (code DOPRI5). The local error is O(h⁶) for a step and O(h⁵) for the interpolant. A delay equation whose delayed values are
-//! taken from the interpolant keeps the global order 5.
+//! Coefficients and interpolant: Hairer, Nørsett, Wanner, *Solving Ordinary Differential Equations I*, II.5 and II.6
+//! (code DOPRI5). The local error is O(h⁶) for a step and O(h⁵) for the interpolant. A delay equation whose delayed
+//! values are taken from the interpolant keeps the global order 5.
 
 /// Polynomial of degree 4 in the fraction u = (t − t₀)/h of a time step, u in [0, 1]: the coefficients of 1, u, … u⁴.
 pub type Quartic = [f64; 5];
@@ -10,8 +10,8 @@ pub type Quartic = [f64; 5];
 /// Times c_i of the stages of a Dormand–Prince step, as fractions of the step.
 const NODES: [f64; 7] = [0.0, 1.0 / 5.0, 3.0 / 10.0, 4.0 / 5.0, 8.0 / 9.0, 1.0, 1.0];
 
-/// Coefficients a_ij of the stages of a Dormand–Prince step: row i combines the preceding stages to stage i + 1. The
-/// last row also gives the fifth-order solution.
+/// Coefficients a_ij of the stages of a Dormand–Prince step: row i gives the argument of stage i + 1 from stages 0 to
+/// i. The last row also gives the fifth-order solution.
 const STAGES: [[f64; 6]; 6] = [
     [1.0 / 5.0, 0.0, 0.0, 0.0, 0.0, 0.0],
     [3.0 / 40.0, 9.0 / 40.0, 0.0, 0.0, 0.0, 0.0],
@@ -132,7 +132,8 @@ impl DormandPrince {
         (sum / self.end.len() as f64).sqrt()
     }
 
-    /// Writes the interpolant of the last trial step: one polynomial of degree 4 for each element of y.
+    /// Writes the interpolant of the last trial step, which has the length `h` and begins at the state `y`: one
+    /// polynomial of degree 4 for each element of y.
     pub fn interpolant(&self, h: f64, y: &[f64], quartics: &mut [Quartic]) {
         for (element, quartic) in quartics.iter_mut().enumerate() {
             let rise = self.end[element] - y[element];

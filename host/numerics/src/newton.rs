@@ -1,7 +1,7 @@
 //! Newton's method x ← x − J⁻¹ r(x) for r(x) = 0, with a bound on the growth of its steps and the reason to stop.
 //!
-//! The caller computes the step J⁻¹ r by a method of its choice: a quotient, an LU decomposition or an iterative solver. [`Newton`] limits
-//! the step and decides when to stop, in the same way for numbers and vectors.
+//! The caller computes the step J⁻¹ r by a method of its choice: a quotient, an LU decomposition or an iterative
+//! solver. [`Newton`] limits the step and decides when to stop, in the same way for numbers and vectors.
 
 use nalgebra::DVector;
 use num_complex::Complex64;

@@ -5,8 +5,8 @@ use std::sync::OnceLock;
 
 use nalgebra::DMatrix;
 
-/// Gauss–Legendre rule: m nodes c in (0, 1), their weights b, and the integrals S_ij = ∫₀^{c_i} ℓ_j of the Lagrange polynomials ℓ_j of
-/// the nodes.
+/// Gauss–Legendre rule: m nodes c in (0, 1), their weights b, and the integrals S_ij = ∫₀^{c_i} ℓ_j of the Lagrange
+/// polynomials ℓ_j of the nodes.
 ///
 /// Quadrature with b is exact for polynomials up to degree 2m − 1, integration with S up to degree m − 1. A collocation
 /// step on these nodes has order 2m (Hairer, Nørsett & Wanner, Solving ODEs I, II.7).
@@ -80,8 +80,8 @@ fn legendre(count: usize, x: f64) -> Vec<f64> {
     values
 }
 
-/// The i-th root of the Legendre polynomial P_count in ascending order and its quadrature weight on [−1, 1], by Newton's method from
-/// Tricomi's estimate.
+/// The i-th root of the Legendre polynomial P_count in ascending order and its quadrature weight on [−1, 1], by
+/// Newton's method from Tricomi's estimate.
 fn root(count: usize, i: usize) -> (f64, f64) {
     let n = count as f64;
     let mut x = -(PI * (i as f64 + 0.75) / (n + 0.5)).cos();

@@ -1,7 +1,8 @@
-//! Roots and extrema of functions of one real variable: bisection, Newton's method with a bracket, regula falsi, golden section.
+//! Roots and extrema of functions of one real variable: bisection, Newton's method with a bracket, regula falsi, golden
+//! section.
 
-/// Narrows the bracket [below, above] of a root by bisection, until it is no wider than `width`, or until no number lies
-/// between its ends.
+/// Narrows the bracket [below, above] of a root by bisection, until it is no wider than `width`, or until no number
+/// lies between its ends.
 ///
 /// The condition `is_below` is true at the first end and false at the second; either end may be the larger number. With
 /// `width` 0 the root is found to the last bit.
@@ -35,9 +36,11 @@ pub fn bisection(
 /// Largest number of steps of [`monotone`]. Bisection alone needs about 52 to reduce the bracket to rounding.
 const STEPS_MAX: usize = 100;
 
-/// Root of an increasing function in [low, high] by Newton's method, in which bisection replaces a step that leaves the bracket.
+/// Root of an increasing function in [low, high] by Newton's method, in which bisection replaces a step that leaves the
+/// bracket.
 ///
-/// `function` returns value and derivative. The error of the root is 2 ε · max(|x|, (high − low)/2), with the machine precision ε.
+/// `function` returns value and derivative. The search ends after a step of at most 2 ε · max(|x|, (high − low)/2),
+/// with the machine precision ε, or after 100 steps.
 pub fn monotone([mut low, mut high]: [f64; 2], start: f64, function: impl Fn(f64) -> [f64; 2]) -> f64 {
     let reach = 0.5 * (high - low);
     let mut x = start;
@@ -139,8 +142,8 @@ impl SignChange {
 /// Ratio of the widths of successive brackets in a golden-section search, (√5 − 1)/2.
 const GOLDEN: f64 = 0.618_033_988_749_894_8;
 
-/// Argument of the minimum of a function with a single minimum in [from, to], by golden-section search (Kiefer, Proc. AMS 4 (1953) 502)
-/// until the bracket is no wider than `width` or reaches rounding.
+/// Argument of the minimum of a function with a single minimum in [from, to], by golden-section search (Kiefer, Proc.
+/// AMS 4 (1953) 502) until the bracket is no wider than `width` or reaches rounding.
 ///
 /// Rounding limits the accuracy of the argument to about the square root of the machine precision.
 pub fn minimum([mut from, mut to]: [f64; 2], width: f64, function: impl Fn(f64) -> f64) -> f64 {

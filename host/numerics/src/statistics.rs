@@ -1,8 +1,8 @@
 //! Quantiles of the normal, Student's, χ² and F distributions, and intervals of a proportion.
 //!
-//! A quantile inverts the monotone distribution function by bracketing and bisection, that of the normal distribution by Halley's method. The
-//! number of iterations is bounded for every argument. Continued fractions and series of the incomplete gamma and beta functions: Press
-//! et al., *Numerical Recipes*, 3rd edition, 6.2 and 6.4 (Lentz's method).
+//! A quantile inverts the monotone distribution function by bracketing and bisection, that of the normal distribution
+//! by Halley's method. The number of iterations is bounded for every argument. Continued fractions and series of the
+//! incomplete gamma and beta functions: Press et al., *Numerical Recipes*, 3rd edition, 6.2 and 6.4 (Lentz's method).
 
 use std::f64::consts::{PI, SQRT_2};
 
@@ -24,7 +24,8 @@ pub fn normal_probability(x: f64) -> f64 {
     0.5 * libm::erfc(-x / SQRT_2)
 }
 
-/// Quantile Φ⁻¹ of the standard normal distribution: the number below which the variable stays with the probability `share`; error 1e-12.
+/// Quantile Φ⁻¹ of the standard normal distribution: the number below which the variable stays with the probability
+/// `share`; error 1e-12.
 ///
 /// A `share` below 1e-300 or above 1 − 2.2e-16 is replaced by this bound.
 pub fn normal_quantile(share: f64) -> f64 {
@@ -50,7 +51,8 @@ pub fn normal_quantile(share: f64) -> f64 {
     x
 }
 
-/// The probability that |t| of Student's distribution with ν degrees of freedom stays below `t`: 1 − I_{ν/(ν + t²)}(ν/2, 1/2).
+/// The probability that |t| of Student's distribution with ν degrees of freedom stays below `t`: 1 − I_{ν/(ν +
+/// t²)}(ν/2, 1/2).
 fn student_two_sided_probability(t: f64, freedoms: f64) -> f64 {
     // The complement I_{t²/(ν + t²)}(1/2, ν/2), which is free of cancellation for small t.
     incomplete_beta(0.5, 0.5 * freedoms, t * t / (freedoms + t * t))
@@ -93,8 +95,8 @@ pub fn f_quantile(share: f64, freedoms: [f64; 2]) -> f64 {
     quantile(share, |x| f_probability(x, freedoms))
 }
 
-/// Exact two-sided confidence interval, at the level `share`, of a probability after `hits` successes in `trials` trials (Clopper and
-/// Pearson, Biometrika 26 (1934) 404).
+/// Exact two-sided confidence interval, at the level `share`, of a probability after `hits` successes in `trials`
+/// trials (Clopper and Pearson, Biometrika 26 (1934) 404).
 pub fn binomial_interval(share: f64, hits: usize, trials: usize) -> [f64; 2] {
     let tail = 0.5 * (1.0 - share);
     let (k, n) = (hits.min(trials) as f64, trials as f64);
@@ -115,7 +117,8 @@ pub fn median(values: &mut [f64]) -> Option<f64> {
     (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
 
-/// Quantile of a `sorted` sample, interpolated linearly between the order statistics at (i + 1/2)/n (Hazen); `None` for an empty sample.
+/// Quantile of a `sorted` sample, interpolated linearly between the order statistics at (i + 1/2)/n (Hazen); `None` for
+/// an empty sample.
 pub fn sample_quantile(sorted: &[f64], share: f64) -> Option<f64> {
     let position = (share * sorted.len() as f64 - 0.5).max(0.0);
     let (below, rest) = (position.floor() as usize, position.fract());
@@ -211,7 +214,8 @@ fn incomplete_beta(a: f64, b: f64, x: f64) -> f64 {
 
 /// ln B(a, b) = ln Γ(a) + ln Γ(b) − ln Γ(a + b).
 ///
-/// For large arguments the logarithms of Γ cancel. Stirling's series of their difference does not (Abramowitz & Stegun 6.1.41).
+/// For large arguments the logarithms of Γ cancel. Stirling's series of their difference does not (Abramowitz & Stegun
+/// 6.1.41).
 fn log_beta(a: f64, b: f64) -> f64 {
     let (small, large) = (a.min(b), a.max(b));
     // For arguments from 20 on, four terms of Stirling's series are accurate to 1e-14.

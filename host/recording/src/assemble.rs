@@ -153,7 +153,8 @@ pub(super) fn recording(
     })
 }
 
-/// Refuses a file that gives no names for its columns, unless the option `--map` or the sidecar names a column.
+/// Refuses a file that gives no names for its columns, unless the option `--map` or the sidecar names at least one of
+/// them.
 fn require_names(path: &Path, raw: &Raw, sidecar: &Sidecar, import: &Import) -> Result<(), RecordingError> {
     let names: Vec<String> = raw.columns.iter().map(|column| column.name.clone()).collect();
     let is_named = |index: usize| {
@@ -208,8 +209,9 @@ fn require_names(path: &Path, raw: &Raw, sidecar: &Sidecar, import: &Import) -> 
     })
 }
 
-/// Sample rate (samples per second) and first time (s) of evenly spaced time stamps. An error if there are fewer than two
-/// stamps, or if they are not finite, do not grow or are uneven.
+/// Sample rate (samples per second) and first time (s) of evenly spaced time stamps. An error if there are fewer than
+/// two stamps, if one is not finite, if the last is not above the first, or if one deviates from even spacing by more
+/// than [`UNEVEN`] steps.
 fn even_rate(path: &Path, time: &[f64]) -> Result<(f64, f64), RecordingError> {
     let wrong = |what: String| RecordingError::Content {
         path: path.into(),
@@ -242,7 +244,8 @@ fn even_rate(path: &Path, time: &[f64]) -> Result<(f64, f64), RecordingError> {
     Ok((1.0 / step, *first))
 }
 
-/// Error text for time stamps that are not evenly spaced: the largest step, and the median step.
+/// Error text for time stamps that are not evenly spaced: the step of largest absolute value, with its place, and the
+/// median step.
 fn uneven(time: &[f64]) -> String {
     let mut steps: Vec<f64> = time.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let largest = (0..steps.len())

@@ -1,4 +1,5 @@
-//! Converts a recording into the input of the monitor on the device: blocks of sensor counts, tachometer edges, settings.
+//! Converts a recording into the input of the monitor on the device: blocks of sensor counts, tachometer edges,
+//! settings.
 
 use quietcut_core::acceleration::{Block, Counts, MAX_BLOCK_SAMPLES, Sensor, is_clipped};
 use quietcut_core::monitor::Settings;
@@ -9,7 +10,8 @@ use quietcut_core::working_point::{Tool, WorkingPoint};
 use super::criteria::LEAST_SWING;
 use super::{Channel, Quantity, Recording, RecordingError};
 
-/// Acceleration per count, m/s², of the IIS3DWB accelerometer in its ranges ±2, ±4, ±8 and ±16 g (sensitivities of its data sheet, mg/LSB).
+/// Acceleration per count, m/s², of the IIS3DWB accelerometer in its ranges ±2, ±4, ±8 and ±16 g (sensitivities of its
+/// data sheet, mg/LSB).
 const COUNT: [f64; 4] = [
     0.061e-3 * 9.806_65,
     0.122e-3 * 9.806_65,
@@ -31,7 +33,8 @@ pub struct Sensed {
     pub blocks: Vec<Block>,
     /// Rising tachometer edges, in order; empty without a tachometer, or if the user gives the spindle speed.
     pub edges: Vec<Edge>,
-    /// False if the unit of an acceleration channel is not known; amplitudes are then relative, not in m/s².
+    /// False if a channel used as acceleration is recorded in another unit, such as volts, or in an unknown one;
+    /// amplitudes are then relative, not in m/s².
     pub is_calibrated: bool,
 }
 
@@ -47,12 +50,14 @@ pub struct SpindleSettings {
 impl Sensed {
     /// Converts a recording into blocks of counts, tachometer edges and settings.
     ///
-    /// The acceleration channels ax, ay, az are quantized in the smallest range of the sensor that holds them. Without them, the only channel
-    /// of unknown quantity or voltage is taken for ax. Beyond the largest range, or if a unit is not known, the largest sample sets the scale.
+    /// The acceleration channels ax, ay, az are quantized in the smallest range of the sensor that holds them all.
+    /// Without them, the only channel of unknown quantity or voltage other than tacho is taken for ax. Beyond the
+    /// largest range, or if a channel is not recorded in units of acceleration, the largest absolute sample sets the
+    /// scale.
     ///
     /// # Errors
-    /// The recording has no acceleration channel, or several that may be one; neither tachometer nor constant spindle speed; or no number of
-    /// teeth, or more than 255.
+    /// The recording has no acceleration channel, or several that may be one; neither tachometer nor constant spindle
+    /// speed; or no number of teeth, or more than 255.
     pub fn new(recording: &Recording, speed: SpindleSettings) -> Result<Self, RecordingError> {
         let (axes, is_calibrated) = axes(recording)?;
         let largest = axes
@@ -63,7 +68,7 @@ impl Sensed {
         let count = count(largest, is_calibrated);
         let teeth = teeth(recording, speed)?;
         // A spindle speed that the user gives replaces the recorded tachometer, so that recordings with a faulty
-        // tachometer can be replayed.
+        // tachometer can be converted for the monitor.
         let wheel = wheel(recording).filter(|_| speed.rpm.is_none());
         let cut = recording.sidecar.cut.unwrap_or_default();
         let rpm = speed.rpm.or(cut.spindle_rpm.filter(|_| cut.last_rpm.is_none()));
@@ -77,8 +82,8 @@ impl Sensed {
             sensor: Sensor {
                 nominal_rate: Hertz(rate as f32),
                 meters_per_second2_per_count: count as f32,
-                // For acceleration of unknown unit only the quantization noise is known: variance count²/12, spread
-                // over 0 to half the sample rate.
+                // For channels that are not recorded in units of acceleration only the quantization noise is known:
+                // variance count²/12, spread evenly from 0 to half the sample rate.
                 noise_meters_per_second2_per_root_hertz: if is_calibrated {
                     Sensor::IIS3DWB_16G.noise_meters_per_second2_per_root_hertz
                 } else {
@@ -103,8 +108,8 @@ impl Sensed {
         })
     }
 
-    /// Pairs each block with its tachometer edges: the edges after the previous pair and before the start of the next block; the last block
-    /// gets all remaining edges.
+    /// Pairs each block with its tachometer edges: the edges after the previous pair and before the start of the next
+    /// block; the last block gets all remaining edges.
     pub fn steps(&self) -> impl Iterator<Item = (&Block, &[Edge])> {
         let mut rest = self.edges.as_slice();
         let ends = self
@@ -121,7 +126,8 @@ impl Sensed {
     }
 }
 
-/// Acceleration channels of the recording for the axes x, y, z, and whether their unit is known.
+/// Channels of the recording used as acceleration along x, y and z, and whether all of them are recorded in units of
+/// acceleration.
 fn axes(recording: &Recording) -> Result<([Option<&Channel>; 3], bool), RecordingError> {
     let axes = ["ax", "ay", "az"].map(|name| recording.channel(name));
     if axes.iter().any(Option::is_some) {
@@ -148,8 +154,8 @@ fn axes(recording: &Recording) -> Result<([Option<&Channel>; 3], bool), Recordin
     }
 }
 
-/// Acceleration per sensor count, m/s² (or unit of the recording if that is unknown), such that the largest absolute
-/// sample `largest` fits into the 16 bits of the device.
+/// Acceleration per sensor count, m/s² (without `is_calibrated`: in the unit of the channel), such that the largest
+/// absolute sample `largest` fits into the 16 bits of the device.
 fn count(largest: f64, is_calibrated: bool) -> f64 {
     let needed = largest / FULL_SCALE;
     if needed <= 0.0 {
@@ -176,8 +182,8 @@ fn teeth(recording: &Recording, speed: SpindleSettings) -> Result<u8, RecordingE
     }
 }
 
-/// Tachometer wheel (mark positions and missing marks) from the sidecar, one mark by default; `None` if the recording
-/// has no channel `tacho`.
+/// Tachometer wheel (mark positions and missing marks) from the sidecar, by default one position with its mark; `None`
+/// if the recording has no channel `tacho`.
 pub(super) fn wheel(recording: &Recording) -> Option<Wheel> {
     recording.channel("tacho")?;
     let said = recording
@@ -210,7 +216,8 @@ fn stamp(sample: f64, rate: f64) -> Nanoseconds {
     Nanoseconds((sample / rate * 1e9).round().max(0.0) as u64)
 }
 
-/// Quantizes the acceleration channels (`count` m/s² per count, `rate` samples per second) into blocks.
+/// Quantizes the acceleration channels (`count` m/s² per count, `rate` samples per second) into blocks; a missing axis
+/// is 0.
 fn blocks(axes: &[Option<&Channel>; 3], count: f64, rate: f64) -> Vec<Block> {
     let length = axes
         .iter()

@@ -1,7 +1,9 @@
-//! Reader of text tables: a row of names, then rows of numbers. [`super::text_head`] finds separator, decimal mark and names.
+//! Reader of text tables: a row of names, then rows of numbers. [`super::text_head`] finds separator, decimal mark and
+//! names.
 //!
-//! Files of hundreds of megabytes are read in chunks, without the whole text in memory. Lines that start with `#`, `%` or `//` are comments.
-//! Empty lines are skipped. Numbers may be quoted. Columns without any value are left out, as are unnamed ones that count the rows.
+//! Files of hundreds of megabytes are read in chunks, without the whole text in memory. Lines that start with `#`, `%`
+//! or `//` are comments. Empty lines are skipped. Numbers may be quoted. Columns without any value are left out, as
+//! are, in a table of several columns, unnamed ones that count the rows.
 
 use std::fs::File;
 use std::io::Read;
@@ -21,7 +23,8 @@ const CHUNK: usize = 1 << 18;
 /// a few kilobytes.
 const HEAD_MAX: usize = 1 << 18;
 
-/// Reads a text table. With `finite`, a NaN or infinite value, or an empty field in a column with values, is an error that names its line.
+/// Reads a text table. With `finite`, a NaN or infinite value, or an empty field in a column with values, is an error
+/// that names its line.
 pub(super) fn read(path: &Path, finite: bool) -> Result<Raw, RecordingError> {
     let unreadable = |cause| FileError::Read {
         path: path.into(),
@@ -45,8 +48,8 @@ pub(super) fn read(path: &Path, finite: bool) -> Result<Raw, RecordingError> {
     Ok(raw)
 }
 
-/// Names of the columns of a text table, with their units in brackets, from the head of the file alone; empty if it has no
-/// row of names or cannot be understood.
+/// Names of the columns of a text table, with their units in brackets, from the head of the file alone; empty if it has
+/// no row of names or cannot be understood.
 pub(super) fn titles(path: &Path) -> Result<Vec<String>, RecordingError> {
     let unreadable = |cause| FileError::Read {
         path: path.into(),
@@ -250,7 +253,8 @@ impl<'a> Table<'a> {
         Ok(rest)
     }
 
-    /// Parses a line of numbers in any separator and decimal mark; an empty field is counted in the gaps of its column.
+    /// Parses a line of numbers with the separator and decimal mark of the file; an empty field becomes NaN and is
+    /// counted in the gaps of its column. A line of empty fields only is skipped.
     fn general_row(&mut self, line: &[u8]) -> Result<(), RecordingError> {
         let text = String::from_utf8_lossy(line);
         let fields = self.dialect.fields(text.trim_matches(['\n', '\r']));
@@ -300,8 +304,8 @@ impl<'a> Table<'a> {
         }
     }
 
-    /// The columns of the text table that have values, without unnamed ones that count the rows. If values must be finite,
-    /// a column with values in some rows and empty fields in others is an error.
+    /// The columns of the text table that have values, without unnamed ones that count the rows. If values must be
+    /// finite, a column with values in some rows and empty fields in others is an error.
     fn raw(self, head: Head) -> Result<Raw, RecordingError> {
         let mut notes = head.notes;
         let is_unnamed = |name: &str, index: usize| {

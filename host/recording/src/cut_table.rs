@@ -69,7 +69,7 @@ const OUTCOMES: [(&str, Outcome); 6] = [
     ("marginal", Outcome::Marginal),
 ];
 
-/// Titles of the columns of a table of cuts, two for each column, in the order of [`Places`].
+/// Titles of the columns of a table of cuts, two for each: spindle speed, axial depth, outcome, chatter frequency.
 const TITLES: [[&str; 2]; 4] = [
     ["rpm [rev/min]", "rpm"],
     ["depth [mm]", "depth_mm"],
@@ -83,8 +83,8 @@ const FAULTS_NAMED: usize = 5;
 /// Reads a table of trial cuts; a table without rows gives an empty list.
 ///
 /// # Errors
-/// The file cannot be read, lacks a column, has one twice or an unknown one; a row has more or fewer values than there are
-/// columns; or a speed, depth, frequency or outcome is not possible.
+/// The file cannot be read, lacks the column of speed, depth or outcome, has a column twice or an unknown one; a row
+/// has more or fewer values than there are columns; or a speed, depth, frequency or outcome is not possible.
 pub fn read(path: &Path) -> Result<Vec<TrialCut>, CutTableError> {
     parse(path, &read_text(path)?)
 }

@@ -114,7 +114,7 @@ pub enum RecordingError {
         path: PathBuf,
         /// Sidecar file in which the user could state the sample rate.
         sidecar: PathBuf,
-        /// Names of the channels whose unit is not stated either.
+        /// Names of the channels with a standard name, such as `fx`, whose unit is not stated either.
         without_unit: Vec<String>,
     },
     /// The recording lacks a channel or a setting that the command requires.
@@ -129,7 +129,8 @@ pub enum RecordingError {
     },
 }
 
-/// Message for a channel that is not there, or whose unit is unknown, such as `fx [unknown]`: the option that states the unit.
+/// Message for a channel or setting that a recording lacks, with the channels that it has; if the unit of one of them
+/// is unknown, as in `fx [unknown]`, also the option `--map` that would state it.
 fn no_channel(needed: &str, found: &[String]) -> String {
     let names: Vec<&str> = found
         .iter()
@@ -163,7 +164,8 @@ fn no_rate(without_unit: &[String], sidecar: &std::path::Path) -> String {
     }
 }
 
-/// The option `--map` that states a unit for each of the channels whose name stands for a quantity; `None` if there is none.
+/// The option `--map` that states a unit for each of the channels whose name stands for a quantity; `None` if there is
+/// none.
 fn map_of_units(names: &[&str]) -> Option<String> {
     let map: Vec<String> = names
         .iter()

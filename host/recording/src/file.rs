@@ -56,7 +56,8 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
     write_with(path, |writer| writer.write_all(bytes))
 }
 
-/// Paths of the temporary files of writes in progress. The holder of the lock may create, rename and remove temporary files.
+/// Paths of the temporary files of writes in progress. The holder of the lock may create, rename and remove temporary
+/// files.
 static ASIDE: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
 /// Locks the list of temporary files of writes in progress.

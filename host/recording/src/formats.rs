@@ -16,17 +16,18 @@ use crate::file::Prepared;
 pub const WRITTEN: [&str; 4] = ["csv", "uff", "unv", "bunv"];
 
 impl Recording {
-    /// Reads the only recording of a file (text table, WAV, MAT, LabVIEW measurement file, TDMS or UFF 58) and its sidecar.
+    /// Reads the only recording of a file (text table, WAV, MAT, LabVIEW measurement file, TDMS or UFF 58) and its
+    /// sidecar.
     ///
     /// # Errors
-    /// For example: the file has several records; it is missing or malformed; a unit is unknown or contradicts the channel name; time is not
-    /// evenly spaced; there is no sample rate; a sample is NaN or infinite.
+    /// For example: the file has several records; it is missing or malformed; a unit is unknown or contradicts the
+    /// channel name; time is not evenly spaced; there is no sample rate; a sample is NaN or infinite.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, RecordingError> {
         Self::read_segment(path, Segment::default())
     }
 
-    /// Reads a segment of a recording and its sidecar. Samples outside the segment may be NaN or infinite, except in a LabVIEW measurement
-    /// file.
+    /// Reads a segment of a recording and its sidecar. Samples of channels outside the segment may be NaN or infinite,
+    /// except in a LabVIEW measurement file; time stamps may not.
     ///
     /// # Errors
     /// An error of [`Recording::read`], or a segment that lies outside the recording.
@@ -38,8 +39,8 @@ impl Recording {
         Self::import(path, &import).map(|imported| imported.recording)
     }
 
-    /// Reads the only record of a file with its sidecar and what the user states about the file; also says how it was
-    /// understood.
+    /// Reads the only record of a file, or the one that `import` chooses, with its sidecar and the facts that the user
+    /// states about the file; also returns a report of how it was understood.
     ///
     /// # Errors
     /// An error of [`Recording::read`], or a file with several records of which `import` does not choose one.
@@ -60,8 +61,8 @@ impl Recording {
     /// Reads all records of a file, or the one that `import` chooses, each as a recording of its own.
     ///
     /// # Errors
-    /// An error of [`Recording::read`] other than that of several records, or a record or column that `import` names and the
-    /// file does not have.
+    /// An error of [`Recording::read`] other than that of several records, or a record or column that `import` names
+    /// and the file does not have.
     pub fn import_all(path: impl AsRef<Path>, import: &Import) -> Result<Vec<Imported>, RecordingError> {
         let path = path.as_ref();
         let ending = crate::file::ending(path);
@@ -118,8 +119,8 @@ impl Recording {
     /// Writes the recording and its sidecar to `path` in the format of the file extension.
     ///
     /// Both files are complete under temporary names before they are renamed, the sidecar first. On an error the
-    /// previous recording stays. If the second rename fails, or the machine between the two, the new sidecar stands beside
-    /// the previous recording or none.
+    /// previous recording stays. If the second rename fails, or the computer between the two, the new sidecar stands
+    /// beside the previous recording, or beside none if there was none.
     ///
     /// # Errors
     /// The extension is not one of [`WRITTEN`], or a file cannot be written.
@@ -135,7 +136,7 @@ impl Recording {
         }
     }
 
-    /// Writes the recording to `path` as UFF 58, with its sidecar. Both files are replaced together, in the way of
+    /// Writes the recording to `path` as UFF 58, with its sidecar. Both files are replaced one after the other, as by
     /// [`Recording::write`].
     ///
     /// # Errors

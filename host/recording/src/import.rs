@@ -11,7 +11,8 @@ pub struct Import {
     pub segment: Segment,
     /// Columns for which the user states name and unit with the option `--map`.
     pub map: Vec<ColumnMap>,
-    /// Sample rate, samples per second (`--rate`); it replaces the time column of the file.
+    /// Sample rate, samples per second (`--rate`); it replaces the time column of the file and every rate that file or
+    /// sidecar state.
     pub rate_hz: Option<f64>,
     /// Number of the one record to read from a file with several records, from 1 (`--record`); `None` for all.
     pub record: Option<usize>,
@@ -27,11 +28,11 @@ pub struct ColumnMap {
     pub name: String,
     /// True if the channel points against its axis (`acc=-ax`): samples change their sign.
     pub is_negative: bool,
-    /// Unit of the samples in the column, or sensitivity of its sensor; `None` if the file states the unit.
+    /// Unit of the samples in the column, or sensitivity of its sensor; `None` if the user states neither.
     pub scale: Option<Scale>,
 }
 
-/// Unit of the samples of a column, or sensitivity of the sensor that gave them.
+/// Unit of the samples of a column, sensitivity of the sensor that gave them, or unit of a frequency response function.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Scale {
     /// Unit of the samples, which may have a factor: `g`, `98.1 m/s^2`.
@@ -47,7 +48,7 @@ impl ColumnMap {
     /// `2=fx:N`, `acc=-az`, `ch1=ax:10.2 mV/g`.
     ///
     /// # Errors
-    /// The text has another form, or the unit is unknown; the message states the forms.
+    /// The text has another form, or the unit is unknown; the message states the form that is needed.
     pub fn parse(text: &str) -> Result<Self, String> {
         let forms =
             "COLUMN=NAME or COLUMN=NAME:UNIT is needed, such as acc=ax:g, 2=fx:N or \"ch1=ax:10.2 mV/g\"";
@@ -87,8 +88,9 @@ impl ColumnMap {
         })
     }
 
-    /// True if this option is about the column called `name`: its text is this name (capitals do not matter), or the
-    /// number `number` (from 1) of the column if no column in `names` is called so.
+    /// True if this option is about the column called `name`. If the option names a column of `names` exactly, it is
+    /// about that column only; otherwise about the column with the number `number` (from 1) or with the same name in
+    /// other capitals.
     pub fn is_about(&self, name: &str, number: usize, names: &[String]) -> bool {
         if names.contains(&self.column) {
             return self.column == name;
@@ -100,7 +102,7 @@ impl ColumnMap {
     }
 }
 
-/// True if the text is a ratio of two units, such as `um/N`, or `1/kg` or decibels.
+/// True if the text is a unit of a frequency response function: a ratio of two units, such as `um/N`, `1/kg` or `dB`.
 fn is_ratio(text: &str) -> bool {
     let of_force = text.rsplit_once('/').is_some_and(|(response, force)| {
         let is_unit = |text: &str| text.parse::<Unit>().is_ok();

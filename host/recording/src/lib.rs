@@ -1,12 +1,12 @@
 //! Recordings: channels with name, unit and sample rate, and the sidecar file that describes the test.
 //!
-//! Sign conventions: a force is the force on the structure. With one mark per revolution, a rising edge of `tacho` is immersion angle 0 of
-//! tooth 1. Samples are in SI units if their unit is known.
+//! Sign conventions: a force is the force on the structure. With one mark per revolution, a rising edge of `tacho` is
+//! immersion angle 0 of tooth 1. Samples are in SI units if their unit is known.
 //!
-//! Main types: [`Recording`] with its [`Channel`]s, [`Sidecar`] (kind of test, cut, posture, names and units of channels), [`Unit`] and
-//! [`Quantity`], [`SpindleAngle`] (spindle angle from the tachometer). Formats: CSV and other text tables, WAV, MAT,
-//! LabVIEW measurement files, TDMS and UFF 58 ([`uff`]). [`Recording::import`] also reads files in the words of other programs, and says how it
-//! understood them ([`Understood`]).
+//! Main types: [`Recording`] with its [`Channel`]s, [`Sidecar`] (kind of test, cut, posture, names and units of
+//! channels), [`Unit`] and [`Quantity`], [`SpindleAngle`] (spindle angle from the tachometer). Formats: CSV and other
+//! text tables, WAV, MAT, LabVIEW measurement files, TDMS and UFF 58 ([`uff`]). [`Recording::import`] also reads files
+//! in the words of other programs, and says how it understood them ([`Understood`]).
 //!
 //! ```
 //! use quietcut_recording::{Channel, Quantity, Recording, Sidecar};

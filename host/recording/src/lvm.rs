@@ -1,7 +1,8 @@
 //! Reader of LabVIEW measurement files (`.lvm`): a file header, then blocks of channels with their own header.
 //!
-//! Format: National Instruments, "Specification for the LabVIEW Measurement File (.lvm)". Separator tab or comma, decimal point or comma, one
-//! X column, one for each channel, or none. Each block is a record of its own. The column `Comment` is skipped.
+//! Format: National Instruments, "Specification for the LabVIEW Measurement File (.lvm)". Separator tab or comma,
+//! decimal point or comma, one X column, one for each channel, or none. Each block is a record of its own. The column
+//! `Comment` is skipped.
 
 use std::path::Path;
 
@@ -89,8 +90,9 @@ fn dialect(lines: &[Line<'_>]) -> Dialect {
         Some(text) if text.to_lowercase().contains("comma") => Separator::Comma,
         _ => Separator::Tab,
     };
-    // The stated decimal mark follows the separator in its line. In a file separated by commas, a decimal comma is
-    // therefore the second comma of that line.
+    // In the header line `Decimal_Separator` the stated decimal mark follows the separator. In a file separated by
+    // commas a decimal comma is therefore the second comma of that line; it is ignored, since it could not be told from
+    // the separator.
     let decimal_comma = value("Decimal_Separator").is_some_and(|text| {
         let commas = text.matches(',').count();
         commas > usize::from(separator == Separator::Comma)
@@ -108,8 +110,8 @@ struct BlockHeader<'a> {
 }
 
 impl<'a> BlockHeader<'a> {
-    /// Value of `key` for channel number `index`, from 0, in the header of a block; the first value if there are fewer
-    /// values than channels.
+    /// Value of `key` for channel number `index`, from 0, in the header of a block; the first value if there is none
+    /// with that number. `None` if the key is missing or the value empty.
     fn value(&self, key: &str, index: usize) -> Option<&'a str> {
         let (_, values) = self.rows.iter().find(|(name, _)| *name == key)?;
         values
@@ -200,8 +202,8 @@ fn block<'l, 'a>(lines: &'l [Line<'a>], dialect: Dialect) -> Result<(Raw, &'l [L
     Ok((record(x, columns, &header, dialect), after))
 }
 
-/// Record of a block of samples. The sample rate follows from the interval that the header states if the X values agree
-/// with it; otherwise the X values are a time column.
+/// Record of a block of samples. The sample rate follows from the interval that the header of the block states if the X
+/// values agree with it or are missing; otherwise the X values are a time column.
 fn record(
     x: Option<Vec<f64>>,
     mut columns: Vec<RawColumn>,

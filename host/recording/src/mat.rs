@@ -1,13 +1,13 @@
 //! Reader of MAT-files of level 5, compressed or uncompressed: numbers, text, structures and cells.
 //!
-//! The longer dimension of a matrix is time: the columns of an N × 3 matrix are channels, and the rows of a 3 × N matrix. The columns of a
-//! square matrix are channels. [`records`] finds the records in the variables.
+//! The longer dimension of a matrix is time: the columns of an N × 3 matrix are channels, and the rows of a 3 × N
+//! matrix. The columns of a square matrix are channels. [`records`] finds the records in the variables.
 //!
-//! Format: MathWorks, "MAT-File Format", level 5. Objects, complex, logical and sparse arrays, and arrays of more than two
-//! dimensions are skipped. Level 7.3 (HDF5) is an error.
+//! Format: MathWorks, "MAT-File Format", level 5. Objects, complex, logical and sparse arrays, and arrays of more than
+//! two dimensions are skipped. Level 7.3 (HDF5) is an error.
 //!
-//! The file is read in chunks and its values are stored only once. The length of the file bounds the allocated memory, whatever sizes its
-//! headers state; 64 MiB of values are allowed for any file.
+//! The file is read in chunks and its values are stored only once. The length of the file bounds the allocated memory,
+//! whatever sizes its headers state; 64 MiB of values are allowed for any file.
 
 mod records;
 mod source;
@@ -40,8 +40,8 @@ const VALUES_MIN: u64 = 64 << 20;
 /// numbers need a factor of 8, and measured channels compress by a factor below 20: together 160.
 const VALUES_PER_BYTE: u64 = 200;
 
-/// Number of values of a variable for which memory is reserved before they are read, at most, in a MAT-file of fewer
-/// bytes than this; in a longer file it is the length in bytes. A choice; it bounds the cost of a header with a false
+/// Largest number of values of a variable for which memory is reserved before they are read; in a MAT-file with more
+/// bytes than this number, its length in bytes takes its place. A choice; it bounds the cost of a header with a false
 /// size.
 const TRUSTED: u64 = 1 << 16;
 
@@ -51,15 +51,15 @@ const COMPRESSED: u32 = 15;
 /// Code of the data type of a matrix element in a MAT-file (miMATRIX).
 const MATRIX: u32 = 14;
 
-/// Largest number of levels of nested structures and cells of a MAT-file that are read. A choice; recordings have one or two
-/// levels.
+/// Largest number of levels of nested structures and cells of a MAT-file that are read. A choice; recordings have one
+/// or two levels.
 const DEPTH_MAX: usize = 6;
 
-/// Largest total number of field values of all structures and elements of all cells of a MAT-file. A choice; a record in
-/// a structure array has a few fields.
+/// Largest total number of field values of all structures and elements of all cells of a MAT-file. A choice; a record
+/// in a structure array has a few fields.
 const ELEMENTS_MAX: usize = 100_000;
 
-/// Reads the records of a MAT-file: one from its vectors and matrices, or one from each of its structures.
+/// Reads the records of a MAT-file: one from its vectors and matrices, or else one from each element of its structures.
 pub(super) fn read(path: &Path) -> Result<Vec<Raw>, RecordingError> {
     let unreadable = |cause| FileError::Read {
         path: path.into(),
@@ -134,8 +134,8 @@ struct ValueMemory {
 }
 
 impl ValueMemory {
-    /// Reserves memory for `count` values of variable `name`; an error if the remaining memory of the MAT-file does not
-    /// suffice.
+    /// Deducts the memory of `count` values of variable `name` from what the values of the MAT-file may still take; an
+    /// error if that does not suffice.
     fn take(&mut self, name: &str, count: u64) -> Result<(), String> {
         let needed = count.saturating_mul(size_of::<f64>() as u64);
         self.bytes = self.bytes.checked_sub(needed).ok_or_else(|| {
@@ -148,8 +148,8 @@ impl ValueMemory {
         Ok(())
     }
 
-    /// Counts `count` more field values of structure `name`, or elements of cell `name`; an error if the MAT-file has more than
-    /// [`ELEMENTS_MAX`].
+    /// Counts `count` more field values of structure `name`, or elements of cell `name`; an error if the MAT-file has
+    /// more than [`ELEMENTS_MAX`].
     fn take_elements(&mut self, name: &str, count: usize) -> Result<(), String> {
         self.elements = self.elements.checked_sub(count).ok_or_else(|| {
             format!("structure \"{name}\" has more than {ELEMENTS_MAX} elements; save the records as vectors")
@@ -157,8 +157,8 @@ impl ValueMemory {
         Ok(())
     }
 
-    /// Largest number of samples per channel for which memory is reserved before the samples of a variable with `channels`
-    /// channels are read.
+    /// Largest number of samples per channel for which memory is reserved before the samples of a variable with
+    /// `channels` channels are read.
     fn trusted(&self, channels: usize) -> usize {
         usize::try_from(self.file.max(TRUSTED) / channels.max(1) as u64 + 1).unwrap_or(usize::MAX)
     }
@@ -192,8 +192,9 @@ fn inflated(source: &mut Source<'_>, length: u64, memory: &mut ValueMemory) -> R
     Ok(found)
 }
 
-/// Reads the data of a matrix element `depth` levels inside others; `None` unless it holds a real matrix, a text of
-/// at most [`SMALL_MAX`] bytes, or a structure or cell above the depth [`DEPTH_MAX`], with two dimensions.
+/// Reads the data of a matrix element `depth` levels inside others; `None` unless it has two dimensions and holds a
+/// real numeric matrix, a text of at most [`SMALL_MAX`] bytes, or a structure or cell less than [`DEPTH_MAX`] levels
+/// inside others.
 fn matrix(source: &mut Source<'_>, memory: &mut ValueMemory, depth: usize) -> Result<Option<Item>, String> {
     // An empty field of a MAT structure is stored as an element without any content.
     if source.available == 0 {

@@ -16,6 +16,6 @@ pub(super) struct Meaning {
     pub(super) from: Basis,
     /// Unit of the column as the file or the user states it, shown in the report of the import.
     pub(super) unit: Option<String>,
-    /// Sensitivity of the sensor as the user states it, shown in the report of the import.
+    /// Sensitivity of the sensor that the user states, in volts per SI unit, shown in the report of the import.
     pub(super) sensitivity: Option<String>,
 }

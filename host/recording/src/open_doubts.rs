@@ -37,8 +37,8 @@ pub(super) struct Doubts {
 }
 
 impl Doubts {
-    /// Adds each column, not yet in doubt, whose words name a channel that an earlier column already is; time is no such
-    /// channel.
+    /// Adds each column, not yet in doubt, whose words name a channel that an earlier column already is; time is no
+    /// such channel.
     pub(super) fn twice(&mut self, columns: &[RawColumn], meanings: &[Meaning]) {
         for (index, meaning) in meanings.iter().enumerate() {
             let is_open = self.open.iter().any(|open| open.column == columns[index].name);
@@ -56,7 +56,8 @@ impl Doubts {
         }
     }
 
-    /// The columns in doubt, each with a proposed channel name and unit; each name is proposed only once.
+    /// The columns in doubt, each with a proposed channel name and, where the file states none, a proposed unit or
+    /// sensitivity; each name is proposed only once.
     pub(super) fn suggested(&self, meanings: &[Meaning]) -> Vec<Doubt> {
         let mut taken: Vec<String> = meanings.iter().map(|meaning| meaning.name.clone()).collect();
         let mut doubts = Vec::new();

@@ -56,8 +56,9 @@ fn peak(channel: &Channel) -> Option<String> {
 /// Warning if the time derivative of order `order` of motion `lower` agrees with motion `upper` except for a unit
 /// factor such as 9.81 or 1000.
 ///
-/// Differences of `lower` over 2T equal weighted integrals of `upper` exactly, whatever the signal: for order 2,
-/// x(t+T) − 2x(t) + x(t−T) = ∫ (T − |s|) a(t+s) ds. Sums over the samples approximate the integrals. The longer T, the less the noise of `lower` is amplified; the T
+/// Differences of `lower` over a time 2T equal weighted integrals of `upper` exactly, whatever the signal: for order 2,
+/// x(t+T) − 2x(t) + x(t−T) = ∫ (T − |s|) a(t+s) ds from s = −T to T. Sums over the samples approximate the integrals.
+/// The longer T, the less the noise of `lower` is amplified; the T from 1 to 64 sample intervals, in powers of two,
 /// with the best correlation counts.
 fn contradiction(lower: &Channel, order: u32, upper: &Channel, rate_hz: f64) -> Option<String> {
     let mut best: Option<(f64, f64)> = None;
@@ -102,7 +103,7 @@ fn compared(lower: &[f64], order: u32, upper: &[f64], half: usize, rate_hz: f64)
     }
     let sum = |from: usize, to: usize| first[to] - first[from];
     let mut pairs = Vec::with_capacity(count);
-    // One difference every `half` samples suffices: neighbouring differences are nearly equal.
+    // One difference every `half` samples suffices, since those in between differ little.
     for center in (half..count.saturating_sub(half)).step_by(half) {
         let (difference, integral) = if order == 2 {
             let difference = lower[center + half] - 2.0 * lower[center] + lower[center - half];

@@ -11,16 +11,17 @@ pub(super) struct Raw {
     /// Sample rate, samples per second, that a text or a variable of the file states, such as `Fs = 25600`; the sidecar
     /// takes precedence.
     pub(super) worded_rate_hz: Option<f64>,
-    /// Time of the first sample of the record, s; a time column replaces it.
+    /// Time of the first sample of the record, s; a time column replaces it unless the option `--rate` replaces that
+    /// column.
     pub(super) start_s: f64,
-    /// Name of the group, structure element or block of the file that holds the record; `None` if the file has only one
-    /// record.
+    /// Name of the group (TDMS), structure element (MAT) or block (LabVIEW) that holds the record; `None` for the only
+    /// record of a TDMS or LabVIEW file, for variables of a MAT-file outside structures, and in other formats.
     pub(super) label: Option<String>,
     /// Number of the first line with numbers in a text file without a row of names; `None` if there are names. Columns
     /// without names are called by their numbers.
     pub(super) unnamed_line: Option<u64>,
-    /// True if all columns come from one matrix of the file, so that the file has no names for them and the user must
-    /// give them.
+    /// True if there are several columns and all come from one matrix of a MAT-file, which has no names for them, so
+    /// that the user must give them.
     pub(super) asks_names: bool,
     /// Facts about the reading of the file that the user should see: separator, encoding, omitted columns.
     pub(super) notes: Vec<String>,

@@ -16,8 +16,8 @@ pub struct Recording {
     pub sample_rate_hz: f64,
     /// Time of the first sample of the recording, s.
     pub start_s: f64,
-    /// Time from the start of the whole recording to the first sample of this segment, s; 0 for a whole recording. Effects that depend on
-    /// time, such as drift, count their time from the start of the whole recording.
+    /// Time from the start of the whole recording to the first sample of this segment, s; 0 for a whole recording.
+    /// Effects that depend on time, such as drift, count their time from the start of the whole recording.
     pub since_s: f64,
     /// Channels, all with the same number of samples. The time column is not a channel.
     pub channels: Vec<Channel>,
@@ -77,7 +77,8 @@ impl Recording {
         }
     }
 
-    /// The error for a recording without the channel described by `needed`; the message lists the channels that it has.
+    /// The error for a recording that lacks the channel or setting described by `needed`; the message lists the
+    /// channels that it has.
     pub fn lacks(&self, needed: impl Into<String>) -> RecordingError {
         RecordingError::NoChannel {
             path: self.path.clone(),

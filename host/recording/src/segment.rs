@@ -21,8 +21,8 @@ impl Segment {
     /// Cuts the segment out of `recording`.
     ///
     /// # Errors
-    /// A given start or end leaves fewer than two samples; the channels differ in length; or the segment has a NaN or
-    /// infinite sample.
+    /// A given start or end leaves fewer than two samples; a channel ends before the segment, or before the first
+    /// channel if the segment has no given end; or the segment has a NaN or infinite sample.
     pub(super) fn of(self, recording: Recording) -> Result<Recording, RecordingError> {
         let (count, rate) = (recording.len(), recording.sample_rate_hz);
         let content = |what: String| RecordingError::Content {

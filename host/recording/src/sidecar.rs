@@ -1,4 +1,5 @@
-//! The sidecar of a recording: `NAME.toml` beside `NAME.csv` holds the kind of test, the cut, the posture and the channel descriptions.
+//! The sidecar of a recording: `NAME.toml` beside `NAME.csv` holds the kind of test, the cut, the posture and the
+//! channel descriptions.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -35,7 +36,8 @@ pub struct Sidecar {
     /// Kind of the recorded test.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub kind: Option<TestKind>,
-    /// Names of the channels that hold the input force (excitation); `None` means all force channels.
+    /// Names of the channels that hold the excitation, a force or an imposed motion; if `None`, the force channels
+    /// count as excitation.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub input: Option<Vec<String>>,
     /// Sample rate, samples per second; required if neither the file nor an option states it.
@@ -94,7 +96,8 @@ pub struct RecordedChannel {
     /// Mounting position of the sensor, such as `spindle-housing`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub at: Option<String>,
-    /// Standard name of the channel (`fx`, `ax`, `tacho` …) if the file uses another name; `-ax` for a sensor against the axis.
+    /// Standard name of the channel (`fx`, `ax`, `tacho` …) if the file uses another name; `-ax` for a sensor against
+    /// the axis.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
     /// Unit of the channel, such as `m/s^2`; it overrides the unit in the file.
@@ -109,13 +112,13 @@ pub struct RecordedChannel {
     /// Number of adjacent missing marks on the tachometer wheel (the gap that marks angle 0); default 0.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub missing: Option<u16>,
-    /// True if an anti-aliasing filter stands between the sensor and the samples, so that nothing above half the sample rate
-    /// folds into the record; default false.
+    /// True if an anti-aliasing filter stands between the sensor and the samples, so that nothing above half the sample
+    /// rate folds into the record; default false.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub anti_aliasing: Option<bool>,
 }
 
-/// True for the text of a case: it has a section that no sidecar has.
+/// True for the text of a case file: it has a section (`structure`, `tool` or `material`) that no sidecar has.
 fn is_case(text: &str) -> bool {
     text.parse::<toml::Table>().is_ok_and(|table| {
         ["structure", "tool", "material"]
@@ -143,8 +146,8 @@ impl Sidecar {
     /// Reads the sidecar of `recording`; the default (empty) sidecar if the file does not exist.
     ///
     /// # Errors
-    /// The file exists but cannot be read, is a case, is no valid TOML, has an unknown key, or has a value of a wrong type
-    /// or out of bounds.
+    /// The file exists but cannot be read, is a case, is no valid TOML, has an unknown key, or has a value of a wrong
+    /// type or out of bounds.
     pub fn beside(recording: &Path) -> Result<Self, RecordingError> {
         let path = Self::path_of(recording);
         if !path.exists() {

@@ -18,8 +18,9 @@ impl SpindleAngle {
     /// Computes the spindle angle from the channel `tacho`; `teeth` is the number of evenly spaced teeth.
     ///
     /// # Errors
-    /// There is no tachometer; there are fewer than two edges; the edges do not match the wheel described in the sidecar; or the wheel
-    /// has no gap and its number of positions does not divide the number of teeth, so that the edges do not define the tooth angle.
+    /// There is no tachometer; there are fewer than two edges; the edges do not match the wheel described in the
+    /// sidecar; or the wheel has no gap and its number of positions does not divide the number of teeth, so that the
+    /// edges do not define the tooth angle.
     pub fn new(recording: &Recording, teeth: u32) -> Result<Self, RecordingError> {
         let Some(edges) = TachometerEdges::new(recording) else {
             return Err(recording.lacks("tacho channel, which defines the angle of the teeth"));

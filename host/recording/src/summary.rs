@@ -25,13 +25,13 @@ pub struct ChannelSummary {
     pub rms: f64,
     /// Mean (DC component).
     pub mean: f64,
-    /// Number of clipped samples of the channel: those in runs of equal samples at its largest or smallest value, if this
-    /// is far from the median; 0 for a constant channel or a tachometer.
+    /// Number of clipped samples of the channel: those in runs of equal samples at its largest or smallest value, if
+    /// this is far from the median; 0 for a constant channel or a tachometer.
     pub clipped: usize,
     /// True if all samples of the channel are equal.
     pub constant: bool,
-    /// Dropouts of the channel: long runs of equal samples between its extremes although it changes otherwise, each with
-    /// start and excluded end in s.
+    /// Dropouts of the channel: long runs of equal samples between its extremes although it changes otherwise, each
+    /// with start and excluded end in s.
     pub dropouts_s: Vec<[f64; 2]>,
 }
 
@@ -97,8 +97,8 @@ fn runs(samples: &[f64]) -> Vec<(usize, usize)> {
     runs
 }
 
-/// Envelope for a small picture of a channel: largest absolute deviation from the mean in each of `width` equal parts
-/// of the samples, divided by the largest of all parts. There are fewer parts if there are fewer samples.
+/// Envelope for a small picture of a channel: largest absolute deviation from the mean of the channel in each of
+/// `width` equal runs of samples (one per sample if there are fewer samples), divided by the largest of all runs.
 pub fn envelope(samples: &[f64], width: usize) -> Vec<f64> {
     let mean = samples.iter().sum::<f64>() / samples.len().max(1) as f64;
     let width = width.min(samples.len());

@@ -1,7 +1,8 @@
-//! Head of a text table: separator, decimal mark, encoding, names and units of the columns, sample rate, and where the numbers begin.
+//! Head of a text table: separator, decimal mark, encoding, names and units of the columns, sample rate, and where the
+//! numbers begin.
 //!
-//! The head ends at the first line of numbers that is the last line, is followed by one with as many numbers, or is preceded by a row of as
-//! many names.
+//! The head ends before the first line of numbers that is the last line, is followed by one with as many fields, or, in
+//! a table of several columns, is preceded by a row of as many fields. Comments and empty lines do not count.
 
 use super::raw::FoundUnit;
 use super::text_dialect::{Dialect, Separator, bare, blank_fields};
@@ -26,9 +27,9 @@ pub(super) struct Head {
     /// Number of columns in the first line of numbers of the text table; without such a line, number of fields in the
     /// first line that is no comment, or 0.
     pub(super) width: usize,
-    /// Offset of the first line of numbers from the start of the file, bytes.
+    /// Offset of the first row after the head of the text table from the start of the file, bytes.
     pub(super) offset: usize,
-    /// Number of lines before the first line of numbers.
+    /// Number of lines of the text file before the first row after its head.
     pub(super) lines: u64,
     /// Sample rate that a line before the numbers of the text table states, samples per second; `None` if none does.
     pub(super) rate_hz: Option<f64>,
@@ -202,7 +203,8 @@ fn columns_before(
     Ok(None)
 }
 
-/// Fault of a table with commas between the columns and commas in its numbers: its rows have more fields than the row of names.
+/// Fault of a table with commas between the columns and commas in its numbers: its rows have more fields than the row
+/// of names.
 ///
 /// A decimal comma splits a number in two, so that a row has at most twice as many fields as names.
 fn ambiguous_commas(dialect: Dialect, width: usize, before: &[&Line], first: &Line) -> Option<(u64, String)> {
@@ -275,8 +277,8 @@ fn lines<'t>(text: &'t str, bytes: &[u8]) -> Vec<Line<'t>> {
 /// Number of lines that are searched for a decimal comma: a choice, since the first samples may be whole numbers.
 const LINES_FOR_DECIMAL: usize = 200;
 
-/// Separator and decimal mark, found from one line of numbers and the lines after it; `None` if the line holds text or no
-/// number.
+/// Separator and decimal mark, found from one line of numbers and the lines after it; `None` if the line holds text or
+/// no number.
 fn dialect(line: &str, lines: &[&Line]) -> Option<Dialect> {
     let with = |separator| Dialect {
         separator,

@@ -1,4 +1,4 @@
-//! Report of the import of a file: which column became which channel, and which columns are in doubt.
+//! Report of the import of a file: which column became which channel, the sample rate, notes and warnings.
 
 use std::fmt;
 use std::path::PathBuf;
@@ -12,8 +12,8 @@ use super::{RecordedChannel, Sidecar};
 pub struct Understood {
     /// The file.
     pub file: PathBuf,
-    /// Name of the group, structure element or block of the file that holds the record; `None` if the file has only one
-    /// record.
+    /// Name of the group (TDMS), structure element (MAT) or block (LabVIEW) that holds the record; `None` for the only
+    /// record of a TDMS or LabVIEW file, for variables of a MAT-file outside structures, and in other formats.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub record: Option<String>,
     /// Sample rate, samples per second.
@@ -43,8 +43,8 @@ pub struct UnderstoodColumn {
     /// Unit of the column, as the file, the sidecar or the option states it; `None` if none of them does.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unit: Option<String>,
-    /// Sensitivity that converts the voltage in the column, as the sidecar or the option states it; `None` if there is
-    /// none.
+    /// Sensitivity that converts the voltage in the column, in volts per SI unit, from the sidecar or the option;
+    /// `None` if there is none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sensitivity: Option<String>,
     /// SI unit of the samples of the channel.
@@ -65,7 +65,8 @@ pub enum Basis {
     Sidecar,
     /// The user names the channel with the option `--map`.
     Option,
-    /// No word in the head of the column names a quantity: it is an auxiliary channel.
+    /// Neither name nor unit shows the column to be a force, a motion, a tachometer or the time of the record: it is an
+    /// auxiliary channel.
     Auxiliary,
 }
 
@@ -84,8 +85,9 @@ impl Understood {
 }
 
 impl Understood {
-    /// A sidecar that states the result of the import: `before` with name, unit and sensitivity of every column that was
-    /// understood from its words, the sidecar or an option, and with the sample rate if the sidecar or an option gave it.
+    /// A sidecar that states the result of the import: `before` with name, unit and sensitivity of every column that
+    /// was understood from its words, the sidecar or an option, and with the sample rate if the sidecar or an option
+    /// gave it.
     #[must_use]
     pub fn sidecar(&self, before: &Sidecar) -> Sidecar {
         let mut sidecar = before.clone();
@@ -110,7 +112,7 @@ impl Understood {
 }
 
 impl fmt::Display for Understood {
-    /// Report of an import in one line: file, columns with channel and unit, sample rate, notes.
+    /// Report of an import in one line: file, record, sample rate, columns with unit and channel, notes, warnings.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}", self.file.display())?;
         if let Some(record) = &self.record {

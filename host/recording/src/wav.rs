@@ -1,5 +1,5 @@
-//! Reader of WAV files. Channels are called ch1, ch2 …; the sidecar gives names and units. Samples are divided by the
-//! full scale of the format.
+//! Reader of WAV files. Channels are called ch1, ch2 …; the sidecar gives names and units. Integer samples are divided
+//! by the full scale of their format; floating-point samples are unchanged.
 //!
 //! The length of the file bounds the allocated memory, whatever sizes its header states.
 

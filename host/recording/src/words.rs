@@ -78,8 +78,8 @@ const TACHO: &[&str] = &["tacho", "tachometer", "drehzahlsensor", "keyphasor"];
 /// choice: `kraft` begins `Kraftsensor`, `acc` must not begin `accuracy`.
 const STEM: usize = 5;
 
-/// Words whose presence in a column name means that its other words state no quantity or direction: `cutting speed`, `force error`,
-/// and settings that are no signal of a sensor.
+/// Words whose presence in a column name means that its other words state no quantity or direction: `cutting speed`,
+/// `force error`, and settings that are no signal of a sensor.
 const OTHER: &[&str] = &[
     "speed",
     "rpm",
@@ -239,8 +239,8 @@ fn unit_at_end(tokens: &[String], quantity: Quantity) -> Option<Unit> {
     })
 }
 
-/// Splits a column title into name and unit: `name [unit]`, `name (unit)`, `name {unit}`, `name / unit`, `name in unit`,
-/// `name, unit`.
+/// Splits a column title into name and unit: `name [unit]`, `name (unit)`, `name {unit}`, `name / unit`, `name in
+/// unit`, `name, unit`.
 ///
 /// Square brackets at the end always hold a unit. Other forms count only if the text is a known unit.
 pub(super) fn name_and_unit(title: &str) -> (&str, Option<&str>) {

@@ -1,17 +1,20 @@
-//! Anti-aliasing filter and decimation: attenuates components above half the sampling rate, which would alias into the band.
+//! Anti-aliasing filter and decimation: attenuates components above half the sampling rate, which would alias into the
+//! band.
 
 use std::f64::consts::{PI, TAU};
 
-/// Half the length of the anti-aliasing filter, in output samples. With this length the Hann-windowed sinc attenuates by 40 dB from half
-/// the output sampling rate on; the test of this file checks that.
+/// Half the length of the anti-aliasing filter, in output samples. With this length the Hann-windowed sinc attenuates
+/// by more than 40 dB from half the output sampling rate on; the test of this file checks that from 0.52 of that rate
+/// on.
 const HALF: usize = 12;
 
-/// The −6 dB frequency of the anti-aliasing filter as a fraction of the output sampling rate: the middle of the transition band from 0.35
-/// to 0.5.
+/// The −6 dB frequency of the anti-aliasing filter as a fraction of the output sampling rate: the middle of the
+/// transition band from 0.35 to 0.5.
 const CORNER: f64 = 0.425;
 
-/// Every `factor`-th sample of `samples` after a linear-phase low pass without delay and with unit gain at 0 Hz (Hann-windowed sinc). The
-/// signal is extended by its first and last values.
+/// Every `factor`-th sample of `samples` after a linear-phase low pass without delay and with unit gain at 0 Hz
+/// (Hann-windowed sinc). The signal is extended by its first and last values. A `factor` of 1 leaves `samples`
+/// unchanged.
 pub(super) fn decimated(samples: Vec<f64>, factor: usize) -> Vec<f64> {
     let Some(last) = samples.len().checked_sub(1).filter(|_| factor > 1) else {
         return samples;

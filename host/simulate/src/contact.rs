@@ -11,12 +11,12 @@ use quietcut_model::cutter::{Immersion, Tooth};
 use quietcut_numerics::crossing::first_below_zero;
 use quietcut_numerics::dormand_prince::{Quartic, at};
 
-/// Order of the discontinuous derivative of a machined surface from which on an integration step need not end there: the discontinuity does
-/// not lower the order of an integrator of order 5.
+/// Order of the discontinuous derivative of a machined surface from which on an integration step need not end there:
+/// the discontinuity does not lower the order of an integrator of order 5.
 const SMOOTH_FROM: u8 = 5;
 
-/// Two instants closer than this fraction of the shortest tooth-passing period count as equal. Rounding of the time, 2.2e-16 of it, stays
-/// below this for 4 million periods; entries and exits of milling are much further apart.
+/// Two instants closer than this fraction of the shortest tooth-passing period count as equal. Rounding of the time,
+/// 2.2e-16 of it, stays below this for 4 million periods; entries and exits of milling are much further apart.
 const SAME_TIME: f64 = 1e-9;
 
 /// State of contact of all teeth with the workpiece, and the machined surfaces that the teeth leave.
@@ -24,11 +24,13 @@ const SAME_TIME: f64 = 1e-9;
 pub(super) struct Contact<'a> {
     cutting: &'a Cutting,
     teeth: Vec<ToothState>,
-    /// Start and end of the integration step that is evaluated, s, moved inwards by a rounding margin: see [`Surface::height_m`].
+    /// Start and end of the integration step that is evaluated, s, moved inwards by a rounding margin: see
+    /// [`Surface::height_m`].
     within: [f64; 2],
     same_time_s: f64,
     longest_delay_s: f64,
-    /// Order of the displacement's discontinuous derivative minus that of the force's: 2, or 1 if the velocity jumps with the force.
+    /// Order of the displacement's discontinuous derivative minus that of the force's: 2, or 1 if the velocity jumps
+    /// with the force.
     gain_of_order: u8,
 }
 
@@ -39,17 +41,19 @@ struct ToothState {
     in_arc: bool,
     /// Time of the tooth's next entry into, or exit from, the engagement arc, s.
     next_switch_s: f64,
-    /// Number of the tooth's present passing through the engagement arc, counted by the spindle angle.
+    /// Number of the tooth's present passing through the engagement arc, or of its next one while it is outside,
+    /// counted by the spindle angle.
     pass: f64,
     windows: MaterialWindows,
     in_material: bool,
     /// True while the edge cuts or touches the surface; otherwise the surface of the earlier passing persists.
     at_surface: bool,
-    /// Time of the tooth's last change of contact, s; a second change at the same time shows that it can neither keep nor lose contact.
+    /// Time of the tooth's last change of contact, s; a second change at the same time shows that it can neither keep
+    /// nor lose contact.
     changed_s: f64,
     surface: Surface,
-    /// Kinks of the surface in front of the tooth: time at which the tooth meets each kink, s, and order of the derivative that is
-    /// discontinuous there.
+    /// Kinks of the machined surface in front of the tooth, where a derivative of its height over time is
+    /// discontinuous: time at which the tooth meets each kink, s, and order of that derivative.
     kinks: VecDeque<(f64, u8)>,
 }
 
@@ -71,7 +75,8 @@ pub(super) struct Change {
 }
 
 impl<'a> Contact<'a> {
-    /// Contact of the teeth at t = 0 with a tool at rest; `velocity_jumps` as in [`super::Dynamics::velocity_jumps`].
+    /// State of contact of the teeth at t = 0, for a tool that was at rest before; `velocity_jumps` as in
+    /// [`super::Dynamics::velocity_jumps`].
     pub(super) fn new(cutting: &'a Cutting, velocity_jumps: bool) -> Self {
         let cutter = &cutting.cutter;
         let shortest = cutter
@@ -126,7 +131,7 @@ impl<'a> Contact<'a> {
         self.within = [from_s + inset, to_s - inset];
     }
 
-    /// Cutting force on the tool, N, at the time `t` and displacement `x`; without process damping.
+    /// Cutting force of all teeth on the tool, N, at the time `t`, s, and displacement `x`, m; without process damping.
     pub(super) fn force_n(&self, t: f64, x: [f64; 3]) -> [f64; 3] {
         let cutter = &self.cutting.cutter;
         let depth_m = self.depth_m(t, x);
@@ -144,8 +149,8 @@ impl<'a> Contact<'a> {
         sum.map(|force| force * cutter.force.wear(t))
     }
 
-    /// Matrix D, N s/m, of the process damping force −D v at the time `t` and displacement `x`; `None` without process damping or
-    /// tool diameter.
+    /// Matrix D, N s/m, of the process damping force −D v at the time `t` and displacement `x`; `None` without process
+    /// damping or tool diameter.
     pub(super) fn damping_ns_per_m(&self, t: f64, x: [f64; 3]) -> Option<[[f64; 3]; 3]> {
         let cutter = &self.cutting.cutter;
         cutter.force.process_damping?;
@@ -153,7 +158,8 @@ impl<'a> Contact<'a> {
         let depth_m = self.depth_m(t, x);
         let mut sum = [[0.0; 3]; 3];
         for tooth in self.cutting_teeth() {
-            // The flank force acts radially, so that the radial fraction of the axial depth applies.
+            // The whole flank force, which acts along the chip thickness, is taken with the radial fraction of the
+            // axial depth.
             let depth_m = depth_m * self.shares(tooth, t)[1];
             let damping = cutter
                 .force
@@ -165,7 +171,8 @@ impl<'a> Contact<'a> {
         Some(sum)
     }
 
-    /// Fractions of the axial depth that act in tangential, radial and axial force at the location of a tooth: see [`super::Pores`].
+    /// Factors on the axial depth in tangential, radial and axial force at the location of a tooth in porous material,
+    /// see [`super::Pores`]; 1 in solid material.
     fn shares(&self, tooth: &Tooth, t: f64) -> [f64; 3] {
         match &self.cutting.pores {
             Some(pores) => pores.at_tooth(&self.cutting.cutter, &self.cutting.spindle, tooth, t),
@@ -187,8 +194,8 @@ impl<'a> Contact<'a> {
         cutter.depth_at_m(cutter.depth_m * self.cutting.traverse.depth_share(t), x[2])
     }
 
-    /// Feed, m, during the regenerative delay of `tooth` at the time `t`. The feed axis moves at constant speed even if the spindle speed
-    /// varies.
+    /// Feed, m, during the regenerative delay of `tooth` at the time `t`. The feed axis moves at constant speed even if
+    /// the spindle speed varies.
     fn feed_m(&self, tooth: &Tooth, t: f64) -> f64 {
         tooth.feed_m * self.cutting.spindle.delay_share(t, tooth.pitch_rad)
     }
@@ -216,7 +223,8 @@ impl<'a> Contact<'a> {
             .immersion(self.cutting.spindle.angle_rad(t) + tooth.angle_rad)
     }
 
-    /// Height of the surface in front of a tooth, m: the surface of the tooth ahead minus the feed during the regenerative delay.
+    /// Height of the surface in front of a tooth, m: that of the surface which the tooth ahead left, minus the
+    /// contribution of the feed during the regenerative delay.
     fn surface_in_front_m(&self, tooth: &Tooth, immersion: Immersion, t: f64) -> f64 {
         let cutter = &self.cutting.cutter;
         let spindle = &self.cutting.spindle;
@@ -229,8 +237,8 @@ impl<'a> Contact<'a> {
         left - cutter.recession_m(immersion, self.feed_m(tooth, t))
     }
 
-    /// The first time after `t`, s, at which a tooth enters or leaves the engagement arc or the material, or meets a kink of the
-    /// surface, or at which the depth over the traverse has a knot.
+    /// The first time after `t`, s, at which a tooth enters or leaves the engagement arc or the material, or meets a
+    /// kink of the machined surface, or at which the rate of the axial depth over the traverse jumps.
     pub(super) fn next_switch_s(&self, t: f64) -> f64 {
         let after = t + self.same_time_s;
         let of_teeth = self.teeth.iter().map(|state| {
@@ -242,7 +250,8 @@ impl<'a> Contact<'a> {
             .min(self.cutting.traverse.next_knot(after))
     }
 
-    /// Applies the entries, exits and kinks at the time `t` of [`Self::next_switch_s`]; `x`, m, and `v`, m/s, are the motion of the tool.
+    /// Applies the entries and exits of the teeth, and the kinks of the machined surfaces, at the time `t` of
+    /// [`Self::next_switch_s`]; `x`, m, and `v`, m/s, are the motion of the tool.
     pub(super) fn switch(&mut self, t: f64, x: [f64; 3], v: [f64; 3]) {
         let now = t + self.same_time_s;
         let mut force_jumps = false;
@@ -265,7 +274,8 @@ impl<'a> Contact<'a> {
         }
     }
 
-    /// Moves a tooth into or out of the engagement arc if its entry or exit lies before the time `now`, s; true if it entered.
+    /// Moves a tooth into or out of the engagement arc if its entry or exit lies before the time `now`, s; true if it
+    /// entered.
     fn switch_arc(&mut self, index: usize, now: f64) -> bool {
         let mut entered = false;
         while self.teeth[index].next_switch_s <= now {
@@ -313,13 +323,14 @@ impl<'a> Contact<'a> {
         state.windows = MaterialWindows::default();
     }
 
-    /// Decides for each tooth that has just entered the engagement arc whether it is in contact, from the sign of its chip thickness shortly
-    /// afterwards.
+    /// Decides for each tooth that has just entered the engagement arc whether it is in contact, from the sign of its
+    /// chip thickness shortly afterwards.
     fn decide_contact_after_entry(&mut self, t: f64, x: [f64; 3], v: [f64; 3]) {
         if self.cutting.regeneration != Regeneration::AllPasses {
             return;
         }
-        // The time after entry must resolve the growth of the chip from zero and be short enough for linear extrapolation of the motion.
+        // The time after entry must resolve the growth of the chip from zero and be short enough for linear
+        // extrapolation of the motion.
         let soon_s = CONTACT_DECIDED * self.shortest_delay_s();
         let then = std::array::from_fn(|axis| x[axis] + soon_s * v[axis]);
         self.set_step(t, t + soon_s);
@@ -331,7 +342,8 @@ impl<'a> Contact<'a> {
         }
     }
 
-    /// The first loss or regain of contact in the step from `t` to `t + h`, s, while the tool moves along `displacement`.
+    /// The first loss or regain of contact in the step from `t` to `t + h`, s, while the tool moves along
+    /// `displacement`.
     pub(super) fn first_change(&self, t: f64, h: f64, displacement: &[Quartic; 3]) -> Option<Change> {
         if self.cutting.regeneration != Regeneration::AllPasses
             || self
@@ -356,7 +368,8 @@ impl<'a> Contact<'a> {
         let sign = if self.teeth[index].at_surface { 1.0 } else { -1.0 };
         let tolerance_m =
             (CONTACT_TOLERANCE * self.cutting.cutter.feed_per_tooth_m).max(CONTACT_TOLERANCE_MIN_M);
-        // Chip thickness, m, with a sign that makes it positive while the present state of contact persists.
+        // Chip thickness, m, with a sign that makes it positive in the present state of contact, plus the tolerance of
+        // contact: negative once the contact changes.
         let margin = |u: f64| {
             let x = std::array::from_fn(|axis| at(&displacement[axis], u));
             sign * self.chip(tooth, t + u * h, x).thickness_m + tolerance_m
@@ -364,8 +377,8 @@ impl<'a> Contact<'a> {
         first_below_zero(margin).map(|u| Change { tooth: index, u })
     }
 
-    /// Changes the contact of a tooth at the time `t`. False if it has already changed at this time: then the motion can continue neither
-    /// in contact nor out of contact.
+    /// Changes the contact of a tooth at the time `t`. False if it has already changed at this time: then the motion
+    /// can continue neither in contact nor out of contact.
     pub(super) fn change(&mut self, index: usize, t: f64) -> bool {
         let jumps = self.cutting.cutter.force.jumps_at_contact();
         let again = (t - self.teeth[index].changed_s).abs() <= self.same_time_s * 1e-3;
@@ -400,8 +413,8 @@ impl<'a> Contact<'a> {
         }
     }
 
-    /// Notes that derivative `order` of the force is discontinuous at the time `t`, s: the surfaces that are being cut then have a kink in
-    /// derivative `order` + `gain_of_order`.
+    /// Notes that derivative `order` of the force is discontinuous at the time `t`, s: the surfaces that are being cut
+    /// then have a kink in derivative `order` + `gain_of_order`.
     fn kink_of_force(&mut self, t: f64, order: u8) {
         self.kink_of_motion(t, order + self.gain_of_order);
     }
@@ -414,7 +427,8 @@ impl<'a> Contact<'a> {
         }
     }
 
-    /// Notes a kink at the time `t`, s, of the surface that tooth `index` leaves: the next tooth meets it one regenerative delay later.
+    /// Notes a kink at the time `t`, s, of the surface that tooth `index` leaves: the next tooth meets it one
+    /// regenerative delay later.
     fn kink_behind(&mut self, index: usize, t: f64, order: u8) {
         if order >= SMOOTH_FROM {
             return;
@@ -431,7 +445,8 @@ impl<'a> Contact<'a> {
         }
     }
 
-    /// Applies the kinks in the surface in front of tooth `index` that the tooth meets up to the time `now`, s.
+    /// Passes on the kinks of the surface in front of tooth `index` that the tooth meets up to the time `now`, s: out
+    /// of contact to the surface behind it, in contact to the force and so to all surfaces being cut.
     fn pass_kinks(&mut self, index: usize, now: f64) {
         while let Some((when, order)) = self.teeth[index]
             .kinks

@@ -13,7 +13,8 @@ pub struct Cutting {
     pub spindle: Spindle,
     /// Entry of the tool into the workpiece, full engagement, and exit.
     pub traverse: WorkpieceTraverse,
-    /// Earlier vibration of the tool that the chip thickness contains: that of all tooth passings, of the last one, or none.
+    /// Earlier vibration of the tool that the chip thickness contains: that of all tooth passings, of the last one, or
+    /// none.
     pub regeneration: Regeneration,
     /// Pores of the workpiece material; `None` for solid material.
     pub pores: Option<Pores>,
@@ -22,12 +23,13 @@ pub struct Cutting {
 /// The earlier vibration that the chip thickness includes (regenerative effect).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Regeneration {
-    /// All earlier tooth passings (multiple regeneration): a tooth that does not reach the surface they left has no force (thesis
-    /// eqs 6.20 to 6.27).
+    /// All earlier tooth passings (multiple regeneration): a tooth that does not reach the surface they left has no
+    /// force (thesis eqs 6.20 to 6.27).
     AllPasses,
-    /// The last tooth passing only; a negative chip thickness gives a negative force. This is the linear delay model of stability charts.
+    /// The last tooth passing only; a negative chip thickness gives a negative force. This is the linear delay model of
+    /// stability charts.
     LastPass,
-    /// No vibration at all: the chip thickness is that of feed and runout. The motion is the forced vibration, to which a stable cut
-    /// converges.
+    /// No vibration at all: the chip thickness is that of feed and runout. The motion is the forced vibration, to which
+    /// a stable cut converges.
     None,
 }

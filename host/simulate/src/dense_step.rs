@@ -14,7 +14,8 @@ pub struct DenseStep<'a> {
     pub(super) to_s: f64,
 }
 
-/// Motion of the tool, or at a sensor away from the tool tip, and force on the tool at one instant, in the machine's x, y, z.
+/// Motion of the tool, or at a sensor away from the tool tip, and force on the tool at one instant, in the machine's x,
+/// y, z.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Motion {
     /// Displacement of the tool or at the sensor, m.
@@ -33,7 +34,8 @@ pub struct Motion {
 pub struct Workspace {
     pub(super) state: Vec<f64>,
     pub(super) rate: Vec<f64>,
-    /// Equations of motion with the motion at a sensor away from the tool tip as output; `None` for a sensor at the tool.
+    /// Equations of motion with the motion at a sensor away from the tool tip as output; `None` for a sensor at the
+    /// tool.
     pub(super) sensor_dynamics: Option<Dynamics>,
 }
 
@@ -48,8 +50,8 @@ impl Workspace {
         }
     }
 
-    /// Buffers for the motion at a sensor: `modes[r]` is the shape of mode r at the sensor divided by its shape at the tool. An empty
-    /// list means a sensor at the tool.
+    /// Buffers for the motion at a sensor: `modes[r]` is the shape of mode r at the sensor divided by its shape at the
+    /// tool. An empty list means a sensor at the tool.
     pub fn at_sensor(model: &Model, modes: &[f64]) -> Self {
         Self {
             sensor_dynamics: (!modes.is_empty()).then(|| model.dynamics.at_sensor(modes)),

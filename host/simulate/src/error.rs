@@ -13,15 +13,16 @@ pub enum SimulateError {
         "the tool's diameter is not known, so its way into the workpiece is not: give diameter_mm in [tool], or let the depth grow instead"
     )]
     NoDiameter,
-    /// The displacement of the tool exceeded the bound [`super::Settings::largest_m`], or no integration step above the rounding of the time
-    /// has an error within the tolerance.
+    /// The displacement of the tool, or another state of the structure converted into one, exceeded the bound
+    /// [`super::Settings::largest_m`], or no integration step above the rounding of the time has an error within the
+    /// tolerance.
     #[error(
         "at {time_s:.6} s the tool is displaced by {displacement_mm:.3} mm and growing: beyond that the model means nothing (a softening spring has given way, or the cut is so unstable that loss of contact does not bound it)"
     )]
     Diverged {
         /// Simulated time at which the run stopped, s.
         time_s: f64,
-        /// Displacement of the tool, mm.
+        /// Largest state of the structure, converted into a displacement of the tool, mm.
         displacement_mm: f64,
     },
     /// The integration took more steps than [`super::Settings::steps_max`].

@@ -144,8 +144,9 @@ impl<'a> Integrator<'a> {
             Event::RegimeEnd { index, .. } => {
                 self.statistics.regime_changes += 1;
                 self.regimes[index] = self.next_regime(index, Some(self.regimes[index]));
-                // Just after a change a restoring force counts as within its new regime (see `first_below_zero`), so it should not change
-                // again at once. More changes than allowed without a step between them mean that no regime is consistent with the motion.
+                // Just after a change a restoring force counts as within its new regime (see `first_below_zero`), so it
+                // should not change again at once. More changes than allowed without a step between them mean that no
+                // regime is consistent with the motion.
                 *stuck += 1;
                 if *stuck > REGIME_CHANGES_MAX {
                     return Err(SimulateError::RegimeUndecided { time_s: self.t });
@@ -213,8 +214,8 @@ impl<'a> Integrator<'a> {
         if model.restoring_forces[index].locked(self.regimes[index]) {
             return held[axis];
         }
-        // The state derivative `rate` was computed with the friction force of slip. The holding force is that force plus the one that makes
-        // the axis's acceleration zero.
+        // The state derivative `rate` was computed with the friction force of slip. The holding force is that force
+        // plus the one that makes the axis's acceleration zero.
         let at = self.at(t, y);
         let sliding =
             model.restoring_forces[index].restoring_n(self.regimes[index], &at, &y[self.state_range(index)]);
@@ -254,8 +255,8 @@ impl<'a> Integrator<'a> {
         }
     }
 
-    /// Attempts steps until the error is within tolerance. Returns the length, s, and the event at the end of the step, which is not yet
-    /// accepted. Length 0 means that the event is at the current time.
+    /// Attempts steps until the error is within tolerance. Returns the length, s, and the event at the end of the step,
+    /// which is not yet accepted. Length 0 means that the event is at the current time.
     fn step_towards(&mut self, stop_s: f64) -> Result<(f64, Option<Event>), SimulateError> {
         let mut h = self.next_h;
         let is_held = self.is_held();
@@ -267,8 +268,8 @@ impl<'a> Integrator<'a> {
             let error = self.attempt(h);
             if error <= 1.0 {
                 let grown = h * (0.9 * error.max(1e-8).powf(-0.2)).clamp(0.2, 5.0);
-                // If a step was shortened only to end at a stop (a time at which the right-hand side is not smooth), the next step keeps
-                // the length planned before.
+                // If a step was shortened only to end at a stop (a time at which the right-hand side is not smooth),
+                // the next step keeps the length planned before.
                 self.next_h = if h < self.next_h {
                     grown.max(self.next_h)
                 } else {
@@ -346,7 +347,8 @@ impl<'a> Integrator<'a> {
         first_below_zero(margin).map(|u| Event::RegimeEnd { index, u })
     }
 
-    /// Attempts one integration step of length `h`, s, and its dense output; returns the step's local error divided by the tolerance.
+    /// Attempts one integration step of length `h`, s, and its dense output; returns the step's local error divided by
+    /// the tolerance.
     fn attempt(&mut self, h: f64) -> f64 {
         self.set_step(h);
         let model = self.model;
@@ -367,7 +369,8 @@ impl<'a> Integrator<'a> {
         })
     }
 
-    /// Largest state at the two ends of the last attempted integration step, converted into a displacement of the tool, m.
+    /// Largest state of the structure at the two ends of the last attempted integration step, converted into a
+    /// displacement of the tool, m.
     fn amplitude_m(&self) -> f64 {
         let ends = self.y.iter().zip(self.step.end());
         ends.zip(self.model.dynamics.sizes())
@@ -428,16 +431,16 @@ impl<'a> Integrator<'a> {
         contact.min(drive).min(end_s)
     }
 
-    /// The longest integration step, s: half the shortest tooth-passing period, so that the surface in front of a tooth is known. Without
-    /// a cut it is `end_s`.
+    /// The longest integration step, s: half the shortest tooth-passing period, so that the surface in front of a tooth
+    /// is known. Without a cut it is `end_s`.
     fn longest_step(&self, end_s: f64) -> f64 {
         self.contact
             .as_ref()
             .map_or(end_s, |contact| 0.5 * contact.shortest_delay_s())
     }
 
-    /// The longest step while the tool is at rest or friction sticks, s. The motion has then no error that would shorten the step, so the
-    /// excitation force limits it.
+    /// The longest step while the tool is at rest or friction sticks, s. The motion has then no error that would
+    /// shorten the step, so the excitation force limits it.
     fn longest_step_at_rest(&self) -> f64 {
         let drive = self.model.drive.as_ref();
         drive.map_or(f64::INFINITY, |drive| drive.longest_step_s())

@@ -1,14 +1,16 @@
-//! Time-domain simulation: the delay differential equations of milling integrated in time, test rigs, and the sensors that record them.
+//! Time-domain simulation: the delay differential equations of milling integrated in time, test rigs, and the sensors
+//! that record them.
 //!
-//! The equations are those of thesis chapters 3 and 6. Entry and exit of the teeth are not smoothed: a tooth enters and leaves exactly at its
-//! angles. The chip thickness follows from the surface that *all* earlier tooth passings left (thesis eqs 6.20 to 6.27). A tooth that does not reach
-//! the surface has no force.
+//! The equations are those of thesis chapters 3 and 6. Entry and exit of the teeth are not smoothed: a tooth enters and
+//! leaves exactly at its angles. The chip thickness follows from the surface that all earlier tooth passings left
+//! (thesis eqs 6.20 to 6.27). A tooth that does not reach the surface has no force.
 //!
-//! Main types: [`VirtualCut`] describes a cut of a case, [`Model`] is its equation of motion, [`DenseStep`] the motion over one step with dense
-//! output, [`rig::Rig`] a test with shaker, hammer or free decay, [`Recorder`] the recording of a cut.
+//! Main types: [`VirtualCut`] describes a cut of a case, [`Model`] is its equation of motion, [`DenseStep`] the motion
+//! over one step with dense output, [`rig::Rig`] a test with shaker, hammer or free decay, [`Recorder`] the recording
+//! of a cut.
 //!
-//! "The thesis" in this crate is *Chatter Vibrations in Robotic Milling Considering Structural Nonlinearity*, a doctoral
-//! thesis of the University of Victoria; its equation numbers are given as "thesis eq. 5.16".
+//! "The thesis" in this crate is *Chatter Vibrations in Robotic Milling Considering Structural Nonlinearity*, a
+//! doctoral thesis of the University of Victoria; its equation numbers are given as "thesis eq. 5.16".
 //!
 //! ```
 //! use std::path::Path;

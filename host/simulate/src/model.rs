@@ -8,7 +8,8 @@ use super::drive::Drive;
 use quietcut_model::restoring_force::{self, Regimes};
 use quietcut_model::{Dynamics, RestoringForce};
 
-/// Equation of motion M ẍ + C ẋ + K x + f_r = F: structure, cutting force, external excitation and added restoring forces f_r.
+/// Equation of motion M ẍ + C ẋ + K x + f_r = F: structure, cutting force, external excitation and added restoring
+/// forces f_r.
 pub struct Model {
     /// Linear structure with its cubic terms, in first-order form.
     pub dynamics: Dynamics,
@@ -24,7 +25,8 @@ pub struct Model {
 #[derive(Clone, Copy)]
 pub(super) struct StepContext<'a> {
     pub(super) contact: Option<&'a Contact<'a>>,
-    /// Start and end of the integration step, s, moved inwards by a rounding margin: the excitation force may jump at either.
+    /// Start and end of the integration step, s, moved inwards by a rounding margin: the excitation force may jump at
+    /// either.
     pub(super) within: [f64; 2],
     pub(super) regimes: Regimes<'a>,
 }
@@ -35,7 +37,7 @@ impl Model {
         self.dynamics.order() + restoring_force::states(&self.restoring_forces)
     }
 
-    /// Force on the tool from cut and excitation, N.
+    /// Force on the tool from cut and excitation, N, with process damping and the force drop of a shaker.
     pub(super) fn force_n(&self, context: StepContext<'_>, t: f64, x: [f64; 3], y: &[f64]) -> [f64; 3] {
         let mut force = context.contact.map_or([0.0; 3], |contact| contact.force_n(t, x));
         if let Some(drive) = &self.drive {
@@ -59,7 +61,8 @@ impl Model {
         }
     }
 
-    /// Force F on the tool with process damping, N. Solves F = `force` − D v together with the velocity v = C A y + C B F of the first-order form.
+    /// Force F on the tool with process damping, N. Solves F = `force` − D v together with the velocity v = C A y + C B
+    /// F of the first-order form.
     fn damped_n(&self, force: [f64; 3], damping: [[f64; 3]; 3], y: &[f64]) -> [f64; 3] {
         let v = Vector3::from(
             self.dynamics
@@ -69,8 +72,8 @@ impl Model {
         let jump = self.dynamics.velocity_per_force();
         let jump = Matrix3::from_fn(|i, j| jump[i][j]);
         let free = Vector3::from(force) - damping * v;
-        // D C B, by which the damping force reacts on the velocity that the force causes, is small compared with 1: the matrix I + D C B is
-        // regular.
+        // D C B, by which the damping force reacts on the velocity that the force causes, is small compared with 1: the
+        // matrix I + D C B is regular.
         (Matrix3::identity() + damping * jump)
             .lu()
             .solve(&free)
@@ -78,8 +81,8 @@ impl Model {
             .into()
     }
 
-    /// Writes the derivative ẏ of the states `y` at the time `t`, s, and displacement `x`, m; returns the force on the tool from cut and
-    /// excitation, N.
+    /// Writes the derivative ẏ of the states `y` at the time `t`, s, and displacement `x`, m; returns the force on the
+    /// tool from cut and excitation, N.
     pub(super) fn rate(
         &self,
         context: StepContext<'_>,

@@ -5,11 +5,12 @@ use quietcut_model::spindle::Spindle;
 
 /// A random foam whose pores are columns along the tool axis.
 ///
-/// Each node of a square lattice in the plane of feed and normal is solid or a pore at random. Between nodes the solid fraction s is
-/// interpolated twice differentiably. A tooth cuts the fraction s of its axial depth, so its force is s times the force in solid
-/// material; the surface that it leaves is the same. The tangential, radial and axial cutting pressures vary independently by
-/// ± `strength` from node to node. The tool feeds between two tooth passings, so that the force has a broad spectrum between the
-/// harmonics of the tooth-passing frequency, and its three components are not proportional (thesis section 7.2.1).
+/// Each node of a square lattice in the plane of feed and normal is solid or a pore at random. Between nodes the solid
+/// fraction s is interpolated twice differentiably. A tooth cuts the fraction s of its axial depth, so its force is s
+/// times the force in solid material; the surface that it leaves is the same. The tangential, radial and axial cutting
+/// pressures vary independently by ± `strength` from node to node. The tool feeds between two tooth passings, so that
+/// the force has a broad spectrum between the harmonics of the tooth-passing frequency, and its three components are
+/// not proportional (thesis section 7.2.1).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pores {
     /// Probability that a lattice node is a pore, 0 to 1.
@@ -23,9 +24,10 @@ pub struct Pores {
 }
 
 impl Pores {
-    /// Fractions of the axial depth that act in tangential, radial and axial force at the location of `tooth` at `t`, in s.
+    /// Factors on the axial depth in tangential, radial and axial force at the location of `tooth` at the time `t`, s.
     ///
-    /// The tool axis feeds at constant speed along x from 0 at t = 0. For a tool without diameter the teeth lie on its axis.
+    /// The tool axis moves at constant speed along the feed, from 0 at t = 0. For a tool without diameter the teeth lie
+    /// on its axis.
     pub(super) fn at_tooth(&self, cutter: &Cutter, spindle: &Spindle, tooth: &Tooth, t: f64) -> [f64; 3] {
         let revolutions = spindle.speed_rad_per_s() * t / std::f64::consts::TAU;
         let fed_m = cutter.feed_per_tooth_m * cutter.teeth.len() as f64 * revolutions;
@@ -34,7 +36,8 @@ impl Pores {
         self.at(fed_m + radius_m * sin, radius_m * cos)
     }
 
-    /// Solid fraction at a point of the workpiece times the relative cutting pressure: tangential, radial, axial.
+    /// Solid fraction at a point of the workpiece times the relative cutting pressure: tangential, radial, axial. The
+    /// point is given along feed and normal, m.
     pub(super) fn at(&self, x_m: f64, y_m: f64) -> [f64; 3] {
         let cell = LatticeCell::at(x_m / self.size_m, y_m / self.size_m);
         let solid = cell.interpolate(|i, j| f64::from(self.node_chance(i, j, 0) >= self.share));
@@ -53,8 +56,8 @@ impl Pores {
         })
     }
 
-    /// A uniform random number in [0, 1) that depends only on the lattice node (i, j), the seed and the purpose: 0 for the pore, 1 to 3 for
-    /// the three pressures.
+    /// A uniform random number in [0, 1) that depends only on the lattice node (i, j), the seed and the purpose: 0 for
+    /// the pore, 1 to 3 for the three pressures.
     fn node_chance(&self, i: i64, j: i64, purpose: u64) -> f64 {
         let bits = hashed(self.seed ^ hashed((i as u64) ^ hashed((j as u64) ^ hashed(purpose))));
         // The upper 53 bits.

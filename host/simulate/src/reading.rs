@@ -8,14 +8,14 @@ use super::effect::Pickup;
 use super::section_filter::SectionFilter;
 use quietcut_recording::Quantity;
 
-/// Number of intervals per sample in which the dynamics of a sensor are integrated. A choice: the parabola through a tone of a fifth of the
-/// sampling rate then has an error of 2·10⁻⁴, most of which cancels in the integral.
+/// Number of intervals per sample in which the dynamics of a sensor are integrated. A choice: the parabola through a
+/// tone of a fifth of the sampling rate then has an error of 2·10⁻⁴, most of which cancels in the integral.
 const INTERVALS_PER_SAMPLE: f64 = 4.0;
 
 /// Samples of one channel, collected while the motion is integrated.
 ///
-/// If a step of the force makes the velocity jump ([`super::Dynamics::velocity_jumps`]), an acceleration sample is the mean over one
-/// sampling interval h, (v(t + h/2) − v(t − h/2))/h.
+/// If a step of the force makes the velocity jump ([`super::Dynamics::velocity_jumps`]), an acceleration sample is the
+/// mean over one sampling interval h, (v(t + h/2) − v(t − h/2))/h.
 pub struct Reading {
     pickup: Pickup,
     workspace: Workspace,
@@ -24,7 +24,8 @@ pub struct Reading {
     is_mean: bool,
     /// Dynamics of the sensor along the motion; `None` for a sensor without dynamics, and before the first step.
     filter: Option<SectionFilter<1>>,
-    /// Samples of the channel. If `is_mean`: velocities half a sampling interval before each sample, and half an interval after the last.
+    /// Samples of the channel. If `is_mean`: velocities half a sampling interval before each sample, and half an
+    /// interval after the last.
     values: Vec<f64>,
 }
 
@@ -43,8 +44,9 @@ impl Reading {
         }
     }
 
-    /// Takes the samples of the channel that lie in the newest integration step. A delay of the sensor, or a mean over the sampling
-    /// interval, places the first values before t = 0, where the tool is at rest at its initial displacement.
+    /// Takes the samples of the channel that lie in the newest integration step. A delay of the sensor, or a mean over
+    /// the sampling interval, places the first values before t = 0, where the tool is at rest at its initial
+    /// displacement.
     pub fn observe(&mut self, step: &DenseStep<'_>) {
         if self.filter.is_none() && !self.pickup.sections.is_empty() {
             let start = step.motion(step.from_s(), &mut self.workspace);

@@ -24,18 +24,18 @@ pub enum Recorder {
         /// Seed of noise and jitter; the same seed gives the same recording.
         seed: u64,
     },
-    /// Ideal sampling without noise and filter. If the velocity of the structure jumps with the force, acceleration samples are means over
-    /// one sampling interval.
+    /// Ideal sampling without noise and filter. If the velocity of the structure jumps with the force, acceleration
+    /// samples are means over one sampling interval.
     Ideal {
         /// Sampling rate, Hz.
         rate_hz: f64,
     },
-    /// Ideal sampling after one linear-phase anti-aliasing filter without delay: pass band to 0.35, stop band from 0.5 of the rate. The
-    /// tachometer is not filtered.
+    /// Ideal sampling after one linear-phase anti-aliasing filter without delay: pass band to 0.35, stop band from 0.5
+    /// of the rate. The tachometer is not filtered.
     Filtered {
         /// Sampling rate, Hz.
         rate_hz: f64,
-        /// Factor by which the rate at which the simulated motion is evaluated, before the filter, exceeds the sampling rate of the
+        /// Rate at which the simulated motion is evaluated before the filter, divided by the sampling rate of the
         /// recording.
         oversampling: usize,
     },
@@ -58,11 +58,11 @@ impl Recorder {
 }
 
 impl VirtualCut {
-    /// Simulates the cut and records the [measured](Self::measured) quantities along those of x, y and z that the structure has, and the
-    /// tachometer. `path` is the path of the recording's file.
+    /// Simulates the cut and records the [measured](Self::measured) quantities along those of x, y and z that the
+    /// structure has, and the tachometer. `path` is the path of the recording's file.
     ///
-    /// The time base is the true time, so that a sensor with a clock error has its true sampling rate. Forces and displacements are sampled
-    /// at the same instants as the acceleration.
+    /// The time base is the true time, so that a sensor with a clock error has its true sampling rate. Forces and
+    /// displacements are sampled at the same instants as the acceleration.
     ///
     /// # Errors
     /// As [`VirtualCut::sense`]; also a tachometer wheel too fine for the sampling rate.
@@ -178,8 +178,8 @@ impl VirtualCut {
         Ok(sidecar)
     }
 
-    /// Tachometer level, 0 to 1: high for half the shortest pitch period of the wheel after each edge. An edge rises over two samples, as
-    /// after an anti-aliasing filter, so that its midpoint can be interpolated between samples.
+    /// Tachometer level, 0 to 1: high for half the shortest pitch period of the wheel after each edge. An edge rises
+    /// over two samples, as after an anti-aliasing filter, so that its midpoint can be interpolated between samples.
     fn level(
         &self,
         tachometer: TachometerModel,
@@ -189,7 +189,8 @@ impl VirtualCut {
         seed: Option<u64>,
     ) -> Result<Vec<f64>, VirtualCutError> {
         let [pitch_s, _] = spindle.bounds_s(TAU / f64::from(tachometer.wheel.positions));
-        // Shortest pitch of the wheel, s: two samples for the rise, two for the fall, and one for each level between them.
+        // Shortest pitch of the wheel, s, that the sampling resolves: two samples for the rise, two for the fall, and
+        // one for each level between them.
         let least = SAMPLES_PER_PITCH_MIN / rate_hz;
         if pitch_s < least {
             return Err(VirtualCutError::WheelTooFine {
@@ -263,7 +264,8 @@ impl Sensors {
         }
     }
 
-    /// Time that the simulation must continue after the last sample of the recording, s, because the filters need later motion.
+    /// Time that the simulation must continue after the last sample of the recording, s, because the filters need later
+    /// motion.
     fn tail_s(&self) -> f64 {
         self.samplers
             .iter()
@@ -277,7 +279,8 @@ impl Sensors {
         }
     }
 
-    /// Measured acceleration of a channel, m/s²; `None` for channels without an accelerometer.
+    /// Accelerations along x, y and z, m/s², measured by the accelerometer that a channel reads; `None` for channels
+    /// without an accelerometer.
     fn measured(&self, pickup: &Pickup) -> Option<Vec<[f64; 3]>> {
         let (accelerometer, seed) = self.accelerometer?;
         let (_, sampler) = self

@@ -10,12 +10,13 @@ use super::workpiece_traverse::WorkpieceTraverse;
 impl Model {
     /// Integrates from rest at t = 0 to `end_s`, s; `observe` receives every integration step in the order of time.
     ///
-    /// The local error is controlled (see [`Settings`]). Steps end where the right-hand side is not smooth: for example where a tooth enters
-    /// or leaves the arc, loses or regains contact, meets a kink of the surface from one of these events, or where friction begins to stick.
+    /// The local error is controlled (see [`Settings`]). Steps end where the right-hand side is not smooth: for example
+    /// where a tooth enters or leaves the arc, loses or regains contact, meets a kink of the surface from one of these
+    /// events, or where friction begins to stick.
     ///
     /// # Errors
-    /// The motion diverges, the integration takes too many steps, a tooth can neither keep nor lose contact, no regime of the restoring
-    /// forces is consistent, or the tool diameter is required and missing.
+    /// The motion diverges, the integration takes too many steps, a tooth can neither keep nor lose contact, no regime
+    /// of the restoring forces is consistent, or the tool diameter is required and missing.
     pub fn run(
         &self,
         end_s: f64,
@@ -25,7 +26,8 @@ impl Model {
         self.run_from(vec![0.0; self.order()], end_s, settings, observe)
     }
 
-    /// Integrates from the initial states `y` (see [`Self::order`]), otherwise as [`Self::run`]; before t = 0 the tool is at rest.
+    /// Integrates from the initial states `y` (see [`Self::order`]), otherwise as [`Self::run`]; before t = 0 the tool
+    /// is at rest.
     ///
     /// # Errors
     /// As [`Self::run`].
@@ -45,7 +47,8 @@ impl Model {
         Integrator::new(self, settings, y).run(end_s, observe)
     }
 
-    /// Motion at the times `first_s` + k·`every_s` up to `end_s`, s, from the initial states `y`; otherwise as [`Self::run_from`].
+    /// Motion at the times `first_s` + k·`every_s` up to `end_s`, s, from the initial states `y`; otherwise as
+    /// [`Self::run_from`].
     ///
     /// # Errors
     /// As [`Self::run`].

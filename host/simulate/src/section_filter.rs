@@ -4,8 +4,9 @@ use super::effect::FirstOrderSection;
 
 /// Readings of a sensor with dynamics: N signals that each pass the same first-order sections in series.
 ///
-/// A section H(s) = (b₀ + b₁·s)/(1 + T·s) has one state w, T·ẇ = x − w, and the output y = (b₁/T)·x + (b₀ − b₁/T)·w. Over a short interval
-/// the input x is a parabola through its values at the ends and in the middle, for which ẇ is integrated exactly.
+/// A section H(s) = (b₀ + b₁·s)/(1 + T·s) has one state w, T·ẇ = x − w, and the output y = (b₁/T)·x + (b₀ − b₁/T)·w.
+/// Over a short interval the input x is a parabola through its values at the ends and in the middle, for which ẇ is
+/// integrated exactly.
 #[derive(Clone, Debug)]
 pub(crate) struct SectionFilter<const N: usize> {
     sections: Vec<FirstOrderSection>,
@@ -55,7 +56,8 @@ fn pass(section: &FirstOrderSection, w: &mut f64, duration_s: f64, x: [f64; 3]) 
     if duration_s <= 0.0 {
         return x.map(|x| output(x, before));
     }
-    // x = x₀ + c₁·u + c₂·u² for u from 0 to 1. The particular solution is a parabola too: κ·dw/du = x − w with κ = T/duration.
+    // x = x₀ + c₁·u + c₂·u² for u from 0 to 1. The particular solution is a parabola too: κ·dw/du = x − w with κ =
+    // T/duration.
     let quadratic = 2.0 * (x[0] + x[2] - 2.0 * x[1]);
     let linear = x[2] - x[0] - quadratic;
     let kappa = section.time_constant_s / duration_s;

@@ -1,4 +1,5 @@
-//! Models of a digital accelerometer (bandwidth, range, noise, 16-bit resolution, clock error) and of a tachometer (jitter).
+//! Models of a digital accelerometer (bandwidth, range, noise, 16-bit resolution, clock error) and of a tachometer
+//! (jitter).
 
 use std::f64::consts::PI;
 
@@ -15,15 +16,17 @@ use super::{DenseStep, Model, Spindle, Workspace};
 
 /// Standard gravity, m/s².
 pub const STANDARD_GRAVITY: f64 = 9.806_65;
-/// Ratio of the rate at which the motion is evaluated to the sampling rate of the sensor. The number is a choice: the difference of the
-/// velocity over a quarter of the sampling interval lowers the gain by 0.5 % at the upper end of the pass band (sinc of 0.23/4).
+/// Ratio of the rate at which the motion is evaluated to the sampling rate of the sensor. The number is a choice: the
+/// difference of the velocity over a quarter of the sampling interval lowers the gain by 0.5 % at the upper end of the
+/// pass band (sinc of 0.23/4).
 const OVERSAMPLING: usize = 4;
-/// Number of taps of the anti-aliasing filter on each side of its centre tap, at the oversampled rate. From Kaiser's formula
-/// N = (A − 7.95)/(2.285 Δω) with a stop band of A = 70 dB and a transition band Δω = 2π·0.27/[`OVERSAMPLING`]: N = 64 = 2·32.
+/// Number of taps of the anti-aliasing filter on each side of its centre tap, at the oversampled rate. From Kaiser's
+/// formula N = (A − 7.95)/(2.285 Δω) with a stop band of A = 70 dB and a transition band Δω = 2π·0.27/[`OVERSAMPLING`]:
+/// N = 64 = 2·32.
 const TAPS_PER_SIDE: usize = 32;
 
-/// A simulated triaxial digital accelerometer, aligned with the machine axes. It reads the motion of the tool tip, or of another point of
-/// the structure with [`Sampler::at_sensor`].
+/// A simulated triaxial digital accelerometer, aligned with the machine axes. It reads the motion of the tool tip, or
+/// of another point of the structure with [`Sampler::at_sensor`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Accelerometer {
     /// Full scale of the accelerometer, g, at about ±32 768 counts.
@@ -38,7 +41,8 @@ pub struct Accelerometer {
     pub stamp_jitter_s: f64,
 }
 
-/// A tachometer wheel on the spindle. An edge, the first one after the gap if there is a gap, is at the spindle angle 0.
+/// A tachometer wheel on the spindle. An edge, the first one after the gap if there is a gap, is at the spindle
+/// angle 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TachometerModel {
     /// Number of positions on the tachometer wheel, and number of missing ones, which form the gap.
@@ -78,11 +82,12 @@ impl Accelerometer {
     }
 }
 
-/// Samples the acceleration of the tool while the motion is integrated.
+/// Samples the acceleration of the tool, or of a sensor location away from it, while the motion is integrated.
 ///
-/// Each sample is the acceleration after a linear-phase low pass without delay: pass band to 0.23, stop band from 0.5 of the sampling
-/// rate (6.1 and 13.3 kHz for the IIS3DWB). A real sensor adds a constant delay, see [`Self::late_by`]. The filter input is the
-/// difference of the velocity over a quarter of the sampling interval, so that a jump of the velocity acts as an impulse of acceleration.
+/// Each sample is the acceleration after a linear-phase low pass without delay: pass band to 0.23, stop band from 0.5
+/// of the sampling rate (6.1 and 13.3 kHz for the IIS3DWB). A real sensor adds a constant delay, see [`Self::late_by`].
+/// The filter input is the difference of the velocity over a quarter of the sampling interval, so that a jump of the
+/// velocity acts as an impulse of acceleration.
 #[derive(Clone, Debug)]
 pub struct Sampler {
     accelerometer: Accelerometer,
@@ -93,7 +98,7 @@ pub struct Sampler {
     /// Number of tool velocities evaluated so far. Velocity k belongs to the time (k − ½)·`step_s` − `delay_s`.
     taken: usize,
     velocity: [f64; 3],
-    /// Dynamics in front of the sensor; they act on the velocity.
+    /// First-order sections in front of the accelerometer, which filter the velocity; `None` if there are none.
     dynamics: Option<SectionFilter<3>>,
     /// Ring buffer of the newest accelerations at the oversampled rate, m/s², for the anti-aliasing filter.
     ring: Vec<[f64; 3]>,
@@ -117,7 +122,8 @@ impl Sampler {
         }
     }
 
-    /// This sampler at a location away from the tool; `modes` are the ratios of the mode shapes, see [`Workspace::at_sensor`].
+    /// This sampler at a location away from the tool; `modes` are the ratios of the mode shapes, see
+    /// [`Workspace::at_sensor`].
     #[must_use]
     pub fn at_sensor(self, model: &Model, modes: &[f64]) -> Self {
         Self {
@@ -139,13 +145,14 @@ impl Sampler {
         Self { dynamics, ..self }
     }
 
-    /// Time that the simulation must continue after the last sample, s, apart from the sensor's delay: half the length of the anti-aliasing
-    /// filter.
+    /// Time that the simulation must continue after the last sample, s, apart from the sensor's delay: half the length
+    /// of the anti-aliasing filter.
     pub fn tail_s(&self) -> f64 {
         (TAPS_PER_SIDE + 1) as f64 * self.step_s
     }
 
-    /// Takes the velocities that lie in the newest integration step, and the acceleration samples that follow from them.
+    /// Takes the velocities that lie in the newest integration step, and the acceleration samples that follow from
+    /// them.
     pub fn observe(&mut self, step: &DenseStep<'_>) {
         loop {
             let t = (self.taken as f64 - 0.5) * self.step_s - self.delay_s;
@@ -177,7 +184,8 @@ impl Sampler {
     fn take(&mut self, velocity: [f64; 3]) {
         let length = self.ring.len();
         if self.taken > 0 {
-            // The difference of the last two velocities gives the acceleration of the oversampled interval with the number `taken − 1`.
+            // The difference of the last two velocities gives the acceleration of the oversampled interval with the
+            // number `taken − 1`.
             let index = self.taken - 1;
             self.ring[index % length] =
                 std::array::from_fn(|axis| (velocity[axis] - self.velocity[axis]) / self.step_s);
@@ -197,8 +205,8 @@ impl Sampler {
         self.taken += 1;
     }
 
-    /// The samples so far without noise, m/s²; sample k belongs to the time k divided by the true sampling rate, minus the
-    /// delay.
+    /// The samples so far without noise, m/s²; sample k belongs to the time k divided by the true sampling rate, minus
+    /// the delay.
     pub fn samples(&self) -> &[[f64; 3]] {
         &self.samples
     }
@@ -250,7 +258,8 @@ impl TachometerModel {
         jitter_s: 2e-6,
     };
 
-    /// Time stamps of the edges from t = 0 to `end_s`, s, with jitter, in the order of time; the same seed gives the same jitter.
+    /// Time stamps of the edges from t = 0 to `end_s`, s, with jitter, in the order of time; the same seed gives the
+    /// same jitter.
     pub fn edges(&self, spindle: &Spindle, end_s: f64, seed: u64) -> Vec<Edge> {
         let mut source = stream(seed, Stream::Edges);
         let mut edges: Vec<Edge> = self
@@ -281,7 +290,8 @@ impl TachometerModel {
     }
 }
 
-/// Independent random streams of one seed: noise, time stamps of blocks and edges of the tachometer do not influence each other.
+/// Independent random streams of one seed: noise, time stamps of blocks and edges of the tachometer do not influence
+/// each other.
 enum Stream {
     Noise = 1,
     Stamps = 2,
@@ -303,8 +313,8 @@ fn nanoseconds(t: f64) -> Nanoseconds {
     Nanoseconds((t * 1e9).round() as u64)
 }
 
-/// Weights of the anti-aliasing low pass at the oversampled rate: a sinc with the −6 dB point at 0.365 of the sampling rate, under a Kaiser
-/// window with β = 7 (stop band −70 dB).
+/// Weights of the anti-aliasing low pass at the oversampled rate: a sinc with the −6 dB point at 0.365 of the sampling
+/// rate, under a Kaiser window with β = 7 (stop band −70 dB).
 fn low_pass() -> [f64; 2 * TAPS_PER_SIDE + 1] {
     let cutoff = 0.365 / OVERSAMPLING as f64;
     let weights: [f64; 2 * TAPS_PER_SIDE + 1] = std::array::from_fn(|index| {

@@ -9,15 +9,16 @@ pub struct Settings {
     pub absolute_m: f64,
     /// Relative tolerance of the local error, as a fraction of the amplitude of the motion.
     pub relative: f64,
-    /// Displacement of the tool beyond which the motion counts as diverged, m.
+    /// Displacement of the tool, or another state of the structure converted into one, beyond which the motion counts
+    /// as diverged, m.
     pub largest_m: f64,
     /// Largest number of steps, accepted and rejected; more end the run as too stiff.
     pub steps_max: u64,
 }
 
 impl Default for Settings {
-    /// Tolerances of 1e-12 m and of 1e-8 of the amplitude, far below the error of any measurement; a displacement of at most
-    /// 0.1 m; any number of steps.
+    /// Tolerances of 1e-12 m and of 1e-8 of the amplitude, far below the error of any measurement; a displacement of at
+    /// most 0.1 m; any number of steps.
     fn default() -> Self {
         Self {
             absolute_m: 1e-12,

@@ -5,14 +5,15 @@ use std::collections::VecDeque;
 use quietcut_model::cutter::{Cutter, Immersion, Tooth};
 use quietcut_numerics::dormand_prince::{Quartic, at};
 
-/// Interpolation nodes, as fractions of an integration step, for the surface below a tooth that is out of contact. Six equidistant nodes give
-/// a polynomial of degree 5, the order of the integrator.
+/// Interpolation nodes, as fractions of an integration step, for the surface below a tooth that is out of contact. Six
+/// equidistant nodes give a polynomial of degree 5, the order of the integrator.
 pub(super) const SURFACE_NODES: [f64; 6] = [0.0, 0.2, 0.4, 0.6, 0.8, 1.0];
 
-/// The machined surface that one tooth left during at least the last 1.5 longest regenerative delays, as a function of the time at which
-/// the tooth passed.
+/// The machined surface that one tooth left during at least the last 1.5 longest regenerative delays, as a function of
+/// the time at which the tooth passed.
 ///
-/// Heights of the surface, m, are along the chip thickness as in [`Cutter::reach_m`], in the frame that feeds with the tool.
+/// Heights of the surface, m, are along the chip thickness as in [`Cutter::reach_m`], in the frame that feeds with the
+/// tool.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Surface {
     arcs: VecDeque<SurfaceArc>,
@@ -29,16 +30,17 @@ struct SurfaceArc {
 #[derive(Clone, Copy, Debug)]
 /// Height of a piece of the machined surface as a function of the time at which the tooth passed.
 enum Profile {
-    /// Part of the surface that the tooth cuts: it is the path of the edge, which follows from the displacement of the tool (dense output,
-    /// m).
+    /// Part of the surface that the tooth cuts: it is the path of the edge, which follows from the displacement of the
+    /// tool (dense output, m).
     Cut([Quartic; 3]),
-    /// Part of the surface that the edge does not reach: the surface of an earlier tooth passing persists; its heights as Newton's divided
-    /// differences at [`SURFACE_NODES`].
+    /// Part of the surface that the edge does not reach: the surface of an earlier tooth passing persists; its heights
+    /// as Newton's divided differences at [`SURFACE_NODES`].
     Uncut([f64; 6]),
 }
 
 impl Surface {
-    /// Appends the piece of surface that the tooth cuts from `from_s` to `to_s`, s, while the tool moves along `displacement`.
+    /// Appends the piece of surface that the tooth cuts from `from_s` to `to_s`, s, while the tool moves along
+    /// `displacement`.
     pub(super) fn push_cut(&mut self, from_s: f64, to_s: f64, displacement: [Quartic; 3]) {
         self.arcs.push_back(SurfaceArc {
             from_s,
@@ -47,7 +49,8 @@ impl Surface {
         });
     }
 
-    /// Appends the piece of surface that the tooth does not reach from `from_s` to `to_s`, s; `heights`, m, are at [`SURFACE_NODES`].
+    /// Appends the piece of surface that the tooth does not reach from `from_s` to `to_s`, s; `heights`, m, are at
+    /// [`SURFACE_NODES`].
     pub(super) fn push_uncut(&mut self, from_s: f64, to_s: f64, mut heights: [f64; 6]) {
         for order in 1..heights.len() {
             for i in (order..heights.len()).rev() {
@@ -68,10 +71,11 @@ impl Surface {
         }
     }
 
-    /// Height of the surface that `tooth` left at the time `t`, m. Before the first recorded piece the tool was at rest.
+    /// Height of the surface that `tooth` left at the time `t`, m. Before the first recorded piece the tool was at
+    /// rest.
     ///
-    /// `within` are start and end of the evaluated step, s, each minus the regenerative delay. Where two pieces meet at one of these times,
-    /// the piece inside the step is used.
+    /// `within` are start and end of the evaluated step, s, each minus the regenerative delay. Where two pieces meet at
+    /// one of these times, the piece inside the step is used.
     pub(super) fn height_m(
         &self,
         cutter: &Cutter,

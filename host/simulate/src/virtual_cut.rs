@@ -20,8 +20,8 @@ use quietcut_recording::Quantity;
 pub struct VirtualCut {
     /// Spindle speed at the start of the virtual cut, rev/min.
     pub spindle_rpm: f64,
-    /// Spindle speed at the end of a linear speed sweep, rev/min; `None` for a constant speed. The feed speed is constant and gives the feed
-    /// per tooth of the case at the mean spindle speed.
+    /// Spindle speed at the end of a linear speed sweep, rev/min; `None` for a constant speed. The feed speed is
+    /// constant and gives the feed per tooth of the case at the mean spindle speed.
     pub last_rpm: Option<f64>,
     /// Axial depth of cut, mm.
     pub depth_mm: f64,
@@ -118,8 +118,8 @@ pub struct SensedCut {
 }
 
 impl VirtualCut {
-    /// A cut of `depth_mm` at constant speed that enters and leaves through the faces of the workpiece, with 0.2 s without contact at each
-    /// end.
+    /// A cut of `depth_mm` at constant speed that enters and leaves through the faces of the workpiece, with 0.2 s
+    /// without contact at each end.
     pub fn new(spindle_rpm: f64, depth_mm: f64, seconds: f64) -> Self {
         Self {
             spindle_rpm,
@@ -137,8 +137,8 @@ impl VirtualCut {
     /// The equation of motion of this cut of `case`.
     ///
     /// # Errors
-    /// The case lacks a section or has an extension that cannot be simulated, the duration is too short, wear makes the cutting force
-    /// negative, or the tool diameter is required and missing.
+    /// The case lacks a section or has an extension that cannot be simulated, the duration is too short, wear makes the
+    /// cutting force negative, or the tool diameter is required and missing.
     pub fn model(&self, case: &Case) -> Result<Model, VirtualCutError> {
         let effects = Effects::of_case(case)?.and(&self.effects);
         let mean_rpm = self.spindle_motion().speed_rad_per_s() * 60.0 / TAU;

@@ -12,7 +12,8 @@ pub enum WorkpieceTraverse {
     Air,
     /// Full engagement at all times; the surface at t = 0 is that of a tool at rest.
     Steady,
-    /// The axial depth grows linearly for the time `ramp_s` from `start_s` on, and decreases linearly for the same time until `end_s`.
+    /// The axial depth grows linearly for the time `ramp_s` from `start_s` on, and decreases linearly for the same time
+    /// until `end_s`.
     Ramp {
         /// Time of the first contact of the tool with the workpiece, s.
         start_s: f64,
@@ -21,8 +22,9 @@ pub enum WorkpieceTraverse {
         /// Time of the last contact of the tool with the workpiece, s.
         end_s: f64,
     },
-    /// The tool feeds in through the front face of the workpiece and out through its end face, so that the immersion grows and decreases.
-    /// A tooth at the immersion angle φ cuts while its position R sin φ along the feed is between the two faces.
+    /// The tool feeds in through the front face of the workpiece and out through its end face, so that the immersion
+    /// grows and decreases. A tooth at the immersion angle φ cuts while its position R sin φ along the feed is between
+    /// the two faces.
     Feed {
         /// Time at which the circle of the teeth touches the front face, s.
         start_s: f64,
@@ -57,15 +59,15 @@ impl MaterialWindows {
 }
 
 impl WorkpieceTraverse {
-    /// Time from the first contact with the front face of the workpiece to full engagement at the feed speed, s; the exit through the end
-    /// face takes as long.
+    /// Time from the first contact with the front face of the workpiece to full engagement at the feed speed, s; the
+    /// exit through the end face takes as long.
     ///
     /// # Errors
     /// The tool has no diameter.
     pub fn entry_duration_s(cutter: &Cutter, spindle: &Spindle) -> Result<f64, SimulateError> {
         let radius_m = cutter.radius_m.ok_or(SimulateError::NoDiameter)?;
-        // The tool is fully engaged when the last point of its engagement arc has passed the workpiece face: always one of the two ends of
-        // the arc.
+        // The tool is fully engaged when the last point of its engagement arc has passed the workpiece face: always one
+        // of the two ends of the arc.
         let last = cutter.start_rad.sin().min(cutter.exit_rad.sin());
         Ok(radius_m * (1.0 - last) / feed_speed(cutter, spindle))
     }
@@ -131,7 +133,8 @@ impl WorkpieceTraverse {
         }
     }
 
-    /// The times at which a tooth has material in front of it, if it passes the start angle at `open_s` and the exit angle at `close_s`, s.
+    /// The times at which a tooth has material in front of it, if it passes the start angle at `open_s` and the exit
+    /// angle at `close_s`, s.
     pub fn windows(&self, cutter: &Cutter, spindle: &Spindle, open_s: f64, close_s: f64) -> MaterialWindows {
         let whole = Some([open_s, close_s]);
         match *self {
@@ -148,8 +151,8 @@ impl WorkpieceTraverse {
                 let opened_rad = spindle.angle_rad(open_s);
                 let sin = |t: f64| (cutter.start_rad + (spindle.angle_rad(t) - opened_rad)).sin();
                 let window = [open_s, close_s];
-                // sin φ minus (position of a face)/R is positive where the tooth is beyond that face. This difference is
-                // concave in t, since the spindle speed varies slowly compared with a tooth passing.
+                // sin φ minus (position of a face)/R is positive where the tooth is beyond that face. This difference
+                // is concave in t, since the spindle speed varies slowly compared with a tooth passing.
                 let behind_front = positive(|t| sin(t) - (1.0 - speed * (t - start_s)), window);
                 let behind_end = positive(|t| sin(t) - (1.0 - speed * (t - end_s)), window);
                 let [before, after] = complement(behind_end, window);
@@ -192,8 +195,8 @@ fn positive(f: impl Fn(f64) -> f64, [from, to]: [f64; 2]) -> Option<[f64; 2]> {
     if f(top) <= 0.0 {
         return None;
     }
-    // The bound of the bisection at which the concave function `f` is positive, so that the window does not exceed the range of positive
-    // values.
+    // The bound of the bisection at which the concave function `f` is positive, so that the window does not exceed the
+    // range of positive values.
     let root = |negative: f64| {
         let [_, positive] = bisection([negative, top], 0.0, |x| {
             let is_positive = f(x) > 0.0;

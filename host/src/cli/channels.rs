@@ -23,8 +23,8 @@ pub(super) struct Channels {
     /// accelerometer of a cut has its own noise (--noise-ug) unless --ideal is given.
     #[arg(long, value_name = "P", default_value_t = 0.0, value_parser = non_negative, allow_negative_numbers = true)]
     noise_percent: f64,
-    /// Standard deviation of the noise of one channel in its SI unit, such as fx=0.02. Replaces --noise-percent for this
-    /// channel; may be repeated.
+    /// Standard deviation of the noise of one channel in its SI unit, such as fx=0.02. Replaces --noise-percent for
+    /// this channel; may be repeated.
     #[arg(long, value_name = "CHANNEL=VALUE", value_parser = channel_noise)]
     noise: Vec<(String, f64)>,
 }

@@ -34,7 +34,8 @@ pub struct Args {
 /// virtual cell predicts chatter at both.
 const CUTS: [(f64, f64); 2] = [(1045.0, 2.0), (900.0, 2.0)];
 
-/// Lowest and highest spindle speed of the lobe table, rev/min: a choice that contains both cuts and their advised speeds.
+/// Lowest and highest spindle speed of the lobe table, rev/min: a choice that contains both cuts and their advised
+/// speeds.
 const TABLE_RPM: (f64, f64) = (600.0, 2400.0);
 /// Largest axial depth of the lobe table, mm: a choice, three times the depth of the cuts.
 const TABLE_DEPTH_MM: f64 = 6.0;
@@ -63,8 +64,8 @@ struct TrialAnswer {
     alarm: Option<VerdictAnswer>,
     /// Last verdict of the device on one cut of the demonstration, before the tool begins to leave the workpiece.
     verdict: Option<&'static str>,
-    /// Root mean square of the acceleration in one cut of the demonstration along x, y and z over the last quarter of
-    /// full engagement, m/s².
+    /// Standard deviation of the acceleration in one cut of the demonstration along x, y and z over the last quarter
+    /// of full engagement, m/s².
     vibration_m_per_s2: [f64; 3],
 }
 
@@ -250,8 +251,8 @@ fn print_events(trial: &Trial, output: Output) -> Result<(), Error> {
     ))
 }
 
-/// Root mean square of the acceleration over the last quarter of full engagement, m/s², along the axis with the largest
-/// value.
+/// Standard deviation of the acceleration over the last quarter of full engagement, m/s², along the axis with the
+/// largest value.
 fn largest_vibration(trial: &Trial) -> f64 {
     trial.vibration().into_iter().fold(0.0, f64::max)
 }
@@ -259,7 +260,8 @@ fn largest_vibration(trial: &Trial) -> f64 {
 /// Checks the result of the demonstration.
 ///
 /// # Errors
-/// The device did not detect chatter in a first cut, advised no other speed or depth, or reports chatter in the advised cut.
+/// The device did not detect chatter in a first cut, advised no other speed or depth, or reports chatter in the
+/// advised cut.
 fn check(stories: &[Story]) -> Result<(), Error> {
     for Story { first, advised } in stories {
         let cut = format!("{:.0} rev/min, {:.2} mm", first.rpm, first.depth_mm);

@@ -14,7 +14,8 @@ use crate::report::digits::significant;
 use crate::report::lobes_change::{sentences, trial_cut_counts};
 use crate::trial_cuts::{self, TrialCut};
 
-/// Finds why the simulation of a case differs from recordings, extends the case, and states the gain in prediction error.
+/// Finds why the simulation of a case differs from recordings, extends the case, and states the gain in prediction
+/// error.
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Example:\n  quietcut simulate tests/cases/kuka-kr90-full.toml --experiment sweep --direction x --frequency-hz 10:25:2 --force-n 20 --effect cubic-stiffness=-5e12 --effect cubic-stiffness.direction=x --noise-percent 1 --out measured.csv\n  quietcut diagnose tests/cases/kuka-kr90-full.toml measured.csv --out diagnosis"
@@ -29,8 +30,8 @@ pub struct Args {
     /// Folder to write: extended.toml (the extended case), diagnosis.json and report.html.
     #[arg(long, value_name = "DIR", value_parser = folder)]
     out: Option<PathBuf>,
-    /// Trial cuts, a CSV file with the columns rpm [rev/min], depth [mm] and outcome (stable, chatter, marginal): compared
-    /// with the stability that the case and the extended case predict.
+    /// Trial cuts, a CSV file with the columns rpm [rev/min], depth [mm] and outcome (stable, chatter, marginal):
+    /// compared with the stability that the case and the extended case predict.
     #[arg(long, value_name = "FILE")]
     cuts: Option<PathBuf>,
     /// Seed of random numbers. Reserved: the diagnosis draws none, and its result does not depend on the seed.
@@ -73,8 +74,8 @@ pub fn run(args: Args) -> Result<(), Error> {
     args.output.answer_with(&understood, &diagnosis, text(&diagnosis))
 }
 
-/// Parses the name of the folder to write; the ending of an output file, such as `.html`, is refused unless a folder has
-/// that name.
+/// Parses the name of the folder to write; the ending of an output file, such as `.html`, is refused unless a folder
+/// has that name.
 fn folder(text: &str) -> Result<PathBuf, String> {
     let path = PathBuf::from(text);
     match crate::file::ending(&path).as_str() {
@@ -87,7 +88,8 @@ fn folder(text: &str) -> Result<PathBuf, String> {
 }
 
 /// Adds stability limits to the diagnosis: those of the case and of the extended case, or only those of the case if the
-/// diagnosis extends nothing and there are trial cuts or recorded cuts. A failed computation of limits becomes a warning.
+/// diagnosis extends nothing and there are trial cuts or recorded cuts. A failed computation of limits becomes a
+/// warning.
 fn add_limits(case: &Case, recordings: &[Recording], cuts: &[TrialCut], diagnosis: &mut Diagnosis) {
     let has_cuts = || !cuts.is_empty() || !recorded_cuts(case, recordings).0.is_empty();
     let found = match diagnosis.extended(case) {
@@ -108,8 +110,8 @@ fn add_limits(case: &Case, recordings: &[Recording], cuts: &[TrialCut], diagnosi
     }
 }
 
-/// Length of the progress bar of `quietcut diagnose`: the number of stages of a diagnosis, including the stability
-/// limits and the second search for causes in long recordings.
+/// Length of the progress bar of `quietcut diagnose`: at least the eight stages of a diagnosis that searches causes
+/// once, including the stability limits. A second search, in the whole of long recordings, has more stages.
 const STAGES: u64 = 9;
 
 fn stage_message(stage: Stage) -> &'static str {

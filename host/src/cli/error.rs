@@ -16,13 +16,12 @@ type Cause = Box<dyn StdError + Send + Sync>;
 
 /// The error with which a verb (subcommand) of `quietcut` ends.
 ///
-/// The `From` conversions decide for each error of the library crates whether it is an input error.
+/// The `From` conversions decide for each error of the library whether it is an input error.
 #[derive(Debug)]
 pub enum Error {
-    /// Wrong usage or wrong input: exit status 2. The message names the file, the line or key, the value found and the
-    /// allowed values.
+    /// Wrong usage or wrong input, which the user can correct: exit status 2.
     Input(Cause),
-    /// Anything else: exit status 1.
+    /// Failure that the user cannot correct: exit status 1.
     Other(Cause),
     /// The reader of standard output has closed the pipe (`quietcut monitor … | head`): exit status 0.
     ReaderGone,
@@ -39,7 +38,8 @@ impl Error {
         Self::Other(cause.into())
     }
 
-    /// Exit status of the process: 2 for wrong usage or input, 1 for other errors, 0 if the reader of standard output is gone.
+    /// Exit status of the process: 2 for wrong usage or input, 1 for other errors, 0 if the reader of standard output
+    /// has closed the pipe.
     pub fn exit_status(&self) -> u8 {
         match self {
             Self::Input(_) => 2,
@@ -147,8 +147,8 @@ impl From<DeviceError> for Error {
             DeviceError::PseudoTerminal { .. } | DeviceError::TooLarge { .. } | DeviceError::Cell(_) => {
                 Self::other(error)
             }
-            // These errors concern the port, the cable, the device or the lobe table, which the user can correct: they
-            // are input errors.
+            // These errors concern the port, the cable, the device, the lobe table or the state file of the simulated
+            // device, which the user can correct: they are input errors.
             _ => Self::input(error),
         }
     }

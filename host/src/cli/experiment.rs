@@ -23,12 +23,12 @@ pub(super) struct Experiment {
     /// Direction of the excitation force of a vibration test. Default: the first direction of the structure.
     #[arg(long, value_name = "x|y|z")]
     direction: Option<Direction>,
-    /// Frequencies in Hz, first:last:count or first:last: the steps of step-sine, the first and last frequency of a sweep, or the
-    /// tones of a shaker.
+    /// Frequencies in Hz, first:last:count or first:last: the steps of step-sine, the first and last frequency of a
+    /// sweep, or the tones of a shaker.
     #[arg(long, value_name = "R", value_parser = Range::positive, allow_negative_numbers = true)]
     frequency_hz: Option<Range>,
-    /// Force in N: amplitude of a sine, peak of an impact, or static force before a free decay. With commas: the levels of
-    /// step-sine, or the first and last amplitude of a shaker.
+    /// Force in N: amplitude of a sine, peak of an impact, or static force before a free decay. With commas: the levels
+    /// of step-sine, or the first and last amplitude of a shaker.
     #[arg(long, value_name = "F,…", value_parser = positive, allow_negative_numbers = true, value_delimiter = ',')]
     force_n: Vec<f64>,
     /// Duration of the excitation at each step of step-sine, in s.
@@ -99,7 +99,7 @@ struct ExperimentOutput {
     branch_changes: u64,
 }
 
-/// Simulates a vibration test and writes its recording.
+/// Simulates a vibration test on the structure of the case and writes its recording.
 pub(super) fn run(
     case: &Case,
     kind: ExperimentKind,
@@ -180,9 +180,10 @@ fn direction(options: &Experiment, structure: &Structure) -> Result<Direction, S
         .ok_or_else(|| "the structure has no direction in which a force can act".into())
 }
 
-/// Default sampling rate of a simulated vibration test in Hz: a power of two of at least 20 times the highest excited
-/// frequency (30 Hz if none is given), so that the eighth harmonic lies below the Nyquist frequency. An impact of duration T excites up to about
-/// 1/T.
+/// Default sampling rate of a simulated vibration test in Hz: the smallest power of two of at least 20 times the
+/// highest excited frequency, so that the eighth harmonic of this frequency lies below the Nyquist frequency. The
+/// highest excited frequency is that of `--frequency-hz`, 30 Hz without this option; an impact of duration T excites up
+/// to about 1/T.
 fn default_rate_hz(kind: ExperimentKind, options: &Experiment) -> f64 {
     let highest_hz = match kind {
         ExperimentKind::Hammer => 1e3 / options.pulse_ms,

@@ -51,11 +51,12 @@ pub fn run(args: Args) -> Result<(), Error> {
     args.output.answer_with(&understood, &answer, text)
 }
 
-/// Warns if aliasing (content above half the sample rate, folded into the record) may change the peak of a receptance by
-/// a ratio above [`SMALL_FOLDING`], and refuses a ratio above [`LARGEST_FOLDING`].
+/// Adds a warning if aliasing (content above half the sample rate, folded into the record) may change the peak of a
+/// receptance by a relative error above [`SMALL_FOLDING`]. A relative error above [`LARGEST_FOLDING`] is an error.
 fn check_folding(measurement: &mut Measurement) -> Result<(), Error> {
-    // The error by aliasing is inversely proportional to the spectra of force and response. So |H| divided by this
-    // error is largest at the resonance that the impacts excite, and small where the force spectrum vanishes.
+    // The error by aliasing at a frequency line is a sum of two terms: one is inversely proportional to the force
+    // spectrum there, the other to the response spectrum. So |H| divided by this error is largest at the resonance that
+    // the impacts excite, and small where the force spectrum vanishes.
     let at_peak = |(entry, folding): (&Frf, &Vec<f64>)| {
         let excited = |line: usize| entry.receptance[line].norm() / folding[line].max(f64::MIN_POSITIVE);
         let peak = (0..folding.len()).max_by(|&a, &b| excited(a).total_cmp(&excited(b)));

@@ -68,7 +68,7 @@ pub fn run(args: Args) -> Result<(), Error> {
     args.output.answer_with(&understood, &answer, text(&answer))
 }
 
-/// Sections (TOML tables) of the case file at `path`, after a check that it is a valid case.
+/// Content of the case file at `path` as a TOML table, after a check that it is a valid case.
 fn sections(path: &Path) -> Result<toml::Table, Error> {
     Case::read(path).map_err(Error::input)?;
     let text = crate::file::read_text(path)?;
@@ -76,7 +76,8 @@ fn sections(path: &Path) -> Result<toml::Table, Error> {
         .map_err(|error| Error::input(format!("{}: {error}", path.display())))
 }
 
-/// Significant digits of identified parameters in the text output; JSON and case files keep all. A choice.
+/// Number of significant digits of the identified parameters in the text output; JSON and case files keep all digits. A
+/// choice.
 const DIGITS: usize = 6;
 
 fn text(answer: &IdentifyOutput) -> String {

@@ -47,7 +47,8 @@ struct DeviceOutput {
 pub fn run(args: Args) -> Result<(), Error> {
     let (mut client, info) = args.port.connect()?;
     let (settings, status) = (client.settings()?, client.status()?);
-    // Asked last, because a device with older firmware rejects the request for the feed direction.
+    // The feed direction is requested last, because a device with older firmware rejects this request and those after
+    // it.
     let direction = client.feed_direction()?;
     let answer = DeviceOutput {
         feed_direction_deg: direction.map(|direction| number(direction.0)),

@@ -30,8 +30,8 @@ pub struct Args {
     /// Spindle speeds in rev/min, first:last:count or first:last (61 speeds).
     #[arg(long, value_name = "R", value_parser = Range::positive)]
     rpm: Option<Range>,
-    /// Axial depths in mm, first:last:count or first:last (61 depths). Limits are searched from depth 0 to the last, in steps no
-    /// wider than these.
+    /// Axial depths in mm, first:last:count or first:last (61 depths). Limits are searched from depth 0 to the last, in
+    /// steps no wider than these.
     #[arg(long, value_name = "R", value_parser = Range::non_negative)]
     depth_mm: Option<Range>,
     #[command(flatten)]
@@ -41,19 +41,21 @@ pub struct Args {
     cells: bool,
     #[command(flatten)]
     varied: Varied,
-    /// Ignore the standard deviations of the case (keys that end in _std): compute only the limits of the nominal parameters.
+    /// Ignore the standard deviations of the case (keys that end in _std): compute only the limits of the nominal
+    /// parameters.
     #[arg(long)]
     nominal: bool,
     /// Compute the probability of a stable cut at every speed and depth from the standard deviations of the case.
     #[arg(long, conflicts_with_all = ["nominal", "cells"])]
     probability: bool,
-    /// Trial cuts, a CSV file with the columns rpm [rev/min], depth [mm] and outcome (stable, chatter, marginal), or the table
-    /// that identify --method inverse-stability reads. The chart shows them, and wrong predictions are counted.
+    /// Trial cuts, a CSV file with the columns rpm [rev/min], depth [mm] and outcome (stable, chatter, marginal), or
+    /// the table that identify --method inverse-stability reads. The chart shows them, and wrong predictions are
+    /// counted.
     #[arg(long, value_name = "FILE", conflicts_with = "cells")]
     cuts: Option<PathBuf>,
-    /// Compute the limits at the given speeds only. Without this option further speeds are added where limits bend, so that
-    /// straight lines between all speeds are right to 1 % in depth or 0.1 % in speed; methods that need seconds per speed add
-    /// none.
+    /// Compute the limits at the given speeds only. Without this option further speeds are added where limits bend, so
+    /// that straight lines between all speeds are right to 1 % in depth or 0.1 % in speed; methods that need seconds
+    /// per speed add none.
     #[arg(long, conflicts_with = "cells")]
     no_refine: bool,
     /// Seed of the random parameters that are drawn from the standard deviations.
@@ -78,7 +80,8 @@ struct PointsOutput {
 }
 
 impl Args {
-    /// Refuses options without the ranges or points that they need; one message names all that is missing.
+    /// Refuses options of a chart, such as `--cells` or `--out`, and single ranges if `--rpm` or `--depth-mm` is
+    /// missing, and a command without ranges and points; one message names all that is missing.
     fn check(&self) -> Result<(), Error> {
         let has_range = self.rpm.is_some() || self.depth_mm.is_some();
         let missing: Vec<&str> = [
@@ -183,7 +186,7 @@ fn run_points(method: &dyn Method, at: &[(f64, f64)], output: Output) -> Result<
     output.answer(&PointsOutput { label, points }, text)
 }
 
-/// Modulus of a Floquet multiplier: six decimals, or seven digits of a large one.
+/// Modulus of a Floquet multiplier as text: six decimals below 1000, seven significant digits from 1000 on.
 fn modulus(value: f64) -> String {
     if value < 1e3 {
         format!("{value:.6}")
@@ -192,7 +195,6 @@ fn modulus(value: f64) -> String {
     }
 }
 
-/// Speeds, depths, probability option and trial cuts of a stability chart.
 struct ChartRequest {
     rpm: Range,
     depth_mm: Range,
@@ -274,7 +276,8 @@ fn run_chart(
     output.answer(&answer, text)
 }
 
-/// Warning about limits whose error cannot be computed, with every reason; `None` if there are none.
+/// Warning about stability limits whose error cannot be computed, with the reason for each; `None` if there are no such
+/// limits.
 fn error_warning(chart: &Chart) -> Option<String> {
     let reasons: Vec<&str> = chart
         .lines()
@@ -368,8 +371,8 @@ fn write_chart(case: &Case, chart: &Chart, depth_mm: f64, marks: &[Mark], path: 
 
 fn picture(case: &Case, chart: &Chart, depth_mm: f64, marks: &[Mark]) -> Result<String, Error> {
     let columns: Vec<Column> = chart.lines().into_iter().map(Column::from).collect();
-    // The chart cannot be drawn if the user gives only one spindle speed: this is an input error.
     let title = format!("{}, method: {}", case.name, chart.label);
+    // The chart cannot be drawn if the user gives only one spindle speed: this is an input error.
     lobe_chart(&title, &columns, depth_mm, marks).map_err(Error::input)
 }
 
@@ -425,7 +428,7 @@ fn row(line: &SpeedLine) -> maud::Markup {
     }
 }
 
-/// Parses `RPM,MM` into spindle speed in rev/min and axial depth in mm.
+/// Parses `RPM,MM` or `RPM:MM` into spindle speed in rev/min and axial depth in mm.
 fn working_point(text: &str) -> Result<(f64, f64), String> {
     let (rpm, depth_mm) = text
         .split_once([',', ':'])

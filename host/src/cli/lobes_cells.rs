@@ -10,8 +10,8 @@ use crate::report::cell_map::cell_map;
 use crate::report::page::{figure, page};
 use crate::stability::{CellChart, Method, Verdict, cell_chart};
 
-/// Computes the Floquet multipliers on the grid, writes them to each file of `--out`, and prints the counts of stable,
-/// unstable and undecided points.
+/// Computes the dominant Floquet multiplier at each speed and depth of the grid, writes them to each file of `--out`,
+/// and prints the counts of stable, unstable and undecided points.
 pub(super) fn run(
     case: &Case,
     method: &dyn Method,
@@ -76,7 +76,7 @@ fn picture(case: &Case, chart: &CellChart) -> Result<String, Error> {
     let mut sorted = chart.clone();
     sorted.speeds.sort_by(|a, b| a.rpm.total_cmp(&b.rpm));
     let title = format!("{}: |Floquet multiplier|, method: {}", case.name, chart.label);
-    // The map cannot be drawn for a single spindle speed or for descending depths: these are input errors.
+    // The map cannot be drawn for a single spindle speed, a single depth or descending depths: these are input errors.
     cell_map(&title, &sorted).map_err(Error::input)
 }
 

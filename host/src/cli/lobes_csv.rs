@@ -4,8 +4,8 @@ use super::Error;
 use super::lobes_spread::{intervals, percentiles};
 use crate::stability::Chart;
 
-/// Stability chart as CSV with one row per change of stability over depth; a speed without any change has one row with
-/// only its speed.
+/// Stability limits as CSV with one row for each change of stability over the axial depth at each spindle speed; a
+/// speed without any change has one row with its speed and, if computed, the percentiles of its first limit.
 pub(super) fn as_csv(chart: &Chart) -> Result<String, Error> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     let mut header = vec![

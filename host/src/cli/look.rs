@@ -11,7 +11,8 @@ use crate::frf::FrfTable;
 use crate::recording::{ChannelSummary, Import, Imported, Recording, Segment, Sidecar, Understood, envelope};
 use crate::report::digits::significant;
 
-/// Shows how a file is understood: channels, units, sample rate, peaks, clipping, dropouts, and the sidecar that states them.
+/// Shows how a file is understood: channels, units, sample rate, peaks, clipping, dropouts, and the sidecar that states
+/// them.
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Example:\n  quietcut simulate tests/cases/kuka-kr90-acetal.toml --experiment hammer --direction y --force-n 300 --sample-rate-hz 512 --noise-percent 0.1 --out tap.csv\n  quietcut look tap.csv\n\n\
@@ -122,7 +123,8 @@ pub fn run(args: Args) -> Result<(), Error> {
     args.output.answer(&answer, text.trim_end())
 }
 
-/// Refuses files of quietcut that are neither recordings nor tables of frequency response functions, with the command that shows them.
+/// Refuses lobe tables (`.qct`), cases and sidecars (`.toml`), which are neither recordings nor tables of frequency
+/// response functions; the error names the command that shows them.
 fn refuse_other_kinds(path: &Path) -> Result<(), Error> {
     let what = match crate::file::ending(path).as_str() {
         "qct" => format!("a lobe table; quietcut table --show {} shows it", path.display()),
@@ -290,9 +292,10 @@ impl RecordOutput {
     }
 }
 
-/// A number with its unit and four significant digits; some units get a prefix where the number is small or large.
+/// A number with its unit and four significant digits; some units get a prefix for a nonzero size below 0.1 or of 10⁴
+/// and more.
 fn shown(value: f64, unit: &str) -> String {
-    // Prefixes belong to units that carry them in practice.
+    // Only units that are written with prefixes in practice get one.
     let takes_prefix = matches!(unit, "m" | "N" | "V" | "m/s" | "m/s^2" | "Pa");
     let (factor, prefix) = match value.abs() {
         _ if !takes_prefix => (1.0, ""),
@@ -307,7 +310,8 @@ fn shown(value: f64, unit: &str) -> String {
         .into()
 }
 
-/// Picture of the envelope of a channel, drawn with block characters in one line.
+/// Picture of a channel over time, drawn with block characters in one line: the largest deviation from the mean in each
+/// part of the record, relative to the largest of all.
 fn picture(samples: &[f64]) -> String {
     const BLOCKS: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
     envelope(samples, WIDTH)

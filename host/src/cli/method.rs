@@ -20,11 +20,12 @@ use crate::stability::{
 /// Default number of time steps per tooth-passing period of semi-discretization and full discretization: a choice.
 const STEPS: usize = 100;
 
-/// Upper bound of `--steps`, time steps per tooth-passing period. A choice: of 20 000 steps each is a rotation of at
-/// most 0.018 degrees.
+/// Upper bound of `--steps`, time steps per tooth-passing period. A choice: with 20 000 steps the tool rotates by at
+/// most 0.018 degrees in each step.
 const STEPS_MAX: usize = 20_000;
 
-/// Upper bound of `--harmonics`, a choice: more harmonics make the truncated Hill matrix too large to be useful.
+/// Upper bound of `--harmonics`, harmonics of the directional coefficients. A choice: more make the truncated Hill
+/// matrix too large to be useful.
 const HARMONICS_MAX: usize = 400;
 
 /// Copy of the case with the values that its wear and drift give the parameters after `after_s` seconds of operation.
@@ -48,12 +49,12 @@ pub(super) struct MethodChoice {
     /// Stability method. Default: collocation; with --frf multi-frequency.
     #[arg(long, value_enum)]
     method: Option<MethodName>,
-    /// Table of receptances that replaces the structure of the case: frequency_hz,hxx_re [m/N],hxx_im [m/N],… or a table of
-    /// mobility or accelerance, also as magnitude and phase.
+    /// Table of receptances that replaces the structure of the case: frequency_hz,hxx_re [m/N],hxx_im [m/N],… or a
+    /// table of mobility or accelerance, also as magnitude and phase.
     #[arg(long, value_name = "FILE")]
     frf: Option<PathBuf>,
-    /// Meaning and unit of a column of --frf, such as Real=hxx_re:m/N,Imag=hxx_im:m/N, or hxx_mag, hxx_db, hxx_phase:deg,
-    /// coherence_xx. Several with commas between; may be repeated.
+    /// Meaning and unit of a column of --frf, such as Real=hxx_re:m/N,Imag=hxx_im:m/N, or hxx_mag, hxx_db,
+    /// hxx_phase:deg, coherence_xx. Several with commas between; may be repeated.
     #[arg(long, value_name = "COLUMN=NAME[:UNIT],…", value_delimiter = ',', value_parser = ColumnMap::parse, requires = "frf")]
     map: Vec<ColumnMap>,
     /// Highest harmonic of the directional coefficients in the stability computation. Default: multi-frequency adds
@@ -118,8 +119,8 @@ impl MethodChoice {
             return self.on_receptances(FrequencyProblem::of_table(case, &table)?, path);
         }
         let needs_collocation = (needs_orbit(case) || depends_on_speed(case)) && !self.linear;
-        // Only collocation computes limits about a forced orbit, as cubic terms require, and with coefficients that depend on the
-        // speed. The other methods refuse cubic terms unless `--linear` removes them.
+        // Only collocation computes limits about a forced orbit, as cubic terms require, and with cutting coefficients
+        // that depend on the spindle speed. The other methods refuse cubic terms unless `--linear` removes them.
         let cubic = if self.linear {
             CubicTerms::LeaveOut
         } else {

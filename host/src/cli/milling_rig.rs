@@ -46,7 +46,8 @@ struct MillingRigOutput {
     contact_changes: u64,
 }
 
-/// Default sampling rate, Hz: a choice far above the natural frequencies of a milling robot (tens of Hz).
+/// Default sampling rate of the recording of a porous or speed-sweep cut, Hz: a choice far above the natural
+/// frequencies of a milling robot (tens of Hz).
 const SAMPLE_RATE_HZ: f64 = 2048.0;
 
 /// Simulates the cut of porous or speed-sweep and writes the recording of its sensors.
@@ -128,9 +129,9 @@ pub(super) fn run(
     output.answer(&answer, text)
 }
 
-/// Lower bound of the internal sampling rate of the simulation, Hz: the larger of 1000 times the tooth-passing frequency (teeth enter and
-/// leave suddenly) and three times the rate at which a tooth passes pores, π·D·n/size with tool diameter D, n
-/// revolutions per second and the pore size. The fastest speed of the cut counts.
+/// Lower bound of the internal sampling rate of the simulation, Hz: the larger of 1000 times the tooth-passing
+/// frequency (teeth enter and leave suddenly) and three times the rate at which a tooth passes pores, π·D·n/size with
+/// tool diameter D, n revolutions per second and the pore size. The fastest spindle speed of the cut counts.
 fn fastest_hz(cut: &VirtualCut, case: &Case) -> f64 {
     let revolutions_hz = cut.spindle_rpm.max(cut.last_rpm.unwrap_or(0.0)) / 60.0;
     let tool = case.tool.as_ref();
@@ -142,7 +143,8 @@ fn fastest_hz(cut: &VirtualCut, case: &Case) -> f64 {
     (3.0 * pores_hz).max(1000.0 * teeth_hz)
 }
 
-/// Copy of the case with the immersion angles at entry and exit that the options give.
+/// Copy of the case with the immersion angles of `--start-deg` and `--exit-deg`; an option that is not given leaves the
+/// angle of the case.
 pub(super) fn immersed(case: &Case, rig: &MillingRig) -> Result<Case, Error> {
     let mut case = case.clone();
     if let Some(cut) = &mut case.cut {

@@ -1,7 +1,8 @@
 //! The command line: one file per verb, each with its arguments and a `run`.
 //!
-//! Exit status 0: success. Exit status 2: wrong usage or wrong input, with one message on stderr. Exit status 130: interrupted by
-//! Ctrl-C, which ends `monitor` with success. Exit status 1: any other failure. An output file is complete or unchanged.
+//! Exit status 0: success, or the reader of standard output has closed the pipe. Exit status 2: wrong usage or wrong
+//! input, with one message on stderr. Exit status 130: interrupted by Ctrl-C, which ends `monitor` with success. Exit
+//! status 1: any other failure. An output file is complete or unchanged.
 
 mod channels;
 pub mod demo;
@@ -86,7 +87,7 @@ pub fn main() -> ExitCode {
     panic::set_hook(Box::new(|fault| {
         eprintln!("quietcut: a fault in quietcut itself, please report it: {fault}");
     }));
-    // clap ends the process itself: exit status 2 for wrong usage, 0 for help.
+    // `error.exit()` of clap ends the process: with exit status 2 for wrong usage, 0 for `--help` and `--version`.
     let cli = Cli::try_parse().unwrap_or_else(|error| {
         let given: Vec<String> = std::env::args().collect();
         match dashed_value(&given).filter(|_| error.kind() == ErrorKind::UnknownArgument) {
@@ -117,8 +118,8 @@ pub fn main() -> ExitCode {
     }
 }
 
-/// Message for the first value of an option that begins with a dash and a digit or point, such as `--rpm -900:1200:7`: the
-/// parser takes such a value for an option.
+/// Message for the first value of an option that begins with a dash and a digit or point, such as `--rpm -900:1200:7`:
+/// the parser takes such a value for an option.
 fn dashed_value(given: &[String]) -> Option<String> {
     let is_value = |text: &str| {
         let mut letters = text.chars();

@@ -25,8 +25,8 @@ pub struct Args {
     output: StreamedOutput,
 }
 
-/// Least time between two printed lines while verdict and advice of the device do not change: a choice, short enough to show that
-/// the device still answers.
+/// Least time between two printed lines while verdict and advice of the device do not change: a choice, short enough to
+/// show that the device still answers.
 const UNCHANGED_LINE_PERIOD: Duration = Duration::from_secs(2);
 
 /// Longest wait for an event of the device before Ctrl-C and `--seconds` are checked: a choice.

@@ -114,7 +114,8 @@ pub struct StreamedOutput {
 }
 
 impl StreamedOutput {
-    /// Prints what has just happened: the JSON of `object` with `--json-lines`, nothing with `--json`, else `text`.
+    /// Prints one event, such as a change of the verdict: the JSON of `object` with `--json-lines`, nothing with
+    /// `--json`, else `text`.
     pub fn event(self, object: &impl Serialize, text: impl Display) -> Result<(), Error> {
         if self.json_lines {
             print(&serde_json::to_string(object).map_err(Error::other)?)
@@ -132,8 +133,8 @@ impl StreamedOutput {
         }
     }
 
-    /// Prints the end: with `--json-lines` an object with `summary` and, if a file had to be interpreted, `understood`; else as
-    /// [`Output::answer_with`].
+    /// Prints the last line of a verb that goes on: with `--json-lines` an object with `summary` and, if a file had to
+    /// be interpreted, `understood`; else as [`Output::answer_with`].
     pub(super) fn end(
         self,
         understood: &[Understood],
@@ -153,7 +154,7 @@ impl StreamedOutput {
     }
 }
 
-/// Last line of `--json-lines`.
+/// Last line of the output with `--json-lines`.
 #[derive(Serialize)]
 struct LastLine<'a, T> {
     summary: &'a T,

@@ -1,4 +1,5 @@
-//! `quietcut plan`: a search for the smallest set of tests that reduces the uncertainty of the stability limits to a given width.
+//! `quietcut plan`: a search for the smallest set of tests that reduces the uncertainty of the stability limits to a
+//! given width.
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -12,8 +13,8 @@ use crate::report::plan_chart::plan_chart;
 
 /// Finds the fewest cuts and tests that reduce the 90 % intervals of all stability limits to a given width.
 ///
-/// The standard deviations of the parameters stand in the case (keys that end in _std); for a case without such keys the
-/// options --assume-… apply. The widest 90 % interval of a limit is the width of the chart.
+/// The standard deviations of the parameters stand in the case (keys that end in _std); for a case without such keys
+/// the options --assume-… apply. The widest 90 % interval of a limit is the width of the chart.
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Example:\n  quietcut plan tests/cases/kuka-kr90-acetal.toml --rpm 700:2000:40 --depth-mm 0:6:60 --width-percent 15 --out plan.svg\n  quietcut plan tests/cases/insperger-1dof-ad1.toml --rpm 5000:15000:40 --depth-mm 0:4:60 --width-percent 10 --json"
@@ -25,8 +26,8 @@ pub struct Args {
     /// Spindle speeds in rev/min, first:last:count or first:last (61 speeds).
     #[arg(long, value_name = "R", value_parser = Range::positive)]
     rpm: Range,
-    /// Axial depths in mm, first:last:count or first:last (61 depths). Limits are searched from depth 0 to the last, in steps no
-    /// wider than these.
+    /// Axial depths in mm, first:last:count or first:last (61 depths). Limits are searched from depth 0 to the last, in
+    /// steps no wider than these.
     #[arg(long, value_name = "R", value_parser = Range::non_negative)]
     depth_mm: Range,
     /// Required width of the 90 % interval of every stability limit, in percent of the limit.
@@ -121,7 +122,8 @@ pub fn run(args: Args) -> Result<(), Error> {
     args.output.answer(&found, output_text)
 }
 
-/// Warnings about limits without derivatives: first limits, whose speeds the plan leaves out, and deeper lobes.
+/// Warnings about stability limits without derivatives with respect to the unknown parameters: one about first limits,
+/// whose spindle speeds the plan leaves out, and one about lobes at larger depths.
 fn derivative_warnings(without_derivative: &[WithoutDerivative]) -> Vec<String> {
     let listed = |is_first: bool| -> Vec<String> {
         without_derivative

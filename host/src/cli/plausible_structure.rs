@@ -1,4 +1,5 @@
-//! Plausibility of the structure of a case: a stiffness at the tool that no machine has is named before anything is computed.
+//! Plausibility of the structure of a case: warnings, before limits are computed, about a stiffness at the tool that no
+//! machine has.
 
 use std::f64::consts::TAU;
 
@@ -6,15 +7,16 @@ use crate::case::Case;
 use crate::criteria::{LEAST_DYNAMIC_STIFFNESS, PLAUSIBLE_STIFFNESS};
 use crate::report::digits::significant;
 
-/// Warns about a direction whose stiffness lies outside [`PLAUSIBLE_STIFFNESS`], or at a resonance below [`LEAST_DYNAMIC_STIFFNESS`].
+/// Warns about each direction x, y, z of the tool whose static stiffness lies outside [`PLAUSIBLE_STIFFNESS`], or whose
+/// dynamic stiffness at a resonance is below [`LEAST_DYNAMIC_STIFFNESS`].
 pub(super) fn warn(case: &Case) {
     for warning in warnings(case) {
         tracing::warn!("{warning}");
     }
 }
 
-/// Warnings about directions that are softer or stiffer than any machine, statically or at a resonance; none if the structure is missing or
-/// has no receptance.
+/// Warnings, at most one for each direction, about directions of the tool that are statically softer or stiffer than
+/// any machine, or softer at a resonance; none if the case has no structure or the structure has no receptance.
 fn warnings(case: &Case) -> Vec<String> {
     let Some(first_order) = case
         .structure
@@ -56,7 +58,8 @@ fn warnings(case: &Case) -> Vec<String> {
         .collect()
 }
 
-/// Reason why no machine has this stiffness, N/m, at the angular frequency; `None` if it is plausible.
+/// Reason why no machine has the stiffness `n_per_m` at the angular frequency `omega`, rad/s; static at 0. `None` if it
+/// is plausible.
 fn implausible(omega: f64, n_per_m: f64) -> Option<String> {
     let [softest, stiffest] = PLAUSIBLE_STIFFNESS;
     let is_static = omega == 0.0;

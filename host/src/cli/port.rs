@@ -10,7 +10,8 @@ use super::Error;
 use crate::device::{self, Client};
 use crate::report::answer::number;
 
-/// Port of the device: options of every verb that connects to a device.
+/// Port of the device, and state file of the simulated device: options of `upload`, `info`, `working-point` and
+/// `monitor`.
 #[derive(Debug, clap::Args)]
 pub struct PortArgs {
     /// Serial port of the device, or `simulated`.
@@ -118,14 +119,14 @@ pub enum SlotAnswer {
     Valid {
         /// Size of the table, bytes.
         length: u32,
-        /// Generation number of the lobe table; each upload increases it by one.
+        /// Generation number of the lobe table: an uploaded table gets that of the table in use plus one.
         generation: u32,
     },
     /// The slot holds the lobe table that the device uses.
     InUse {
         /// Size of the table, bytes.
         length: u32,
-        /// Generation number of the table; each upload increases it by one.
+        /// Generation number of the lobe table in use; the next uploaded table gets this number plus one.
         generation: u32,
     },
 }

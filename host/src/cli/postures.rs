@@ -1,4 +1,4 @@
-//! Postures of a lobe table, which bound the posture of a working point.
+//! Postures of a lobe table: the posture of a working point must be one of them.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -17,10 +17,11 @@ pub(super) fn of_table(path: &Path, bytes: &[u8]) -> Result<Vec<u8>, Error> {
     Ok(postures(&table))
 }
 
-/// Postures of the newest lobe table in the memory file of the simulated device; `None` if it holds none.
+/// Postures of the newest lobe table in the memory file of the simulated device; `None` if the file cannot be read or
+/// holds no lobe table.
 pub(super) fn of_state(path: &Path) -> Option<Vec<u8>> {
     let bytes = crate::file::read(path).ok()?;
-    // The firmware begins a table at a word of the flash memory.
+    // The firmware begins a lobe table at a multiple of a word of the flash memory.
     let tables = (0..bytes.len()).step_by(WORD).filter_map(|at| {
         let rest = &bytes[at..];
         let header = Header::read(rest).ok()?;
@@ -37,7 +38,7 @@ fn postures(table: &LobeTable<'_>) -> Vec<u8> {
     postures.into_iter().collect()
 }
 
-/// Refuses a posture that is not among the `known` ones.
+/// Refuses a posture that is not among the postures `known` of the lobe table; `None` accepts every posture.
 pub(super) fn check(posture: u8, known: Option<&[u8]>) -> Result<(), Error> {
     let Some(known) = known.filter(|known| !known.contains(&posture)) else {
         return Ok(());

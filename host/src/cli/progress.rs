@@ -1,6 +1,7 @@
 //! Progress of a verb on a terminal: a line on standard error while it computes.
 //!
-//! The line that `show` draws is removed before results or log messages are printed. Without a terminal nothing is shown.
+//! The line that `show` draws is removed before results or log messages are printed. Without a terminal nothing is
+//! shown.
 
 use std::io::IsTerminal;
 use std::sync::{Mutex, PoisonError};
@@ -11,7 +12,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 /// Period of the animation of the progress line on the terminal: a choice, short enough to show that the command works.
 const TICK: Duration = Duration::from_millis(200);
 
-/// The progress line that stands on the terminal at present; `None` if there is none.
+/// The progress line that [`show`] has drawn and [`clear`] has not removed; `None` if there is none.
 static SHOWN: Mutex<Option<ProgressBar>> = Mutex::new(None);
 
 /// Shows a progress line with the activity `doing` and the elapsed time, until [`clear`].

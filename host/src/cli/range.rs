@@ -4,7 +4,8 @@ use std::str::FromStr;
 
 use super::number::finite;
 
-/// Evenly spaced values from `first` to `last`, both included; written `first:last:count`, `first:last`, or one number alone.
+/// Evenly spaced values from `first` to `last`, both included; written `first:last:count`, `first:last`, or one number
+/// alone.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Range {
     first: f64,
@@ -17,7 +18,8 @@ impl Range {
     /// error.
     const MAX_COUNT: usize = 1_000_000;
 
-    /// Number of values of `first:last` without a count. A choice: steps of a sixtieth are fine in a chart.
+    /// Number of values of `first:last` without a count. A choice: steps of a sixtieth of the range are fine in a
+    /// chart.
     pub const DEFAULT_COUNT: usize = 61;
 
     /// First value of the range.
@@ -46,7 +48,8 @@ impl Range {
             .collect()
     }
 
-    /// Number of equal steps from 0 to the larger end of the range such that no step is wider than those of the range.
+    /// Number of equal steps from 0 to the larger end of the range, each at most as wide as the width of the range
+    /// divided by its number of values; 1 for a single value.
     pub fn steps_from_zero(&self) -> usize {
         let widest = (self.last - self.first).abs() / self.count.max(2) as f64;
         if widest > 0.0 {
@@ -86,7 +89,8 @@ impl Range {
 /// Form of a range, for messages.
 const FORM: &str = "first:last or first:last:count, such as 600:2400 or 600:2400:91";
 
-/// Numbers of a range as it is written: first, last and count. Commas in place of colons are read too.
+/// Numbers of a range as it is written: first, last and count, the latter two `None` where they are missing. Commas in
+/// place of colons are read too.
 fn parts(text: &str) -> Result<(f64, Option<f64>, Option<usize>), String> {
     let separator = if text.contains(':') { ':' } else { ',' };
     let parts: Vec<&str> = text.split(separator).map(str::trim).collect();
@@ -117,7 +121,8 @@ fn parts(text: &str) -> Result<(f64, Option<f64>, Option<usize>), String> {
     }
 }
 
-/// The range that was probably meant by `600-2400`, `600..2400` or `600 2400`.
+/// The range that was probably meant by a text such as `600-2400`, `600..2400` or `600 2400`; `None` if the text
+/// suggests none.
 fn meant(text: &str) -> Option<String> {
     ["..", "-", " ", ";", "/"].into_iter().find_map(|separator| {
         let ends: Vec<&str> = text

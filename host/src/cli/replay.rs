@@ -127,8 +127,8 @@ fn on_host(args: &Args, sensed: &Sensed, table: Option<&[u8]>) -> Result<Verdict
     Ok(log)
 }
 
-/// Runs the signal chain of a device on a recording. Afterwards it restores the settings of the device and returns it
-/// to its own sensor; an uploaded lobe table stays.
+/// Runs the signal chain of a device on a recording. Afterwards it restores the settings, the working point and a
+/// replaced feed direction of the device, and returns it to its own sensor; an uploaded lobe table stays.
 fn on_device(args: &Args, port: &str, sensed: &Sensed, table: Option<&[u8]>) -> Result<VerdictLog, Error> {
     let (mut client, _) = Client::connect(device::open(port, None)?)?;
     if let (Some(bytes), Some(path)) = (table, &args.table) {

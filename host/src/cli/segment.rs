@@ -12,8 +12,8 @@ pub(super) struct RecordedSegment {
     /// Start of the segment in s on the time axis of the file. Default: the first sample.
     #[arg(long, value_name = "T", value_parser = finite, allow_negative_numbers = true)]
     from_s: Option<f64>,
-    /// End of the segment in s on the time axis of the file; samples at this time or later are not used. Default: the last
-    /// sample.
+    /// End of the segment in s on the time axis of the file; samples at this time or later are not used. Default: the
+    /// last sample.
     #[arg(long, value_name = "T", value_parser = finite, allow_negative_numbers = true)]
     until_s: Option<f64>,
     #[command(flatten)]
@@ -56,7 +56,7 @@ impl StatedColumns {
 }
 
 impl RecordedSegment {
-    /// The options as an import.
+    /// The options `--from-s`, `--until-s`, `--map`, `--rate` and `--record` as the instructions for reading a file.
     pub(super) fn import(&self) -> Import {
         self.stated.import(Segment {
             from_s: self.from_s,
@@ -64,10 +64,11 @@ impl RecordedSegment {
         })
     }
 
-    /// Reads the segment of each recording, in the order of `paths`; prints one line on stderr for each file that had to be interpreted.
+    /// Reads the segment of every recording in the files `paths`, in their order; prints one line on stderr for each
+    /// file whose first record had to be interpreted.
     ///
     /// # Errors
-    /// A recording cannot be read, or has no samples in the segment.
+    /// For example: a recording cannot be read, or has no samples in the segment.
     pub(super) fn read(&self, paths: &[PathBuf]) -> Result<Recorded, Error> {
         let import = self.import();
         let mut read = Recorded::default();

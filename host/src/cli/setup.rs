@@ -171,7 +171,7 @@ pub fn run(args: Args) -> Result<(), Error> {
     args.output.answer(&output, text)
 }
 
-/// Which taps to make.
+/// Text for the user about the taps to make: number, directions, files and sensor.
 const TAPS: &str = "\
 Taps: five in x, five in y, saved as taps/x.csv and taps/y.csv (CSV, UFF, MAT, WAV …).
 
@@ -224,8 +224,8 @@ struct Question {
 }
 
 impl Given {
-    /// These answers of the user; each that is missing here is taken from `other`. Material and immersion are not mixed:
-    /// `other` gives them only if these answers have none.
+    /// These answers of the user; each that is missing here is taken from `other`. Answers about the material are not
+    /// mixed, and neither are those about the immersion: `other` gives them only if these answers have none.
     fn or(self, other: Self) -> Self {
         let has_material = self.material.is_some() || self.ktc_mpa.is_some();
         let has_cut = self.down_milling_mm.is_some() || self.up_milling_mm.is_some() || self.slot;
@@ -422,7 +422,7 @@ fn material_of(name: &str) -> Result<MaterialAnswer, String> {
     ))
 }
 
-/// Parses `first:last`, rev/min.
+/// Parses the lowest and the highest spindle speed, `first:last` in rev/min.
 fn speeds(text: &str) -> Result<(f64, f64), Error> {
     let wrong = || {
         Error::input(format!(

@@ -49,8 +49,8 @@ pub struct Args {
     /// Effect to add to the case, such as runout=20 (µm) or runout.angle_deg=45; may be repeated; listed below.
     #[arg(long, value_name = "NAME=VALUE")]
     effect: Vec<String>,
-    /// Entry into and exit from the workpiece. Default: feed, or ramp if the tool diameter is not given or the duration is
-    /// too short for feed.
+    /// Entry into and exit from the workpiece. Default: feed, or ramp if the tool diameter is not given or the duration
+    /// is too short for feed.
     #[arg(long, value_name = "KIND")]
     entry: Option<EntryKind>,
     /// Duration of the depth ramp with --entry ramp, in s. Default: a tenth of the duration of the cut.
@@ -87,8 +87,8 @@ pub struct Args {
     /// Seed of the random numbers (sensor noise, scatter of impacts); the same seed gives the same file.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// Recording to write; the ending sets the format: csv, uff (UFF 58, text) or bunv (UFF 58, binary). Metadata go to a
-    /// sidecar file with the ending .toml.
+    /// Recording to write; the ending sets the format: csv, uff (UFF 58, text) or bunv (UFF 58, binary). Metadata go to
+    /// a sidecar file with the ending .toml.
     #[arg(long, value_name = "REC.csv", value_parser = recording_to_write)]
     out: PathBuf,
     #[command(flatten)]

@@ -24,8 +24,8 @@ pub struct Args {
     /// Lobe table to write.
     #[arg(long, value_name = "FILE.qct", value_parser = Endings(&["qct"]).parser(), requires = "cases")]
     out: Option<PathBuf>,
-    /// Spindle speeds in rev/min, first:last or first:last:count. Only the ends are used; the speeds between them are chosen adaptively.
-    /// Default: the speed limits of the machine, else the range of the lobes.
+    /// Spindle speeds in rev/min, first:last or first:last:count. Only the ends are used; the speeds between them are
+    /// chosen adaptively. Default: the speed limits of the machine, else the range of the lobes.
     #[arg(long, value_name = "R", value_parser = Range::positive, requires = "cases")]
     rpm: Option<Range>,
     /// Largest axial depth in mm. Default: four times the lowest stability limit.
@@ -34,16 +34,17 @@ pub struct Args {
     /// Initial number of spindle speeds in the lobe table; more are added where the limits curve. Default: 121.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(2..=2000), requires = "cases")]
     speeds: Option<u16>,
-    /// Feeds per tooth in mm, separated by commas, for cases whose limits depend on the feed. Each becomes a layer; more
-    /// layers are added between them where the limits curve.
+    /// Feeds per tooth in mm, separated by commas, for cases whose limits depend on the feed. Each becomes a layer;
+    /// more layers are added between them where the limits curve.
     #[arg(long, value_name = "MM", value_parser = super::positive, value_delimiter = ',', requires = "cases")]
     feed: Vec<f64>,
-    /// Feed directions in degrees from the machine's x towards its y, separated by commas. Each becomes a layer; more layers
-    /// are added between them where the limits curve. Default: the feed direction of each case, which the table does not store.
+    /// Feed directions in degrees from the machine's x towards its y, separated by commas. Each becomes a layer; more
+    /// layers are added between them where the limits curve. Default: the feed direction of each case, which the table
+    /// does not store.
     #[arg(long, value_name = "DEG", value_parser = super::finite, value_delimiter = ',', allow_negative_numbers = true, requires = "cases")]
     feed_direction_deg: Vec<f64>,
-    /// Store the derivatives of each limit with respect to natural frequencies, damping ratios and cutting force, for a device
-    /// that updates these parameters.
+    /// Store the derivatives of each limit with respect to natural frequencies, damping ratios and cutting force, for a
+    /// device that updates these parameters.
     #[arg(long, requires = "cases")]
     derivatives: bool,
     /// Store this percentile of the first limit, in percent, instead of the nominal limit. It follows from the standard
@@ -76,8 +77,8 @@ struct TableOutput {
     warnings: Vec<String>,
 }
 
-/// Bound of the interpolation error between the entries of a lobe table: in depth, mm, and in spindle speed, relative
-/// to the speed.
+/// Bound of the interpolation error of the stability limits between the entries of a lobe table: in axial depth, mm,
+/// and in spindle speed, relative to the speed.
 #[derive(Serialize)]
 struct ErrorOutput {
     depth_mm: f32,

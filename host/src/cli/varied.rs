@@ -12,7 +12,8 @@ use crate::stability::{Label, SpeedLine, chart};
 /// Options that vary a third parameter of the stability chart besides spindle speed and axial depth.
 #[derive(Debug, clap::Args)]
 pub(super) struct Varied {
-    /// Compute the limits for each of these feed directions: degrees from the machine's x towards its y, first:last:count.
+    /// Compute the limits for each of these feed directions: degrees from the machine's x towards its y,
+    /// first:last:count.
     #[arg(long, value_name = "R", allow_negative_numbers = true, requires = "rpm", conflicts_with_all = ["out", "cells", "feed_mm"])]
     feed_direction_deg: Option<Range>,
     /// Compute the limits for each of these feeds per tooth, in mm, first:last:count. Limits depend on the feed with
@@ -44,7 +45,7 @@ struct ChartOutput {
 
 impl Varied {
     /// The parameter of the cut, feed direction or feed per tooth, that the options vary over a range; `None` without
-    /// such an option.
+    /// these options.
     pub(super) fn variation(&self) -> Option<Variation> {
         let direction = self.feed_direction_deg.map(|range| Variation {
             name: "feed_direction_deg",
@@ -68,7 +69,7 @@ impl Varied {
     }
 }
 
-/// Computes and prints the stability chart for each value of the varied feed or feed direction.
+/// Computes and prints the stability limits over the spindle speed for each value of the varied feed or feed direction.
 pub(super) fn run(
     case: &Case,
     method: &MethodChoice,

@@ -36,8 +36,8 @@ pub struct Args {
     /// Posture of the robot: index of the posture in the lobe table.
     #[arg(long, value_name = "N", default_value_t = 0)]
     posture: u8,
-    /// The lobe table on the device: the posture must be one of its postures. Default: the table in the file of --state. A
-    /// device does not send its table back.
+    /// The lobe table on the device: the posture must be one of its postures. Default: the table in the file of
+    /// --state. A device does not send its table back.
     #[arg(long, value_name = "FILE.qct")]
     table: Option<PathBuf>,
     #[command(flatten)]

@@ -1,4 +1,5 @@
-//! Test bench of the demonstration: virtual cell, simulated device at its spindle, and client at the other end of the serial line.
+//! Test bench of the demonstration: virtual cell, simulated device at its spindle, and client at the other end of the
+//! serial line.
 
 use std::sync::mpsc::{Sender, channel};
 use std::time::Duration;
@@ -49,8 +50,8 @@ impl Bench {
     /// Starts the device and connects to it over its serial port.
     ///
     /// # Errors
-    /// For example: the case of the cell is invalid, the operating system has no free pseudo-terminal, or the device does
-    /// not answer.
+    /// For example: the case of the cell is invalid, the operating system has no free pseudo-terminal, or the device
+    /// does not answer.
     pub fn new(cell: VirtualCell) -> Result<(Self, Info), DeviceError> {
         let (cuts, queue) = channel();
         let setup = Setup {
@@ -84,11 +85,12 @@ impl Bench {
         &mut self.client
     }
 
-    /// Simulates one cut and collects the reports of the device.
+    /// Simulates one cut, which the device monitors, and collects the reports, spectra and stroboscopic samples of the
+    /// device.
     ///
     /// # Errors
-    /// The cut cannot be simulated, the device refuses a request or does not answer, or the report of the last block does
-    /// not arrive.
+    /// The cut cannot be simulated, the device refuses a request or does not answer, or the report of the last block
+    /// does not arrive.
     pub fn cut(&mut self, rpm: f64, depth_mm: f64) -> Result<Trial, BenchError> {
         let recorded = self.cell.cut(rpm, depth_mm, CUT_SECONDS, self.seed)?;
         let mut trial = Trial {
@@ -120,8 +122,8 @@ impl Bench {
         Ok(trial)
     }
 
-    /// Collects the events of the device into the trial, up to the report of block `last` and the spectra and map
-    /// points that follow it.
+    /// Collects the events of the device into the trial, up to the report of block `last` and the spectra and
+    /// stroboscopic samples that follow it; ends early if no event arrives within [`REPORT_TIMEOUT`].
     fn collect(&mut self, trial: &mut Trial, last: u32) -> Result<(), DeviceError> {
         let mut is_over = false;
         let mut start = None;
@@ -132,7 +134,7 @@ impl Bench {
             is_over = matches!(&event, Event::Report(report) if report.sequence == last);
             take(trial, event, &mut start);
         }
-        // Spectra and points of the stroboscopic map of the last block arrive before the reply to the next request.
+        // Spectra and stroboscopic samples of the last block arrive before the reply to the next request.
         self.client.subscribe(Subscription::default())?;
         while let Some(event) = self.client.next_event(Duration::ZERO)? {
             take(trial, event, &mut start);
@@ -141,8 +143,8 @@ impl Bench {
     }
 }
 
-/// Adds one event of the device to the record of a cut, of spectra and strobes only those of the structure band. Report
-/// times are counted from the first report of the cut.
+/// Adds one event of the device to the trial; of spectra and stroboscopic samples only those of the structure band.
+/// Report times are counted from the first report of the cut.
 fn take(trial: &mut Trial, event: Event, start: &mut Option<Nanoseconds>) {
     match event {
         Event::Spectrum(chunk) => trial.take_spectrum(&chunk),

@@ -27,7 +27,8 @@ pub struct Story {
 const CHART_RPM: RangeInclusive<f64> = 850.0..=1200.0;
 /// Largest axial depth of the lobe chart, mm: a choice, twice the depth of the cuts.
 const CHART_DEPTH_MM: f64 = 4.0;
-/// Highest frequency of the spectra, Hz: a choice that shows the modes of the robot and the first tooth-passing harmonics.
+/// Highest frequency of the spectra, Hz: a choice that shows the modes of the robot and the first tooth-passing
+/// harmonics.
 const SPECTRUM_HZ: f64 = 120.0;
 
 /// Renders the page: the lobe chart of the table with all cuts, then the texts and pictures of each story.
@@ -124,7 +125,8 @@ fn chapter(story: &Story) -> Result<Markup, PictureError> {
     })
 }
 
-/// Axis and value ranges that the pictures of both cuts of a story share.
+/// Axis of the acceleration, and ranges of its values over time and at the tooth passings, that the pictures of both
+/// cuts of a story share.
 struct CommonScale {
     axis: usize,
     signal: Range<f64>,
@@ -215,7 +217,8 @@ fn pictures(trial: &Trial, scale: &CommonScale) -> Result<Markup, PictureError> 
     })
 }
 
-/// Axis with the largest standard deviation of the acceleration over the last quarter of full engagement.
+/// Index of the axis (x, y, z) with the largest standard deviation of the acceleration over the last quarter of full
+/// engagement.
 fn dominant_axis(trial: &Trial) -> usize {
     let [x, y, z] = trial.vibration();
     if x >= y && x >= z {

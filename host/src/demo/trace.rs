@@ -13,8 +13,8 @@ pub struct Trace {
 }
 
 impl Trace {
-    /// Filters the blocks into the structure band as the device does, and removes the delay of the filter. The sampling rate
-    /// follows from the time stamps of the first and the last block.
+    /// Filters the blocks into the structure band as the device does, and removes the delay of the filter. The sampling
+    /// rate follows from the time stamps of the first and the last block.
     pub fn of(blocks: &[Block], sensor: &Sensor) -> Self {
         let mut trace = Self::default();
         let (Ok(decimation), Some(first), Some(last)) = (
@@ -49,7 +49,7 @@ impl Trace {
         trace
     }
 
-    /// Standard deviation of the acceleration along each axis between two times, m/s².
+    /// Standard deviation of the low-pass filtered acceleration along each axis between two times, m/s².
     pub fn rms(&self, [from_s, to_s]: [f64; 2]) -> [f64; 3] {
         let (from, to) = (
             self.t_s.partition_point(|&t| t < from_s),
@@ -106,7 +106,8 @@ mod tests {
             );
         }
         let [x, y, _] = trace.rms([0.5, 1.5]);
-        // The interval of 1 s contains no whole number of periods: the relative error of the mean square is at most 1/(4π·17.4).
+        // The interval of 1 s contains no whole number of periods: the relative error of the mean square is at most
+        // 1/(4π·17.4).
         assert!(
             (x / (amplitude / 2f64.sqrt()) - 1.0).abs() < 0.01 && y == 0.0,
             "{x} {y}"

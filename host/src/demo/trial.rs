@@ -5,7 +5,7 @@ use quietcut_core::protocol::SpectrumChunk;
 
 use super::trace::Trace;
 
-/// Power spectrum from the device.
+/// Power spectrum of the acceleration in the structure band, as the device sent it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Spectrum {
     /// Sequence number of the block of samples that completed this power spectrum.
@@ -33,7 +33,8 @@ pub struct Trial {
     pub reports: Vec<Report>,
     /// Power spectra of the acceleration in the structure band, as the device sent them.
     pub spectra: Vec<Spectrum>,
-    /// Stroboscopic samples of the structure band, one per tooth passing, each with the number of its block.
+    /// Stroboscopic samples of the acceleration in the structure band, one per tooth passing, each with the sequence
+    /// number of its block.
     pub strobes: Vec<(u32, Strobe)>,
 }
 
@@ -96,7 +97,8 @@ impl Trial {
             .find(|spectrum| spectrum.sequence <= last)
     }
 
-    /// Appends a chunk of a power spectrum from the device; chunks arrive in order.
+    /// Appends a chunk of a power spectrum of the structure band; chunks arrive in order, and one after a gap is
+    /// ignored.
     pub(super) fn take_spectrum(&mut self, chunk: &SpectrumChunk) {
         if chunk.band != Band::Structure {
             return;

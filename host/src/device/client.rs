@@ -21,8 +21,8 @@ const ATTEMPTS: u32 = 4;
 /// Longest wait for a reply: the emulated board needs about 1 s for its first reply over a pseudo-terminal.
 const REPLY: Duration = Duration::from_millis(if cfg!(test) { 20 } else { 1200 });
 
-/// Longest wait for a reply that follows an erasure of flash memory: a choice far above the 22 ms of a page and the processing of
-/// waiting blocks.
+/// Longest wait for a reply that follows an erasure of flash memory: a choice far above the 22 ms of a page and the
+/// processing of waiting blocks.
 pub(super) const REPLY_AFTER_ERASE: Duration = Duration::from_secs(3);
 
 /// Longest wait for the reply to a request after an unreadable frame: a choice.
@@ -135,7 +135,8 @@ impl Client {
 
     /// Requests the feed direction; `None` if none is set.
     ///
-    /// Older firmware does not support this request and is treated as having none. It must be the last request to such a device.
+    /// Older firmware does not support this request and is treated as having none. It must be the last request to such
+    /// a device.
     pub fn feed_direction(&mut self) -> Result<Option<Degrees>, DeviceError> {
         match self.exchange(&Request::FeedDirection, "feed direction", REPLY) {
             Ok(Reply::FeedDirection(direction)) => Ok(direction),
@@ -274,8 +275,8 @@ impl Client {
         }
     }
 
-    /// Reads the serial line once, for at most `timeout`. Returns the frame that concerns the request with this number, if
-    /// one was completed.
+    /// Reads the serial line once, for at most `timeout`. Returns the completed frame that concerns the request with
+    /// this number, or an unreadable one; `None` if neither was completed.
     fn receive(&mut self, timeout: Duration, number: Option<u16>) -> Result<Option<ReplyFrame>, DeviceError> {
         // A buffer avoids one system call per byte; all bytes in it are decoded before the reply is returned.
         let mut bytes = [0; 256];
@@ -299,7 +300,8 @@ impl Client {
         Ok(answer)
     }
 
-    /// Queues an event of the device; returns a response that concerns the request with this number.
+    /// Queues an event of the device; returns a response that concerns the request with this number, and otherwise
+    /// `None`.
     fn sort(&mut self, sequence: u16, response: Response, number: Option<u16>) -> Option<ReplyFrame> {
         let order = self.responses.check(sequence);
         if let Err(FrameError::OutOfOrder { expected, found }) = order {
@@ -360,7 +362,7 @@ enum ReplyFrame {
     Reply(Reply),
     /// The received frame cannot be decoded.
     Unreadable(FrameError),
-    /// The device asks for the request again.
+    /// The request must be sent again: the device refused its frame, or frames before the reply were lost.
     Again(FrameError),
     /// The device uses another version of the protocol: the one stated.
     Version(u8),

@@ -1,4 +1,4 @@
-//! Errors between host and device: port, line, protocol, lobe table.
+//! Errors between host and device: port, line, protocol, lobe table, state file of the simulated device.
 
 use std::io;
 use std::time::Duration;
@@ -73,7 +73,8 @@ pub enum DeviceError {
         /// Number of times that the host sent the request.
         attempts: u32,
     },
-    /// The received frames are damaged or out of order, also after repeated requests.
+    /// Frames from or to the device are damaged, unknown to the receiver or out of order, also after the request was
+    /// repeated.
     #[error(
         "{port}: no usable answer to {request}, asked {attempts} times: {error}; check the cable and that nothing else uses the port"
     )]
@@ -84,7 +85,7 @@ pub enum DeviceError {
         request: &'static str,
         /// Number of times that the host sent the request.
         attempts: u32,
-        /// Fault of the last frame.
+        /// Fault of the last faulty frame.
         error: FrameError,
     },
     /// The device uses another version of the protocol.

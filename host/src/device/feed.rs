@@ -10,8 +10,8 @@ use super::DeviceError;
 use super::client::Client;
 
 impl Client {
-    /// Feeds one block and the tachometer edges up to its end; returns after the signal chain has processed it. Subscribed events of
-    /// the block are then available from [`next_event`](Self::next_event).
+    /// Feeds one block and the tachometer edges up to its end; returns after the signal chain has processed it.
+    /// Subscribed events of the block are then available from [`next_event`](Self::next_event).
     ///
     /// # Errors
     /// The device does not answer or refuses the block.

@@ -38,8 +38,8 @@ pub enum FlashFileError {
     },
 }
 
-/// Flash memory with the write and erase rules of the board. Every change is written to the file at once, so that an aborted
-/// command leaves the same state as a power failure.
+/// Flash memory with the write and erase rules of the board. Every change is written to the file at once, so that an
+/// aborted command leaves the same state as a power failure.
 pub(super) struct FlashFile {
     flash: FlashModel<Vec<u8>, WORD, PAGE>,
     file: Option<File>,
@@ -91,7 +91,8 @@ impl FlashFile {
         })
     }
 
-    /// Writes the bytes of the flash memory between two offsets to the state file of the simulated device.
+    /// Writes the bytes of the flash memory from offset `from` to before `to` to the state file of the simulated
+    /// device, if it has one.
     fn store(&mut self, from: u32, to: u32) -> Result<(), NorFlashErrorKind> {
         let Some(file) = &mut self.file else { return Ok(()) };
         let changed = self.flash.mapped().get(from as usize..to as usize);

@@ -25,11 +25,12 @@ use std::path::Path;
 
 use port::{Port, SIMULATED, SerialLine};
 
-/// Opens the port `name`: a serial port, or `simulated` for a simulated device whose virtual spindle repeats cuts. The file `state`,
-/// if given, keeps the memory of the simulated device.
+/// Opens the port `name`: a serial port, or `simulated` for a simulated device whose virtual spindle repeats cuts. The
+/// file `state`, if given, keeps the memory of the simulated device.
 ///
 /// # Errors
-/// The port does not exist or cannot be opened.
+/// The port does not exist or cannot be opened, or the simulated device cannot be started, for example because the file
+/// `state` cannot be used.
 pub fn open(name: &str, state: Option<&Path>) -> Result<Box<dyn Port>, DeviceError> {
     if name != SIMULATED {
         return Ok(Box::new(SerialLine::open(name)?));

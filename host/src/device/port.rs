@@ -23,8 +23,8 @@ pub trait Port: Send {
     fn receive(&mut self, into: &mut [u8], timeout: Duration) -> Result<usize, DeviceError>;
 }
 
-/// Number of attempts to open a port that is in use: a choice. A starting child process holds a copy of the lock of its parent for a
-/// short time.
+/// Number of attempts to open a port that is in use: a choice. A starting child process holds a copy of the lock of its
+/// parent for a short time.
 const TRIES: usize = 6;
 /// Pause between two attempts to open a port that is in use: a choice.
 const BETWEEN_TRIES: Duration = Duration::from_millis(50);

@@ -1,4 +1,5 @@
-//! Pseudo-terminal: a serial port without hardware. The host opens one end by its path; the simulated device uses the other end.
+//! Pseudo-terminal: a serial port without hardware. The host opens one end by its path; the simulated device uses the
+//! other end.
 
 use std::io::{self, Read, Write};
 use std::time::Duration;

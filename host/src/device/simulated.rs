@@ -1,5 +1,5 @@
-//! Simulated device: the device logic of the firmware in a thread of this process, with a pseudo-terminal as serial line and a
-//! virtual spindle as sensor.
+//! Simulated device: the device logic of the firmware in a thread of this process, with a pseudo-terminal as serial
+//! line and a virtual spindle as sensor.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -127,7 +127,8 @@ impl Port for SimulatedPort {
     }
 }
 
-/// Settings of the signal chain: sensor of the board, one tachometer mark per revolution.
+/// Settings of the signal chain of the simulated device: the sensor of the board, and one tachometer mark per
+/// revolution.
 fn settings(teeth: u8) -> Settings {
     Settings {
         sensor: Sensor::IIS3DWB_16G,
@@ -149,8 +150,8 @@ struct Machine {
     stop: Arc<AtomicBool>,
 }
 
-/// Clock of the simulated device: the time of its newest sample block at [`Pace::AsFastAsPossible`], else the time since
-/// the start of the device.
+/// Clock of the simulated device: the time of its newest sample block at [`Pace::AsFastAsPossible`], else the time
+/// since the start of the device.
 #[derive(Clone)]
 struct SharedClock(Arc<AtomicU64>);
 

@@ -21,7 +21,8 @@ pub struct Uploaded {
 }
 
 impl Client {
-    /// Sends the table and activates it on the device. The device keeps its old table until the new one is complete and checked.
+    /// Sends the table and activates it on the device. The device keeps its old table until the new one is complete and
+    /// checked.
     ///
     /// At the start and after each chunk `progress` gets the number of received bytes and the total number of bytes.
     ///

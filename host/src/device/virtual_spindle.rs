@@ -75,7 +75,8 @@ impl VirtualSpindle {
     }
 }
 
-/// Period of the sample blocks, ns: the mean over all blocks, since time stamps jitter.
+/// Time between the starts of two successive sample blocks, ns: the mean over all blocks, since time stamps jitter; 0
+/// for fewer than two blocks.
 fn block_period(blocks: &[Block]) -> u64 {
     match (blocks.first(), blocks.last()) {
         (Some(first), Some(last)) if blocks.len() > 1 => {

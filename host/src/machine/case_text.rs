@@ -62,12 +62,12 @@ pub enum MaterialAnswer {
     },
 }
 
-/// What the user answered.
+/// Answers of the user to `quietcut setup` about machine, tool, material and cut.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Answers {
     /// Name of the machine and job.
     pub name: String,
-    /// Comments that stand at the head of the case file: machine, holder, sensor, each as the user wrote it but on one line.
+    /// Notes for the comments at the head of the case file: machine, holder or sensor, each with the text of the user.
     pub notes: Vec<(&'static str, String)>,
     /// Number of teeth.
     pub teeth: u8,

@@ -1,5 +1,5 @@
-//! Files of one machine: `case.toml`, `taps/`, `frf/`, `cuts/`, `tried.csv`, `lobes.html`, `table.qct`, `diagnosis/`, each with the
-//! time of its last change.
+//! Files of one machine: `case.toml`, `taps/`, `frf/`, `cuts/`, `tried.csv`, `lobes.html`, `table.qct`, `diagnosis/`,
+//! each with the time of its last change.
 
 use std::fs;
 use std::io;
@@ -108,7 +108,7 @@ pub enum FileKind {
     LobeTable,
 }
 
-/// Reads every file and keeps those that cannot be read.
+/// Tries to read every one of the files; returns those that cannot be read, each with the reason.
 fn broken<'a>(files: impl Iterator<Item = (FileKind, &'a DatedFile)>) -> Vec<BrokenFile> {
     files
         .filter_map(|(kind, DatedFile { path, .. })| {
@@ -138,7 +138,7 @@ fn broken<'a>(files: impl Iterator<Item = (FileKind, &'a DatedFile)>) -> Vec<Bro
 }
 
 impl MachineFolder {
-    /// Lists the files in the folder of a machine and reads its case.
+    /// Lists the files in the folder of a machine, reads its case, and tries to read its recordings and tables.
     ///
     /// # Errors
     /// The folder cannot be read, or `case.toml` is wrong. A recording or table that cannot be read is no error: see
@@ -211,7 +211,7 @@ fn files_in(folder: &Path, endings: &[&str]) -> io::Result<Vec<DatedFile>> {
     Ok(files)
 }
 
-/// The file at a path, with the time of its last change; `None` if it is no regular file.
+/// The file at a path, with the time of its last change; `None` if there is no regular file.
 fn dated(path: PathBuf) -> Option<DatedFile> {
     let about = fs::metadata(&path).ok()?;
     let changed = about.is_file().then(|| about.modified().ok()).flatten()?;

@@ -1,12 +1,12 @@
 //! Ranges of cutting coefficients from the literature, each with its source.
 //!
-//! A row of single coefficients belongs here only with author, year, table and the range of chip thickness for which it was
-//! measured.
+//! A row of single coefficients belongs here only with author, year, table and the range of chip thickness for which it
+//! was measured.
 
 /// Range of the cutting coefficients of a class of materials over the tests of several authors.
 ///
-/// The sources of a range state no chip thickness. A range is no standard deviation: where one value in it is as likely as
-/// another, the mean is (a + b)/2 and the standard deviation (b − a)/√12.
+/// The sources of a range state no chip thickness. A range is no standard deviation: where one value in it is as likely
+/// as another, the mean is (a + b)/2 and the standard deviation (b − a)/√12.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MaterialRange {
     /// Word on the command line.

@@ -10,7 +10,7 @@ use super::folder::{BrokenFile, DatedFile, FileKind, MachineFolder};
 /// Next useful command for a machine, with its reason.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct NextStep {
-    /// State of the machine's folder, one statement for each kind of file.
+    /// State of the machine's folder: one statement for each kind of file, and one for each file that cannot be read.
     pub state: Vec<String>,
     /// The command to run next.
     pub command: String,
@@ -25,7 +25,7 @@ const CHART_SPEEDS: usize = 60;
 /// chart is one diameter deep, the usual limit of a slot.
 const DEEPEST_MM: f64 = 10.0;
 
-/// Finds the next step.
+/// Finds the next useful command for the machine of `folder`.
 pub fn next_step(folder: &MachineFolder) -> NextStep {
     let at = |name: &str| quoted(&folder.path.join(name));
     let case = at("case.toml");
@@ -182,13 +182,14 @@ fn is_newer(file: &Option<DatedFile>, than: SystemTime) -> bool {
     file.as_ref().is_some_and(|file| file.changed >= than)
 }
 
-/// Options of the proposed chart: the speed range of the spindle, else that of the lobes; depths up to one tool diameter,
-/// else up to [`DEEPEST_MM`].
+/// Options `--rpm` and `--depth-mm` of the proposed chart: the speed range of the spindle, else that of the lobes, else
+/// 1000 to 10 000 rev/min; depths up to one tool diameter, else up to [`DEEPEST_MM`].
 fn ranges(folder: &MachineFolder) -> String {
     let case = folder.case.as_ref().map(|(_, case)| case);
     let speeds = case.and_then(|case| {
         if let Some(limits) = case.limits {
-            // No cut exists at rest: the chart begins at a twentieth of the highest speed or above.
+            // No cut exists at rest: the chart begins at the lowest speed of the spindle, but not below a twentieth of
+            // the highest.
             return Some((limits.rpm_min.max(0.05 * limits.rpm_max), limits.rpm_max));
         }
         let structure = case.structure.as_ref()?.first_order().ok()?;

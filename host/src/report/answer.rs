@@ -19,7 +19,7 @@ pub struct VerdictAnswer {
     pub verdict: &'static str,
     /// Chatter frequency, Hz; `None` without chatter.
     pub chatter_hz: Option<f64>,
-    /// Probability that the verdict is correct, 0 to 1.
+    /// Probability that the verdict is correct, 0 to 1, as the device estimates it.
     pub confidence: f64,
     /// Spindle speed, rev/min; `None` if it is unknown.
     pub spindle_rpm: Option<f64>,
@@ -79,8 +79,8 @@ impl AdviceAnswer {
 /// Log of the changes in a sequence of reports: the output of `replay` and `monitor`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct VerdictLog {
-    /// The first verdict of the sequence, and every later one that differs from the entry before it in verdict or advice.
-    /// A small change of the advised speed does not count.
+    /// The first verdict of the sequence, and every later one that differs from the entry before it in verdict or
+    /// advice. A change of the advised speed by at most 1 % does not count.
     pub verdicts: Vec<VerdictAnswer>,
     /// Summary over all reports.
     pub summary: Summary,
@@ -92,11 +92,12 @@ pub struct Summary {
     /// Main verdict of a sequence of reports: the first kind of chatter that was detected; without chatter the last
     /// verdict. `None` without any report.
     pub verdict: Option<&'static str>,
-    /// Time of the first report with the main verdict, s, on the clock of the samples.
+    /// Time of the report since which the main verdict holds, s, on the clock of the samples: for chatter the first
+    /// report of chatter, otherwise the first after the last change of the verdict.
     pub since_s: Option<f64>,
     /// Number of evaluated blocks.
     pub blocks: u64,
-    /// Number of clipped samples.
+    /// Number of clipped acceleration samples since the signal chain was started or reset.
     pub clipped: u32,
     /// Number of gaps in the sequence of samples, where samples are missing.
     pub gaps: u32,
@@ -150,8 +151,8 @@ fn is_same_advice(a: Option<&AdviceAnswer>, b: Option<&AdviceAnswer>) -> bool {
         (None, None) => true,
         (Some(a), Some(b)) => {
             let near = (a.rpm - b.rpm).abs() <= SAME_SPEED * a.rpm;
-            // Two answers that advise to keep cutting are equal whatever speed is measured; others are equal if speed and
-            // depth are.
+            // Two answers that advise to keep cutting are equal whatever speed is measured; others are equal if their
+            // advised speeds are near each other and their depths are equal.
             let same_target = a.action == "keep" || (near && a.depth_mm == b.depth_mm);
             a.action == b.action && a.source == b.source && same_target
         }

@@ -1,4 +1,5 @@
-//! Map of the modulus |μ| of the dominant Floquet multiplier over spindle speed and axial depth, with the stability limit |μ| = 1.
+//! Map of the modulus |μ| of the dominant Floquet multiplier over spindle speed and axial depth, with the stability
+//! limit |μ| = 1.
 
 use plotters::chart::SeriesLabelPosition;
 use plotters::prelude::{LineSeries, Rectangle, WHITE};
@@ -74,8 +75,8 @@ fn edges(values: &[f64]) -> Vec<f64> {
     edges
 }
 
-/// Index of the colour band of a cell of the map from its |μ| (modulus of the dominant Floquet multiplier);
-/// `BANDS.len()` for undecided cells.
+/// Index in [`BANDS`] of the colour band of a cell of the map from its |μ| (modulus of the dominant Floquet
+/// multiplier); `BANDS.len()` for undecided cells.
 fn band_of(multiplier_abs: f64, verdict: Verdict) -> usize {
     if verdict == Verdict::Undecided {
         return BANDS.len();
@@ -84,8 +85,8 @@ fn band_of(multiplier_abs: f64, verdict: Verdict) -> usize {
     BANDS.iter().position(below).unwrap_or(BANDS.len() - 1)
 }
 
-/// Draws the cells of the map whose |μ| lies in one colour band; neighbouring cells along the depth become one
-/// rectangle.
+/// Draws the cells of the map whose |μ| lies in one colour band, or the undecided cells; neighbouring cells along the
+/// depth become one rectangle.
 fn draw_band(
     axes: &mut Axes<'_, '_>,
     chart: &CellChart,

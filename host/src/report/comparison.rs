@@ -50,8 +50,8 @@ impl LineRole {
     }
 }
 
-/// Draws lines over a common axis as SVG of `size` pixels; `y_range` is the range of the vertical axis, by default that of all
-/// points.
+/// Draws lines over a common axis as SVG of `size` pixels; `y_range` is the range of the vertical axis, by default that
+/// of all points.
 ///
 /// # Errors
 /// There are fewer than two points, or the drawing library fails.

@@ -10,8 +10,8 @@ use super::residual_pictures::{file_name, pictures};
 use crate::diagnose::answer::{EstimatedCause, Figure, Outcome};
 use crate::diagnose::{Diagnosis, ResidualView};
 
-/// Number of channels of which the page of a diagnosis shows residual pictures, those with the largest normalized
-/// residual: a choice.
+/// Number of recorded channels of which the page of a diagnosis shows residual pictures, those with the largest ratio
+/// of residual to noise: a choice.
 const PICTURED: usize = 3;
 
 /// Renders the page of `diagnosis`; `case_name` names the baseline model, `extended` is the text of the extended case.
@@ -121,7 +121,8 @@ fn prediction_error_table(diagnosis: &Diagnosis) -> Markup {
     }
 }
 
-/// Residual pictures of the channels with the largest ratio of residual to noise.
+/// Pictures of the residual of the case in the [`PICTURED`] recorded channels with the largest ratio of residual to
+/// noise.
 fn all_pictures(diagnosis: &Diagnosis) -> Result<Markup, PictureError> {
     let mut views: Vec<&ResidualView> = diagnosis.views.iter().collect();
     let residual_to_noise = |view: &ResidualView| view.sizes()[1] / view.deviation.max(f64::MIN_POSITIVE);

@@ -1,6 +1,7 @@
 //! Numbers for a reader: a fixed number of significant digits, never an exponent such as `6.86495e2`.
 
-/// A number with this many significant digits: decimals from 0.0001 to below 10⁶, else a power of ten, as in `6.86·10¹²`.
+/// A number with this many significant digits: decimals from 0.0001 to below 10⁶, else a power of ten, as in
+/// `6.86·10¹²`.
 pub fn significant(value: f64, digits: usize) -> String {
     if value == 0.0 {
         return "0".into();
@@ -17,14 +18,14 @@ pub fn significant(value: f64, digits: usize) -> String {
         return text;
     };
     if (-4..6).contains(&power) {
-        // At most 4 + digits decimals, and none below the point.
+        // Number of decimals that shows `digits` significant digits; none if all these digits stand before the point.
         let decimals = (digits as i32 - 1 - power).max(0) as usize;
         return format!("{value:.decimals$}");
     }
     format!("{mantissa}·10{}", superscript(power))
 }
 
-/// A power in small raised digits.
+/// Text of the exponent of a power of ten in superscript digits.
 fn superscript(power: i32) -> String {
     power
         .to_string()

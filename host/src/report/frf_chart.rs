@@ -15,7 +15,7 @@ const SIZE: (u32, u32) = (900, 860);
 /// Colours of the receptances in the chart, used cyclically.
 const COLORS: [RGBColor; 6] = [BLUE, ORANGE, QUIET, CHATTER, VIOLET, INK];
 
-/// Draws magnitude in µm/N, phase in degrees and coherence of all receptances of a table as SVG.
+/// Draws magnitude in µm/N, phase in degrees and, where known, coherence of all receptances of a table as SVG.
 ///
 /// # Errors
 /// The table has fewer than two frequencies, or the drawing library fails.

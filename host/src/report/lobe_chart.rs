@@ -1,5 +1,5 @@
-//! Stability lobe diagram: stable axial depths over spindle speed, kind of each limit, trial cuts. A limit is a depth at which the dominant
-//! Floquet multiplier (characteristic multiplier) has the modulus 1.
+//! Stability lobe diagram: stable axial depths over spindle speed, kind of each limit, trial cuts. A limit is a depth
+//! at which the dominant Floquet multiplier (characteristic multiplier) has the modulus 1.
 
 use plotters::chart::SeriesLabelPosition;
 use plotters::prelude::{Circle, LineSeries, PathElement, Polygon, Rectangle, WHITE};
@@ -32,11 +32,12 @@ pub struct Column {
     /// Undecided depths, mm, as ascending intervals in which the modulus of the dominant Floquet multiplier is 1 within
     /// the error of the method.
     pub undecided_mm: Vec<(f64, f64)>,
-    /// First stability limit at this speed; `None` if none was found up to the largest computed depth.
+    /// First stability limit at this speed; `None` if none was found up to the largest computed depth, or if the lowest
+    /// interval of a lobe table that is not stable is undecided.
     pub first_limit: Option<FirstLimit>,
-    /// 5, 50 and 95 % percentiles of the first stability limit at this speed, mm; for an extended case the ends of its 90 %
-    /// interval with the limit between them. An entry is `None` if it is deeper than the largest computed depth. `None`
-    /// in all if no spread of the limit is computed.
+    /// 5, 50 and 95 % percentiles of the first stability limit at this speed, mm; for an extended case the ends of its
+    /// 90 % interval with the limit between them. An entry is `None` if it is deeper than the largest computed depth.
+    /// `None` in all if no spread of the limit is computed.
     pub percentiles_mm: Option<[Option<f64>; 3]>,
 }
 
@@ -154,7 +155,7 @@ pub fn lobe_chart(
     })
 }
 
-/// Draws the undecided depths of a lobe diagram, if any interval is at least one pixel high.
+/// Draws the undecided depths of a lobe diagram, if any interval of them is at least about one pixel high.
 fn draw_undecided(
     chart: &mut Axes<'_, '_>,
     columns: &[Column],

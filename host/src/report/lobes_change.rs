@@ -9,8 +9,8 @@ use super::page::figure;
 use crate::criteria::UNCHANGED_LIMIT;
 use crate::diagnose::lobes::{Change, Chart, Lobes};
 
-/// Sentences about the change of the stability limits by the extension of a case, and about the trial cuts that both
-/// predict.
+/// Sentences about the change of the stability limits by the extension of a case, about the tried and recorded cuts
+/// that the case and the extended case predict wrong, and about the time of drift and wear.
 pub fn sentences(lobes: &Lobes) -> Vec<String> {
     let changes = lobes
         .speeds
@@ -103,7 +103,7 @@ fn limit(
     }
 }
 
-/// Sentence, without a full stop, that counts the trial cuts that a chart predicts wrong.
+/// Sentence, without a full stop, with the number of tried and recorded cuts that a chart predicts wrong.
 pub fn trial_cut_counts(chart: &Chart) -> String {
     let calls = chart.calls();
     format!(
@@ -112,7 +112,8 @@ pub fn trial_cut_counts(chart: &Chart) -> String {
     )
 }
 
-/// Lobe diagrams of the case and of the extended case with the trial cuts; a ring marks a wrong prediction.
+/// Sentences about the change of the limits, lobe diagrams of the case and of the extended case with the tried and
+/// recorded cuts (a ring marks a wrong prediction), and a table of the limits at each spindle speed.
 ///
 /// # Errors
 /// A picture cannot be drawn.
@@ -140,7 +141,7 @@ pub(super) fn section(lobes: &Lobes) -> Result<Markup, PictureError> {
     })
 }
 
-/// One lobe diagram with the trial cuts; a ring marks a wrong prediction.
+/// One lobe diagram with the tried and recorded cuts; a ring marks a cut that the chart predicts wrong.
 ///
 /// # Errors
 /// The picture cannot be drawn.

@@ -1,4 +1,4 @@
-//! Marks of cuts on a stability chart, with arrows to the advised speed and depth.
+//! Marks of cuts on a stability chart, with arrows to the advised spindle speed and axial depth.
 
 use plotters::prelude::{Circle, Cross, PathElement, Polygon, Rectangle, Text, WHITE};
 use plotters::style::text_anchor::{HPos, Pos, VPos};
@@ -104,8 +104,8 @@ pub(super) fn draw_marks(
     Ok(())
 }
 
-/// Draws a label near the pixel `at`: above, below, then farther away, at the first place where it covers no mark and no
-/// other label; above if there is no such place.
+/// Draws the label of a cut near the pixel `at` of its mark: above, below, then farther away, at the first place where
+/// it covers no mark and no label drawn before; directly above the mark if there is no such place.
 fn draw_label(
     canvas: &Canvas<'_>,
     at: (i32, i32),
@@ -146,7 +146,8 @@ fn draw_label(
     Ok(())
 }
 
-/// Draws an arrow between two pixels with a gap of 12 pixels at both ends; draws nothing if they are too close.
+/// Draws an arrow from one pixel to another with a gap of 12 pixels at both ends; draws nothing if the two are less
+/// than 35 pixels apart.
 fn draw_arrow(canvas: &Canvas<'_>, from: (i32, i32), to: (i32, i32)) -> Result<(), PictureError> {
     const GAP: f64 = 12.0;
     const HEAD: f64 = 11.0;

@@ -57,7 +57,7 @@ pub(super) fn legend<'a: 'c, 'c>(chart: &mut Axes<'a, 'c>) -> Result<(), Picture
     Ok(())
 }
 
-/// Draws on a white canvas of `size` pixels and returns the SVG text.
+/// Draws on a white canvas of width and height `size`, in pixels, and returns the SVG text.
 pub(super) fn draw(
     size: (u32, u32),
     paint: impl FnOnce(&Canvas<'_>) -> Result<(), PictureError>,
@@ -114,7 +114,8 @@ pub(super) fn axes<'a, 'c>(
     Ok(chart)
 }
 
-/// Draws a word on a white background that covers the lines below it; `at` is its upper left corner in pixels.
+/// Draws a word on a white background of 80 % opacity, so that lines below it are faint; `at` is the upper left corner
+/// of the word in pixels.
 pub(super) fn label(
     canvas: &Canvas<'_>,
     at: (i32, i32),
@@ -132,7 +133,8 @@ pub(super) fn label(
     Ok(())
 }
 
-/// Formats a number of an axis without the rounding digits of binary fractions.
+/// Formats a number at a tick of an axis: rounded to four decimals, or with an exponent and two digits below 0.001 and
+/// from a million on.
 fn tick(value: &f64) -> String {
     let size = value.abs();
     if size < 1e-12 {
@@ -144,8 +146,8 @@ fn tick(value: &f64) -> String {
     }
 }
 
-/// Range of an axis: all finite values plus a margin of 6 % of their range at both ends. For equal values the
-/// margin is half the value; without values the range is −1 to 1.
+/// Range of an axis: all finite values plus a margin of 6 % of their range at both ends. If all values are equal, the
+/// margin is half their absolute value, at least 5e-7; without finite values the range is −1 to 1.
 pub(super) fn span(values: impl Iterator<Item = f64>) -> std::ops::Range<f64> {
     let (low, high) = values
         .filter(|value| value.is_finite())

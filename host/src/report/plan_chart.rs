@@ -1,4 +1,5 @@
-//! Chart of a test plan: 90 % intervals of the limits before and after the tests, and the planned trial cuts.
+//! Chart of a test plan over the spindle speed: the stability limit of the case, its 90 % intervals before and after
+//! the planned tests, and marks for the tests that bracket the limit by trial cuts.
 
 use plotters::chart::SeriesLabelPosition;
 use plotters::prelude::{LineSeries, PathElement, Polygon, Rectangle, WHITE};
@@ -11,10 +12,11 @@ use crate::plan::{Plan, Speed, Test};
 /// Width and height in pixels of the chart of a test plan.
 const SIZE: (u32, u32) = (960, 480);
 
-/// Draws the chart of a test plan as SVG with depths from 0 to `depth_max_mm`; it sorts the speeds.
+/// Draws the chart of a test plan as SVG, with axial depths from 0 to `depth_max_mm`; the spindle speeds of the plan
+/// may stand in any order.
 ///
 /// # Errors
-/// There are fewer than two speeds, or the drawing library fails.
+/// The plan has fewer than two different spindle speeds, or the drawing library fails.
 pub fn plan_chart(title: &str, plan: &Plan, depth_max_mm: f64) -> Result<String, PictureError> {
     let mut speeds = plan.chart.clone();
     speeds.sort_by(|a, b| a.rpm.total_cmp(&b.rpm));
@@ -81,7 +83,8 @@ pub fn plan_chart(title: &str, plan: &Plan, depth_max_mm: f64) -> Result<String,
     })
 }
 
-/// Shaded area of a chart between a lower and an upper value at each spindle speed, with its colour, opacity and name.
+/// Shaded area of the chart between a lower and an upper axial depth at each spindle speed, with its colour, opacity
+/// and name in the legend.
 struct Band {
     interval: fn(&Speed) -> [f64; 2],
     color: RGBColor,

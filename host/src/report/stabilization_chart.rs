@@ -15,10 +15,10 @@ const SIZE: (u32, u32) = (900, 820);
 /// Colours of the receptances in the stabilization diagram, used cyclically.
 const COLORS: [RGBColor; 6] = [BLUE, ORANGE, QUIET, CHATTER, VIOLET, INK];
 
-/// Draws stable poles, unstable poles and the selected modes over frequency and model order; below them the magnitude of the
-/// measured receptances (dots) and of the modal model (lines).
+/// Draws stable poles, other poles and the selected modes over frequency and model order; below them the magnitudes of
+/// the measured receptances (dots) and of those of the modal model (lines).
 ///
-/// A pole is stable if its frequency, damping and mode shape change little from one model order to the next.
+/// A pole is stable if its frequency, damping and mode shape agree with those of a pole of the previous model order.
 ///
 /// # Errors
 /// The drawing library fails.
@@ -77,7 +77,7 @@ fn diagram(
             mode.mode.frequency_hz,
             100.0 * mode.mode.damping_ratio
         );
-        // Labels of modes with neighbouring frequencies get different heights, so that they do not overlap.
+        // The labels of three modes in a row, by frequency, get different heights, so that they do not overlap.
         let at = chart.backend_coord(&(mode.mode.frequency_hz, top + 2.6 - (index % 3) as f64));
         let origin = canvas.get_base_pixel();
         label(canvas, (at.0 - origin.0 + 4, at.1 - origin.1), &words, QUIET)?;

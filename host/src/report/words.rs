@@ -76,7 +76,7 @@ pub fn reason(reason: Reason) -> &'static str {
     }
 }
 
-/// One line of text for a report: time, spindle speed, verdict, advice.
+/// One line of text for a report: time, spindle speed, verdict, and the advice unless it is to keep cutting.
 pub fn line(report: &Report) -> String {
     match &report.advice {
         Some(advice) if advice.action != Action::Keep => format!(
@@ -115,8 +115,8 @@ pub fn action(advice: &Advice) -> String {
     }
 }
 
-/// Reason for the advice: its source, the obstacle to a better source, and the assumed working point. `speed` is the spindle
-/// speed of the report.
+/// Reason for the advice: its source and, where there are such, the obstacle to a better source and the assumed working
+/// point; for the advice to keep cutting only that no chatter is detected. `speed` is the spindle speed of the report.
 pub fn why(advice: &Advice, judgement: &Judgement, speed: Option<Rpm>) -> String {
     let mut parts = vec![source_reason(advice, judgement, speed)];
     if advice.action != Action::Keep {
@@ -161,7 +161,7 @@ fn source_reason(advice: &Advice, judgement: &Judgement, speed: Option<Rpm>) -> 
     }
 }
 
-/// Text of the reason why advice does not come from a better source, such as the lobe table.
+/// Text of the reason why advice does not come from a better source, such as the lobe table, or proposes no speed.
 pub fn obstacle(obstacle: &Obstacle) -> String {
     match obstacle {
         Obstacle::NoTable => "the device has no lobe table".into(),
@@ -180,7 +180,8 @@ pub fn obstacle(obstacle: &Obstacle) -> String {
     }
 }
 
-/// Text of the kind of stability loss, such as Hopf.
+/// Text of the reason why a lobe table does not call an interval of axial depths stable: Hopf, period doubling, fold,
+/// or an undecided computation.
 pub fn limit(kind: lobes::IntervalKind) -> &'static str {
     match kind {
         lobes::IntervalKind::Hopf => "chatter at a frequency not synchronous with the teeth (Hopf)",

@@ -5,26 +5,29 @@
 //! cases of `tests/cases` alone. Tolerances of pure numerics (the last step of Newton's method, rounding, sizes of
 //! matrices) stand where they are used.
 
-/// Least stated error of a Floquet multiplier, relative to max(1, |μ|); methods that step through the period state at
-/// least 1e-9 instead. Independent computations confirm multipliers to this accuracy (`tests/multipliers.rs`:
-/// references good to 2e-8). Collocation itself settles at 1e-10 and below.
+/// Least stated error of a Floquet multiplier, relative to max(1, |μ|), and of a limit from receptances or forced
+/// orbits, relative to its depth; methods that step through the period state at least 1e-9 instead. Independent
+/// computations confirm multipliers to this accuracy (`tests/multipliers.rs`: references good to 2e-8). Collocation
+/// itself settles at 1e-10 and below.
 pub const LEAST_ERROR: f64 = 1e-7;
 
-/// Least stated error of a multiplier from the collocated map that Newton's method on the characteristic matrix did not
-/// confirm, relative to max(1, |μ|). It is ten times the residual 1e-7 at which Krylov spaces settle.
+/// Least stated error of a Floquet multiplier from the collocated map over a tooth period that Newton's method on the
+/// characteristic matrix did not confirm, relative to max(1, |μ|). It is ten times the residual 1e-7 at which Krylov
+/// spaces settle.
 pub(crate) const UNCONFIRMED: f64 = 1e-6;
 
-/// Factor in the stated error of a multiplier on its change from the working to the finer mesh. The change is the error
-/// of the working mesh, since the finer mesh errs by far less; the factor is a safety margin. `tests/random.rs` checks
-/// on random machines that the stated errors hold.
+/// Factor in the stated error of a Floquet multiplier on its change from the working to the finer mesh of the period.
+/// The change is the error of the working mesh, since the finer mesh errs by far less; the factor is a safety margin.
+/// `tests/random.rs` checks on random machines that the stated errors hold.
 pub(crate) const MESH_ROOM: f64 = 10.0;
 
-/// Factor in the stated error on the error from Richardson extrapolation, for a method with a known order in its step.
-/// The order holds for small steps only; the factor is a safety margin. `tests/agreement.rs` checks on all cases that
-/// the stated errors hold.
+/// Factor in the stated error of a Floquet multiplier on the error from Richardson extrapolation, for a method with a
+/// known order in its time step. The order holds for small steps only; the factor is a safety margin.
+/// `tests/agreement.rs` checks on all cases that the stated errors hold.
 pub(crate) const STEP_ROOM: f64 = 3.0;
 
-/// Relative rounding error of a multiplier from the map of a period of some hundred time steps. Unfounded: an estimate.
+/// Rounding error, relative to max(1, |μ|), of a Floquet multiplier from the map over a period of some hundred time
+/// steps. Unfounded: an estimate.
 pub(crate) const STEP_ROUNDING: f64 = 1e-9;
 
 // Multipliers of a period map.
@@ -47,14 +50,14 @@ pub(crate) const MAPPED: f64 = 0.25;
 /// [`MAPPED`]. If none is larger, those above half the largest are computed.
 pub(crate) const KRYLOV_ANY: f64 = 0.25;
 
-/// Largest number of eigenvalues that are candidates for the dominant one: of the collocated map over a tooth period
-/// always, of other maps if all are small. More than that many of nearly one size are the cluster near zero of a
-/// compact period map. Unfounded.
+/// Largest number of eigenvalues that are candidates for the dominant one: of the collocated map over a tooth period if
+/// block Arnoldi computes them, of other maps if none exceeds [`KRYLOV_ANY`]. More than that many of nearly one size
+/// are the cluster near zero of a compact period map. Unfounded.
 pub(crate) const CROWD: usize = 24;
 
-/// Least |μ| of a Floquet multiplier that is taken from the transition matrix Φ(w) alone, which omits the surface of
-/// the preceding tooth. That surface acts with the factor 1/μ, so that the eigenvalue of Φ(w) has a relative error of
-/// 1e-6, from which Newton's method starts.
+/// Least |μ| of the largest Floquet multiplier at which multipliers are taken from the transition matrix Φ(w) alone,
+/// which omits the surface of the preceding tooth. That surface acts with the factor 1/μ, so that the eigenvalue of
+/// Φ(w) has a relative error of 1e-6, from which Newton's method starts.
 pub(crate) const GROWN: f64 = 1e6;
 
 /// Largest entry of a period map, or of its projection on a Krylov space, relative to max(1, |μ|) of its largest
@@ -67,14 +70,16 @@ pub(crate) const NORMAL: f64 = 1e7;
 /// element, so that 4000 elements cover three thousand vibrations; cuts that need more are refused. Unfounded.
 pub(crate) const ELEMENTS_MAX: f64 = 4000.0;
 
-/// Number of subinterval ends in a revolution beyond which no further generation of kinks is added. Subintervals are
-/// then short, and kinks of later generations are smooth. Unfounded.
+/// Largest number of instants in a revolution at which the displacement may have a kink: entries and exits of teeth,
+/// and their echoes one or more delays later. A generation of echoes that would exceed it is left out, with all later
+/// ones. The subintervals between these instants are then short, and later echoes are smooth. Unfounded.
 pub(crate) const KINKS_MAX: usize = 300;
 
 // Dominant multiplier of one cut.
 
-/// Least |μ| of a multiplier of the coarse scan, as a share of the largest, at which it may be the largest on the
-/// working mesh. The scan errs by 1e-8 where it converges; the margin of a tenth is unfounded.
+/// Least |μ| of a Floquet multiplier on one mesh of the tooth period, as a share of the largest on that mesh, at which
+/// it may be the largest on another mesh. The coarse mesh of the scan errs by 1e-8 where it converges; the margin of a
+/// tenth is unfounded.
 pub(crate) const RIVAL: f64 = 0.9;
 
 /// Largest |1 − 1/μ| at which Newton's method on the characteristic matrix computes a multiplier, hence |μ| above about
@@ -86,28 +91,31 @@ pub(crate) const KAPPA_MAX: f64 = 20.0;
 /// five times the axial depth w, for which the mesh of the search is built.
 pub(crate) const WOUND: f64 = 0.25;
 
-/// Radii at which the winding number is counted in turn, as relative distances beyond the largest |μ| found (or beyond
-/// [`WOUND`]): a count of zero shows that no multiplier lies beyond the radius. The distance of the smallest radius
-/// with a count of zero enters the stated error; the sequence is unfounded.
+/// Radii of the circles in the plane of μ on which the winding number of the characteristic function is computed in
+/// turn, as relative distances beyond the largest |μ| found (or beyond [`WOUND`] if none is): a count of zero shows
+/// that no multiplier lies beyond the radius. The distance of the smallest radius with a count of zero enters the
+/// stated error; the sequence is unfounded.
 pub(crate) const MARGINS: [f64; 5] = [2.8, 0.3, 0.05, 0.01, 2e-3];
 
-/// Relative distances beyond the largest multiplier found that follow [`MARGINS`]. They are used while the radius lies
-/// outside the unit circle and that multiplier inside, so that the verdict is open. Unfounded.
+/// Relative distances beyond the largest |μ| found that follow [`MARGINS`]. They are used while the smallest radius
+/// with a count of zero is 1 or more and that |μ| is 1 or less, so that the verdict on the cut is open. Unfounded.
 pub(crate) const FINE_MARGINS: [f64; 2] = [4e-4, 1e-4];
 
-/// Convergence of a winding number, which is the mean of a logarithmic derivative over points on a circle. The number of
-/// points is doubled until the last three means, latest first, differ from one integer by less than these three values.
-/// Each doubling squares the error once the points resolve the nearest zero: 0.4 becomes 0.16, and that 0.03.
+/// Convergence of a winding number, which is the mean of a logarithmic derivative over points on a circle. The number
+/// of points is doubled until the last three means, latest first, differ from one integer by less than these three
+/// values. Each doubling squares the error once the points resolve the nearest zero: 0.4 becomes 0.16, and that 0.03.
 pub(crate) const WINDING_ERRORS: [f64; 3] = [0.02, 0.1, 0.4];
 
 // Limits along the depth.
 
-/// Least number of steps in depth at which a line of a chart is sampled. With 40 steps the limits of random machines
-/// agree with verdicts at single depths (`tests/multipliers.rs`, eight depths of each line).
+/// Least number of steps in axial depth at which a line of a chart, that is one spindle speed, is sampled. With 40
+/// steps the limits of random machines agree with verdicts at single depths (`tests/multipliers.rs`, eight depths of
+/// each line).
 pub(crate) const CHART_SAMPLES_MIN: usize = 40;
 
-/// Number of halvings of a depth interval in which multipliers cannot be followed. With 40 steps the last interval is
-/// 6e-6 of the depth range; in it the number of multipliers outside the unit circle is bisected. Unfounded.
+/// Largest number of halvings of an interval of axial depth in which Floquet multipliers cannot be followed. With 40
+/// steps the last interval is 6e-6 of the depth range; in it the number of multipliers outside the unit circle is
+/// bisected. Unfounded.
 pub(crate) const LINE_LEVELS: u32 = 12;
 
 /// Least |μ| of the multipliers that are followed along the depth. The number outside the unit circle is compared at
@@ -120,17 +128,19 @@ pub(crate) const LINE_FOLLOWED: f64 = 0.3;
 /// (`tests/multipliers.rs`).
 pub(crate) const LINE_FAR: f64 = 0.5;
 
-/// Distance of |μ| from 1 within which Newton's method corrects a multiplier of the scan before it counts as inside or
-/// outside the unit circle. It is 1e5 times the error of the scan, 1e-8 per element.
+/// Distance of |μ| from 1 within which Newton's method corrects a multiplier of the scan over the depth before it
+/// counts as inside or outside the unit circle. It is 1e5 times the error of the scan in each element of its mesh,
+/// 1e-8.
 pub(crate) const LINE_POLISHED: f64 = 1e-3;
 
-/// Largest distance, half way between two sampled depths, between the tangents to a multiplier's path from both depths,
-/// as a share of the distance that the multiplier travels between them. A pair with a larger distance is taken as two
-/// different multipliers. Unfounded.
+/// Largest distance, half way between two sampled depths, between the tangents to a Floquet multiplier's path in the
+/// complex plane from both depths, as a share of the distance that the multiplier travels between them. A pair with a
+/// larger distance is taken as two different multipliers. Unfounded.
 pub(crate) const TANGENT_MISS: f64 = 0.25;
 
 /// Safety factor on |dμ/dw| × (step in depth), the linear estimate of a multiplier's move. A multiplier is followed if
-/// its distance from the unit circle is at most this factor times that move, plus [`REACH_LEAST`]. Unfounded.
+/// its distance from the unit circle is less than this factor times that move, plus [`REACH_LEAST`], and less than
+/// [`LINE_FAR`]. Unfounded.
 pub(crate) const REACH_FACTOR: f64 = 3.0;
 
 /// Distance of |μ| from 1 within which a multiplier is followed along the depth, however small its derivative dμ/dw.
@@ -148,14 +158,14 @@ pub(crate) const TOUCHING: f64 = 0.3;
 /// 1 % that a chart states.
 pub(crate) const CHART_DEPTH: f64 = 0.01;
 
-/// Largest relative gap between two speeds of a chart that is never divided, and the accepted error in speed of a steep
-/// limit: 0.1 %, the accuracy to which a spindle holds its speed.
+/// Largest gap between two speeds of a chart, relative to the speed, that is never divided, and the accepted relative
+/// error in speed of a steep limit: 0.1 %, the accuracy to which a spindle holds its speed.
 pub(crate) const CHART_SPEED: f64 = 1e-3;
 
-/// Least number of lines of a chart per lobe. A lobe is the distance in speed over which the number of vibrations in a
-/// tooth period changes by one, and the multiplier rotates once. Three lines then lie in each quarter of a revolution,
-/// so that the parabola through them bends as the limit does. `tests/between_speeds.rs` checks nearly three thousand
-/// random points of random machines.
+/// Least number of lines of a chart, that is spindle speeds, per lobe. A lobe is the distance in speed over which the
+/// number of vibrations in a tooth period changes by one, and the Floquet multiplier turns once about 0. Three lines
+/// then lie in each quarter of that turn, so that the parabola through them bends as the limit does.
+/// `tests/between_speeds.rs` checks nearly three thousand random points of random machines.
 pub(crate) const LINES_OF_LOBE: f64 = 12.0;
 
 /// Largest gap between two speeds of a chart, relative to the speed. A region of stability or of chatter that is wider
@@ -173,12 +183,14 @@ pub(crate) const CHART_LINES_MAX: usize = 4000;
 
 // Cell charts.
 
-/// Relative error of the cubic in depth, between two sampled depths, up to which it gives the multipliers of the cells
-/// between them: half of the 1e-4 that a cell may have.
+/// Error of the cubic in depth that interpolates a multiplier between two sampled depths, relative to the smaller of
+/// the dominant |μ| at both, up to which the cells between them are interpolated: half of the 1e-4 that a cell may
+/// have.
 pub(crate) const CELL_TOLERANCE: f64 = 5e-5;
 
-/// Relative error of the cubic in depth up to which it gives multipliers beyond [`CELL_FAR`], of which only the verdict
-/// "unstable" matters. With an error of 0.5 % such a multiplier is still larger than 2.
+/// Error of the cubic in depth, relative to the smaller of the dominant |μ| at both depths, up to which cells are
+/// interpolated if that |μ| is above [`CELL_FAR`]: of these only the verdict "unstable" matters. With an error of 0.5 %
+/// such a multiplier is still larger than 2.
 pub(crate) const CELL_TOLERANCE_FAR: f64 = 5e-3;
 
 /// Least |μ| of the dominant multiplier at both ends of a depth interval at which the cells in it may have the error of
@@ -191,8 +203,8 @@ pub(crate) const CELL_FOLLOWED: f64 = 0.4;
 
 // Spread of limits.
 
-/// Number of randomly drawn machines in a batch: a power of 2, as stratification requires. The choice of 64 is
-/// unfounded.
+/// Number of machines in a batch that are drawn at random from the standard deviations of the case: a power of 2, as
+/// stratification requires. The choice of 64 is unfounded.
 pub(crate) const BATCH: u32 = 64;
 
 /// Least and largest number of batches of randomly drawn machines. Four batches give an estimate of their scatter; 128
@@ -203,12 +215,12 @@ pub(crate) const BATCHES: std::ops::RangeInclusive<u32> = 4..=128;
 /// least of [`BATCHES`].
 pub(crate) const PILOT: u32 = 4;
 
-/// Half the width of the 90 % confidence interval of a percentile of the limiting depth, relative to the percentile, at
-/// which no further batch of machines is drawn. Unfounded: percentiles accurate to 1 % are the aim.
+/// Largest half width of the 90 % confidence interval of a percentile of the limiting depth, relative to the
+/// percentile, at which no further batch of machines is drawn. Unfounded: percentiles accurate to 1 % are the aim.
 pub(crate) const PERCENTILE_SETTLED: f64 = 7e-3;
 
-/// Largest share of drawn machines that are not physical (negative damping, indefinite matrices); beyond it the
-/// standard deviations of the case are refused. Unfounded.
+/// Largest share of drawn machines that are not valid (for example with negative damping or indefinite matrices);
+/// beyond it the standard deviations of the case are refused. Unfounded.
 pub(crate) const IMPOSSIBLE_MAX: f64 = 0.2;
 
 /// Depth down to which the limit of a drawn machine is searched first, as a multiple of the limit predicted from
@@ -218,8 +230,8 @@ pub(crate) const SEARCHED_BEYOND: f64 = 1.2;
 /// Least predicted limit of a drawn machine in the first search, as a share of the nominal limit. Unfounded.
 pub(crate) const SHALLOWEST_SEARCH: f64 = 0.25;
 
-/// Depth of the first search for a drawn machine's limit, as a share of the whole depth, from which on the whole depth is
-/// searched at once. Unfounded.
+/// Depth of the first search for a drawn machine's limit, as a share of the whole depth, from which on the whole depth
+/// is searched at once. Unfounded.
 pub(crate) const WORTH_SEARCHING_NEAR: f64 = 0.7;
 
 /// Least number of batches of 64 machines for the probability that a cell is stable: 256 machines, whose share has a
@@ -228,8 +240,9 @@ pub(crate) const BATCHES_OF_CELLS: u32 = 4;
 
 // Loops of receptances.
 
-/// Height of a peak in a table of receptances, as a share of the highest peak, above which it counts as a resonance and
-/// the frequency grid is refined about it. A peak of noise costs computing time only. Unfounded.
+/// Least norm of the receptance matrix at a peak of a table of receptances, as a share of its largest norm in the
+/// table, at which the peak counts as a resonance and the frequency grid is refined about it. A peak of noise costs
+/// computing time only. Unfounded.
 pub(crate) const PEAK_SHARE: f64 = 0.01;
 
 /// Damping ratio of a mode up to which, negative ones included, its receptance counts as infinite, so that methods from
@@ -245,9 +258,9 @@ pub(crate) const SAME_LIMIT: f64 = 0.1;
 /// truncation error by four or more, so that the limits with the doubled number err by a third of the change at most.
 pub(crate) const HARMONICS_SETTLED_LIMIT: f64 = 1e-4;
 
-/// Largest relative change of a Floquet multiplier by doubling the harmonics at which no more are added. Doubling
-/// divides the truncation error by four or more, so that the multiplier with the doubled number errs by a third of the
-/// change at most.
+/// Largest change of a Floquet multiplier by doubling the harmonics, relative to max(1, |μ|), at which no more are
+/// added. Doubling divides the truncation error by four or more, so that the multiplier with the doubled number errs by
+/// a third of the change at most.
 pub(crate) const HARMONICS_SETTLED_MULTIPLIER: f64 = 1e-6;
 
 /// Relative difference in depth up to which a limit with twice the number of harmonics counts as the same limit as one
@@ -286,20 +299,22 @@ pub(crate) const ROOT_LINES: [f64; 14] = [
     0.0, -0.3, -0.6, -0.8, -0.9, -0.97, -1.2, -2.0, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0,
 ];
 
-/// Smallest locus, as a share of the inverse axial depth 1/w, that is traced along a line Re s = σ to predict roots
-/// away from the line. Unfounded.
+/// Least absolute value of a characteristic locus, as a share of the inverse axial depth 1/w, at which the locus is
+/// traced along a line Re s = σ to predict roots away from the line. Unfounded.
 pub(crate) const LOCUS_REACH: f64 = 0.05;
 
-/// Range of the real part of the position, on the chord between two samples of a locus, at which the chord predicts a
-/// root: 0 at the one sample, 1 at the other. A chord predicts poorly far beyond its ends. Unfounded.
+/// Range of the real part of the position, on the chord between two frequency samples of a characteristic locus, at
+/// which the chord predicts a root: 0 at the lower frequency, 1 at the higher. A chord predicts poorly far beyond its
+/// ends. Unfounded.
 pub(crate) const PREDICTED_BETWEEN: std::ops::RangeInclusive<f64> = -0.6..=1.6;
 
-/// Largest distance of a predicted root from the line Re s = σ, as a multiple of the frequency interval plus the slowest
-/// decay rate. Unfounded.
+/// Largest distance of a predicted root s from the line Re s = σ, as a multiple of the sum of the frequency interval of
+/// the prediction and the slowest decay rate of a resonance. Unfounded.
 pub(crate) const PREDICTED_DISTANCE: f64 = 20.0;
 
-/// Distance of a predicted root to the left of the rightmost root found, in slowest decay rates, beyond which it is not
-/// computed. The distance of that root from the line Re s = σ is added. Unfounded.
+/// Distance of a predicted root to the left of the rightmost root found along the same line Re s = σ, in slowest decay
+/// rates of a resonance, beyond which it is not computed. The distance of that rightmost root from the line is added.
+/// Unfounded.
 pub(crate) const PREDICTED_LAG: f64 = 3.0;
 
 /// Factor on [`LOCUS_BEND`] for the zeroth-order approximation. With a tenth the phase mismatch ωτ − π + 2 arg(1/λ)
@@ -332,8 +347,8 @@ pub(crate) const ORBIT_ROOM: f64 = 10.0;
 /// orbits; a larger change halves the step. Unfounded.
 pub(crate) const MULTIPLIER_MOVE_MAX: f64 = 0.12;
 
-/// Least |μ| of the multipliers that are followed along the depth in cases with friction, backlash or hysteresis.
-/// Unfounded.
+/// Size |μ| above which Floquet multipliers are computed along the depth in cases with friction, backlash or
+/// hysteresis. Unfounded.
 pub(crate) const EQUIVALENT_FOLLOWED: f64 = 0.5;
 
 /// Least number of steps in depth at which, in cases with friction, backlash or hysteresis, the number of multipliers
@@ -368,9 +383,9 @@ pub(crate) const LAYER_PROBES: usize = 16;
 /// largest depth, beyond which a speed, feed or feed direction is added. Unfounded.
 pub(crate) const TABLE_TOLERANCE: f64 = 0.003;
 
-/// Least number of speeds at which the table is checked between two entries. With two, one lies where the error of a
-/// straight line between the entries, 4 s (1 − s) of its largest value at the fraction s of the gap, is at least 85 %
-/// of that value.
+/// Least number of spindle speeds at which a lobe table is checked between two neighbouring speeds of the table. With
+/// two, one lies where the error of a straight line over the gap, 4 s (1 − s) of its largest value at the fraction s of
+/// the gap, is at least 85 % of that value.
 pub(crate) const LEAST_CHECKS: f64 = 2.0;
 
 /// Largest distance between the spindle speeds at which a lobe table is first checked between two of its speeds,
@@ -383,11 +398,12 @@ pub(crate) const CHECK_STEP: f64 = 0.01;
 /// at most, since the gap was halved after the check; twice as much means a corner.
 pub(crate) const SUSPECT: f64 = 0.5;
 
-/// Factor by which the largest disagreement between lobe table and method in a gap must grow with a doubling of its
-/// checked speeds for another doubling. [`TABLE_ROOM`] contains the same factor.
+/// Factor by which the largest disagreement between lobe table and method in a gap must grow with a doubling of the
+/// speeds checked in that gap for another doubling. [`TABLE_ROOM`] contains the same factor.
 pub(crate) const CHECK_GROWTH: f64 = 1.2;
 
-/// Factor of the stated depth error on the largest disagreement at the checked speeds. Two checks of a smooth limit see
-/// 85 % of its largest error at least, and doubling stops at a growth by 1.2 ([`CHECK_GROWTH`]): together 1.2/0.85 =
-/// 1.4. Held by `lobe_table/accuracy_tests.rs` at 999 of 1000 random speeds per table.
+/// Factor in the stated depth error of a lobe table on its largest disagreement with the method at the checked speeds.
+/// Two checks of a smooth limit see 85 % of its largest error at least, and doubling stops at a growth by 1.2
+/// ([`CHECK_GROWTH`]): together 1.2/0.85 = 1.4. Held by `lobe_table/accuracy_tests.rs` at 999 of 1000 random speeds per
+/// table.
 pub(crate) const TABLE_ROOM: f64 = 1.5;

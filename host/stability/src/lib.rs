@@ -9,11 +9,11 @@
 //! the coefficients of edge and feed forces under axial-depth modulation, and τ the tooth period. Without β a cut is
 //! stable at a sufficiently small w if the structure is damped. Equation numbers in this crate are those of the thesis
 //! *Chatter Vibrations in Robotic Milling Considering Structural Nonlinearity* (University of Victoria), from which the
-//! cases `kuka-*` and `staubli-*` come. The default method collocates the map over one period; others are
-//! interchangeable behind [`Method`].
+//! cases `kuka-*` and `staubli-*` come. The default method collocates this equation over one tooth period, or over the
+//! revolution for unequal pitch. All methods share the interface [`Method`].
 //!
-//! Main types: [`Problem`] is the linear delay equation of a case. A [`Method`] computes from it the stability of one cut
-//! ([`CutStability`]) or all limits at one speed ([`SpeedLine`]). [`chart()`] does so at many speeds, and
+//! Main types: [`Problem`] is the linear delay equation of a case. A [`Method`] computes from it the stability of one
+//! cut ([`CutStability`]) or all limits at one spindle speed ([`SpeedLine`]). [`chart()`] does so at many speeds, and
 //! [`lobe_table::build_table`] writes the table of the device.
 //!
 //! ```
@@ -73,11 +73,11 @@
 //! | [`lobe_table`] | the table of the device |
 //! | [`trial_cuts`] | predictions against tried cuts |
 //!
-//! `methods` stands above `limits`, since [`Method`] returns limits; `frequency` is the mathematics that four methods share. Tests
-//! across rooms, with a test oracle of Taylor series that shares no code with them, are in `tests`.
+//! `methods` uses `limits`, since [`Method`] returns limits; `frequency` is the mathematics that four methods share.
+//! Tests across rooms, with a test oracle of Taylor series that shares no code with them, are in `tests`.
 //!
-//! This crate must not know recordings of vibration, simulation in time, identification or the command line. It opens no file
-//! other than a table of tried cuts.
+//! This crate must not use recordings of vibration, simulation in time, identification or the command line. The only
+//! file that it reads is a table of trial cuts.
 
 mod criteria;
 mod error;

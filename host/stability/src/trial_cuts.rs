@@ -13,7 +13,8 @@ pub use quietcut_recording::cut_table::{Outcome, TrialCut, read};
 /// computed; methods refine them where needed. A choice: half more than the least number of a chart, 40.
 const SAMPLES: usize = 60;
 
-/// Numbers of trial cuts that a method predicts wrongly, and of those that decide nothing.
+/// Numbers of trial cuts whose outcome a stability method predicts wrongly, and of those that decide nothing about the
+/// method.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Calls {
     /// Number of trial cuts.
@@ -29,7 +30,7 @@ pub struct Calls {
     pub undecided: usize,
 }
 
-/// Head of the columns of a CSV file of trial cuts.
+/// Names of the columns in the first line of a CSV file of trial cuts.
 const HEADER: [&str; 3] = ["rpm [rev/min]", "depth [mm]", "outcome"];
 
 /// Text of a CSV file of trial cuts, without chatter frequencies; [`read`] reads it.
@@ -48,7 +49,8 @@ pub fn text(cuts: &[TrialCut]) -> String {
 }
 
 impl Calls {
-    /// Compares the predictions of a method, computed at the speed of each cut, with the observed outcomes.
+    /// Counts of a stability method's predictions, computed at the spindle speed of each trial cut, against the
+    /// observed outcomes.
     ///
     /// # Errors
     /// As [`Method::line`].
@@ -70,7 +72,7 @@ impl Calls {
     }
 }
 
-/// Result of comparing the prediction for one cut with its outcome.
+/// Result of comparing the prediction for one trial cut with its observed outcome.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Call {
     /// Prediction and outcome agree.
@@ -90,7 +92,8 @@ impl Call {
     }
 }
 
-/// Compares predictions with outcomes for each cut, in the order of the cuts, each at its own speed.
+/// Compares the predictions of a stability method with the outcomes of trial cuts, each at its own spindle speed; one
+/// result for each cut, in the order of the cuts.
 ///
 /// # Errors
 /// As [`Method::line`].
@@ -112,8 +115,8 @@ pub fn calls<M: Method + ?Sized>(method: &M, cuts: &[TrialCut]) -> Result<Vec<Ca
     Ok(cuts.iter().map(|cut| call(&lines, cut)).collect())
 }
 
-/// Compares the prediction for one cut with its outcome. One of the lines must have the speed of the cut and reach its
-/// depth; otherwise the cut is taken as predicted unstable.
+/// Compares the prediction for one trial cut with its outcome. One of the `lines` must have the spindle speed of the
+/// cut and reach its depth; otherwise the cut is taken as predicted unstable.
 pub fn call(lines: &[SpeedLine], cut: &TrialCut) -> Call {
     let line = lines.iter().find(|line| line.rpm == cut.rpm);
     let within = |of: fn(&SpeedLine) -> &Vec<[f64; 2]>| {

@@ -10,13 +10,13 @@ use crate::working_point::{Limits, Tool, WorkingPoint};
 
 /// Returns the advice for the present verdict and spindle speed.
 ///
-/// `limits` are intersected with the limits of the table, if it has any. Without chatter the result is [`Action::Keep`].
-/// A point that is unstable in the table is never advised.
+/// `limits` are intersected with the limits of the table, if it has any. Without chatter the result is
+/// [`Action::Keep`]. A point that is unstable in the table is never advised.
 ///
-/// Cost: the search for a quiet speed passes over the entries of the table for this cut at most once, and begins at the
-/// present speed. If it finds none, the search for a smaller depth passes over the entries again. Both also interpolate
-/// columns of the table. Call it when an input changes, not for
-/// every block.
+/// Cost: the search for a quiet speed passes over the entries of the table for this cut at most once, apart from the
+/// speed band around the present speed, which it passes twice. It begins at this band. If it finds no quiet speed,
+/// the search for a smaller depth passes over the entries again. Both also interpolate columns of the table. Call it
+/// when an input changes, not for every block.
 pub fn advise(
     judgement: &Judgement,
     speed: Rpm,
@@ -179,8 +179,8 @@ fn by_table(cut: &Cut<'_>, speed: Rpm, range: (f32, f32), keep: Advice) -> Resul
     })
 }
 
-/// Advice from the tooth-passing rule. Speeds outside the speed range, and speeds that the lobe table calls unstable for
-/// the cut, are skipped.
+/// Advice from the tooth-passing rule. Speeds outside the speed range, and speeds that the lobe table calls unstable
+/// for the cut, are skipped.
 fn by_rule(
     judgement: &Judgement,
     tool: &Tool,

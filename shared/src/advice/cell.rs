@@ -12,7 +12,7 @@ use crate::lobes::{CutLobes, FEW, Interval};
 pub(super) enum Cell {
     /// The cut is stable at every speed of the cell and all depths within the margin.
     Stable,
-    /// The cut is unstable at every speed of the cell, at the depth or at an end of its margin.
+    /// The cut is unstable or undecided at every speed of the cell, at the depth or at an end of its margin.
     Unstable,
     /// The stability of the cut changes within the cell, or the entries at both ends of the cell do not decide it
     /// without interpolation.
@@ -27,13 +27,13 @@ pub(super) struct Node {
     /// layers.
     is_stable: bool,
     /// Whether the depths `(1 − DEPTH_MARGIN)·d`, `d` and `(1 + DEPTH_MARGIN)·d`, with the depth d of the cut, are
-    /// unstable in every layer.
+    /// unstable or undecided in every layer.
     is_unstable: [bool; 3],
 }
 
 impl Node {
-    /// Stability of the cut at the speed of the table with index `speed_index` and the depth `depth_mm`. `depth_to_mm` is the
-    /// largest depth of the table.
+    /// Stability of the cut at the speed of the table with index `speed_index` and the depth `depth_mm`.
+    /// `depth_to_mm` is the largest depth of the table.
     ///
     /// `None` if the entries of the table alone do not decide the stability between this speed and the next one of the
     /// table.

@@ -43,8 +43,9 @@ impl QuietSpeedSearch<'_> {
         best.map(|(rpm, depth_mm)| (Rpm(rpm), Millimeters(depth_mm)))
     }
 
-    /// Spindle speeds at which the upper bound of the quiet depth (stable with margin) exceeds `to_beat_mm`, in
-    /// descending order of the bound: at most [`CANDIDATE_SPEEDS`], and only one of neighbouring speeds.
+    /// Spindle speeds at which the upper bound of the quiet depth (stable with margin) exceeds `to_beat_mm`: at most
+    /// [`CANDIDATE_SPEEDS`], and only one of those within [`SPEED_BAND`] of each other. They are in descending order
+    /// of the bound; of nearly equal bounds, that of the speed nearer to the present `speed` comes first.
     fn candidates(&self, speed: Rpm, to_beat_mm: f32) -> Vec<Candidate, CANDIDATE_SPEEDS> {
         let mut candidates: Vec<Candidate, CANDIDATE_SPEEDS> = Vec::new();
         let (low_rpm, high_rpm) = self.known_rpm;
@@ -93,8 +94,8 @@ impl QuietSpeedSearch<'_> {
         largest_possible_mm(&self.cut, indices, self.depth_mm, self.depth_to_mm)
     }
 
-    /// The largest quiet depth (stable with margin) in mm at a spindle speed, if it exceeds `at_least_mm`. The speed band
-    /// around the speed, within the machine's limits, is checked in steps; `None` if it leaves the lobe table.
+    /// The largest quiet depth (stable with margin) in mm at a spindle speed, if it exceeds `at_least_mm`. The speed
+    /// band around the speed, within the machine's limits, is checked in steps; `None` if it leaves the lobe table.
     fn largest_depth_mm(&self, rpm: f32, at_least_mm: f32) -> Option<f32> {
         let (low_rpm, high_rpm) = self.known_rpm;
         let from_rpm = f32::max(rpm * (1.0 - SPEED_BAND), self.machine_rpm.0);
@@ -167,8 +168,8 @@ fn insert(candidates: &mut Vec<Candidate, CANDIDATE_SPEEDS>, new: Candidate, spe
 #[derive(Default)]
 struct Window {
     /// Pairs (spindle speed in rev/min, upper bound in mm of the quiet depth, which is stable with margin), ascending
-    /// in both. A bound is removed once a later bound is not larger. If the list is full, the newest bound is dropped: the
-    /// minimum may then be larger, which is still an upper bound.
+    /// in both. A bound is removed once a later bound is not larger. If the list is full, the newest bound is
+    /// dropped: the minimum may then be larger, which is still an upper bound.
     bounds: Deque<(f32, f32), 32>,
 }
 

@@ -62,14 +62,14 @@ pub struct Advice {
     pub action: Action,
     /// Advised spindle speed.
     pub speed: Rpm,
-    /// Advised axial depth; the set depth if no other is advised. `None` if the tooth-passing rule, which has no depths,
-    /// says to reduce the depth. Without a working point `None`, unless the lobe table proposes a depth.
+    /// Advised axial depth; the set depth if no other is advised. `None` if the tooth-passing rule, which has no
+    /// depths, says to reduce the depth. Without a working point `None`, unless the lobe table proposes a depth.
     pub depth: Option<Millimeters>,
     /// Source of the advice.
     pub source: Source,
     /// The working point that the advice assumes because none is set; `None` if one is set or none was assumed.
     pub assumed: Option<WorkingPoint>,
-    /// The reason why the advice does not come from a better source, or proposes no speed; `None` without chatter, or if
-    /// the advice comes from the lobe table.
+    /// The reason why the advice does not come from a better source, or proposes no speed; `None` without chatter, or
+    /// if the advice comes from the lobe table.
     pub obstacle: Option<Obstacle>,
 }

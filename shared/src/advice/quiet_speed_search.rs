@@ -87,8 +87,8 @@ impl<'t> QuietSpeedSearch<'t> {
     /// The first quiet speed (stable with margin) in this direction from `speed`, if its ratio to `speed` (the larger
     /// over the smaller) is below `limit`.
     ///
-    /// The search steps from cell to cell of the table. It interpolates in cells of mixed stability, and at each speed that
-    /// it is about to return.
+    /// The search steps from cell to cell of the table. It interpolates in cells of mixed stability, and at each
+    /// speed that it is about to return.
     fn walk(&self, direction: Direction, speed: Rpm, limit: f32) -> Option<Rpm> {
         let (low_rpm, high_rpm) = self.known_rpm;
         let end_rpm = match direction {
@@ -264,8 +264,9 @@ impl Run<'_, '_> {
         stable_rpm
     }
 
-    /// The first speed that may be quiet: the speed whose speed band begins at the start of the run, or the start itself
-    /// if it is at a limit of the machine. It does not lie before the present speed in the direction of the search.
+    /// The first speed that may be quiet: the speed whose speed band begins at the start of the run, or the start
+    /// itself if it is at a limit of the machine. It does not lie before the present speed in the direction of the
+    /// search.
     fn centre_rpm(&self, start_rpm: f32) -> f32 {
         let machine_rpm = match self.direction {
             Direction::Faster => self.quiet.machine_rpm.0,

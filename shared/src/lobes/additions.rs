@@ -30,11 +30,11 @@ pub struct InterpolationError {
 pub struct Additions<'a> {
     /// Bound of the interpolation error of the lobe table, if known.
     pub interpolation_error: Option<InterpolationError>,
-    /// For each layer the feed direction for which it is valid, from the machine's x axis towards its y axis; `None` for any. An empty
-    /// slice means any direction for all layers.
+    /// For each layer the feed direction for which it is valid, from the machine's x axis towards its y axis; `None`
+    /// for any. An empty slice means any direction for all layers.
     pub feed_directions: &'a [Option<Degrees>],
-    /// For each layer the modes by whose parameters the limits are differentiated; the same number for all layers, at most
-    /// [`MODES_MAX`]. An empty slice means no derivatives.
+    /// For each layer the modes by whose parameters the limits are differentiated; the same number for all layers, at
+    /// most [`MODES_MAX`]. An empty slice means no derivatives.
     pub modes: &'a [&'a [LayerMode]],
     /// Derivatives of the limits of every unstable depth interval, in the order of layers, speeds and intervals of the
     /// table.

@@ -121,8 +121,8 @@ pub(super) fn check_layers(
             && layer.exit.0.is_finite();
         let clashes = |(other, other_direction): (Validity, Option<Degrees>)| match other.is_family_of(&layer)
         {
-            // Table layers with different feed directions do not overlap. A layer for any direction overlaps every
-            // other.
+            // Two table layers of equal immersion and posture that are valid for different feed directions do not
+            // overlap. A layer valid for any feed direction may overlap a layer for one direction.
             true if direction.zip(other_direction).is_some_and(|(a, b)| a != b) => false,
             true => other.feed_from <= layer.feed_to && layer.feed_from <= other.feed_to,
             // Table layers of equal immersion and posture form a family. The immersion ranges of two families,

@@ -9,7 +9,8 @@ use crate::units::{Hertz, Millimeters};
 /// are merged, which may call stable depths unstable.
 const CAPACITY: usize = 32;
 
-/// The unstable depth intervals at one spindle speed, ascending and without overlaps; intervals may touch.
+/// The depth intervals at one spindle speed at which the cut is unstable or undecided, ascending and without
+/// overlaps; intervals may touch.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Column {
     depth_from_mm: f32,
@@ -28,7 +29,8 @@ impl Column {
         }
     }
 
-    /// Appends an unstable depth interval to the column.
+    /// Appends an unstable depth interval to the column. Joins it with the last one if the two touch and have the
+    /// same kind and chatter frequency.
     ///
     /// If the column is full, the last interval is extended instead. Stable depths may then be called unstable, never
     /// the reverse.
@@ -53,7 +55,8 @@ impl Column {
         &self.intervals
     }
 
-    /// The lowest unstable depth interval: its lower end is the stability limit for growing depth.
+    /// The lowest unstable or undecided depth interval: its lower end is the stability limit for growing depth.
+    /// `None` if all depths are stable.
     pub fn first_limit(&self) -> Option<&Interval> {
         self.intervals.first()
     }
@@ -177,8 +180,8 @@ impl Column {
 
     /// Linear interpolation between two corresponding unstable depth intervals of neighbouring columns.
     ///
-    /// An interval end at the end of the table may lie beyond it in truth. The result then also ends at the end of the
-    /// table.
+    /// An interval end at the smallest or largest depth of the table may lie beyond that depth in truth. If either
+    /// interval ends there, the result does too. Its chatter frequency is 0 (unknown) if that of either interval is.
     fn interpolate(&self, a: &Interval, b: &Interval, weight: f32) -> Interval {
         let between = |x: f32, y: f32| x + (y - x) * weight;
         let from_mm = if f32::min(a.from.0, b.from.0) <= self.depth_from_mm {

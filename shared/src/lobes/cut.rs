@@ -144,8 +144,8 @@ impl<'a> LobeTable<'a> {
     }
 }
 
-/// The two table layers that enclose the working point in feed or in feed direction, and the interpolation weight of the
-/// second.
+/// The two table layers that enclose the working point in feed or in feed direction, and the interpolation weight of
+/// the second.
 // `inline(never)` on this function and those below: one copy of the code saves flash, and the time of a call is
 // negligible.
 #[inline(never)]
@@ -201,8 +201,9 @@ fn family<'t>(table: &'t LobeTable<'_>, working_point: &'t WorkingPoint) -> impl
         .map(|(index, _)| index)
 }
 
-/// The nearest feed directions of table layers below and above the requested one, if they are at most
-/// [`FEED_DIRECTION_SPAN`] apart. A layer for any direction counts as having exactly the requested one.
+/// The nearest feed directions of table layers below and above the requested one, if one of them is within
+/// [`FEED_DIRECTION_TOLERANCE`] of it or the two are at most [`FEED_DIRECTION_SPAN`] apart. A layer for any direction
+/// counts as having exactly the requested one.
 #[inline(never)]
 fn neighbours(
     table: &LobeTable<'_>,
@@ -227,8 +228,8 @@ fn neighbours(
     (is_there || to_below + to_above <= FEED_DIRECTION_SPAN.0).then_some((below, above))
 }
 
-/// The angle in degrees from one feed direction to another, counter-clockwise, from 0 to below 360; NaN if their difference is
-/// NaN or above 10⁶ degrees.
+/// The angle in degrees from one feed direction to another, counter-clockwise, from 0 to below 360; NaN if their
+/// difference is NaN or above 10⁶ degrees.
 #[inline(never)]
 fn turn(from: Degrees, to: Degrees) -> f32 {
     let mut turn = to.0 - from.0;

@@ -21,9 +21,9 @@ pub struct Content<'a> {
     pub teeth: u8,
     /// Speed limits of the machine's spindle, if known.
     pub limits: Option<Limits>,
-    /// The smallest computed depth.
+    /// The smallest axial depth of the table.
     pub depth_from: Millimeters,
-    /// The largest computed depth.
+    /// The largest axial depth of the table.
     pub depth_to: Millimeters,
     /// Spindle speeds of the lobe table, strictly ascending, with steps of any size.
     pub speeds: &'a [Rpm],

@@ -56,7 +56,7 @@ pub enum TableError {
     },
     /// A tool without teeth.
     Teeth,
-    /// The speed limits of the machine are not an ascending range.
+    /// The speed limits of the machine are not an ascending, finite range of speeds of at least 0.
     Limits {
         /// Slowest.
         from: Rpm,
@@ -89,8 +89,9 @@ pub enum TableError {
         /// Its value.
         found: Rpm,
     },
-    /// A layer of the table has an empty range, feeds that overlap those of another layer of the same immersion and
-    /// posture, or an immersion that differs from that of another layer by less than twice the tolerance.
+    /// A layer of the table has an empty range of feed or immersion; or its feed range overlaps that of a layer of
+    /// equal immersion and posture whose feed direction is not another one; or its immersion differs by at most twice
+    /// the tolerance from that of a layer of the same posture, without being equal.
     Layer {
         /// Index of the layer.
         layer: u32,
@@ -132,7 +133,7 @@ pub enum TableError {
         /// Index of the unstable depth interval in its column.
         interval: u32,
     },
-    /// The buffer is too small for the bytes of the lobe table.
+    /// The buffer is too small for the bytes of the lobe table, or the table is longer than 2³² − 1 bytes.
     Buffer {
         /// Bytes needed.
         needed: u64,
@@ -156,15 +157,16 @@ pub enum TableError {
         /// Index of the mode in its table layer.
         mode: u32,
     },
-    /// The interpolation error that the table states is negative or not finite.
+    /// The interpolation error that the table states is negative or not finite in depth, or not in [0, 1) in relative
+    /// speed.
     InterpolationError {
         /// Stated error in depth.
         depth: Millimeters,
         /// Stated interpolation error in spindle speed, relative to the speed; it must be below 1.
         speed: f32,
     },
-    /// A derivative of a limit is not finite, the number of derivatives differs from the number of unstable intervals,
-    /// or layers have different numbers of modes.
+    /// A derivative of a limit is not finite, the number of sets of derivatives differs from the number of unstable
+    /// intervals, or the layers have different numbers of modes or more than [`MODES_MAX`](super::MODES_MAX).
     Slopes {
         /// Index in the table of the unstable interval with the faulty derivative, or the number of sets of
         /// derivatives.

@@ -16,31 +16,40 @@
 //! | 33 | 1 | length of the name in bytes |
 //! | 34 | 2 | L, number of layers |
 //! | 36 | 2 | S, number of speeds |
-//! | 38 | 2 | flags: bit 0, the machine's limits are given; schema 2: bit 1, the interpolation error is given; bits 8–15 M, number of modes |
+//! | 38 | 2 | flags: bit 0 machine's limits given; schema 2: bit 1 interpolation error given, bits 8–15 M |
 //! | 40 | 4+4 | slowest and fastest speed of the machine, f32, rev/min |
 //! | 48 | 4+4 | smallest and largest depth of the table, f32, mm |
 //! | 56 | 4 | largest chatter frequency, f32, Hz: the scale of all chatter frequencies |
 //! | 60 | 4 | I, number of intervals |
 //! | 64 | 32 | name of the case, UTF-8, padded with zeros |
-//! | 96 | 24·L | layers: feed from, feed to (f32, mm), start, exit (f32, degrees), posture (1 byte), 3 zeros, index of its first interval (u32); schema 2 instead of the zeros: 1 where a feed direction is given, and it (u16, 1/100 degree) |
+//! | 96 | 24·L | layers, each of 24 bytes as described below |
 //! | … | 4·S | speeds, f32, rev/min, strictly ascending, steps of any size |
-//! | … | 2·L·(S+1) | per layer: where the intervals of each speed begin, relative to the layer's first, u16; one more for the end |
+//! | … | 2·L·(S+1) | per layer: index of each speed's first interval, counted in the layer, u16; one more for the end |
 //! | … | 8·I | intervals: from, to, chatter (u16 each), kind (1 byte: 0 Hopf, 1 flip, 2 fold, 3 undecided), 1 zero |
 //! | … | 4+4 | schema 2, where flagged: interpolation error in depth (f32, mm) and in speed (f32, relative) |
 //! | … | 8·L·M | schema 2: per layer its modes: natural frequency (f32, Hz), damping ratio (f32) |
-//! | … | 4·(2M+1)·I | schema 2, where M > 0: per interval for `from`, then for `to`: derivatives by frequency and by damping ratio of each mode, by cutting force (IEEE binary16, mm per relative change) |
+//! | … | 4·(2M+1)·I | schema 2, where M > 0: per interval the derivatives of `from`, then those of `to` |
+//!
+//! A layer has feed from and feed to (f32, mm), start and exit (f32, degrees), posture (1 byte), 3 further bytes, and
+//! the index of its first interval (u32). The 3 bytes are zeros in schema 1. In schema 2 they are 1 if a feed
+//! direction is given, else 0 (1 byte), and the feed direction (u16, 1/100 degree).
+//!
+//! M is the number of modes of each layer. The derivatives of an interval end are those by the natural frequency of
+//! each mode, then by the damping ratio of each mode, then by the cutting force (IEEE binary16, mm per relative
+//! change).
 //!
 //! A depth is smallest + q·(largest − smallest)/65535, a chatter frequency q·largest/65535 with 0 for "not known".
 //! `from` is rounded down and `to` up, so that an entry errs by less than one step and to the unstable side only
-//! (a depth within 1/50 of a step is taken as that step: a table that is read and encoded again keeps its bytes). The chatter frequency is rounded to
-//! the nearest, but never to 0. With 10 mm and 5 000 Hz a step is 0.15 µm and 0.08 Hz. 600 speeds, 6 layers and
-//! 2 intervals per column are 67 KB; 3 are 96 KB.
+//! (a depth within 1/50 of a step is taken as that step: a table that is read and encoded again keeps its bytes). The
+//! chatter frequency is rounded to the nearest, but never to 0. With 10 mm and 5 000 Hz a step is 0.15 µm and 0.08
+//! Hz. 600 speeds, 6 layers and 2 intervals per column are 67 KB; 3 are 96 KB.
 //!
 //! # Schemas
 //!
-//! The header never changes. Schema 1 is a table without additions. Tables without additions are always written in schema 1, so
-//! that devices with older firmware accept them. Schema 2 has the additions marked above. A reader refuses every other schema
-//! with [`TableError::Schema`](super::TableError::Schema) before it reads beyond the header, and refuses unknown flags of schema 2.
+//! The header never changes. Schema 1 is a table without additions. Tables without additions are always written in
+//! schema 1, so that devices with older firmware accept them. Schema 2 has the additions marked above. A reader
+//! refuses every other schema with [`TableError::Schema`](super::TableError::Schema) before it reads beyond the
+//! header, and refuses unknown flags of schema 2.
 //!
 //! A further addition needs a higher [`SCHEMA`], goes to the end of the table, and has its bytes frozen in the tests.
 

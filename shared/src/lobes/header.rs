@@ -129,7 +129,8 @@ impl Header {
         bytes
     }
 
-    /// The CRC-32 over the header of the lobe table only; the caller updates it with the bytes after the header.
+    /// The CRC-32 over the header of the lobe table without its CRC field; the caller updates it with the bytes after
+    /// the header.
     pub fn begin_crc(&self) -> Crc32 {
         let mut crc = Crc32::new();
         crc.update(self.without_crc().get(..CRC_OFFSET).unwrap_or_default());

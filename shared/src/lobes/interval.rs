@@ -26,9 +26,9 @@ pub enum IntervalKind {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Interval {
-    /// Smallest unstable depth.
+    /// Smallest depth of the interval, at which the cut is not stable.
     pub from: Millimeters,
-    /// Smallest stable depth above the unstable interval, or the largest depth of the table.
+    /// Upper end of the interval, which does not belong to it unless it is the largest depth of the table.
     pub to: Millimeters,
     /// Kind of stability loss.
     pub kind: IntervalKind,

@@ -84,7 +84,8 @@ impl Shape {
         })
     }
 
-    /// Checks that the counts, depths and speed limits in the description of a lobe table are possible values.
+    /// Checks that the values in the description of a lobe table (teeth, speed limits, depths, largest chatter
+    /// frequency, numbers of speeds and layers) are possible.
     pub(super) fn check(&self) -> Result<(), TableError> {
         if self.teeth == 0 {
             return Err(TableError::Teeth);
@@ -307,7 +308,8 @@ impl Shape {
     }
 }
 
-/// Refuses unknown flags of a lobe table of schema 2. In schema 1 all flags except the first are ignored.
+/// Refuses unknown flags of a lobe table of schema 2, and more than [`MODES_MAX`] modes. In schema 1 all flags except
+/// the first are ignored.
 fn check_flags(flags: u16, is_extended: bool) -> Result<(), TableError> {
     let modes = usize::from(flags >> MODES_SHIFT);
     if is_extended && (flags & 0xFF & !KNOWN_FLAGS != 0 || modes > MODES_MAX) {

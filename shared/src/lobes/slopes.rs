@@ -1,8 +1,8 @@
 //! Derivatives of the stability limits by modal parameters and cutting force, and the corrected limit.
 //!
-//! To first order, limit(p + Δp) = limit(p) + Σ ∂limit/∂ln p · Δp/p. The parameters p are the natural frequencies and damping
-//! ratios of a layer's modes, and the cutting force coefficient K_tc. Mode shapes and the ratios K_rc/K_tc and K_ac/K_tc are
-//! fixed.
+//! To first order, limit(p + Δp) = limit(p) + Σ ∂limit/∂ln p · Δp/p. The parameters p are the natural frequencies and
+//! damping ratios of a layer's modes, and the cutting force coefficient K_tc. Mode shapes and the ratios K_rc/K_tc
+//! and K_ac/K_tc are fixed.
 
 use serde::{Deserialize, Serialize};
 
@@ -34,7 +34,8 @@ pub struct Slopes {
     pub by_cutting_force: f32,
 }
 
-/// Derivatives of both ends of an unstable depth interval; 0 for an end at the smallest or largest depth of the table.
+/// Derivatives of both ends of an unstable depth interval; 0 for an end at the smallest or largest depth of the
+/// table, or without a computed derivative.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct IntervalSlopes {
     /// Derivatives of the lower end.
@@ -56,8 +57,8 @@ pub struct Learned {
 }
 
 impl Learned {
-    /// The relative parameter changes if the mode with this index has the frequency and damping ratio of `now` instead
-    /// of those of `table`. They are 0 for an index beyond [`MODES_MAX`].
+    /// The relative parameter changes if the mode with this index has the frequency and damping ratio of `now`
+    /// instead of those of `table`. They are 0 for an index of [`MODES_MAX`] or more.
     pub fn of_mode(index: usize, table: &LayerMode, now: &LayerMode) -> Self {
         let mut learned = Self::default();
         if let Some(slot) = learned.frequency.get_mut(index) {

@@ -106,7 +106,8 @@ impl<'a> LobeTable<'a> {
         (0..self.shape.layers).map(move |layer| table.shape.validity(table.bytes, layer).unwrap_or(NOWHERE))
     }
 
-    /// The unstable depth intervals of one layer at one speed of the table.
+    /// The unstable depth intervals of one layer at one speed of the table; `None` if the table has no such layer or
+    /// speed, or is damaged.
     pub fn entry(&self, layer: usize, speed_index: usize) -> Option<Column> {
         let mut column = self.empty_column();
         self.read_column(layer, speed_index, &mut column).ok()?;
@@ -127,8 +128,8 @@ impl<'a> LobeTable<'a> {
     }
 
     pub(super) fn speed_rpm(&self, index: usize) -> f32 {
-        // If the bytes of the table were changed after the check, the speed is NaN: all comparisons fail, and the
-        // lookup returns `NotKnown`.
+        // A speed beyond the bytes of the table is NaN: all comparisons with it fail, and the lookup returns
+        // `NotKnown`.
         self.shape.speed_rpm(self.bytes, index).unwrap_or(f32::NAN)
     }
 

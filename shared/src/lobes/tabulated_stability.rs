@@ -59,7 +59,8 @@ pub enum NotKnown {
     Undecided,
     /// The bytes of the lobe table were changed after the check.
     Damaged,
-    /// The lobe table has layers for several feed directions, and none is close enough to that of the cut.
+    /// The table layers for this immersion and posture are valid for other feed directions, between which the lookup
+    /// cannot interpolate to that of the cut.
     FeedDirection {
         /// The requested feed direction.
         asked: Degrees,

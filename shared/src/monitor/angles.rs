@@ -27,7 +27,7 @@ impl Angles {
 }
 
 impl Monitor {
-    /// The spindle angles of the samples of the newest block; `None` while the tachometer has no lock.
+    /// The spindle angles of the samples of the newest block; `None` without a tachometer, and while it has no lock.
     pub(super) fn angles(&self, state: &State) -> Option<Angles> {
         let tachometer = self.tachometer.as_ref()?;
         let phase = tachometer.phase(&state.tachometer, state.sample_clock.time_of(0)?)?;

@@ -77,8 +77,8 @@ impl<const POINTS: usize, const BINS: usize> BandState<POINTS, BINS> {
         self.samples_since_growth = self.samples_since_growth.saturating_add(1);
     }
 
-    /// Discards the samples, tracked tone and tooth periods of the band after a gap in the samples. The background
-    /// spectrum is kept.
+    /// Discards the samples, tracked tone and tooth periods of the band after a gap in the samples. The newest
+    /// spectrum and the background spectrum are kept.
     pub(super) fn interrupt(&mut self) {
         self.overlap.reset();
         self.tone = None;

@@ -40,7 +40,8 @@ impl Monitor {
         &self.settings
     }
 
-    /// One-sided spectral density of the sensor's white noise and of its rounding to counts, in (m/s²)² per Hz.
+    /// One-sided spectral density of one axis of the sensor, from its white noise and its rounding to counts, in
+    /// (m/s²)² per Hz.
     pub(super) fn noise_density(&self) -> f32 {
         let sensor = &self.settings.sensor;
         let density = sensor.noise_meters_per_second2_per_root_hertz;

@@ -31,7 +31,8 @@ pub const MAX_TEETH: u8 = 12;
 pub enum SettingsError {
     /// The tool has no teeth, or more than [`MAX_TEETH`].
     Teeth(u8),
-    /// The tachometer wheel has no positions, or fewer than four teeth outside of its gap.
+    /// The tachometer wheel has no positions; or it has a gap and fewer than four teeth outside of it, or a gap of
+    /// 100 positions or more.
     Wheel(Wheel),
     /// The sample rate of the sensor is outside the range of the decimation filters.
     SampleRate(Hertz),

@@ -19,8 +19,8 @@ const STRUCTURE_TONES: (Hertz, Hertz) = (Hertz(5.0), STRUCTURE_BAND);
 const TOOL_TONES: (Hertz, Hertz) = (Hertz(150.0), TOOL_BAND);
 
 impl Monitor {
-    /// Computes the spectra of the bands that have a complete block, and updates the background spectrum and the tracked tone of
-    /// each band.
+    /// Computes the spectra of the bands that have a complete block, and updates the background spectrum and the
+    /// tracked tone of each band.
     pub(super) fn take_spectra(&self, state: &mut State, measured: Option<Hertz>) {
         let rate = state
             .sample_clock
@@ -75,8 +75,8 @@ impl Monitor {
         }
     }
 
-    /// Spindle speed in revolutions per second, from a tone of the spectrum near the assumed tooth-passing frequency;
-    /// `None` if no tone there is strong enough.
+    /// Spindle speed in revolutions per second, from the strongest tone of the spectrum near the assumed
+    /// tooth-passing frequency; `None` if no spindle speed is assumed or no tone there is strong enough.
     fn speed_from_tone(&self, spectrum: &PowerSpectrum<'_>) -> Option<Hertz> {
         let assumed = self.settings.assumed_speed?.to_hertz().0 * f32::from(self.settings.tool.teeth);
         let reach = ASSUMED_SPEED_UNCERTAINTY * assumed + spectrum.bin.0;

@@ -29,8 +29,8 @@ pub struct State {
     pub(super) work: [f32; STRUCTURE_POINTS],
     /// Running mean over the blocks of the share of samples that are clipped or lost.
     pub(super) damage: f32,
-    /// Spindle speed estimated from the spectrum, in revolutions per second; `None` if the tachometer measures the
-    /// speed.
+    /// Spindle speed estimated from the newest spectrum of the tool band, in revolutions per second; `None` if the
+    /// tachometer measures the speed or the spectrum has no tooth-passing tone.
     pub(super) tone_speed: Option<Hertz>,
     pub(super) detector: Detector,
     pub(super) advice: Option<Advised>,
@@ -45,7 +45,7 @@ pub(super) struct Advised {
     pub(super) chatter: Option<Hertz>,
     pub(super) speed: Rpm,
     pub(super) working_point: Option<WorkingPoint>,
-    /// CRC-32 of the lobe table.
+    /// CRC-32 of the lobe table, from its header; `None` without a table.
     pub(super) table: Option<u32>,
     /// Feed direction of the cut for which the advice was computed, if it is set.
     pub(super) feed_direction: Option<Degrees>,
@@ -104,8 +104,8 @@ impl State {
         (*losses, *damage, *tone_speed, *advice) = (0, 0.0, None, None);
     }
 
-    /// The points of the stroboscopic map from the newest block, oldest first. They come from the structure band if the tooth period is
-    /// long enough for it, else from the tool band.
+    /// The points of the stroboscopic map from the newest block, oldest first. They come from the structure band if
+    /// the tooth period is long enough for it, else from the tool band.
     pub fn strobes(&self) -> &[Strobe] {
         &self.strobes
     }

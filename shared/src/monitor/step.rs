@@ -13,8 +13,9 @@ use crate::working_point::WorkingPoint;
 impl Monitor {
     /// Processes the next block and the new tachometer edges up to the end of the block.
     ///
-    /// Edges must be in order of time. An edge may be passed with a later block than the one in which it occurred, at most one
-    /// revolution late.
+    /// Edges must be in order of time. An edge may be passed with a later block than the one in which it occurred,
+    /// unless the tachometer loses its lock meanwhile: without an edge for 2.5 times the longest regular interval
+    /// between edges.
     pub fn step(
         &self,
         state: &mut State,
@@ -57,8 +58,9 @@ impl Monitor {
         }
     }
 
-    /// Updates the sample clock with a block. After lost samples, resets filters, spectra and the history of the
-    /// chatter detector.
+    /// Updates the sample clock with a block, and the share of clipped or lost samples. After lost samples or a
+    /// restart of the sample clock, resets the decimation filters, and discards samples for spectra, tracked tones,
+    /// tooth periods and the history of the chatter detector.
     fn take_block(&self, state: &mut State, block: &Block) {
         let lost = match self.sample_clock.observe(&mut state.sample_clock, block) {
             Continuity::Contiguous => 0,
@@ -78,7 +80,8 @@ impl Monitor {
         }
     }
 
-    /// Processes the tachometer edges up to the time `now`. Returns the measured spindle speed, if there is one.
+    /// Processes the new tachometer edges. The lock is lost if no edge came for too long before `now`, the time of
+    /// the last sample of the block. Returns the measured spindle speed, if there is one.
     fn take_edges(&self, state: &mut State, edges: &[Edge], now: Nanoseconds) -> Option<Rpm> {
         let tachometer = self.tachometer.as_ref()?;
         for &edge in edges {

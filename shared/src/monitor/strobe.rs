@@ -11,7 +11,8 @@ use crate::synchronous::Passed;
 pub struct Strobe {
     /// The band of the acceleration.
     pub band: Band,
-    /// Number of tooth periods since the tachometer locked. Modulo the number of teeth it is the index of the tooth.
+    /// Number of the tooth period, counted from angle 0 of the tachometer, which lies 1024 revolutions before its
+    /// lock. Modulo the number of teeth it is the index of the tooth.
     pub tooth: u32,
     /// Acceleration along x, y and z at this angle, in m/s².
     pub meters_per_second2: [f32; 3],

@@ -7,8 +7,8 @@
 //! | 1 … [`MAX_BODY`] | body: the message in postcard |
 //! | 4 | CRC-32 of all preceding bytes, little-endian |
 //!
-//! COBS removes zero bytes, and one zero byte ends the frame. Zeros between frames are ignored. After connecting, a host sends one
-//! zero to end a frame that noise may have begun.
+//! COBS removes zero bytes, and one zero byte ends the frame. Zeros between frames are ignored. After connecting, a
+//! host sends one zero to end a frame that noise may have begun.
 
 use cobs::{DecodeResult, DecoderState};
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
@@ -24,7 +24,8 @@ const CRC: usize = 4;
 /// Largest length of a frame before COBS encoding, in bytes.
 const MAX_RAW: usize = HEADER + MAX_BODY + CRC;
 
-/// Largest length of a frame on the wire, in bytes, with the closing zero: COBS adds one byte per 254.
+/// Largest length of a frame on the wire, in bytes, with the closing zero: COBS adds one byte, and another for
+/// every 254.
 pub const MAX_FRAME: usize = MAX_RAW + MAX_RAW / 254 + 1 + 1;
 
 /// A message: a type that can be sent as the body of a frame.
@@ -178,7 +179,8 @@ impl FrameErrors {
     }
 }
 
-/// A message that is too large for a frame. All messages of this crate fit; a test checks the largest message of each variant.
+/// A message that is too large for a frame. All messages of this crate fit; a test checks the largest message of each
+/// variant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TooLarge;
 

@@ -1,4 +1,5 @@
-//! The messages between host and device. The order of variants and fields is part of the protocol: see [`super::version`].
+//! The messages between host and device. The order of variants and fields is part of the protocol: see
+//! [`super::version`].
 
 use heapless::{String, Vec};
 use serde::{Deserialize, Serialize};
@@ -47,19 +48,19 @@ pub enum Request {
     /// Selects the messages that the device sends without a request. After [`Hello`](Self::Hello) there are none.
     Subscribe(Subscription),
     /// Begins or resumes the upload of the lobe table with this file header. Reply: [`Reply::Upload`] with the offset
-    /// of the next chunk. A device keeps the part of the same table that it already holds.
+    /// of the next chunk. A device whose unfinished upload has the same header continues it.
     UploadBegin(Header),
     /// Sends a chunk of the lobe table. Reply: [`Reply::Upload`].
     UploadChunk {
         /// Offset of the chunk in bytes from the start of the lobe table; it must be the next one expected.
         offset: u32,
-        /// The bytes of the chunk of the lobe table, at least 1.
+        /// The bytes of the chunk of the lobe table, at most [`MAX_CHUNK`].
         data: Vec<u8, MAX_CHUNK>,
     },
     /// Requests the progress of the upload of a lobe table, also after a restart of the device. Reply:
     /// [`Reply::Upload`].
     UploadQuery,
-    /// Ends the upload: the device checks the lobe table and uses it from now on.
+    /// Ends the upload: the device checks the lobe table and puts it in use.
     UploadCommit,
     /// Aborts the upload.
     UploadAbort,
@@ -133,7 +134,8 @@ pub enum Refusal {
     HelloFirst,
     /// The settings are invalid.
     Settings(SettingsError),
-    /// The working point is invalid: depth and feed must be numbers of at least 0, the entry angle below the exit angle.
+    /// The working point is invalid: depth and feed must be finite numbers of at least 0, and the entry angle below
+    /// the exit angle, both finite.
     WorkingPoint(WorkingPoint),
     /// The lobe table or its header is invalid.
     Table(TableError),
@@ -230,7 +232,7 @@ pub struct Info {
     pub board: String<24>,
     /// Version of the firmware.
     pub firmware: String<16>,
-    /// The accelerometer of the board; `None` if the host feeds the samples.
+    /// The accelerometer of the board; `None` if the board has none.
     pub sensor: Option<Sensor>,
     /// Largest length of a lobe table that fits into a slot, in bytes.
     pub slot_capacity: u32,
@@ -299,9 +301,9 @@ impl TableSummary {
 /// Operating status of a device.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Status {
-    /// Time since the start.
+    /// Time since the start of the device.
     pub uptime: Nanoseconds,
-    /// Blocks processed since the start.
+    /// Number of sample blocks processed since the start of the device.
     pub blocks: u32,
     /// Number of clipped samples since the signal chain was configured or reset.
     pub clipped: u32,
@@ -313,11 +315,12 @@ pub struct Status {
     pub working_point: Option<WorkingPoint>,
     /// The messages that the device sends without a request.
     pub subscription: Subscription,
-    /// Frames received.
+    /// Number of readable frames received from the host.
     pub frames: u32,
-    /// Refused frames.
+    /// Numbers of refused frames from the host.
     pub frame_errors: FrameErrors,
-    /// Number of reports, spectra and stroboscopic points that were dropped because the line is too slow.
+    /// Number of messages that were dropped because the line is too slow: reports, spectra, and sets of the
+    /// stroboscopic points of one block.
     pub dropped: u32,
 }
 
@@ -363,8 +366,8 @@ pub struct Feed {
     time: Nanoseconds,
     lost: u32,
     clipped: u16,
-    /// Counts of x, y and z as six bytes per sample, little-endian. With the variable-length integers of postcard, a block of
-    /// large counts would exceed the frame.
+    /// Counts of x, y and z as six bytes per sample, little-endian. With the variable-length integers of postcard, a
+    /// block of large counts would exceed the frame.
     counts: Vec<[u8; 6], MAX_BLOCK_SAMPLES>,
     /// Tachometer edges from the host up to the end of the block, in order of time. They follow those of
     /// [`Request::FeedEdges`].
@@ -409,7 +412,8 @@ fn counts_of([a, b, c, d, e, f]: [u8; 6]) -> Counts {
     ]
 }
 
-/// A chunk of a spectrum. The chunks of one spectrum are sent in order and are not interleaved with those of another.
+/// A chunk of a spectrum. The chunks of one spectrum are sent in order; other messages, and chunks of the spectrum of
+/// the other band, may come between them. The rest of a spectrum is dropped once a newer one of its band is complete.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SpectrumChunk {
     /// The frequency band of the spectrum.

@@ -85,8 +85,8 @@ pub struct Configuration {
 }
 
 impl Default for Configuration {
-    /// The largest range and the full band, with an interrupt every 64 samples. 17 ms remain from the interrupt until
-    /// the sensor's queue is full.
+    /// The largest range and the full band. Pin INT1 rises when 64 samples are in the sensor's queue; 17 ms remain
+    /// from then until the queue is full.
     fn default() -> Self {
         Self {
             range: Range::default(),

@@ -1,7 +1,7 @@
 //! The device's clock: timer TIM2, which captures tachometer edges and the sensor's watermark line in hardware.
 //!
-//! Both inputs pass the same filter, so that both have the same delay. The timer wraps every 53 s. Events and calls of [`now`]
-//! extend its count beyond 32 bits.
+//! Both inputs pass the same filter, so that both have the same delay. The timer wraps every 53 s. Events and calls
+//! of [`now`] extend its count beyond 32 bits.
 
 use core::cell::{Cell, RefCell};
 
@@ -38,7 +38,8 @@ static TIMER: Mutex<RefCell<Option<Timer<'static, TIM2>>>> = Mutex::new(RefCell:
 /// The newest count of the timer TIM2, extended to 64 bits.
 static TICKS: Mutex<Cell<u64>> = Mutex::new(Cell::new(0));
 
-/// Starts the clock. From then on the two pins are inputs of the timer.
+/// Starts timer TIM2, the device's clock. The pins of the tachometer and of the sensor's watermark line become
+/// capture inputs of the timer.
 pub(crate) fn start(
     timer: Peri<'static, TIM2>,
     tachometer: Peri<'static, PA0>,

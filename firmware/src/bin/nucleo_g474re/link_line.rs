@@ -1,4 +1,5 @@
-//! The serial port of the link: LPUART1 with DMA, and a queue of bytes in each direction between its tasks and the device.
+//! The serial port of the link: LPUART1 with DMA, and a queue of bytes in each direction between its tasks and the
+//! device.
 
 use core::convert::Infallible;
 

@@ -11,8 +11,8 @@
 //! | PA2, PA3 | ST-LINK | LPUART1 TX and RX: the link to the host, 921 600 baud, 8N1 |
 //! | SWD | ST-LINK | log of defmt over RTT |
 //!
-//! Priorities, highest first: captures of the timer; port and DMA of the link; the tasks for sensor and link, in an interrupt executor; the
-//! device, in the main executor.
+//! Priorities, highest first: captures of the timer; port and DMA of the link; the tasks for sensor and link, in an
+//! interrupt executor; the device, in the main executor.
 #![no_std]
 #![no_main]
 #![deny(clippy::undocumented_unsafe_blocks)]
@@ -173,7 +173,8 @@ struct BlockEdges {
 }
 
 impl BlockEdges {
-    /// The tachometer edges since the preceding block, up to the end of `block`.
+    /// The tachometer edges since the end of the preceding block, up to the end of `block` at the nominal sample
+    /// rate; at most [`MAX_BLOCK_EDGES`], the others go to later blocks.
     fn until_the_end_of(&mut self, block: &Block) -> &[Edge] {
         let period_ns = (1e9 / Sensor::IIS3DWB_16G.nominal_rate.0) as u64;
         let end = Nanoseconds(block.time.0 + block.counts.len() as u64 * period_ns);
@@ -202,7 +203,8 @@ impl Clock for BoardClock {
     }
 }
 
-/// Core clock of 160 MHz from the board's 24 MHz crystal: a divider of 16 then gives exactly the sensor bus's maximum of 10 MHz.
+/// Core clock of 160 MHz from the board's 24 MHz crystal: a divider of 16 then gives exactly the sensor bus's maximum
+/// of 10 MHz.
 fn clocks() -> Config {
     let mut config = Config::default();
     config.rcc.hse = Some(Hse {
@@ -222,8 +224,8 @@ fn clocks() -> Config {
     config
 }
 
-/// Handler of the interrupt that reading a lobe table raises if a loss of power has damaged it: returns and lets the read
-/// continue.
+/// Handler of the interrupt that reading a lobe table raises if a loss of power has damaged it: returns and lets the
+/// read continue. Any other cause of the interrupt stops the program.
 // SAFETY: the handler touches a flag of the flash memory only.
 #[exception]
 unsafe fn NonMaskableInt() {

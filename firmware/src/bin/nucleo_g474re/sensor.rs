@@ -22,12 +22,12 @@ use crate::work::WORK;
 pub(crate) type Sensor =
     Iis3dwb<ExclusiveDevice<Spi<'static, Blocking, Master>, Output<'static>, Delay>, Delay>;
 
-/// Capacity of the queue of sample blocks: 38 ms of blocks, for the duration of a page erase or of the check of a lobe
-/// table. A test in the emulator asserts that no request takes longer.
+/// Capacity of the queue of sample blocks: 38 ms of blocks, for the duration of a page erase or of the check of a
+/// lobe table. A test in the emulator asserts that no request of a table upload takes longer.
 pub(crate) const MAX_BLOCKS: usize = 16;
 
-/// Longest wait for the watermark line, which rises every 2.4 ms. If the line is not connected, the sensor's queue is read at
-/// this interval; it is full after 19 ms.
+/// Longest wait for the watermark line, which rises every 2.4 ms. If the line is not connected, the sensor's queue is
+/// read at this interval; it is full after 19 ms.
 const LINE_TIMEOUT: Duration = Duration::from_millis(10);
 const RETRY: Duration = Duration::from_secs(1);
 

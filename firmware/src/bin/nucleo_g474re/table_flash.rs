@@ -1,11 +1,12 @@
 //! The flash of the two table slots: the second bank of the internal flash, as defined in `memory.x`.
 //!
-//! The program runs from the first bank, so processor and interrupts continue while a page of the second is erased or written (RM0440,
-//! chapter 3: read-while-write). Only the caller waits. The driver disables the data cache meanwhile and clears it. It refuses to
-//! start if the option bytes select single-bank mode.
+//! The program runs from the first bank, so processor and interrupts continue while a page of the second is erased or
+//! written (RM0440, chapter 3: read-while-write). Only the caller waits. The flash driver of embassy-stm32 disables
+//! the data cache meanwhile and clears it. embassy-stm32 refuses to start if the option bytes select single-bank
+//! mode.
 //!
-//! Not yet confirmed on a board, and not testable in an emulator: sampling continues during a page erase, and a double word left
-//! half written by a loss of power raises the interrupt of [`pass_over_damage`] only.
+//! Not yet confirmed on a board, and not testable in an emulator: sampling continues during a page erase, and a
+//! double word left half written by a loss of power raises the interrupt of [`pass_over_damage`] only.
 
 use embassy_stm32::flash::{Blocking, Error, FLASH_BASE, Flash};
 use embassy_stm32::pac;
@@ -51,7 +52,8 @@ impl TableFlash {
     }
 }
 
-/// Handles the non-maskable interrupt on reading a double word with a two-bit error, which a loss of power during a write leaves behind.
+/// Handles the non-maskable interrupt on reading a double word with a two-bit error, which a loss of power during a
+/// write leaves behind.
 ///
 /// The bytes are used as read, and the CRC of the table detects them. Returns false if the interrupt has another cause.
 pub(crate) fn pass_over_damage() -> bool {

@@ -3,6 +3,6 @@
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
 
-/// Signal that wakes the main loop: a block of samples has arrived, bytes have arrived, or the line accepts bytes
-/// again.
+/// Signal that wakes the main loop: a block of samples has arrived, bytes from the host have arrived, or the queue of
+/// bytes to the host has room again.
 pub(crate) static WORK: Signal<CriticalSectionRawMutex, ()> = Signal::new();

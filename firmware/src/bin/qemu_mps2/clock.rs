@@ -36,7 +36,7 @@ pub(crate) fn ticks() -> u32 {
     u32::MAX - unsafe { (VALUE as *const u32).read_volatile() }
 }
 
-/// Time since the start.
+/// Time since the start of timer 0, in microseconds.
 pub(crate) fn microseconds() -> u64 {
     loop {
         let wraps = WRAPS.load(Ordering::Relaxed);

@@ -1,18 +1,20 @@
 //! Cost of the device: stack depth, and processing time of blocks and of polls of the link.
 //!
-//! The memory below the stack is filled with a pattern at the start. Later the overwritten part gives the stack depth. Times
-//! come from the board's timer. If the emulator counts instructions (`-icount shift=6`), one instruction takes 64 ns.
+//! The memory below the stack is filled with a pattern at the start. Later the overwritten part gives the stack
+//! depth. Times come from the board's timer. If the emulator counts instructions (`-icount shift=6`), one instruction
+//! takes 64 ns.
 
 use crate::{clock, flash};
 
-/// Largest stack depth of the device that can be measured, in bytes: it exceeds the RAM of the real board.
+/// Largest stack depth of the device that can be measured, in bytes: the size of the whole RAM of the real board.
 const PAINTED_BYTES: usize = 128 * 1024;
 /// Number of bytes below the stack pointer that are not filled with the pattern, because the filling function uses
 /// them.
 const SPARED_BYTES: usize = 256;
 const PAINT: u32 = 0xdead_beef;
 
-/// The largest costs of the device, in time and stack memory, measured so far.
+/// Costs of the device measured so far: stack depth, number of blocks with their total and largest processing time,
+/// and largest times of a poll of the link.
 pub(crate) struct Cost {
     /// Value of the stack pointer when the memory below it was filled with the pattern.
     top: usize,
@@ -20,7 +22,7 @@ pub(crate) struct Cost {
     ticks: u64,
     most_ticks: u32,
     /// Largest processing time of a poll of the link without its flash operations, in ticks of 40 ns. A poll performs
-    /// at most one request.
+    /// at most one request if the host waits for each reply.
     request_ticks: u32,
     /// Largest time of the flash operations during one poll of the link, in ticks of 40 ns.
     flash_ticks: u32,
@@ -70,7 +72,8 @@ impl Cost {
         done
     }
 
-    /// Writes the largest stack depth and the largest times to the log.
+    /// Writes the stack depth, the number of blocks, their total and largest processing time, and the largest times
+    /// of a poll of the link to the log.
     pub(crate) fn log(&self) {
         defmt::info!(
             "cost: {=usize} bytes of stack; {=u32} blocks took {=u64} ticks, one at most {=u32}; a request at most {=u32}, and the flash {=u32}",
@@ -85,7 +88,8 @@ impl Cost {
 
     fn stack_bytes(&self) -> usize {
         let is_painted = |word: &usize| {
-            // SAFETY: the address is in RAM that was filled with the pattern at the start.
+            // SAFETY: the address is in RAM, at most `PAINTED_BYTES` below the stack pointer at the start of the
+            // measurement.
             unsafe { (*word as *const u32).read_volatile() == PAINT }
         };
         let painted = (self.top - PAINTED_BYTES..self.top)

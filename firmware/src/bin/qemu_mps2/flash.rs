@@ -1,7 +1,9 @@
-//! Emulated flash for the lobe tables in the board's non-volatile memory, with the timing and restrictions of the real board's flash.
+//! Emulated flash for the lobe tables in the board's non-volatile memory, with the timing and restrictions of the
+//! real board's flash.
 //!
-//! A page has 2 KB, and an erase sets all its bits. A double word of 8 bytes is written once. The times are those of the STM32G474, so
-//! that a loss of power interrupts the same operations as on the real board.
+//! A page has 2 KB, and an erase sets all its bits. A double word of 8 bytes is written once after each erase; only
+//! zeros may overwrite it. The times are those of the STM32G474, so that a loss of power interrupts the same
+//! operations as on the real board.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
@@ -40,7 +42,7 @@ pub(crate) struct Flash(());
 
 impl Flash {
     /// # Safety
-    /// Must be called once.
+    /// Must be called at most once.
     pub(crate) unsafe fn take() -> Self {
         Self(())
     }

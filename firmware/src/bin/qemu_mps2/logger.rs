@@ -13,8 +13,8 @@ struct State {
     restore: UnsafeCell<critical_section::RestoreState>,
 }
 
-// SAFETY: both cells are accessed only between `acquire` and `release`, with interrupts off on a single core. `TAKEN` excludes a
-// second access.
+// SAFETY: both cells are accessed only between `acquire` and `release`, with interrupts off on a single core. `TAKEN`
+// excludes a second access.
 unsafe impl Sync for State {}
 
 static TAKEN: AtomicBool = AtomicBool::new(false);

@@ -34,7 +34,8 @@ impl Spindle {
         }
     }
 
-    /// Processes a byte from the stimulus port. At the end of a frame it returns the byte that answers the frame.
+    /// Processes a byte from the stimulus port. Returns the byte that answers a frame at the end of the frame, or as
+    /// soon as the frame is too long.
     pub(crate) fn take(&mut self, byte: u8, device: &mut BoardDevice, line: &mut Uart) -> Option<u8> {
         if self.is_skipping {
             self.is_skipping = byte != 0;
@@ -58,8 +59,8 @@ impl Spindle {
         Some(if is_done.is_some() { TAKEN } else { REFUSED })
     }
 
-    /// Passes the stimuli of `bytes` bytes that are stored in the board's memory to the device; `None` if they are
-    /// refused.
+    /// Passes the stimuli that the first `bytes` bytes of the store in the board's memory contain to the device;
+    /// `None` as soon as one is unreadable or refused.
     fn play(&mut self, bytes: usize, device: &mut BoardDevice, line: &mut Uart) -> Option<()> {
         if bytes > MEMORY_BYTES - STORE_OFFSET {
             return None;
@@ -76,7 +77,8 @@ impl Spindle {
         Some(())
     }
 
-    /// Passes a stimulus to the device; `None` if the stimulus is refused.
+    /// Processes a stimulus: keeps a tachometer edge for the next block, passes a block of samples to the device, or
+    /// logs the costs. `None` if it is refused: too many edges, or [`Stimulus::Stored`].
     fn give(&mut self, stimulus: Stimulus, device: &mut BoardDevice, line: &mut Uart) -> Option<()> {
         match stimulus {
             Stimulus::Edge(edge) => self.edges.push(edge).ok()?,

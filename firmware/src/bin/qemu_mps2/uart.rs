@@ -1,7 +1,7 @@
 //! The board's serial ports.
 //!
-//! Each port holds one byte per direction. The emulator stops the sender while a byte is not read, so that no byte is lost. The
-//! ports are polled; their interrupts only wake the board.
+//! Each port holds one byte per direction. The emulator stops the sender while a byte is not read, so that no byte is
+//! lost. The ports are polled; their interrupts only wake the board.
 
 use core::convert::Infallible;
 
@@ -66,7 +66,7 @@ impl Uart {
         self.read(Self::STATE) & Self::TX_FULL == 0
     }
 
-    /// Clears the interrupt flag of the serial port.
+    /// Clears the flag of the receive interrupt of the serial port.
     pub(crate) fn clear_interrupt(self) {
         self.write(Self::INTERRUPT, Self::RX_INTERRUPT);
     }

@@ -1,4 +1,5 @@
-//! The cubic matrices of a structure as a restoring force f_r = C₃ v∘³ + K₃ x∘³.
+//! The cubic matrices of a structure as a restoring force f_r = C₃ v∘³ + K₃ x∘³, with the cubes of each velocity v and
+//! displacement x of the tool.
 
 use quietcut_model::structure::{CubicForce, Structure};
 use quietcut_simulate::{MotionState, Regime, RestoringForce};

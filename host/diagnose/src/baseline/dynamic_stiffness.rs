@@ -1,4 +1,4 @@
-//! The dynamic stiffness of a structure: force per displacement.
+//! The dynamic stiffness of a structure: force on the tool per displacement of the tool.
 
 use nalgebra::{DMatrix, Matrix3};
 use num_complex::Complex64;
@@ -7,10 +7,12 @@ use rayon::prelude::*;
 use crate::signal::grid::Grid;
 use quietcut_model::structure::{FirstOrder, Form, Structure};
 
-/// Z(iω) = −ω²M + iωC + K along the machine's `axes`, N/m, at the bins of `grid`.
+/// Dynamic stiffness Z(iω) = −ω²M + iωC + K of a structure along the machine's `axes`, N/m, at the bins of a signal
+/// that is not upsampled; rows force, columns displacement.
 ///
-/// For a structure given by matrices without rotations, Z is this sum, also where K is singular and no receptance exists. For other
-/// structures, Z is the inverse of the receptance over `axes`, and zero at bins where that inverse does not exist.
+/// For a `structure` given by matrices without rotations, Z is this sum of its matrices, also where K is singular and
+/// no receptance exists. For other structures, Z is the inverse of the receptance of `first_order` over `axes`, and
+/// zero at bins where that receptance or its inverse does not exist.
 pub(crate) fn table(
     structure: &Structure,
     first_order: &FirstOrder,

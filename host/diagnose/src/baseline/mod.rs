@@ -20,16 +20,18 @@ pub(crate) struct Baseline<'a> {
     pub structure: &'a Structure,
     /// Extensions of the case file.
     pub effects: Effects,
-    /// Structure with the mass, damping and stiffness that the extensions change.
+    /// Structure of the case file with its mass, damping and stiffness as the extensions change them, without restoring
+    /// forces and additional modes of extensions.
     pub altered: Structure,
-    /// Restoring forces f_r of the extensions and of the structure's cubic matrices, which the linear structure does not contain.
+    /// Restoring forces f_r of the extensions and of the structure's cubic matrices, which the linear structure does
+    /// not contain.
     pub terms: Vec<Box<dyn RestoringForce>>,
-    /// The linear structure with all linear extensions, in first-order form.
+    /// The linear structure with all linear extensions, additional modes included, in first-order form.
     pub first_order: FirstOrder,
-    /// Receptance of the linear structure.
+    /// Receptance at the tool of the linear structure with all linear extensions (`first_order`).
     pub receptance: Receptance,
-    /// True if a step of the force makes the velocity jump, so that accelerations are averages over a sampling interval: see
-    /// [`quietcut_simulate::Dynamics::velocity_jumps`].
+    /// True if a step of the force makes the velocity of the tool jump, so that accelerations are averages over a
+    /// sampling interval: see [`quietcut_simulate::Dynamics::velocity_jumps`].
     pub velocity_jumps: bool,
     /// The machine's axes (0, 1, 2) in which the structure moves.
     pub axes: Vec<usize>,
@@ -64,24 +66,24 @@ impl<'a> Baseline<'a> {
         })
     }
 
-    /// The linear structure with the baseline's extensions and one further effect, in first-order form.
+    /// The linear structure with the linear extensions of the baseline and those in `effect`, in first-order form.
     ///
     /// # Errors
-    /// The effect does not apply to this structure.
+    /// An effect in `effect` does not apply to this structure.
     pub(crate) fn altered(&self, effect: &Effects) -> Result<FirstOrder, ModelError> {
         let (dynamics, _) = self.effects.clone().and(effect).dynamics(self.structure)?;
         Ok(dynamics.first_order())
     }
 
-    /// True for a structure with a rigid-body mode: a pole at zero.
+    /// True if the baseline structure has a rigid-body mode: a pole at zero.
     pub(crate) fn is_free(&self) -> bool {
         let poles = self.first_order.poles();
         let largest = poles.iter().map(|pole| pole.norm()).fold(0.0, f64::max);
         poles.iter().any(|pole| pole.norm() <= 1e-9 * largest.max(1e-9))
     }
 
-    /// The longest time constant of the structure, s: the largest −1/Re λ of its poles λ, with −Re λ taken as at least 1e-6·|λ| and 1e-9
-    /// 1/s.
+    /// The longest time constant of the baseline structure, s: the largest −1/Re λ of its poles λ, with −Re λ taken as
+    /// at least 1e-6·|λ| and 1e-9 1/s.
     pub(crate) fn slowest_decay_s(&self) -> f64 {
         self.first_order
             .poles()
@@ -100,8 +102,8 @@ impl<'a> Baseline<'a> {
             .min_by(f64::total_cmp)
     }
 
-    /// The sensor of the channel `name`, with the sensor effects of the case's extensions; `None` for a quantity that is neither force nor
-    /// motion along x, y or z.
+    /// The sensor of the channel `name`, with the sensor effects of the case's extensions; `None` for a name that
+    /// stands neither for a force nor for a displacement, velocity or acceleration along x, y or z.
     pub(crate) fn pickup(&self, name: &str) -> Option<Pickup> {
         pickup_of(name).map(|pickup| self.effects.pickup(pickup))
     }
@@ -135,7 +137,7 @@ fn pickup_of(name: &str) -> Option<Pickup> {
     Some(Pickup::of_axis(quantity, axis))
 }
 
-/// The restoring forces of `effects` alone, without those of the baseline.
+/// The restoring forces of `effects` alone on `structure`, without those of the baseline.
 pub(crate) fn terms_of(
     effects: &Effects,
     structure: &Structure,
@@ -147,7 +149,8 @@ pub(crate) fn terms_of(
     Ok(terms)
 }
 
-/// Number of time derivatives from displacement to a quantity.
+/// Number of time derivatives from displacement to a quantity: 1 for velocity, 2 for acceleration, 0 for every other
+/// quantity.
 pub(crate) fn derivatives(quantity: quietcut_recording::Quantity) -> i32 {
     match quantity {
         quietcut_recording::Quantity::Velocity => 1,

@@ -1,7 +1,9 @@
-//! The depth of cut follows the axial vibration, b = b₀ − z. The effect is on or off and has no magnitude.
+//! The axial depth b of a cut follows the axial vibration z of the tool, b = b₀ − z. The effect is on or off and has no
+//! magnitude.
 //!
-//! Shows: forces that vary with z, if the edge angle is not 90°. Does not show: anything if z is stiff or the edge angle is 90°. Fit: one
-//! coefficient of the regressor, which is 1 if the effect exists; no reported parameter. Source: thesis, eq. 3.5.
+//! Shows: cutting forces that vary with z. Does not show: anything if the tool does not vibrate along z, as on a
+//! structure that is stiff along z. Fit: one coefficient of the regressor, which is 1 if the effect exists; no reported
+//! parameter. Source: thesis, eq. 3.5.
 
 use super::process::{changed, everywhere, has_axial};
 use crate::candidates::cause::{Cause, Location, Parameter, Regressors};

@@ -1,8 +1,10 @@
-//! A share s of the spring does not act within a gap: f_r += s·k·(d(x) − x), d the dead zone of the gap.
+//! A share s of the spring along an axis does not act within a gap of total width g: f_r += s·k·(d(x) − x), with the
+//! static stiffness k and d(x) = 0 for |x| ≤ g/2, x ∓ g/2 beyond.
 //!
-//! Shows: above the amplitude of the gap, a stiffness that rises with amplitude towards that of the case; odd harmonics. Does not show: a
-//! change of damping; any effect other than reduced stiffness within the gap. Fit: linear in s for each gap; the gap is a nonlinear
-//! parameter. Source: Nordin and Gutman, Automatica 38 (2002).
+//! Shows: at amplitudes above half the gap, a stiffness that rises with amplitude towards that of the case; odd
+//! harmonics. Does not show: a change of damping; at amplitudes within the gap, any effect other than a reduced
+//! stiffness. Fit: linear in s for each gap; the gap g is a nonlinear parameter. Source: Nordin and Gutman, Automatica
+//! 38 (2002).
 
 use super::restoring::{Restoring, largest_m, logarithmic, plain, smallest_m};
 use crate::criteria::LARGEST_SPRING_SHARE;

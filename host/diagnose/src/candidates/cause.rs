@@ -51,7 +51,8 @@ impl Location {
         }
     }
 
-    /// The keys `direction`, `directions` and `channel` by which a table `[extension.NAME]` states this location of the cause.
+    /// Those of the keys `direction`, `directions` and `channel` by which a table `[extension.NAME]` states this
+    /// location of a cause.
     pub(crate) fn table(&self) -> toml::Table {
         let mut table = toml::Table::new();
         if let Some(direction) = self.direction() {
@@ -88,12 +89,15 @@ impl fmt::Display for Location {
 /// Contribution of a candidate cause to the residual of a record, per unit of one coefficient of the cause.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Regressor {
-    /// Restoring force f_r of the cause per unit of its coefficient, along the machine's axes, N, upsampled. A record in the response
-    /// domain compares −H·f_r with the residual, a record in the force domain f_r itself.
+    /// Restoring force f_r of the cause per unit of its coefficient, along the machine's axes, N, upsampled; empty
+    /// along an axis without force. A record in the response domain compares −H·f_r with the residual, a record in the
+    /// force domain f_r itself.
     pub restoring_n: [Vec<f64>; 3],
-    /// Contribution of a sensor error to the reading of each channel, at the samples of the record; empty for channels without one.
+    /// Contribution of the cause to the reading of each channel, at the samples of the record, for causes such as
+    /// sensor errors that act on readings; empty for channels without one.
     pub observed: Vec<Vec<f64>>,
-    /// Contribution of the cause to the cutting force, in a record of a cut; otherwise `None`.
+    /// Contribution of the cause to the cutting force per unit of its coefficient, in a record of a cut; `None` if
+    /// there is none.
     pub cut: Option<CutForce>,
 }
 
@@ -106,7 +110,7 @@ impl Regressor {
         }
     }
 
-    /// Regressor of a sensor error, which acts directly on the readings of channels.
+    /// Regressor of a cause whose contribution to the readings of the channels is given, such as a sensor error.
     pub(crate) fn of_channels(observed: Vec<Vec<f64>>) -> Self {
         Self {
             observed,
@@ -122,8 +126,8 @@ impl Regressor {
         }
     }
 
-    /// Contribution of this regressor to the residual of each channel of `record`, in the unit of the channel per unit of the coefficient,
-    /// sample by sample.
+    /// Contribution of this regressor to the residual of each channel of `record`, in the unit of the channel per unit
+    /// of the coefficient, sample by sample.
     pub(crate) fn columns(&self, record: &Record) -> Vec<Vec<f64>> {
         let count = record.grid.count();
         let mut columns: Vec<Vec<f64>> = (0..record.channels.len())
@@ -149,7 +153,8 @@ impl Regressor {
                 .then(|| record.grid.spectrum_of_fine(force))
         });
         for (index, (channel, column)) in record.channels.iter().zip(&mut columns).enumerate() {
-            // A restoring force moves the tool, but is no part of the cutting force that the channel measures.
+            // A restoring force moves the tool, but is no part of the cutting force that a force channel measures in a
+            // cut.
             if record.domain == Domain::Response && channel.pickup.quantity == Quantity::Force {
                 continue;
             }
@@ -205,8 +210,8 @@ pub(crate) struct LocatedEffect {
 
 /// A physical term that the baseline may lack.
 ///
-/// It is linear in its coefficients once its nonlinear parameters (gap, yield displacement, time constant …) are given: residual = Σ
-/// coefficient · regressor(nonlinear parameters, measured motion) + free decays + noise.
+/// It is linear in its coefficients once its nonlinear parameters (gap, yield displacement, time constant …) are given:
+/// residual = Σ coefficient · regressor(nonlinear parameters, measured motion) + free decays + noise.
 pub(crate) trait Cause: Send + Sync {
     /// The effect of the model that this cause represents.
     fn effect(&self) -> EffectName;
@@ -229,8 +234,8 @@ pub(crate) trait Cause: Send + Sync {
         vec![Vec::new()]
     }
 
-    /// Further start values of the nonlinear parameters, from the residual `_residual` that other causes leave: samples by record and
-    /// channel.
+    /// Further start values of the nonlinear parameters, from the residual `_residual` that other causes leave: samples
+    /// by record and channel.
     fn nonlinear_grid_beside(
         &self,
         _study: &Study<'_>,
@@ -254,7 +259,8 @@ pub(crate) trait Cause: Send + Sync {
         nonlinear_parameters: &[f64],
     ) -> Regressors;
 
-    /// Parameters by key from the fitted coefficients; `None` if they are not physical, as a negative friction force.
+    /// Parameters by key from the fitted coefficients and the nonlinear parameters; `None` if they are not physical, as
+    /// a negative friction force.
     fn parameters(
         &self,
         study: &Study<'_>,
@@ -263,8 +269,8 @@ pub(crate) trait Cause: Send + Sync {
         coefficients: &[f64],
     ) -> Option<Vec<Parameter>>;
 
-    /// Nonlinear parameters computed from the fitted coefficients, for a cause whose regressors are exact at those values: they are found
-    /// by fixed-point iteration, not by a search. `None` for other causes.
+    /// Nonlinear parameters computed from the fitted coefficients, for a cause whose regressors are exact at those
+    /// values: they are found by fixed-point iteration, not by a search. `None` for other causes.
     fn settled(&self, _nonlinear_parameters: &[f64], _coefficients: &[f64]) -> Option<Vec<f64>> {
         None
     }
@@ -278,7 +284,8 @@ pub(crate) trait Cause: Send + Sync {
         table
     }
 
-    /// Entries of the cause in the answer, for example one for each effect name, axis or channel, with parameters and extension table.
+    /// Entries of the cause in the answer, for example one for each effect name, axis or channel, with parameters and
+    /// extension table.
     fn located_effects(&self, location: &Location, parameters: &[Parameter]) -> Vec<LocatedEffect> {
         vec![LocatedEffect {
             name: self.name(),
@@ -288,13 +295,14 @@ pub(crate) trait Cause: Send + Sync {
         }]
     }
 
-    /// Standard deviations, by key, of parameters that another measurement than the fit determines, as the tachometer does.
+    /// Standard deviations, by key, of those parameters that the tachometer determines instead of the fit to the
+    /// channels.
     fn known_deviations(&self, _study: &Study<'_>) -> Vec<Parameter> {
         Vec::new()
     }
 
-    /// Further parameters for the answer that express the same change in other quantities, as a natural frequency instead of a relative
-    /// change.
+    /// Further parameters for the answer that express the same change in other quantities, as a natural frequency
+    /// instead of a relative change.
     fn also(&self, _study: &Study<'_>, _location: &Location, _parameters: &[Parameter]) -> Vec<Parameter> {
         Vec::new()
     }

@@ -1,4 +1,5 @@
-//! Cutting or edge coefficients of the material that differ from those of the case. The force F is linear in each.
+//! Cutting or edge coefficients of the material that differ from those of the case. The cutting force F is linear in
+//! each.
 
 use super::process::{changed, cutter, everywhere, has_axial};
 use crate::candidates::cause::{Cause, Location, Parameter, Regressors};
@@ -8,15 +9,17 @@ use quietcut_model::effects::EffectName;
 use quietcut_model::milling::Material;
 use quietcut_simulate::Cutter;
 
-/// Tangential, radial and axial coefficient.
+/// The cause that the tangential, radial and axial coefficients of the material, all cutting or all edge coefficients,
+/// differ from the case.
 pub(super) struct Coefficients {
     pub(super) effect: EffectName,
     pub(super) keys: [&'static str; 3],
     /// Returns the tangential, radial and axial coefficient (all cutting or all edge coefficients) of a material.
     pub(super) of: fn(&mut Material) -> [&mut f64; 3],
-    /// Step of the finite difference of the cutting force with respect to one coefficient, in the unit of the coefficient.
+    /// Step of the finite difference of the cutting force with respect to one coefficient, in the unit of the
+    /// coefficient.
     pub(super) step: fn(&Cutter) -> f64,
-    /// True if a tangential coefficient of this value is physically possible.
+    /// True if a tangential coefficient of the given value is physically possible.
     pub(super) can_be: fn(f64) -> bool,
 }
 

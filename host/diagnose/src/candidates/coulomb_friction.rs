@@ -1,9 +1,11 @@
-//! f_r += fc·sign(v), sticking included; fc is the same in both directions of motion, or has one value for each.
+//! Dry friction f_r += fc·sign(v), sticking included; fc is the same in both directions of motion, or has one value for
+//! each.
 //!
-//! Shows: damping that falls as 1/amplitude, sticking at low levels, odd harmonics that decrease slowly with their order. Does not show: a
-//! change of frequency while it slips, or an effect at large amplitudes. A Bouc–Wen loop with very stiff pre-slip is equivalent. Fit:
-//! linear in fc along the measured motion; sticking is simulated. Source: Armstrong-Hélouvry, Dupont and Canudas de Wit, Automatica 30
-//! (1994).
+//! Shows: damping that falls as 1/amplitude, sticking at low amplitudes, odd harmonics that decrease slowly with their
+//! order. Does not show: a change of frequency while it slips, or an effect at large amplitudes. A Bouc–Wen loop that
+//! is very stiff before it yields is equivalent. Fit: linear in fc along the measured motion, where f_r passes linearly
+//! from −fc to fc while |v| is below the noise; sticking is represented by the simulation of the prediction-error fit.
+//! Source: Armstrong-Hélouvry, Dupont and Canudas de Wit, Automatica 30 (1994).
 
 use super::restoring::{Restoring, largest_m, plain};
 use crate::records::domain::Domain;
@@ -19,7 +21,8 @@ pub(super) const ASYMMETRIC: Restoring = Restoring {
     ..plain(EffectName::CoulombFriction, &["fc_n", "fc_minus_n"])
 };
 
-/// Friction behind a backlash: after each reversal no force until the gap is crossed, then friction.
+/// Dry friction behind a backlash: after each reversal of the motion no force until the gap `play_mm` is crossed, then
+/// friction.
 pub(super) const BEHIND_BACKLASH: Restoring = Restoring {
     nonlinear_parameters: &["play_mm"],
     nonlinear_grid: |study, axis| {
@@ -34,8 +37,9 @@ pub(super) const BEHIND_BACKLASH: Restoring = Restoring {
     ..plain(EffectName::CoulombFriction, &["fc_n", "fc_minus_n"])
 };
 
-/// Friction behind a backlash whose contact closes gradually over `contact_mm`. It is a candidate only if the motion is imposed and every
-/// instant of the force is measured; for a structure that moves freely, hysteresis (Bouc–Wen) describes the same loop.
+/// Dry friction behind a backlash whose contact closes gradually over `contact_mm`. It is a candidate only if all
+/// records compare the measured force along a measured motion; for a structure driven by a force, hysteresis (Bouc–Wen)
+/// describes the same loop.
 pub(super) const BEHIND_SOFT_BACKLASH: Restoring = Restoring {
     nonlinear_parameters: &["play_mm", "contact_mm"],
     nonlinear_grid: |study, axis| {

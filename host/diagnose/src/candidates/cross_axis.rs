@@ -1,8 +1,9 @@
-//! A channel that also reads another direction: y = y_t + p·(the other direction), y_t the true value.
+//! A channel of motion that also reads the motion along another axis: y = y_t + p·(motion along the other axis), y_t
+//! the true value.
 //!
-//! Shows: the motion of the other direction without delay or phase, also if only that direction is driven. Does not show: anything if the
-//! other direction is at rest. Unlike a cross receptance, it is not reciprocal. Fit: linear in p. Source: transverse sensitivity as in
-//! McConnell and Varoto, Vibration Testing (2008).
+//! Shows: the motion along the other axis without delay or phase, also if only that axis is driven. Does not show:
+//! anything if the other axis is at rest. Unlike a cross receptance, it is not reciprocal. Fit: linear in p. Source:
+//! transverse sensitivity as in McConnell and Varoto, Vibration Testing (2008).
 
 use num_complex::Complex64;
 
@@ -14,7 +15,7 @@ use quietcut_model::effects::EffectName;
 
 pub(super) struct CrossAxis;
 
-/// Cross-axis fraction p of the finite difference that gives the change of chip thickness and cutting force.
+/// Cross-axis fraction p at which the finite difference of the cutting force between measured and true motion is taken.
 const SMALL_FRACTION: f64 = 0.05;
 
 impl Cause for CrossAxis {
@@ -47,7 +48,8 @@ impl Cause for CrossAxis {
         weights[*axis] = 1.0;
         let read = readings_at(record, location, |_| weights, |_| Complex64::ONE);
         let other = record.motion.clone();
-        // A channel reads y = x + p·(the other direction), so the true motion is x = y − p·(the other direction).
+        // A channel reads y = x + p·(motion along the other axis), so the true motion is x = y − p·(motion along the
+        // other axis).
         Ok(with_chip_of_true_motion(
             record,
             location,

@@ -1,4 +1,4 @@
-//! The damping differs from the case: linear in its relative change.
+//! The damping of the structure differs from the case; the regressor is linear in its relative change.
 
 use super::linear_parameter::{LinearChange, StructureMatrix};
 

@@ -1,8 +1,10 @@
-//! Stiffness that changes with time: K·(1 + r·t), or K·(1 + a·(1 − e^(−t/T))).
+//! Stiffness of the structure that changes with the time t since the start of the recording: K·(1 + r·t), or K·(1 +
+//! a·(1 − e^(−t/T))).
 //!
-//! Shows: natural frequencies that change along the record at constant amplitude, all by the same factor. Does not show: harmonics, or a
-//! dependence on amplitude. Levels that only rise or only fall with time cannot be told from drift. Fit: linear in r or a; T is a nonlinear
-//! parameter. Source: structures with time-dependent parameters as in Poulimenos and Fassois, MSSP 20 (2006).
+//! Shows: natural frequencies that change along the record at constant amplitude, all by the same factor. Does not
+//! show: harmonics, or a dependence on amplitude. If the vibration level only rises or only falls along the records, a
+//! stiffness that depends on amplitude cannot be told from drift. Fit: linear in r or a; T is a nonlinear parameter.
+//! Source: structures with time-dependent parameters as in Poulimenos and Fassois, MSSP 20 (2006).
 
 use super::restoring::{Restoring, logarithmic, longest_s, plain};
 use quietcut_model::effects::EffectName;
@@ -22,7 +24,7 @@ pub(super) const SETTLING: Restoring = Restoring {
             .collect()
     },
     everywhere: true,
-    // A stiffness that more than doubles or becomes negative is no drift.
+    // A relative change a beyond ±1, with which the stiffness would more than double or become negative, is no drift.
     physical: |change| change.iter().all(|change| change.abs() <= 1.0),
     bounds: |study, _| vec![[0.05 * longest_s(study), 2.0 * longest_s(study)]],
     ..plain(EffectName::Drift, &["relative_change"])

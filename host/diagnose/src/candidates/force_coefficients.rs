@@ -1,8 +1,9 @@
-//! The cutting coefficients K_tc, K_rc, K_ac differ from those of the case.
+//! The cutting coefficients K_tc, K_rc, K_ac of the material differ from those of the case.
 //!
-//! Shows: forces proportional to the chip thickness, and changed chatter limits. Does not show: force at vanishing chip thickness. In the
-//! steady state of a stable linear cut without measured force, one factor on all cutting and edge coefficients is equivalent to a gain of
-//! all channels. Fit: linear in each coefficient. Source: Altintas, Manufacturing Automation (2012), ch. 2.
+//! Shows: a change of the cutting force in proportion to the chip thickness, and changed chatter limits. Does not show:
+//! a change of the force at vanishing chip thickness. In the steady state of a stable linear cut without measured
+//! force, one factor on all cutting and edge coefficients is equivalent to one gain of all channels of motion. Fit:
+//! linear in each coefficient. Source: Altintas, Manufacturing Automation (2012), ch. 2.
 
 use super::coefficients::Coefficients;
 use quietcut_model::effects::EffectName;

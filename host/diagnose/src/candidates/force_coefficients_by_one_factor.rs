@@ -1,6 +1,8 @@
-//! All cutting and edge coefficients change by one factor: F·(1 + change).
+//! All cutting and edge coefficients of the material change by one factor, and the cutting force F with them: F·(1 +
+//! change).
 //!
-//! In the steady state of a stable linear cut without measured force, one gain of all channels is exactly equivalent.
+//! In the steady state of a stable linear cut without measured force, one gain of all channels of motion is exactly
+//! equivalent.
 
 use super::process::{changed, cutter, everywhere};
 use crate::candidates::cause::{Cause, LocatedEffect, Location, Parameter, Regressors};
@@ -9,7 +11,9 @@ use crate::records::study::Study;
 use quietcut_model::effects::EffectName;
 use quietcut_model::milling::Material;
 
-/// One factor on the cutting coefficients and, if `with_edge` is true, on the edge coefficients.
+/// The cause that one factor changes the cutting coefficients and, if `with_edge` is true, the edge coefficients. With
+/// `with_edge` it is a candidate only if the case has an edge coefficient other than zero, without it only if the case
+/// has none.
 pub(super) struct CommonFactor {
     pub(super) with_edge: bool,
 }

@@ -1,11 +1,11 @@
-//! The force is not proportional to the chip thickness: F = K·b·h₀·(h/h₀)^p.
+//! The cutting force is not proportional to the chip thickness h: F = K·b·h₀·(h/h₀)^p with the axial depth b.
 //!
-//! Shows: at two feeds, or over the chip thicknesses of one tooth passing, a force that grows less (p < 1) or more (p > 1) than in
-//! proportion to the chip thickness. Does not show: at one chip thickness, any difference from other cutting coefficients. Source: Kienzle,
-//! VDI-Z 94 (1952).
+//! Shows: at two feeds, or over the chip thicknesses of one tooth passing, a force that grows less (p < 1) or more
+//! (p > 1) than in proportion to the chip thickness. Does not show: at one chip thickness, any difference from other
+//! cutting coefficients. Source: Kienzle, VDI-Z 94 (1952).
 //!
-//! Fit: with a reference chip thickness h*, h₀·(h/h₀)^p = e^q·h*·(h/h*)^p with q = (1 − p)·ln(h₀/h*). The coefficients are p − 1 and q. The
-//! regressors are finite differences, exact if p and q are the values at which they are computed.
+//! Fit: with a reference chip thickness h*, h₀·(h/h₀)^p = e^q·h*·(h/h*)^p with q = (1 − p)·ln(h₀/h*). The coefficients
+//! are p − 1 and q. The regressors are finite differences, exact if p and q are the values at which they are computed.
 
 use super::process::{added, changed, cutter, everywhere, step};
 use crate::candidates::cause::{Cause, Location, Parameter, Regressors, WRONG_PARAMETERS};
@@ -17,11 +17,11 @@ use quietcut_simulate::ChipLaw;
 
 pub(super) struct ForceExponent;
 
-/// Smallest step, in magnitude, of the finite differences with respect to the parameters p − 1 and q of the force law F =
-/// K·b·e^q·h*·(h/h*)^p.
+/// Smallest step, in magnitude, of the finite differences of the cutting force with respect to the parameters p − 1 and
+/// q of the force law F = K·b·e^q·h*·(h/h*)^p.
 const LEAST: f64 = 1e-3;
 
-/// Reference chip thickness h*, m: half the feed per tooth of the first cut; 0.1 mm without a cut.
+/// Reference chip thickness h*, m: half the feed per tooth of the first cut of the study; 1e-4 m without a cut.
 fn reference_m(study: &Study<'_>) -> f64 {
     cutter(study).map_or(1e-4, |cutter| 0.5 * cutter.feed_per_tooth_m)
 }

@@ -1,8 +1,9 @@
-//! Bouc–Wen: f_r += k_h·(z − x), ż = v·(1 − |z/z_y|ⁿ(γ·sgn(vz) + β)).
+//! Bouc–Wen hysteresis along an axis: f_r += k_h·(z − x), ż = v·(1 − |z/z_y|ⁿ(γ·sgn(vz) + β)), β = 1 − γ.
 //!
-//! Shows: loops of force over displacement that do not depend on speed; with rising amplitude, stiffness that falls and damping that first
-//! rises and then falls. Does not show: even harmonics. At large slip it is equivalent to friction and reduced stiffness. Fit: linear in
-//! k_h; z_y, n and γ are nonlinear parameters. Source: Wen, J. Eng. Mech. Div. ASCE 102 (1976).
+//! Shows: loops of force over displacement that do not depend on speed; with rising amplitude, stiffness that falls and
+//! damping that first rises and then falls. Does not show: even harmonics. At large slip it is equivalent to friction
+//! and reduced stiffness. Fit: linear in k_h; z_y, n and γ are nonlinear parameters. Source: Wen, J. Eng. Mech. Div.
+//! ASCE 102 (1976).
 
 use super::restoring::{Restoring, largest_m, logarithmic, plain, smallest_m};
 use quietcut_model::effects::EffectName;

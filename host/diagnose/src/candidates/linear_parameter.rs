@@ -1,14 +1,15 @@
-//! Mass, stiffness or damping that differs from the case.
+//! Mass, stiffness or damping of the structure that differs from the case.
 //!
-//! Shows: a receptance that differs from the baseline and does not depend on amplitude: above resonance for mass, below it for stiffness,
-//! at it for damping. Does not show: harmonics, or response at frequencies without excitation. All three changed by one factor are
-//! equivalent to a gain of the only channel. Fit: linear in the relative change. Source: the output-error equation of Pintelon and
-//! Schoukens, System Identification (2012).
+//! Shows: a receptance that differs from the baseline and does not depend on amplitude: above resonance for mass, below
+//! it for stiffness, at it for damping. Does not show: harmonics, or response at frequencies without excitation. All
+//! three changed by one factor are equivalent to a gain of the only channel of motion. Fit: linear in the relative
+//! change. Source: the output-error equation of Pintelon and Schoukens, System Identification (2012).
 //!
-//! With H the receptance and θ the relative change of the parameter, x = H(θ) F, and where Z = H⁻¹ is linear in θ (every
-//! structure of mass, damping and stiffness) the residual along the *measured* motion is exact for changes of any size:
-//! x − H F = −θ H (∂Z/∂θ) x = θ (∂H/∂θ) F_eff with F_eff = H⁻¹ x. Where H nearly vanishes (between two modes) F_eff would be
-//! noise; there it is the measured force: F_eff = F + H* (x − H F)/(|H|² + ε²).
+//! With H the receptance and θ the relative change of the parameter, x = H(θ) F, and where Z = H⁻¹ is linear in θ
+//! (every structure of mass, damping and stiffness) the residual along the measured motion is exact for changes of any
+//! size: x − H F = −θ H (∂Z/∂θ) x = θ (∂H/∂θ) F_eff with F_eff = H⁻¹ x. Where H nearly vanishes (between two modes),
+//! F_eff would be noise. It is therefore computed as F_eff = F + H* (x − H F)/(|H|² + ε²), which is near the measured
+//! force F there.
 
 use nalgebra::{DMatrix, DVector, Matrix3};
 use num_complex::Complex64;
@@ -27,11 +28,13 @@ use quietcut_model::structure::Form;
 use quietcut_recording::Quantity;
 use quietcut_simulate::Effects;
 
-/// Relative change of mass, damping or stiffness in the central differences that give the derivative of the receptance (of the dynamic
-/// stiffness if force is compared). Their relative error is about its square, 1e-8; rounding contributes 1e-12/`STEP`.
+/// Relative change θ of mass, damping or stiffness in the central differences that give the derivative of the
+/// receptance with respect to θ (of the dynamic stiffness if forces are compared). Their relative error is about its
+/// square, 1e-8; rounding contributes 1e-12/`STEP`.
 const STEP: f64 = 1e-4;
-/// Size of |H| at which it counts as nearly vanishing, over the root sum of squares of its modal contributions: ε of this file's head is
-/// this number times that root.
+/// Size of the receptance |H| at which it counts as nearly vanishing, over the root sum of squares of its modal
+/// contributions. The regularization ε of the effective force F + H* (x − H F)/(|H|² + ε²) is this number times that
+/// root.
 const VANISHING: f64 = 0.05;
 
 #[derive(Clone, Copy)]
@@ -52,7 +55,8 @@ impl LinearChange {
         }
     }
 
-    /// Diagonal entry of the mass, stiffness or damping matrix for the direction of `location`; `None` if there is none.
+    /// Diagonal entry of the case's mass, stiffness or damping matrix for the direction of `location`; `None` if the
+    /// structure is not given by matrices, or if `location` has no single direction.
     fn entry(&self, study: &Study<'_>, location: &Location) -> Option<f64> {
         let Form::Matrices(matrices) = &study.baseline.structure.form else {
             return None;
@@ -235,8 +239,9 @@ impl Cause for LinearChange {
     }
 }
 
-/// Spectra of the cutting forces on the upsampled grid, for a cut with measured acceleration; otherwise `None`. Above half the sample rate
-/// the structure responds as a mass, and sampling folds its acceleration into the band.
+/// Spectra of the baseline's cutting forces on the upsampled grid, by axis, for a cut with measured acceleration;
+/// otherwise `None`. Above half the sample rate the structure responds as a mass, and sampling folds its acceleration
+/// into the band.
 fn of_folded_forces(record: &Record) -> Option<[Option<Vec<Complex64>>; 3]> {
     let cut = record.cut.as_ref()?;
     record
@@ -246,8 +251,9 @@ fn of_folded_forces(record: &Record) -> Option<[Option<Vec<Complex64>>; 3]> {
         .then(|| record.cut_spectra(&cut.force))
 }
 
-/// The force F_eff = F + H*(x − H F)/(|H|² + ε²) that explains the measured displacement x, N: by axis and frequency bin. F is the measured
-/// force, H the receptance, and ε keeps the division regular where H nearly vanishes.
+/// The force F_eff = F + H*(x − H F)/(|H|² + ε²) that explains the estimated displacement x of the tool, N: by axis and
+/// frequency bin. F is the force that excites the structure (measured, or predicted in a cut; 0 along an axis without
+/// force), H the receptance of the baseline, and ε keeps the division regular where H nearly vanishes.
 fn effective_force(study: &Study<'_>, record: &Record) -> [Vec<Complex64>; 3] {
     let baseline = &study.baseline;
     let (axes, grid) = (&baseline.axes, &record.grid);

@@ -1,11 +1,14 @@
-//! A further mode in the receptance of a direction: y changes by F/(m·(ω_m² − ω² + 2iζω_m ω)), which is exact if the force is measured.
+//! A further mode in the receptance of the tool along one axis: the displacement y changes by F/(m·(ω_m² − ω² + 2iζω_m
+//! ω)), which is exact if F is a measured force along the axis.
 //!
-//! Shows: a resonance with its phase at a frequency where the case has none, the same at all levels. Does not show: harmonics, or a
-//! dependence on amplitude. Far outside the band it acts as a small stiffness or mass (the residual terms of a modal fit). Fit: linear in
-//! 1/m; ω_m and ζ are nonlinear parameters. Source: Ewins, Modal Testing (2000), ch. 4.
+//! Shows: a resonance with its phase at a frequency where the case has none, the same at all levels of excitation. Does
+//! not show: harmonics, or a dependence on amplitude. A mode far outside the band of the records acts as a small
+//! stiffness or mass (the residual terms of a modal fit). Fit: linear in 1/m, the inverse modal mass; ω_m and ζ are
+//! nonlinear parameters. Source: Ewins, Modal Testing (2000), ch. 4.
 //!
-//! In a free decay the structure starts from static deflection: the mode begins at rest at its deflection under the static force F₀ =
-//! H(0)⁻¹ u(0), and y changes by F₀/(m ω_m²)·e^(−ζω_m t)·(cos ω_d t + ζω_m/ω_d · sin ω_d t), ω_d = ω_m √(1 − ζ²).
+//! A free decay without measured force is taken to start from static deflection: the mode begins at rest at its
+//! deflection under the static force F₀ = H(0)⁻¹ u(0), with the initial displacement u(0) of the baseline, and y
+//! changes by F₀/(m ω_m²)·e^(−ζω_m t)·(cos ω_d t + ζω_m/ω_d · sin ω_d t), ω_d = ω_m √(1 − ζ²).
 
 use nalgebra::Vector3;
 use num_complex::Complex64;
@@ -23,10 +26,10 @@ use quietcut_model::effects::EffectName;
 
 pub(super) struct MissingMode;
 
-/// Damping ratios at which the search for a missing mode starts.
+/// Damping ratios of a missing mode at which the search for its frequency starts.
 const DAMPING: [f64; 3] = [0.008, 0.025, 0.08];
-/// Number of candidate modes (frequency, damping ratio) that are kept as start values of a missing mode: of the peaks of the reduction of
-/// χ² over frequency, the largest.
+/// Number of candidate modes (frequency, damping ratio) that are kept as start values of a missing mode: those at the
+/// largest peaks, over frequency, of the reduction of the residual energy.
 const KEPT: usize = 4;
 
 impl Cause for MissingMode {
@@ -60,7 +63,8 @@ impl Cause for MissingMode {
         self.nonlinear_grid_beside(study, location, &residual)
     }
 
-    /// Frequencies and damping ratios at which one more mode would explain most of the residual `left`.
+    /// Frequencies, Hz, and damping ratios at which one further mode would reduce the energy of the residual `left`
+    /// most.
     fn nonlinear_grid_beside(
         &self,
         study: &Study<'_>,
@@ -168,9 +172,9 @@ impl Cause for MissingMode {
         Ok(vec![Regressor::of_channels(observed)])
     }
 
-    /// Frequency, damping ratio and modal mass of the missing mode. `None` if the modal mass is not positive, or if the baseline has a
-    /// larger mode whose half-power bandwidth overlaps with that of the missing mode: the fit then describes a change of the baseline's
-    /// mode.
+    /// Frequency, damping ratio and modal mass of the missing mode. `None` if the modal mass is not positive, or if the
+    /// baseline has a mode of smaller modal mass along the axis whose half-power bandwidth overlaps with that of the
+    /// missing mode: the fit then describes a change of the baseline's mode.
     fn parameters(
         &self,
         study: &Study<'_>,
@@ -200,7 +204,7 @@ impl Cause for MissingMode {
     }
 }
 
-/// 1/(ω_m² − ω² + 2iζω_m ω): the receptance of a mode with modal mass 1 kg.
+/// 1/(ω_m² − ω² + 2iζω_m ω): the receptance, m/N, of a mode with modal mass 1 kg.
 fn mode(omega: f64, frequency_hz: f64, damping_ratio: f64) -> Complex64 {
     let natural = TAU * frequency_hz;
     Complex64::new(
@@ -215,12 +219,14 @@ fn is_free_decay_along(record: &Record, axis: usize) -> bool {
     starts_anywhere(record) && record.force_n[axis].is_empty()
 }
 
-/// The static force that held the baseline before its free decay, N; `None` if it cannot be computed.
+/// The static force along x, y and z that held the baseline in the fitted initial state of a record's free decay, N;
+/// `None` if it cannot be computed.
 fn static_force_n(study: &Study<'_>, record: &Record) -> Option<Vector3<f64>> {
     holding_force_n(study, &study.baseline.first_order, &record.decays.start)
 }
 
-/// Samples of a channel that reads the free decay of a mode with modal mass 1 kg from rest under the static force `force_n` along `axis`.
+/// Samples of a channel that reads the free decay of a mode with modal mass 1 kg. The mode starts at rest at its
+/// deflection under the static force `force_n` along `axis`; the samples do not end.
 fn free_decay_of_mode<'a>(
     record: &'a Record,
     channel: &'a Observed,
@@ -230,7 +236,8 @@ fn free_decay_of_mode<'a>(
 ) -> impl Iterator<Item = f64> + 'a {
     let natural = TAU * frequency_hz;
     let pole = natural * Complex64::new(-damping_ratio, (1.0 - damping_ratio * damping_ratio).sqrt());
-    // η(t) = η(0)·Re[−λ̄/(i ω_d)·e^(λt)]: η(0) at the start, with zero velocity.
+    // Modal displacement η(t) = η(0)·Re[−λ̄/(i ω_d)·e^(λt)] with the pole λ = −ζω_m + iω_d: it starts at η(0) with zero
+    // velocity.
     let start = -pole.conj() / Complex64::new(0.0, pole.im)
         * pole.powi(derivatives(channel.pickup.quantity))
         * channel.pickup.dynamics(pole);
@@ -242,7 +249,8 @@ fn free_decay_of_mode<'a>(
     })
 }
 
-/// A free decay and a channel that reads `axis`: record, channel, residual of the channel, axis, and static force along the axis, N.
+/// A free decay and a channel that reads `axis`: record, channel, residual of the channel, axis, and static force along
+/// the axis, N.
 type FreeDecay<'a> = (&'a Record, &'a Observed, &'a [f64], usize, f64);
 
 fn free_decays<'a>(study: &'a Study<'_>, axis: usize, left: &'a [Vec<Vec<f64>>]) -> Vec<FreeDecay<'a>> {
@@ -259,8 +267,9 @@ fn free_decays<'a>(study: &'a Study<'_>, axis: usize, left: &'a [Vec<Vec<f64>>])
     all
 }
 
-/// One frequency bin of a channel: ω in rad/s; the force spectrum as the channel would read it as displacement (factor of the sensor
-/// included); the residual spectrum. The latter two are divided by the standard deviation of the channel's noise.
+/// One frequency bin of a channel: ω in rad/s; the spectrum of the exciting force as the channel would read it if it
+/// were the displacement (weight and dynamics of the sensor included); the spectrum of the residual. Both spectra are
+/// divided by the standard deviation of the channel's noise.
 type Bin = (f64, Complex64, Complex64);
 
 fn bins(study: &Study<'_>, axis: usize, left: &[Vec<Vec<f64>>]) -> Vec<Bin> {
@@ -284,8 +293,9 @@ fn bins(study: &Study<'_>, axis: usize, left: &[Vec<Vec<f64>>]) -> Vec<Bin> {
     all
 }
 
-/// Reduction of the residual's χ² by a missing mode of this frequency and damping ratio, with the modal mass that fits best; 0 if that mass
-/// is not positive.
+/// Reduction of the residual energy by a missing mode of this frequency and damping ratio, with the modal mass that
+/// fits best; 0 if that mass is not positive. For free decays alone it is that of χ²; bins count with the energy of the
+/// unnormalized spectrum.
 fn chi_square_reduction(
     bins: &[Bin],
     free_decays: &[FreeDecay<'_>],

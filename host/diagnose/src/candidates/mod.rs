@@ -1,5 +1,6 @@
-//! Candidate causes, one or two files for each effect. They contain what depends on records: regressors, start values, bounds. Parts that
-//! several causes share are, for example, in [`linear_parameter`], [`restoring`], [`process`] and [`sensor`].
+//! Candidate causes, one or two files for each effect of the model. The files contain the parts of a cause that depend
+//! on records: regressors, start values, bounds. Code that several causes share is, for example, in
+//! [`linear_parameter`], [`restoring`], [`process`] and [`sensor`].
 
 mod axial_depth_modulation;
 mod backlash;
@@ -42,13 +43,13 @@ use quietcut_model::effects::EffectName;
 
 use self::cause::Cause;
 
-/// The candidate causes of all effects.
+/// The candidate causes of all effects of the model.
 pub(crate) fn all() -> Vec<Box<dyn Cause>> {
     EffectName::ALL.into_iter().flat_map(of).collect()
 }
 
-/// The forms of a cause that compete under the name of one effect. The match has no wildcard, so that a new effect without an entry here
-/// does not compile.
+/// The candidate causes that compete under the name of one effect, such as drift at a constant rate and drift that
+/// settles. The match has no wildcard, so that a new effect without an entry here does not compile.
 fn of(effect: EffectName) -> Vec<Box<dyn Cause>> {
     match effect {
         EffectName::Mass => vec![Box::new(mass::CAUSE)],

@@ -1,8 +1,10 @@
-//! A potential shared by two directions: ½·k_xxyy·x²y² or k_xxy·x²y. The restoring force of each direction is its derivative.
+//! A potential shared by two axes: ½·k_xxyy·x²y² or k_xxy·x²y, with x and y the displacements along the first and the
+//! second axis. The restoring force along each axis is the derivative of the potential.
 //!
-//! Shows, if both directions move: response at sums and differences of multiples of their frequencies; a stiffness of one direction that
-//! changes with the amplitude of the other. Does not show: with x²y², anything while one direction is at rest; with x²y, anything while x
-//! is at rest. Fit: linear in the coefficient. Source: Nayfeh and Mook, Nonlinear Oscillations (1979), ch. 6.
+//! Shows, if the tool moves along both axes: response at sums and differences of multiples of their frequencies; a
+//! stiffness along one axis that changes with the amplitude along the other. Does not show: with x²y², anything while
+//! one axis is at rest; with x²y, anything while x is at rest. Fit: linear in the coefficient. Source: Nayfeh and Mook,
+//! Nonlinear Oscillations (1979), ch. 6.
 
 use super::restoring::{Restoring, plain};
 use quietcut_model::effects::EffectName;

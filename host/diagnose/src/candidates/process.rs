@@ -1,8 +1,8 @@
 //! Causes in the cutting process: each changes the cutting force along the measured motion.
 //!
-//! The simulation's own [`Cutter`](quietcut_simulate::Cutter) and [`ForceLaw`](quietcut_simulate::ForceLaw) compute the force with the
-//! cause. The difference from the force of the baseline is filtered by the receptance if motion is compared, and compared directly if force
-//! is measured.
+//! The simulation's own [`Cutter`](quietcut_simulate::Cutter) and [`ForceLaw`](quietcut_simulate::ForceLaw) compute the
+//! force with the cause. The difference from the cutting force of the baseline, filtered by the receptance of the
+//! baseline, is the contribution to a channel of motion; the difference itself is that to a channel of force.
 
 use crate::candidates::cause::{Location, Regressor};
 use crate::motion::cut_force::CutForce;
@@ -11,8 +11,8 @@ use crate::records::record::Record;
 use crate::records::study::Study;
 use quietcut_simulate::Cutter;
 
-/// Location of a cause in the cutting process: the whole machine. Empty if the study has no cut, or if the case already has an extension
-/// with the cause's name.
+/// Location of a cause in the cutting process: the whole machine. Empty if the study has no cut, or if the case already
+/// has an extension with the cause's name.
 pub(super) fn everywhere(study: &Study<'_>, name: &str) -> Vec<Location> {
     let known = study.baseline.case.extensions.contains_key(name);
     if known || cutter(study).is_none() {
@@ -35,8 +35,8 @@ pub(super) fn has_axial(study: &Study<'_>) -> bool {
     study.baseline.axes.contains(&2)
 }
 
-/// Regressor of a parameter of the cutter: the cutting force with the cutter `after` minus the force with the cutter `before`, divided by
-/// the parameter change `over`; empty for a record without a cut.
+/// Regressor of a parameter of the cutter: the cutting force with the cutter changed by `after` minus that with the
+/// cutter changed by `before`, divided by the parameter change `over`; empty for a record without a cut.
 pub(super) fn added(
     record: &Record,
     before: impl Fn(&mut Cutter),
@@ -50,8 +50,8 @@ pub(super) fn added(
     Regressor::of_cut(after.difference(&before, over))
 }
 
-/// Regressor of a parameter of the cutter: the cutting force with the cutter `after` minus the force of the baseline, divided by the
-/// parameter change `over`; empty for a record without a cut.
+/// Regressor of a parameter of the cutter: the cutting force with the cutter changed by `after` minus that of the
+/// baseline, divided by the parameter change `over`; empty for a record without a cut.
 pub(super) fn changed(record: &Record, after: impl Fn(&mut Cutter), over: f64) -> Regressor {
     let Some(cut) = &record.cut else {
         return Regressor::default();

@@ -1,8 +1,10 @@
-//! The flank rubs on the wave that the edge has just cut: a force −(C/V)·b·v_n on the edge, V the cutting speed.
+//! The flank rubs on the wave that the edge has just cut: a force −(C/V)·b·v_n on the edge along the chip thickness,
+//! with the axial depth b, the cutting speed V and the velocity v_n of the edge in that direction.
 //!
-//! Shows: damping that grows with axial depth and with 1/speed, in the direction normal to the edge. Does not show: anything without
-//! cutting, unlike damping of the structure. At one speed and depth it is equivalent to damping of the structure. Fit: linear in C, along
-//! the measured velocity. Source: Altintas, Eynian and Onozuka, CIRP Annals 57 (2008).
+//! Shows: damping that grows with axial depth and with 1/(spindle speed), in the direction normal to the edge. Does not
+//! show: anything without cutting, unlike damping of the structure. At one spindle speed and axial depth it is
+//! equivalent to damping of the structure. Fit: linear in C, along the measured motion. Source: Altintas, Eynian and
+//! Onozuka, CIRP Annals 57 (2008).
 
 use super::process::{changed, cutter, everywhere};
 use crate::candidates::cause::{Cause, Location, Parameter, Regressors};

@@ -1,4 +1,4 @@
-//! f_r += c2·|v|·v: linear in c2 along the measured motion.
+//! Quadratic damping f_r += c2·|v|·v along an axis. Fit: linear in c2 along the measured motion.
 
 use super::restoring::{Restoring, plain};
 use quietcut_model::effects::EffectName;

@@ -1,4 +1,4 @@
-//! Restoring forces: the equations are those of the simulation, evaluated along the measured motion.
+//! Causes that are restoring forces: their equations are those of the simulation, evaluated along the measured motion.
 
 use crate::baseline::terms_of;
 use crate::candidates::cause::{Cause, LocatedEffect, Location, Parameter, Regressor, Regressors};
@@ -8,35 +8,39 @@ use quietcut_model::effects::EffectName;
 use quietcut_simulate::Effects;
 use quietcut_simulate::path::restoring_along;
 
-/// A restoring force f_r = Σ coefficient · f(x, v, t; nonlinear parameters).
+/// A cause that is a restoring force f_r = Σ coefficient · f(x, v, t; nonlinear parameters) of displacement x and
+/// velocity v of the tool.
 pub(super) struct Restoring {
     pub(super) effect: EffectName,
     /// Parameter keys of the coefficients in which the restoring force is linear.
     pub(super) linear: &'static [&'static str],
     /// Keys of the nonlinear parameters.
     pub(super) nonlinear_parameters: &'static [&'static str],
-    /// Number of axes whose displacements enter the restoring force: 1 or 2.
+    /// Number of axes at each location of the restoring force: 2 for a potential that couples two axes, otherwise 1.
     pub(super) axes: usize,
-    /// True if exchanging the two axes leaves the restoring force unchanged: (a, b) and (b, a) are then one location.
+    /// True if exchanging the two axes of a coupling leaves the restoring force unchanged: (a, b) and (b, a) are then
+    /// one location.
     pub(super) is_symmetric: bool,
-    /// True if the diagnosis also tries this restoring force along all axes with the same coefficients.
+    /// True if the diagnosis also tries this restoring force along all axes with the same coefficients, if more than
+    /// one axis is driven.
     pub(super) everywhere: bool,
-    /// True if the diagnosis also tries this restoring force with separate coefficients along all driven axes together, as in joints of one
-    /// kind. A driven axis is one along which some record has a force or a motion above the noise. A force that is tried like this has no
-    /// nonlinear parameters.
+    /// True if the diagnosis also tries this restoring force with separate coefficients along all driven axes together,
+    /// as in joints of one kind. A driven axis is one along which some record has a force or a motion above the noise.
+    /// A force that is tried like this has no nonlinear parameters.
     pub(super) each: bool,
-    /// Start values of the restoring force's nonlinear parameters for one axis, from the records of the study: for example from the
-    /// displacement amplitudes along this axis.
+    /// Start values of the restoring force's nonlinear parameters for one axis, from the records of the study: for
+    /// example from the displacement amplitudes along this axis.
     pub(super) nonlinear_grid: fn(&Study<'_>, usize) -> Vec<Vec<f64>>,
-    /// Bounds of the nonlinear parameters.
+    /// Lowest and highest value of each nonlinear parameter for one axis.
     pub(super) bounds: fn(&Study<'_>, usize) -> Vec<[f64; 2]>,
     /// True if the restoring force acts behind a backlash; the answer then also names the backlash.
     pub(super) behind_backlash: bool,
-    /// True for physically possible coefficients.
+    /// True if the coefficients of the restoring force along one axis are physically possible.
     pub(super) physical: fn(coefficients: &[f64]) -> bool,
 }
 
-/// Description of a restoring force along one axis that is linear in its coefficients; the coefficients may have either sign.
+/// Description of a restoring force along one axis that is linear in its coefficients; the coefficients may have either
+/// sign.
 pub(super) const fn plain(effect: EffectName, linear: &'static [&'static str]) -> Restoring {
     Restoring {
         effect,
@@ -53,7 +57,7 @@ pub(super) const fn plain(effect: EffectName, linear: &'static [&'static str]) -
     }
 }
 
-/// The largest displacement along an axis in any record, m.
+/// The largest absolute displacement of the tool along an axis in any record, m.
 pub(super) fn largest_m(study: &Study<'_>, axis: usize) -> f64 {
     study
         .records
@@ -62,7 +66,8 @@ pub(super) fn largest_m(study: &Study<'_>, axis: usize) -> f64 {
         .fold(0.0, f64::max)
 }
 
-/// The smallest nonzero RMS displacement along an axis in any record, m; infinite if no record has one.
+/// The smallest RMS displacement of the tool along an axis over the records in which it is not zero, m; infinite if
+/// there is no such record.
 pub(super) fn smallest_m(study: &Study<'_>, axis: usize) -> f64 {
     study
         .records
@@ -72,7 +77,7 @@ pub(super) fn smallest_m(study: &Study<'_>, axis: usize) -> f64 {
         .fold(f64::INFINITY, f64::min)
 }
 
-/// The longest record, s.
+/// Duration of the longest record of the study, s.
 pub(super) fn longest_s(study: &Study<'_>) -> f64 {
     study
         .records
@@ -88,8 +93,8 @@ fn first_axis(location: &Location) -> usize {
     }
 }
 
-/// Splits the location of a cause into locations with coefficients of their own: one for each axis of [`Location::EachOf`], otherwise the
-/// location itself.
+/// Splits the location of a restoring force into locations with coefficients of their own: one for each axis of
+/// [`Location::EachOf`], otherwise the location itself.
 fn single_locations(location: &Location) -> Vec<Location> {
     match location {
         Location::EachOf(axes) => axes.iter().map(|axis| Location::Axis(*axis)).collect(),
@@ -105,7 +110,8 @@ pub(super) fn logarithmic(first: f64, last: f64, count: usize) -> Vec<f64> {
 }
 
 impl Restoring {
-    /// True if the case already has an extension with a name of this cause. A case can hold only one extension of each name.
+    /// True if the case already has an extension with a name of this cause, which is then no candidate: a case can hold
+    /// only one extension of each name.
     fn in_baseline(&self, study: &Study<'_>) -> bool {
         self.names()
             .iter()
@@ -125,7 +131,8 @@ impl Restoring {
         table
     }
 
-    /// Entries of the answer for a restoring force along one axis: the force, and the backlash before it if there is one.
+    /// Entries of the answer for a restoring force at one location: the force, and the backlash before it if there is
+    /// one.
     fn effects_along_one_axis(&self, location: &Location, parameters: &[Parameter]) -> Vec<LocatedEffect> {
         let of_play = |(key, _): &&Parameter| self.behind_backlash && self.nonlinear_parameters.contains(key);
         let own: Vec<Parameter> = parameters.iter().filter(|p| !of_play(p)).copied().collect();
@@ -157,8 +164,8 @@ impl Restoring {
         parts
     }
 
-    /// The force along the motion of a record if coefficient number `index` is 1 and the others are 0, or the reason why the extension cannot
-    /// be applied to the structure.
+    /// Regressor of coefficient number `index`: the restoring force along the motion of a record if that coefficient is
+    /// 1 and the others are 0, or the reason why the extension cannot be applied to the structure.
     fn along(
         &self,
         study: &Study<'_>,

@@ -1,8 +1,9 @@
-//! Runout: tooth j on the radius R + e·cos(ψ + 2πj/N).
+//! Runout: the edge of tooth j of N teeth lies on the radius R + e·cos(ψ + 2πj/N), with the offset e of the tool axis.
 //!
-//! Shows: lines at the spindle frequency and its multiples other than tooth-passing harmonics, from the first engaged tooth on. Does not
-//! show: growth, or lines that are not multiples of the spindle frequency. A saturated flip of a tool with an even number of teeth has the
-//! same lines. Fit: linear in e cos ψ and e sin ψ. Source: Kline and DeVor, Int. J. Mach. Tool Des. Res. 23 (1983).
+//! Shows: lines at the spindle frequency and its multiples other than tooth-passing harmonics, from the first engaged
+//! tooth on. Does not show: growth, or lines that are not multiples of the spindle frequency. Flip chatter of constant
+//! amplitude of a tool with an even number of teeth has lines at the same frequencies. Fit: linear in e cos ψ and e sin
+//! ψ. Source: Kline and DeVor, Int. J. Mach. Tool Des. Res. 23 (1983).
 
 use std::f64::consts::TAU;
 
@@ -16,9 +17,10 @@ use quietcut_simulate::Cutter;
 
 pub(super) struct RunoutCause;
 
-/// Offsets e of a runout at which its fit starts, as shares of the feed per tooth.
+/// Offsets e of a runout, other than zero, at which its fit starts, as shares of the feed per tooth.
 const SHARES_OF_FEED: [f64; 2] = [0.1, 0.25];
-/// Smallest step of the finite differences with respect to the runout components e cos ψ and e sin ψ, µm.
+/// Smallest step, in magnitude, of the finite differences of the cutting force with respect to the runout components e
+/// cos ψ and e sin ψ, µm.
 const LEAST_UM: f64 = 0.01;
 
 fn teeth(study: &Study<'_>) -> usize {
@@ -54,8 +56,8 @@ impl Cause for RunoutCause {
         }
     }
 
-    /// Start values (e cos ψ, e sin ψ) of the runout in µm: zero, and offsets e of a tenth and a quarter of the feed per tooth in several
-    /// directions.
+    /// Start values (e cos ψ, e sin ψ) of the runout in µm: zero, and offsets e of a tenth and a quarter of the feed
+    /// per tooth in several directions.
     fn nonlinear_grid(&self, study: &Study<'_>, _: &Location) -> Vec<Vec<f64>> {
         let feed_um = cutter(study).map_or(0.0, |cutter| 1e6 * cutter.feed_per_tooth_m);
         let directions = if teeth(study) > 2 { 6 } else { 2 };

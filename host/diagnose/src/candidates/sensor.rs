@@ -1,5 +1,5 @@
-//! Regressors of sensor errors, shared by gain, delay, cross-axis sensitivity and offset. The estimated motion stands for the true value
-//! y_t.
+//! Regressors of sensor errors, shared by gain, delay, cross-axis sensitivity and offset. The estimated motion of the
+//! tool stands for the true value y_t of a reading.
 
 use num_complex::Complex64;
 
@@ -12,7 +12,8 @@ use crate::records::study::Study;
 use quietcut_recording::Quantity;
 use quietcut_simulate::path::SampledMotion;
 
-/// Names of the channels of motion, if all records are compared in the response domain; otherwise empty.
+/// Names of the channels of motion of a study, each once, if all records are compared in the response domain; otherwise
+/// empty.
 pub(super) fn channels(study: &Study<'_>) -> Vec<String> {
     if !study.all_in(Domain::Response) {
         return Vec::new();
@@ -26,15 +27,17 @@ pub(super) fn channels(study: &Study<'_>) -> Vec<String> {
     names
 }
 
-/// Locations of a sensor error (gain, delay, offset): each motion channel and, if there are several and a force is measured, all of them
-/// with one common value. Empty if the case already has this extension, if not all records are compared in the response domain, or if there
-/// is neither a measured force nor a second motion channel.
+/// Locations of a sensor error (gain, delay, offset from the tool tip): each channel of motion and, if there are
+/// several and the exciting force of some record is known (measured, or predicted in a cut), all of them with one
+/// common value. Empty if the case already has this extension, if not all records are compared in the response domain,
+/// or if there is neither a known exciting force nor a second channel of motion.
 pub(super) fn one_or_all(study: &Study<'_>, name: &str) -> Vec<Location> {
     if study.baseline.case.extensions.contains_key(name) {
         return Vec::new();
     }
     let names = channels(study);
-    // Without a measured force in any record, the error of the only motion channel is not identifiable.
+    // If the exciting force of no record is known, as in free decays, the error of the only channel of motion is not
+    // identifiable.
     let free = study
         .records
         .iter()
@@ -57,11 +60,12 @@ pub(super) fn is_at(location: &Location, channel: &Observed) -> bool {
     }
 }
 
-/// Reading of a channel from the estimated motion, with its spectrum multiplied by `change`(ω).
+/// Reading that a channel with the axis weights `weights` has of the estimated motion, in the unit of the channel, with
+/// its spectrum multiplied by `change`(ω).
 ///
 /// The acceleration of a cut jumps when teeth enter and leave, and sampling folds much of it into the band. In a cut,
-/// if a channel of the same quantity, delay and filters reads this axis alone, its own reading is used instead of the estimated
-/// displacement.
+/// if a channel of the same quantity, delay and filters reads an axis alone, its reading of the estimated motion, which
+/// contains this aliasing, is used for the axis instead of the estimated displacement.
 pub(super) fn read(
     record: &Record,
     channel: &Observed,
@@ -104,7 +108,8 @@ pub(super) fn read(
     grid.samples(&sum)
 }
 
-/// Readings of the channels at `location`, each with its spectrum multiplied by `change`(ω).
+/// Regressor of a sensor error: the readings that the channels at `location` have of the estimated motion, each with
+/// its spectrum multiplied by `change`(ω); empty for all other channels.
 pub(super) fn readings_at(
     record: &Record,
     location: &Location,
@@ -121,8 +126,9 @@ pub(super) fn readings_at(
     vec![Regressor::of_channels(record.channels.iter().map(of).collect())]
 }
 
-/// Reading of a channel in a cut with its spectrum multiplied by `change`(ω). The response to the cutting force is changed on the upsampled
-/// grid, so that steps stay steps; the rest of the reading is changed at the samples of the record.
+/// Reading that a channel has of the estimated motion in a cut, with its spectrum multiplied by `change`(ω); `None` if
+/// the record is not of a cut. The response to the cutting force of the baseline is changed on the upsampled grid, so
+/// that its steps stay steps; the rest of the reading is changed at the samples of the record.
 pub(super) fn reading_in_cut(
     record: &Record,
     channel: usize,
@@ -140,7 +146,8 @@ pub(super) fn reading_in_cut(
     let mut changed = record.read_response(&force, channel);
     let readings = record.readings[channel].iter().zip(&known);
     let mut rest: Vec<f64> = readings.map(|(all, known)| all - known).collect();
-    // Samples that the fit skips are replaced by the sample before, so that the spectrum has no gap.
+    // Values of the rest at samples that are not compared are replaced by the value at the sample before, so that the
+    // spectrum has no gap.
     for &sample in record.skipped[channel].iter().filter(|sample| **sample > 0) {
         rest[sample] = rest[sample - 1];
     }
@@ -154,12 +161,13 @@ pub(super) fn reading_in_cut(
     Some(changed)
 }
 
-/// Completes the regressors of a sensor error for a cut, whose chip is computed along the motion that the sensor misreads: subtracts the
-/// change of the cutting force from the measured to the true motion. `truth` corrects the motion along an axis for a sensor error of `over`
-/// units.
+/// Completes the regressor of a sensor error for a cut, whose chips are computed along the motion that the sensor
+/// misreads: adds the change of the cutting force from the measured to the true motion, divided by `over`. `truth`
+/// corrects the motion along an axis for a sensor error of `over` units.
 ///
-/// With y = S x the reading of the motion x and F the force along a motion, y − H F(y) = (y − x) − H (F(y) − F(x)). If several sensors read
-/// one axis, each has an equal share in its estimated motion.
+/// With y = S x the reading of the motion x, F the cutting force along a motion and H the receptance, the residual is y
+/// − H F(y) = (y − x) + H (F(x) − F(y)), because x = H F(x). If several channels of motion have one main axis, each is
+/// taken to have an equal share in the estimated motion along that axis.
 pub(super) fn with_chip_of_true_motion(
     record: &Record,
     location: &Location,

@@ -1,8 +1,10 @@
-//! A channel that is late: y(t) = y_t(t − τ), so that y − ŷ = y(t) − y(t + τ), which is −τ·ẏ for a short delay.
+//! A channel of motion that is late by τ: y(t) = y_t(t − τ) with the true value y_t, so that its residual is y(t) −
+//! y(t + τ), which is −τ·ẏ for a short delay.
 //!
-//! Shows: a phase proportional to frequency over a band. Does not show: a change of amplitude; in a narrow band it is equivalent to
-//! damping. Without a force or another channel as reference the delay is not identifiable. Fit: τ is a nonlinear parameter; the regressor
-//! is exact for delays of any length. Source: McConnell and Varoto, Vibration Testing (2008).
+//! Shows: a phase proportional to frequency over a band. Does not show: a change of amplitude; in a narrow band it is
+//! equivalent to damping. Without a known force or another channel as reference the delay is not identifiable. Fit: τ
+//! is a nonlinear parameter; the regressor is exact for delays of any length. Source: McConnell and Varoto, Vibration
+//! Testing (2008).
 
 use num_complex::Complex64;
 
@@ -15,7 +17,7 @@ use quietcut_model::effects::EffectName;
 
 pub(super) struct SensorDelayCause;
 
-/// Longest sensor delay that the search tries, in periods of the highest frequency of the motion.
+/// Longest sensor delay that the fit allows, in periods of the highest frequency of the measured motion.
 const LONGEST: f64 = 0.4;
 
 impl Cause for SensorDelayCause {
@@ -51,7 +53,8 @@ impl Cause for SensorDelayCause {
         nonlinear_parameters: &[f64],
     ) -> Regressors {
         let delay = *nonlinear_parameters.first().ok_or(WRONG_PARAMETERS)?;
-        // The regressor of the sensor delay τ is (1 − e^(iωτ))/τ times the reading, so that its coefficient is the delay in seconds.
+        // The regressor of a sensor delay τ is (1 − e^(iωτ))/τ times the spectrum of the reading, so that its
+        // coefficient is the delay in seconds.
         let change = |omega: f64| (Complex64::ONE - Complex64::cis(omega * delay)) / delay;
         let read = if record.cut.is_some() {
             let of = |channel: usize| {
@@ -82,8 +85,8 @@ impl Cause for SensorDelayCause {
         ))
     }
 
-    /// The fitted sensor delay, s, as new nonlinear parameter, because the regressor is exact at the delay for which it is computed. `None`
-    /// if the delay is not positive.
+    /// The fitted sensor delay, s, as new nonlinear parameter, because the regressor is exact at the delay for which it
+    /// is computed. `None` if the fitted delay is not positive.
     fn settled(&self, _: &[f64], coefficients: &[f64]) -> Option<Vec<f64>> {
         coefficients
             .first()
@@ -91,8 +94,8 @@ impl Cause for SensorDelayCause {
             .map(|delay| vec![*delay])
     }
 
-    /// The fitted sensor delay. `None` if it is not positive, or differs by a factor of at least [`ANOTHER_DELAY`] from the delay
-    /// for which the regressor is computed.
+    /// The fitted sensor delay, s. `None` if it is not positive, or differs by a factor of at least [`ANOTHER_DELAY`]
+    /// from the delay for which the regressor is computed.
     fn parameters(
         &self,
         _: &Study<'_>,

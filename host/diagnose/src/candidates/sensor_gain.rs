@@ -1,9 +1,10 @@
-//! A channel that reads g times the true value: y = g·y_t, so that y − ŷ = (1 − 1/g)·y.
+//! A channel of motion that reads g times the true value: y = g·y_t, so that its residual is y − y_t = (1 − 1/g)·y.
 //!
-//! Shows: one factor at all frequencies and amplitudes, in one channel. Does not show: a phase, or anything in other channels. Equivalent
-//! are: for the only channel under a measured force, mass, damping and stiffness changed by one factor; for all channels of a steady cut
-//! without measured force, a factor on the cutting force. The gain of the only channel of a free decay has no effect, because the initial
-//! state is unknown. Fit: linear in 1 − 1/g. Source: the calibration factor of ISO 16063.
+//! Shows: one factor at all frequencies and amplitudes, in one channel. Does not show: a phase shift, or anything in
+//! other channels. Equivalent are: to a gain of the only channel of motion under a measured force, mass, damping and
+//! stiffness changed by one factor; to one gain of all channels of a steady cut without measured force, a factor on the
+//! cutting force. The gain of the only channel of a free decay has no effect, because the initial state is unknown.
+//! Fit: linear in 1 − 1/g. Source: the calibration factor of ISO 16063.
 
 use num_complex::Complex64;
 
@@ -16,7 +17,8 @@ use quietcut_model::effects::EffectName;
 
 pub(super) struct SensorGainCause;
 
-/// Share 1 − 1/g of a sensor gain g at which the finite difference of the change of chip thickness, and so of cutting force, is taken.
+/// Share 1 − 1/g of a sensor gain g at which the finite difference of the cutting force between measured and true
+/// motion is taken.
 const SMALL_SHARE: f64 = 0.05;
 
 /// The sensor gain g from the fitted share 1 − 1/g; `None` if the share is not below [`LARGEST_GAIN_SHARE`].
@@ -41,7 +43,7 @@ impl Cause for SensorGainCause {
             |channel| channel.pickup.weights,
             |_| Complex64::ONE,
         );
-        // A channel with gain g reads y = g·x, so the true motion is x = (1 − share)·y with share = 1 − 1/g.
+        // A channel with the gain g reads y = g·x, so the true motion is x = (1 − share)·y with share = 1 − 1/g.
         Ok(with_chip_of_true_motion(
             record,
             location,

@@ -1,9 +1,11 @@
-//! Force sensors that read g times the cutting force: y = g·F, so that y − ŷ = (g − 1)·F along the measured motion.
+//! Force sensors in a cut that read g times the cutting force: y = g·F, so that the residual of their channels is (g −
+//! 1)·F, with the force F that the baseline predicts along the measured motion.
 //!
-//! Shows: one factor on the measured forces of one sensor or of a whole dynamometer at all tooth-passing harmonics, while the motion agrees
-//! with the baseline. Does not show: anything in the motion, whereas other cutting coefficients also change the motion. If a measured force
-//! drives the structure, the gain of its sensor is equivalent to one gain of all channels of motion. Fit: linear in g − 1. Source: the
-//! calibration factor of ISO 16063; Altintas, Manufacturing Automation (2012), ch. 2, for dynamometers in cuts.
+//! Shows: one factor on the measured forces of one sensor or of a whole dynamometer at all tooth-passing harmonics,
+//! while the motion agrees with the baseline. Does not show: anything in the motion, whereas other cutting coefficients
+//! also change the motion. If a measured force drives the structure, the gain of its sensor is equivalent to one gain
+//! of all channels of motion. Fit: linear in g − 1. Source: the calibration factor of ISO 16063; Altintas,
+//! Manufacturing Automation (2012), ch. 2, for dynamometers in cuts.
 
 use crate::candidates::cause::{Cause, LocatedEffect, Location, Parameter, Regressor, Regressors};
 use crate::criteria::LEAST_FORCE_GAIN;
@@ -14,7 +16,7 @@ use quietcut_recording::Quantity;
 
 pub(super) struct ForceSensorGainCause;
 
-/// Names of the channels at the location of a sensor error; empty if the location is no channel.
+/// Names of the channels of force at the location of a sensor error; empty if the location is no channel.
 fn names(location: &Location) -> &[String] {
     match location {
         Location::Channel(name) => std::slice::from_ref(name),
@@ -50,7 +52,8 @@ impl Cause for ForceSensorGainCause {
                 return Vec::new();
             }
             let mut force = channel.predicted.clone();
-            // Samples that the fit skips have no residual, so the regressor of the force sensor's gain is zero there.
+            // Samples that are not compared have no residual, so the regressor of the force sensor's gain is zero
+            // there.
             for &sample in &record.skipped[index] {
                 force[sample] = 0.0;
             }

@@ -1,11 +1,13 @@
-//! A sensor that does not sit at the tool tip, as its sidecar states: y = Σ ratio_r·u_r with u_r the contribution of mode r at the tool
-//! tip, so that y − ŷ = Σ (ratio_r − 1)·u_r.
+//! A sensor of motion that does not sit at the tool tip, as the sidecar states: it reads y = Σ ratio_r·u_r with u_r the
+//! contribution of mode r at the tool tip, so that its residual is Σ (ratio_r − 1)·u_r.
 //!
-//! Shows: a ratio for each mode, without phase. Does not show: other frequencies or damping. Fit: linear in the ratios. Source: mode shapes
-//! of a rigid or flexible body as in Ewins, Modal Testing (2000), ch. 2.
+//! Shows: a ratio for each mode, without phase. Does not show: other frequencies or damping. Fit: linear in the ratios,
+//! or in 1 − 1/ratio if there is only one. Source: mode shapes of a rigid or flexible body as in Ewins, Modal Testing
+//! (2000), ch. 2.
 //!
-//! There is only one ratio, equivalent to a gain of the channel, if one mode moves the axis, if the structure is not given by its modes or
-//! by more than nine, if all channels share the error, or in a cut, where the chip is computed along the motion of this sensor.
+//! There is only one ratio, equivalent to a gain of the channel, if one mode moves the axis, if the structure is not
+//! given by its modes or by more than nine, if all channels share the error, or if a record is of a cut, where the
+//! chips are computed along the motion of this sensor.
 
 use super::sensor::one_or_all;
 use super::sensor_gain::{SensorGainCause, factor};
@@ -22,13 +24,14 @@ use quietcut_model::structure::Form;
 
 pub(super) struct SensorOffsetCause;
 
-/// Keys of the ratios of the modes, in the order of the case. Structures with more modes have one ratio.
+/// Keys of the sensor-to-tool-tip ratios of the modes, in the order of the modes in the case. Structures with more
+/// modes have one ratio for all.
 const RATIOS: [&str; 9] = [
     "ratio_1", "ratio_2", "ratio_3", "ratio_4", "ratio_5", "ratio_6", "ratio_7", "ratio_8", "ratio_9",
 ];
 
-/// Indices of the modes that have a sensor-to-tool-tip ratio of their own in the channel, and the number of modes of the case; `None` if
-/// one ratio holds for all modes.
+/// Indices of the modes that have a sensor-to-tool-tip ratio of their own in the channel, and the number of modes of
+/// the case; `None` if one ratio holds for all modes.
 fn modes(study: &Study<'_>, location: &Location) -> Option<(Vec<usize>, usize)> {
     let name = location.channel()?;
     let Form::Modes(modes) = &study.baseline.structure.form else {
@@ -55,7 +58,8 @@ fn modes(study: &Study<'_>, location: &Location) -> Option<(Vec<usize>, usize)> 
     (seen.len() > 1).then_some((seen, modes.len()))
 }
 
-/// Reading of a channel from one mode alone under the forces of the record, including the mode's free decay.
+/// Reading that a channel has of one mode alone under the exciting forces of the record and the restoring forces of the
+/// baseline, including the mode's free decay.
 fn read_of(study: &Study<'_>, record: &Record, index: usize, mode: usize) -> Vec<f64> {
     let channel: &Observed = &record.channels[index];
     let first_order = &study.baseline.first_order;

@@ -1,9 +1,9 @@
-//! f_r += k3·x³ + k5·x⁵ with k3 < 0 < k5.
+//! Softening-hardening spring f_r += k3·x³ + k5·x⁵ along an axis, with k3 < 0 < k5.
 //!
-//! Shows: a natural frequency that falls with amplitude and then rises; odd harmonics up to the fifth. Does not show: any difference from a
-//! cubic spring at amplitudes far below the minimum of f_r/x at x² = −k3/(2·k5). Two stiffness regimes with a sharp transition are
-//! backlash, or stay unexplained. Fit: linear in k3 and k5. Source: Nayfeh and Mook, Nonlinear Oscillations (1979), ch. 4 (the quintic term
-//! of the Duffing oscillator).
+//! Shows: a natural frequency that falls with amplitude and then rises; odd harmonics up to the fifth. Does not show:
+//! any difference from a cubic spring at amplitudes far below the minimum of f_r/x at x² = −k3/(2·k5). Two stiffness
+//! regimes with a sharp transition are backlash, or stay unexplained. Fit: linear in k3 and k5. Source: Nayfeh and
+//! Mook, Nonlinear Oscillations (1979), ch. 4 (the quintic term of the Duffing oscillator).
 
 use super::restoring::{Restoring, plain};
 use quietcut_model::effects::EffectName;

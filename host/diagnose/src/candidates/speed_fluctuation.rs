@@ -1,11 +1,13 @@
 //! The spindle speed varies periodically: Ω = Ω₀(1 + δ·sin(2πf_m t + ψ)).
 //!
-//! Shows: in the tachometer signal, and as sidebands at ±f_m of the tooth-passing lines. Does not show: without a tachometer, any
-//! difference from drift of the structure. Source: Sexton, Milne and Stone (1977); Insperger and Stépán, J. Vib. Control 10 (2004).
+//! Shows: a modulation of the tachometer signal, and sidebands at ±f_m of the tooth-passing lines. Does not show:
+//! without a tachometer, any difference from drift of the structure. Source: Sexton, Milne and Stone (1977); Insperger
+//! and Stépán, J. Vib. Control 10 (2004).
 //!
-//! Fit: δ, f_m and ψ are fitted to the tachometer edges, with f_m up to half the spindle frequency. The regressor is the difference between
-//! the cutting force with this modulation and the force at constant speed. Its coefficient is 1 if the records confirm the modulation; the
-//! reported amplitude is that of the tachometer, which is more accurate.
+//! Fit: δ, f_m and ψ are fitted to the tachometer edges, with f_m up to 0.45 times the lowest spindle frequency. The
+//! regressor is the difference between the cutting force with this modulation and the force at constant speed. Its
+//! coefficient is 1 if the records confirm the modulation; the reported amplitude is that of the tachometer, which is
+//! more accurate.
 
 use super::process::everywhere;
 use crate::candidates::cause::{Cause, Location, Parameter, Regressor, Regressors, WRONG_PARAMETERS};
@@ -18,7 +20,7 @@ use quietcut_simulate::Fluctuation;
 
 pub(super) struct SpeedFluctuationCause;
 
-/// The speed modulation in the tachometer signals of all cuts.
+/// The speed modulation in the tachometer signals of all cuts of the study; `None` if there is none.
 fn of_tachometer(study: &Study<'_>) -> Option<SpeedModulation> {
     let spindle_motions: Vec<&SpindleMotion> = study
         .records
@@ -75,7 +77,8 @@ impl Cause for SpeedFluctuationCause {
         Ok(vec![Regressor::of_cut(force.difference(&cut.force, 1.0))])
     }
 
-    /// The nonlinear parameters of the speed modulation (amplitude, frequency, phase) come from the tachometer, not from the fit.
+    /// The nonlinear parameters of the speed modulation (amplitude, frequency, phase) come from the tachometer, not
+    /// from the fit.
     fn settled(&self, nonlinear_parameters: &[f64], _: &[f64]) -> Option<Vec<f64>> {
         Some(nonlinear_parameters.to_vec())
     }

@@ -1,7 +1,8 @@
-//! The edge wears: all cutting forces grow along the record by the factor 1 + r·t.
+//! The edge wears: all cutting forces grow with the time t since the start of the recording by the factor 1 + r·t.
 //!
-//! Shows: all tooth-passing lines grow by the same factor along the record. Does not show: changes of frequency. A sensor whose gain drifts
-//! is equivalent. Fit: linear in r. Source: Altintas, Manufacturing Automation (2012), ch. 2 (forces over flank wear).
+//! Shows: all tooth-passing lines grow by the same factor along the record. Does not show: changes of frequency. A
+//! drift of the gain of all channels is equivalent. Fit: linear in r. Source: Altintas, Manufacturing Automation
+//! (2012), ch. 2 (forces over flank wear).
 
 use super::process::{changed, everywhere};
 use crate::candidates::cause::{Cause, Location, Parameter, Regressors};

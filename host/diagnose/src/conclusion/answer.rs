@@ -1,4 +1,4 @@
-//! The answer of a diagnosis, as JSON contains it.
+//! The answer of a diagnosis; JSON contains most of its fields.
 
 use std::collections::BTreeMap;
 
@@ -17,9 +17,9 @@ pub enum Outcome {
     Cause,
     /// The baseline agrees with the records within the noise.
     None,
-    /// Several candidate models explain the records equally well.
+    /// Several candidate models with different causes or locations explain the records equally well.
     Confounded,
-    /// No known cause explains the residual.
+    /// No candidate model explains enough of the residual.
     Unexplained,
 }
 
@@ -39,13 +39,14 @@ pub struct EstimatedCause {
     pub name: &'static str,
     /// Confidence that the cause is present, from 0 to 1.
     pub confidence: f64,
-    /// Direction x, y or z in which the cause acts, or which the channel also reads, if there is one such axis.
+    /// Direction x, y or z in which the cause acts or, for a cross-axis error, which the channel also reads; `None` if
+    /// there is no single one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub direction: Option<&'static str>,
     /// The two directions that the cause couples, if it couples two.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub directions: Option<[&'static str; 2]>,
-    /// The channel in which the cause acts, if it is an error of one sensor.
+    /// Name of the channel in which the cause acts, if it is an error of one sensor.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub channel: Option<String>,
     /// Parameters by key.
@@ -53,18 +54,18 @@ pub struct EstimatedCause {
     /// The table `[extension.NAME]` that adds the cause to a case.
     #[serde(skip)]
     pub extension: toml::Table,
-    /// Index of the cause in the candidate model. The entries of a cause that has several, for example one for each direction, have the
-    /// same index.
+    /// Index of the cause in its candidate model. If a cause has several entries, for example one for each direction,
+    /// they have the same index.
     #[serde(skip)]
     pub choice: usize,
-    /// The table `[extension.NAME]` with parameters at both ends of the 90 % interval along each principal direction of the correlation of
-    /// the fitted parameters.
+    /// The table `[extension.NAME]` with parameters at both ends of the 90 % interval along each principal direction of
+    /// the correlation of the fitted parameters.
     #[serde(skip)]
     pub moved: Vec<[toml::Table; 2]>,
 }
 
 impl EstimatedCause {
-    /// Channel of the cause, otherwise its direction or directions; empty if it has none of them.
+    /// Name of the cause's channel, otherwise its direction or directions in words; empty if it has none of them.
     pub fn location(&self) -> String {
         let directions = self.directions.map(|[one, other]| format!("{one} and {other}"));
         let channel = self.channel.clone();
@@ -75,7 +76,8 @@ impl EstimatedCause {
     }
 }
 
-/// The causes of one candidate model, each with its channel or directions: `mass along x with sensor-gain of ax`.
+/// The causes of one candidate model in words, each with its channel or directions: `mass along x with sensor-gain of
+/// ax`.
 pub(crate) fn label(causes: &[EstimatedCause]) -> String {
     let mut names: Vec<String> = Vec::new();
     for cause in causes {
@@ -92,33 +94,35 @@ pub(crate) fn label(causes: &[EstimatedCause]) -> String {
     names.join(" with ")
 }
 
-/// Prediction error of a model.
+/// Prediction error of the baseline or of the extended case. That of the extended case is the baseline's times the
+/// square root of the ratio of their χ², unless a long record is validated on its rest.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Quality {
-    /// NRMSE on held-out segments: root mean square of the residual over that of the measured channel in its whole record; all channels
-    /// have equal weight.
+    /// NRMSE on the held-out segments: root mean square of the residual of a channel in a segment over that of the
+    /// measured channel in its whole record. The squares are averaged over all channels and segments with equal weight.
     pub nrmse_heldout: f64,
-    /// NRMSE on the whole records.
+    /// NRMSE on the whole records, each one segment; otherwise as `nrmse_heldout`.
     pub nrmse_whole: f64,
 }
 
-/// Reduction of the held-out residual by the extension.
+/// Reduction of the residual energy on the held-out segments by the extension.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Gain {
-    /// Share of the held-out residual energy above the noise that the extension explains: 1 − (E_after − n)/(E_before − n), with energies
-    /// in units of the noise and n compared values; limited to −1 to 1.
+    /// Share of the held-out residual energy above the noise that the extension explains: 1 − (E_after − n)/(E_before −
+    /// n), with the residual energies E before and after the extension in units of the noise variance, and n compared
+    /// values; limited to −1 to 1.
     pub residual_energy_removed: f64,
-    /// 90 % interval of `residual_energy_removed`, from the variance of both residual energies by the noise. It is limited to −1, where the
-    /// extension doubles the residual energy above the noise, and to 1. It is wide if the held-out residual of the baseline is close to the
-    /// noise.
+    /// 90 % interval of `residual_energy_removed`, from the variance of both residual energies by the noise. It is
+    /// limited to −1, where the extension doubles the residual energy above the noise, and to 1. It is wide if the
+    /// held-out residual of the baseline is close to the noise.
     pub ci90: [f64; 2],
 }
 
 impl Gain {
-    /// Computes the gain from the χ² `before` and `after` the extension, over `count` compared values.
+    /// Computes the gain from the χ² `before` and `after` the extension, each over the same `count` compared values.
     ///
-    /// Each χ² is that of a signal with energy s² in noise: non-central, with variance 2n + 4s². Both contain the same noise; treating it
-    /// as independent widens the interval if both residuals are large.
+    /// Each χ² is that of a signal with energy s² in noise: non-central, with variance 2n + 4s². Both contain the same
+    /// noise; treating it as independent widens the interval if both residuals are large.
     pub(crate) fn new(before: f64, after: f64, count: f64) -> Self {
         let there = (before - count).max(1e-9 * before);
         let left = (after - count) / there;
@@ -138,9 +142,11 @@ impl Gain {
 /// The unexplained residual.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Unexplained {
-    /// Share of the baseline's residual energy above the noise that the best candidate model does not explain; 0 if only noise is left.
+    /// Share of the baseline's residual energy above the noise that the best candidate model does not explain; 0 if
+    /// only noise is left.
     pub fraction: f64,
-    /// Channel, frequency and time at which the unexplained residual is largest, in words; `none above noise` if only noise is left.
+    /// Channel with the largest unexplained residual relative to its noise, in words, with the frequency and time at
+    /// which that is largest; `none above noise` if only noise is left.
     #[serde(rename = "where")]
     pub location: String,
     /// A formula that may describe the unexplained restoring force: a guess.
@@ -171,15 +177,16 @@ pub struct NextTest {
     /// Feed per tooth of the proposed cut, mm.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub feed_per_tooth_mm: Option<f64>,
-    /// Duration, s.
+    /// Duration of the proposed test, s.
     pub seconds: f64,
     /// Quantities that the proposed test measures in addition to the channels of the present records.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub measure: Option<&'static str>,
-    /// Smallest distance between the predictions of two candidate models in the proposed test, in standard deviations of the noise. About 8
-    /// separate two models nearly always.
+    /// Distance between the predictions of those two candidate models that the proposed test separates least, in
+    /// standard deviations of the noise. A distance of about 8 separates two models nearly always.
     pub distance: f64,
-    /// The candidate models that the test separates, and the channel in which they differ most.
+    /// In words: the two candidate models that the proposed test separates least, and the channel in which they differ
+    /// most; if no test separates them reliably, the distance instead of the channel.
     pub why: String,
 }
 
@@ -216,19 +223,20 @@ impl NextTest {
     }
 }
 
-/// The answer.
+/// The answer of a diagnosis.
 #[derive(Clone, Debug, Serialize)]
 pub struct Diagnosis {
     /// Outcome of the diagnosis.
     pub outcome: Outcome,
     /// Prediction error of the baseline.
     pub baseline: Quality,
-    /// The causes of the best candidate model; if they are confounded, followed by those that equivalent candidate models add.
+    /// The causes of the best candidate model; if the outcome is `Confounded`, followed by those that equivalent
+    /// candidate models add.
     pub causes: Vec<EstimatedCause>,
-    /// Groups of cause names that the records cannot separate.
+    /// Groups of names of causes that the records cannot separate; empty unless the outcome is `Confounded`.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub equivalent: Vec<Vec<&'static str>>,
-    /// Prediction error of the extended case.
+    /// Prediction error of the extended case; `None` without an extension.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub extended: Option<Quality>,
     /// Reduction of the held-out residual by the extension, if there is one.
@@ -239,8 +247,8 @@ pub struct Diagnosis {
     /// Effect of the extension on the stability limits; `None` without an extension, or if limits cannot be computed.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lobes: Option<Lobes>,
-    /// Stability lobes of the case with the trial cuts and recorded cuts; `None` with an extension, without such cuts, or if limits cannot
-    /// be computed.
+    /// Stability lobes of the case without extension, with the trial cuts and recorded cuts; `None` with an extension,
+    /// without such cuts, or if limits cannot be computed.
     #[serde(skip)]
     pub baseline_lobes: Option<Chart>,
     /// The experiment that separates confounded candidate models.
@@ -248,25 +256,26 @@ pub struct Diagnosis {
     pub next_test: Option<NextTest>,
     /// Remarks, for example on the records or on results that cannot be computed.
     pub warnings: Vec<String>,
-    /// The equivalent candidate models, each with the causes that act together: more than one if the outcome is `Confounded`.
+    /// The best candidate model and those equivalent to it, each with the causes that act together: more than one if
+    /// the outcome is `Confounded`.
     #[serde(skip_serializing_if = "is_single")]
     pub explanations: Vec<Vec<EstimatedCause>>,
-    /// Number of `causes`, from the first, that act together in the extended case.
+    /// Number of entries of `causes`, from the first, that act together in the extended case; 0 without an extension.
     #[serde(skip)]
     pub acting: usize,
-    /// The residuals by channel.
+    /// Measured samples and residuals of each channel of each record.
     #[serde(skip)]
     pub views: Vec<ResidualView>,
 }
 
-/// True if `explanations` repeats `causes`, and JSON omits it.
+/// True if `explanations` has no entry beyond the causes of the best candidate model, so that JSON omits it.
 fn is_single(explanations: &[Vec<EstimatedCause>]) -> bool {
     explanations.len() < 2
 }
 
 impl Diagnosis {
-    /// Adds an equivalent candidate model to `explanations`, if it is new, and its causes to `causes`. A cause already listed is skipped:
-    /// one with the same name or, if `other_locations` is true, with the same name and location.
+    /// Adds an equivalent candidate model to `explanations`, if it is new, and its causes to `causes`. A cause already
+    /// listed is skipped: one with the same name or, if `other_locations` is true, with the same name and location.
     pub(crate) fn add_rival(&mut self, causes: Vec<EstimatedCause>, other_locations: bool) {
         for cause in &causes {
             let is_known = self.causes.iter().any(|known| {
@@ -316,7 +325,8 @@ mod tests {
         // χ² of 1 000 values: twice the noise before, the noise after.
         let gain = Gain::new(2000.0, 1000.0, 1000.0);
         assert_eq!(gain.residual_energy_removed, 1.0);
-        // The extension leaves no residual above the noise, so that only the energy after it scatters: 1 − 1.645·√(2·1 000)/1 000 = 0.926.
+        // The extension leaves no residual above the noise, so that only the energy after it scatters: 1 − 1.645·√(2·1
+        // 000)/1 000 = 0.926.
         assert!(
             (gain.ci90[0] - 0.926).abs() < 1e-3 && gain.ci90[1] == 1.0,
             "{gain:?}"

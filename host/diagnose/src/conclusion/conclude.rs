@@ -62,7 +62,7 @@ fn answer(
         .filter(|_| of_noise <= NOISE_TOLERANCE || of_excess <= allowed)
     else {
         if of_noise > NOISE_TOLERANCE {
-            // The candidate model is rejected: the views show the residual of the baseline.
+            // No candidate model is accepted: the views show the residual of the baseline.
             diagnosis.views = residual_views(study, library, None);
             diagnosis.unexplained.location = crate::conclusion::unexplained::describe(&diagnosis.views);
             diagnosis.outcome = Outcome::Unexplained;
@@ -83,8 +83,8 @@ fn answer(
         1.0
     };
     let confidence = doubt * confidence(selection.ahead, of_excess / allowed);
-    // Errors of the computation are proportional to the signal. If they resemble the contribution of a cause, they bias its parameters, so
-    // the variances are raised.
+    // Errors of the computation are proportional to the signal. If they resemble the contribution of a cause, they bias
+    // its parameters, so the variances are raised.
     let uncertain = inflation + criteria.coherent;
     let spread = |model: &CandidateModel| {
         let closed = criteria.closed.as_ref();
@@ -116,8 +116,8 @@ fn answer(
     diagnosis
 }
 
-/// The answer if the baseline is right, with a warning if the prediction error is much larger on the whole records than on the held-out
-/// segments.
+/// The answer if the baseline is right, with a warning if the prediction error is much larger on the whole records than
+/// on the held-out segments.
 fn of_baseline(
     study: &Study<'_>,
     library: &Library,
@@ -158,8 +158,8 @@ fn of_baseline(
     }
 }
 
-/// Largest share of the baseline's residual energy above the noise that may stay unexplained by the candidate model `best` for `best` to be
-/// accepted.
+/// Largest share of the baseline's residual energy above the noise that may stay unexplained by the candidate model
+/// `best` for `best` to be accepted.
 fn allowed_residual(study: &Study<'_>, best: Option<&CandidateModel>) -> f64 {
     match best {
         _ if study.all_in(Domain::Force) => UNEXPLAINED_OF_FORCE,
@@ -170,7 +170,7 @@ fn allowed_residual(study: &Study<'_>, best: Option<&CandidateModel>) -> f64 {
     }
 }
 
-/// Warnings about estimated sensor gains close to the factor of a unit mix-up (such as 9.81 for g instead of m/s²).
+/// Warnings about estimated sensor gains close to the ratio of a unit mix-up (such as 9.81 for g instead of m/s²).
 fn unit_warnings(causes: &[EstimatedCause]) -> Vec<String> {
     causes
         .iter()
@@ -186,7 +186,8 @@ fn unit_warnings(causes: &[EstimatedCause]) -> Vec<String> {
         .collect()
 }
 
-/// The names of the best candidate model that all equivalent models contain; empty without an equivalent model.
+/// The names of causes of the best candidate model, `best`, that all equivalent models contain; empty without an
+/// equivalent model.
 fn shared_names(library: &Library, selection: &Selection, best: &[&'static str]) -> Vec<&'static str> {
     let others = &selection.others;
     let in_all = |name: &&'static str| {
@@ -196,8 +197,9 @@ fn shared_names(library: &Library, selection: &Selection, best: &[&'static str])
     best.iter().copied().filter(in_all).collect()
 }
 
-/// Sets the outcome to confounded. The group of equivalent names holds those that not all equivalent candidate models share, and their
-/// confidence is bounded. If all models share all names, the group holds the names that occur at different locations.
+/// Sets the outcome to confounded. The group of equivalent names holds those that not all equivalent candidate models
+/// share, and the confidence in them is bounded by one over the number of names or of models, whichever is larger. If
+/// all models share all names, the group holds the names that occur at different locations.
 fn confound(diagnosis: &mut Diagnosis, shared: &[&'static str]) {
     diagnosis.outcome = Outcome::Confounded;
     let mut group = diagnosis.names();
@@ -217,9 +219,9 @@ fn confound(diagnosis: &mut Diagnosis, shared: &[&'static str]) {
     diagnosis.equivalent = vec![group];
 }
 
-/// Confidence that a cause is present, from 0 to [`HIGHEST_CONFIDENCE`]. `ahead` is the lead of its candidate model over the best
-/// non-equivalent rival; `left` is the share of the residual energy above the noise that the model does not explain, over the allowed
-/// share.
+/// Confidence that a cause is present, from 0 to [`HIGHEST_CONFIDENCE`]. `ahead` is the lead in gain of its candidate
+/// model over its best rival; `left` is the share of the residual energy above the noise that the model does not
+/// explain, over the allowed share.
 fn confidence(ahead: f64, left: f64) -> f64 {
     let by_rivals = 1.0 / (1.0 + (-(ahead - 0.5 * EQUIVALENT) / CONFIDENCE_WIDTH).exp());
     let by_rest = 1.0 - CONFIDENCE_LOSS * left.clamp(0.0, 1.0).powi(2);

@@ -1,4 +1,4 @@
-//! The case with the estimated extension.
+//! The case with the extensions of the estimated causes.
 
 use std::fmt::Write as _;
 
@@ -9,7 +9,8 @@ use crate::conclusion::answer::{Diagnosis, EstimatedCause, Figure, Outcome};
 use crate::conclusion::lobes::IntervalEnds;
 use quietcut_model::case::Case;
 
-/// TOML comment with the 90 % intervals of `key` in all `causes` that have it, numbered keys (`ratio_1`, `ratio_2` …) included.
+/// TOML comment with the 90 % intervals of the parameter `key` in all `causes` that have it, numbered keys (`ratio_1`,
+/// `ratio_2` …) included; empty if none has it.
 fn intervals(causes: &[&EstimatedCause], key: &str) -> String {
     let is_of_key = |known: &str| {
         let behind = known
@@ -36,7 +37,7 @@ impl Diagnosis {
         found.map(|cause| (cause.name, &cause.extension))
     }
 
-    /// The case with the extensions of the acting causes; `None` without causes.
+    /// The case with the extensions of the acting causes; `None` without acting causes.
     pub fn extended(&self, case: &Case) -> Option<Case> {
         (self.acting > 0).then(|| {
             let mut extended = case.clone();
@@ -45,8 +46,9 @@ impl Diagnosis {
         })
     }
 
-    /// The extended case with parameters at both ends of the 90 % interval along each principal direction of the covariance, for one cause
-    /// after the other. Causes are taken as independent.
+    /// The extended case with parameters at both ends of the 90 % interval along each principal direction of the
+    /// correlation of a cause's fitted parameters, for one cause after the other. The parameters of different causes
+    /// are taken as independent.
     pub fn moved(&self, case: &Case) -> Vec<IntervalEnds> {
         let found = &self.causes[..self.acting];
         let choices = found
@@ -75,8 +77,8 @@ impl Diagnosis {
         all
     }
 
-    /// The text of the extended case: that of the case, with a table `[extension.NAME]` for each acting cause, and the 90 % intervals of
-    /// its parameters as comments. `None` if the outcome is neither a cause nor confounded.
+    /// The text of the extended case: that of the case, with a table `[extension.NAME]` for each acting cause, and the
+    /// 90 % intervals of its parameters as comments. `None` if the outcome is neither a cause nor confounded.
     ///
     /// Of confounded candidate models it contains the first.
     pub fn extended_case(&self, case_text: &str) -> Option<String> {

@@ -1,10 +1,11 @@
 //! A formula for a residual that no known cause explains.
 //!
-//! The missing restoring force along an axis is Σ cᵢ φᵢ(x, v) with few of many terms: products of powers x^i v^j, terms with |x|, |v| or
-//! the sign of v, and the state z of Bouc–Wen loops with several yield displacements. Forward regression adds the term that reduces χ²
-//! most, up to four terms and as long as Schwarz's criterion n ln χ² + k ln n decreases. The quality of the formula is the share of the
-//! held-out residual energy that it explains. S. A. Billings, Nonlinear System Identification, 2013, ch. 3 (forward regression); S. L.
-//! Brunton et al., PNAS 113 (2016) 3932 (sparse regression).
+//! The missing restoring force is Σ cᵢ φᵢ(x, v) with few of many terms in the displacement x and velocity v along one
+//! axis each: products of powers x^i v^j, terms with |x|, |v| or the sign of v, and the state z of Bouc–Wen loops with
+//! several yield displacements. Forward regression adds the term that reduces χ² most, up to four terms and as long as
+//! Schwarz's criterion n ln χ² + k ln n for k terms and n compared values decreases. The quality of the formula is the
+//! share of the held-out residual energy that it explains. S. A. Billings, Nonlinear System Identification, 2013, ch. 3
+//! (forward regression); S. L. Brunton et al., PNAS 113 (2016) 3932 (sparse regression).
 
 use std::fmt::Write;
 
@@ -39,8 +40,8 @@ const POWERS: [(i32, i32); 16] = [
     (0, 5),
 ];
 
-/// Yield displacements of the Bouc–Wen loops that a guessed restoring force may contain, as shares of the largest displacement along the
-/// axis.
+/// Yield displacements of the Bouc–Wen loops that a guessed restoring force may contain, as shares of the largest
+/// displacement along the axis.
 const YIELDS: [f64; 4] = [0.05, 0.15, 0.4, 0.8];
 
 /// One term φ(x, v) of a guessed restoring force along one axis.
@@ -59,8 +60,8 @@ enum FormulaTerm {
     Loop(f64),
 }
 
-/// A guessed formula for the unexplained restoring force, with the share of the held-out residual energy that it explains; `None` if that
-/// is less than `LEAST_EXPLAINED_BY_GUESS`, or if no formula is found.
+/// A guessed formula for the unexplained restoring force, with the share of the held-out residual energy that it
+/// explains; `None` if that is less than `LEAST_EXPLAINED_BY_GUESS`, or if no formula is found.
 pub(crate) fn guess(study: &Study<'_>, regression: &mut Regression) -> Option<String> {
     let mut all: Vec<(usize, FormulaTerm, usize)> = Vec::new();
     for axis in study.driven_axes() {
@@ -132,8 +133,8 @@ fn terms(study: &Study<'_>, axis: usize) -> Vec<FormulaTerm> {
     powers.chain(others).chain(loops).collect()
 }
 
-/// Contribution of a term of the guessed restoring force to the residual, per unit of its coefficient, by record, channel and sample;
-/// `None` if the structure cannot have the term, or if a value is not finite.
+/// Contribution of a term of the guessed restoring force to the residual, per unit of its coefficient, by record,
+/// channel and sample; `None` if the structure cannot have the term, or if a value is not finite.
 fn column(study: &Study<'_>, axis: usize, term: FormulaTerm) -> Option<Vec<Vec<Vec<f64>>>> {
     let columns: Vec<Vec<Vec<f64>>> = study
         .records
@@ -179,7 +180,8 @@ fn along(study: &Study<'_>, motion: &SampledMotion, axis: usize, term: FormulaTe
                 .first()?
                 .restoring_forces(study.baseline.structure)
                 .ok()?;
-            // The restoring force of a Bouc–Wen effect with unit stiffness is z − x; adding the displacement x gives the state z.
+            // The restoring force of a Bouc–Wen effect with unit stiffness is z − x; adding the displacement x gives
+            // the state z.
             let difference = restoring_along(&**terms.first()?, motion).into_iter().nth(axis)?;
             difference
                 .iter()

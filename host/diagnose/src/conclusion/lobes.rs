@@ -14,12 +14,12 @@ use quietcut_stability::{
     default_speeds, needs_orbit, spaced,
 };
 
-/// Number of spindle speeds at equal ratios in a stability chart, to which those of recorded cuts are added; fewer if each limit takes
-/// seconds to compute.
+/// Number of spindle speeds at equal ratios in a stability chart, to which those of recorded cuts are added;
+/// [`FEW_SPEEDS`] if each limit takes seconds to compute.
 const SPEEDS: usize = 41;
 
-/// Number of spindle speeds at equal ratios in a stability chart whose limits take seconds each, as limits about forced orbits over a
-/// revolution do. Those of recorded cuts are added.
+/// Number of spindle speeds at equal ratios in a stability chart whose limits take seconds each, as limits about forced
+/// orbits over a revolution do. Those of recorded cuts are added.
 const FEW_SPEEDS: usize = 2;
 
 /// Largest number of spindle speeds at which [`depth_mm`] searches the lowest stability limit.
@@ -27,26 +27,28 @@ const COARSE: usize = 12;
 
 /// First axial depth of the search for the lowest stability limit in [`depth_mm`], mm.
 const SHALLOWEST_MM: f64 = 0.01;
-/// Bound of the axial depth in the search for the lowest stability limit in [`depth_mm`], mm; its result if no limit is found.
+/// Bound of the axial depth in the search for the lowest stability limit in [`depth_mm`], mm; its result if no limit is
+/// found.
 const DEEPEST_MM: f64 = 200.0;
 
-/// Largest axial depth of a stability chart without trial cuts, as a multiple of the lowest stability limit found in the speed range. The
-/// chart is deeper if [`BELOW_CUTS`] requires it.
+/// Largest axial depth of a stability chart without trial cuts, as a multiple of the lowest stability limit found in
+/// the speed range. The chart is deeper if [`BELOW_CUTS`] requires it.
 const DEPTH: f64 = 4.0;
 
-/// Largest axial depth of a stability chart with trial cuts, as a multiple of the axial depth of the deepest trial or recorded cut in it.
-/// Without trial cuts a chart is at least as deep as this.
+/// Largest axial depth of a stability chart with trial cuts, as a multiple of the axial depth of the deepest trial or
+/// recorded cut in it. Without trial cuts a chart is at least as deep as this.
 const BELOW_CUTS: f64 = 1.2;
 
-/// Stability limit at one spindle speed before and after the extension; `None` if it is above the largest depth of the search.
+/// Stability limit at one spindle speed before and after the extension, each with its kind and chatter frequency; a
+/// limit is `None` if it is above the largest depth of the search.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Change {
     /// Stability limit of axial depth of the case without the extension, mm.
     pub limit_before_mm: Option<f64>,
     /// Stability limit of axial depth of the extended case, mm.
     pub limit_after_mm: Option<f64>,
-    /// 90 % interval of `limit_after_mm`, from the intervals of the parameters. An upper end of `None` is above the largest depth of the
-    /// search.
+    /// 90 % interval of `limit_after_mm`, from the intervals of the causes' parameters; `None` if it was not computed.
+    /// An upper end of `None` is above the largest depth of the search.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub limit_after_ci90_mm: Option<[Option<f64>; 2]>,
     /// Spindle speed, rev/min.
@@ -66,7 +68,7 @@ pub struct Change {
 pub struct CallsChange {
     /// Right and wrong stability predictions for trial and recorded cuts by the case without the extension.
     pub before: Calls,
-    /// Predictions of the extended case.
+    /// Right and wrong stability predictions for the same cuts by the extended case.
     pub after: Calls,
 }
 
@@ -85,25 +87,28 @@ pub struct Chart {
     pub warnings: Vec<String>,
 }
 
-/// Stability limits of the case and of the extended case.
+/// Stability limits of the case without the extension and of the extended case.
 #[derive(Clone, Debug, Serialize)]
 pub struct Lobes {
-    /// Limits at the speed of the first recorded cut; without one, at the speed where the two cases differ most.
+    /// Limits at the speed of the first recorded cut; without one, at the speed where the limits of the two cases
+    /// differ most in ratio.
     #[serde(flatten)]
     pub at: Change,
     /// Largest axial depth up to which stability limits were searched, mm.
     pub searched_mm: f64,
-    /// Time since the start of the recording for which stability limits with drift or wear hold: the end of the longest recording, s.
+    /// Time since the start of the recording for which stability limits with drift or wear hold: the end of the longest
+    /// recording, s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub after_s: Option<f64>,
     /// Name of the stability method of the extended case.
     pub method_after: &'static str,
     /// Stability limits before and after the extension, at every speed of the chart.
     pub speeds: Vec<Change>,
-    /// Right and wrong predictions for trial and recorded cuts before and after the extension; `None` without such cuts.
+    /// Right and wrong predictions for trial and recorded cuts before and after the extension; `None` without such
+    /// cuts.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub calls: Option<CallsChange>,
-    /// Stability charts of the case and of the extended case.
+    /// Stability charts of the case without the extension and of the extended case, in this order.
     #[serde(skip)]
     pub charts: [Chart; 2],
     /// Sentences about intervals that cannot be computed, and about recorded cuts whose outcome cannot be determined.
@@ -111,11 +116,12 @@ pub struct Lobes {
     pub warnings: Vec<String>,
 }
 
-/// An extended case with parameters at both ends of the 90 % interval along one principal direction of their covariance.
+/// An extended case with the parameters of one cause at both ends of the 90 % interval along one principal direction of
+/// their correlation.
 pub type IntervalEnds = [Case; 2];
 
-/// The stability lobes of a case over the range of the spindle speeds of trial cuts, else around those of recorded cuts, else over the
-/// default speed range of the case.
+/// The stability lobes of a case over the range of the spindle speeds of trial cuts, else around those of recorded
+/// cuts, else over the default speed range of the case.
 ///
 /// # Errors
 /// The case has no tool, material or cut, or its limits cannot be computed.
@@ -130,8 +136,8 @@ pub fn baseline_lobes(
     Chart::new(&*method, &range, &cuts)
 }
 
-/// Stability limits of a case and of its extended case over the same spindle speeds. `moved` holds the extended case with parameters at
-/// both ends of their 90 % intervals.
+/// Stability limits of a case and of its extended case at the same spindle speeds. `moved` holds, for each principal
+/// direction of the causes' parameters, the extended case at both ends of the 90 % interval.
 ///
 /// # Errors
 /// The case or the extended case has no tool, material or cut, or its limits cannot be computed.
@@ -187,8 +193,8 @@ pub fn lobes(
     })
 }
 
-/// Adds the 90 % intervals of the limits to `speeds`. The principal directions of the parameters are independent: the squares of their
-/// changes of a limit add, separately for increases and decreases.
+/// Adds the 90 % intervals of the extended case's limits to `speeds`. The principal directions of the parameters are
+/// independent: the squares of the changes that they cause in a limit add, separately for increases and decreases.
 fn spread(
     speeds: &mut [Change],
     searched_mm: f64,
@@ -259,7 +265,7 @@ impl<'a> Cuts<'a> {
     }
 }
 
-/// Spindle speeds of a stability chart, and its largest axial depth.
+/// Spindle speeds of a stability chart, and the largest axial depth up to which limits are searched in it.
 struct Range {
     speeds_rpm: Vec<f64>,
     searched_mm: f64,
@@ -322,7 +328,8 @@ fn is_costly(case: &Case) -> bool {
 }
 
 impl Change {
-    /// Natural logarithm of the limit after the extension over the limit before it. A limit of `None` counts as `searched_mm`.
+    /// Natural logarithm of the limit after the extension over the limit before it. A limit of `None` counts as
+    /// `searched_mm`, one below a millionth of it as that millionth.
     pub fn relative(&self, searched_mm: f64) -> f64 {
         let limit = |limit_mm: Option<f64>| limit_mm.unwrap_or(searched_mm).max(1e-6 * searched_mm);
         (limit(self.limit_after_mm) / limit(self.limit_before_mm)).ln()
@@ -357,8 +364,9 @@ fn method(case: &Case, after_s: Option<f64>) -> Result<Box<dyn Method>, Stabilit
     }
 }
 
-/// Spindle speeds of a chart, rev/min: the range of trial cuts (widened if it is one speed), else around that of recorded cuts, else the
-/// default range of the case. Speeds of recorded cuts are always among them.
+/// Spindle speeds of a stability chart, rev/min: `count` at equal ratios over the range of the trial cuts `cuts`
+/// (widened if it is one speed), else around that of recorded cuts, else over the default range of the case. Speeds of
+/// recorded cuts are always added.
 fn speeds(
     case: &Case,
     cuts: &[TrialCut],
@@ -389,8 +397,8 @@ fn speeds(
     Ok(speeds)
 }
 
-/// Largest axial depth of a chart, mm: a multiple of the lowest limit, which is searched by doubling the depth; [`DEEPEST_MM`] if none is
-/// found.
+/// Largest axial depth of a stability chart, mm: [`DEPTH`] times the lowest stability limit over some of the speeds,
+/// which is searched by doubling the depth; [`DEEPEST_MM`] if no limit is found.
 fn depth_mm(method: &dyn Method, speeds_rpm: &[f64]) -> Result<f64, StabilityError> {
     let every = speeds_rpm.len().div_ceil(COARSE).max(1);
     let coarse: Vec<f64> = speeds_rpm.iter().copied().step_by(every).collect();

@@ -1,10 +1,11 @@
-//! Long records of random forces, impacts and cuts: causes are searched in the first part of each record, and the rest validates the
-//! result.
+//! Long records of random forces, impacts and cuts: causes are searched in the first part of each record, and the rest
+//! validates the result.
 //!
-//! A search predicts its records hundreds of times. The first seconds of a random excitation, of impacts or of a cut at one speed contain
-//! nearly the information of a minute, except on changes over the minute. Therefore the extended case (the
-//! case itself if no cause was found) is accepted only if its residual in the rest is near the noise or a small share of the baseline's.
-//! The gain is computed from the rest alone, to which nothing was fitted.
+//! A search predicts its records hundreds of times. The first seconds of a random excitation, of impacts or of a cut at
+//! one speed contain nearly the information of a minute, except on changes over the minute. Therefore the extended case
+//! (the case itself if no cause was found) is accepted only if its residual energy in the rest is near that of the
+//! noise, or exceeds it by a small share of the baseline's excess. The gain is computed from the rest alone, to which
+//! nothing was fitted.
 
 use crate::baseline::Baseline;
 use crate::conclusion::answer::{Diagnosis, Gain, Outcome, Quality};
@@ -17,15 +18,19 @@ use crate::records::study::Study;
 use quietcut_model::case::Case;
 use quietcut_recording::{Recording, TestKind};
 
-/// Number of samples of all records together in which causes are searched; `PERIODS` and `REVOLUTIONS` may require more.
+/// Number of samples of all records together in whose first parts causes are searched; `PERIODS` and `REVOLUTIONS` may
+/// require more.
 const SEARCHED: usize = 32_768;
-/// Smallest length of the first part of a record, in which causes are searched, in periods of the lowest natural frequency.
+/// Smallest length of the first part of a record, in which causes are searched, in periods of the lowest natural
+/// frequency of the baseline.
 const PERIODS: f64 = 60.0;
-/// Smallest length of the first part of a recorded cut, in which causes are searched, in revolutions.
+/// Smallest length of the first part of a recorded cut, in which causes are searched, in revolutions of the spindle. As
+/// many revolutions are left out before it.
 const REVOLUTIONS: f64 = 24.0;
 
-/// The first part and the rest of each record, if all records are of random forces, of impacts or of cuts at one speed; otherwise
-/// `None`. Also `None` if the case has no baseline model, or if the first parts would hold at least [`SHORTENED_SHARE`] of all samples.
+/// The first part and the rest of each record, if all records are of random forces, of impacts or of cuts at one speed;
+/// otherwise `None`. Also `None` if the case has no baseline model with an oscillating mode, if the sidecar of a cut
+/// gives no spindle speed, or if the first parts would hold at least [`SHORTENED_SHARE`] of all samples.
 fn beginnings(case: &Case, recordings: &[Recording]) -> Option<[Vec<Recording>; 2]> {
     // A case without baseline model is not reported here: it is refused when the whole records are prepared.
     let lowest_hz = Baseline::new(case).ok()?.lowest_hz()?;
@@ -35,7 +40,8 @@ fn beginnings(case: &Case, recordings: &[Recording]) -> Option<[Vec<Recording>; 
         .map(|recording| {
             let revolutions_s = revolutions_s(recording)?;
             let samples = |seconds: f64| (seconds * recording.sample_rate_hz).ceil() as usize;
-            // The first part of a cut begins after the transient of the tool's entry, for which `REVOLUTIONS` revolutions are left out.
+            // The first part of a cut begins after the transient of the tool's entry, for which `REVOLUTIONS`
+            // revolutions are left out if the record is long enough.
             let from = samples(revolutions_s);
             let least = samples((PERIODS / lowest_hz).max(revolutions_s));
             let count = (SEARCHED / recordings.len()).max(least);
@@ -48,8 +54,8 @@ fn beginnings(case: &Case, recordings: &[Recording]) -> Option<[Vec<Recording>; 
     ((left as f64) < SHORTENED_SHARE * all as f64).then_some([shortened, rest])
 }
 
-/// Smallest duration of the first part of a recorded cut, in which causes are searched, s; zero for shaker and hammer; `None` for tests
-/// whose recordings are not divided.
+/// Smallest duration of the first part of a recorded cut, in which causes are searched, s; zero for shaker and hammer;
+/// `None` for tests whose recordings are not divided.
 fn revolutions_s(recording: &Recording) -> Option<f64> {
     match (recording.sidecar.kind, &recording.sidecar.cut) {
         (Some(TestKind::Shaker | TestKind::Hammer), _) => Some(0.0),
@@ -60,8 +66,9 @@ fn revolutions_s(recording: &Recording) -> Option<f64> {
     }
 }
 
-/// The answer from the first parts of the records, if it holds for the rest too or leaves the residual unexplained; otherwise `None`, as
-/// for records that are not divided. The second value is a warning if the first parts or the rest cannot be evaluated on their own.
+/// The answer from the first parts of the records, if it holds for the rest of them too or leaves the residual
+/// unexplained; otherwise `None`, as for records that are not divided. The second value is a warning if the first parts
+/// or the rest cannot be compared alone.
 pub(crate) fn concluded(
     case: &Case,
     recordings: &[Recording],
@@ -82,7 +89,8 @@ pub(crate) fn concluded(
     }
 }
 
-/// The answer from the first parts of the records, if it holds for the rest too or leaves the residual unexplained; otherwise `None`.
+/// The answer from the first parts of the records, if it holds for the rest of them too or leaves the residual
+/// unexplained; otherwise `None`.
 ///
 /// # Errors
 /// A first part or a rest cannot be compared alone.
@@ -105,7 +113,7 @@ fn validated(
         searched_s.fold(0.0, f64::max)
     ));
     let extended = match diagnosis.outcome {
-        // More samples cannot make a known cause explain the residual.
+        // The rest of the records is not evaluated: more samples would not make a known cause explain the residual.
         Outcome::Unexplained => return Ok(Some(diagnosis)),
         Outcome::None => case.clone(),
         _ => match diagnosis.extended(case) {
@@ -120,7 +128,7 @@ fn validated(
     {
         return Ok(None);
     }
-    // Nothing was fitted to the rest: all of it is held out.
+    // No parameter of a cause was fitted to the rest of the records: all of it is held out.
     let quality = |nrmse: f64| Quality {
         nrmse_heldout: nrmse,
         nrmse_whole: nrmse,
@@ -137,13 +145,13 @@ fn validated(
     Ok(Some(diagnosis))
 }
 
-/// Residual of a case in records to which nothing is fitted.
+/// Residual of a case in whole records to which no cause is fitted.
 struct Residual {
-    /// Residual energy χ², in units of the noise variance.
+    /// Residual energy χ² of all records, in units of the noise variance.
     energy: f64,
-    /// Number of compared values.
+    /// Number of compared values of all records.
     count: f64,
-    /// Prediction error (NRMSE).
+    /// Prediction error (NRMSE) of the case on the whole records.
     nrmse: f64,
 }
 

@@ -1,7 +1,7 @@
-//! The restoring force that a residual implies, along the axis of its channel.
+//! The restoring force along the axis of a channel that the residual of this channel implies.
 //!
-//! The residual of a response y = H (F − f_r) is y − H F = −H f_r. At frequencies where the residual exceeds its noise, dividing by −H
-//! gives the missing force f_r. In the force domain the residual is f_r itself.
+//! The residual of a response y = H (F − f_r) is y − H F = −H f_r. At frequencies where the residual exceeds its noise,
+//! dividing it by −H gives the missing force f_r. For records compared in force the residual is f_r itself.
 
 use num_complex::Complex64;
 
@@ -12,36 +12,41 @@ use crate::records::domain::Domain;
 use crate::records::record::Record;
 use quietcut_recording::Quantity;
 
-/// Number of frequency bins over which the power of a residual is averaged before it is compared with the noise.
+/// Number of frequency bins over which the power of a channel's residual is averaged before it is compared with the
+/// noise power.
 const SMOOTHED: usize = 9;
 
-/// Duration of the segments over which stiffness and damping of the missing force are fitted, in periods of the lowest natural frequency.
-/// Each segment has one amplitude.
+/// Duration of the segments over which stiffness and damping of the missing force are fitted, in periods of the lowest
+/// natural frequency. Each segment gives one amplitude.
 const PERIODS: f64 = 2.0;
 
-/// Restoring force along one axis that the baseline lacks, with the displacement and velocity on which it depends.
+/// Restoring force along one axis that the baseline lacks, with the displacement and velocity of the tool along this
+/// axis, at the samples of the record.
 #[derive(Clone, Debug)]
 pub struct MissingForce {
-    /// Displacement along the axis, m.
+    /// Displacement of the tool along the axis at each sample, m.
     pub x: Vec<f64>,
-    /// Velocity along the axis, m/s.
+    /// Velocity of the tool along the axis at each sample, m/s.
     pub v: Vec<f64>,
-    /// Missing restoring force, N.
+    /// Missing restoring force at each sample, N.
     pub force_n: Vec<f64>,
-    /// Static stiffness of the baseline along the axis, N/m; 0 without stiffness.
+    /// Static stiffness of the baseline along the axis, N/m: one over the static compliance; 0 if that is not positive.
     pub stiffness: f64,
     /// Number of samples in each segment over which stiffness and damping of the missing force are fitted.
     segment: usize,
 }
 
-/// Stiffness and damping of the missing force in a segment, at its amplitude.
+/// Stiffness and damping of the missing force in one segment of a record, and the displacement amplitude of the
+/// segment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AtAmplitude {
-    /// Displacement amplitude of the segment: largest distance from its mean, m.
+    /// Displacement amplitude of the segment: largest distance of the displacement from its mean over the segment, m.
     pub amplitude_m: f64,
-    /// Stiffness that the missing force adds: the least-squares slope of force over displacement, N/m.
+    /// Stiffness that the missing force adds: the least-squares slope of its force over the displacement in the
+    /// segment, N/m.
     pub stiffness: f64,
-    /// Damping that the missing force adds: the least-squares slope of force over velocity, N s/m.
+    /// Damping that the missing force adds: the least-squares slope of its force over the velocity in the segment, N
+    /// s/m.
     pub damping: f64,
 }
 
@@ -79,7 +84,8 @@ impl MissingForce {
         })
     }
 
-    /// Stiffness and damping of the missing force by segment, without segments of small amplitude.
+    /// Stiffness and damping of the missing force in each segment of the record, without segments whose amplitude is
+    /// small against the largest.
     pub fn at_amplitudes(&self) -> Vec<AtAmplitude> {
         let all: Vec<AtAmplitude> = self
             .x
@@ -108,8 +114,10 @@ impl MissingForce {
     }
 }
 
-/// −residual/receptance along the channel's axis, N, from the bins in the band of the record where the mean residual power
-/// exceeds `MISSING_FORCE_OVER_NOISE` times the noise power; 1 minus the ratio of the latter to the former is the weight of a bin.
+/// Missing force along the channel's axis, N, at the samples of the record: −residual/response per newton, from the
+/// bins in the band of the record where the residual power, averaged over neighbouring bins, exceeds
+/// `MISSING_FORCE_OVER_NOISE` times the noise power. The weight of a bin is 1 minus the ratio of the latter product to
+/// the averaged power.
 fn response_over(record: &Record, channel: &Observed, axis: usize, residual: &[f64]) -> Vec<f64> {
     let grid = &record.grid;
     let spectrum = grid.spectrum(residual);

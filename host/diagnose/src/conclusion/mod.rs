@@ -1,4 +1,5 @@
-//! From the selected candidate model to the answer: parameter estimates, intervals, residual views, gain, effect on the lobes.
+//! From the selected candidate model to the answer: parameter estimates, intervals, residual views, gain, effect on the
+//! lobes.
 
 pub mod answer;
 pub(crate) mod conclude;

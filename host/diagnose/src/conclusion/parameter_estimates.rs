@@ -14,7 +14,8 @@ use crate::fit::regression::{Regression, Subset};
 use crate::records::study::Study;
 use quietcut_model::effects::EffectName;
 
-/// The causes of a candidate model with their estimated parameters.
+/// The causes of a candidate model with their estimated parameters and 90 % intervals. `inflation` is the factor on the
+/// variances for unit-variance noise, `confidence` the confidence in every cause.
 pub(crate) fn parameter_estimates(
     study: &Study<'_>,
     library: &Library,
@@ -86,8 +87,8 @@ pub(crate) fn parameter_estimates(
     all
 }
 
-/// The causes mass, stiffness and damping, all changed by one factor, if that is equivalent to the sensor gain or offset that is the only
-/// cause of `best`; otherwise empty.
+/// The causes mass, stiffness and damping, all changed by one factor, if that explains the records as well as the
+/// sensor gain or sensor offset that is the only cause of `best`; otherwise empty.
 pub(crate) fn by_common_factor(
     study: &Study<'_>,
     library: &Library,
@@ -102,8 +103,8 @@ pub(crate) fn by_common_factor(
     if !of_reading.contains(&library.cause(choice.candidate).effect()) {
         return Vec::new();
     }
-    // For a fair comparison with the common factor on mass, damping and stiffness, χ² of the sensor gain comes from the linear regression
-    // along the measured motion too.
+    // For a fair comparison with the common factor on mass, damping and stiffness, χ² of the sensor gain comes from the
+    // linear regression along the measured motion too.
     let along = match regression.fit(Subset::Whole, &library.columns_of(best)) {
         Some(fit) => fit.left,
         None => best.fit.left,
@@ -120,7 +121,8 @@ pub(crate) fn by_common_factor(
         if (left - along) / inflation > EQUIVALENT {
             continue;
         }
-        // The common factor on mass, damping and stiffness has the same relative standard deviation as the equivalent sensor gain.
+        // The common relative change of mass, damping and stiffness is taken to have the standard deviation of the
+        // fitted coefficient of the equivalent sensor gain.
         let deviation = best.fit.covariance[(0, 0)].max(0.0).sqrt() * inflation.sqrt();
         return library
             .candidates
@@ -134,8 +136,8 @@ pub(crate) fn by_common_factor(
                 let of = |change: f64| cause.parameters(study, &known.location, &[], &[change]);
                 let parameters = of(change)?;
                 let (key, value) = *parameters.first()?;
-                // Each reported parameter is linear in the relative change, so one slope converts the standard deviation of the change into
-                // that of the parameter.
+                // Each reported parameter of mass, stiffness and damping is linear in the relative change, so one slope
+                // converts the standard deviation of the change into that of the parameter.
                 let (_, beyond) = *of(change + 1.0)?.first()?;
                 let scale = beyond - value;
                 let extension = cause.extension(&known.location, &parameters);
@@ -176,15 +178,16 @@ fn figure(value: f64, deviation: f64) -> Figure {
     }
 }
 
-/// The effects of a cause with their parameters at both ends of the 90 % interval along each principal direction of their correlation. A
-/// parameter set that is not physical is replaced by the estimate.
+/// The effects of a cause with their parameters at both ends of the 90 % interval along each principal direction of the
+/// correlation of the fitted parameters `inner`. Parameters that are not physical there are replaced by the estimate.
 fn moved(
     parts_of: &dyn Fn(&[f64]) -> Option<Vec<LocatedEffect>>,
     inner: &[f64],
     covariance: &DMatrix<f64>,
     inflation: f64,
 ) -> Vec<[Vec<LocatedEffect>; 2]> {
-    // The principal directions are those of the correlation matrix, because the coefficients have different units.
+    // The principal directions are those of the correlation matrix, not of the covariance, because the fitted
+    // parameters have different units.
     let scales: Vec<f64> = covariance
         .diagonal()
         .iter()
@@ -219,8 +222,8 @@ fn moved(
         .collect()
 }
 
-/// Standard deviations of the reported parameters `values`, from the covariance of the fitted parameters `inner` and numerical derivatives
-/// of the former by the latter.
+/// Standard deviations of the reported parameters `values`, from the covariance of the fitted parameters `inner` and
+/// numerical derivatives of the former by the latter.
 fn deviations(
     values: &dyn Fn(&[f64]) -> Option<Vec<f64>>,
     inner: &[f64],

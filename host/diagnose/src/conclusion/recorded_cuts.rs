@@ -1,4 +1,4 @@
-//! Recorded cuts as trial cuts. The signal chain of the device determines the outcome of each.
+//! Recorded cuts as trial cuts. The signal chain of the chatter monitor determines the outcome of each.
 
 use crate::criteria::{SAME_FEED, SAME_IMMERSION_DEG};
 use quietcut_core::detector::Verdict;
@@ -8,9 +8,10 @@ use quietcut_model::case::Case;
 use quietcut_recording::{RecordedCut, Recording, Sensed, SpindleSettings, TestKind};
 use quietcut_stability::trial_cuts::{Outcome, TrialCut};
 
-/// The recorded cuts that belong to the chart of a case: with one given speed and depth, and with the immersion and
-/// feed of the case, as far as the sidecar gives these two.
-/// Behind them one warning for each cut whose outcome cannot be determined, with the reason.
+/// The recorded cuts that belong to the stability chart of a case, as trial cuts: those whose sidecar gives one spindle
+/// speed and an axial depth, and whose immersion and feed, if the sidecar gives them, are those of the case. The second
+/// value holds one warning, with the reason, for each cut whose outcome cannot be determined and which therefore counts
+/// as marginal.
 pub fn recorded_cuts(case: &Case, recordings: &[Recording]) -> (Vec<TrialCut>, Vec<String>) {
     let mut warnings = Vec::new();
     let cuts = recordings
@@ -50,11 +51,11 @@ fn is_on_chart(case: &Case, given: &RecordedCut) -> bool {
         )
 }
 
-/// Outcome of a recorded cut: chatter if the device detects it at any time; stable if it reports a stable cut, forced vibration
-/// or runout, and no chatter; marginal otherwise.
+/// Outcome of a recorded cut: chatter if the chatter monitor detects it at any time; stable if the monitor reports a
+/// stable cut, forced vibration or runout, and no chatter; marginal otherwise.
 ///
 /// # Errors
-/// The device cannot evaluate the recording; the error is a sentence.
+/// The chatter monitor cannot evaluate the recording; the error is a sentence.
 fn outcome(recording: &Recording, teeth: Option<usize>) -> Result<Outcome, String> {
     let recorded = recording.sidecar.cut.and_then(|cut| cut.teeth);
     let speed = SpindleSettings {

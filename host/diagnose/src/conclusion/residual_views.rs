@@ -23,7 +23,7 @@ pub struct ResidualView {
     pub channel: String,
     /// Unit of the channel.
     pub unit: &'static str,
-    /// Samples per second.
+    /// Sample rate of the channel, Hz.
     pub rate_hz: f64,
     /// Highest frequency at which the channel is compared, Hz.
     pub highest_hz: f64,
@@ -31,36 +31,37 @@ pub struct ResidualView {
     pub deviation: f64,
     /// Measured samples, in the unit of the channel.
     pub measured: Vec<f64>,
-    /// Measured samples minus those that the baseline (the case file with its extensions) predicts along the measured motion, in the unit
-    /// of the channel.
+    /// Measured samples minus those that the baseline (the case file with its extensions) predicts along the measured
+    /// motion, free decay included, in the unit of the channel.
     pub residual: Vec<f64>,
-    /// Measured samples minus those that the extended case predicts, in the unit of the channel; empty without an extension.
+    /// Measured samples minus those that the extended case predicts, in the unit of the channel; empty without an
+    /// extension.
     pub left: Vec<f64>,
-    /// The restoring force that would explain the residual of the baseline in this channel; `None` for a channel of force if motion is
-    /// compared, or if the channel's axis has no motion.
+    /// The restoring force that would explain the residual of the baseline in this channel; `None` for a channel of
+    /// force if motion is compared, or if the channel's axis has no motion.
     pub missing: Option<MissingForce>,
-    /// The channel and its baseline residual sampled at the tooth passings of a cut; `None` for other tests.
+    /// The channel and its baseline residual, interpolated at the tooth passings of a cut; `None` for other tests.
     pub spindle_motion: Option<SpindleMotionView>,
 }
 
-/// A channel of a cut sampled at the tooth passings.
+/// A channel of a cut and its baseline residual, interpolated at the tooth passings.
 #[derive(Clone, Debug)]
 pub struct SpindleMotionView {
     /// Mean spindle speed, rev/min.
     pub rpm: f64,
     /// Number of teeth of the tool.
     pub teeth: usize,
-    /// For each passage of a tooth through immersion angle 0 (teeth taken as equally pitched): its number, and the measured value of the
-    /// channel at that instant.
+    /// For each passage of a tooth through immersion angle 0 (teeth taken as equally pitched): its number, and the
+    /// measured value of the channel at that instant.
     pub measured: Vec<(u32, f64)>,
-    /// For each passage of a tooth through immersion angle 0 (teeth taken as equally pitched): its number, and the baseline residual of the
-    /// channel at that instant.
+    /// For each passage of a tooth through immersion angle 0 (teeth taken as equally pitched): its number, and the
+    /// baseline residual of the channel at that instant.
     pub residual: Vec<(u32, f64)>,
 }
 
 impl ResidualView {
-    /// Amplitude spectrum of a signal of this channel: (frequency in Hz, amplitude per line), with the lines averaged by power to at most
-    /// `points` points.
+    /// Amplitude spectrum of `samples`, a signal of this channel: (frequency in Hz, amplitude of a sinusoid per
+    /// spectral line, in the unit of the channel). Neighbouring lines are averaged by power to at most `points` points.
     pub fn spectrum(&self, samples: &[f64], points: usize) -> Vec<(f64, f64)> {
         if samples.is_empty() {
             return Vec::new();
@@ -79,7 +80,8 @@ impl ResidualView {
             .collect()
     }
 
-    /// Root mean squares of the measured samples, the residual of the baseline and the residual of the extended case.
+    /// Root mean squares over the whole record, in the unit of the channel: of the measured samples, of the baseline's
+    /// residual, and of the extended case's residual (0 without an extension).
     pub fn sizes(&self) -> [f64; 3] {
         [rms(&self.measured), rms(&self.residual), rms(&self.left)]
     }
@@ -127,7 +129,8 @@ pub(crate) fn residual_views(
     all
 }
 
-/// Residual of each channel after the candidate model `best` and, if motion is compared, after the free decay that fits the rest best.
+/// Residual of each channel of a record after subtracting the contribution of the candidate model `best` and, if motion
+/// is compared, the free decay of the baseline that then fits best.
 fn left_by(study: &Study<'_>, library: &Library, record: &Record, best: &CandidateModel) -> Vec<Vec<f64>> {
     let explained = library.explained(study, record, best);
     let left: Vec<Vec<f64>> = record
@@ -151,7 +154,8 @@ fn left_by(study: &Study<'_>, library: &Library, record: &Record, best: &Candida
         .collect()
 }
 
-/// Instants at which a tooth of a tool with equal pitch passes through the angle 0: number of the passing from 0, and time in samples.
+/// Instants at which a tooth passes through immersion angle 0, the teeth taken as equally pitched: number of the tooth
+/// passing from 0, and time in samples.
 fn passes(record: &Record, cut: &RecordedCut) -> Vec<(u32, f64)> {
     let pitch = TAU / cut.cutter.teeth.len().max(1) as f64;
     let rate_hz = record.grid.rate_hz();
@@ -170,7 +174,7 @@ fn passes(record: &Record, cut: &RecordedCut) -> Vec<(u32, f64)> {
     found
 }
 
-/// Values of `samples` at tooth passings, by linear interpolation, each with the number of its passing.
+/// Values of `samples` at the tooth passings `passes`, by linear interpolation, each with the number of its passing.
 fn strobe(passes: &[(u32, f64)], samples: &[f64]) -> Vec<(u32, f64)> {
     passes
         .iter()

@@ -6,14 +6,15 @@ use crate::conclusion::residual_views::ResidualView;
 use crate::signal::grid::Grid;
 use crate::signal::noise::rms;
 
-/// Largest number of segments of equal length (the last may be shorter) into which a record is divided to find when the residual is
-/// largest.
+/// Largest number of segments of equal length (the last may be shorter) into which a record is divided to find when the
+/// residual energy is largest.
 const SEGMENTS: usize = 40;
-/// Number of spectral lines on each side of the residual's largest line whose energy counts as that of the line.
+/// Number of spectral lines on each side of the residual's largest line whose energy is counted with that of the line.
 const NEAR: usize = 8;
 
-/// Words for the channel whose residual is largest relative to its noise: amplitude, frequency, spindle order and time. The residual is
-/// that of the extended case, or of the baseline if there is no extension.
+/// Words for the channel whose residual is largest relative to its noise: RMS of the residual, its largest spectral
+/// line with the spindle order, and the time of its largest energy. The residual is that of the extended case, or of
+/// the baseline if there is no extension.
 pub(crate) fn describe(views: &[ResidualView]) -> String {
     let worst = views.iter().max_by(|a, b| {
         let beside_noise =
@@ -60,8 +61,9 @@ fn of_channel(view: &ResidualView) -> String {
     )
 }
 
-/// Frequency of the largest spectral line of a residual up to the highest frequency of its view, Hz, and the share of the residual's energy
-/// in the lines near it; `None` for a zero or empty residual.
+/// Frequency, Hz, of the largest spectral line of the residual `samples` up to the highest frequency at which its
+/// channel is compared, and the share of the residual's energy in that line and the [`NEAR`] lines on each side; `None`
+/// for a zero or empty residual.
 fn peak(view: &ResidualView, samples: &[f64]) -> Option<(f64, f64)> {
     if samples.is_empty() {
         return None;
@@ -90,8 +92,8 @@ fn segment_energies(samples: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-/// Share of the residual energy in those segments of a record (a quarter of them) that have the largest measured energy: about a quarter if
-/// the residual does not depend on the amplitude, more if it grows with the amplitude.
+/// Share of the residual energy in those segments of a record (a quarter of them) that have the largest measured
+/// energy: about a quarter if the residual does not depend on the amplitude, more if it grows with the amplitude.
 fn share_at_large_amplitude(energy: &[f64], measured: &[f64]) -> f64 {
     let mut order: Vec<usize> = (0..measured.len().min(energy.len())).collect();
     order.sort_by(|a, b| measured[*b].total_cmp(&measured[*a]));

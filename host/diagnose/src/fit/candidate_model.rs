@@ -7,7 +7,8 @@ use nalgebra::DMatrix;
 use crate::fit::regression::Fit;
 use crate::records::record::Clean;
 
-/// A cause at one location with one set of values of its nonlinear parameters, referred to by indices into the library of candidates.
+/// A cause at one location with one set of values of its nonlinear parameters, referred to by indices into the library
+/// of candidates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub(crate) struct Choice {
     /// Index, in the library, of the candidate: a cause at one location.
@@ -16,27 +17,29 @@ pub(crate) struct Choice {
     pub variant: usize,
 }
 
-/// A set of causes with fitted parameters.
+/// A candidate model: causes at their locations, with fitted parameters.
 #[derive(Clone, Debug)]
 pub(crate) struct CandidateModel {
     /// The causes of this candidate model, each at its location and with one set of nonlinear parameters.
     pub choices: Vec<Choice>,
-    /// The linear fit of all coefficients, in the order of `choices`.
+    /// The linear fit of all coefficients to the residual of the baseline, in the order of `choices`. A
+    /// prediction-error fit overwrites its coefficients and its χ².
     pub fit: Fit,
     /// Number of fitted parameters of the candidate model, nonlinear ones included.
     pub parameter_count: usize,
-    /// Result of the prediction-error fit, if one was made. Coefficients, nonlinear parameters and χ² of the model are then those of this
-    /// fit.
+    /// Result of the prediction-error fit, if one was made. Coefficients, nonlinear parameters and χ² of the model are
+    /// then those of this fit.
     pub simulated: Option<Simulated>,
 }
 
-/// Result of a prediction-error fit.
+/// Result of a prediction-error fit of a candidate model.
 #[derive(Clone, Debug)]
 pub(crate) struct Simulated {
-    /// For each cause of the candidate model: covariance of its coefficients and, after them, of its nonlinear parameters, for
-    /// unit-variance noise.
+    /// For each cause of the candidate model: covariance of its coefficients and, after them, of its nonlinear
+    /// parameters, for unit-variance noise.
     pub covariance: Vec<DMatrix<f64>>,
-    /// For each record: the fitted initial state of the simulation; empty for a start from rest.
+    /// For each record: the fitted initial state of the simulation; empty for a start from rest. No entries in a study
+    /// with a cut.
     pub starts: Vec<Vec<f64>>,
     /// Prediction of the records by the extended case, if a later stage needs it.
     pub reading: Option<Arc<ExtendedPrediction>>,
@@ -45,8 +48,9 @@ pub(crate) struct Simulated {
 /// Prediction of the records by an extended case.
 #[derive(Debug)]
 pub(crate) struct ExtendedPrediction {
-    /// For each record and channel: measured samples minus those that the extended case predicts.
+    /// For each record and channel: measured samples minus those that the extended case predicts, 0 at samples that are
+    /// not compared.
     pub residuals: Vec<Vec<Vec<f64>>>,
-    /// Noise-free samples of the channels.
+    /// Noise-free samples of the channels of each record, as the extended case predicts them.
     pub predicted: Vec<Clean>,
 }

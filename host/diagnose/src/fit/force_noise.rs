@@ -1,13 +1,14 @@
-//! Covariance of the parameters of a nonlinear machine under the noise of force sensors.
+//! Covariance of the fitted parameters of a nonlinear machine under the noise of force sensors.
 //!
-//! The simulation is driven by the measured force f, the machine by f − n. The residual that n causes is whitened with the receptance of
-//! the baseline, S = diag(σ²) + Σ σ_f² h hᴴ (`whitening`). For a machine with a fold near its resonance, or with dry friction, that linear
-//! S is wrong: whether the machine jumps or slips depends on n as much as on the parameters, and the covariance of the fit is far too
-//! small. Let J be the Jacobian in units of the noise and N = JᵀJ: a residual e that n causes shifts the parameters by δ = N⁻¹ Jᵀ e. This
-//! file draws noise n_k, computes e_k = y(f + n_k) − y(f), and subtracts the linear part e'_k = H n_k that N already contains: C = D N⁻¹ D,
-//! D_i² = max(1, 1 + ν/(ν − 2) · mean_k(δ_ki² − δ'_ki²) / (N⁻¹)_ii) with ν ≥ 3 the number of draws that do not diverge. This is a
-//! parametric bootstrap with one Gauss–Newton step (Efron and Tibshirani, An Introduction to the Bootstrap, 1993, ch. 6) and the linear
-//! machine as control variate. Intervals only become wider.
+//! The simulation is driven by the measured force f, the machine by f − n. The residual that n causes is whitened with
+//! the receptance of the baseline, S = diag(σ²) + Σ σ_f² h hᴴ (`whitening`). For a machine with a fold near its
+//! resonance, or with dry friction, that linear S is wrong: whether the machine jumps or slips depends on n as much as
+//! on the parameters, and the covariance of the fit is far too small. Let J be the Jacobian in units of the noise and N
+//! = JᵀJ: a residual e that n causes shifts the parameters by δ = N⁻¹ Jᵀ e. This file draws noise n_k, computes e_k =
+//! y(f + n_k) − y(f), and subtracts the linear part e'_k = H n_k that N already contains: C = D N⁻¹ D, D_i² = max(1,
+//! 1 + ν/(ν − 2) · mean_k(δ_ki² − δ'_ki²) / (N⁻¹)_ii) with ν ≥ 3 the number of draws that do not diverge. This is a
+//! parametric bootstrap with one Gauss–Newton step (Efron and Tibshirani, An Introduction to the Bootstrap, 1993,
+//! ch. 6) and the linear machine as control variate. Intervals only become wider.
 
 use std::ops::Range;
 
@@ -26,24 +27,26 @@ use crate::fit::output_error::{OutputError, projected};
 use crate::fit::segment::{Segment, Subset};
 use crate::fit::unknowns::{FreeParameter, at_bounds, covariance};
 
-/// Least and largest number of draws of force noise. The relative error of a standard deviation from n draws is 1/√(2n): a third for 4
-/// draws, a fifth for 16.
+/// Least and largest number of draws of force noise. The relative error of a standard deviation from n draws is
+/// 1/√(2n): a third for 4 draws, a fifth for 16.
 const DRAWS: [usize; 2] = [4, 16];
-/// Largest total number of samples simulated in all draws of force noise, as long as the smallest number of draws is kept.
+/// Largest total number of samples simulated in all draws of force noise, as long as the smallest number of draws is
+/// kept.
 const SIMULATED: usize = 400_000;
-/// Smallest number of draws of force noise before the test whether more are drawn; they are not if the added variance is below
-/// `LEAST_FORCE_NOISE_VARIANCE`.
+/// Smallest number of draws of force noise before the test whether more are drawn; they are not if the added variance
+/// is below `LEAST_FORCE_NOISE_VARIANCE`.
 const FIRST: usize = 4;
-/// Stream number of the random generator for draws of force noise, so that they differ from the noise of a simulated record with the same
-/// seed.
+/// Stream number of the random generator for draws of force noise, so that they differ from the noise of a simulated
+/// record with the same seed.
 const STREAM: u64 = 0x666f_7263_6573;
 
 /// Forces along the machine's axes, N, at the samples of a record.
 type Forces = [Vec<f64>; 3];
 
 impl OutputError<'_> {
-    /// The candidate model with its covariance widened by force noise; `None` if no prediction-error fit was made, if no force has noise,
-    /// if the extended case is linear, if its simulation fails, or if the widening is insignificant.
+    /// The candidate model with its parameters' covariance widened by the noise of the force sensors; `None` if no
+    /// prediction-error fit was made, if no force has noise, if the extended case is linear, if its simulation fails,
+    /// or if no parameter's variance grows by more than the share `LEAST_FORCE_NOISE_VARIANCE`.
     pub(crate) fn spread(&self, library: &Library, model: &CandidateModel) -> Option<CandidateModel> {
         let simulated = model.simulated.as_ref()?;
         let mut deviations = self
@@ -74,8 +77,8 @@ impl OutputError<'_> {
         at_bounds(&problem, &point, &mut normal, &mut gradient);
         let covariance = covariance(&normal)?;
         let size = problem.slots.len();
-        // δ² − δ'² for each parameter and one draw of force noise: squared parameter shift by that noise minus its linear part. `None` if
-        // the simulation diverges.
+        // δ² − δ'² for each parameter and one draw of force noise: squared parameter shift by that noise minus its
+        // linear part. `None` if the simulation diverges.
         let more_of = |draw: usize| {
             let noise = self.drawn(draw as u64);
             let closed = ClosedLoop::driven_by(self.study, &self.with(&noise));
@@ -107,8 +110,8 @@ impl OutputError<'_> {
             return None;
         }
         drawn.extend(draws(first..most));
-        // The variance comes from few draws of force noise, so the normal distribution becomes Student's t with ν degrees of freedom and
-        // variance ν/(ν − 2).
+        // The added variance comes from few draws of force noise. The normal distribution of the parameters is
+        // therefore replaced by Student's t with ν degrees of freedom, which has the variance ν/(ν − 2).
         let degrees = drawn.iter().flatten().count().max(3) as f64;
         let more = mean(&drawn)? * (degrees / (degrees - 2.0));
         let mut spread = model.clone();
@@ -132,7 +135,7 @@ impl OutputError<'_> {
         Some(spread)
     }
 
-    /// One random draw of the noise of the force sensors, N, for each record.
+    /// Samples of the noise of the force sensors, N, for each record: random draw number `draw`.
     fn drawn(&self, draw: u64) -> Vec<Forces> {
         let mut random = ChaCha8Rng::seed_from_u64(draw);
         random.set_stream(STREAM);
@@ -153,7 +156,7 @@ impl OutputError<'_> {
             .collect()
     }
 
-    /// The measured forces plus `noise`.
+    /// The measured forces of each record plus `noise`, N.
     fn with(&self, noise: &[Forces]) -> Vec<Forces> {
         let records = self.study.records.iter().zip(noise);
         records
@@ -166,7 +169,7 @@ impl OutputError<'_> {
             .collect()
     }
 
-    /// Whitened response of the baseline to the force noise `noise`, by record.
+    /// Whitened response of the channels of the linear baseline to the force noise `noise` in `segments`, by record.
     fn by_baseline(&self, noise: &[Forces], segments: &[&Segment]) -> Vec<Vec<f64>> {
         let records = self.study.records.iter().zip(noise).enumerate();
         records
@@ -184,8 +187,8 @@ impl OutputError<'_> {
     }
 }
 
-/// Mean of the added variance of each parameter over the draws of force noise. A draw whose simulation diverged counts as the elementwise
-/// maximum of the others; `None` if all diverged.
+/// Mean of the added variance of each parameter over the draws of force noise. A draw whose simulation diverged counts
+/// as the elementwise maximum of the others; `None` if all diverged.
 fn mean(drawn: &[Option<DVector<f64>>]) -> Option<DVector<f64>> {
     let largest = drawn.iter().flatten().cloned().reduce(|a, b| a.sup(&b))?;
     let sum: DVector<f64> = drawn.iter().map(|draw| draw.as_ref().unwrap_or(&largest)).sum();
@@ -244,8 +247,9 @@ mod tests {
                 ((k3.value - K3_N_PER_M3) / (0.5 * (high - low))).powi(2)
             })
             .sum();
-        // The errors are in units of the 90 % half-width, 1.645 standard deviations. Their root mean square is 1/1.645 = 0.61 for a normal
-        // distribution, and six draws exceed twice that once in a thousand. Without this file's widening it is three.
+        // The errors are in units of the 90 % half-width, 1.645 standard deviations. Their root mean square is 1/1.645
+        // = 0.61 for a normal distribution, and six draws exceed twice that once in a thousand. Without this file's
+        // widening it is three.
         let scatter = (squares / count).sqrt();
         assert!(scatter < 1.2, "{scatter} half-widths");
     }

@@ -1,4 +1,4 @@
-//! The causes of a study at their locations, with their regression columns.
+//! The library: the causes of a study at their locations, with their regression columns.
 
 use rayon::prelude::*;
 
@@ -20,7 +20,7 @@ pub(crate) struct Candidate {
     pub variants: Vec<(Vec<f64>, Vec<usize>)>,
 }
 
-/// The causes of a study and their candidates.
+/// The causes that a study can contain and their candidates, each a cause at one location.
 pub(crate) struct Library {
     /// All causes, whether they have a location in this study or not.
     pub causes: Vec<Box<dyn Cause>>,
@@ -30,7 +30,8 @@ pub(crate) struct Library {
     pub unexamined: Vec<String>,
 }
 
-/// The effects that change mass, stiffness and damping of the structure. One factor on all three is a factor on its dynamic stiffness.
+/// The effects that change mass, stiffness and damping of the structure. One factor on all three is a factor on its
+/// dynamic stiffness.
 pub(crate) const OF_DYNAMIC_STIFFNESS: [EffectName; 3] =
     [EffectName::Mass, EffectName::Stiffness, EffectName::Damping];
 
@@ -121,8 +122,8 @@ impl Library {
         }
     }
 
-    /// Regression columns of a cause that acts along each of several axes with separate coefficients, from the columns of the single axes;
-    /// `None` at any other location, or if the columns of one axis are missing.
+    /// Regression columns of a cause that acts along each of several axes with separate coefficients, from the columns
+    /// of the single axes; `None` at any other location, or if the columns of one axis are missing.
     fn columns_along_each(
         &self,
         cause: usize,
@@ -144,7 +145,7 @@ impl Library {
         Some(columns)
     }
 
-    /// The cause of a candidate.
+    /// The cause of the candidate with the index `candidate`.
     pub(crate) fn cause(&self, candidate: usize) -> &dyn Cause {
         &*self.causes[self.candidates[candidate].cause]
     }
@@ -160,7 +161,8 @@ impl Library {
             .collect()
     }
 
-    /// Indices of the regression columns that belong to one cause with one set of nonlinear parameters.
+    /// Indices of the regression columns of one cause at one location with one set of nonlinear parameters, one for
+    /// each coefficient.
     pub(crate) fn columns(&self, choice: Choice) -> &[usize] {
         &self.candidates[choice.candidate].variants[choice.variant].1
     }
@@ -187,8 +189,8 @@ impl Library {
         self.parameters(study, &model).map(|_| model)
     }
 
-    /// Number of fitted parameters of one cause of a candidate model. Nonlinear parameters that follow from the coefficients
-    /// ([`Cause::settled`]) do not count.
+    /// Number of fitted parameters of one cause of a candidate model. Nonlinear parameters that follow from the
+    /// coefficients ([`Cause::settled`]) do not count.
     pub(crate) fn parameter_count(&self, choice: Choice) -> usize {
         let (nonlinear_parameters, columns) = &self.candidates[choice.candidate].variants[choice.variant];
         let settles = self
@@ -217,7 +219,8 @@ impl Library {
         model.fit.coefficients[from..from + self.columns(model.choices[position]).len()].to_vec()
     }
 
-    /// Contribution of a candidate model to the residual of each channel of a record.
+    /// Contribution of a candidate model to the residual of each channel of a record, along the measured motion:
+    /// samples in the unit of the channel.
     pub(crate) fn explained(
         &self,
         study: &Study<'_>,
@@ -242,8 +245,8 @@ impl Library {
         sum
     }
 
-    /// χ² of a candidate model on the held-out segments, with coefficients fitted to the fitted segments; χ² of the baseline if that fit is
-    /// not possible.
+    /// χ² of a candidate model on the held-out segments, with coefficients fitted to the fitted segments; χ² of the
+    /// baseline if that fit is not possible.
     pub(crate) fn left_held_out(&self, regression: &Regression, model: &CandidateModel) -> f64 {
         let columns = self.columns_of(model);
         match regression.fit(Subset::Fitted, &columns) {
@@ -252,7 +255,7 @@ impl Library {
         }
     }
 
-    /// Parameters of every cause of a candidate model; `None` if one is not physical.
+    /// Parameters by key of every cause of a candidate model; `None` if the parameters of one cause are not physical.
     pub(crate) fn parameters(
         &self,
         study: &Study<'_>,
@@ -293,8 +296,9 @@ impl Library {
         Some(parts.map(|part| (part.name, part.extension)).collect())
     }
 
-    /// For each cause of the candidate model: indices of the regression columns that hold derivatives with respect to its nonlinear
-    /// parameters; none if there are no such parameters, if they follow from the coefficients, or if a derivative cannot be computed.
+    /// For each cause of the candidate model: indices of the regression columns that hold derivatives with respect to
+    /// its nonlinear parameters; none if there are no such parameters, if they follow from the coefficients, or if a
+    /// derivative cannot be computed.
     pub(crate) fn slopes_of(
         &self,
         study: &Study<'_>,
@@ -318,8 +322,9 @@ impl Library {
             .collect()
     }
 
-    /// Adds regression columns with the derivatives of a cause's contribution with respect to its nonlinear parameters, by finite
-    /// differences (central, one-sided at a bound), and returns their indices; `None` if they cannot be computed.
+    /// Adds regression columns with the derivatives of a cause's contribution with respect to its nonlinear parameters,
+    /// by finite differences (central, one-sided at a bound), and returns their indices; `None` if they cannot be
+    /// computed.
     pub(crate) fn slopes(
         &self,
         study: &Study<'_>,
@@ -370,8 +375,8 @@ impl Library {
             .collect()
     }
 
-    /// χ² of a linear fit that changes mass, stiffness and damping at `location` by one common relative change, and that change; `None` if
-    /// the library lacks one of the three there, or if the change has no effect.
+    /// χ² of a linear fit that changes mass, stiffness and damping at `location` by one common relative change, and
+    /// that change; `None` if the library lacks one of the three there, or if the change has no effect.
     pub(crate) fn common_factor(&self, regression: &Regression, location: &Location) -> Option<(f64, f64)> {
         let columns: Vec<usize> = OF_DYNAMIC_STIFFNESS
             .iter()
@@ -395,7 +400,8 @@ impl Library {
         Some((at(best), best))
     }
 
-    /// Adds further sets of nonlinear parameters to all candidates: those that the residual `left` of a candidate model suggests.
+    /// Adds further sets of nonlinear parameters to all candidates: those that the residual `left` of a candidate model
+    /// suggests.
     pub(crate) fn add_variants_beside(
         &mut self,
         study: &Study<'_>,
@@ -410,8 +416,8 @@ impl Library {
         }
     }
 
-    /// Adds a set of values of a candidate's nonlinear parameters with its regression columns, unless the candidate has it already; `None`
-    /// if its regressors cannot be computed.
+    /// The choice of a candidate with a set of values of its nonlinear parameters. The set and its regression columns
+    /// are added, unless the candidate has the set already; `None` if its regressors cannot be computed.
     pub(crate) fn add_variant(
         &mut self,
         study: &Study<'_>,
@@ -447,7 +453,8 @@ impl Library {
     }
 }
 
-/// Regressors of a cause by coefficient, record, channel and sample, or the reason why they cannot be computed or are not finite.
+/// Regressors of a cause by coefficient, record, channel and sample, or the reason why they cannot be computed or are
+/// not finite.
 fn columns(
     study: &Study<'_>,
     cause: &dyn Cause,

@@ -2,22 +2,24 @@
 
 use nalgebra::DMatrix;
 
-/// Values of each column in one block of a matrix product: 8 KiB per column, so that the block of some hundred columns stays in the cache.
+/// Values of each column in one block of a matrix product: 8 KiB per column, so that the block of some hundred columns
+/// stays in the cache.
 const BLOCK: usize = 1024;
 
-/// Inner products of the regression columns, over one subset of the records' segments.
+/// Inner products of the whitened regression columns, over one subset of the records' segments.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Products {
-    /// Lower triangle, row by row, of the Gram matrix: inner products between those regression columns that the last call of
-    /// [`Self::complete`] has included.
+    /// Lower triangle, row by row, of the Gram matrix: inner products between those regression columns that the last
+    /// call of [`Self::complete`] has included.
     gram: Vec<Vec<f64>>,
-    /// Squared length of every column.
+    /// Squared length of every regression column over the subset.
     squares: Vec<f64>,
     /// Inner product of every regression column with the baseline's residual.
     pub(crate) with_residual: Vec<f64>,
-    /// Squared length of the residual.
+    /// Squared length of the baseline's residual over the subset: its χ².
     pub(crate) residual: f64,
-    /// Number of values of the subset, minus the skipped samples and one for each projected free decay or sensor offset.
+    /// Number of values of the subset, minus the skipped samples and one for each projected free decay or sensor
+    /// offset.
     pub(crate) count: usize,
 }
 
@@ -28,7 +30,8 @@ impl Products {
         self.with_residual.push(with_residual);
     }
 
-    /// Adds the inner products of new regression columns with all columns up to themselves: one row of `rows` for each new column.
+    /// Adds the inner products of new regression columns with all columns up to themselves: one row of `rows` for each
+    /// new column.
     pub(crate) fn complete(&mut self, rows: &DMatrix<f64>) {
         for row in rows.row_iter() {
             let until = self.gram.len() + 1;
@@ -36,7 +39,7 @@ impl Products {
         }
     }
 
-    /// Squared length of a column.
+    /// Squared length of a regression column over the subset.
     pub(crate) fn square(&self, column: usize) -> f64 {
         self.squares[column]
     }
@@ -52,8 +55,8 @@ impl Products {
 
 /// Inner products of the regression columns from index `first` on with all `columns`, one row for each.
 ///
-/// The cost is 2·(new columns)·(columns)·(samples) flops. Products of blocks stay in the cache, whereas single inner products would be
-/// limited by memory.
+/// The cost is 2·(new columns)·(columns)·(samples) flops. Products of blocks stay in the cache, whereas single inner
+/// products would be limited by memory.
 pub(crate) fn products(columns: &[&[f64]], first: usize) -> DMatrix<f64> {
     let (size, length) = (columns.len(), columns.first().map_or(0, |column| column.len()));
     let mut sum = DMatrix::zeros(size - first, size);

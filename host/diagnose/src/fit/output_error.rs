@@ -1,10 +1,11 @@
-//! Residuals of simulated candidate models, and their Jacobian (output error).
+//! Residuals of simulated candidate models, and the Jacobian of the simulated samples (output error).
 //!
-//! Regression along the measured motion is biased by the noise in that motion and by aliasing. A simulation does not use that motion: with
-//! r(θ) = y − y_simulated(θ) in units of the noise, Σ r² is minimal at the most likely θ (Ljung, System Identification, 1999, chapter 7).
-//! The Jacobian is computed by finite differences. The unknown initial state of a free decay is fitted with the parameters. If the start
-//! values fit the whole records much worse than the regression does, they are first improved on the beginning of each record, unless the
-//! regression is far behind that of the best candidate model.
+//! Regression along the measured motion is biased by the noise in that motion and by aliasing. A simulation does not
+//! use that motion: with r(θ) = y − y_simulated(θ) in units of the noise, Σ r² is minimal at the most likely θ (Ljung,
+//! System Identification, 1999, chapter 7). The Jacobian is computed by finite differences. The unknown initial state
+//! of a free decay is fitted with the parameters. If a simulation with the start values fits the whole records much
+//! worse than the linear regression does, the start values are first improved on the beginning of each record, unless
+//! the regression is far behind that of the best candidate model.
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -19,30 +20,32 @@ use crate::records::study::Study;
 use crate::signal::dot::dot;
 use quietcut_simulate::Effects;
 
-/// Shares of each record, from its beginning, on which a poor start value is fitted first, one after the other.
+/// Shares of each record, from its beginning, on which poor start values of the parameters are fitted first, one share
+/// after the other.
 const HORIZONS: [f64; 2] = [0.12, 0.35];
 
-/// Smallest step of the finite difference by which a simulated response is differentiated, relative to the parameter. Smaller steps drown
-/// in the rounding errors of the integration.
+/// Smallest step of the finite difference by which a simulated response is differentiated by a parameter or an initial
+/// state, relative to its value. Smaller steps drown in the rounding errors of the integration.
 pub(crate) const LEAST_STEP: f64 = 1e-7;
 
-/// Smallest step of the finite difference by which a simulated response with dry friction is differentiated, relative to the parameter.
-/// Accelerations jump when friction slips or sticks, and the time of a jump changes by whole samples: a step must shift it by many samples.
+/// Smallest step of the finite difference by which a simulated response with dry friction is differentiated by a
+/// parameter of a cause, relative to the parameter. Accelerations jump when friction slips or sticks, and the time of a
+/// jump changes by whole samples: a step must shift it by many samples.
 const LEAST_STEP_OF_FRICTION: f64 = 3e-3;
 
 /// Compares simulations of candidate models with the records of a study.
 pub(crate) struct OutputError<'a> {
     pub(crate) study: &'a Study<'a>,
     pub(crate) closed: ClosedLoop,
-    /// Fitted, held-out and whole segments of all records, in the order of the records.
+    /// Whole, fitted and held-out segments of all records, in the order of the records.
     segments: Vec<Segment>,
     pub(crate) horizons: Vec<Vec<Segment>>,
     /// True if every record of the study is a free decay.
     pub(crate) is_free_decay: bool,
 }
 
-/// One column of the Jacobian of a simulation, in one record: index of the record, index of the free parameter, and the derivatives of the
-/// whitened samples.
+/// One column of the Jacobian of a simulation, in one record: index of the record, index of the free parameter, and the
+/// derivatives of the whitened samples.
 pub(crate) type Column = (usize, usize, Vec<f64>);
 
 /// Jᵀ r, the product of the Jacobian's columns with the residuals, for `size` free parameters.
@@ -58,7 +61,8 @@ impl<'a> OutputError<'a> {
     /// Prepares the simulations of a study; `None` if one of its records cannot be simulated.
     pub(crate) fn new(study: &'a Study<'a>) -> Option<Self> {
         let closed = ClosedLoop::new(study)?;
-        // The unknown initial state of a free decay is fitted with the parameters, so only sensor offsets are projected out there.
+        // The unknown initial state of a free decay is fitted with the parameters, so only sensor offsets are projected
+        // out there.
         let nuisance = |record: &crate::records::record::Record| {
             if starts_anywhere(record) {
                 Nuisance::Offsets
@@ -91,8 +95,8 @@ impl<'a> OutputError<'a> {
             .collect()
     }
 
-    /// Whitened difference between measured and simulated samples of one record, in some of its segments, under the forces of the closed
-    /// loop `closed`.
+    /// Whitened difference between the measured samples of one record and those of its simulation under the forces of
+    /// `closed`, in those of the `segments` that belong to the record; `None` if the simulation fails.
     fn residual(
         &self,
         closed: &ClosedLoop,
@@ -131,7 +135,8 @@ impl<'a> OutputError<'a> {
         self.residuals_by(&self.closed, problem, segments, point)
     }
 
-    /// The same residuals as [`Self::residuals`], but simulated with the forces of the closed loop `closed` instead of the measured forces.
+    /// The same residuals as [`Self::residuals`], but simulated with the forces of `closed` instead of the measured
+    /// forces.
     pub(crate) fn residuals_by(
         &self,
         closed: &ClosedLoop,
@@ -146,8 +151,8 @@ impl<'a> OutputError<'a> {
             .collect()
     }
 
-    /// Columns of the Jacobian J = ∂y_simulated/∂θ of the simulated samples by finite differences, record after record. `left` is the
-    /// residual at the parameter values `point`.
+    /// Columns of the Jacobian J = ∂y_simulated/∂θ of the simulated samples by finite differences, record after record.
+    /// `left` is the residual at the parameter values `point`.
     pub(crate) fn columns(
         &self,
         problem: &FitProblem<'_>,
@@ -159,7 +164,7 @@ impl<'a> OutputError<'a> {
             .slots
             .iter()
             .map(|(slot, step)| {
-                // If the step leaves the physical range, the opposite step is taken.
+                // If the step of a parameter leads to values that are not physical, the opposite step is taken.
                 [*step, -step].into_iter().find_map(|step| {
                     let mut moved = point.clone();
                     *slot.of(&mut moved) += step;
@@ -186,8 +191,8 @@ impl<'a> OutputError<'a> {
             .collect()
     }
 
-    /// Computes Jᵀ J and Jᵀ r of the simulated candidate model from the Jacobian's `columns`, and adapts the steps of the finite
-    /// differences so that, within limits, each step changes χ² by about one near its minimum.
+    /// Computes Jᵀ J and Jᵀ r of the simulated candidate model from the Jacobian's `columns`, and adapts the steps of
+    /// the finite differences so that, within limits, each step changes χ² by about one near its minimum.
     pub(crate) fn normal(
         &self,
         problem: &mut FitProblem<'_>,
@@ -234,8 +239,8 @@ impl<'a> OutputError<'a> {
         (normal, gradient)
     }
 
-    /// The free parameters of a candidate model and their start values from its linear regression; `None` if these are not physical or
-    /// cannot be simulated.
+    /// The free parameters of a candidate model and their start values from its linear regression; `None` if the start
+    /// values are not physical or cannot be simulated.
     pub(crate) fn problem<'b>(
         &self,
         library: &'b Library,
@@ -310,7 +315,8 @@ impl<'a> OutputError<'a> {
         Some((problem, point))
     }
 
-    /// Initial state of the baseline in a record, fitted to the residual of the candidate model.
+    /// Initial state of the baseline in a record, whose free decay best fits the measured samples minus the baseline's
+    /// forced response and the candidate model's contribution.
     fn state_at_start(&self, library: &Library, model: &CandidateModel, index: usize) -> Vec<f64> {
         let record = &self.study.records[index];
         let explained = library.explained(self.study, record, model);

@@ -127,7 +127,8 @@ impl ClosedFit for OutputError<'_> {
         point.starts.clone_from(&simulated.starts);
         let fitted = self.of_subset(Subset::Fitted);
         let found = self.search(&mut problem, &fitted, point, 4, f64::INFINITY)?;
-        // The initial states of held-out records have no influence on the fitted segments, and are fitted to the held-out segments here.
+        // The initial states of held-out records have no influence on the fitted segments, and are fitted to the
+        // held-out segments here.
         let held_out = self.of_subset(Subset::HeldOut);
         let only_here = |slot: &FreeParameter| match slot {
             FreeParameter::Start { record, .. } => !fitted.iter().any(|segment| segment.record == *record),

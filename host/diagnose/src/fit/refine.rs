@@ -1,4 +1,4 @@
-//! Refines nonlinear parameters between the points of their start grid.
+//! Refines the nonlinear parameters of candidate models between the points of their start grid.
 
 use crate::criteria::{LEAST_REFINEMENT, REFINED_SHARE};
 use crate::fit::candidate_model::CandidateModel;
@@ -9,7 +9,8 @@ use crate::records::study::Study;
 /// Largest number of candidate models whose nonlinear parameters are refined.
 const REFINED: usize = 3;
 
-/// Refines the nonlinear parameters of the best candidate models.
+/// Refines the nonlinear parameters of the best candidate models: the first `REFINED` of `found` that reduce χ² by more
+/// than the share `REFINED_SHARE` of the reduction by the very first. Sorts `found` by χ² at the end.
 pub(crate) fn refine(
     study: &Study<'_>,
     library: &mut Library,
@@ -57,12 +58,12 @@ fn one(
     }
 }
 
-/// Largest number of fixed-point iterations of nonlinear parameters that follow from the coefficients. The iteration converges slowly if
-/// teeth lose contact.
+/// Largest number of fixed-point iterations of those nonlinear parameters of a cause that follow from the fitted
+/// coefficients. The iteration converges slowly if teeth lose contact.
 const FIXED_POINT_ITERATIONS: usize = 12;
 
-/// Iterates to their fixed point those nonlinear parameters that follow from the fitted coefficients. If the whole step does not decrease
-/// χ², half a step is tried.
+/// Iterates to their fixed point those nonlinear parameters that follow from the fitted coefficients. If the whole step
+/// to the new values does not decrease χ², half a step is tried.
 fn settle(
     study: &Study<'_>,
     library: &mut Library,
@@ -99,8 +100,8 @@ fn settle(
             with_nonlinear_parameters(study, library, regression, &model, position, next.collect())
                 .filter(|better| better.fit.left < model.fit.left)
         });
-        // If no step decreases χ², the whole step is taken: the regressors are exact only at the fixed point, so that a smaller χ²
-        // elsewhere does not count.
+        // If no step decreases χ², the whole step is taken: the regressors are exact only at the fixed point, so that a
+        // smaller χ² elsewhere does not count.
         let better =
             better.or_else(|| with_nonlinear_parameters(study, library, regression, &model, position, asked));
         let Some(better) = better else {
@@ -111,10 +112,12 @@ fn settle(
     model
 }
 
-/// Largest number of Gauss–Newton steps by which a cause's nonlinear parameters are refined after the search by decreasing steps.
+/// Largest number of Gauss–Newton steps by which a cause's nonlinear parameters are refined after the search by
+/// decreasing steps.
 const GAUSS_NEWTON_STEPS: usize = 3;
 
-/// Searches each nonlinear parameter in turn with decreasing steps, then takes Gauss–Newton steps.
+/// Searches each nonlinear parameter of the cause at `position` in turn with decreasing steps, then takes Gauss–Newton
+/// steps in all of them.
 fn search(
     study: &Study<'_>,
     library: &mut Library,
@@ -138,7 +141,8 @@ fn search(
             for sign in [1.0, -1.0] {
                 let mut moved = nonlinear_parameters.clone();
                 let step = sign * steps[parameter];
-                // A nonlinear parameter with a positive lower bound is changed by a factor, any other by a share of its range.
+                // A nonlinear parameter with a positive lower bound is changed by a factor, any other by a share of its
+                // range.
                 moved[parameter] = if low > 0.0 {
                     nonlinear_parameters[parameter] * (1.0 + step)
                 } else {
@@ -168,8 +172,8 @@ fn search(
     model
 }
 
-/// One Gauss–Newton step in the nonlinear parameters; `None` if it cannot be computed, or does not decrease χ² by more than
-/// `LEAST_REFINEMENT`.
+/// One Gauss–Newton step in the nonlinear parameters of the cause at `position`; `None` if it cannot be computed, or
+/// does not decrease χ² by more than `LEAST_REFINEMENT`.
 fn along_slopes(
     study: &Study<'_>,
     library: &mut Library,

@@ -1,7 +1,8 @@
 //! Linear least squares of regressors in units of the noise, with free decays and sensor offsets projected out.
 //!
-//! Every record is one segment as a whole, and is also divided into fitted and held-out segments. Residual and regressors of each segment
-//! are whitened. Their inner products (Gram matrices) then give the fit of any set of regressors.
+//! Every record is one segment as a whole, and is also divided into fitted and held-out segments. Residual and
+//! regressors of each segment are whitened. Their inner products (Gram matrices) then give the fit of any set of
+//! regressors.
 
 use nalgebra::{DMatrix, DVector};
 use quietcut_numerics::least_squares::{Idle, NormalEquations};
@@ -14,32 +15,34 @@ use crate::fit::segment::{Nuisance, Segment, split};
 use crate::records::study::Study;
 use crate::signal::dot::dot;
 
-/// Ridge added to the unit diagonal of the scaled normal equations with all regression columns of the library, which are nearly dependent.
+/// Ridge added to the unit diagonal of the scaled normal equations with all regression columns of the library, which
+/// are nearly dependent.
 const SOFTENED: f64 = 1e-9;
 
-/// Ridge added to the unit diagonal of the scaled normal equations of one fit: the rounding error. For cuts, whose regression columns are
-/// less accurate, the square of their relative error replaces it.
+/// Ridge added to the unit diagonal of the scaled normal equations of a fit of few regression columns: the rounding
+/// error. In a study with a cut, whose columns are less accurate, the square of their relative error replaces it.
 const ROUNDING: f64 = 1e-13;
 
 /// Result of a linear fit of some regression columns to the residual of the baseline.
 #[derive(Clone, Debug)]
 pub(crate) struct Fit {
-    /// The coefficients.
+    /// The coefficients of the regression columns, in the order of the columns.
     pub coefficients: Vec<f64>,
     /// Covariance of the fitted coefficients for unit-variance noise.
     pub covariance: DMatrix<f64>,
-    /// χ² of the fit: residual sum of squares in units of the noise. A prediction-error fit overwrites it and the coefficients.
+    /// χ² of the fit: residual sum of squares in units of the noise. A prediction-error fit overwrites it and the
+    /// coefficients.
     pub left: f64,
 }
 
 /// Result of a linear fit of some regression columns to the residual of a candidate model.
 #[derive(Clone, Debug)]
 pub(crate) struct Refit {
-    /// Change of the columns' coefficients.
+    /// Change of the coefficients of the regression columns.
     pub change: Vec<f64>,
-    /// χ² before the change.
+    /// χ² of the candidate model before the change of its coefficients.
     pub before: f64,
-    /// Decrease of χ² by the changed coefficients, against the candidate model before the refit.
+    /// Decrease of χ² by the changed coefficients that the linear fit predicts.
     pub taken: f64,
 }
 
@@ -49,7 +52,8 @@ pub(crate) struct Regression {
     /// Whitened regression columns: by column and segment, the values of the whitened segment.
     columns: Vec<Vec<Vec<f64>>>,
     residuals: Vec<Vec<f64>>,
-    /// Inner products of the regression columns over the fitted segments, over the held-out segments and over the whole records.
+    /// Inner products of the regression columns over the fitted segments, over the held-out segments and over the whole
+    /// records.
     products: [Products; 3],
     /// Number of regression columns, from the first, whose inner products with each other are computed.
     complete: usize,
@@ -85,8 +89,8 @@ impl Regression {
         regression
     }
 
-    /// Recomputes the inner products of each regression column with itself and with the baseline's residual, and discards those between
-    /// columns.
+    /// Recomputes χ² of the baseline and the inner products of each regression column with itself and with the
+    /// baseline's residual, and discards those between columns.
     fn sum(&mut self) {
         self.products = std::array::from_fn(|_| Products::default());
         self.complete = 0;
@@ -113,11 +117,12 @@ impl Regression {
         }
     }
 
-    /// Multiplies the noise variance of each record by its χ² per degree of freedom over the smallest one of all records (feasible GLS). It
-    /// is χ² after a fit of all columns to the record alone; a value below 1 counts as 1.
+    /// Multiplies the noise variance of each record by its χ² per degree of freedom over the smallest one of all
+    /// records (feasible GLS). This χ² is that of the record after a fit of all regression columns to the record alone;
+    /// a value below 1 per degree of freedom counts as 1.
     ///
-    /// In the force domain the residual contains errors of the equations, which differ between records. Without rescaling, least squares
-    /// would fit mainly the record that the equations describe worst.
+    /// In the force domain the residual contains errors of the equations, which differ between records. Without
+    /// rescaling, least squares would fit mainly the record that the equations describe worst.
     pub(crate) fn level_records(&mut self) {
         let records = self
             .segments
@@ -163,8 +168,8 @@ impl Regression {
         }
     }
 
-    /// Energy Σ (y/σ)² of the measured samples y of all records, σ being the standard deviation of their noise; free decays and sensor
-    /// offsets are projected out.
+    /// Energy Σ (y/σ)² of the measured samples y of all records, σ being the standard deviation of their noise; free
+    /// decays and sensor offsets are projected out.
     pub(crate) fn signal(&self, study: &Study<'_>) -> f64 {
         let of_segment = |segment: &Segment| {
             let channels = study.records[segment.record].channels.iter();
@@ -179,8 +184,8 @@ impl Regression {
         whole.map(of_segment).sum()
     }
 
-    /// Adds a regressor, given as samples by record and channel, as a regression column and returns the index of that column. Its inner
-    /// products with other columns are computed on demand until [`Self::complete`].
+    /// Adds a regressor, given as samples by record and channel, as a regression column and returns the index of that
+    /// column. Its inner products with other columns are computed on demand until [`Self::complete`].
     pub(crate) fn add(&mut self, samples: &[Vec<Vec<f64>>]) -> usize {
         let column: Vec<Vec<f64>> = self
             .segments
@@ -192,7 +197,8 @@ impl Regression {
         self.columns.len() - 1
     }
 
-    /// Computes all missing inner products of the regression columns at once. It is called before many sets of columns are fitted.
+    /// Computes all missing inner products of the regression columns at once. It is called before many sets of columns
+    /// are fitted.
     pub(crate) fn complete(&mut self) {
         let (first, size) = (self.complete, self.columns.len());
         if first == size {
@@ -215,8 +221,8 @@ impl Regression {
         self.complete = size;
     }
 
-    /// Euclidean length of a whitened regression column over a subset of segments: standard deviations of noise per unit of the
-    /// coefficient.
+    /// Euclidean length of a whitened regression column over a subset of segments: standard deviations of noise per
+    /// unit of the coefficient.
     pub(crate) fn length(&self, subset: Subset, column: usize) -> f64 {
         self.products(subset).square(column).sqrt()
     }
@@ -244,13 +250,14 @@ impl Regression {
         self.products(subset).residual
     }
 
-    /// Number of values over a subset of segments, minus the skipped samples and one for each projected free decay or sensor offset.
+    /// Number of values over a subset of segments, minus the skipped samples and one for each projected free decay or
+    /// sensor offset.
     pub(crate) fn count(&self, subset: Subset) -> usize {
         self.products(subset).count
     }
 
-    /// Prediction error (NRMSE) of the baseline on a subset, relative to the mean square of each channel over its whole record; each
-    /// channel of each segment has equal weight.
+    /// Prediction error (NRMSE) of the baseline on a subset, relative to the mean square of each channel over its whole
+    /// record; the squares are averaged over all channels of all segments with equal weight.
     pub(crate) fn nrmse(&self, study: &Study<'_>, subset: Subset) -> f64 {
         let (mut sum, mut count) = (0.0_f64, 0.0_f64);
         for segment in self.segments.iter().filter(|segment| segment.subset == subset) {
@@ -266,19 +273,19 @@ impl Regression {
         if count > 0.0 { f64::sqrt(sum / count) } else { 0.0 }
     }
 
-    /// Number of columns.
+    /// Number of regression columns.
     pub(crate) fn columns(&self) -> usize {
         self.columns.len()
     }
 
-    /// Linear fit of the regression columns `columns` to the baseline's residual on a subset of segments; `None` if the columns are
-    /// dependent or zero.
+    /// Linear fit of the regression columns `columns` to the baseline's residual on a subset of segments; `None` if the
+    /// columns are dependent or zero.
     pub(crate) fn fit(&self, subset: Subset, columns: &[usize]) -> Option<Fit> {
         self.solve(subset, columns, self.ridge)
     }
 
-    /// Coefficients with which the regression columns `columns` fit the regression column `target`, and the energy of `target` that they
-    /// explain; `None` if the columns are dependent or zero.
+    /// Coefficients with which the regression columns `columns` fit the regression column `target`, and the squared
+    /// length of `target` that they explain; `None` if the columns are dependent or zero.
     pub(crate) fn fit_column(
         &self,
         subset: Subset,
@@ -294,8 +301,8 @@ impl Regression {
         Some((solution, taken))
     }
 
-    /// The change of the coefficients of the regression columns `columns` that fits `residuals`, given by record and channel; `None` if the
-    /// columns are dependent or zero.
+    /// The change of the coefficients of the regression columns `columns` that fits `residuals`, given by record and
+    /// channel; `None` if the columns are dependent or zero.
     pub(crate) fn refit(
         &self,
         subset: Subset,
@@ -325,7 +332,8 @@ impl Regression {
         })
     }
 
-    /// χ² of `residuals`, given by record and channel, after subtracting the regression columns `columns` times these `coefficients`.
+    /// χ² of `residuals`, given by record and channel, after subtracting the regression columns `columns` times these
+    /// `coefficients`.
     pub(crate) fn left_with(
         &self,
         subset: Subset,
@@ -345,8 +353,9 @@ impl Regression {
         sum
     }
 
-    /// Covariance of a fit whose residual is not unit-variance noise, but an error of the equations with an unknown spectrum: (XᵀX)⁻¹ Xᵀ
-    /// diag(r²/(1 − h)²) X (XᵀX)⁻¹ with h = diag(X (XᵀX)⁻¹ Xᵀ). The values of the spectrum are taken as independent of each other (HC3 of
+    /// Covariance of the coefficients of a fit whose residual is not unit-variance noise, but an error of the equations
+    /// with an unknown spectrum: (XᵀX)⁻¹ Xᵀ diag(r²/(1 − h)²) X (XᵀX)⁻¹ with the regression columns X, the residual r
+    /// of the fit and h = diag(X (XᵀX)⁻¹ Xᵀ). The values of the spectrum are taken as independent of each other (HC3 of
     /// MacKinnon and White, 1985).
     pub(crate) fn covariance_by_residual(
         &self,
@@ -409,8 +418,8 @@ impl Regression {
         })
     }
 
-    /// Solution and inverse of the normal equations of the regression columns `columns`, with the right side `right` in the same order;
-    /// `None` if the columns are dependent or zero.
+    /// Solution and inverse of the normal equations of the regression columns `columns`, with the right side `right` in
+    /// the same order; `None` if the columns are dependent or zero.
     fn normal(
         &self,
         subset: Subset,
@@ -432,7 +441,8 @@ impl Regression {
         Some((solution.as_slice().to_vec(), equations.inverse()))
     }
 
-    /// χ² of the baseline's residual on a subset of segments after subtracting the regression columns `columns` times these `coefficients`.
+    /// χ² of the baseline's residual on a subset of segments after subtracting the regression columns `columns` times
+    /// these `coefficients`.
     pub(crate) fn left(&self, subset: Subset, columns: &[usize], coefficients: &[f64]) -> f64 {
         let products = self.products(subset);
         let mut left = products.residual;

@@ -1,5 +1,5 @@
-//! Restarts a prediction-error search that is stuck: with friction near the point where it ended, for free decays from multiples of the
-//! start values.
+//! Restarts a prediction-error search that is stuck: with dry friction near the parameter values at which it ended, for
+//! free decays from multiples of the start values of the parameters.
 
 use crate::criteria::{SEARCH_SETTLED, STUCK};
 use crate::fit::output_error::{LEAST_STEP, OutputError};
@@ -7,14 +7,14 @@ use crate::fit::search::ROUNDS;
 use crate::fit::segment::Segment;
 use crate::fit::unknowns::{FitProblem, FreeParameter, ParameterPoint, SearchResult, energy};
 
-/// Relative changes of one parameter, up and down from its value at the end of a search with friction. The search restarts from the change
-/// with the smallest χ².
+/// Relative changes of one parameter, up and down from its value at the end of a search with dry friction. The search
+/// restarts from the change with the smallest χ².
 const NEARBY: [f64; 6] = [5e-4, 1e-3, 2e-3, 4e-3, 8e-3, 0.016];
-/// Factors on the start value of each parameter of a single cause, from which the fit of free decays restarts; two parameters take every
-/// pair of factors.
+/// Factors on the start value of each parameter of a single cause, from which the search for free decays restarts; two
+/// parameters take every pair of factors.
 const SIZES: [f64; 6] = [0.1, 0.25, 0.5, 1.0, 2.0, 4.0];
-/// Largest number of parameters with which a search restarts from multiples of the start values: the number of restarts grows exponentially
-/// with it.
+/// Largest number of parameters with which a search restarts from multiples of the start values: the number of restarts
+/// grows exponentially with it.
 const MOST_PARAMETERS: usize = 2;
 /// Number of restarts that are searched to the end: those with the smallest χ² on the beginning of each record.
 const COMPLETED: usize = 3;
@@ -22,8 +22,8 @@ const COMPLETED: usize = 3;
 const RANKING_ROUNDS: usize = 4;
 
 impl OutputError<'_> {
-    /// The search result `found` from `start`, or the better result of a restart. `count` is the number of compared values, `rival` the χ²
-    /// that another candidate model has reached.
+    /// The search result `found` from `start`, or the better result of a restart. `count` is the number of compared
+    /// values, `rival` the smallest χ² that another candidate model has reached.
     pub(crate) fn restarted(
         &self,
         problem: &mut FitProblem<'_>,
@@ -43,8 +43,9 @@ impl OutputError<'_> {
         found
     }
 
-    /// Restarts the prediction-error search from the best point near its end, if χ² is smaller there: χ² is discontinuous where friction
-    /// begins to slip.
+    /// Restarts the prediction-error search from the best of some parameter values near those at which it ended, if χ²
+    /// is smaller there: χ² as a function of the parameters jumps where friction begins to slip. The better of both
+    /// results.
     fn restarted_nearby(
         &self,
         problem: &mut FitProblem<'_>,
@@ -71,8 +72,8 @@ impl OutputError<'_> {
         again.filter(|again| again.left < ended.left).unwrap_or(ended)
     }
 
-    /// The best result of searches that start at multiples of the parameters' start values. In a free decay of a nonlinear structure the
-    /// phase depends on the parameters, and χ² has several minima.
+    /// The best of the result `ended` and those of searches that start at multiples of the parameters' start values. In
+    /// a free decay of a nonlinear structure the phase depends on the parameters, and χ² has several minima.
     fn restarted_elsewhere(
         &self,
         problem: &mut FitProblem<'_>,

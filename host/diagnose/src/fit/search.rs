@@ -11,7 +11,8 @@ use crate::fit::unknowns::{
     FitProblem, ParameterPoint, RIDGE, SearchResult, at_bounds, energy, predicted, stepped,
 };
 
-/// Largest number of Levenberg–Marquardt iterations of a full search; searches that prepare, rank or check take fewer.
+/// Largest number of Levenberg–Marquardt iterations of the full search for a candidate model's parameters; searches
+/// that prepare, rank or check take fewer.
 pub(crate) const ROUNDS: usize = 15;
 
 /// Damping of the search. It never falls to zero, since parameters of a candidate model may depend on each other.
@@ -23,11 +24,11 @@ const DAMPING: Damping = Damping {
     least_retried: 1e-3,
 };
 
-/// Largest number of Levenberg–Marquardt steps, with increasing damping, that are tried from one point: the last one has a damping of 10 or
-/// more. It limits the computing time.
+/// Largest number of Levenberg–Marquardt steps, with increasing damping, that are tried from one point: the last one
+/// has a damping of 10 or more. It limits the computing time.
 const TRIALS: usize = 6;
 
-/// Residuals of a simulated candidate model with given parameter values, and their energy χ².
+/// Whitened residuals of a simulated candidate model at given parameter values, by record, and their energy χ².
 struct Residuals {
     of_segments: Vec<Vec<f64>>,
     left: f64,
@@ -42,7 +43,8 @@ struct Search<'a, 'b, 'c> {
 }
 
 impl Search<'_, '_, '_> {
-    /// Lag of a search: its χ² minus the χ² of the rival candidate model minus [`HOPELESS_LAG`]. A positive lag may end the search.
+    /// Lag of a search: its χ² minus the χ² of the rival candidate model minus [`HOPELESS_LAG`]. A positive lag may end
+    /// the search.
     fn behind(&self, left: f64) -> f64 {
         left - self.rival - HOPELESS_LAG
     }
@@ -78,8 +80,8 @@ impl Objective for Search<'_, '_, '_> {
         next.left < now.left && now.left - next.left < SEARCH_SETTLED
     }
 
-    /// Gives up, after two iterations or more, if the lag is positive and the last iteration has left more of it than the share
-    /// [`SLOW_CATCHING_UP`].
+    /// Gives the search up, after two iterations or more, if its lag (χ² minus that of the rival candidate model minus
+    /// [`HOPELESS_LAG`]) is positive and the last iteration has left more of it than the share [`SLOW_CATCHING_UP`].
     fn gives_up(&self, round: usize, now: &Residuals, before: Option<&Residuals>) -> bool {
         let behind = self.behind(now.left);
         round >= 2
@@ -87,8 +89,9 @@ impl Objective for Search<'_, '_, '_> {
             && before.is_some_and(|before| behind > SLOW_CATCHING_UP * self.behind(before.left))
     }
 
-    /// Gives up, after the first iteration, if even the linearized model predicts a χ² that lags behind the rival candidate model and
-    /// exceeds the share [`HOPELESS_PREDICTED_SHARE`] of the present χ².
+    /// Gives the search up, after one iteration or more, if even the χ² that the linearized model predicts exceeds that
+    /// of the rival candidate model by more than [`HOPELESS_LAG`], and the present χ² times the share
+    /// [`HOPELESS_PREDICTED_SHARE`].
     fn gives_up_linearized(&self, round: usize, now: &Residuals, sums: &NormalSums) -> bool {
         let promised = now.left - predicted(&sums.matrix, &sums.gradient);
         round >= 1 && self.behind(promised) > 0.0 && promised > HOPELESS_PREDICTED_SHARE * now.left
@@ -96,8 +99,9 @@ impl Objective for Search<'_, '_, '_> {
 }
 
 impl OutputError<'_> {
-    /// Levenberg–Marquardt search from `start`; `None` if the start cannot be simulated or a Jacobian cannot be computed. The search ends
-    /// early if its χ² stays behind `rival`, the χ² that another candidate model has reached.
+    /// Levenberg–Marquardt search from `start`; `None` if the start cannot be simulated or a Jacobian cannot be
+    /// computed. The search ends early if its χ² stays far above `rival`, the χ² that another candidate model has
+    /// reached.
     pub(crate) fn search(
         &self,
         problem: &mut FitProblem<'_>,

@@ -1,5 +1,5 @@
-//! Segments of records in the form in which they are compared: transformed, band-limited, whitened, and orthogonal to free decays and
-//! constant offsets of the sensors.
+//! Segments of records in the form in which they are compared: transformed, band-limited, whitened, and orthogonal to
+//! free decays and constant offsets of the sensors.
 
 use std::borrow::Cow;
 use std::ops::Range;
@@ -26,11 +26,12 @@ pub(crate) struct Segment {
     whitening: Whitening,
     /// For each channel: indices, from the start of the segment, of samples that are not compared.
     skipped: Vec<Vec<usize>>,
-    /// Orthonormal basis of the unknown contributions that are projected out: whitened free decays and sensor offsets.
+    /// Orthonormal basis of the unknown contributions that are projected out of the segment: whitened free decays and
+    /// sensor offsets.
     nuisance: Vec<Vec<f64>>,
 }
 
-/// Unknown contributions that are projected out of a segment; none in the force domain.
+/// Unknown contributions that are projected out of a segment; none for a record compared in force.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Nuisance {
     /// Free decays of the baseline from an unknown initial state, and offsets of sensors.
@@ -44,16 +45,17 @@ pub(crate) enum Nuisance {
 pub(crate) enum Subset {
     /// Segments to which parameters are fitted for the prediction of the held-out segments.
     Fitted,
-    /// Segments on which the prediction by the fit to [`Self::Fitted`] is tested. Only unknown initial states are fitted to them.
+    /// Segments on which the prediction by the fit to [`Self::Fitted`] is tested. Only unknown initial states and
+    /// sensor offsets are fitted to them.
     HeldOut,
     /// Whole records, one segment each.
     Whole,
 }
 
-/// Divides the compared range of each record: the whole, and four segments of a third, a sixth, a third and a sixth of it. The short ones
-/// are held out. They contain other times than the fitted ones and, in a sweep, other frequencies. In a study of several records a free
-/// decay is not divided, because the end of a decay contains little information: it is held out if it is the last record of the study, and
-/// fitted otherwise.
+/// Divides the compared range of each record: the whole, and four segments of a third, a sixth, a third and a sixth of
+/// it. The short ones are held out. They contain other times than the fitted ones and, in a sweep, other frequencies.
+/// In a study of several records a free decay is not divided, because the end of a decay contains little information:
+/// it is held out if it is the last record of the study, and fitted otherwise.
 pub(crate) fn split(study: &Study<'_>, unknown: impl Fn(&Record) -> Nuisance) -> Vec<Segment> {
     let several = study.records.len() > 1;
     let last = study.records.len().saturating_sub(1);
@@ -123,8 +125,8 @@ impl Segment {
         segment
     }
 
-    /// Transforms a segment of `samples`, given by channel for the whole record, limits its band, whitens it, and projects out free decays
-    /// and offsets.
+    /// The values of this segment that are compared: transforms the segment of `samples`, given by channel for the
+    /// whole record, limits its band, whitens it, and projects out free decays and sensor offsets.
     pub(crate) fn whiten(&self, samples: &[Vec<f64>]) -> Vec<f64> {
         let mut column = raw(self, samples);
         for nuisance in &self.nuisance {
@@ -139,8 +141,8 @@ impl Segment {
         column
     }
 
-    /// Number of samples of the segment that do not count as compared: one for each projected free decay or offset, and the skipped
-    /// samples.
+    /// Number of samples of the segment that do not count as compared: one for each projected free decay or offset, and
+    /// the skipped samples.
     pub(crate) fn taken(&self) -> usize {
         self.nuisance.len() + self.skipped.iter().map(Vec::len).sum::<usize>()
     }
@@ -164,7 +166,7 @@ fn raw(segment: &Segment, samples: &[Vec<f64>]) -> Vec<f64> {
     column
 }
 
-/// Orthonormal basis of free decays and offsets in a segment; empty in the force domain.
+/// Orthonormal basis of whitened free decays and sensor offsets in a segment; empty for a record compared in force.
 fn nuisance(record: &Record, segment: &Segment, unknown: Nuisance) -> Vec<Vec<f64>> {
     if record.domain == Domain::Force {
         return Vec::new();

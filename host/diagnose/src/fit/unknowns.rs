@@ -37,16 +37,17 @@ pub(crate) struct FitProblem<'a> {
     pub(crate) library: &'a Library,
     pub(crate) choices: &'a [Choice],
     pub(crate) slots: Vec<(FreeParameter, f64)>,
-    /// Smallest step of a finite difference with respect to a parameter of a cause, relative to that parameter. Initial states have a limit
-    /// of their own.
+    /// Smallest step of a finite difference with respect to a parameter of a cause, relative to that parameter. Initial
+    /// states have a limit of their own.
     pub(crate) least_step: f64,
 }
 
-/// Result of a search: the parameters, their χ² and the normal matrix.
+/// Result of a search for a candidate model's parameters: their values, χ² there and the normal matrix.
 pub(crate) struct SearchResult {
     pub(crate) point: ParameterPoint,
     pub(crate) left: f64,
-    /// Normal matrix Jᵀ J of the free parameters at the end of the search.
+    /// Normal matrix Jᵀ J of the free parameters from the last linearization, at the end of the search or one step
+    /// before.
     pub(crate) normal: DMatrix<f64>,
 }
 
@@ -58,8 +59,8 @@ impl FreeParameter {
         }
     }
 
-    /// True if this free parameter changes the simulated response of the record with index `record`: an initial state changes only its own
-    /// record.
+    /// True if this free parameter changes the simulated response of the record with index `record`: an initial state
+    /// changes only its own record.
     pub(crate) fn affects(self, record: usize) -> bool {
         match self {
             Self::Inner { .. } => true,
@@ -93,12 +94,13 @@ impl FitProblem<'_> {
     }
 }
 
-/// χ² of all records.
+/// χ² of all records from their whitened residuals.
 pub(crate) fn energy(residuals: &[Vec<f64>]) -> f64 {
     residuals.iter().map(|residual| dot(residual, residual)).sum()
 }
 
-/// The parameter values after a step of the free parameters from `point`, limited to their bounds.
+/// The parameter values after the step `step` of the free parameters from `point`, limited to the bounds of the
+/// parameters.
 pub(crate) fn stepped(
     problem: &FitProblem<'_>,
     point: &ParameterPoint,
@@ -118,8 +120,8 @@ pub(crate) fn stepped(
     next
 }
 
-/// Ridge added to the unit diagonal of the scaled normal equations of a prediction-error search: about the square of the simulation's
-/// accuracy.
+/// Ridge added to the unit diagonal of the scaled normal equations of a prediction-error search: about the square of
+/// the simulation's accuracy.
 pub(crate) const RIDGE: f64 = 1e-12;
 
 /// Decrease of χ² by a whole Gauss–Newton step, predicted by the linearized model.
@@ -127,7 +129,8 @@ pub(crate) fn predicted(normal: &DMatrix<f64>, gradient: &DVector<f64>) -> f64 {
     NormalEquations::new(normal, 1e-9, Idle::Hold).map_or(0.0, |equations| equations.explained(gradient))
 }
 
-/// Fixes every free parameter that lies at one of its bounds and whose next step would leave it: its gradient, row and column become zero.
+/// Fixes every free parameter that lies at one of its bounds and whose next step would leave it: its gradient, row and
+/// column become zero.
 pub(crate) fn at_bounds(
     problem: &FitProblem<'_>,
     point: &ParameterPoint,
@@ -155,8 +158,8 @@ pub(crate) fn covariance(normal: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     Some(NormalEquations::new(normal, RIDGE, Idle::Hold)?.inverse())
 }
 
-/// For each cause of the candidate model: covariance of its parameters for unit-variance noise, with the initial states unknown; zero for a
-/// fixed parameter, and throughout if the normal matrix cannot be inverted.
+/// For each cause of the candidate model: covariance of its parameters for unit-variance noise, with the initial states
+/// unknown; zero for a fixed parameter, and throughout if the normal matrix cannot be inverted.
 pub(crate) fn by_choice(slots: &[FreeParameter], found: &SearchResult) -> Vec<DMatrix<f64>> {
     let mut all: Vec<DMatrix<f64>> = found
         .point

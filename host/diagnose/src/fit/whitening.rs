@@ -1,4 +1,5 @@
-//! Whitens a record: after it, the noise has unit variance and is independent between channels.
+//! Whitens the spectra of a record's channels: after it, their noise has unit variance and is independent between
+//! channels.
 
 use nalgebra::Cholesky;
 use num_complex::Complex64;
@@ -7,20 +8,21 @@ use crate::records::amplification::LoopNoise;
 use crate::records::domain::Domain;
 use crate::records::record::Record;
 
-/// Whitening by L⁻¹, with the covariance of the channels at each bin S = diag(σ²) + Σ σ_f² h hᴴ = L Lᴴ. The first part is the noise of the
-/// motion sensors. The second is the response h to noise of the force sensors and to aliased forces, both contained in the noise floor σ_f
-/// of each force; it is correlated between channels and absent in the force domain. In a cut near or in chatter, the noise covariance of
-/// its closed loop ([`LoopNoise`]) replaces S.
+/// Whitening by L⁻¹, with the covariance of the channels at each bin S = diag(σ²) + Σ σ_f² h hᴴ = L Lᴴ. The first part
+/// is the noise of the motion sensors. The second is the response h to noise of the force sensors and to aliased
+/// forces, both contained in the noise floor σ_f of each force; it is correlated between channels and absent in the
+/// force domain. In a cut near or in chatter, the noise covariance of its closed loop ([`LoopNoise`]) replaces S.
 #[derive(Default)]
 pub(crate) struct Whitening {
     channels: usize,
-    /// For each frequency bin: number of real values per channel, 1 for a real bin (zero and half the sample rate) and 2 for a complex one.
+    /// For each frequency bin: number of real values per channel, 1 for a real bin (zero and half the sample rate) and
+    /// 2 for a complex one.
     numbers: Vec<usize>,
-    /// For each frequency bin and channel: one over the diagonal element of L, the Cholesky factor of the noise covariance between
-    /// channels.
+    /// For each frequency bin and channel: one over the diagonal element of L, the Cholesky factor of the noise
+    /// covariance between channels.
     weights: Vec<f64>,
-    /// For each frequency bin: elements left of the diagonal of L, the Cholesky factor of the noise covariance between channels; empty if
-    /// the channels' noise is independent.
+    /// For each frequency bin: elements left of the diagonal of L, the Cholesky factor of the noise covariance between
+    /// channels; empty if the channels' noise is independent.
     common: Vec<Complex64>,
 }
 
@@ -71,8 +73,8 @@ impl Whitening {
         whitening
     }
 
-    /// Whitens the values of all channels: multiplies them by L⁻¹, the inverse Cholesky factor of the noise covariance. `column` holds them
-    /// channel after channel.
+    /// Whitens the values of all channels: multiplies them by L⁻¹, the inverse Cholesky factor of the noise covariance.
+    /// `column` holds them channel after channel.
     pub(crate) fn apply(&self, column: &mut [f64]) {
         let per_channel = column.len() / self.channels.max(1);
         let rows = if self.common.is_empty() {
@@ -104,8 +106,8 @@ impl Whitening {
     }
 }
 
-/// Writes into `read` each channel's response at ω (rad/s) to one standard deviation σ_f of the noise of each force. `forces` holds the
-/// axis and σ_f of each force.
+/// Writes into `read` each channel's response at ω (rad/s) to one standard deviation σ_f of the noise of each force.
+/// `forces` holds the axis and σ_f of each force.
 fn read_of_noise(record: &Record, omega: f64, forces: &[(usize, f64)], read: &mut [Complex64]) {
     let nearest = (omega / record.grid.omega(1)).round() as usize;
     let of_channels = read.chunks_exact_mut(forces.len().max(1));
@@ -121,8 +123,8 @@ fn read_of_noise(record: &Record, omega: f64, forces: &[(usize, f64)], read: &mu
     }
 }
 
-/// Writes the Cholesky factor L of the channels' noise covariance S = diag(σ²) + R Rᴴ into `rows`. `deviations` is σ, `read` is R with one
-/// row per channel.
+/// Writes the Cholesky factor L of the channels' noise covariance S = diag(σ²) + R Rᴴ into `rows`. `deviations` is σ,
+/// `read` is R with one row per channel.
 fn factorize(deviations: &[f64], read: &[Complex64], rows: &mut [Complex64]) {
     let (channels, forces) = (deviations.len(), read.len() / deviations.len().max(1));
     for i in 0..channels {
@@ -170,7 +172,8 @@ mod tests {
 
     #[test]
     fn a_signal_common_to_two_channels_counts_once() {
-        // Two channels that read one common signal. It has three values: the constant, and real and imaginary part of one bin.
+        // Two channels that read one common signal. It has three values: the constant, and real and imaginary part of
+        // one bin.
         let rows = [Complex64::new(3.0, -1.0), Complex64::new(0.0, 2.0)];
         let whitening = Whitening {
             channels: 2,

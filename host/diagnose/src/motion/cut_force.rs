@@ -5,13 +5,13 @@
 pub(crate) struct CutForce {
     /// Mean cutting force over each interval of the upsampled grid, N.
     pub mean_n: [Vec<f64>; 3],
-    /// Cutting force at the samples of the record, N; 0 at samples near the entry or exit of a tooth, and at all samples if no force is
-    /// measured.
+    /// Cutting force at the samples of the record, N; 0 at samples near the entry or exit of a tooth, and at all
+    /// samples if no force is measured.
     pub sampled_n: [Vec<f64>; 3],
 }
 
 impl CutForce {
-    /// (`self` − `other`)/`divisor`.
+    /// Difference of two cutting forces over a divisor: (`self` − `other`)/`divisor`.
     pub(crate) fn difference(&self, other: &Self, divisor: f64) -> Self {
         let of = |a: &[Vec<f64>; 3], b: &[Vec<f64>; 3]| {
             std::array::from_fn(|axis| {

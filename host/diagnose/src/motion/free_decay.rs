@@ -11,13 +11,15 @@ use crate::signal::grid::Grid;
 use quietcut_recording::Quantity;
 use quietcut_simulate::effect::Pickup;
 
-/// Ridge on the unit diagonal of the normal equations: rounding of the responses, which are products of many matrices.
+/// Ridge on the unit diagonal of the normal equations for the initial state: rounding of the free decays, which are
+/// products of many matrices.
 const ROUNDING: f64 = 1e-12;
 
-/// Free decays of the baseline in each channel of a record, and the initial state.
+/// Free decays of the baseline in each channel of a record, and the fitted initial state.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Decays {
-    /// Free decays of the baseline in each channel for a unit initial value of one state variable: by channel, state variable and sample.
+    /// Free decays of the baseline in each channel for a unit initial value of one state variable: by channel, state
+    /// variable and sample.
     columns: Vec<Vec<Vec<f64>>>,
     /// For each channel: indices of samples that are not compared and that the fit of the free decay leaves out.
     skipped: Vec<Vec<usize>>,
@@ -67,7 +69,7 @@ impl Decays {
         }
     }
 
-    /// Number of state variables.
+    /// Number of state variables of the baseline structure.
     pub(crate) fn count(&self) -> usize {
         self.start.len()
     }
@@ -77,7 +79,8 @@ impl Decays {
         &self.columns[channel][state]
     }
 
-    /// Fits the initial state to `residuals` by least squares, with the residual of each channel divided by its size in `sizes`.
+    /// Fits the initial state to `residuals`, samples by channel, by least squares over the compared samples, with the
+    /// residual of each channel divided by its entry in `sizes`.
     pub(crate) fn fit(&mut self, residuals: &[Vec<f64>], sizes: &[f64]) {
         let order = self.start.len();
         let mut gram = DMatrix::<f64>::zeros(order, order);
@@ -112,7 +115,8 @@ impl Decays {
         columns
     }
 
-    /// Subtracts the free decay from the compared samples of a channel.
+    /// `samples` of a channel minus the free decay from the fitted initial state, which counts as zero at samples that
+    /// are not compared.
     pub(crate) fn without(&self, channel: usize, samples: &[f64]) -> Vec<f64> {
         let mut without = samples.to_vec();
         for (column, start) in self.compared(channel).iter().zip(&self.start) {
@@ -123,7 +127,7 @@ impl Decays {
         without
     }
 
-    /// Adds the free decay to the compared samples of a channel.
+    /// Adds the free decay from the fitted initial state to the compared samples of a channel.
     pub(crate) fn add_to(&self, channel: usize, samples: &mut [f64]) {
         for (column, start) in self.compared(channel).iter().zip(&self.start) {
             for (sample, value) in samples.iter_mut().zip(column) {
@@ -133,8 +137,8 @@ impl Decays {
     }
 }
 
-/// Output row `row` of the free motion ẋ = A x behind the dynamics of a sensor: row·(b₀ + b₁·A)·(1 + T·A)⁻¹ for each section. A section with
-/// a pole of the structure as its pole, for which the inverse does not exist, is left out.
+/// Output row `row` of the free motion ẋ = A x behind the dynamics of a sensor: row·(b₀ + b₁·A)·(1 + T·A)⁻¹ for each
+/// section. A section with a pole of the structure as its pole, for which the inverse does not exist, is left out.
 fn through_sensor(row: DMatrix<f64>, pickup: &Pickup, a: &DMatrix<f64>) -> DMatrix<f64> {
     let one = DMatrix::<f64>::identity(a.nrows(), a.ncols());
     pickup.sections.iter().fold(row, |row, section| {

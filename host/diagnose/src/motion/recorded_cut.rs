@@ -1,8 +1,10 @@
 //! The cutting force of a recorded cut along a known motion.
 //!
-//! The measured motion u determines the chip thickness of every tooth: h = min over earlier passes p of n·(u − u(t − pτ)) + (r_j − r_(j+p))
-//! sin γ + p f sin φ sin γ, because the surface is what all earlier passes left. The cutting force is linear in most parameters of the
-//! process. It jumps between samples when teeth enter and leave. Its mean over each interval of the upsampled grid drives the structure,
+//! The motion u of the tool determines the chip thickness of every tooth j: h = min over earlier passes p of n·(u − u(t
+//! − pτ)) + (r_j − r_(j+p)) sin γ + p f sin φ sin γ, because the surface is what all earlier passes left. Here n is the
+//! direction of the chip thickness, τ the time between passes, r the runout of a tooth, f the feed per tooth, φ the
+//! immersion angle and γ the edge angle. The cutting force is linear in most parameters of the process. It jumps
+//! between samples when teeth enter and leave. Its mean over each interval of the upsampled grid drives the structure,
 //! with entry, exit and loss of contact at their exact instants.
 
 use crate::criteria::{SPEED_MISMATCH, UNCERTAIN_SAMPLES};
@@ -15,8 +17,9 @@ use quietcut_recording::Recording;
 use quietcut_simulate::path::SampledMotion;
 use quietcut_simulate::{Cutter, Effects, Spindle};
 
-/// Smallest sin φ of the immersion angle φ down to which all passes that a vibrating tooth may miss are evaluated. The feed adds f·sin φ to
-/// the chip thickness, so nearer to the ends of a slot a tooth could miss any number of passes.
+/// Smallest sin φ of the immersion angle φ down to which all passes that a vibrating tooth may miss are evaluated. The
+/// feed per tooth f adds about f·sin φ to the chip thickness, so that nearer to the ends of a slot a tooth could miss
+/// any number of passes.
 const SHALLOW: f64 = 0.1;
 /// Largest number of successive passes for which a tooth may leave the workpiece uncut.
 const MOST_MISSED: usize = 24;
@@ -32,12 +35,13 @@ pub(crate) struct RecordedCut {
     rate_hz: f64,
     /// Number of samples of the record.
     count: usize,
-    /// Number of earlier tooth passes that may have left the present surface, if vibrating teeth miss passes; `None` for two passes, or one
-    /// revolution and one pass if the teeth differ in radius.
+    /// Number of earlier tooth passes of which one has left the present surface, if vibrating teeth miss passes; `None`
+    /// for two passes, or one revolution and one pass if the teeth differ in radius.
     passes: Option<usize>,
 }
 
-/// Immersion and feed of a recording: from its sidecar, otherwise from the case. The feed direction is that of the case.
+/// Immersion and feed of a recording: from its sidecar, otherwise from the case. The feed direction is that of the
+/// case.
 ///
 /// # Errors
 /// The case has no cut.
@@ -53,12 +57,12 @@ pub(crate) fn cut_of(case: &Case, recording: &Recording) -> Result<Cut, Diagnose
 }
 
 impl RecordedCut {
-    /// The cut of a recording: speed from the tachometer, depth, immersion and feed from the sidecar, the rest from the case with its
-    /// extensions. Immersion and feed that the sidecar lacks are those of the case.
+    /// The cut of a recording: speed from the tachometer, depth, immersion and feed from the sidecar, the rest from the
+    /// case with its extensions. Immersion and feed that the sidecar lacks are those of the case.
     ///
     /// # Errors
-    /// The case, the sidecar or the tachometer lacks a value that describes the cut; they contradict each other in the number of teeth or
-    /// the speed; or the cut or an extension is not possible.
+    /// The case, the sidecar or the tachometer lacks a value that describes the cut; they contradict each other in the
+    /// number of teeth or the speed; or the cut or an extension is not possible.
     pub(crate) fn new(case: &Case, effects: &Effects, recording: &Recording) -> Result<Self, DiagnoseError> {
         let (tool, material, cut) = (case.tool()?, case.material()?, cut_of(case, recording)?);
         let given = recording.sidecar.cut.unwrap_or_default();
@@ -100,7 +104,8 @@ impl RecordedCut {
         })
     }
 
-    /// The chips along `motion` for a given spindle motion. `motion` has `finer` samples per sample of the record.
+    /// The chips of every tooth along `motion` for a given spindle motion. `motion` has `finer` samples per sample of
+    /// the record; `with_force` is true if the cutting force at the samples of the record is needed.
     pub(crate) fn chips(
         &self,
         spindle_motion: &SpindleMotion,
@@ -125,14 +130,15 @@ impl RecordedCut {
         self.rate_hz
     }
 
-    /// Lets teeth miss passes, as with a tool that vibrates with the amplitude `amplitude_m`. Near the ends of a slot each pass adds only
-    /// the share `SHALLOW` of the feed to the chip, so that a tooth misses amplitude / (share · feed) passes after a deep cut.
+    /// Lets teeth miss passes, as with a tool whose displacement varies by up to `amplitude_m`. Near the ends of a slot
+    /// each pass adds only the share `SHALLOW` of the feed per tooth to the chip, so that teeth miss `amplitude_m` /
+    /// (`SHALLOW` · feed per tooth) passes after one that cut deep, at most `MOST_MISSED`.
     pub(crate) fn let_miss(&mut self, amplitude_m: f64) {
         let missed = amplitude_m / (SHALLOW * self.cutter.feed_per_tooth_m).max(f64::MIN_POSITIVE);
         self.passes = Some((missed.ceil() as usize).min(MOST_MISSED) + 2);
     }
 
-    /// Number of samples in the first revolutions, whose chips depend on passes before the record.
+    /// Number of samples in the first revolutions of the record, whose chips depend on tooth passes before the record.
     pub(crate) fn first_revolutions(&self) -> usize {
         let passes = self.passes.unwrap_or(1).max(self.cutter.teeth.len());
         let revolutions = passes as f64 / self.cutter.teeth.len() as f64;

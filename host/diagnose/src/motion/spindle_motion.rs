@@ -15,21 +15,23 @@ use quietcut_simulate::{Fluctuation, Spindle};
 pub(crate) struct SpindleMotion {
     spindle: Spindle,
     rpm: f64,
-    /// Spindle angle at the beginning of the whole recording, rad. The phase of a speed modulation is given at the same time.
+    /// Spindle angle at the beginning of the whole recording, rad. The phase of a speed modulation is given at the same
+    /// time.
     start_rad: f64,
     fluctuation: Option<Fluctuation>,
     /// Time from the beginning of the whole recording to the first sample, s: see [`Recording::since_s`].
     since_s: f64,
-    /// Times, from the beginning of the whole recording, at which tooth 1 passes immersion angle 0: one edge of the tachometer per
-    /// revolution, s.
+    /// Times, from the beginning of the whole recording, at which tooth 1 passes immersion angle 0: one edge of the
+    /// tachometer per revolution, s.
     edges_s: Vec<f64>,
 }
 
 impl SpindleMotion {
-    /// Fits the spindle angle to the tachometer of a recording: constant speed, with the speed modulation of the case if there is one.
+    /// Fits the spindle angle to the tachometer of a recording: constant speed, with the speed modulation of the case
+    /// if there is one.
     ///
     /// # Errors
-    /// The recording has no tachometer channel, or its edges are too few or do not match the wheel.
+    /// The recording has no tachometer channel, or its edges are too few or do not match the tachometer wheel.
     pub(crate) fn new(
         recording: &Recording,
         fluctuation: Option<Fluctuation>,
@@ -74,12 +76,13 @@ impl SpindleMotion {
         .fitted()
     }
 
-    /// Least-squares fit of mean speed and start angle to the tachometer edges. The angle that the speed modulation adds is proportional to
-    /// the mean speed, so that the angle at an edge is linear in start angle and mean speed.
+    /// Least-squares fit of mean speed and start angle to the tachometer edges. The angle that the speed modulation
+    /// adds is proportional to the mean speed, so that the angle at an edge is linear in start angle and mean speed.
     fn fitted(mut self) -> Self {
         let count = self.edges_s.len() as f64;
         for _ in 0..3 {
-            // At tachometer edge k the spindle angle is 2πk. It is linear in the edge time plus the lead of the speed modulation, s.
+            // At tachometer edge k the spindle angle is 2πk. It is linear in the edge time plus the lead of the speed
+            // modulation, s.
             let modulation_s = |t: f64| self.modulation_s(t);
             let times: Vec<f64> = self.edges_s.iter().map(|t| t + modulation_s(*t)).collect();
             let mean_t = times.iter().sum::<f64>() / count;
@@ -107,7 +110,7 @@ impl SpindleMotion {
         })
     }
 
-    /// Mean spindle speed, rev/min.
+    /// Mean spindle speed over the record, rev/min.
     pub(crate) fn rpm(&self) -> f64 {
         self.rpm
     }
@@ -127,18 +130,19 @@ impl SpindleMotion {
         self.since_s + t
     }
 
-    /// Regenerative delay at time `t` for a pitch of `angle_rad` between two teeth, s.
+    /// Regenerative delay at time `t` after the first sample, for a pitch of `angle_rad` between two teeth, s.
     pub(crate) fn delay_s(&self, t: f64, angle_rad: f64) -> f64 {
         self.spindle.delay_s(self.since_s(t), angle_rad)
     }
 
-    /// Mean revolution period, s.
+    /// Mean duration of a revolution, s.
     pub(crate) fn revolution_s(&self) -> f64 {
         60.0 / self.rpm
     }
 }
 
-/// Step of the grid of tried frequencies of a speed modulation, in modulation periods per duration of the longest record.
+/// Step of the grid of tried frequencies of a speed modulation, in modulation periods per duration of the longest
+/// record.
 const STEP: f64 = 0.2;
 
 /// A speed modulation estimated from tachometer edges.
@@ -146,15 +150,18 @@ const STEP: f64 = 0.2;
 pub(crate) struct SpeedModulation {
     /// Relative amplitude δ, frequency f_m and phase ψ of the modulation.
     pub fluctuation: Fluctuation,
-    /// Standard deviations of the errors of the estimated δ, f_m in Hz and ψ in rad, from the residual of the tachometer edge times.
+    /// Standard deviations of the errors of the estimated δ, f_m in Hz and ψ in rad, from the residual of the
+    /// tachometer edge times.
     pub deviation: [f64; 3],
 }
 
-/// The speed modulation that fits the tachometer edges of all records best; `None` if the edges are too few, or if it is not significant or
-/// its amplitude too large.
+/// The speed modulation that fits the tachometer edges of all records best; `None` if the edges are too few, or if the
+/// modulation is not significant or its amplitude too large. Frequencies from 0.7 periods per longest record to 0.45
+/// times the lowest spindle frequency are tried.
 ///
-/// Edge k is at the time t with k T₀ = t + δ cos ψ·(1 − cos ωt)/ω + δ sin ψ·sin ωt/ω + constant. The equation is linear in all unknowns
-/// except the frequency ω. T₀ and the constant differ between records.
+/// Edge k is at the time t with k T₀ = t + δ cos ψ·(1 − cos ωt)/ω + δ sin ψ·sin ωt/ω + constant. The equation is linear
+/// in all unknowns except the frequency ω. T₀, the mean duration of a revolution, and the constant differ between
+/// records.
 pub(crate) fn speed_modulation(spindle_motions: &[&SpindleMotion]) -> Option<SpeedModulation> {
     let longest_s = spindle_motions
         .iter()
@@ -206,8 +213,8 @@ pub(crate) fn speed_modulation(spindle_motions: &[&SpindleMotion]) -> Option<Spe
     })
 }
 
-/// Standard deviations of the errors of the estimated δ, f_m in Hz and ψ in rad, if the tachometer edge times scatter with `variance`, s²;
-/// infinite if the three are not identifiable.
+/// Standard deviations of the errors of the estimated δ, f_m in Hz and ψ in rad, if the tachometer edge times scatter
+/// with `variance`, s²; infinite if the three are not identifiable.
 fn deviation(
     spindle_motions: &[&SpindleMotion],
     frequency_hz: f64,
@@ -244,7 +251,8 @@ struct ModulationFit {
     /// Components of the relative speed amplitude δ in cosine and sine phase: δ cos ψ (`along`) and δ sin ψ (`across`).
     along: f64,
     across: f64,
-    /// Residual sum of squares of the tachometer edge times, s², with the speed modulation (`left`) and without it (`without`).
+    /// Residual sum of squares of the tachometer edge times, s², with the speed modulation (`left`) and without it
+    /// (`without`).
     left: f64,
     without: f64,
 }
@@ -266,7 +274,7 @@ fn fit_modulation(spindle_motions: &[&SpindleMotion], frequency_hz: f64) -> Modu
             left: fit.sum_of_squares,
             without,
         },
-        // The two components are linearly dependent at the edges.
+        // The cosine and the sine component are linearly dependent at the times of the edges.
         Err(_) => ModulationFit {
             along: 0.0,
             across: 0.0,
@@ -282,8 +290,8 @@ fn modulation_s(frequency_hz: f64, t: f64) -> [f64; 2] {
     [(1.0 - (omega * t).cos()) / omega, (omega * t).sin() / omega]
 }
 
-/// Least-squares equations of the three columns `of` at the edge times, after elimination of a straight line in the number of the edge
-/// from each record.
+/// Least-squares equations of the three columns `of` at the edge times, after elimination of a straight line in the
+/// number of the edge from each record.
 fn without_lines(spindle_motions: &[&SpindleMotion], of: impl Fn(f64) -> [f64; 3]) -> DMatrix<f64> {
     let equations: Vec<DMatrix<f64>> = spindle_motions
         .iter()

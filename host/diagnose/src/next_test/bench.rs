@@ -15,15 +15,16 @@ use quietcut_model::case::Case;
 use quietcut_model::milling::Cut;
 use quietcut_recording::{Channel, Quantity, Recording, TestKind};
 
-/// Largest number of samples per channel in the standard duration of a proposed test. Some tests last longer, up to a factor of four, and
-/// cuts begin with a transient.
+/// Largest number of samples per channel in the standard duration of a proposed test. Some tests last longer, up to a
+/// factor of four, and cuts begin with a transient.
 const SAMPLES: f64 = 8192.0;
-/// Smallest and largest standard duration of a proposed test, in periods of the lowest natural frequency, unless [`SAMPLES`] shortens it.
+/// Smallest and largest standard duration of a proposed test, in periods of the lowest natural frequency, unless
+/// [`SAMPLES`] shortens it.
 const PERIODS: [f64; 2] = [20.0, 60.0];
 /// Samples of a simulated test per period of the highest natural frequency of the baseline.
 const SAMPLES_PER_PERIOD: f64 = 24.0;
-/// Duration of the transient that is simulated before a proposed cut is compared, in multiples of the longest time constant of the
-/// structure.
+/// Duration of the transient that is simulated before a proposed cut is compared, in multiples of the longest time
+/// constant of the structure.
 const SETTLED: f64 = 12.0;
 /// Largest duration of the simulated transient of a proposed cut, as a multiple of the standard duration of a test.
 const WAITED: f64 = 4.0;
@@ -32,7 +33,7 @@ const WAITED: f64 = 4.0;
 pub(super) struct MeasuredChannel {
     pub(super) name: String,
     quantity: Quantity,
-    /// Standard deviation of the channel's noise in the records; 0 if unknown.
+    /// Standard deviation of the channel's noise in the records, in the SI unit of the channel; 0 if unknown.
     deviation: f64,
 }
 
@@ -45,7 +46,7 @@ pub(super) struct CutSoFar {
     pub(super) cut: Cut,
 }
 
-/// The machine, the sensors of its records, and the size of the tests that suit it.
+/// The machine, the sensors of its records, and the force, duration and sample rate of the tests that suit it.
 pub(super) struct Bench<'a> {
     pub(super) case: &'a Case,
     pub(super) baseline: Baseline<'a>,
@@ -54,11 +55,11 @@ pub(super) struct Bench<'a> {
     pub(super) modes_hz: [f64; 2],
     /// True if a recorded cut has a channel of force.
     pub(super) has_force: bool,
-    /// Force of level 1 in proposed tests of the structure, N: the largest force in records other than cuts. Without such a force, the one
-    /// that causes the displacement `largest_m` at the lowest natural frequency.
+    /// Force of level 1 in proposed tests of the structure, N: the largest force in records other than cuts. Without
+    /// such a force, the one that causes the displacement `largest_m` at the lowest natural frequency.
     pub(super) force_n: f64,
-    /// Largest displacement of the tool in the records, m. Peaks of velocity and acceleration are converted at the lowest natural
-    /// frequency.
+    /// Largest displacement of the tool in the records, m. Peaks of velocity and acceleration are converted to
+    /// displacement at the lowest natural frequency.
     pub(super) largest_m: f64,
     /// Standard duration of a proposed test, s.
     pub(super) seconds: f64,
@@ -70,7 +71,8 @@ impl<'a> Bench<'a> {
     /// Prepares the simulation of tests that may be proposed.
     ///
     /// # Errors
-    /// The case cannot be simulated, has no oscillating mode, or the records contain no motion; the error is a sentence.
+    /// The case cannot be simulated, has no oscillating mode, or the records contain no motion; the error is a
+    /// sentence.
     pub(super) fn new(
         case: &'a Case,
         recordings: &[Recording],
@@ -127,8 +129,8 @@ impl<'a> Bench<'a> {
         compliance(&self.baseline, 0.0)
     }
 
-    /// Standard deviation of each reading's noise: that of the same channel in the records, otherwise an assumed share of the reading's
-    /// root mean square.
+    /// Standard deviation of each reading's noise: that of the same channel in the records, otherwise an assumed share
+    /// of the reading's root mean square.
     pub(super) fn deviations(&self, readings: &[SimulatedReading]) -> Vec<f64> {
         let of = |reading: &SimulatedReading| {
             let measured = self
@@ -148,7 +150,7 @@ impl<'a> Bench<'a> {
         (SETTLED * self.baseline.slowest_decay_s()).min(WAITED * self.seconds)
     }
 
-    /// The quantities of the mounted sensors, each once.
+    /// The quantities of the mounted sensors of motion, each once.
     pub(super) fn quantities(&self) -> Vec<Quantity> {
         let mut all: Vec<Quantity> = Vec::new();
         for measured in &self.channels {
@@ -182,7 +184,7 @@ fn peak(channel: &Channel) -> f64 {
         .fold(0.0, |most: f64, value| value.abs().max(most))
 }
 
-/// The channels of motion in the recordings, each name once.
+/// The channels of motion in the recordings that the baseline predicts, each name once.
 fn measured(
     baseline: &Baseline<'_>,
     recordings: &[Recording],
@@ -212,7 +214,8 @@ fn cut_so_far(case: &Case, recording: &Recording) -> Option<CutSoFar> {
     })
 }
 
-/// Standard deviation of a channel's noise: the quadratic mean over the records; 0 if unknown.
+/// Standard deviation of a channel's noise: the root mean square of its values in the records; 0 if no record has the
+/// channel.
 fn deviation(views: &[ResidualView], name: &str) -> f64 {
     let known: Vec<f64> = views
         .iter()
@@ -228,7 +231,7 @@ fn highest_hz(baseline: &Baseline<'_>) -> Option<f64> {
     modes.map(|pole| pole.norm() / TAU).max_by(f64::total_cmp)
 }
 
-/// The largest |receptance| along an axis at `frequency_hz`, m/N.
+/// The largest |receptance| of the baseline along one of its axes at `frequency_hz`, m/N.
 fn compliance(baseline: &Baseline<'_>, frequency_hz: f64) -> f64 {
     let receptance: Matrix3<Complex64> = baseline.receptance.at(TAU * frequency_hz);
     let along = baseline.axes.iter().map(|axis| receptance[(*axis, *axis)].norm());

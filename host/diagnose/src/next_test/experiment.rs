@@ -1,4 +1,4 @@
-//! Experiments that can be proposed, and their simulated readings.
+//! Tests that can be proposed as the next experiment, and their simulated readings.
 
 use std::f64::consts::{PI, TAU};
 use std::path::Path;
@@ -17,7 +17,7 @@ use quietcut_simulate::{Effects, Entry, Recorder, TachometerModel, VirtualCut};
 
 /// Smallest peak force of a proposed impact, N.
 const LEAST_IMPACT_N: f64 = 1.0;
-/// Excitation of a test: a force on the structure, or a cut.
+/// Excitation of a proposed test: a force on the structure, or a cut.
 #[derive(Clone, Debug)]
 pub(super) enum Excitation {
     /// A force on the structure at standstill.
@@ -36,12 +36,12 @@ pub(super) enum Excitation {
 pub(super) struct Experiment {
     pub(super) excitation: Excitation,
     rate_hz: f64,
-    /// Effort of the test relative to others, without that of additional sensors. Of the proposals that separate the candidate models, the
-    /// one with the least sum of both is preferred.
+    /// Effort of the test relative to others, without that of additional sensors. Of the tests with a set of sensors
+    /// that separate the candidate models, the one with the least sum of both efforts is proposed.
     pub(super) effort: f64,
 }
 
-/// All experiments that can be proposed.
+/// All tests that can be proposed: of the structure along each of its directions, and cuts if a cut was recorded.
 pub(super) fn experiments(bench: &Bench<'_>) -> Vec<Experiment> {
     let mut all = Vec::new();
     for direction in &bench.baseline.structure.directions {
@@ -51,8 +51,8 @@ pub(super) fn experiments(bench: &Bench<'_>) -> Vec<Experiment> {
     all
 }
 
-/// Tests of the structure along a direction: an impact, sweeps at three levels, a longer sweep, and a step sine at three levels at the
-/// lowest natural frequency.
+/// Proposed tests of the structure along a direction: an impact, sweeps at three levels, a longer sweep, and a step
+/// sine at three levels at the lowest natural frequency.
 fn of_structure(bench: &Bench<'_>, direction: Direction) -> Vec<Experiment> {
     let [lowest_hz, highest_hz] = bench.modes_hz;
     let experiment = |signal: Signal, effort: f64| Experiment {
@@ -82,8 +82,9 @@ fn of_structure(bench: &Bench<'_>, direction: Direction) -> Vec<Experiment> {
         experiment(sweep(3.0, 1.0), 1.3),
         experiment(sweep(1.0, 4.0), 1.5),
     ];
-    // The spectrum of a half-sine pulse has its first zero at 1.5/pulse, which is above the highest mode. The impact reaches the
-    // displacement x = ω·impulse/k of the records.
+    // The spectrum of a half-sine pulse has its first zero at the frequency 1.5/`pulse_s`, twice the highest natural
+    // frequency. The impulse is chosen so that the tool reaches the largest displacement x = ω·impulse/k in the
+    // records, with the lowest natural frequency ω and the static stiffness k.
     let pulse_s = 0.75 / highest_hz;
     let impulse_ns = bench.largest_m / (TAU * lowest_hz * bench.static_compliance());
     let peak_n = (impulse_ns / (2.0 / PI * pulse_s)).max(LEAST_IMPACT_N);
@@ -102,12 +103,14 @@ fn of_structure(bench: &Bench<'_>, direction: Direction) -> Vec<Experiment> {
     all
 }
 
-/// The recorded cut at its own and at other speeds, depths and feeds, and over a longer time.
+/// Proposed cuts: the recorded cut again, at another spindle speed, axial depth or feed per tooth, and over a longer
+/// time.
 fn of_cuts(bench: &Bench<'_>) -> Vec<Experiment> {
     let Some(so_far) = &bench.cut else {
         return Vec::new();
     };
-    // Factors on spindle speed, axial depth and feed per tooth of the recorded cut, and on the standard duration of a test.
+    // Factors on spindle speed, axial depth and feed per tooth of the recorded cut, and on the standard duration of a
+    // test.
     let factors = [
         (1.0, 1.0, 1.0, 1.0),
         (0.8, 1.0, 1.0, 1.0),
@@ -142,13 +145,14 @@ impl Experiment {
         }
     }
 
-    /// Readings of all sensors if `case` is the true machine.
+    /// Simulated readings of all sensors in this test if `case` is the true machine; of a cut without its transient.
     ///
     /// # Errors
     /// The experiment cannot be simulated, or the tool moves too far in a cut; the error is a sentence.
     pub(super) fn readings(&self, bench: &Bench<'_>, case: &Case) -> Result<Vec<SimulatedReading>, String> {
         let mounted = self.recording(bench, case)?;
-        // A second sensor next to a mounted one is taken as free of errors, so the sensor extensions of the case are removed for it.
+        // A second sensor next to a mounted one is taken as free of errors, so the sensor extensions of the case are
+        // removed for it.
         let mut faultless = case.clone();
         faultless.extensions.retain(|name, _| {
             name.parse()

@@ -1,10 +1,11 @@
 //! The experiment that separates confounded candidate models.
 //!
-//! Every equivalent candidate model is simulated in all experiments ([`experiment`]). The readings of two models are compared in units of
-//! the noise, after the parameters of one are fitted to the readings of the other ([`separation`]). The proposal is the experiment with the
-//! least effort that separates all of them, or, if there is none, the one with the largest of the smallest distances. The distance follows
-//! A. C. Atkinson and V. V. Fedorov, The design of experiments for discriminating between two rival models, Biometrika 62 (1975),
-//! T-optimality.
+//! Every equivalent candidate model is simulated in all experiments ([`experiment`]). The readings of two models are
+//! compared in units of the noise, after the parameters of one are fitted to the readings of the other
+//! ([`separation`]). The proposal is the experiment with the least effort that separates all models from each other or,
+//! if there is none, the one in which the smallest distance between two models is largest. The distance follows A. C.
+//! Atkinson and V. V. Fedorov, The design of experiments for discriminating between two rival models, Biometrika 62
+//! (1975), T-optimality.
 
 mod bench;
 mod experiment;
@@ -28,16 +29,18 @@ use quietcut_recording::Recording;
 struct Proposal<'a> {
     experiment: &'a Experiment,
     sensors: Sensors,
-    /// Distance between the two candidate models that the experiment separates least; `between` holds the indices of these two models.
+    /// Distance between the two candidate models that the experiment separates least; `between` holds the indices of
+    /// these two models.
     least: Difference,
     between: [usize; 2],
 }
 
-/// The experiment that separates the candidate models of `diagnosis`, or comes nearest to it; `None` if there are fewer than two.
+/// The experiment that separates the candidate models of `diagnosis`, or comes nearest to it; `None` if there are fewer
+/// than two.
 ///
 /// # Errors
-/// The machine has no oscillating mode or its records no motion, or no experiment can be simulated with all candidate models; the error is
-/// a sentence.
+/// The machine has no oscillating mode or its records no motion, or no experiment can be simulated with all candidate
+/// models; the error is a sentence.
 pub(super) fn next_test(
     case: &Case,
     recordings: &[Recording],

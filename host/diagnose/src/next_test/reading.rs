@@ -1,4 +1,4 @@
-//! The readings of the sensors in an experiment.
+//! The simulated readings of the sensors in a proposed test.
 
 /// A set of sensors in a proposed test.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -7,7 +7,7 @@ pub(super) enum Sensors {
     Mounted,
     /// The sensors of the records, and at the tool a second one next to each sensor of motion.
     Second,
-    /// The sensors of the records, and a dynamometer.
+    /// The sensors of the records, and a dynamometer for the cutting force.
     Force,
 }
 

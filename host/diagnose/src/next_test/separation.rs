@@ -10,8 +10,8 @@ use crate::candidates::extension_tables::joined;
 use crate::conclusion::answer::{EstimatedCause, Figure, NINETY_PERCENT};
 use quietcut_model::case::Case;
 
-/// Smallest step of the finite difference of simulated readings, relative to the parameter. The simulation is accurate to 1e-9, so that the
-/// derivative is accurate to 1e-5.
+/// Smallest step of the finite difference by which simulated readings are differentiated by a parameter, relative to
+/// the parameter. The simulation is accurate to 1e-9, so that the derivative is accurate to 1e-5.
 const LEAST_STEP: f64 = 1e-4;
 
 /// A candidate model in a comparison: the causes that act together.
@@ -22,27 +22,29 @@ pub(super) struct Rival<'a> {
 /// Readings of an experiment under a candidate model.
 pub(super) struct Predicted {
     readings: Vec<SimulatedReading>,
-    /// For each uncertain parameter whose step can be simulated: readings with the parameter changed by the step, and the step in standard
-    /// deviations of the parameter.
+    /// For each uncertain parameter whose step can be simulated: readings with the parameter changed by the step, and
+    /// the step in standard deviations of the parameter.
     moved: Vec<(Vec<SimulatedReading>, f64)>,
 }
 
-/// Distance between the readings that two candidate models predict in an experiment, in standard deviations of the noise, after the
-/// parameters of one model are fitted to the other within their uncertainty.
+/// Distance between the readings that two candidate models predict in an experiment, in standard deviations of the
+/// noise, after the parameters of one model are fitted to the readings of the other within their uncertainty.
 #[derive(Clone, Debug)]
 pub(super) struct Difference {
-    /// min over δ of ‖y_A − y_B − J_B δ‖² + ‖δ‖², or the same with A and B exchanged if that is smaller. Readings y are in standard
-    /// deviations of their noise, δ in standard deviations of the parameters.
+    /// min over δ of ‖y_A − y_B − J_B δ‖² + ‖δ‖², or the same with A and B exchanged if that is smaller. Readings y are
+    /// in standard deviations of their noise, the difference without its mean in each channel; δ is in standard
+    /// deviations of the parameters.
     pub(super) squared: f64,
     /// The channel in which the readings of the two candidate models differ most after the fit, in units of its noise.
     pub(super) channel: String,
-    /// Root mean square of the two models' difference in that channel after the fit, in standard deviations of the channel's noise.
+    /// Root mean square of the two models' difference in that channel after the fit, in standard deviations of the
+    /// channel's noise.
     pub(super) times_noise: f64,
 }
 
 impl Rival<'_> {
-    /// Simulated readings of an experiment if this candidate model is the true machine. A parameter whose step cannot be simulated counts
-    /// as known.
+    /// Simulated readings of an experiment if this candidate model is the true machine. A parameter whose changed value
+    /// cannot be simulated counts as known.
     ///
     /// # Errors
     /// The experiment cannot be simulated with this candidate model; the error is a sentence.
@@ -59,8 +61,8 @@ impl Rival<'_> {
         Ok(Predicted { readings, moved })
     }
 
-    /// Steps for the uncertain parameters of a candidate model: index of the cause, key of the parameter, step in its unit, and step in its
-    /// standard deviations.
+    /// Steps for the uncertain parameters of a candidate model: index of the cause, key of the parameter, step in its
+    /// unit, and step in its standard deviations.
     fn steps(&self) -> Vec<(usize, &'static str, f64, f64)> {
         let of = |(index, cause): (usize, &EstimatedCause)| {
             let figures: Vec<(&'static str, Figure)> = cause
@@ -107,8 +109,8 @@ impl Rival<'_> {
     }
 }
 
-/// Adds `step` to the number `key` of a table, or to an element of a list (`ratio_2` is the second of `ratio`). A key that restates another
-/// parameter is not in the table and changes nothing.
+/// Adds `step` to the number `key` of a table, or to an element of a list (`ratio_2` is the second of `ratio`). A key
+/// that restates another parameter is not in the table and changes nothing.
 fn move_by(table: &mut toml::Table, key: &str, step: f64) {
     let add = |value: &mut toml::Value| {
         if let toml::Value::Float(number) = value {
@@ -130,7 +132,8 @@ fn move_by(table: &mut toml::Table, key: &str, step: f64) {
     }
 }
 
-/// Distance between the readings of these sensors that the candidate models `one` and `other` predict.
+/// Distance between the readings of `sensors` that the candidate models `one` and `other` predict: the smaller one of
+/// fitting the parameters of either model.
 pub(super) fn between(bench: &Bench<'_>, one: &Predicted, other: &Predicted, sensors: Sensors) -> Difference {
     let there = difference(bench, one, other, sensors);
     let back = difference(bench, other, one, sensors);
@@ -141,8 +144,8 @@ pub(super) fn between(bench: &Bench<'_>, one: &Predicted, other: &Predicted, sen
     }
 }
 
-/// Difference between the readings that the candidate model `truth` and the candidate model `model` predict, after the parameters of
-/// `model` are fitted to the readings of `truth` within their uncertainty.
+/// Difference between the readings that the candidate model `truth` and the candidate model `model` predict, after the
+/// parameters of `model` are fitted to the readings of `truth` within their uncertainty.
 fn difference(bench: &Bench<'_>, truth: &Predicted, model: &Predicted, sensors: Sensors) -> Difference {
     let deviations = bench.deviations(&truth.readings);
     let compared: Vec<usize> = (0..truth.readings.len())
@@ -184,7 +187,8 @@ fn difference(bench: &Bench<'_>, truth: &Predicted, model: &Predicted, sensors: 
     }
 }
 
-/// Difference `apart` − Jδ at the δ that minimizes ‖apart − Jδ‖² + Σ (step·δ)², and that minimum. `columns` are the columns of J.
+/// Difference `apart` − Jδ at the δ that minimizes ‖apart − Jδ‖² + Σ (step·δ)², and that minimum. `columns` are the
+/// columns of J.
 pub(super) fn least(apart: &DVector<f64>, columns: &[DVector<f64>], steps: &[f64]) -> (DVector<f64>, f64) {
     if columns.is_empty() {
         return (apart.clone(), apart.norm_squared());

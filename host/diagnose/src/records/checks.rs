@@ -12,7 +12,8 @@ use crate::records::channel::Observed;
 use crate::signal::noise::rms;
 use quietcut_recording::Recording;
 
-/// Refuses a recording that is too short or without a channel to compare, or has a channel that is clipped, not finite, or zero throughout.
+/// Refuses a recording that is too short or without a channel to compare, or has a channel that is clipped, not finite,
+/// or zero throughout.
 pub(crate) fn record(
     baseline: &Baseline<'_>,
     recording: &Recording,
@@ -66,8 +67,8 @@ pub(crate) fn record(
     Ok(())
 }
 
-/// Ratios by which a wrong unit scales a channel up or down, each with its tolerance as a difference of logarithms, and the words for the
-/// unit that was probably meant.
+/// Ratios by which a wrong unit scales a channel up or down, each with its tolerance as a difference of logarithms, and
+/// the words for the unit that was probably meant.
 const UNITS: [(f64, f64, &str); 6] = [
     (4.448, POUND_TOLERANCE, "4.45: pounds of force for N"),
     (1e3, UNIT_TOLERANCE, "a thousand: mm, kN or g for m, N or kg"),
@@ -77,12 +78,12 @@ const UNITS: [(f64, f64, &str); 6] = [
     (9.806_65, UNIT_TOLERANCE, "9.81: g for m/s²"),
 ];
 
-/// Refuses a channel whose ratio to the prediction is outside the range from `FRICTION_RATIO` to `WRONG_UNIT_RATIO` at the same waveform,
-/// or impossible ([`far_off`]).
+/// Refuses a channel whose ratio to the prediction is outside the range from `FRICTION_RATIO` to `WRONG_UNIT_RATIO` at
+/// the same waveform, or impossible ([`far_off`]).
 ///
-/// `response` is the response to the forces alone that the baseline predicts, `measured` the samples of the channel, `by_noise` the energy
-/// of the response to force-sensor noise. The ratio is the absolute least-squares factor from the first to the second; unless impossible,
-/// it is evaluated only if they correlate.
+/// `response` is the response to the forces alone that the baseline predicts, `measured` the samples of the channel,
+/// `by_noise` the energy of the channel's response to force-sensor noise. The ratio is the absolute least-squares
+/// factor from the first to the second; unless impossible, it is evaluated only if they correlate.
 pub(crate) fn unit(
     path: &std::path::Path,
     name: &str,
@@ -96,16 +97,16 @@ pub(crate) fn unit(
     if own <= LEAST_ENERGY_OVER_FORCE_NOISE * by_noise || whole <= 0.0 {
         return Ok(());
     }
-    // An impossible ratio is refused only if the varying part of the predicted response exceeds the response to force noise: the response
-    // to a constant force says nothing about the vibration.
+    // An impossible ratio is refused only if the varying part of the predicted response exceeds the response to force
+    // noise: the response to a constant force says nothing about the vibration.
     if spread(response).powi(2) * response.len() as f64 > LEAST_ENERGY_OVER_FORCE_NOISE * by_noise {
         far_off(path, name, response, measured)?;
     }
     let factor = cross.abs() / own;
     let alike = cross * cross / (own * whole);
     let likely = likely(factor);
-    // A wrong unit is reported only at a high correlation of measured and predicted samples, higher if their ratio belongs to no known
-    // unit.
+    // A wrong unit is reported only at a high correlation of measured and predicted samples, higher if their ratio
+    // belongs to no known unit.
     let least_alike = if likely.is_some() {
         LEAST_CORRELATION_OF_KNOWN_UNIT
     } else {
@@ -123,9 +124,9 @@ pub(crate) fn unit(
     ))
 }
 
-/// Result of the unit checks of a cut: success if one channel passes or none is checked, otherwise the first refusal. If one unit is right,
-/// a ratio of another channel within the limits of [`far_off`] is not a wrong unit: a wrong edge coefficient alone changes a small axial
-/// force by a factor of ten.
+/// Result of the unit checks of a cut: success if one channel passes or none is checked, otherwise the first refusal.
+/// If one unit is right, a ratio of another channel within the limits of [`far_off`] is not a wrong unit: a wrong edge
+/// coefficient alone changes a small axial force by a factor of ten.
 pub(crate) fn unless_one_is_right(
     checked: impl IntoIterator<Item = Result<(), DiagnoseError>>,
 ) -> Result<(), DiagnoseError> {
@@ -136,9 +137,9 @@ pub(crate) fn unless_one_is_right(
     checked.into_iter().collect()
 }
 
-/// Refuses a channel whose amplitude differs from its prediction by a factor that no machine reaches, whatever its waveform. Sensor offsets
-/// are removed. A channel is too large against the prediction including its mean, because evenly pitched teeth in a slot give almost no
-/// variation; it is too small against the variation of the prediction.
+/// Refuses a channel whose amplitude differs from its prediction by a factor that no machine reaches, whatever its
+/// waveform. Sensor offsets are removed. A channel is too large against the prediction including its mean, because
+/// evenly pitched teeth in a slot give almost no variation; it is too small against the variation of the prediction.
 pub(crate) fn far_off(
     path: &std::path::Path,
     name: &str,
@@ -161,18 +162,20 @@ pub(crate) fn far_off(
     ))
 }
 
-/// Standard deviation of the samples from their mean.
+/// Root mean square of the deviations of the samples from their mean.
 fn spread(samples: &[f64]) -> f64 {
     let mean = samples.iter().sum::<f64>() / samples.len().max(1) as f64;
     rms(&samples.iter().map(|x| x - mean).collect::<Vec<_>>())
 }
 
-/// The unit mix-up (such as g for m/s²) that a fitted sensor gain may stand for; `None` if the gain is near the ratio of no such mix-up.
+/// The unit mix-up (such as g for m/s²) that a fitted sensor gain may stand for; `None` if the gain is near the ratio
+/// of no such mix-up.
 pub(crate) fn unit_of_gain(gain: f64) -> Option<&'static str> {
     unit_within(gain.abs(), |_| GAIN_UNIT_TOLERANCE)
 }
 
-/// The unit that was probably meant if a channel is larger or smaller than predicted by `factor`; `None` if no known unit has this ratio.
+/// Words for the unit mix-up that probably made a channel larger or smaller than predicted by `factor`; `None` if no
+/// known one has this ratio.
 fn likely(factor: f64) -> Option<&'static str> {
     unit_within(factor, |share| share)
 }
@@ -189,9 +192,9 @@ fn said(likely: Option<&str>) -> String {
     likely.map_or_else(String::new, |meant| format!(" It is about {meant}."))
 }
 
-/// The level at which a channel is clipped: at one end of its range, unless that is zero, it has at least two flat tops of at least three
-/// equal samples with more than the share `CLIPPED_SHARE` of all samples, or one as short as an impact with steep flanks. `None` without
-/// clipping.
+/// The level at which a channel is clipped: at one end of its range, unless that is zero, it has at least two flat tops
+/// of at least three equal samples with more than the share `CLIPPED_SHARE` of all samples, or one as short as an
+/// impact with steep flanks. `None` without clipping.
 fn clipped(samples: &[f64]) -> Option<f64> {
     let (low, high) = samples
         .iter()
@@ -229,9 +232,10 @@ fn clipped(samples: &[f64]) -> Option<f64> {
     })
 }
 
-/// True if a flat top as short as an impact has a steep flank on both sides. A smooth peak that is flat over three samples falls by at most
-/// ten levels two samples beside them: a parabola that stays within one level over three samples has a curvature of c ≤ 1 level and falls
-/// by 9c up to there, and rounding adds one level.
+/// True if, at the end `end` of a channel's range, a flat top as short as that of an impact has a steep flank on both
+/// sides. A smooth peak that is flat over three samples falls by at most ten levels two samples beside them: a parabola
+/// that stays within one level over three samples has a curvature of c ≤ 1 level and falls by 9c up to there, and
+/// rounding adds one level.
 fn has_cliff(samples: &[f64], at: impl Fn(&f64) -> bool, end: f64, resolution: f64) -> bool {
     let (mut first, mut steepest) = (0, 0.0_f64);
     while first < samples.len() {
@@ -253,8 +257,8 @@ fn has_cliff(samples: &[f64], at: impl Fn(&f64) -> bool, end: f64, resolution: f
         && steepest > CLIPPED_IMPACT_STEP * written_resolution(samples, end)
 }
 
-/// Resolution of a channel of decimal numbers: the value of the last digit of `end`, if all samples were written with as many digits as the
-/// longest one.
+/// Resolution of a channel of decimal numbers: the value of the last digit of `end`, if all samples were written with
+/// as many digits as the longest one.
 fn written_resolution(samples: &[f64], end: f64) -> f64 {
     let digits = |x: &f64| {
         let text = format!("{x:e}");

@@ -1,4 +1,4 @@
-//! Predicts the channels of a cut along its estimated motion.
+//! Predicts the channels of a recorded cut along the estimated motion of the tool.
 
 use crate::baseline::Baseline;
 use crate::criteria::CLOSED_LOOP_SETTLED;
@@ -10,14 +10,16 @@ use crate::records::{amplification, checks, motion_estimate};
 use crate::signal::noise::rms;
 use quietcut_recording::{Quantity, Recording};
 
-/// Number of iterations between cutting force and motion: the force determines the motion, and the motion determines the chip thickness and
-/// so the force.
+/// Number of iterations between the cutting force and the motion of a recorded cut: the force determines the motion,
+/// and the motion determines the chip thickness and so the force.
 const ROUNDS: usize = 4;
-/// Largest number of iterations if a candidate model supplies the motion. They end earlier if, away from chatter, the motion is within
-/// [`CLOSED_LOOP_SETTLED`] of the closed-loop prediction.
+/// Largest number of iterations between cutting force and motion of a recorded cut if a candidate model supplies the
+/// motion. They end earlier if, away from chatter, the motion is within [`CLOSED_LOOP_SETTLED`] of the closed-loop
+/// prediction.
 const ROUNDS_OF_A_MODEL: usize = 8;
 
-/// Completes the record of a cut: predicts all channels, and corrects the motion by the residual.
+/// Completes the record of a cut: predicts all channels with the baseline, and corrects the estimated motion by their
+/// residual.
 ///
 /// # Errors
 /// The case and the recording do not describe one cut, or the size of a channel is that of a wrong unit.
@@ -87,28 +89,31 @@ pub(super) fn predicted(
             check_units(&record)?;
         }
         let off = record.distance_from_closed_loop();
-        // In the first iteration the force is that of the feed alone, and not yet along the motion that a candidate model supplies.
+        // In the first iteration the force is that of the feed alone, and not yet along the motion that a candidate
+        // model supplies.
         let is_along = (round > 0 || record.clean.is_none()) && !record.amplifies;
         motion_estimate::learn(&mut record, baseline, &force, is_along.then_some(&slopes));
         if record.clean.is_some() && is_along && off < CLOSED_LOOP_SETTLED {
             break;
         }
     }
-    // The regressors of causes are differences from the cutting force along the final motion, so that force is computed here.
+    // The regressors of causes are differences from the cutting force along the final motion, so that force is computed
+    // here.
     cutting.follow(&record.motion);
     record.cut = Some(cutting);
     Ok(record)
 }
 
-/// Refuses channels whose size cannot be that of this cut. The first prediction is that for a tool that moves by the feed alone. Measured
-/// forces are close to those by the feed alone and are compared with them; motion is only checked roughly, because regeneration may amplify
-/// it.
+/// Refuses a record with a channel whose size cannot be that of this cut. The prediction at this stage is that for a
+/// tool that moves by the feed alone. Measured forces are close to those by the feed alone and are compared with them;
+/// motion is only checked roughly, because regeneration may amplify it.
 fn check_units(record: &Record) -> Result<(), DiagnoseError> {
     let mut forces = Vec::new();
     for (index, channel) in record.channels.iter().enumerate() {
         let mut response = record.decays.without(index, &channel.predicted);
         let mut measured = channel.measured.clone();
-        // Skipped samples carry the measured value as prediction; both are set to zero so that they do not count in the check of units.
+        // Skipped samples carry the measured value as prediction; both are set to zero so that they do not count in the
+        // check of units.
         for &sample in &record.skipped[index] {
             (response[sample], measured[sample]) = (0.0, 0.0);
         }
@@ -123,8 +128,8 @@ fn check_units(record: &Record) -> Result<(), DiagnoseError> {
     checks::unless_one_is_right(forces)
 }
 
-/// Excludes from the comparison the first revolutions, whose chips depend on passes before the record, and, unless the record is short, as
-/// many samples at its end.
+/// Excludes from the comparison the first revolutions of a record, whose chips depend on tooth passes before the
+/// record, and, unless the record is short, as many samples at its end.
 fn compare_without_ends(record: &mut Record, cut: &RecordedCut) {
     let (ends, count) = (cut.first_revolutions(), record.grid.count());
     record.compared = ends..if count > 4 * ends { count - ends } else { count };

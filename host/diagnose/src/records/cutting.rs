@@ -1,4 +1,4 @@
-//! The cutting force of a recorded cut along a motion.
+//! The cutting force of a recorded cut along a motion of the tool.
 
 use crate::baseline::Baseline;
 use crate::error::DiagnoseError;
@@ -12,7 +12,7 @@ use quietcut_recording::{Quantity, Recording};
 use quietcut_simulate::Cutter;
 use quietcut_simulate::path::SampledMotion;
 
-/// A recorded cut with the cutting force of the baseline along a motion.
+/// A recorded cut with the cutting force of the baseline along a motion of the tool.
 pub(crate) struct Cutting {
     /// Tool, engagement and spindle angle of the cut.
     pub cut: RecordedCut,
@@ -26,12 +26,12 @@ pub(crate) struct Cutting {
 }
 
 impl Cutting {
-    /// The cut of a recording with the cutting force of the baseline along `motion`, which has `finer` samples per sample of the record.
-    /// `with_force` is true if forces are measured.
+    /// The cut of a recording with the cutting force of the baseline along the motion `motion` of the tool, which has
+    /// `finer` samples per sample of the record. `with_force` is true if forces are measured.
     ///
     /// # Errors
-    /// The case or the recording lacks a value that describes the cut, they contradict each other, or an extension does not apply to the
-    /// cut.
+    /// The case or the recording lacks a value that describes the cut, they contradict each other, or an extension does
+    /// not apply to the cut.
     pub(super) fn new(
         baseline: &Baseline<'_>,
         recording: &Recording,
@@ -50,8 +50,8 @@ impl Cutting {
         })
     }
 
-    /// Indices of the samples of a channel that are not compared. Forces and accelerations jump when a tooth enters or leaves, and the
-    /// tachometer leaves open on which side of the jump a nearby sample lies.
+    /// Indices of the samples of a channel that are not compared. Forces and accelerations jump when a tooth enters or
+    /// leaves, and the tachometer leaves open on which side of the jump a nearby sample lies.
     pub(super) fn skipped(&self, channel: &Observed) -> Vec<usize> {
         if !matches!(channel.pickup.quantity, Quantity::Force | Quantity::Acceleration) {
             return Vec::new();
@@ -60,7 +60,8 @@ impl Cutting {
         (0..channel.measured.len()).filter(is_beside).collect()
     }
 
-    /// The cutting force linearized about the motion along which the chips are computed.
+    /// The cutting force of the baseline linearized about the motion along which the chips are computed, as means over
+    /// the record.
     pub(crate) fn mean_slopes(&self) -> MeanSlopes {
         self.chips.mean_slopes(&self.cut.cutter, &self.cut.spindle_motion)
     }
@@ -73,13 +74,14 @@ impl Cutting {
         self.force = self.force_of(&self.cut.cutter, motion);
     }
 
-    /// The cutting force of the tool `cutter` with the chips of this cut. `motion` must be the motion along which these chips were
-    /// computed.
+    /// The cutting force of the tool `cutter` with the chips of this cut. `motion` must be the motion along which these
+    /// chips were computed.
     pub(crate) fn force_of(&self, cutter: &Cutter, motion: &SampledMotion) -> CutForce {
         self.chips.force(cutter, &self.cut.spindle_motion, motion)
     }
 
-    /// The cutting force of the baseline's tool along another spindle motion or another motion of the tool, with new chips.
+    /// The cutting force of the baseline's tool along another spindle motion or another motion of the tool, with new
+    /// chips.
     pub(crate) fn force_along(&self, spindle_motion: &SpindleMotion, motion: &SampledMotion) -> CutForce {
         self.cut
             .chips(spindle_motion, motion, self.finer, self.with_force)

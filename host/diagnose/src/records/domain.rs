@@ -1,25 +1,29 @@
-//! The quantity in which a record is compared with the baseline: motion or force.
+//! The quantity in which a recording is compared with the baseline model: the motion, or the force on the structure.
 
 use crate::baseline::Baseline;
 use crate::error::DiagnoseError;
 use quietcut_recording::{Quantity, Recording, TestKind};
 
-/// The quantity in which a record is compared with the baseline.
+/// The quantity in which a recording is compared with the baseline model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Domain {
-    /// The force F is the input, and motion is compared: y − H·(F − f_r). In a cut the baseline predicts F, and a measured force is
-    /// compared too.
+    /// The force F is the input, and the motion y is compared: y − H·(F − f_r), with the receptance H and the nonlinear
+    /// restoring forces f_r of the baseline model. In a cut the baseline model predicts F, and a measured force is
+    /// compared too. A free decay has no F.
     Response,
-    /// The motion is the input (`input = ["x"]`, or a structure with a rigid-body mode), and force is compared: F − (M ẍ + C ẋ + K x +
-    /// f_r).
+    /// The motion x is the input, and the force F is compared: F − (M ẍ + C ẋ + K x + f_r). So it is if the sidecar
+    /// names a motion, as `input = ["x"]`, or, except in free decays, if the structure has a rigid-body mode; never in
+    /// a cut.
     Force,
 }
 
 impl Domain {
-    /// The domain (motion or force) in which a recording is compared, from its kind, its input and its channels, and from the structure.
+    /// The domain (motion or force) in which a recording is compared, from its kind, its input and its channels, and
+    /// from the structure.
     ///
     /// # Errors
-    /// The recording lacks a required channel, or is an idle record, which has no known excitation.
+    /// The recording lacks a required channel, or it is an idle record to be compared in motion: its excitation is not
+    /// known.
     pub(super) fn of(baseline: &Baseline<'_>, recording: &Recording) -> Result<Self, DiagnoseError> {
         let has = |quantity: Quantity| {
             recording

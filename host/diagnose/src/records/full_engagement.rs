@@ -1,10 +1,11 @@
 //! The segment of a recorded cut with full engagement.
 //!
-//! A case describes a tool at full immersion and depth. Recordings of real cuts begin and end in air, and during entry and exit the tool
-//! crosses a face of the workpiece, where the case does not define the chips. Therefore only the segment with full engagement is compared.
-//! A revolution is in air if the vibration of one channel is small both against the other revolutions of the recording and against the
-//! response of the baseline to the feed alone. The second condition is needed because chatter exceeds the response to the feed by far:
-//! before chatter has grown, revolutions are small against later ones without being in air.
+//! A case describes a cut with its whole radial engagement and axial depth. Recordings of real cuts begin and end in
+//! air, and during entry and exit the tool crosses a face of the workpiece, where the case does not define the chips.
+//! Therefore only the segment with full engagement is compared. A revolution is in air if the vibration of one channel
+//! is small both against the other revolutions of the recording and against the response of the baseline to the feed
+//! alone. The second condition is needed because chatter exceeds the response to the feed by far: before chatter has
+//! grown, the vibration of a revolution is small against that of later ones, although the tool is not in air.
 
 use quietcut_numerics::statistics::median;
 use std::borrow::Cow;
@@ -28,11 +29,12 @@ use quietcut_recording::{Quantity, Recording, TestKind};
 use quietcut_simulate::effect::Pickup;
 use quietcut_simulate::{Cutter, Spindle, WorkpieceTraverse};
 
-/// Number of angles per revolution at which the cutting force is evaluated.
+/// Number of spindle angles per revolution at which the cutting force of the feed alone is evaluated.
 const ANGLES: usize = 512;
 
-/// The recordings, each cut to its segment of full engagement, and warnings: one for each that is shortened, and one more if its tool has
-/// no diameter. Recordings that show no air, and those of other tests, stay as they are.
+/// The recordings, each shortened to its segment of full engagement, and warnings: one for each shortened recording,
+/// and one more if its tool has no diameter. Recordings of other tests stay as they are, and so do cuts in which no
+/// segment is found: without air, without a required value, or without a revolution of full vibration level.
 ///
 /// # Errors
 /// The case cannot be simulated, or a recording has too few revolutions of full engagement.
@@ -84,12 +86,14 @@ fn is_of_a_cut(recording: &Recording) -> bool {
 #[derive(Debug, PartialEq)]
 struct Engaged {
     range: Range<usize>,
-    /// False if the tool has no diameter, so that the times of entry and exit are estimated from the level of the vibration.
+    /// False if the tool has no diameter, so that the times of entry and exit are estimated from the level of the
+    /// vibration.
     has_diameter: bool,
 }
 
-/// The samples of a recorded cut with full engagement; `None` if it is not a cut, lacks a value, shows no air, or never reaches
-/// `ENGAGED_LEVEL`.
+/// The samples of a recorded cut with full engagement; `None` if the recording is not of a cut, lacks a usable
+/// tachometer or another value, shows no air, has no channel with vibration above its noise, or has no revolution in
+/// which all channels reach `ENGAGED_LEVEL`.
 fn engaged(baseline: &Baseline<'_>, recording: &Recording) -> Option<Engaged> {
     if !is_of_a_cut(recording) {
         return None;
@@ -114,8 +118,9 @@ fn engaged(baseline: &Baseline<'_>, recording: &Recording) -> Option<Engaged> {
         0 => 0.0,
         start => start as f64 + (ENTRY_MARGIN * way).max(engaged_after) + 1.0,
     };
-    // The recording may end with the cut, before the vibration has decayed; then nothing is cut off at its end. Chatter stays large until
-    // the tool has left the workpiece.
+    // The recording may end with the cut, before the vibration has decayed; then its end is kept. Otherwise the
+    // duration of the exit is subtracted: with the factor `ENTRY_MARGIN` in chatter, which stays large until the tool
+    // has left the workpiece, with `EXIT_SHARE` in a stable cut.
     let to = if cut.end == levels.count && cut.end - last <= LEAST_AIR_AT_ENDS {
         f64::INFINITY
     } else {
@@ -133,8 +138,8 @@ fn engaged(baseline: &Baseline<'_>, recording: &Recording) -> Option<Engaged> {
     })
 }
 
-/// The tool in its cut at the mean spindle speed `rpm`, rev/min; `None` if a required value is missing or wrong, which the preparation of
-/// the record reports as an error.
+/// The tool in its cut at the mean spindle speed `rpm`, rev/min; `None` if a required value is missing or wrong, which
+/// the preparation of the record reports as an error.
 fn cutter(baseline: &Baseline<'_>, recording: &Recording, rpm: f64) -> Option<Cutter> {
     let case = baseline.case;
     let depth_mm = recording.sidecar.cut?.axial_depth_mm?;
@@ -143,8 +148,8 @@ fn cutter(baseline: &Baseline<'_>, recording: &Recording, rpm: f64) -> Option<Cu
     baseline.effects.cutter(cutter.at_speed(rpm)).ok()
 }
 
-/// Response of the baseline to the chips of the feed alone: harmonics of the spindle frequency `omega`, rad/s, in force, N, and
-/// displacement, m.
+/// Cutting force of the feed alone and response of the baseline to it: complex amplitudes of force, N, and
+/// displacement, m, at the harmonics 1, 2 … of the spindle frequency `omega`, rad/s.
 struct Forced {
     omega: f64,
     harmonics: Vec<[Vector3<Complex64>; 2]>,
@@ -173,7 +178,8 @@ impl Forced {
         Self { omega, harmonics }
     }
 
-    /// Standard deviation of a channel over a revolution, in its SI unit, from the harmonics below half the sample rate.
+    /// Standard deviation over a revolution that the feed alone causes in a channel, in the channel's SI unit, from the
+    /// harmonics of the spindle frequency below half the sample rate.
     fn level(&self, pickup: &Pickup, rate_hz: f64) -> f64 {
         let squares = self.harmonics.iter().enumerate().map(|(index, [force, x])| {
             let omega = (index + 1) as f64 * self.omega;
@@ -192,7 +198,8 @@ impl Forced {
     }
 }
 
-/// Cutting force on a rigid tool without runout at one spindle angle, N.
+/// Cutting force at one spindle angle on a rigid tool without runout, whose teeth all advance by the mean feed per
+/// tooth, N.
 fn force_n(cutter: &Cutter, angle_rad: f64) -> Vector3<f64> {
     let arc = cutter.exit_rad - cutter.start_rad;
     cutter
@@ -212,22 +219,24 @@ fn force_n(cutter: &Cutter, angle_rad: f64) -> Vector3<f64> {
         .sum()
 }
 
-/// Level of each channel in each revolution: its standard deviation over a reference. The reference is the median over the revolutions, or
-/// the response to the feed alone if that is smaller, as in chatter.
+/// Vibration level of each channel in each revolution of a recorded cut: the standard deviation of the channel, without
+/// its noise, over a reference. The reference is the median of the standard deviation over the revolutions, or the
+/// standard deviation that the feed alone causes if that is smaller, as in chatter.
 struct Levels {
     count: usize,
-    /// True if the median vibration level of some channel over the revolutions exceeds the level that the feed alone causes by the factor
-    /// `CHATTER_LEVEL`.
+    /// True if the median standard deviation of some channel over the revolutions exceeds the one that the feed alone
+    /// causes by more than the factor `CHATTER_LEVEL`.
     chatters: bool,
-    /// Levels by channel and revolution.
+    /// Vibration levels by channel and revolution.
     of: Vec<Vec<f64>>,
-    /// Standard deviation of each channel's noise, divided by the channel's vibration level in the cut.
+    /// Standard deviation of each channel's noise, divided by the same reference as the vibration levels of the
+    /// channel.
     noise: Vec<f64>,
 }
 
 impl Levels {
-    /// Computes the vibration level of each channel in each revolution of a recording; `None` if no channel exceeds its noise enough to
-    /// distinguish air from cutting.
+    /// Computes the vibration levels in each revolution of a recording, of the channels that exceed their noise enough
+    /// to distinguish air from cutting; `None` if no channel does.
     fn of(
         baseline: &Baseline<'_>,
         recording: &Recording,
@@ -278,7 +287,7 @@ impl Levels {
             .fold(f64::INFINITY, f64::min)
     }
 
-    /// Ranges of successive revolutions in which the tool is in air.
+    /// Ranges of successive revolutions in which the tool is in air, by the smallest vibration level of all channels.
     fn in_air(&self) -> Vec<Range<usize>> {
         let mut in_air = Vec::new();
         let mut revolution = 0;
@@ -301,8 +310,8 @@ impl Levels {
         in_air
     }
 
-    /// True if all channels that are small in the first revolution grow in the second, as the vibration does when a cut begins with the
-    /// recording.
+    /// True if the vibration level of every channel that is below `AIR_LEVEL` in the first revolution grows in the
+    /// second, as it does when a cut begins with the recording.
     fn grows_from_rest(&self) -> bool {
         self.of
             .iter()
@@ -312,7 +321,7 @@ impl Levels {
     }
 }
 
-/// Standard deviation of the samples, with the noise variance subtracted; 0 if that is larger.
+/// Square root of the variance of the samples less the noise variance; 0 if the noise variance is larger.
 fn deviation(samples: &[f64], noise: f64) -> f64 {
     let count = samples.len().max(1) as f64;
     let mean = samples.iter().sum::<f64>() / count;
@@ -320,7 +329,8 @@ fn deviation(samples: &[f64], noise: f64) -> f64 {
     (square - noise * noise).max(0.0).sqrt()
 }
 
-/// The longest range of revolutions that is not in air, of `count` revolutions, given the ranges in air; `None` if no revolution is in air.
+/// The longest range of revolutions that is not in air, of `count` revolutions, given the ranges in air; `None` if no
+/// revolution is in air.
 fn longest_gap(in_air: &[Range<usize>], count: usize) -> Option<Range<usize>> {
     if in_air.is_empty() {
         return None;
@@ -338,8 +348,8 @@ mod tests {
     use crate::{Options, diagnose};
     use quietcut_simulate::{Entry, VirtualCut};
 
-    /// Time in which the tool crosses a face of the workpiece at 900 rev/min with two teeth and a feed of 0.15 mm per tooth, s: tool radius
-    /// over feed rate.
+    /// Time in which the tool crosses a face of the workpiece at 900 rev/min with two teeth and a feed of 0.15 mm per
+    /// tooth, s: tool radius over feed rate.
     const WAY_S: f64 = 6.35 / (0.3 * 15.0);
     const SECONDS: f64 = 8.0;
     const AIR_S: f64 = 0.2;
@@ -378,8 +388,8 @@ mod tests {
             let Engaged { range, .. } = engaged(&Baseline::new(&case).unwrap(), &recording).unwrap();
             let [from_s, to_s] = [range.start, range.end].map(|sample| recording.time_s(sample));
             println!("{name} {depth_mm} mm {entry:?} {measured:?}: {from_s} to {to_s} s");
-            // The tool first touches the workpiece at `AIR_S` from the start of the recording, and leaves it at `AIR_S` from the end. Slow
-            // free decays after the exit resemble a part of the cut.
+            // The tool first touches the workpiece at `AIR_S` from the start of the recording, and leaves it at `AIR_S`
+            // from the end. Slow free decays after the exit resemble a part of the cut.
             let way_s = if entry == ramp { 1.0 } else { WAY_S };
             let touches = [AIR_S, SECONDS - AIR_S];
             assert!(from_s >= touches[0] + way_s && from_s < touches[0] + 1.6 * WAY_S);
@@ -409,7 +419,8 @@ mod tests {
 
     #[test]
     fn a_cut_is_diagnosed_in_its_segment_of_full_engagement() {
-        // Speed modulation and wear are functions of the time from the start of the recording, not from the start of full engagement.
+        // Speed modulation and wear are functions of the time from the start of the recording, not from the start of
+        // full engagement.
         let modulation =
             "\n[extension.speed-fluctuation]\ndelta = 0.01\nfrequency_hz = 0.7\nphase_deg = 40.0\n";
         let wear = "\n[extension.wear]\nrelative_rate_per_s = 0.1\n";

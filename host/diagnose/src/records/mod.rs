@@ -1,8 +1,8 @@
 //! Recordings prepared for comparison, each with the prediction of the baseline.
 //!
-//! The files build on each other from the top to the bottom: `domain` and `channel`; `checks` and `full_engagement`, which refuse or
-//! shorten recordings; `cutting`; `record`; `motion_estimate` and `amplification`; `response_prediction` and `cut_prediction`;
-//! `prepare`, the one place where a record is built; `study`.
+//! The files build on each other from the top to the bottom: `domain` and `channel`; `checks` and `full_engagement`,
+//! which refuse or shorten recordings; `cutting`; `record`; `motion_estimate` and `amplification`;
+//! `response_prediction` and `cut_prediction`; `prepare`, the one place where a record is built; `study`.
 
 pub(crate) mod amplification;
 pub(crate) mod channel;

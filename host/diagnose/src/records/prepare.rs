@@ -1,9 +1,9 @@
-//! Builds records, in stages that each return a new value.
+//! Builds records, in three stages.
 //!
 //! 1. [`opened`]: channels, transforms and transfer functions of a recording that passed its checks.
 //! 2. The prediction of the baseline, and with it the motion: [`response_prediction`] for a test of the structure,
 //!    [`cut_prediction`] for a cut, [`motion_estimate`] if forces are compared.
-//! 3. [`checked`], for all but compared forces: refuses a record if the size of its channels shows a wrong unit.
+//! 3. [`checked`], unless forces are compared: refuses a record if the amplitude of its channels shows a wrong unit.
 
 use crate::baseline::Baseline;
 use crate::baseline::dynamic_stiffness;
@@ -20,15 +20,15 @@ use crate::signal::noise::{BANDS, floor_between_impacts, rms, white_floor};
 use quietcut_recording::{Quantity, Recording, TestKind};
 use quietcut_simulate::path::SampledMotion;
 
-/// Oversampling factor of the grid on which a cut's force and motion are computed. It is high because the force jumps when teeth enter
-/// and leave.
+/// Oversampling factor of the time grid on which the cutting force and the motion of a recorded cut are computed. It is
+/// high because the force jumps when teeth enter and leave the workpiece.
 const FINER_IN_CUTS: usize = 8;
 
 /// Prepares a recording for comparison: a record with the prediction of the baseline.
 ///
 /// # Errors
-/// The recording cannot be compared. It is, for example, too short, clipped, without a required channel, in a wrong unit, or of a kind
-/// without a known excitation.
+/// The recording cannot be compared. It is, for example, too short, clipped, without a required channel, in a wrong
+/// unit, or of a kind without a known excitation.
 pub(super) fn prepare(
     baseline: &Baseline<'_>,
     recording: &Recording,
@@ -68,13 +68,15 @@ fn opened(baseline: &Baseline<'_>, recording: &Recording, known: Known) -> Resul
     checks::record(baseline, recording, &channels)?;
     let highest_hz = highest_hz(recording);
     let rate_hz = recording.sample_rate_hz;
-    // The upsampled grid must represent harmonics of nonlinear restoring forces up to the sixteenth of `highest_hz`, the end of the
-    // measured motion's band: they lie below half the upsampled rate. The oversampling factor does not exceed 8, even if fewer harmonics fit.
+    // The upsampled grid must represent harmonics of nonlinear restoring forces up to 16 times `highest_hz`, the upper
+    // end of the band of the measured motion: they lie below half the upsampled rate. The oversampling factor does not
+    // exceed 8, even if fewer harmonics are then represented.
     let finer = ((32.0 * highest_hz / rate_hz).ceil() as usize)
         .clamp(if is_cut { FINER_IN_CUTS } else { 1 }, 8)
         .next_power_of_two();
-    // Duration of the zero padding of a record, in longest time constants of the structure. In a cut it may be shorter: the circular
-    // convolution wraps its end around to its beginning, where it is a free decay, which is subtracted.
+    // Duration of the zero padding of a record, in longest time constants of the structure. In a cut it may be shorter:
+    // the circular convolution wraps the decay after the end of the record around to its beginning, where the fitted
+    // free decay contains it.
     let decays = if is_cut { 2.0 } else { 8.0 };
     let room_s = decays * baseline.slowest_decay_s();
     let grid = Grid::new(recording.len(), rate_hz, room_s, finer);
@@ -132,12 +134,14 @@ fn opened(baseline: &Baseline<'_>, recording: &Recording, known: Known) -> Resul
     Ok(record)
 }
 
-/// Returns the record unless the size of a channel shows a wrong unit; a cut is returned if one channel passes. In a cut only channels of
-/// motion are checked here; its forces were checked in the first prediction.
+/// Returns the record unless the amplitude of a channel shows a wrong unit; a cut is returned if one checked channel
+/// passes. In a cut only channels of motion are checked here; its forces were checked when its channels were first
+/// predicted.
 fn checked(record: Record) -> Result<Record, DiagnoseError> {
     let is_cut = record.kind == Some(TestKind::Cutting);
     let checked = |(index, channel): (usize, &Observed)| {
-        // A channel along an axis without force is not checked: a small cross-axis sensitivity of its sensor may exceed the predicted motion.
+        // A channel along an axis without force is not checked: a small cross-axis sensitivity of its sensor may exceed
+        // the predicted motion.
         let axis = main_axis(channel)?;
         if record.force_n[axis].is_empty() || is_cut && channel.pickup.quantity == Quantity::Force {
             return None;
@@ -158,14 +162,14 @@ fn checked(record: Record) -> Result<Record, DiagnoseError> {
     Ok(record)
 }
 
-/// Energy Σ y² of a channel's response to force-sensor noise, over the samples of the record.
+/// Expected energy Σ y² of a channel's response y to force-sensor noise, over the samples of the record.
 fn energy_by_force_noise(record: &Record, channel: usize) -> f64 {
     let power = record.power_by_force_noise(channel);
     power.iter().sum::<f64>() / BANDS as f64 * record.grid.count() as f64
 }
 
-/// Measured forces along the axes of the baseline, N, divided by the gains of the force sensors in the baseline; empty along an axis
-/// without force channel.
+/// Measured forces along the axes of the baseline, N, divided by the gains of the force sensors in the baseline; empty
+/// along an axis without force channel, or along which the structure does not move.
 fn forces(baseline: &Baseline<'_>, recording: &Recording) -> [Vec<f64>; 3] {
     std::array::from_fn(|axis| {
         let name = ["fx", "fy", "fz"][axis];
@@ -219,8 +223,8 @@ fn channels(baseline: &Baseline<'_>, recording: &Recording, domain: Domain) -> V
             let pickup = baseline.pickup(&channel.name)?;
             let axes_known = (0..3).all(|axis| pickup.weights[axis] == 0.0 || baseline.axes.contains(&axis));
             let is_force = pickup.quantity == Quantity::Force;
-            // Channels of force are compared in the force domain and in cuts, where the force is an output too; all others in the response
-            // domain.
+            // Channels of force are compared in the force domain, and in cuts, where the cutting force is predicted
+            // too; channels of motion are compared in the response domain.
             let compared =
                 is_force == (domain == Domain::Force) || recording.sidecar.kind == Some(TestKind::Cutting);
             let is_mean = baseline.velocity_jumps && pickup.quantity == Quantity::Acceleration;
@@ -240,7 +244,8 @@ fn channels(baseline: &Baseline<'_>, recording: &Recording, domain: Domain) -> V
         .collect()
 }
 
-/// Frequency below which the share [`MOTION_BAND_SHARE`] of the power of every channel of motion lies, Hz; at least three times the resolution of the record.
+/// Frequency below which the share [`MOTION_BAND_SHARE`] of the power of every channel of motion lies, Hz; at least
+/// three times the frequency resolution 1/duration of the recording.
 fn highest_hz(recording: &Recording) -> f64 {
     let grid = Grid::new(recording.len(), recording.sample_rate_hz, 0.0, 1);
     let of_motion = recording.channels.iter().filter(|channel| {

@@ -19,8 +19,8 @@ use crate::signal::noise::{BANDS, floor_between_lines, rms, white_floor_beside};
 use quietcut_recording::{Quantity, TestKind};
 use quietcut_simulate::path::{SampledMotion, restoring_along};
 
-/// For each axis of the force: response of one channel per newton at the bins of the upsampled spectrum; empty for an axis to which the
-/// channel does not respond.
+/// For each axis of the force: frequency response of one channel, in its unit per newton, at the bins of the upsampled
+/// spectrum. Empty along an axis in which the structure does not move, and for a channel of force.
 pub(crate) type Responses = [Vec<Complex64>; 3];
 
 /// Noise-free samples of a record's channels, as an extended case predicts them.
@@ -46,45 +46,54 @@ pub(crate) struct Record {
     pub grid: Grid,
     /// Channels that are compared.
     pub channels: Vec<Observed>,
-    /// Forces that excite the structure along the machine's axes, N; empty for an axis without force.
+    /// Forces on the structure along the machine's axes at the samples of the record, N: the measured ones, or in a cut
+    /// the cutting force that the baseline predicts. Empty for an axis without force.
     pub force_n: [Vec<f64>; 3],
-    /// Noise floor of each force as a standard deviation of white noise, N: sensor noise and aliased force.
+    /// Noise floor of each measured force as a standard deviation of white noise, N: sensor noise and aliased force.
+    /// Zero in a cut.
     pub force_deviation_n: [f64; 3],
-    /// Estimated motion of the tool: the predicted displacement, corrected at each frequency towards the measured one by a weight from 0 to
-    /// 1 (Wiener). In the force domain: the measured motion within its band.
+    /// Estimated displacement and velocity of the tool, upsampled: the predicted displacement, corrected at each
+    /// frequency towards the measured one by a weight from 0 to 1 (Wiener), with its derivative. In the force domain:
+    /// the measured motion within its band.
     pub motion: SampledMotion,
-    /// Spectra of the estimated displacement at the samples of the record, m; beyond both ends of the record the displacement is continued
-    /// by reflection and fades out.
+    /// Spectra of the estimated displacement at the samples of the record, m; beyond both ends of the record the
+    /// displacement is continued by reflection and fades out.
     pub displacement: [Vec<Complex64>; 3],
-    /// For each channel, in a cut: the estimated motion as this channel reads it, with aliasing, in the unit of the channel.
+    /// For each channel, in a cut: the estimated motion as this channel reads it, in the unit of the channel; for a
+    /// channel of force, its predicted samples.
     pub readings: Vec<Vec<f64>>,
-    /// Frequency below which 99.5 % of the power of each channel of motion lies, Hz; at least three times the resolution of the record.
+    /// Frequency below which 99.5 % of the power of each channel of motion lies, Hz; at least three times the frequency
+    /// resolution 1/duration of the record.
     pub highest_hz: f64,
     /// Lowest natural frequency of the baseline, Hz; 0 without oscillating modes.
     pub lowest_hz: f64,
     /// Highest frequency at which the record is compared with the prediction, Hz.
     pub band_hz: f64,
-    /// Receptance H(iω) of the baseline, m/N, at the bins of the upsampled spectrum. In the force domain: dynamic stiffness, N/m, at the
-    /// bins of the samples.
+    /// Receptance H(iω) of the baseline, m/N, at the bins of the upsampled spectrum. In the force domain: dynamic
+    /// stiffness of the baseline, N/m, at the bins of the spectrum that is not upsampled.
     pub transfer: Vec<Matrix3<Complex64>>,
-    /// For each channel: its frequency response per newton of force, at the bins of the upsampled spectrum.
+    /// For each channel: its frequency response per newton of force, at the bins of the upsampled spectrum. Empty in
+    /// the force domain.
     pub(super) responses: Vec<Responses>,
-    /// Range of the samples of the record that are compared with the prediction. Samples before it only determine later chips. Near the end
-    /// of a cut the motion is less certain if its sensors measure velocity or acceleration.
+    /// Range of the samples of the record that are compared with the prediction: all, except near the ends of a cut.
+    /// The samples at its beginning only determine later chips. Near its end the motion is less certain if its sensors
+    /// measure velocity or acceleration.
     pub compared: Range<usize>,
     /// For each channel: indices of samples that are not compared, such as those beside a jump of the cutting force.
     pub skipped: Vec<Vec<usize>>,
-    /// Free decays of the baseline in each channel.
+    /// Free decays of the baseline in each channel, and the fitted initial state of the record.
     pub decays: Decays,
     /// The cut with its force, if the record is of a cut.
     pub cut: Option<Cutting>,
-    /// By channel, in a cut: prediction of the baseline in closed loop, in which the predicted motion determines the chips.
+    /// By channel, in a cut: prediction of the baseline in closed loop, in which the predicted motion determines the
+    /// chips.
     pub(super) closed: Option<Vec<Vec<f64>>>,
     /// Noise-free samples that determine the motion instead of the measured ones, if an extended case supplies them.
     pub clean: Option<Clean>,
-    /// True for a cut near chatter, whose motion is taken as measured (see `amplification`).
+    /// True for a cut near or in chatter, whose motion is taken as measured (see `amplification`).
     pub(crate) amplifies: bool,
-    /// By axis, in a cut: weight of the measured motion in the estimated one, 0 to 1, at the bins of the samples.
+    /// By axis, in the response domain: weight of the measured motion in the estimated one, 0 to 1, at the bins of the
+    /// spectrum that is not upsampled.
     pub(crate) measured_share: [Vec<f64>; 3],
 }
 
@@ -93,12 +102,15 @@ pub(crate) struct Record {
 pub(crate) struct Known {
     /// Noise-free samples of the channels.
     pub(crate) clean: Option<Clean>,
-    /// True if the cut is known to be near chatter, false if it is known not to be; `None` if the record itself decides.
+    /// True if the cut is known to be near or in chatter, false if it is known not to be; `None` if the record itself
+    /// decides.
     pub(crate) amplifies: Option<bool>,
 }
 
 impl Record {
-    /// Noise variance of a channel from the noise of the force sensors, in bands up to half the sample rate: the mean of σ² |H|² in each.
+    /// Noise variance that the noise of the force sensors causes in a channel, in frequency bands up to half the sample
+    /// rate: the mean over each band of Σ σ² |H|² over the forces, with the noise σ of a force and the channel's
+    /// frequency response H to it.
     pub(super) fn power_by_force_noise(&self, channel: usize) -> [f64; BANDS] {
         let per_band = std::f64::consts::PI * self.grid.rate_hz() / BANDS as f64 / self.grid.omega(1);
         let from = |band: usize| (band as f64 * per_band).round() as usize;
@@ -116,8 +128,8 @@ impl Record {
         })
     }
 
-    /// True if a force acts along `axis`, or if the RMS of a channel that reads `axis` exceeds `MOVING_OVER_NOISE` standard deviations of its
-    /// noise.
+    /// True if the structure can move along `axis`, and a force acts along `axis` or the RMS of a channel that reads
+    /// `axis` exceeds `MOVING_OVER_NOISE` standard deviations of its noise.
     pub(crate) fn moves(&self, axis: usize) -> bool {
         !self.motion.x[axis].is_empty()
             && (self.channels.iter().any(|channel| {
@@ -126,14 +138,14 @@ impl Record {
             }) || !self.force_n[axis].is_empty())
     }
 
-    /// Samples of a channel's response to forces along the machine's axes. The forces are spectra at the bins of the samples or of the
-    /// upsampled signal.
+    /// Samples of a channel's response to forces along the machine's axes. `force` holds the spectra of the forces,
+    /// upsampled or not.
     pub(crate) fn read_response(&self, force: &[Option<Vec<Complex64>>; 3], channel: usize) -> Vec<f64> {
         self.read_by(force, &self.responses[channel], channel)
     }
 
-    /// Samples of a channel's response to forces along the machine's axes, for the given `responses` per newton instead of the channel's
-    /// own; otherwise as [`Self::read_response`].
+    /// Samples of a channel's response to forces along the machine's axes, for the given `responses` per newton instead
+    /// of the channel's own; otherwise as [`Self::read_response`].
     pub(crate) fn read_by(
         &self,
         force: &[Option<Vec<Complex64>>; 3],
@@ -160,8 +172,8 @@ impl Record {
         }
     }
 
-    /// Delay of an acceleration channel in a cut, s. Its reading has steps, so the delay is applied in the time domain, and the channel's
-    /// `responses` do not contain it. Zero for other channels.
+    /// Delay of an acceleration channel in a cut, s. Its reading has steps, so the delay is applied in the time domain,
+    /// and the channel's `responses` do not contain it. Zero for other channels and in other tests.
     fn step_delay_s(&self, channel: &Observed) -> f64 {
         let reads_steps =
             self.kind == Some(TestKind::Cutting) && channel.pickup.quantity == Quantity::Acceleration;
@@ -173,7 +185,8 @@ impl Record {
         self.responses.iter().any(|response| !response[axis].is_empty())
     }
 
-    /// Response of a channel per newton at the bins of the upsampled spectrum, for the receptance `transfer` at its sensor, m/N.
+    /// Response of a channel per newton at the bins of the upsampled spectrum, for the receptance `transfer` at its
+    /// sensor, m/N.
     pub(crate) fn responses_by(
         &self,
         channel: &Observed,
@@ -199,14 +212,14 @@ impl Record {
         })
     }
 
-    /// Receptance at a channel's sensor at the bins of the upsampled spectrum, m/N: that at the tool tip, unless the baseline has mode
-    /// shapes at the sensor.
+    /// Receptance at a channel's sensor at the bins of the upsampled spectrum, m/N: that at the tool tip, unless the
+    /// baseline has mode shapes at the sensor.
     pub(crate) fn seen_by<'a>(&'a self, channel: &'a Observed) -> &'a [Matrix3<Complex64>] {
         channel.seen.as_deref().unwrap_or(&self.transfer)
     }
 
-    /// Transfer function [`Observed::factor`] from displacement to the channel's reading, at a frequency bin. It is zero at the last bin of
-    /// the upsampled spectrum, where it would not be real.
+    /// Transfer function [`Observed::factor`] from displacement to the channel's reading, at a frequency bin. It is
+    /// zero at the last bin of the upsampled spectrum, where it would not be real.
     pub(crate) fn factor(&self, channel: &Observed, bin: usize) -> Complex64 {
         if bin + 1 == self.grid.fine_bins() {
             Complex64::ZERO
@@ -215,7 +228,8 @@ impl Record {
         }
     }
 
-    /// Adds −f_r, the restoring forces of the baseline along the motion, to the spectra `force`.
+    /// Adds −f_r to the force spectra `force`: f_r are the restoring forces along the motion that the linear structure
+    /// of the baseline does not contain.
     pub(crate) fn add_terms(&self, baseline: &Baseline<'_>, force: &mut [Option<Vec<Complex64>>; 3]) {
         for term in &baseline.terms {
             let restoring = restoring_along(&**term, &self.motion);
@@ -233,14 +247,15 @@ impl Record {
         }
     }
 
-    /// Computes the unit free decays of the baseline in every channel.
+    /// Computes the free decays of the baseline in every channel, each from a unit initial value of one state variable.
     pub(crate) fn prepare_decays(&mut self, baseline: &Baseline<'_>) {
         let pickups = self.channels.iter().map(|channel| &channel.pickup);
         self.decays = Decays::of(baseline, &self.grid, pickups, &self.skipped);
     }
 
-    /// Accepts the samples `predicted`, which contain no free decay, as prediction of the record: sets samples that are not compared to the
-    /// measured value, adds the best-fitting free decay, and estimates the noise from the residual unless an extended case supplies it.
+    /// Accepts the samples `predicted`, which contain no free decay, as prediction of the record: sets samples that are
+    /// not compared to the measured value, adds the best-fitting free decay, and estimates the noise from the residual
+    /// unless an extended case supplies it.
     pub(crate) fn accept(&mut self, predicted: Vec<Vec<f64>>) {
         for ((channel, mut predicted), skipped) in self.channels.iter_mut().zip(predicted).zip(&self.skipped)
         {
@@ -272,8 +287,9 @@ impl Record {
         }
     }
 
-    /// Stores the closed-loop prediction, in which the predicted motion determines the chips. Samples that are not compared take the
-    /// predicted value. If an extended case supplied the motion, this prediction becomes the motion.
+    /// Stores the closed-loop prediction, in which the predicted motion determines the chips. Samples that are not
+    /// compared take the value of the prediction along the estimated motion. If an extended case supplied noise-free
+    /// samples, the closed-loop prediction replaces them.
     pub(crate) fn close(&mut self, mut closed: Vec<Vec<f64>>) {
         for ((closed, channel), skipped) in closed.iter_mut().zip(&self.channels).zip(&self.skipped) {
             for &sample in skipped {
@@ -286,8 +302,9 @@ impl Record {
         self.closed = Some(closed);
     }
 
-    /// Largest root mean square, over the channels of motion, of [`Self::to_correct`] in the compared samples, in standard deviations of the
-    /// channel's noise. If an extended case supplies the motion, it is the distance of that motion from the prediction along it.
+    /// Largest root mean square, over the channels of motion, of the measured minus the predicted samples in the
+    /// compared range, in standard deviations of the channel's noise. If an extended case supplies noise-free samples,
+    /// they replace the measured ones: it is then the distance of their motion from the prediction along it.
     pub(crate) fn distance_from_closed_loop(&self) -> f64 {
         (0..self.channels.len())
             .filter(|index| self.channels[*index].pickup.quantity != Quantity::Force)
@@ -295,7 +312,8 @@ impl Record {
             .fold(0.0, f64::max)
     }
 
-    /// Noise-free samples of the channels under the assumption that the baseline is right.
+    /// Noise-free samples of the channels under the assumption that the baseline is right: the closed-loop prediction
+    /// if there is one, otherwise the prediction along the estimated motion.
     pub(crate) fn predicted(&self) -> Clean {
         let open = || {
             self.channels
@@ -309,8 +327,8 @@ impl Record {
         }
     }
 
-    /// Error of a channel's prediction by which the motion is corrected: measured samples, or noise-free ones of an extended case if known,
-    /// minus predicted samples.
+    /// Prediction error of a channel from which the motion is corrected: measured samples, or noise-free ones of an
+    /// extended case if known, minus predicted samples.
     pub(crate) fn to_correct(&self, channel: usize) -> Vec<f64> {
         let observed = &self.channels[channel];
         match &self.clean {
@@ -322,8 +340,8 @@ impl Record {
         }
     }
 
-    /// Samples of every channel for a cutting force: the response to it, or the force itself. Motion is sampled without anti-aliasing
-    /// filter: content above half the sample rate is aliased.
+    /// Samples of every channel for a cutting force: the response to it, or the force itself. Motion is sampled without
+    /// anti-aliasing filter: content above half the sample rate is aliased.
     pub(crate) fn read_cut(&self, force: &CutForce) -> Vec<Vec<f64>> {
         let spectra = self.cut_spectra(force);
         self.channels
@@ -344,8 +362,8 @@ impl Record {
             .collect()
     }
 
-    /// Spectra of a cutting force on the upsampled grid, corrected for the averaging over its intervals; `None` along an axis without
-    /// response.
+    /// Spectra of a cutting force on the upsampled grid, corrected for the averaging over its intervals; `None` along
+    /// an axis of the force to which no channel responds.
     pub(crate) fn cut_spectra(&self, force: &CutForce) -> [Option<Vec<Complex64>>; 3] {
         let step_s = 1.0 / (self.grid.rate_hz() * self.grid.finer() as f64);
         std::array::from_fn(|axis| {

@@ -7,11 +7,12 @@ use crate::baseline::Baseline;
 use crate::records::motion_estimate;
 use crate::records::record::Record;
 
-/// Fixed-point iterations between the motion and the nonlinear restoring forces of the baseline. A linear baseline needs one.
+/// Number of fixed-point iterations between the motion and the nonlinear restoring forces of the baseline. A linear
+/// baseline needs one.
 const ROUNDS: usize = 4;
 
-/// Completes the record of a test of the structure: predicts all channels from the measured forces and the restoring forces of the baseline
-/// along the motion, and corrects the motion by the residual.
+/// Completes the record of a test of the structure: predicts all channels from the measured forces and the restoring
+/// forces of the baseline along the motion, and corrects the motion by the residual.
 pub(super) fn predicted(mut record: Record, baseline: &Baseline<'_>) -> Record {
     record.prepare_decays(baseline);
     let rounds = if baseline.terms.is_empty() { 1 } else { ROUNDS };
@@ -34,7 +35,7 @@ pub(super) fn predicted(mut record: Record, baseline: &Baseline<'_>) -> Record {
     record
 }
 
-/// Predicts every channel as its response to the spectra `force` plus the best-fitting free decay.
+/// Predicts every channel as its response to the force spectra `force` plus the best-fitting free decay.
 fn accept_response(record: &mut Record, force: &[Option<Vec<Complex64>>; 3]) {
     let predicted: Vec<Vec<f64>> = (0..record.channels.len())
         .into_par_iter()

@@ -26,11 +26,12 @@ impl<'a> Study<'a> {
         Self::with(case, recordings, |_| Known::default())
     }
 
-    /// [`Self::new`] with information on each record from an earlier prediction, such as noise-free samples of its channels.
+    /// [`Self::new`] with information on each record from an earlier prediction, such as noise-free samples of its
+    /// channels.
     ///
-    /// Along a measured motion every regressor contains the noise of that motion, and so does the residual. This biases coefficients by
-    /// about (noise/signal)², relative, which exceeds their standard deviation if (noise/signal)·√(number of samples) > 1. Along the motion
-    /// of a candidate model there is no such bias.
+    /// Along a measured motion every regressor contains the noise of that motion, and so does the residual. This biases
+    /// coefficients by about (noise/signal)², relative, which exceeds their standard deviation if
+    /// (noise/signal)·√(number of samples) > 1. Along the motion of a candidate model there is no such bias.
     ///
     /// # Errors
     /// No recording is given, the case cannot be simulated, or a recording cannot be compared.
@@ -51,7 +52,7 @@ impl<'a> Study<'a> {
         Ok(Self { baseline, records })
     }
 
-    /// Axes of the machine along which some record has a force or a motion above the noise.
+    /// Axes of the machine along which the structure moves and some record has a force, or a motion above the noise.
     pub(crate) fn driven_axes(&self) -> Vec<usize> {
         self.baseline
             .axes
@@ -66,8 +67,8 @@ impl<'a> Study<'a> {
         self.records.iter().all(|record| record.domain == domain)
     }
 
-    /// True if a sidecar places the sensor of `channel` away from the tool tip. With `None` as `channel`, true if that holds for any
-    /// channel.
+    /// True if a sidecar places the sensor of `channel` away from the tool tip. With `None` as `channel`, true if that
+    /// holds for any channel.
     pub(crate) fn sits_elsewhere(&self, channel: Option<&str>) -> bool {
         self.records
             .iter()

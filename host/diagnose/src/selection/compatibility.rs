@@ -8,9 +8,10 @@ use quietcut_model::effects::{Argument, Class};
 impl Library {
     /// True if a further cause may join a candidate model.
     ///
-    /// A case holds one extension of a name, so that the same cause cannot act twice. Three terms in the displacement along one axis, or
-    /// three in the velocity, are the series expansion of an unknown law, and no causes. A time-varying spring counts as a spring.
-    /// Hysteresis, which acts like friction before it slips, counts as friction. Causes that share a term are not identifiable together.
+    /// A case holds one extension of a name, so that the same cause cannot act twice. Three restoring forces of the
+    /// displacement along one axis, or three of the velocity, are the series expansion of an unknown law, and no
+    /// causes. A time-varying spring counts as a spring. Hysteresis, which acts like friction before it slips, counts
+    /// as friction. Causes that share a term of the equation are not identifiable together.
     pub(crate) fn may_act_together(&self, some: &[Choice], other: Choice) -> bool {
         let new = self.cause(other.candidate).names();
         let is_new = some.iter().all(|choice| {
@@ -52,8 +53,8 @@ impl Library {
         one.choices.len() == other.choices.len() && one.choices.iter().all(|choice| is_in(choice, other))
     }
 
-    /// True for two causes that share a term at a common location, and are therefore not identifiable together. For example,
-    /// softening-hardening contains a cubic spring, and a ratio for each mode of a channel contains its gain.
+    /// True for two causes that share a term at a common location, and are therefore not identifiable together. For
+    /// example, softening-hardening contains a cubic spring, and a ratio for each mode of a channel contains its gain.
     fn share_a_term(&self, one: Choice, other: Choice) -> bool {
         let effect = |choice: Choice| self.cause(choice.candidate).effect();
         if !effect(one).spec().shares_term_with.contains(&effect(other)) {
@@ -68,7 +69,7 @@ impl Library {
         }
     }
 
-    /// True for two restoring forces in the same variable along a common axis.
+    /// True for two restoring forces of the same variable, displacement or velocity, along a common axis.
     fn are_in_same_variable(&self, one: Choice, other: Choice) -> bool {
         match (self.law(one), self.law(other)) {
             (Some((law, location)), Some((other_law, other_location))) => {
@@ -78,7 +79,8 @@ impl Library {
         }
     }
 
-    /// The variable of a restoring force (displacement or velocity) and its location; `None` for other causes and for coupled modes.
+    /// The variable of a restoring force (displacement or velocity) and its location; `None` for other causes and for
+    /// mode coupling, whose force depends on two displacements.
     fn law(&self, choice: Choice) -> Option<(Argument, &Location)> {
         match self.cause(choice.candidate).effect().spec().class {
             Class::RestoringForce(Argument::TwoDisplacements) => None,

@@ -1,8 +1,9 @@
 //! Searches a further cause with the extended case as the baseline.
 //!
-//! Regressors are filtered by the receptance H of the baseline: y = H(iω)·f. If a cause moves a resonance by more than its bandwidth, that
-//! receptance is far from that of the machine, and the regressors of further causes do not fit. With the extended case as the baseline,
-//! regressors and residual are linearized at the last point of the Gauss–Newton iteration instead of the first.
+//! Regressors are filtered by the receptance H of the baseline: y = H(iω)·f. If a cause moves a resonance by more than
+//! its bandwidth, that receptance is far from that of the machine, and the regressors of further causes do not fit.
+//! With the extended case as the baseline, regressors and residual are linearized at the last point of the Gauss–Newton
+//! iteration instead of the first.
 
 use nalgebra::DMatrix;
 
@@ -15,8 +16,10 @@ use crate::selection::search::singles;
 use quietcut_model::case::Case;
 use quietcut_recording::Recording;
 
-/// Candidate models that consist of `base` and one further cause, found with the extended case of `base` as the baseline, best first. Empty
-/// if `base` does not change the state matrix of the linear structure, or if the recordings cannot be compared with the extended case.
+/// Candidate models that consist of `base` and one further cause, found with the extended case of `base` as the
+/// baseline, best first: by ascending χ² plus the price of the parameters. Empty if `base` does not change the state
+/// matrix of the linear structure, if one of its parameters is not physical, or if the recordings cannot be compared
+/// with the extended case.
 pub(crate) fn extended_rebaselined(
     study: &Study<'_>,
     recordings: &[Recording],

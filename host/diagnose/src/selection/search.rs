@@ -10,7 +10,7 @@ use crate::records::study::Study;
 /// Number of candidate models of two causes, the first of the sorted list, to which a third cause is added.
 const PAIRS_KEPT: usize = 24;
 
-/// The candidate models of one cause, for each candidate the best set of nonlinear parameters; best model first.
+/// The candidate models of one cause, for each candidate the best set of nonlinear parameters; by ascending χ².
 pub(crate) fn singles(library: &Library, study: &Study<'_>, regression: &Regression) -> Vec<CandidateModel> {
     let found = library
         .choices()
@@ -20,7 +20,8 @@ pub(crate) fn singles(library: &Library, study: &Study<'_>, regression: &Regress
     best_of_each(found)
 }
 
-/// The candidate models of two causes, for each pair of candidates the best sets of nonlinear parameters; best model first.
+/// The candidate models of two causes, for each pair of candidates the best sets of nonlinear parameters; by ascending
+/// χ².
 pub(crate) fn pairs(library: &Library, study: &Study<'_>, regression: &Regression) -> Vec<CandidateModel> {
     let choices = library.choices();
     let found = choices
@@ -37,8 +38,8 @@ pub(crate) fn pairs(library: &Library, study: &Study<'_>, regression: &Regressio
     best_of_each(found)
 }
 
-/// The candidate models of three causes that contain one of the best pairs, for each triple of candidates the best sets of nonlinear
-/// parameters; best model first.
+/// The candidate models of three causes that contain one of the first [`PAIRS_KEPT`] models of `pairs`, for each triple
+/// of candidates the best sets of nonlinear parameters; by ascending χ².
 pub(crate) fn triples(
     library: &Library,
     study: &Study<'_>,

@@ -1,5 +1,5 @@
-//! Selection of a candidate model: a further cause is accepted if it decreases χ² by more than the price of its parameters, explains enough
-//! of the residual, and does not increase the held-out χ² beyond chance.
+//! Selection of a candidate model: a further cause is accepted if it decreases χ² by more than the price of its
+//! parameters, explains enough of the residual, and does not increase the held-out χ² beyond chance.
 
 use crate::criteria::{
     CHANCE, EQUIVALENT, INTERPOLATION_ERROR, LEAST_GAIN, LEAST_SHARE, LEAST_SHARE_BESIDE_ENOUGH,
@@ -21,18 +21,19 @@ use quietcut_recording::Recording;
 
 /// Largest number of causes in a candidate model.
 const CAUSES: usize = 3;
-/// Number of candidate models with the largest gain in the regression that are simulated: among models of one, of two and of three causes.
+/// Number of candidate models with the largest gain in the regression that are simulated: among models of one, of two
+/// and of three causes.
 const SIMULATED: [usize; CAUSES] = [9, 5, 3];
 
 /// The selected candidate model, and those that are equivalent to it.
 pub(crate) struct Selection {
     pub(crate) best: Option<CandidateModel>,
     pub(crate) others: Vec<CandidateModel>,
-    /// Lead of the selected candidate model: its gain (decrease of χ² minus the price of its parameters) minus that of its best rival;
-    /// infinite without a rival.
+    /// Lead of the selected candidate model: its gain (decrease of χ² minus the price of its parameters) minus that of
+    /// its best rival; infinite without a rival.
     pub(crate) ahead: f64,
-    /// Gain of the selected candidate model (decrease of χ² minus the price of its parameters) minus that of the model selected
-    /// before it with fewer causes, or 0 for the baseline.
+    /// Gain of the selected candidate model (decrease of χ² minus the price of its parameters) minus that of the model
+    /// selected before it with fewer causes, or 0 for the baseline.
     pub(crate) gained: f64,
 }
 
@@ -42,13 +43,15 @@ pub(crate) struct SelectionCriteria<'a> {
     pub(crate) recordings: &'a [Recording],
     /// The prediction-error fit of candidate models; `None` if the records allow none.
     pub(crate) closed: Option<Box<dyn ClosedFit + 'a>>,
-    /// χ² per degree of freedom that a fit of all columns of the library leaves along the measured motion, including the interpolation
-    /// error; at least 1.
+    /// χ² per degree of freedom that a fit of all columns of the library leaves along the measured motion, including
+    /// the interpolation error; at least 1.
     inflation: f64,
-    /// χ² of the baseline, with which the χ² of candidate models is compared; from a simulation if these are simulated.
+    /// χ² of the baseline, with which the χ² of simulated candidate models is compared: from a simulation of the
+    /// baseline if one is possible, otherwise along the measured motion.
     pub(crate) reference: f64,
-    /// χ² by errors of the computation of a cut, which are proportional to the signal: the square of `RELATIVE_ERROR_OF_CUTS` times the
-    /// signal energy. A wrong cause can gain this much. Zero for tests of the structure.
+    /// χ² by errors of the computation of a cut, which are proportional to the signal: the square of
+    /// `RELATIVE_ERROR_OF_CUTS` times the signal energy. A wrong cause can gain this much. Zero for tests of the
+    /// structure.
     pub(crate) coherent: f64,
 }
 
@@ -63,8 +66,8 @@ impl<'a> SelectionCriteria<'a> {
             Some(output_error) => Some(Box::new(output_error)),
             None => Relinearization::new(study, recordings).map(|closed| Box::new(closed) as Box<_>),
         };
-        // Simulations fit their initial states and do not contain the noise of the measured motion. The baseline is simulated too, for a
-        // comparison on equal terms.
+        // Simulations fit their initial states and do not contain the noise of the measured motion. The baseline is
+        // simulated too, for a comparison on equal terms.
         let by_baseline = closed
             .as_ref()
             .and_then(|closed| closed.left_by_baseline(library, regression));
@@ -83,8 +86,8 @@ impl<'a> SelectionCriteria<'a> {
         }
     }
 
-    /// χ² per degree of freedom of the simulated candidate model `best`, at least 0.5; without a simulated one, that of a fit of the whole
-    /// library.
+    /// χ² per degree of freedom of the simulated candidate model `best`, at least 0.5; without a simulated one, that of
+    /// a fit of the whole library.
     pub(crate) fn inflation(&self, regression: &Regression, best: Option<&CandidateModel>) -> f64 {
         match best {
             Some(best) if best.simulated.is_some() => {
@@ -98,8 +101,8 @@ impl<'a> SelectionCriteria<'a> {
         }
     }
 
-    /// Smallest increase of the gain (decrease of χ² minus the price of the parameters) that a further cause must bring, including what
-    /// errors of the computation may gain.
+    /// Smallest increase of the gain (decrease of χ² minus the price of the parameters) that a further cause must
+    /// bring, including what errors of the computation may gain.
     pub(crate) fn least_gain(&self, regression: &Regression, fewer_are_enough: bool) -> f64 {
         let noise = regression.count(Subset::Whole) as f64;
         let share = if self.coherent > 0.0 && fewer_are_enough {
@@ -110,7 +113,8 @@ impl<'a> SelectionCriteria<'a> {
         LEAST_GAIN + OVER_COMPUTATION_ERROR * self.coherent + share * noise
     }
 
-    /// Gain of a candidate model: decrease of χ² from the baseline, over `inflation`, minus the price of its parameters (Schwarz).
+    /// Gain of a candidate model: decrease of χ² from the baseline, over `inflation`, minus the price of its parameters
+    /// (Schwarz).
     pub(crate) fn gain(&self, regression: &Regression, model: &CandidateModel, inflation: f64) -> f64 {
         let count = regression.count(Subset::Whole).max(2) as f64;
         // A simulated candidate model is compared with the simulated baseline.
@@ -128,8 +132,8 @@ impl<'a> SelectionCriteria<'a> {
         });
     }
 
-    /// Residual energy of `best` above the noise and the errors of the computation: as a share of the noise, and as a share of the
-    /// baseline's residual energy above the noise. Without `best`, that of the baseline.
+    /// Residual energy of `best` above the noise and the errors of the computation: as a share of the noise, and as a
+    /// share of the baseline's residual energy above the noise. Without `best`, that of the baseline.
     pub(crate) fn excess(&self, regression: &Regression, best: Option<&CandidateModel>) -> (f64, f64) {
         let noise = regression.count(Subset::Whole) as f64;
         let left = best.map_or(self.reference, |best| best.fit.left);
@@ -139,7 +143,8 @@ impl<'a> SelectionCriteria<'a> {
         (beyond / noise, beyond / there)
     }
 
-    /// True if no further cause is needed: the residual of `best` is noise, or as small as the error that sampling causes.
+    /// True if no further cause is needed: the residual of `best`, or of the baseline without `best`, is noise, or that
+    /// of `best` is as small as the error that sampling causes.
     fn is_enough(&self, regression: &Regression, best: Option<&CandidateModel>) -> bool {
         let (of_noise, of_excess) = self.excess(regression, best);
         let count = regression.count(Subset::Whole) as f64;
@@ -153,8 +158,8 @@ impl<'a> SelectionCriteria<'a> {
             || (best.is_some() && of_excess < sampling)
     }
 
-    /// True if the residual of a simulated model resembles a further cause, although the residual of `best` is close to noise. The
-    /// simulated model is `best` or, if that is not simulated, the first simulated one of `found`.
+    /// True if the residual of a simulated model resembles a further cause, although the residual of `best` is close to
+    /// noise. The simulated model is `best` or, if that is not simulated, the first simulated one of `found`.
     fn resembles_further_cause(
         &self,
         library: &mut Library,
@@ -182,8 +187,8 @@ impl<'a> SelectionCriteria<'a> {
             .is_some_and(|more| cost(best) - cost(more) > self.least_gain(regression, true))
     }
 
-    /// True if the candidate model `more` explains more than `LEAST_SHARE` of the residual energy that `fewer` (or the baseline) has above
-    /// the noise, or if it has fewer parameters than `fewer`.
+    /// True if the candidate model `more` explains more than `LEAST_SHARE` of the residual energy that `fewer` (or the
+    /// baseline) has above the noise, or if it has fewer parameters than `fewer`.
     fn explains_enough(
         &self,
         regression: &Regression,
@@ -204,7 +209,7 @@ impl<'a> SelectionCriteria<'a> {
         before - more.fit.left > LEAST_SHARE * (before - noise).max(0.0)
     }
 
-    /// χ² of a model on the held-out segments with parameters fitted to the fitted segments.
+    /// χ² of a candidate model on the held-out segments, with parameters fitted to the other segments of the records.
     pub(crate) fn left_held_out(
         &self,
         library: &Library,
@@ -226,8 +231,9 @@ fn inflation(regression: &Regression) -> f64 {
     (regression.left_by_all() / free + sampling).max(1.0)
 }
 
-/// Selects among single causes, then pairs, then triples. The search goes on to more causes if the residual is above the noise or resembles
-/// a further cause, or if two causes may replace one cause with more parameters. It ends, for example, if the last cause explains little.
+/// Selects among single causes, then pairs, then triples. The search goes on to more causes if the residual is above
+/// the noise or resembles a further cause, or if two causes may replace one cause with more parameters. It ends, for
+/// example, if the last cause explains little.
 pub(crate) fn select(
     criteria: &SelectionCriteria<'_>,
     library: &mut Library,
@@ -252,7 +258,8 @@ pub(crate) fn select(
             break;
         }
         let enough = size > 1 && criteria.is_enough(regression, selection.best.as_ref());
-        // One cause with many parameters may imitate two causes with one parameter each: pairs with fewer parameters are then tried.
+        // One cause with many parameters may imitate two causes with one parameter each: pairs with fewer parameters
+        // are then tried.
         let mut imitated = None;
         if enough {
             let Some(best) = &selection.best else { break };
@@ -270,7 +277,8 @@ pub(crate) fn select(
             2 => best_pairs(library, study, regression),
             _ => triples(library, study, regression, &pairs),
         };
-        // If candidate models are simulated, pairs and triples keep the nonlinear parameters that were refined for the best single causes.
+        // If candidate models are simulated, pairs and triples keep the nonlinear parameters that were refined for the
+        // best single causes.
         if size == 1 || criteria.closed.is_none() {
             refine(study, library, regression, &mut found);
         }
@@ -288,8 +296,8 @@ pub(crate) fn select(
         found.sort_by(|a, b| a.fit.left.total_cmp(&b.fit.left));
         let inflation = criteria.inflation(regression, found.first());
         criteria.sort(regression, &mut found, inflation);
-        // If fewer causes are already sufficient, the fit of more causes is not improved by a new linearization before it is selected: it
-        // could win by errors of the computation.
+        // If fewer causes are already sufficient, the fit of more causes is not improved by a new linearization before
+        // it is selected: it could win by errors of the computation.
         if !enough {
             criteria.polish(library, regression, &mut found, inflation);
         }
@@ -305,11 +313,12 @@ pub(crate) fn select(
             .as_ref()
             .map_or(0.0, |best| criteria.gain(regression, best, inflation));
         let held_out = criteria.left_held_out(library, regression, best);
-        // The held-out segments may contain no trace of an effect, as the end of a free decay does, so their χ² need not decrease. But the
-        // candidate model must not increase it beyond chance.
+        // The held-out segments may contain no trace of an effect, as the end of a free decay does, so their χ² need
+        // not decrease. But the candidate model must not increase it beyond chance.
         let chance = CHANCE * (2.0 * regression.count(Subset::HeldOut) as f64).sqrt();
         let explains_enough = criteria.explains_enough(regression, selection.best.as_ref(), best);
-        // If the second of two causes explains little, the search ends: a third cause would only compensate for errors of the other two.
+        // If the second of two causes explains little, the search ends: a third cause would only compensate for errors
+        // of the other two.
         if size > 1 && !explains_enough {
             break;
         }
@@ -342,8 +351,8 @@ pub(crate) fn select(
     selection
 }
 
-/// True for a rival of `best`: a candidate model of other causes with no more parameters, or of the same causes at other locations with as
-/// many parameters.
+/// True for a rival of `best`: a candidate model of other causes with no more parameters, or of the same causes at
+/// other locations with as many parameters.
 fn is_rival(library: &Library, best: &CandidateModel, other: &CandidateModel) -> bool {
     if names(library, other) != names(library, best) {
         return other.parameter_count <= best.parameter_count;
@@ -382,8 +391,9 @@ fn log_best(
     }
 }
 
-/// The first candidate model with fewer parameters than `best` that is as good along the measured motion, otherwise `best`: further parameters
-/// may only compensate for aliasing. Simulated models do not contain aliasing and are not taken as the simpler one.
+/// The first candidate model in `found` with fewer parameters than `best` that explains the records about as well along
+/// the measured motion, otherwise `best`: further parameters may only compensate for aliasing. Simulated models do not
+/// contain aliasing and are not taken as the simpler one.
 fn simplest(
     criteria: &SelectionCriteria<'_>,
     regression: &Regression,

@@ -1,7 +1,7 @@
 //! Builds candidate models with one cause more or less, from the residual of a simulation.
 //!
-//! The residual of a simulation contains neither the noise of the measured motion nor aliasing, and shows the next cause (score test). A
-//! cause that a later one made redundant is removed, or replaced by a simpler one.
+//! The residual of a simulation contains neither the noise of the measured motion nor aliasing, and shows the next
+//! cause (score test). A cause that a later one made redundant is removed, or replaced by a simpler one.
 
 use nalgebra::DMatrix;
 
@@ -10,8 +10,8 @@ use crate::fit::library::Library;
 use crate::fit::regression::{Fit, Regression, Subset};
 use crate::records::study::Study;
 
-/// Candidate models of `base` with one further cause, best first, one for each candidate. `left` is the residual of `base`, by record and
-/// channel.
+/// Candidate models that consist of `base` and one further cause, one for each candidate, best first: by ascending χ²
+/// plus the price of the parameters. `left` is the residual of the simulation of `base`, by record and channel.
 pub(crate) fn extended(
     study: &Study<'_>,
     library: &mut Library,
@@ -101,8 +101,9 @@ pub(crate) fn without(library: &Library, model: &CandidateModel, position: usize
     }
 }
 
-/// Candidate models in which a simpler cause at the same location replaces the cause at index `position`, such as a cubic spring for
-/// softening-hardening. The parameters of the simpler cause are some of those of the replaced one, with the same values.
+/// Candidate models in which a simpler cause at the same location replaces the cause at index `position`, such as a
+/// cubic spring for softening-hardening. The parameters of the simpler cause are some of those of the replaced one,
+/// with the same values.
 pub(crate) fn nested(
     study: &Study<'_>,
     library: &Library,
@@ -127,8 +128,8 @@ pub(crate) fn nested(
         {
             return None;
         }
-        // A simpler cause can replace this one only if its coefficients are reported parameters, with values that the replaced cause has
-        // too.
+        // A simpler cause can replace this one only if its coefficients are reported parameters, with values that the
+        // replaced cause has too.
         let cause = library.cause(choice.candidate);
         let own: Vec<f64> = values
             .iter()

@@ -6,11 +6,11 @@ use std::sync::Arc;
 use num_complex::Complex64;
 use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
 
-/// Transforms of one record of `count` samples, padded with zeros while the response decays.
+/// Fourier transforms of one record of `count` samples, padded with zeros while the response of the structure decays.
 ///
-/// Spectra hold bins 0 … length/2 of the unnormalized transform X_k = Σ x_n e^(−2πikn/length). Signals that are not upsampled are taken as
-/// band-limited to half the sample rate, so that the spectrum defines them between samples. An upsampled signal has `finer` samples per
-/// sample of the record.
+/// Spectra hold bins 0 … length/2 of the unnormalized transform X_k = Σ x_n e^(−2πikn/length). Signals that are not
+/// upsampled are taken as band-limited to half the sample rate, so that the spectrum defines them between samples. An
+/// upsampled signal has `finer` samples per sample of the record.
 #[derive(Clone)]
 pub(crate) struct Grid {
     count: usize,
@@ -24,8 +24,9 @@ pub(crate) struct Grid {
 }
 
 impl Grid {
-    /// Plans the transforms of `count` samples at `rate_hz`, padded with zeros for about `room_s` seconds (at least the smaller of the record
-    /// and 4096 samples, at most three times the record), and of signals upsampled by the factor `finer`.
+    /// Plans the transforms of `count` samples at `rate_hz`, padded with zeros for about `room_s` seconds (at least the
+    /// smaller of the record and 4096 samples, at most three times the record), and of signals upsampled by the factor
+    /// `finer`.
     pub(crate) fn new(count: usize, rate_hz: f64, room_s: f64, finer: usize) -> Self {
         let room = ((room_s * rate_hz) as usize).clamp(count.min(4096), 3 * count.max(1));
         let length = smooth_even(count + room);
@@ -79,7 +80,8 @@ impl Grid {
         transform(&*self.forward, &mut padded)
     }
 
-    /// Spectrum of a signal that is continued smoothly beyond both ends of the record: reflected at its end points, and faded out.
+    /// Spectrum of a signal that is continued smoothly beyond both ends of the record: reflected at its end points, and
+    /// faded out.
     ///
     /// With this continuation, derivatives (iω)·X are accurate to a few percent up to the ends of the record.
     pub(crate) fn continued_spectrum(&self, samples: &[f64]) -> Vec<Complex64> {
@@ -118,7 +120,8 @@ impl Grid {
         samples
     }
 
-    /// Number of bins of an upsampled signal's spectrum. Its first bins are those of [`Self::bins`].
+    /// Number of bins of an upsampled signal's spectrum. The first [`Self::bins`] of them have the frequencies of the
+    /// spectrum that is not upsampled.
     pub(crate) fn fine_bins(&self) -> usize {
         self.finer * self.length / 2 + 1
     }
@@ -135,8 +138,8 @@ impl Grid {
         bins
     }
 
-    /// Samples of the record from the spectrum of an upsampled signal, delayed by `delay_s`. The delay is interpolated by cubics in time,
-    /// because a phase shift of the spectrum would make steps ring.
+    /// Samples of the record from the spectrum of an upsampled signal, delayed by `delay_s`. The delay is interpolated
+    /// by cubics in time, because a phase shift of the spectrum would make steps ring.
     pub(crate) fn late_samples_of_fine(&self, spectrum: &[Complex64], delay_s: f64) -> Vec<f64> {
         let fine = self.fine_samples(spectrum);
         let late = delay_s * self.rate_hz() * self.finer() as f64;
@@ -145,8 +148,8 @@ impl Grid {
             .collect()
     }
 
-    /// Samples of the record from the spectrum of an upsampled signal, as a sensor without anti-aliasing filter reads them: the spectrum is
-    /// folded about half the sample rate.
+    /// Samples of the record from the spectrum of an upsampled signal, as a sensor without anti-aliasing filter reads
+    /// them: the spectrum is folded about half the sample rate.
     pub(crate) fn samples_of_fine(&self, spectrum: &[Complex64]) -> Vec<f64> {
         let whole = self.finer * self.length;
         let at = |bin: usize| {
@@ -205,7 +208,7 @@ fn smooth_even(least: usize) -> usize {
     best
 }
 
-/// Transform of a segment of a signal without padding, with real values as a regression requires.
+/// Fourier transform of a segment of a signal without padding, as the real values that a regression requires.
 pub(crate) struct SegmentTransform {
     plan: Arc<dyn RealToComplex<f64>>,
 }
@@ -217,8 +220,9 @@ impl SegmentTransform {
         }
     }
 
-    /// Appends to `into` real and imaginary parts of the segment's spectrum at bins 0 … `bins` − 1, scaled so that unit-variance noise has
-    /// unit variance in each part. The imaginary parts at zero and at half the sample rate are always zero and left out.
+    /// Appends to `into` the real and imaginary parts of the segment's spectrum at bins 0 … `bins` − 1, scaled so that
+    /// white noise of unit variance has unit variance in each part. The imaginary parts at zero and at half the sample
+    /// rate are always zero and left out.
     pub(crate) fn bins(&self, samples: &[f64], bins: usize, into: &mut Vec<f64>) {
         let length = samples.len();
         let mut buffer = samples.to_vec();
@@ -289,7 +293,8 @@ mod tests {
         let derivative = grid.samples(&spectrum);
         for (n, value) in derivative.iter().enumerate() {
             let truth = TAU * 1.7 * (TAU * 1.7 * n as f64 / rate + 0.4).cos();
-            // The second derivative of the continued signal jumps at the ends of the record, which limits the accuracy there.
+            // The second derivative of the continued signal jumps at the ends of the record, which limits the accuracy
+            // there.
             assert!((value - truth).abs() < 0.03 * TAU * 1.7, "{n}: {value} {truth}");
         }
     }

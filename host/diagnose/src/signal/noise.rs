@@ -1,7 +1,7 @@
-//! Noise floors: the noise variance of a channel, estimated from its residual.
+//! Noise floors: the standard deviation of the noise of a channel, estimated from its residual.
 //!
-//! Sensor noise is assumed white over the band of the record. Any other part of a residual is assumed to lie above the noise floor in some
-//! frequency bands only, so that the other bands show the floor.
+//! Sensor noise is assumed white over the band of the record. Any other part of a residual is assumed to lie above the
+//! noise floor in some frequency bands only, so that the other bands show the floor.
 
 use crate::criteria::{LEAST_RELATIVE_NOISE, LEAST_WHITE_SHARE};
 use crate::signal::grid::SegmentTransform;
@@ -12,21 +12,23 @@ pub(crate) const BANDS: usize = 32;
 
 /// Standard deviation of the white noise in `residual`; `size` is the root mean square of the channel.
 ///
-/// The estimate starts at the lower quartile of the mean periodogram over 32 bands. It is then repeatedly the mean of all bands within three
-/// standard deviations of it, which are nearly all bands if the residual is noise alone. It is at least `LEAST_RELATIVE_NOISE` times `size`.
-/// For fewer than 128 samples it is the root mean square.
+/// The variance is first the lower quartile, over 32 frequency bands, of the mean of the periodogram in a band. It is
+/// then repeatedly the mean over all bands within three standard deviations of it, which are nearly all bands if the
+/// residual is noise alone. The standard deviation is at least `LEAST_RELATIVE_NOISE` times `size`. For fewer than 128
+/// samples it is the root mean square of the residual.
 pub(crate) fn white_floor(residual: &[f64], size: f64) -> f64 {
     white_floor_beside(residual, size, &[0.0; BANDS])
 }
 
-/// [`white_floor`] of a residual that also contains noise of another origin, whose variance `other` is given in each of the [`BANDS`] from
-/// zero to half the sample rate.
+/// [`white_floor`] of a residual that also contains noise of another origin. `other` holds the power of that noise in
+/// each of the [`BANDS`] from zero to half the sample rate, scaled so that the mean over the bands is the variance of
+/// one sample.
 pub(crate) fn white_floor_beside(residual: &[f64], size: f64, other: &[f64; BANDS]) -> f64 {
     floor(residual, size, mean, 1.0, other)
 }
 
-/// [`white_floor`] of a residual with spectral lines in every band, as in a cut. Each band uses the median of the periodogram, which few
-/// lines hardly change.
+/// [`white_floor`] of a residual with spectral lines in every band, as in a cut. Each band uses the median of the
+/// periodogram, which few lines hardly change.
 pub(crate) fn floor_between_lines(residual: &[f64], size: f64) -> f64 {
     let of_band = |squares: &mut [f64]| median(squares).unwrap_or(0.0) / MEDIAN;
     floor(residual, size, of_band, MEDIAN_SPREAD, &[0.0; BANDS])
@@ -34,7 +36,8 @@ pub(crate) fn floor_between_lines(residual: &[f64], size: f64) -> f64 {
 
 /// Median of the square of a unit-variance normal variable.
 const MEDIAN: f64 = 0.454_936;
-/// Standard deviation of a variance estimated from a median over that of one estimated from a mean.
+/// Standard deviation of the noise variance estimated from the median of squares, over that of the one estimated from
+/// their mean.
 const MEDIAN_SPREAD: f64 = 1.65;
 
 fn mean(squares: &mut [f64]) -> f64 {
@@ -74,8 +77,8 @@ fn floor(
         if near.is_empty() {
             break;
         }
-        // The standard deviation of a frequency band's noise variance is proportional to that variance. A band with much noise of other
-        // origin therefore gets little weight.
+        // The standard deviation of a frequency band's noise variance is proportional to that variance. A band with
+        // much noise of other origin therefore gets little weight.
         let weight = |other: f64| (level / (level + other)).powi(2);
         let whole: f64 = near.iter().map(|(_, other)| weight(*other)).sum();
         let mean = |of: fn(&(f64, f64)) -> f64| {
@@ -90,7 +93,8 @@ fn floor(
     level.sqrt().max(least)
 }
 
-/// Average of the periodogram in each band by the estimator `of_band` (mean or median): σ² for white noise.
+/// Average of the periodogram of `residual` in each frequency band by the estimator `of_band` (mean or median): the
+/// variance σ² of a sample for white noise.
 fn band_means(residual: &[f64], of_band: fn(&mut [f64]) -> f64) -> Vec<f64> {
     let count = residual.len();
     let mean = residual.iter().sum::<f64>() / count as f64;
@@ -123,9 +127,9 @@ fn band_means(residual: &[f64], of_band: fn(&mut [f64]) -> f64) -> Vec<f64> {
 /// Number of samples of each window over which [`floor_between_impacts`] computes the variance.
 const WINDOW: usize = 256;
 
-/// Standard deviation of the noise of a channel that is zero most of the time, such as the force of a hammer: from the lower quartile of
-/// the variances of windows. The spectrum of impacts reaches to the end of the band and would hide a noise floor. Infinite for a record
-/// that is too short.
+/// Standard deviation of the noise of a channel that is zero most of the time, such as the force of a hammer: from the
+/// lower quartile of the variances of windows. The spectrum of impacts reaches to the end of the band and would hide a
+/// noise floor. Infinite for a record of fewer than four windows.
 pub(crate) fn floor_between_impacts(samples: &[f64]) -> f64 {
     let mut squares: Vec<f64> = samples
         .chunks_exact(WINDOW)
@@ -167,9 +171,10 @@ mod tests {
             .collect();
         let size = rms(&residual);
         let floor = floor_between_lines(&residual, size);
-        // A line and its leakage through the Hann window exceed the noise in 6 of 48.3 bins. The median of the power is then at most the
-        // quantile 0.5/0.876 = 0.571 of the noise alone, −ln(1 − 0.571)/ln 2 = 1.22 times its median: 10.5 % more in amplitude. Three
-        // standard deviations of the median of 3 000 powers, of which every second is independent, are 5.5 %.
+        // A line and its leakage through the Hann window exceed the noise in 6 of 48.3 bins. The median of the power is
+        // then at most the quantile 0.5/0.876 = 0.571 of the noise alone, −ln(1 − 0.571)/ln 2 = 1.22 times its median:
+        // 10.5 % more in amplitude. Three standard deviations of the median of 3 000 powers, of which every second is
+        // independent, are 5.5 %.
         assert!((0.945..1.16).contains(&floor), "{floor}");
         assert!(white_floor(&residual, size) > 1.5);
     }
@@ -178,8 +183,8 @@ mod tests {
     fn the_floor_of_a_sensor_is_found_beside_known_other_noise() {
         let mut random = ChaCha8Rng::seed_from_u64(5);
         let mut draw = || -> f64 { StandardNormal.sample(&mut random) };
-        // The differences of white noise with standard deviation 2 have the power 4·|1 − e^(−iω)|²: zero at ω = 0, sixteen at half the
-        // sample rate.
+        // The differences of white noise with standard deviation 2 have the power 4·|1 − e^(−iω)|²: zero at ω = 0,
+        // sixteen at half the sample rate.
         let mut last = 0.0;
         let residual: Vec<f64> = (0..6000)
             .map(|_| {
@@ -194,8 +199,8 @@ mod tests {
         };
         let size = rms(&residual);
         let floor = white_floor_beside(&residual, size, &std::array::from_fn(power));
-        // Without other noise, three standard deviations are 6 %. With other noise of up to sixteen times the power, the uncertainty is
-        // twice that.
+        // Without other noise, three standard deviations are 6 %. With other noise of up to sixteen times the power,
+        // the uncertainty is twice that.
         assert!((floor - 1.0).abs() < 0.12, "{floor}");
         assert!(white_floor(&residual, size) > 1.3);
     }

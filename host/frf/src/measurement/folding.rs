@@ -18,16 +18,16 @@ use crate::test_channels::TestChannels;
 
 /// Width of the band below half the sample rate from which the level there is estimated, as a fraction of half the
 /// sample rate. The largest level of the band, scaled to half the sample rate by 1/f², is used. The spectrum of a pulse
-/// of n samples has zeros at every n-th part of the sample rate: a quarter of the band holds more than one maximum
-/// between zeros for pulses of more than 8 samples.
+/// of n samples has zeros at every n-th part of the sample rate: an eighth of the sample rate, the width of the band,
+/// holds a maximum between zeros for pulses of more than 8 samples.
 const TOP: f64 = 0.25;
 
 /// Largest spectral level that aliasing adds to a frequency line, as a fraction of the level at half the sample rate:
 /// π²/24.
 const FOLDED: f64 = std::f64::consts::PI * std::f64::consts::PI / 24.0;
 
-/// Largest power of every channel of a hammer test near half the sample rate, at the scale of the cross-spectra; 0 for
-/// a channel with an anti-aliasing filter. Forces come first.
+/// Largest power of every channel of a hammer test near half the sample rate, scaled to half the sample rate by 1/f⁴,
+/// at the scale of the cross-spectra; 0 for a channel with an anti-aliasing filter. Forces come first.
 pub(super) fn top_powers(
     channels: &TestChannels<'_>,
     signals: &[&[f64]],

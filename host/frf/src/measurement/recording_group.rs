@@ -10,7 +10,8 @@ use crate::table::Frf;
 use crate::test_channels::TestChannels;
 use quietcut_model::structure::Direction;
 
-/// Recordings with the same force directions, the same measured responses and the same kind of excitation, evaluated together.
+/// Recordings with the same force directions, the same measured responses and the same kind of excitation, evaluated
+/// together.
 #[derive(Clone, Debug)]
 pub struct RecordingGroup {
     /// Number of recordings in the group.
@@ -23,8 +24,8 @@ pub struct RecordingGroup {
     pub averages: f64,
     /// Frequencies left out because the forces of the group are linearly dependent there, Hz.
     pub left_out_hz: Vec<f64>,
-    /// Smallest singular value of the force spectra over the frequencies of the group that are not left out, each force normalized at each
-    /// frequency; 1 for a single force.
+    /// Smallest singular value of the force spectra over the frequencies of the group that are not left out, each force
+    /// normalized at each frequency; 1 for a single force.
     pub least_singular: f64,
     /// Single impacts (used) and double impacts (left out) of a hammer test; `None` for other excitation.
     pub impacts: Option<(Vec<MeasuredImpact>, Vec<MeasuredImpact>)>,
@@ -45,7 +46,7 @@ impl RecordingGroup {
 /// group.
 pub(super) struct MeasuredEntry {
     pub(super) frf: Frf,
-    /// Standard deviation of |H|, m/N.
+    /// Standard deviation of the magnitude of the receptance at each frequency of the group, m/N.
     pub(super) deviation: Vec<f64>,
     /// Largest relative error by aliasing at each frequency of the group; 0 except for hammer tests.
     pub(super) folding: Vec<f64>,

@@ -75,6 +75,6 @@ const SEGMENTS_PER_FORCE: usize = 8;
 /// set. A choice between random error and resolution.
 const LINES_PER_FORCE: usize = 8;
 
-/// Length of the taper at each end of the record of a sweep, as a fraction of the record. A choice: the taper reduces leakage from vibration
-/// at the ends of the record.
+/// Length of the taper at each end of the record of a sweep, as a fraction of the record. A choice: the taper reduces
+/// leakage from vibration at the ends of the record.
 const TAPER: f64 = 0.01;

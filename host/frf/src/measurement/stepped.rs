@@ -82,8 +82,8 @@ pub(super) fn stepped(
     Ok(receptances(group, &lines, first, warnings))
 }
 
-/// Force level of a step-sine test to evaluate: without `force_n` (N) the only level of the test, otherwise the level nearest to `force_n`
-/// and within the factor [`SAME_FORCE`] of it; an error if there is none.
+/// Force level of a step-sine test to evaluate: without `force_n` (N) the only level of the test, otherwise the level
+/// nearest to `force_n` and within the factor [`SAME_FORCE`] of it; an error if there is none.
 fn level(
     channels: &TestChannels<'_>,
     mut levels: Vec<ForceLevel>,

@@ -9,8 +9,8 @@ use crate::hammer::{self, MeasuredImpact};
 use crate::measurement_settings::{MeasurementSettings, band};
 use crate::test_channels::TestChannels;
 
-/// Auto- and cross-spectra of hammer tests with one segment for each single impact, and the largest powers of the channels near half the
-/// sample rate; one result for each recording.
+/// Auto- and cross-spectra of hammer tests with one segment for each single impact, and the largest powers of the
+/// channels near half the sample rate; one result for each recording.
 pub(super) fn struck(
     group: &mut RecordingGroup,
     members: &[TestChannels<'_>],
@@ -28,7 +28,8 @@ pub(super) fn struck(
     let rate = members[0].recording.sample_rate_hz;
     let length = cuts.iter().map(|cut| cut.length).min().unwrap_or(0);
     if cuts.iter().any(|cut| cut.length != length) {
-        // All recordings use the segment length of the one with the shortest segments, so that their frequency lines agree.
+        // All recordings use the segment length of the one with the shortest segments, so that their frequency lines
+        // agree.
         windows.segment_s = Some(length as f64 / rate);
         cuts = members
             .iter()

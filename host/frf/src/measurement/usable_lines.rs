@@ -5,7 +5,8 @@ use crate::criteria::{DEPENDENT, EXCITED};
 use crate::cross_spectra::CrossSpectra;
 use crate::estimate::{ChannelCounts, FrfLine};
 
-/// Removes the frequency lines outside the range of a sweep, where the force is too small.
+/// Removes the frequency lines of a sweep at which the power of all forces together is at most [`EXCITED`] of its
+/// largest value over the lines: they lie outside the swept range.
 pub(super) fn keep_excited(lines: &mut Vec<FrfLine>, spectra: &[CrossSpectra], counts: ChannelCounts) {
     let power = |line: usize| -> f64 {
         let forces = (0..counts.forces).map(|force| {

@@ -7,18 +7,19 @@ use quietcut_numerics::least_squares::{Idle, NormalEquations};
 
 use quietcut_recording::{Quantity, Recording, SpindleAngle};
 
-/// Motion under an unmeasured excitation.
+/// Vibration of a structure under an unmeasured excitation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ambient {
-    /// Samples of each channel.
+    /// Samples of each motion channel after the decimation, in its SI unit.
     pub channels: Vec<Vec<f64>>,
-    /// Names of the channels.
+    /// Names of the motion channels, in the order of `channels`.
     pub names: Vec<String>,
-    /// Samples per second.
+    /// Sample rate after the decimation, Hz.
     pub rate_hz: f64,
     /// Mean spindle frequency, whose harmonics were removed unless `harmonics_remain`, Hz; `None` if no speed is known.
     pub turn_hz: Option<f64>,
-    /// Reason why a recorded tachometer does not give the spindle angle; the stated speed is used instead, if there is one.
+    /// Reason why a recorded tachometer does not give the spindle angle; the stated speed is used instead, if there is
+    /// one.
     pub tachometer_fault: Option<String>,
     /// True if the spindle harmonics are still in the samples, because the record is too short to separate them from
     /// each other.
@@ -40,8 +41,8 @@ struct Removal {
 const PER_PERIOD: f64 = 3.0;
 
 impl Ambient {
-    /// Motion channels of a recording, decimated for the band up to `high_hz`: all accelerations if there are any, else all
-    /// velocities, else all displacements.
+    /// Motion channels of a recording, decimated for the band up to `high_hz`: all accelerations if there are any, else
+    /// all velocities, else all displacements.
     ///
     /// `None` if the recording has no motion channel.
     pub fn new(recording: &Recording, high_hz: f64) -> Option<Self> {
@@ -72,14 +73,15 @@ impl Ambient {
         })
     }
 
-    /// Duration of the record, s.
+    /// Duration of the record after the decimation, s.
     pub fn seconds(&self) -> f64 {
         self.channels.first().map_or(0, Vec::len) as f64 / self.rate_hz
     }
 }
 
-/// Removes the mean and all spindle harmonics up to 1.2 `high_hz` by least squares over the record, and trims it to the range in
-/// which the spindle angle is known. Nothing is removed if the record is too short to separate the harmonics.
+/// Removes the mean and all spindle harmonics up to 1.2 `high_hz` from `samples` by least squares over the record,
+/// after trimming the samples to the range in which the spindle angle is known. Nothing is removed if the record is too
+/// short to separate the harmonics.
 fn without_harmonics(recording: &Recording, samples: &mut [Vec<f64>], high_hz: f64) -> Removal {
     let cut = recording.sidecar.cut.unwrap_or_default();
     let rate_hz = recording.sample_rate_hz;

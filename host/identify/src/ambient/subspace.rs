@@ -37,10 +37,10 @@ pub struct AmbientMode {
 /// Modes identified from a record.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AmbientModes {
-    /// The modes within the band that keep their frequency at a higher model order, by ascending frequency.
+    /// The modes within the band that keep their natural frequency at a higher model order, by ascending frequency.
     pub modes: Vec<AmbientMode>,
-    /// Order of the state-space model: the number of singular values of the Hankel matrix that exceed the scatter
-    /// between blocks, rounded up to an even number and limited by the size of the matrix.
+    /// Order of the state-space model: the number of singular values of the covariances' Hankel matrix that exceed the
+    /// scatter between blocks of the record, rounded up to an even number and limited by the size of the matrix.
     pub order: usize,
     /// Number of blocks into which the record was divided; the scatter between them gives the standard deviations.
     pub blocks: usize,
@@ -72,12 +72,12 @@ pub enum AmbientError {
     Poles(#[from] EigenvalueError),
 }
 
-/// Smallest ratio of the length of a block of an ambient record to the longest lag of its covariances. At this ratio the
-/// correlation between neighbouring blocks is negligible.
+/// Smallest ratio of the length of a block of an ambient record to the longest lag of its covariances. At this ratio
+/// the correlation between neighbouring blocks is negligible.
 const BLOCK_LENGTH: usize = 6;
 
-/// Range of lags of the covariances, in periods of the lowest frequency of the band, that a block column of the Hankel
-/// matrix spans, if these are 6 to 60 samples. A choice.
+/// Range of lags of the covariances that a block column of the Hankel matrix spans, in periods of the lowest frequency
+/// of the band; in samples it is limited to 6 to 60. A choice.
 const PERIODS: f64 = 1.5;
 
 /// Step of the numerical derivative of the poles along the deviation of a block's Hankel matrix from the mean matrix,
@@ -153,8 +153,8 @@ struct Record {
     of_blocks: Vec<DMatrix<f64>>,
 }
 
-/// Block Hankel matrix of the covariances R_1 to R_(2i−1), estimated over a range of samples, with i = `rows` block rows and
-/// columns.
+/// Block Hankel matrix of the covariances R_1 to R_(2i−1), estimated over a range of samples, with i = `rows` block
+/// rows and columns.
 fn hankel(channels: &[Vec<f64>], range: std::ops::Range<usize>, rows: usize) -> DMatrix<f64> {
     let count = channels.len();
     let covariance = |lag: usize, i: usize, j: usize| -> f64 {
@@ -173,8 +173,8 @@ fn hankel(channels: &[Vec<f64>], range: std::ops::Range<usize>, rows: usize) -> 
 }
 
 impl Record {
-    /// Model order: the number of singular values of the Hankel matrix that exceed the noise level, limited by the size of
-    /// the matrix. It is rounded up to an even number, since poles come in conjugate pairs.
+    /// Model order: the number of singular values of the mean Hankel matrix that exceed the largest one of its noise,
+    /// limited by the size of the matrix. It is rounded up to an even number, since poles come in conjugate pairs.
     fn order(&self) -> Result<usize, AmbientError> {
         let values = singular_values(self.mean.clone())?;
         // Half the difference between the mean Hankel matrices of the even and of the odd blocks: pure noise, as large
@@ -218,7 +218,7 @@ impl Record {
     }
 
     /// Modes of the mean Hankel matrix within the band; their standard deviations come from the deviations of the
-    /// blocks.
+    /// Hankel matrices of the blocks from the mean.
     fn modes(&self, order: usize) -> Result<Vec<AmbientMode>, AmbientError> {
         let [low_hz, high_hz] = self.band_hz;
         let is_mode = |pole: &Complex64| {

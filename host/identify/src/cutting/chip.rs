@@ -16,8 +16,9 @@ pub struct Chip {
     pub ahead: usize,
 }
 
-/// A point of the surface that the teeth have left. `reach_m` is its height along the chip thickness direction, m,
-/// relative to a tooth without runout, in the feed position of the current tooth passing.
+/// A point of the surface that the last tooth passing has left. `reach_m` is its height along the chip thickness
+/// direction, m, over the path of a tooth without vibration and runout in that tooth passing; the runout of the tooth
+/// `owner` that cut it is not included.
 #[derive(Clone, Copy)]
 struct SurfacePoint {
     phi: f64,
@@ -25,7 +26,7 @@ struct SurfacePoint {
     owner: usize,
 }
 
-/// The chips cut at every sample of a cutting test; `runout_m` is the radial offset r of each tooth, m.
+/// The chips cut at every sample of a cutting test, by sample; `runout_m` is the radial offset r of each tooth, m.
 ///
 /// In tooth passing k the tooth (−k mod N) moves over the arc of engagement. Without feed, and with the tool displaced
 /// by u, its edge stands at p(φ) = (sin φ, cos φ, 0)·u sin γ − z cos γ + r sin γ, with the edge angle γ (thesis eq.
@@ -85,9 +86,9 @@ pub fn chips(test: &CuttingTest, runout_m: &[f64]) -> Vec<Vec<Chip>> {
     chips
 }
 
-/// The machined surface at the immersion angle `phi`: on the cubic through four neighbouring points that one tooth left,
-/// else on the straight line through two, else at the height of one point. `place` is the index of the last point up to
-/// `phi` and only grows. `None` without points.
+/// The machined surface at the immersion angle `phi`: on the cubic through four neighbouring points that one tooth
+/// left, else on the straight line through two, else at the height of one point. `place` is the index of the last point
+/// up to `phi` and only grows. `None` without points.
 fn surface_at(surface: &[SurfacePoint], phi: f64, place: &mut usize) -> Option<SurfacePoint> {
     while *place + 1 < surface.len() && surface[*place + 1].phi <= phi {
         *place += 1;

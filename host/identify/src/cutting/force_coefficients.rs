@@ -1,12 +1,13 @@
-//! Force coefficients from cutting tests.
+//! Force coefficients from cutting tests with measured forces.
 //!
 //! At every instant F = Σ a {(K_tc e_t + K_rc e_r + K_ac e_a)(φ) h + (K_te e_t + K_re e_r + K_ae e_a)(φ)/sin γ}, summed
 //! over the engaged teeth, with the axial depth a and the edge angle γ (thesis eqs 3.2 to 3.4). The chip thickness h
 //! comes from [`chips`] and contains the runout of each tooth. The coefficients minimize the squared residual of the
 //! force over the revolutions of full engagement, without the samples beside tooth entries and exits; each channel is
-//! weighted with the inverse of its residual variance. The mean-force method (Altintas) serves
-//! for comparison: forces averaged over a revolution are regressed on the feed. Runout and stable vibration do not
-//! affect it as long as every tooth stays in contact. Intervals come from the scatter between revolutions.
+//! weighted with the inverse of its residual variance. The mean-force method (Altintas) serves for comparison: forces
+//! averaged over a revolution are regressed on those that each unit coefficient would cause at the feed of the test.
+//! Runout and stable vibration do not affect it as long as every tooth stays in contact. Intervals come from the
+//! scatter between revolutions.
 
 use std::f64::consts::TAU;
 
@@ -52,18 +53,18 @@ pub struct Fit {
     /// Force coefficients from instantaneous forces, in the order of [`KEYS`]; `None` for the axial ones if no axial
     /// force was measured.
     pub coefficients: [Option<Value>; 6],
-    /// Force coefficients from mean forces of revolutions, in the order of [`KEYS`]; `None` if all feeds are equal, or if
-    /// mean forces do not determine the coefficients.
+    /// Force coefficients from mean forces of revolutions, in the order of [`KEYS`]; `None` if all feeds are equal, or
+    /// if mean forces do not determine the coefficients.
     pub averaged: Option<[Option<Value>; 6]>,
     /// Radial offset of the edge of each tooth from the mean of all teeth, m.
     pub runout_m: Vec<Value>,
-    /// NRMSE of the force.
+    /// NRMSE of the fitted force at the samples of the fit.
     pub relative_error: f64,
-    /// Number of revolutions used.
+    /// Number of revolutions of full engagement in the fit, over all tests.
     pub revolutions: usize,
     /// Number of feeds per tooth among the tests that differ by more than 2 %.
     pub feeds: usize,
-    /// Mean feed per tooth of the tests, m.
+    /// Mean of the feeds per tooth of all tests, m.
     pub feed_per_tooth_m: f64,
 }
 
@@ -88,7 +89,7 @@ pub enum ForceCoefficientError {
     NotConverged,
 }
 
-/// Parameters of the fit: force coefficients, and radial offsets of the teeth.
+/// Parameters that are fitted to the forces of cutting tests: force coefficients, and radial offsets of the teeth.
 #[derive(Clone)]
 struct State {
     /// Force coefficients in the order of [`KEYS`].
@@ -100,8 +101,8 @@ struct State {
 struct Sums {
     matrix: DMatrix<f64>,
     gradient: DVector<f64>,
-    /// Σ g gᵀ over revolutions, with g the gradient of one revolution's half sum of squares by the parameters; the
-    /// sandwich covariance uses it.
+    /// Σ g gᵀ over revolutions, with g the gradient, by the parameters, of half the weighted sum of squared force
+    /// residuals of one revolution; the sandwich covariance uses it.
     scatter: DMatrix<f64>,
     /// Sum of squared force residuals in feed, normal and axial direction, N².
     left: Vector3<f64>,
@@ -176,18 +177,18 @@ struct Fitter<'a> {
 }
 
 impl Fitter<'_> {
-    /// Indices of the fitted coefficients.
+    /// Indices in [`KEYS`] of the fitted force coefficients: all, or without an axial force all but the axial ones.
     fn active(&self) -> Vec<usize> {
         (0..6).filter(|index| self.has_axial || index % 3 != 2).collect()
     }
 
-    /// Number of fitted parameters: force coefficients, then the radial offset of every tooth but the last.
+    /// Number of fitted parameters: force coefficients, and radial offsets of all teeth but the last.
     fn size(&self) -> usize {
         self.active().len() + self.teeth - 1
     }
 
-    /// Force on the tool at one sample, N; `slopes` receives its derivatives by the coefficients and by the radial offset of every
-    /// tooth.
+    /// Force on the tool at one sample, N; `slopes` receives its derivatives by the coefficients and by the radial
+    /// offset of every tooth.
     fn model(
         &self,
         prepared: &Prepared<'_>,
@@ -310,15 +311,16 @@ impl Fitter<'_> {
         }
     }
 
-    /// Sets the weight of each force direction of each test to the inverse of its residual variance.
+    /// Sets the weight of each force direction of each test to the inverse of its residual variance, and the axial
+    /// weight to 0 if the axial coefficients are not fitted.
     fn weigh(&mut self, state: &State) {
         let variances: Vec<Vector3<f64>> = self
             .tests
             .iter()
             .map(|prepared| {
                 let sums = self.sums_of(prepared, state);
-                // An exact fit would give an infinite weight; the residual variance is at least 1e-20 of the mean square
-                // force.
+                // An exact fit would give an infinite weight; the residual variance is at least 1e-20 of the mean
+                // square force.
                 let least = 1e-20 * sums.all / sums.samples.max(1) as f64;
                 (sums.left / sums.samples.max(1) as f64).map(|variance| variance.max(least))
             })
@@ -437,7 +439,8 @@ impl Fitter<'_> {
 impl Fit {
     /// Keys of the force coefficients whose values from mean forces and from instantaneous forces differ by more than
     /// the sum of both 90 % half-widths plus 1/20 of the largest coefficient of their kind (cutting or edge). For edge
-    /// coefficients, the force of the mean feed per tooth replaces the largest coefficient if it is larger.
+    /// coefficients, the largest cutting coefficient times the mean feed per tooth replaces the largest edge
+    /// coefficient if it is larger.
     pub fn apart(&self) -> Vec<&'static str> {
         let averaged = self.averaged.unwrap_or_default();
         let largest = |values: &[Option<Value>]| {
@@ -445,8 +448,8 @@ impl Fit {
             sizes.fold(0.0, f64::max)
         };
         let cutting = largest(&self.coefficients[..3]);
-        // Base for differences of edge coefficients: the largest edge coefficient, or the force of the mean feed per
-        // tooth by the largest cutting coefficient, N per mm of depth; MPa times m gives 10³ N/mm.
+        // Base for differences of edge coefficients, N per mm of axial depth: the largest edge coefficient, or if
+        // larger the largest cutting coefficient times the mean feed per tooth; MPa times m gives 10³ N/mm.
         let edge = largest(&self.coefficients[3..]).max(1e3 * self.feed_per_tooth_m * cutting);
         let differs = |&(index, _): &(usize, &'static str)| {
             let (Some(one), Some(other)) = (self.coefficients[index], averaged[index]) else {
@@ -463,7 +466,8 @@ impl Fit {
     }
 }
 
-/// Offset of the tool axis that explains the radial offsets of the teeth: r_j = e cos(ψ + 2πj/N).
+/// Offset e of the tool axis from the spindle axis, and its angle ψ, from the radial offsets r_j = e cos(ψ + 2πj/N) of
+/// the N teeth.
 ///
 /// `None` for one tooth, or if the offset does not exceed the largest 90 % half-width of a tooth's radial offset. Two
 /// teeth show only the component of the offset along the line through them.

@@ -27,19 +27,19 @@ pub struct CuttingTest {
     pub edge_angle: EdgeAngle,
     /// Spindle angle of each sample, rad, ascending.
     pub angle: Vec<f64>,
-    /// Force on the tool, N.
+    /// Force on the tool at each sample in feed, normal and axial direction, N.
     pub force: Vec<Vector3<f64>>,
     /// False if the axial force was not measured; the axial entries of `force` are then 0.
     pub has_axial_force: bool,
-    /// Displacement of the tool at each sample in feed, normal and axial direction, m, from the measured axes; `None` if
-    /// none was measured.
+    /// Displacement of the tool at each sample in feed, normal and axial direction, m, from the measured axes; `None`
+    /// if none was measured.
     pub displacement: Option<Vec<Vector3<f64>>>,
-    /// First sample of full engagement, and the sample after its last one. They bound whole revolutions unless their times
-    /// were set.
+    /// First sample of full engagement, and the sample after its last one. They bound whole revolutions unless their
+    /// times were set.
     pub full_cut: [usize; 2],
 }
 
-/// Tool and feed settings of a cutting test that the recording does not contain.
+/// Edge angle, feed direction and time of full engagement of a cutting test, which the recording does not contain.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Setup {
     /// Edge angle γ, degrees.
@@ -129,8 +129,8 @@ impl CuttingTest {
         self.angle.partition_point(|&known| known < angle)
     }
 
-    /// Whole revolutions of full engagement, as ranges of samples. The first revolution of the recording does not count: it only
-    /// generates the surface that the second one cuts.
+    /// Whole revolutions of full engagement, as ranges of samples. The first revolution of the recording does not
+    /// count: it only generates the surface that the second one cuts.
     pub fn revolutions(&self) -> Vec<[usize; 2]> {
         let [from, to] = self.full_cut;
         if to <= from {
@@ -144,8 +144,8 @@ impl CuttingTest {
             .collect()
     }
 
-    /// Finds the revolutions of full engagement, within the samples of `window` if it is given. `None` if there are too
-    /// few.
+    /// Sets `full_cut` to the samples of full engagement: those in `window`, or if it is not given, those that the
+    /// force shows. `None` if they contain too few whole revolutions.
     fn find_full_cut(&mut self, window: Option<[usize; 2]>) -> Option<()> {
         let (first, last) = (*self.angle.first()?, *self.angle.last()?);
         // The first revolution generates the surface that the second one cuts.
@@ -169,8 +169,8 @@ impl CuttingTest {
             let below = |share: f64| sizes.iter().rposition(|size| *size > share * full);
             let (rise, fall) = (above(ENGAGED_SHARE)?, below(ENGAGED_SHARE)?);
             // Revolutions of the entry, in which the mean force grows from a tenth to nine tenths of that in full
-            // engagement. Half as many and two more are left out after them: with a linear rise, the last tenth would take
-            // an eighth as many. The exit is treated alike.
+            // engagement. After them, half as many and two more are left out: with a linear rise, the last tenth would
+            // take only an eighth as many. The exit is treated alike.
             let way_in = rise - above(1.0 - ENGAGED_SHARE)?;
             let way_out = below(1.0 - ENGAGED_SHARE)? - fall;
             let beyond = |way: usize| if way > 0 { way / 2 + 2 } else { 0 };

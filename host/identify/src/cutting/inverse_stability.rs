@@ -52,12 +52,12 @@ impl Default for PriorFactors {
     }
 }
 
-/// Relative standard deviations of the measured quantities of the trial cuts.
+/// Relative standard deviations of the axial depths and chatter frequencies of the trial cuts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CutErrors {
-    /// Relative standard deviation of depths.
+    /// Relative standard deviation of the set axial depths.
     pub depth: f64,
-    /// Relative standard deviation of chatter frequencies.
+    /// Relative standard deviation of the measured chatter frequencies.
     pub frequency: f64,
 }
 
@@ -119,8 +119,8 @@ pub enum InverseError {
 /// Number of particles of the sequential Monte Carlo sampler, each of which is one structure. A choice.
 const PARTICLES: usize = 192;
 
-/// Smallest effective sample size that one tempering step of the sequential Monte Carlo sampler leaves, as a fraction of
-/// the number of particles. A choice.
+/// Smallest effective sample size that one tempering step of the sequential Monte Carlo sampler leaves, as a fraction
+/// of the number of particles. A choice.
 const EFFECTIVE: f64 = 0.5;
 
 /// Number of Metropolis moves of every particle of the sequential Monte Carlo sampler: after each tempering step but
@@ -142,7 +142,8 @@ struct Family<'a> {
     half_widths: Vec<f64>,
 }
 
-/// Identifies modes from trial cuts; `start` contains the first guess and the force coefficients. Equal seeds give equal results.
+/// Identifies modes from trial cuts; `start` contains the first guess and the force coefficients. Equal seeds give
+/// equal results.
 ///
 /// # Errors
 /// See [`InverseError`].
@@ -190,9 +191,10 @@ pub fn modes(
 /// The modes of `start` in the directions of the machine, with the posterior medians `found` of their parameters, for a
 /// case file.
 ///
-/// Shapes are those of the first guess. Left shapes carry the residue, about ω/2ik, and its standard deviation. The
-/// standard deviation of a parameter is that of its logarithm times the median; the posterior correlation between
-/// parameters is lost. Two modes with one pole, as of a round tool, become two modes of equal frequency.
+/// Mode shapes are those of the first guess, scaled so that the product of right and left shape is the residue, about
+/// ω/(2ik). The standard deviation of the residue is given to the left shape alone. The standard deviation of a
+/// parameter is that of its logarithm times the median; the posterior correlation between parameters is lost. Two modes
+/// with one pole, as of a round tool, become two modes of equal frequency.
 pub fn identified_modes(start: &FirstOrder, found: &[InverseMode]) -> (Vec<Direction>, Vec<IdentifiedMode>) {
     let axes: Vec<usize> = (0..3)
         .filter(|&axis| start.c.row(axis).amax() > 0.0 && start.b.column(axis).amax() > 0.0)
@@ -251,7 +253,7 @@ impl Family<'_> {
             );
             let moved = Complex64::new(-zeta, (1.0 - zeta * zeta).sqrt()) * omega;
             problem.structure.a += projector.map(|entry| 2.0 * ((moved - pole) * entry).re);
-            // The residue of a mode is about ω/2ik with the stiffness k, so it scales with frequency over stiffness.
+            // The residue of a mode is about ω/(2ik) with the stiffness k, so it scales with frequency over stiffness.
             let residue = frequency / stiffness;
             let part = projector.map(|entry| 2.0 * entry.re) * &self.start.structure.b;
             problem.structure.b += part * (residue - 1.0);
@@ -262,8 +264,9 @@ impl Family<'_> {
     /// Log-likelihood of the observed outcomes for the structure θ, and the number of trial cuts that the structure
     /// misjudges.
     ///
-    /// Every cut lowers the log-likelihood. If it has fallen to `least` before the last cut, the evaluation stops and returns
-    /// −∞. It also returns −∞ if the stability of a cut cannot be computed.
+    /// Every cut lowers the log-likelihood. If it has fallen to `least` before the last cut, the evaluation stops and
+    /// returns −∞. It also returns −∞ if the stability of a cut cannot be computed. In both cases all cuts count as
+    /// misjudged.
     fn likelihood(&self, theta: &[f64], least: f64) -> (f64, usize) {
         let problem = self.problem(theta);
         let mut sum = 0.0;
@@ -449,8 +452,8 @@ fn weights(sums: &[f64], step: f64) -> Vec<f64> {
     raw.iter().map(|weight| weight / total).collect()
 }
 
-/// Next increment of the likelihood exponent of the tempering: the largest one that keeps the effective sample size of
-/// the particles.
+/// Next increment of the likelihood exponent of the tempering: the largest one that keeps the effective sample size at
+/// least at the share [`EFFECTIVE`] of the number of particles.
 fn next_step(sums: &[f64], share: f64) -> f64 {
     let effective = |step: f64| 1.0 / weights(sums, step).iter().map(|w| w * w).sum::<f64>();
     let enough = EFFECTIVE * sums.len() as f64;
@@ -460,11 +463,12 @@ fn next_step(sums: &[f64], share: f64) -> f64 {
     }
     // The bisection stops at 1e-12 of the range of increments: far below the scatter of the particles.
     let [low, _] = bisection([0.0, high], 1e-12 * high, |step| effective(step) >= enough);
-    // A smallest increment of the likelihood exponent guarantees that the tempering ends.
+    // A smallest increment of the likelihood exponent, 1e-6, guarantees that the tempering ends.
     low.max(1e-6).min(1.0 - share)
 }
 
-/// Index of the parent of each new particle (systematic resampling).
+/// Index of the old particle that each new particle copies, by systematic resampling with the particle weights
+/// `weights`.
 fn systematic(weights: &[f64], first: f64) -> Vec<usize> {
     let count = weights.len();
     let (mut index, mut below) = (0, weights[0]);
@@ -480,7 +484,8 @@ fn systematic(weights: &[f64], first: f64) -> Vec<usize> {
         .collect()
 }
 
-/// Cholesky factor of the covariance of the particles' parameters θ.
+/// Cholesky factor of the covariance of the particles' parameters θ; 1e-3 times the identity if the factorization
+/// fails.
 fn scatter_root(particles: &[Vec<f64>]) -> DMatrix<f64> {
     let size = particles.first().map_or(0, Vec::len);
     let count = particles.len() as f64;

@@ -11,16 +11,17 @@ use quietcut_model::milling::{Immersion, Material, RotatingVector, ToothForce};
 /// A cutting test with the quantities that the steps of the fit of its force coefficients share.
 pub(super) struct Prepared<'a> {
     pub(super) test: &'a CuttingTest,
-    /// Derivatives of the tooth force by the coefficients, as vectors over the immersion angle. `cutting`: N per unit
-    /// of each cutting coefficient and per meter of chip thickness. `edge`: N per unit of each edge coefficient.
+    /// Derivatives of the tooth force by the force coefficients at the axial depth of the test, as vectors over the
+    /// immersion angle. `cutting`: N per unit of each cutting coefficient and per meter of chip thickness. `edge`: N
+    /// per unit of each edge coefficient.
     pub(super) cutting: [RotatingVector; 3],
     pub(super) edge: [RotatingVector; 3],
     /// Indices of the samples next to a tooth entry or exit. Part of their sampling interval has another number of
     /// engaged teeth, so the fit leaves them out.
     pub(super) switching: BTreeSet<usize>,
     pub(super) revolutions: Vec<[usize; 2]>,
-    /// Weight 1/σ² of the force residual in each direction, with its standard deviation σ; 1/N². It is 1 in the first step
-    /// of the fit, and later 0 in the axial direction if the axial coefficients are not fitted.
+    /// Weight 1/σ² of the force residual in each direction, with its standard deviation σ; 1/N². It is 1 in the first
+    /// step of the fit, and later 0 in the axial direction if the axial coefficients are not fitted.
     pub(super) weights: [f64; 3],
 }
 
@@ -63,8 +64,8 @@ pub(super) fn prepared(test: &CuttingTest) -> Prepared<'_> {
 }
 
 impl Prepared<'_> {
-    /// Mean force of a revolution without runout and vibration, N per unit of each force coefficient; and the measured
-    /// mean force, N.
+    /// Mean over a revolution of the force that each force coefficient causes without runout and vibration, N per unit
+    /// of the coefficient; and the measured mean force, N.
     ///
     /// Both means are over the same samples, so that the sampling of tooth entry and exit biases neither.
     pub(super) fn mean_forces(&self, [from, to]: [usize; 2]) -> ([Vector3<f64>; 6], Vector3<f64>) {

@@ -1,5 +1,5 @@
-//! Steady periodic motion in a recording: segments of constant excitation frequency, and the Fourier coefficients of the
-//! force and motion channels with the variance of their noise.
+//! Steady periodic motion in a recording: segments of constant excitation frequency, and the Fourier coefficients of
+//! the force and motion channels with the variance of their noise.
 
 use std::f64::consts::TAU;
 
@@ -21,18 +21,18 @@ pub struct DwellSegment {
     pub frequency_hz: f64,
 }
 
-/// A measured steady periodic motion: Fourier coefficients of the force and motion channels over one segment of constant
-/// excitation frequency.
+/// A measured steady periodic motion: Fourier coefficients of the force and motion channels over one segment of
+/// constant excitation frequency.
 #[derive(Clone, Debug)]
 pub struct Dwell {
-    /// Fundamental frequency, rad/s.
+    /// Fundamental frequency of the motion, which is the excitation frequency, rad/s.
     pub omega: f64,
     /// Variance of the estimated fundamental frequency, (rad/s)².
     pub omega_variance: f64,
-    /// Number of samples of the segment with the steady motion.
+    /// Number of samples of the fitted segment.
     pub samples: usize,
-    /// (AᵀA)⁻¹ of the harmonic regression with design matrix A. Multiplied by the noise variance of a channel it is the covariance
-    /// of the coefficients of that channel.
+    /// (AᵀA)⁻¹ of the harmonic regression with design matrix A. Multiplied by the noise variance of a channel it is the
+    /// covariance of the coefficients of that channel.
     pub gram_inverse: DMatrix<f64>,
     /// Fourier series of each force channel.
     pub forces: Vec<FourierSeries>,
@@ -50,7 +50,7 @@ pub struct FourierSeries {
     pub quantity: Quantity,
     /// Fourier coefficients of 1, cos, sin, cos 2 …, in the unit of the channel.
     pub coefficients: DVector<f64>,
-    /// Noise variance of one sample.
+    /// Variance of the noise in one sample of the channel.
     pub variance: f64,
 }
 
@@ -66,7 +66,7 @@ impl FourierSeries {
     }
 }
 
-/// The direction of a force or motion channel, from its name.
+/// The direction of a force or motion channel, from its name; `None` for a channel of another quantity or name.
 pub(crate) fn direction_of(channel: &Channel) -> Option<Direction> {
     let direction = match channel.quantity {
         Quantity::Displacement => channel.name.as_str(),
@@ -76,14 +76,15 @@ pub(crate) fn direction_of(channel: &Channel) -> Option<Direction> {
     direction.parse().ok()
 }
 
-/// Length of the blocks of a step-sine record whose RMS force shows pauses, s.
+/// Length of the blocks of a step-sine record over which the RMS of the force is computed, to find pauses of the
+/// excitation, s.
 const BLOCK_S: f64 = 0.1;
 
-/// The segments of `recording` with a constant excitation frequency, found from the force channel with the largest energy. Empty
-/// without a force channel.
+/// The segments of `recording` with a constant excitation frequency, found from the force channel with the largest
+/// energy. Empty without a force channel.
 ///
-/// A segment ends where the force pauses or its frequency steps. A step without a pause shows as a change of the local frequency, from
-/// the times of zero crossings, that far exceeds the scatter of that frequency.
+/// A segment ends where the force pauses or its frequency steps. A step without a pause shows as a change of the local
+/// frequency, from the times of zero crossings of the force, that far exceeds the scatter of that frequency.
 pub fn dwell_segments(recording: &Recording) -> Vec<DwellSegment> {
     let Some(force) = recording
         .channels
@@ -172,7 +173,8 @@ fn split(samples: &[f64], from: usize, rate_hz: f64, found: &mut Vec<DwellSegmen
                     frequency_hz: frequency(begin, last),
                 });
             }
-            // After a segment, the periods in which the frequency step was found contain both frequencies and are skipped.
+            // After a segment, the periods in which the frequency step was found contain both frequencies and are
+            // skipped.
             begin = if stepped && last > begin + 2 * PERIODS {
                 end + PERIODS
             } else {
@@ -182,8 +184,8 @@ fn split(samples: &[f64], from: usize, rate_hz: f64, found: &mut Vec<DwellSegmen
     }
 }
 
-/// Fractional sample indices of the rising zero crossings of the force, with a hysteresis of at most half its RMS, so that
-/// weaker noise gives no second crossing.
+/// Fractional sample indices of the rising zero crossings of the force, with a hysteresis of at most half its RMS, so
+/// that weaker noise gives no second crossing.
 fn rising_crossings(samples: &[f64], from: usize) -> Vec<f64> {
     let size = (energy(&samples[from.min(samples.len())..]) / samples.len().max(1) as f64).sqrt();
     let mut crossings = Vec::new();
@@ -199,8 +201,8 @@ fn rising_crossings(samples: &[f64], from: usize) -> Vec<f64> {
 }
 
 impl Dwell {
-    /// Fits the periodic motion with `harmonics` harmonics to a segment of a recording; the frequency is refined with all force and
-    /// motion channels.
+    /// Fits the periodic motion with `harmonics` harmonics to a segment of a recording; the frequency is refined with
+    /// all force and motion channels.
     ///
     /// `None` if the fit is not possible, for example with too few samples in the segment or without a force channel.
     pub fn fit(recording: &Recording, stretch: DwellSegment, harmonics: usize) -> Option<Self> {
@@ -231,7 +233,8 @@ impl Dwell {
                 let coefficients = &gram_inverse * design.tr_mul(&samples);
                 let residual = &samples - &design * &coefficients;
                 let free = count as f64 - (2 * harmonics + 1) as f64;
-                // The noise variance is at least that of an error of 1e-14 of the RMS of the samples, which rounding causes.
+                // The noise variance is at least that of an error of 1e-14 of the RMS of the samples, which rounding
+                // causes.
                 let variance =
                     (residual.norm_squared() / free).max(1e-28 * samples.norm_squared() / count as f64);
                 if variance > 0.0 {

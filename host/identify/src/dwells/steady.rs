@@ -10,23 +10,24 @@ use crate::criteria::{LEAST_DWELL_PERIODS, NOISE_OVER_TRANSIENT, STEADY_CHANGE, 
 use crate::dwells::dwell::{Dwell, DwellSegment, direction_of, dwell_segments, pool_variances};
 use quietcut_recording::Recording;
 
-/// Length of the transient that is left out at the start of each dwell.
+/// Assumed length of the transient at the start of each dwell, which is left out. Unless the user sets the length, more
+/// is left out while the motion still changes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Settling {
     /// A length of the transient set by the user, s.
     Seconds(f64),
     /// The transient is the first half of the dwell.
     Half,
-    /// The transient ends when a decay e^{−σt}, initially as large as the steady motion, has fallen below the noise of its
-    /// Fourier coefficients; σ is the given decay rate, 1/s.
+    /// The transient ends when a decay e^{−σt}, initially as large as the steady motion, has fallen below a fifth of
+    /// the standard deviation of its Fourier coefficients; σ is the given decay rate, 1/s.
     Decay(f64),
 }
 
 /// Dwells with steady motion found in recordings, and warnings, for example about skipped dwells.
 #[derive(Clone, Debug, Default)]
 pub struct Steady {
-    /// Steady parts of the dwells. If the motion of more than half of the dwells of a recording still changes, these dwells
-    /// are included.
+    /// Steady parts of the dwells. If the motion of more than half of the dwells of a recording still changes, these
+    /// dwells are included.
     pub dwells: Vec<Dwell>,
     /// Warnings for the user.
     pub warnings: Vec<String>,
@@ -90,17 +91,17 @@ pub fn steady(recordings: &[Recording], harmonics: usize, settling: Settling) ->
 /// Steady part of a dwell, after its transient.
 struct Settled {
     dwell: Dwell,
-    /// False if the dwell is too short for a transient of the given decay rate to fall below the noise. Always true if no
-    /// decay rate is given.
+    /// False if the dwell is too short for a transient of the given decay rate to fall below the noise. Always true if
+    /// no decay rate is given.
     whole: bool,
-    /// True if the fundamental of every motion channel is nearly the same in both halves of the part ([`is_still`]), or if
-    /// the user set the length of the transient.
+    /// True if the fundamental of every motion channel is nearly the same in both halves of the steady part
+    /// ([`is_still`]), or if the user set the length of the transient.
     still: bool,
 }
 
-/// The part of a dwell after its transient; `None` if it is too short. While its motion still changes, its last half
-/// replaces it, as long as that contains at least [`LEAST_DWELL_PERIODS`] periods. A length of the transient that the user
-/// set is kept.
+/// The part of a dwell after its transient; `None` if it is too short. While the motion still changes in this part, its
+/// last half replaces it, as long as that contains at least [`LEAST_DWELL_PERIODS`] excitation periods. A length of the
+/// transient that the user set is kept.
 fn settled(
     recording: &Recording,
     stretch: DwellSegment,
@@ -142,8 +143,8 @@ fn settled(
 }
 
 /// True if the fundamental of each motion channel changes between the first and the second half of a dwell by less than
-/// the share [`STEADY_CHANGE`], or by less than [`STEADY_DEVIATIONS`] standard deviations of the change's real or
-/// imaginary part.
+/// the share [`STEADY_CHANGE`], or by less than [`STEADY_DEVIATIONS`] standard deviations, from noise and frequency
+/// error, of the change's real or imaginary part.
 fn is_still(recording: &Recording, part: DwellSegment, dwell: &Dwell) -> bool {
     let middle = (part.from + part.to) / 2;
     let halves = [part.from..middle, middle..part.to];
@@ -162,8 +163,8 @@ fn is_still(recording: &Recording, part: DwellSegment, dwell: &Dwell) -> bool {
         // In half of the samples, real and imaginary part of the fundamental each have the variance 4σ²/n, with the
         // noise variance σ² and n samples in the whole dwell; the difference of two halves has twice that.
         let noise = (8.0 * line.variance / dwell.samples as f64).sqrt();
-        // Difference of the two halves that one standard deviation of the estimated frequency causes in a steady motion,
-        // since it turns the phase between their middles. It adds to the noise that the test allows.
+        // Difference of the two halves that one standard deviation of the estimated frequency causes in a steady
+        // motion, since it turns the phase between their middles. It adds to the noise that the test allows.
         let turned = line.amplitude(1)
             * dwell.omega_variance.sqrt()
             * (0.5 * dwell.samples as f64 / recording.sample_rate_hz);
@@ -229,8 +230,8 @@ fn first_settled(
     }
 }
 
-/// Dwells of a record with constant frequency and slowly changing force: consecutive windows of `periods` excitation
-/// periods each. An incomplete window at the end of a segment is left out.
+/// Dwells of a record with constant excitation frequency and slowly changing force amplitude: consecutive windows of
+/// `periods` excitation periods each. An incomplete window at the end of a segment of constant frequency is left out.
 pub fn windows(recording: &Recording, harmonics: usize, periods: f64) -> Vec<Dwell> {
     let mut dwells = Vec::new();
     for stretch in dwell_segments(recording) {

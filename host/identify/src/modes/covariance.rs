@@ -45,7 +45,8 @@ pub(super) fn covariance(data: &Receptances, fit: &PoleResidue, weights: &Weight
 }
 
 /// Middle matrix M of the sandwich covariance: ½ Σ Re(J(f)ᴴ C_l J(f + l)) over lines f and lags −`lags` … `lags`, with
-/// the Jacobian J, and with C_l the mean of left(f) left(f + l)ᴴ over all lines f, where left is the whitened residual.
+/// the Jacobian J of the weighted receptances, and with C_l the mean of left(f) left(f + l)ᴴ over all lines f, where
+/// left is the weighted residual of all receptances.
 fn meat(jacobian: &[DMatrix<Complex64>], left: &[DVector<Complex64>], lags: usize) -> DMatrix<f64> {
     let size = jacobian.first().map_or(0, DMatrix::nrows);
     let lines = left.first().map_or(0, |left| left.len());
@@ -76,9 +77,9 @@ fn meat(jacobian: &[DMatrix<Complex64>], left: &[DVector<Complex64>], lags: usiz
     meat
 }
 
-/// Upper left block of [N Gᵀ; G 0]⁻¹, with the normal matrix N and the gradients G of the constraints. The right shape
-/// of a mode can be multiplied by any complex factor if the left one is divided by it. The data do not determine this
-/// factor; the constraints fix it.
+/// Covariance block of a modal fit: the upper left block of [N Gᵀ; G 0]⁻¹, with the normal matrix N and the gradients G
+/// of the constraints on the mode shapes. The right shape of a mode can be multiplied by any complex factor if the left
+/// one is divided by it. The data do not determine this factor; the constraints fix it.
 pub(super) fn constrained_inverse(
     fit: &PoleResidue,
     shared: &[(usize, usize)],

@@ -1,10 +1,11 @@
 //! Complex modes from measured receptances, with left and right shapes (thesis eq. 7.15).
 //!
-//! H_pq(s) = Σ_r Ψᴿ_pr Ψᴸ_qr/(s − λ_r) + conjugate at the conjugate pole, with λ = −ζω + iω√(1 − ζ²) and s = iω. The residue
-//! contains neither a conjugation nor a further factor. Left and right shapes may differ: reciprocity is not assumed.
+//! H_pq(s) = Σ_r Ψᴿ_pr Ψᴸ_qr/(s − λ_r) + conjugate at the conjugate pole, where s = iω and
+//! λ_r = −ζ_r ω_r + i ω_r √(1 − ζ_r²). The residue contains neither a conjugation nor a further factor. Left and right
+//! shapes may differ: reciprocity is not assumed.
 //!
-//! `denominator` computes the poles of every model order, [`stabilization`] selects those that are stable over the order, and
-//! `refinement` fits the modes in pole–residue form with their covariance.
+//! `denominator` computes the poles of every model order, [`stabilization`] selects those that are stable over the
+//! order, and `refinement` fits the modes in pole–residue form with their covariance.
 
 mod covariance;
 mod denominator;

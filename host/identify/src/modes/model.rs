@@ -20,8 +20,8 @@ pub struct ModalModel {
     pub responses: Vec<Direction>,
     /// The modes, sorted by frequency.
     pub modes: Vec<IdentifiedMode>,
-    /// For each pair of response and force direction: the compliance of the modes above the band, m/N, and the inertia term of the
-    /// modes below it, the coefficient of 1/s², in 1/kg.
+    /// For each pair of response and force direction: the compliance of the modes above the band, m/N, and the inertia
+    /// term of the modes below it, the coefficient of 1/s², in 1/kg.
     pub outside: Vec<(Direction, Direction, [f64; 2])>,
     /// NRMSE of the fitted receptances, each with equal weight; after a fit to whole records, of the responses in the
     /// records.
@@ -83,8 +83,8 @@ impl ModalModel {
         both.filter(|direction| self.forces.contains(direction)).collect()
     }
 
-    /// The fitted receptance, including the terms of modes outside the band, m/N; `None` if the pair of directions was not
-    /// measured.
+    /// The fitted receptance, including the terms of modes outside the band, m/N; `None` if the pair of directions was
+    /// not measured.
     pub fn receptance(&self, response: Direction, force: Direction, frequency_hz: f64) -> Option<Complex64> {
         let p = self.responses.iter().position(|known| *known == response)?;
         let q = self.forces.iter().position(|known| *known == force)?;

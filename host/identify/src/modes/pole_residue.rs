@@ -1,7 +1,7 @@
 //! Modes in pole–residue form.
 //!
-//! H_pq(s) = Σ_r Ψᴿ_pr Ψᴸ_qr/(s − λ_r) + conjugates + U_pq + L_pq/s², with real U (compliance of the modes above the band) and real
-//! L (inertia of the modes below it). All residue matrices have rank one.
+//! H_pq(s) = Σ_r Ψᴿ_pr Ψᴸ_qr/(s − λ_r) + conjugates + U_pq + L_pq/s², with real U (compliance of the modes above the
+//! band) and real L (inertia of the modes below it). All residue matrices have rank one.
 
 use nalgebra::DVector;
 use num_complex::Complex64;
@@ -63,8 +63,8 @@ impl PoleResidue {
         Ok(start)
     }
 
-    /// Fits the terms U and L of the modes outside the band to the receptances minus the modes, by linear least
-    /// squares.
+    /// Fits the terms U and L of the modes outside the band to the real part of the receptances minus the modes in the
+    /// band, by weighted linear least squares.
     fn fit_outside(&mut self, data: &Receptances) {
         for k in 0..data.values.len() {
             let (mut gram, mut right) = ([[0.0; 2]; 2], [0.0; 2]);
@@ -132,7 +132,8 @@ impl PoleResidue {
         moved
     }
 
-    /// Measured minus fitted receptance `k` at every line, divided by the standard deviation of the measured one.
+    /// Measured minus fitted receptance `k` at every frequency line, divided by the standard deviation `deviation` of
+    /// the measured one.
     pub(super) fn left_of(&self, data: &Receptances, deviation: &[Vec<f64>], k: usize) -> Vec<Complex64> {
         data.frequency_hz
             .iter()

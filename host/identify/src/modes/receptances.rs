@@ -21,10 +21,11 @@ pub struct Receptances {
     /// The receptances, m/N.
     pub values: Vec<Vec<Complex64>>,
     /// Standard deviation of the real part, equal to that of the imaginary part, of every receptance at every
-    /// frequency, m/N. The variance is averaged over neighbouring lines. If only coherence is measured, it is correct up to a
-    /// common factor; if neither is known, it is a fixed fraction of the RMS of the receptance.
+    /// frequency, m/N. The variance is averaged over neighbouring lines. If only coherence is measured, the standard
+    /// deviation is correct up to a common factor; if neither is known, it is a fixed fraction of the RMS of the
+    /// receptance.
     pub deviation: Vec<Vec<f64>>,
-    /// True if the data state standard deviations of the receptances; false if they follow from coherence up to a
+    /// True if standard deviations of the receptances were measured; false if they follow from coherence up to a
     /// factor, or are not known.
     pub has_deviation: bool,
 }

@@ -127,7 +127,7 @@ pub(super) fn search(iterations_max: usize) -> LevenbergMarquardt {
             least_retried: 0.0,
         },
         iterations_max,
-        // λ from 1e-9 to 1e12.
+        // The damping λ of a step is tried from 1e-9 to 1e12.
         trials_max: 22,
         ridge: 0.0,
         idle: Idle::Hold,
@@ -135,7 +135,8 @@ pub(super) fn search(iterations_max: usize) -> LevenbergMarquardt {
 }
 
 impl Refined {
-    /// Norm of the residue matrix of a mode divided by the standard deviation of the residue matrix.
+    /// Norm of the residue matrix of a mode divided by the standard deviation of the matrix (root of the sum of the
+    /// variances of its entries).
     pub(super) fn significance(&self, index: usize) -> f64 {
         let mode = &self.fit.modes[index];
         let width = 2 + 2 * (mode.right.len() + mode.left.len());

@@ -8,8 +8,8 @@ pub(super) fn pair(residue: Complex64, s: Complex64, pole: Complex64) -> Complex
     residue / (s - pole) + residue.conj() / (s - pole.conj())
 }
 
-/// The nearest rank-one matrix right·leftᵀ to a matrix of residues (responses by forces), and the norm of the difference relative
-/// to that of the matrix.
+/// The nearest rank-one matrix right·leftᵀ to a matrix of residues (responses by forces), and the norm of the
+/// difference relative to that of the matrix.
 pub(crate) fn rank_one(residues: &DMatrix<Complex64>) -> Option<(Vec<Complex64>, Vec<Complex64>, f64)> {
     let all = residues.norm();
     let svd = residues.clone().try_svd(true, true, f64::EPSILON, 0)?;

@@ -31,7 +31,7 @@ pub struct Candidate {
     /// Distance to the pole of the previous order in the chain, the larger one of the relative changes of frequency and
     /// damping, in multiples of `SAME_FREQUENCY` and `SAME_DAMPING`.
     change: f64,
-    /// Residues of the pole in all receptances as a vector of norm 1.
+    /// Residues of the pole in all receptances, each receptance normalized by its RMS, as a vector of norm 1.
     shape: Vec<Complex64>,
 }
 
@@ -64,7 +64,7 @@ pub struct Stabilization {
 }
 
 impl Stabilization {
-    /// Rejected poles with the reason.
+    /// Poles of the stabilization diagram that are rejected as modes, with the reasons.
     pub(super) fn rejected(&self) -> Vec<Rejected> {
         let unstable = self
             .unstable
@@ -177,8 +177,8 @@ fn assurance(a: &[Complex64], b: &[Complex64]) -> f64 {
         .norm_sqr()
 }
 
-/// Continues each chain of poles of the previous model order by the nearest stable pole of this order; a pole without a
-/// predecessor starts a new chain.
+/// Continues chains of poles of the previous model order by poles of this order that agree with them in frequency,
+/// damping and shape, the nearest pairs first; a pole without a predecessor starts a new chain.
 fn connect(now: &mut [Candidate], before: &[Candidate], lines: &mut usize) {
     let mut pairs: Vec<(f64, usize, usize)> = Vec::new();
     for (i, a) in now.iter().enumerate() {

@@ -28,7 +28,7 @@ pub(super) struct Weights {
 }
 
 impl Weights {
-    /// Weighted residuals of all receptances.
+    /// Weighted residuals of all receptances, measured minus fitted.
     pub(super) fn left(&self, fit: &PoleResidue, data: &Receptances) -> Vec<DVector<Complex64>> {
         let plain: Vec<DVector<Complex64>> = (0..data.values.len())
             .map(|k| DVector::from_vec(fit.left_of(data, &self.deviation, k)))

@@ -1,7 +1,7 @@
 //! Describing functions: the contribution of nonlinear terms to the dynamic stiffness F/X of a harmonic motion.
 //!
-//! With x = X·sin ωt a force f_r(x, v) acts at the fundamental as N(X, ω)·x, N = (2/(2πX))·∫f_r·(sin + i·cos) d(ωt) over a period:
-//! the real part is a stiffness, the imaginary part a damping force per displacement.
+//! With x = X·sin ωt a force f_r(x, v) acts at the fundamental as N(X, ω)·x, N = (2/(2πX))·∫f_r·(sin + i·cos) d(ωt)
+//! over a period: the real part is a stiffness, the imaginary part a damping force per displacement.
 
 use num_complex::Complex64;
 use quietcut_model::effects::{EffectName, Harmonic};
@@ -45,8 +45,8 @@ impl Nonlinearity {
         self.effect().name()
     }
 
-    /// Describing functions N(X, ω) of the terms of the force, each for a unit coefficient, in the order of the coefficients; zero for an
-    /// effect without a describing function.
+    /// Describing functions N(X, ω) of the one or two terms of the nonlinear force, each for a unit coefficient, in the
+    /// order of the coefficients. Zero for an effect without a describing function.
     pub fn describing_functions(self, at: Harmonic) -> [Complex64; 2] {
         self.effect()
             .spec()
@@ -113,8 +113,8 @@ mod tests {
         };
         // At amplitudes X far below the yield displacement z_y, z = x up to a relative error of X/z_y.
         assert!(hysteresis(1e-3, 1.0).norm() < 2e-3);
-        // At amplitudes X far above z_y the stiffness −1 cancels the spring and friction of the force z_y remains; rounded corners
-        // reduce it by (z_y/X)^(3/2).
+        // At amplitudes X far above z_y the stiffness −1 cancels the spring and friction of the force z_y remains;
+        // rounded corners reduce it by (z_y/X)^(3/2).
         let large = hysteresis(100.0, 1.0);
         let friction = first(Nonlinearity::CoulombFriction, Harmonic::new(100.0, 1.0));
         assert!((large - (friction - 1.0)).norm() < 3e-3, "{large}");

@@ -200,7 +200,7 @@ impl Grid {
     /// `start`.
     ///
     /// # Errors
-    /// Newton does not converge.
+    /// Newton's method does not converge, or its Jacobian is singular.
     pub fn solve(&self, problem: Problem<'_>, start: &DVector<f64>) -> Result<Solution, NotConverged> {
         let failed = NotConverged {
             frequency_hz: problem.omega / TAU,
@@ -230,8 +230,8 @@ impl Grid {
 }
 
 impl Solution {
-    /// Derivatives of the Fourier coefficients of the motion by the parameters θ, by the force coefficients in
-    /// `of_force`, and by the frequency ω.
+    /// Derivatives of the Fourier coefficients of the motion by the parameters θ of the equation of motion, by the
+    /// Fourier coefficients of the force with the indices `of_force`, and by the frequency ω.
     pub fn sensitivities(
         &self,
         of_force: std::ops::Range<usize>,
@@ -326,7 +326,8 @@ mod tests {
         let base = solution(&theta, &law, omega, 9.5, 5);
         let (by_theta, by_force, by_omega) = base.sensitivities(0..11).unwrap();
         let close = |exact: DVector<f64>, difference: DVector<f64>, what: &str| {
-            // Central differences with a relative step of 1e-5 have a relative error of about 1e-10 times the third derivative.
+            // Central differences with a relative step of 1e-5 have a relative error of about 1e-10 times the third
+            // derivative.
             assert!(
                 (&exact - &difference).norm() < 1e-6 * exact.norm(),
                 "{what}: {exact} {difference}"

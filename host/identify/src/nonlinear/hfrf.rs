@@ -19,13 +19,13 @@ pub struct HigherOrder {
     pub h: [Complex64; 3],
 }
 
-/// Responses of a structure at one frequency under several force amplitudes.
+/// Displacements of a structure at one frequency under one or several force amplitudes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Response {
     /// Angular frequency, rad/s.
     pub omega: f64,
-    /// Pairs (F_n, Q_n) of the levels: force amplitude, N, and displacement phasor with the phase relative to the
-    /// force, m.
+    /// For each force level the pair (F_n, Q_n): force amplitude, N, and displacement phasor with the phase relative to
+    /// the force, m.
     pub levels: Vec<(f64, Complex64)>,
 }
 
@@ -40,7 +40,7 @@ pub struct HfrfFit {
     /// Standard deviations of the parameters from the scatter over frequency. They do not include the bias of the
     /// method.
     pub deviations: DVector<f64>,
-    /// The higher-order FRF at each frequency.
+    /// The higher-order FRFs at each frequency with three or more force levels.
     pub estimates: Vec<HigherOrder>,
 }
 
@@ -55,12 +55,13 @@ pub enum HfrfError {
         /// Number of frequencies with three or more force levels.
         frequencies: usize,
     },
-    /// The regression is singular.
+    /// The regression for m, c and k or that for k3 and c3 is singular.
     #[error("the responses do not determine the parameters")]
     Undetermined,
 }
 
-/// Groups dwells by frequency: dwells within the relative difference `tolerance` belong to one step of the test.
+/// Groups dwells by excitation frequency: dwells within the relative difference `tolerance` belong to one step of a
+/// step-sine test. Dwells without motion in the direction of the force are left out.
 pub fn responses(dwells: &[Dwell], tolerance: f64) -> Vec<Response> {
     let mut points: Vec<(f64, f64, Complex64)> = dwells
         .iter()
@@ -111,8 +112,8 @@ pub fn higher_order(response: &Response) -> Option<HigherOrder> {
     })
 }
 
-/// Fits m, c and k to 1/H₁ and k3 and c3 to H₃/(H₁³H₁*), each by linear least squares over all frequencies (thesis eqs 5.16
-/// and 5.17).
+/// Fits m, c and k to 1/H₁ and k3 and c3 to H₃/(H₁³H₁*), each by linear least squares over all frequencies (thesis eqs
+/// 5.16 and 5.17).
 ///
 /// # Errors
 /// Fewer than two frequencies have three or more force levels; or a regression is singular.

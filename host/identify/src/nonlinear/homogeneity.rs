@@ -1,4 +1,5 @@
-//! Homogeneity at constant frequency: whether the response is proportional to a rising force (thesis section 4.2.3).
+//! Homogeneity at constant frequency: ranges of the force amplitude in which the response amplitude is linear in it,
+//! and jumps between them (thesis section 4.2.3).
 
 use crate::criteria::{CURVATURE_SHARE, JUMP_DEVIATIONS, JUMP_SHARE, LEAST_REGION_POINTS, REGION_EVIDENCE};
 

@@ -85,7 +85,8 @@ impl Role {
     }
 }
 
-/// Term factor · Π u_k in one row of the equation of motion, with u = (q, q̇, q̈), n entries each.
+/// Term factor · Π u_k in one row of the equation of motion, with u = (q, q̇, q̈), each with an entry per degree of
+/// freedom.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Monomial {
     /// Row of the equation of motion that contains the term.

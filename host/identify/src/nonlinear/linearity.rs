@@ -1,10 +1,11 @@
-//! Tests whether a structure is linear, and which kind of nonlinearity it has (thesis section 4.2, as tests with error rates).
+//! Tests whether a structure is linear, and which kind of nonlinearity it has (thesis section 4.2, as tests with error
+//! rates).
 //!
 //! *Force-level dependence* and *homogeneity*: the dynamic stiffness F/X of a linear structure at one frequency does
-//! not depend on the force level. The change with the level is fitted by the describing function of each candidate
-//! kind. A kind is named if it reduces the sum of squares by much more than chance does; a quadratic spring is named if
-//! the second harmonic is significant. *Harmonics*: the response of a linear structure at 2ω and 3ω is within the noise
-//! and within the response to the harmonics of the force.
+//! not depend on the force level. The change with the level is fitted by the describing function of each candidate kind
+//! of nonlinearity. A kind is named if it reduces the sum of squares by much more than chance does; a quadratic spring
+//! is named if the second harmonic is significant. *Harmonics*: the response of a linear structure at 2ω and 3ω is
+//! within the noise and within the response to the harmonics of the force.
 
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
@@ -36,11 +37,12 @@ pub struct Verdict {
     pub explained_misfit: f64,
     /// Largest relative change of the stiffness |F/X| between two dwells of one frequency.
     pub level_dependence: f64,
-    /// Second and third harmonics of the response in each dwell, as in figures 5.4 (b) and (c) of the thesis.
+    /// Second and third harmonics of the measured motion in each dwell, as in figures 5.4 (b) and (c) of the thesis.
     pub harmonics: Vec<Harmonics>,
 }
 
-/// Amplitudes of the second and third harmonic of the response at one force level, relative to the fundamental.
+/// Amplitudes of the second and third harmonic of the measured motion X (displacement, velocity or acceleration) in one
+/// dwell, relative to the fundamental.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Harmonics {
     /// Excitation frequency, Hz.
@@ -51,7 +53,7 @@ pub struct Harmonics {
     pub second: f64,
     /// |X(3ω)|/|X(ω)|.
     pub third: f64,
-    /// Standard deviation of the noise of the response's amplitude at 2ω, relative to the fundamental.
+    /// Standard deviation of the noise in the amplitude |X(2ω)| of the measured motion, relative to the fundamental.
     pub noise: f64,
 }
 
@@ -195,8 +197,8 @@ impl<'a> LinearModel<'a> {
         2.0 * (self.points.len() - self.groups) as f64
     }
 
-    /// χ² of the residual stiffnesses after a fit of the describing functions `features` and a free complex stiffness
-    /// per frequency.
+    /// χ² of the measured stiffnesses F/X after a fit of the describing functions `features` and a free complex
+    /// stiffness per frequency.
     fn sum_of_squares(&self, features: &[Vec<Complex64>]) -> f64 {
         let rows = 2 * self.points.len();
         let mut matrix = DMatrix::zeros(rows, features.len().max(1));
@@ -223,8 +225,8 @@ impl<'a> LinearModel<'a> {
         }
     }
 
-    /// Values of all dwells minus their weighted mean over the dwells of the same frequency, divided by the standard
-    /// deviation of the stiffness.
+    /// Values `value` of all dwells minus their weighted mean over the dwells of the same frequency, divided by the
+    /// standard deviation of the stiffness F/X of the dwell.
     fn centered(&self, value: &dyn Fn(usize) -> f64) -> Vec<f64> {
         let mut sums = vec![(0.0, 0.0); self.groups];
         for (i, point) in self.points.iter().enumerate() {
@@ -324,7 +326,7 @@ fn candidates(base: &LinearModel<'_>, points: &[DwellStiffness]) -> Vec<Candidat
         features: features(kind, parameters, 0.0),
     };
     // The gap of backlash and the yield displacement of hysteresis are searched from 0.05 times the smallest to 1.5
-    // times the largest measured amplitude.
+    // times the largest measured displacement amplitude.
     let sizes = points.iter().map(|point| point.amplitude);
     let (least, largest) = sizes.fold((f64::INFINITY, 0.0_f64), |(a, b), x| (a.min(x), b.max(x)));
     let with_bend = |kind| {
@@ -364,15 +366,15 @@ fn candidates(base: &LinearModel<'_>, points: &[DwellStiffness]) -> Vec<Candidat
 /// True if the change of the stiffness F/X with the level is that of a quadratic spring alone.
 ///
 /// Harmonic balance of k₂x² near resonance: a₀ = −k₂X²/2k, X₂ = k₂X²/6k, with the offset a₀, the amplitude X at ω and
-/// X₂ at 2ω. The stiffness changes by k₂(2a₀ + X₂) = −(5/6)k₂²X²/k = −30·k·(X₂/X)². k follows from the change of F/X
-/// with frequency at the lowest level.
+/// X₂ at 2ω. The stiffness changes by k₂(2a₀ + X₂) = −(5/6)k₂²X²/k = −30·k·(X₂/X)². k is the value at ω = 0 of the line
+/// through Re(F/X) over ω² at the lowest level of each frequency.
 fn is_due_to_quadratic_spring(points: &[DwellStiffness], dwells: &[Dwell]) -> bool {
     let shares: Vec<(f64, f64, f64)> = dwells
         .iter()
         .filter_map(|dwell| {
             let (_, motion) = pair(dwell)?;
-            // Ratio X₂/X of the second harmonic of the displacement to its fundamental. In a velocity or an acceleration
-            // the ratio is larger by the factor 2 for each differentiation.
+            // Ratio X₂/X of the second harmonic of the displacement to its fundamental. In a velocity or an
+            // acceleration the ratio is larger by the factor 2 for each differentiation.
             let larger = f64::from(1 << derivative(motion.quantity));
             let share = at_harmonic(motion, dwell, 2)?.0 / motion.amplitude(1) / larger;
             let size = motion.amplitude(1) / dwell.omega.powi(i32::from(derivative(motion.quantity)));

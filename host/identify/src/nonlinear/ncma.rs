@@ -104,8 +104,8 @@ impl Map {
 }
 
 impl Curve {
-    /// Linearized modes from pairs of points with equal |H| on both sides of the resonance peak, with |H| from the
-    /// fraction `share` to 98 % of the peak.
+    /// Linearized modes from pairs of points with equal receptance magnitude |H| on both sides of the resonance peak,
+    /// with |H| from the fraction `share` to 98 % of the peak.
     ///
     /// Each measured point on one side is paired with an interpolated point on the other. Between points, real and
     /// imaginary part of H are cubics through four of them.
@@ -231,15 +231,15 @@ mod tests {
 
     #[test]
     fn the_maps_of_the_thesis_are_as_printed() {
-        // Worked out by hand from thesis eq. 4.8 at F = 4.2 N, X/F = 15 µm/N: (−3.7e8·4.2 + 1.3e9)·2.25e-10 + (5.6e3·4.2 −
-        // 6.3)·15e-6 + (−0.036·4.2 + 8.7).
+        // Worked out by hand from thesis eq. 4.8 at F = 4.2 N, X/F = 15 µm/N: (−3.7e8·4.2 + 1.3e9)·2.25e-10 +
+        // (5.6e3·4.2 − 6.3)·15e-6 + (−0.036·4.2 + 8.7).
         let omega = evaluate(&THESIS_FREQUENCY_HZ, 4.2, 15e-6);
         assert!(
             (omega - (-0.057150 + 0.352_705_5 + 8.5488)).abs() < 1e-9,
             "{omega}"
         );
-        // Worked out by hand from thesis eq. 4.9 at the same point: (6.1e7·4.2 − 2.4e8)·2.25e-10 + (−1.1e3·4.2 + 2.1e3)·15e-6 +
-        // (0.005·4.2 + 0.039).
+        // Worked out by hand from thesis eq. 4.9 at the same point: (6.1e7·4.2 − 2.4e8)·2.25e-10 + (−1.1e3·4.2 +
+        // 2.1e3)·15e-6 + (0.005·4.2 + 0.039).
         let eta = evaluate(&THESIS_LOSS_FACTOR, 4.2, 15e-6);
         assert!((eta - (0.003_645 - 0.0378 + 0.06)).abs() < 1e-9, "{eta}");
     }

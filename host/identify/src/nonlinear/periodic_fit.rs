@@ -1,5 +1,5 @@
 //! Coefficients of a nonlinear equation of motion from whole periods of a periodic test (a multisine), by harmonic
-//! balance with every line of the period.
+//! balance of all spectral lines of a period.
 //!
 //! The balance Σ θ φ(x) = F, with the coefficients θ of the terms φ, is solved for the periodic displacement x at the
 //! samples of a period, at twice the measured sample rate, so that cubes of the measured band do not alias into it.
@@ -35,7 +35,7 @@ pub struct PeriodicFit {
     pub law: Vec<(ForceTerm, f64)>,
     /// Standard deviations of the coefficients.
     pub deviations: Vec<f64>,
-    /// NRMSE of the predicted motion.
+    /// NRMSE of the predicted displacement over all periods.
     pub relative_error: f64,
 }
 
@@ -61,7 +61,7 @@ pub enum PeriodicError {
     Undetermined,
 }
 
-/// Ratio of the sample rate at which the harmonic balance is solved to that of the record.
+/// Ratio of the sample rate at which the harmonic balance is solved to that of the measured periods.
 const DENSER: usize = 2;
 
 struct Balance {
@@ -148,7 +148,8 @@ impl Balance {
         place.map_or(0.0, |index| theta[index])
     }
 
-    /// Derivatives of the nonlinear restoring force by displacement x and velocity v at every sample.
+    /// Derivatives of the nonlinear terms of the equation of motion by displacement x and velocity v at every sample of
+    /// a period.
     fn slopes(&self, theta: &DVector<f64>, x: &[f64]) -> [Vec<f64>; 2] {
         let v = self.derivative(x, 1);
         let (k2, k3) = (

@@ -10,11 +10,12 @@ use quietcut_model::structure::Direction;
 /// Comparison of the cross receptances H_ij and H_ji.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Reciprocity {
-    /// The directions i and j.
+    /// The directions i and j of force and motion.
     pub directions: [&'static str; 2],
     /// Mean over the frequencies of |H_ij − H_ji|² divided by its variance: near 1 for a reciprocal structure.
     pub misfit: f64,
-    /// Largest difference of H_ij and H_ji, relative to the largest |H_ij|.
+    /// Largest difference of H_ij and H_ji over the frequencies, relative to the largest receptance of a force in
+    /// direction i and a motion in direction j.
     pub largest_change: f64,
     /// True if the data are consistent with reciprocity.
     pub reciprocal: bool,
@@ -35,8 +36,8 @@ fn receptance(dwell: &Dwell, from: Direction, to: Direction) -> Option<(Complex6
     Some((h, 2.0 * per_unit * (own + of_force), f.norm()))
 }
 
-/// Compares the two cross receptances at every frequency at which both were measured, each at its lowest force, where a nonlinear
-/// structure is closest to a linear one. `None` if there is no such frequency.
+/// Compares the two cross receptances at every frequency at which both were measured, each at its lowest force, where a
+/// nonlinear structure is closest to a linear one. `None` if there is no such frequency.
 pub fn compare(dwells: &[Dwell], [i, j]: [Direction; 2]) -> Option<Reciprocity> {
     let of = |from, to| -> Vec<(f64, Complex64, f64)> {
         let mut found: Vec<(f64, Complex64, f64, f64)> = dwells

@@ -1,4 +1,4 @@
-//! Motion that an identified equation of motion predicts under a recorded force.
+//! Displacement that an identified equation of motion predicts under a recorded force.
 
 use num_complex::Complex64;
 use rustfft::FftPlanner;
@@ -32,7 +32,7 @@ pub enum ResponseError {
 /// anti-aliasing filter. The classical Runge–Kutta method takes four steps per sample.
 ///
 /// # Errors
-/// No mass, or a motion without bound.
+/// The law has no mass, or the predicted motion grows without bound.
 pub fn displacement(
     law: &[(ForceTerm, f64)],
     force: &[f64],

@@ -91,22 +91,22 @@ pub struct Record<'a> {
     pub rate_hz: f64,
 }
 
-/// Settings of the fit of a restoring-force surface.
+/// Settings of the fit of a force law to a record, and of its restoring-force surface.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Options {
     /// The terms of the law.
     pub terms: Vec<ForceTerm>,
     /// Given moving mass, kg; `None` if the fit determines it. Required for a record without force.
     pub mass_kg: Option<f64>,
-    /// Frequency band of the fit, Hz; `None` takes the band in which the measured motion exceeds its noise. If the
-    /// motion is integrated, the band starts at a quarter of the dominant frequency at least.
+    /// Frequency band in which the force law is fitted, Hz; `None` takes the band in which the measured motion exceeds
+    /// its noise. If the motion is integrated, the band starts at a quarter of the dominant frequency at least.
     pub band_hz: Option<[f64; 2]>,
     /// Duration that is left out of the fit at each end of the record, s; at most a quarter of the
     /// record at each end.
     pub trim_s: f64,
 }
 
-/// Displacement, velocity and acceleration of a record.
+/// Displacement, velocity and acceleration of a structure along one direction at the samples of a record.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Motion {
     /// Displacement, m.
@@ -129,9 +129,9 @@ pub struct Surface {
     /// NRMSE of the force within the band: RMS of the residual over RMS of the force, or of m q̈ in a record without
     /// force.
     pub force_error: f64,
-    /// Frequency band of the fit, Hz.
+    /// Frequency band in which the force law was fitted, Hz.
     pub band_hz: [f64; 2],
-    /// Motion at the samples used.
+    /// Motion at the samples of the record that the fit uses.
     pub motion: Motion,
     /// Restoring force f_r = f − m q̈ at the samples of the surface, N.
     pub restoring_n: Vec<f64>,
@@ -258,9 +258,9 @@ impl Record<'_> {
             right.norm()
         };
         let mut force_error = left.norm() / scale;
-        // Each frequency is weighted with the receptance of the fitted linear terms, relative to the static compliance; this
-        // needs a stiffness term. A free decay is not weighted: it is a transient, which a filter as narrow as the resonance
-        // would spread over the ends of the record.
+        // Each frequency is weighted with the receptance of the fitted linear terms, relative to the static compliance;
+        // this needs a stiffness term. A free decay is not weighted: it is a transient, which a filter as narrow as the
+        // resonance would spread over the ends of the record.
         if driven && terms.contains(&ForceTerm::Stiffness) {
             for _ in 0..REWEIGHTINGS {
                 let receptance = receptance(&terms, &theta, mass);

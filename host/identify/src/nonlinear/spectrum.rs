@@ -2,8 +2,8 @@
 //!
 //! A record is not periodic. For a band from 0 Hz the straight line through its ends is subtracted, and the remaining
 //! signal is continued by point reflection about its end, so that value and slope are continuous. For a higher band the
-//! record is mirrored at its ends. At both ends of the result an error remains, over about one period of the lowest
-//! frequency; callers leave these ends out.
+//! record is mirrored at its ends. At both ends of the filtered record an error remains, over about one period of the
+//! lowest frequency of the band; callers leave these ends out.
 
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -58,8 +58,9 @@ impl Spectral {
         signed * self.rate_hz / self.period as f64
     }
 
-    /// The record filtered with the frequency response `filter`(f), f in Hz. [`Continuation::Points`] subtracts a straight line first;
-    /// `of_line` maps the value of that line at the middle of the record and its slope per second to those of the filtered line.
+    /// The record filtered with the frequency response `filter`(f), f in Hz. [`Continuation::Points`] subtracts a
+    /// straight line first; `of_line` maps the value of that line at the middle of the record and its slope per second
+    /// to those of the filtered line.
     fn through(
         &self,
         samples: &[f64],
@@ -189,8 +190,8 @@ pub fn dominant_frequency_hz(samples: &[f64], rate_hz: f64) -> f64 {
     (strongest(&smooth) as f64 + 0.5) * width_hz
 }
 
-/// Frequency band in which a record exceeds its noise, Hz: the contiguous intervals around the dominant frequency whose smoothed
-/// power exceeds the noise power by a factor of more than `margin`.
+/// Frequency band in which a record exceeds its noise, Hz: the contiguous intervals around the dominant frequency whose
+/// smoothed power exceeds the noise power by a factor of more than `margin`.
 ///
 /// The noise power is the 5 % quantile of the smoothed power spectrum.
 pub fn band_of(samples: &[f64], rate_hz: f64, margin: f64) -> [f64; 2] {
@@ -233,8 +234,9 @@ mod tests {
         let back = spectral.derivative(&spectral.derivative(&plain, 2, [0.0, 60.0]), -2, [1.0, 60.0]);
         for i in 500..length - 500 {
             let slope = omega * (omega * i as f64 / rate).cos() + 0.2;
-            // The compared samples lie at least 2.5 s from the ends. The error from the corners of the continued record falls with
-            // the distance from the ends; a mirrored record has corners in its slope, which integration amplifies.
+            // The compared samples lie at least 2.5 s from the ends. The error from the corners of the continued record
+            // falls with the distance from the ends; a mirrored record has corners in its slope, which integration
+            // amplifies.
             assert!(
                 (twice[i] + omega * omega * at(i)).abs() < 2e-3 * omega * omega,
                 "{i}"

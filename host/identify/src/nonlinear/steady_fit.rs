@@ -33,7 +33,8 @@ pub struct Fit {
     pub robust: bool,
 }
 
-/// Data of a fit: dwells, and the equation of motion whose degrees of freedom are displacements in given directions.
+/// Data of a fit to steady motion: dwells, and the equation of motion whose degrees of freedom are displacements in
+/// given directions.
 #[derive(Clone, Copy)]
 pub struct Data<'a> {
     /// The equation of motion whose parameters are fitted.

@@ -1,9 +1,9 @@
 //! Receptances of two records compared: forward sweep with backward sweep, or one force level with another.
 //!
-//! The local polynomial method estimates the receptance of one record line by line. Over 2R + 1 neighbouring lines Y = H·F + T,
-//! with H and T parabolas in the frequency; T is the transient that the start and the end of the record cause. The estimate does
-//! not depend on the rate or the direction of the sweep, unlike the ratio at the instantaneous frequency: two sweeps of a linear
-//! structure give the same H within noise.
+//! The local polynomial method estimates the receptance of one record line by line. Over 2R + 1 neighbouring lines Y =
+//! H·F + T, with H and T parabolas in the frequency; T is the transient that the start and the end of the record cause.
+//! The estimate does not depend on the rate or the direction of the sweep, unlike the ratio at the instantaneous
+//! frequency: two sweeps of a linear structure give the same H within noise.
 
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
@@ -29,8 +29,8 @@ pub struct Spectra {
 /// Comparison of the receptances of two records.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Comparison {
-    /// Mean over the estimates of the squared difference of the two receptances divided by its variance: usually 1 to 3
-    /// for a linear structure.
+    /// Mean over the common band of the squared difference of the two receptances divided by its variance: usually 1 to
+    /// 3 for a linear structure.
     pub misfit: f64,
     /// Largest difference of the receptances, relative to the largest receptance of the first record.
     pub largest_change: f64,
@@ -66,8 +66,8 @@ impl Spectra {
         }
     }
 
-    /// Lowest and highest frequency at which the smoothed power of the force exceeds the share [`SWEPT_POWER_SHARE`] of
-    /// its maximum, Hz.
+    /// Band of the sweep, Hz: from the upper end of the first to the lower end of the last interval of 2R + 1 lines
+    /// whose force power exceeds the share [`SWEPT_POWER_SHARE`] of the largest one.
     fn band_hz(&self) -> Option<[f64; 2]> {
         let width = (2 * R + 1) as usize;
         let power: Vec<f64> = self
@@ -135,8 +135,8 @@ pub fn compare(a: &Spectra, b: &Spectra) -> Option<Comparison> {
             Some((a.local(frequency)?, b.local(frequency)?))
         })
         .collect();
-    // Noise of the sensor is taken as equal at all lines. The residual of a nonlinear structure near resonance is not
-    // noise, so the noise is the median over the estimates.
+    // Noise of the motion sensor is taken as equal at all lines. The residual of a nonlinear structure near resonance
+    // is not noise, so the noise is the median of the local residuals over the estimates.
     let median = |of: &dyn Fn(&(Local, Local)) -> f64| {
         let mut values: Vec<f64> = pairs.iter().map(of).collect();
         values.sort_by(f64::total_cmp);

@@ -58,7 +58,7 @@ impl OutputMap<'_> {
     /// respect to θ.
     ///
     /// The covariance comprises the noise of the motion, and the noise of force and frequency propagated through the
-    /// derivatives of the equation of motion. `None` if the harmonic balance or the covariance is singular.
+    /// derivatives of the predicted motion. `None` if the harmonic balance or the covariance is singular.
     pub(crate) fn whitened(
         &self,
         dwell: &Dwell,
@@ -119,7 +119,8 @@ impl OutputMap<'_> {
     }
 }
 
-/// Replaces the Fourier coefficients 1, cos, sin, cos 2 … in every column by those of the `order`-th time derivative.
+/// Replaces the Fourier coefficients of 1, cos, sin, cos 2 … in every column by those of the `order`-th time
+/// derivative.
 fn differentiate(x: &mut DMatrix<f64>, order: u8, omega: f64) {
     for _ in 0..order {
         for mut column in x.column_iter_mut() {

@@ -24,8 +24,8 @@ const STEP: f64 = 0.05;
 /// same number of engaged teeth. A choice.
 const PHASES: usize = 90;
 
-/// Largest number of spindle speeds at which candidate tests of a plan bracket the stability limit. A choice that
-/// bounds the computing time.
+/// Largest number of spindle speeds at which candidate tests of a plan bracket the stability limit by trial cuts. A
+/// choice that bounds the computing time.
 const BRACKETS: usize = 40;
 
 /// A test at the machine that a plan may contain.
@@ -40,7 +40,7 @@ pub enum Test {
         #[serde(rename = "blows")]
         impacts: usize,
     },
-    /// A stable cut on a dynamometer, which records the cutting force.
+    /// A stable cut at one speed and depth on a dynamometer, which records the cutting force.
     Force {
         /// Spindle speed, rev/min.
         rpm: f64,
@@ -83,7 +83,7 @@ pub(super) enum CandidateError {
     Invalid {
         /// Name of the unknown.
         unknown: String,
-        /// What is invalid.
+        /// Reason why the case is invalid.
         what: String,
     },
 }

@@ -1,4 +1,4 @@
-//! Uncertainty of the stability limits of a chart that follows from that of the unknown parameters.
+//! 90 % intervals of the stability limits of a lobe chart, from the uncertainty of the unknown parameters of the case.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use quietcut_numerics::statistics::sample_quantile;
@@ -8,7 +8,8 @@ use quietcut_numerics::statistics::NINETY_PERCENT;
 use quietcut_stability::Basis;
 use quietcut_stability::{Linearized, Plane, SpeedLine, StabilityError};
 
-/// Number of stability lobes, from the lowest on, that are considered at each spindle speed of a chart.
+/// Largest number of stability lobes that are considered at each spindle speed of a chart, from the first stability
+/// limit upwards.
 const LOBES: usize = 4;
 
 /// Number of quasi-random points that represent the distribution of the depth of the lowest of several lobes: a power
@@ -42,8 +43,9 @@ pub struct WithoutDerivative {
 impl KnownLimit {
     /// The stability limit at a spindle speed, and the lobes there without derivatives with respect to the unknowns.
     ///
-    /// The limit is `None` if stability is not lost, or if the first limit is among those without derivatives. Its
-    /// gradient has `size` entries; those of unknowns that affect only tests are zero.
+    /// The limit is `None` if stability is not lost up to the largest depth of the chart, or if the first limit is
+    /// among those without derivatives. The gradient of every lobe has `size` entries; those of unknowns that affect
+    /// only tests are zero.
     pub(super) fn new(
         line: &SpeedLine,
         linearized: &Linearized,
@@ -101,8 +103,8 @@ impl KnownLimit {
         self.planes[0].depth_mm
     }
 
-    /// Indices of the lobes that may be the lowest when the unknown parameters deviate; `roots` are their gradients in
-    /// standard coordinates.
+    /// Indices of the lobes that may be the lowest when the unknown parameters deviate; `roots` are the gradients of
+    /// all lobes' depths in coordinates in which the unknowns have unit covariance.
     fn rivals(&self, roots: &[DVector<f64>]) -> Vec<usize> {
         let is_near = |index: &usize| {
             let apart = self.planes[*index].depth_mm - self.depth_mm();
@@ -169,7 +171,7 @@ impl KnownChart {
             return [limit.depth_mm() - half, limit.depth_mm() + half];
         }
         // The distribution of the depth of the lowest lobe depends only on the lobes that may be the lowest: the number
-        // of coordinates equals their number, and the first axis lies along the gradient of the lowest.
+        // of coordinates equals their number, and the first axis lies along the gradient of the nominally lowest lobe.
         let vectors: Vec<DVector<f64>> = rivals.iter().map(|&index| roots[index].clone()).collect();
         let coordinates = triangular(&vectors);
         let mut lowest: Vec<f64> = self.points[rivals.len() - 1]

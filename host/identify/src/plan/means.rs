@@ -1,6 +1,6 @@
-//! Properties of the tests that a plan may contain: sensors, hammer, brackets and recordings.
+//! Properties of the tests that a plan may contain: sensors, impacts of a hammer, brackets of limits, and recordings.
 
-/// Means: properties of the tests that a plan may contain.
+/// Properties of the tests that a plan may contain, and of their sensors.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Means {
     /// Final width of the interval of depth to which cuts bracket a stability limit, relative to the limit.

@@ -1,4 +1,5 @@
-//! A search for the fewest tests that narrow the stability limits of a lobe chart to a given width.
+//! A search for the cheapest set of tests that narrows the 90 % intervals of the stability limits of a lobe chart to a
+//! given width.
 //!
 //! The uncertain parameters of a machine have a normal distribution (`unknowns`). Exact derivatives propagate it to
 //! every limit (`chart`). The Fisher information of every test (`candidate`) follows from these or from central
@@ -39,7 +40,7 @@ pub struct Request {
     pub speeds_rpm: Vec<f64>,
     /// Largest axial depth up to which stability limits are searched, mm.
     pub depth_mm: f64,
-    /// Number of steps in axial depth at which Floquet multipliers are followed.
+    /// Number of equal steps in axial depth over which Floquet multipliers are followed, before refinement.
     pub samples: usize,
     /// Required width of the 90 % interval of every stability limit, relative to the limit.
     pub width: f64,
@@ -54,7 +55,8 @@ pub struct Request {
 /// Reason why a plan of tests cannot be computed.
 #[derive(Debug, thiserror::Error)]
 pub enum PlanError {
-    /// The stability of the case at a speed of the chart cannot be computed.
+    /// The case is refused, for example for its cubic terms, or its stability at a speed of the chart cannot be
+    /// computed.
     #[error(transparent)]
     Stability(#[from] StabilityError),
     /// At no speed of the chart is stability lost up to the largest depth.
@@ -69,13 +71,13 @@ pub enum PlanError {
         /// Largest depth of the chart, mm.
         depth_mm: f64,
     },
-    /// The stability limits of the case have no derivatives by the unknown parameters, no parameter is unknown, or the
-    /// Fisher information of a test cannot be computed.
+    /// The stability limits of the case have no derivatives by the unknown parameters, no parameter is unknown, the
+    /// modes of the structure cannot be computed, or the Fisher information of a test cannot be computed.
     #[error("{case}: limits have no derivatives with respect to the unknowns: {what}")]
     NoDerivatives {
         /// Path of the case file.
         case: String,
-        /// Reason why the limits have no derivatives by the unknown parameters.
+        /// Reason why no plan can be computed: of the limits, of the unknown parameters or of a test.
         what: String,
     },
 }
@@ -87,7 +89,8 @@ pub struct Width {
     pub widest_percent: f64,
     /// Spindle speed with the widest interval of the stability limit, rev/min.
     pub at_rpm: f64,
-    /// Median over the speeds of the widths of the limits' 90 % intervals, percent of the limits.
+    /// Median over the speeds (of an even number, the upper of the two middle values) of the widths of the limits' 90 %
+    /// intervals, percent of the limits.
     pub median_percent: f64,
 }
 
@@ -116,7 +119,7 @@ pub struct Step {
     pub after: Width,
 }
 
-/// Reason why no set of tests reaches the required width of the limits' intervals.
+/// Reason why the plan does not reach the required width of the limits' intervals.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Obstacle {
     /// Width of the limits' 90 % intervals if every candidate test is repeated a thousand times.
@@ -138,7 +141,7 @@ pub struct IfKnown {
 }
 
 /// The cheapest set of tests found that narrows the stability limits of a chart to the required width, and its effect.
-/// If no set reaches this width, `obstacle` states the reason.
+/// If no set is found that reaches this width, `obstacle` states the reason.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Plan {
     /// The required width, percent.
@@ -150,7 +153,8 @@ pub struct Plan {
     /// Names of the unknown parameters, including differences at standstill and sensor gains, each with its standard
     /// deviation in percent where it is assumed.
     pub unknowns: Vec<String>,
-    /// True if the case states standard deviations of its parameters; otherwise defaults are assumed.
+    /// True if the case states standard deviations of its parameters; otherwise those of the request's prior are
+    /// assumed.
     pub stated: bool,
     /// Width of the limits' 90 % intervals before any test.
     pub before: Width,
@@ -162,10 +166,10 @@ pub struct Plan {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub obstacle: Option<Obstacle>,
     /// Spindle speeds that the plan leaves out, rev/min: without a stability limit up to the largest depth, or with a
-    /// limit without derivatives.
+    /// first limit without derivatives.
     pub without_limit_rpm: Vec<f64>,
-    /// Stability limits without derivatives with respect to the unknown parameters, with the reasons. The speeds of first
-    /// limits are among [`Plan::without_limit_rpm`].
+    /// Stability limits without derivatives with respect to the unknown parameters, with the reasons. The speeds of
+    /// first limits are among [`Plan::without_limit_rpm`].
     #[serde(skip)]
     pub without_derivative: Vec<WithoutDerivative>,
     /// All spindle speeds of the chart whose stability limit counts in the plan.
@@ -176,7 +180,7 @@ pub struct Plan {
 const AT_BEST: f64 = 1000.0;
 
 /// The cheapest set of tests found after which the 90 % interval of every stability limit of the chart has at most the
-/// required width. If no set reaches it, the plan contains the tests that narrow the intervals most per cost. Calls
+/// required width. If no such set is found, the plan contains the tests that narrow the intervals most per cost. Calls
 /// `progress` after each speed.
 ///
 /// Intervals follow from limits that are linearized in the unknown parameters: they hold for machines whose parameters
@@ -333,8 +337,8 @@ impl Basis {
         let mut if_known: Vec<IfKnown> = (0..size)
             .map(|index| {
                 let mut known = information.clone();
-                // An exact value is modelled by 1e12 times the prior information: the standard deviation becomes a
-                // millionth of the prior one.
+                // An exact value is modelled by adding 1e12 times the prior information: the standard deviation falls
+                // to a millionth of the prior one or less.
                 known[(index, index)] += 1e12;
                 IfKnown {
                     name: self.unknowns.names[index].clone(),

@@ -57,8 +57,8 @@ impl<'a> Selection<'a> {
         self.excess(information) == 0.0
     }
 
-    /// The cheapest set of tests found that reaches the required width. If no set reaches it, the set of the tests that
-    /// were added one by one.
+    /// The cheapest set of tests found that reaches the required width. If the tests that were added one by one do not
+    /// reach it, these tests.
     pub(super) fn fewest(&self) -> Vec<Chosen> {
         let mut chosen = self.greedy();
         if self.is_reached(&self.information(&chosen)) {
@@ -103,7 +103,7 @@ impl<'a> Selection<'a> {
         }
     }
 
-    /// The candidate tests with their costs when they are carried out in this order.
+    /// The candidate tests `order` with their costs when they are carried out in this order.
     pub(super) fn priced(&self, order: impl IntoIterator<Item = usize>) -> Vec<Chosen> {
         let mut information = self.nothing.clone();
         order
@@ -153,8 +153,8 @@ impl<'a> Selection<'a> {
         (Self::total(&priced) < than && self.is_reached(&self.information(&priced))).then_some(priced)
     }
 
-    /// The set without the most expensive test that is not necessary for the required width; `None` if all tests are
-    /// necessary.
+    /// The set without its most expensive test among those whose omission keeps the required width reached and lowers
+    /// the total cost; `None` if there is no such test.
     fn without_one(&self, chosen: &[Chosen]) -> Option<Vec<Chosen>> {
         let mut dearest: Vec<usize> = (0..chosen.len()).collect();
         dearest.sort_by_key(|&index| std::cmp::Reverse(chosen[index].cost));

@@ -54,7 +54,7 @@ pub(super) struct Unknowns {
 /// The case parameter of an entry (row, column) of a mass, damping or stiffness matrix.
 type Entry = fn(usize, usize) -> Parameter;
 
-/// Name of a mode, and the changes of the case's parameters for a relative change of one in its frequency, in its
+/// Name of a mode, and the changes of the case's parameters for a relative change of 1 (100 %) in its frequency, in its
 /// damping ratio, and in its stiffness or compliance.
 type ModeChanges = (String, [Vec<Deviation>; 3]);
 
@@ -68,7 +68,7 @@ impl Unknowns {
     /// The unknowns whose standard deviations the case states (keys that end in `_std`), or else those of `prior`.
     ///
     /// # Errors
-    /// There are none, or the modes of the matrices cannot be computed; the text gives the reason.
+    /// There are no unknowns, or the modes of the matrices cannot be computed; the text gives the reason.
     pub(super) fn new(case: &Case, prior: &Prior, means: &Means) -> Result<Self, String> {
         let stated = !case.deviations.is_empty();
         let named = if stated {
@@ -178,8 +178,8 @@ fn of_modes(case: &Case, relative: [f64; 3], suffix: &str) -> Result<Vec<Named>,
     Ok(named)
 }
 
-/// Name of a mode, and the changes of its parameters in the case for a relative change of one in frequency, in damping
-/// ratio, and in compliance.
+/// Name of a mode, and the changes of its parameters in the case for a relative change of 1 (100 %) in frequency, in
+/// damping ratio, and in compliance.
 fn of_mode((index, mode): (usize, &Mode)) -> ModeChanges {
     let one = |parameter, std| vec![Deviation { parameter, std }];
     let shape = mode.left.iter().enumerate().flat_map(|(entry, value)| {
@@ -202,8 +202,8 @@ fn the_mode(frequency_hz: f64) -> String {
     format!("the mode at {frequency_hz:.2} Hz")
 }
 
-/// Name of a robot joint, and the changes of its parameters in the case for a relative change of one in frequency,
-/// damping ratio and stiffness of the joint with its link alone.
+/// Name of a robot joint, and the changes of its parameters in the case for a relative change of 1 (100 %) in
+/// frequency, damping ratio and stiffness of the joint with its link alone.
 fn of_joint((index, joint): (usize, &Joint)) -> ModeChanges {
     let part = |parameter, std| Deviation { parameter, std };
     let stiffness = |factor: f64| {
@@ -229,10 +229,12 @@ fn of_joint((index, joint): (usize, &Joint)) -> ModeChanges {
     )
 }
 
-/// Names of the undamped modes Kφ = ω²Mφ of matrices, and the changes of the matrices for a relative change of one in frequency,
-/// damping ratio and stiffness of each mode. With φᵀMφ = 1 and φᵀCφ = 2ζω, a change of one mode alone is a multiple of Mφφᵀ M.
+/// Names of the undamped modes Kφ = ω²Mφ of matrices, and the changes of the matrices for a relative change of 1 (100
+/// %) in frequency, damping ratio and stiffness of each mode. With φᵀMφ = 1 and φᵀCφ = 2ζω, a change of one mode alone
+/// is a multiple of Mφφᵀ M.
 ///
-/// Modes are those of the symmetric parts of the matrices. Damping that couples modes does not change.
+/// Modes are those of the symmetric parts of the matrices; modes with ω² ≤ 0 are left out. Damping that couples modes
+/// does not change.
 ///
 /// # Errors
 /// The mass matrix is not positive definite, or the eigenvalues cannot be computed.

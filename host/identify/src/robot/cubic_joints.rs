@@ -1,11 +1,12 @@
 //! Joints of a robot with cubic terms, from steady tones at several postures and force levels, by harmonic balance.
 //!
-//! With the deviations q of the joint angles from a posture q₀, M(q₀) q̈ + C q̇ + K q + C₃ q̇∘³ + K₃ q∘³ = J(q₀)ᵀ F and u = J(q₀)
-//! q. A cubic term of one joint couples all directions of the tool, differently at every posture. Joint angles are not measured:
-//! harmonic balance gives the periodic joint angles under the measured force. The predicted motion of the tool is fitted to the
-//! measured one, with the weights of [`steady_fit`](crate::nonlinear::steady_fit). The first guess comes from the receptances at
-//! the lowest force of every frequency. The equivalent linearization of the joints at the measured amplitudes a_j of their angles,
-//! k_j + ¾ k₃_j a_j² and c_j + ¾ c₃_j ω² a_j², then improves it.
+//! With the deviations q of the joint angles from a posture q₀, M(q₀) q̈ + C q̇ + K q + C₃ q̇∘³ + K₃ q∘³ = J(q₀)ᵀ F and
+//! u = J(q₀) q. A cubic term of one joint couples all directions of the tool, differently at every posture. Joint
+//! angles are not measured: harmonic balance gives the periodic joint angles under the measured force. The predicted
+//! motion of the tool is fitted to the measured one, with the weights of [`steady_fit`](crate::nonlinear::steady_fit).
+//! The first guess comes from the receptances at the lowest force of every frequency. The equivalent linearization of
+//! the joints at the measured amplitudes a_j of their angles, k_j + ¾ k₃_j a_j² and c_j + ¾ c₃_j ω² a_j², then improves
+//! it.
 
 use std::f64::consts::TAU;
 use std::path::Path;
@@ -37,9 +38,9 @@ pub struct PostureDwells {
 /// Result of a fit to steady tones: a robot with identified stiffness, damping and cubic terms of its joints.
 #[derive(Clone, Debug)]
 pub struct CubicJointFit {
-    /// The robot with the fitted joint parameters, at the posture of the first guess.
+    /// The robot with the fitted joint parameters, at the posture of the robot from which the fit started.
     pub robot: Robot,
-    /// The fitted parameters.
+    /// The joint parameters that were fitted, in the order of the rows of `covariance`.
     pub parameters: Vec<JointParameter>,
     /// Covariance of the fitted parameters.
     pub covariance: DMatrix<f64>,
@@ -127,7 +128,8 @@ pub fn fit(
     } = normal.spread()?;
     let mut robot = start;
     for (parameter, value) in parameters.iter().zip(values.iter()) {
-        // A stiffness, damping or payload that is fitted below zero is not significant: the tones do not determine it.
+        // A stiffness, damping or payload that is fitted as zero or negative is not significant: the tones do not
+        // determine it.
         if *value <= 0.0 && !parameter.is_cubic() {
             return Err(JointFitError::Undetermined(parameter.name()));
         }
@@ -145,7 +147,8 @@ pub fn fit(
     })
 }
 
-/// Normal equations summed over all dwells, always in the same order, so that the number of threads does not change the result.
+/// Normal equations summed over all dwells, always in the same order, so that the number of threads does not change the
+/// result.
 fn sums(
     all: &[(&PostureMatrices, &Dwell)],
     parameters: usize,
@@ -214,8 +217,8 @@ fn lowest(posture: &PostureDwells, force: Direction) -> Option<PostureFrf> {
                 * dwell.force()?.phasor(1);
             let noise = (line.variance * dwell.gram_inverse[(1, 1)]).sqrt() / per_force.norm();
             let receptance = line.phasor(1) / per_force;
-            // Even at the smallest force the cubic terms of the joints change the receptance; the error of the
-            // linearization is added to its noise.
+            // Even at the smallest force the cubic terms of the joints change the receptance; the relative error of the
+            // linearization is added to its noise, as a root of the sum of squares.
             Some((receptance, noise.hypot(LINEARIZATION_ERROR * receptance.norm())))
         };
         if let Some(found) = kept.iter().map(of_dwell).collect::<Option<Vec<_>>>() {
@@ -238,16 +241,17 @@ fn lowest(posture: &PostureDwells, force: Direction) -> Option<PostureFrf> {
     })
 }
 
-/// Number of equal force steps in which the predicted motion of the tool is continued from a small force to the given
-/// force. A choice.
+/// Number of equal steps by which the force rises to the given force while the predicted motion of the tool is
+/// continued. A choice.
 const RISES: u32 = 8;
 
 impl CubicJointFit {
     /// Predicted motion of the tool at a posture under the force F cos ωt, F in N: its fundamental, m, and the standard
     /// deviation of the magnitude of the fundamental in every direction, m.
     ///
-    /// The motion is the one reached when the force rises slowly from zero. `None` if Newton's method does not follow
-    /// that branch to the given force, for example where it ends in a jump.
+    /// The motion is the one reached when the force rises slowly from zero. `None` if the robot without cubic terms is
+    /// undamped and at resonance, or if Newton's method does not follow that branch to the given force, for example
+    /// where it ends in a jump.
     pub fn response(
         &self,
         angles_rad: &[f64],

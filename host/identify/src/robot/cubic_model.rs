@@ -25,12 +25,14 @@ pub(super) struct Model<'a> {
 pub(super) struct PostureMatrices {
     /// Jacobian of the tool center point by the joint angles, m/rad: 3 rows (x, y, z), a column per joint.
     pub(super) jacobian: DMatrix<f64>,
-    /// Mass matrices by the joint angles: without the fitted payload, kg m², and per kilogram of payload, m².
+    /// Mass matrices by the joint angles: without the mass of the last link if that mass is fitted, kg m², and per
+    /// kilogram of the last link, m².
     pub(super) mass: [DMatrix<f64>; 2],
 }
 
 impl PostureMatrices {
-    /// The matrices of `robot` at its posture; the payload counts as given unless it is among `parameters`.
+    /// The matrices of `robot` at its posture; the mass of the last link counts as given unless it is among
+    /// `parameters`.
     pub(super) fn new(robot: &Robot, parameters: &[JointParameter]) -> Self {
         let payload = robot.payload_jacobian();
         let payload = payload.tr_mul(&payload);
@@ -56,8 +58,8 @@ fn dynamic(matrix: &Matrix3xX<f64>) -> DMatrix<f64> {
     DMatrix::from_fn(3, matrix.ncols(), |i, j| matrix[(i, j)])
 }
 
-/// For every motion channel of a dwell: its axis, the fundamental of its displacement, m, and the standard deviation of
-/// this fundamental, m.
+/// For every motion channel of a dwell along x, y or z: the index of its axis, the fundamental of its displacement, m,
+/// and the standard deviation of the real or imaginary part of this fundamental, m.
 pub(super) fn displacements(dwell: &Dwell) -> Vec<(usize, Complex64, f64)> {
     let of = |line: &FourierSeries| {
         let order = i32::from(derivative(line.quantity));
@@ -203,9 +205,9 @@ impl<'a> Model<'a> {
     }
 
     /// Residual of the tool's motion in a dwell, predicted by the equivalent linearization of the joints at the
-    /// measured amplitudes, and its Jacobian, both weighted with the noise and the error of this linearization. The
-    /// latter is relative, so off-resonance lines weigh about as much as peaks, and the fit converges from a distant
-    /// start.
+    /// measured amplitudes, and the derivative of the predicted motion by the joint parameters. Both are divided by the
+    /// noise and the error of this linearization, added as a root of the sum of squares. This error is relative, so
+    /// off-resonance lines weigh about as much as peaks, and the fit converges from a distant start.
     pub(super) fn linearized(
         &self,
         placed: &PostureMatrices,

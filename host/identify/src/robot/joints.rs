@@ -38,9 +38,9 @@ pub struct PostureFrf {
 /// Result of a fit to receptances: a robot with identified stiffness and damping of its joints.
 #[derive(Clone, Debug)]
 pub struct JointFit {
-    /// The robot with the fitted joint parameters, at the posture of the first guess.
+    /// The robot with the fitted joint parameters, at the posture of the robot from which the fit started.
     pub robot: Robot,
-    /// The fitted parameters.
+    /// The joint parameters that were fitted, in the order of the rows of `covariance`.
     pub parameters: Vec<JointParameter>,
     /// Covariance of the logarithms of the joint parameters, from the scatter between receptances and the smallest
     /// assumed relative error of receptances.
@@ -101,8 +101,9 @@ struct Normal {
     rows: usize,
 }
 
-/// Fits the joints of a robot, with stiffness and damping of `start` as a first guess, to receptances at several
-/// postures. With `payload` the mass of the last link is a parameter, too.
+/// Fits the joints of a robot to receptances at several postures. The stiffnesses start from nearly static receptances,
+/// or from those of `start` where these do not determine them; the dampings start from those of `start`. With `payload`
+/// the mass of the last link is a parameter, too.
 ///
 /// # Errors
 /// See [`JointFitError`].
@@ -135,8 +136,8 @@ pub fn fit(start: &Robot, postures: &[PostureFrf], payload: bool) -> Result<Join
     let undetermined = || JointFitError::Undetermined("all parameters".into());
     let found = SEARCH.minimize(&mut fit, robot).ok_or_else(undetermined)?;
     match found.stop {
-        // If no shorter step reduces the sum of squares any more, the steps are below the length that counts as
-        // converged.
+        // If no step, however short, reduces the sum of squared residuals any more, the search has ended at rounding
+        // errors and counts as converged.
         Stop::Converged | Stop::Stagnated => finish(found.point, parameters, &found.value),
         Stop::Singular => Err(undetermined()),
         _ => Err(JointFitError::NotConverged(
@@ -260,8 +261,9 @@ fn place<'a>(robot: &Robot, frf: &'a PostureFrf) -> PostureMatrices<'a> {
     }
 }
 
-/// Weights 1/σ of the lines of one receptance, with its standard deviation σ. A variance estimated from few averages is
-/// inaccurate but smooth over frequency, so it is averaged over neighbouring lines.
+/// Weights 1/σ of the lines of one receptance, with its standard deviation σ of at least [`LEAST_RELATIVE_ERROR`] of
+/// its magnitude. A variance estimated from few averages is inaccurate but smooth over frequency, so it is averaged
+/// over eight lines on either side.
 fn weights(receptance: &[Complex64], deviation: &[f64]) -> Vec<f64> {
     const NEIGHBOURS: usize = 8;
     (0..deviation.len())
@@ -321,8 +323,8 @@ fn first_guess(robot: &mut Robot, placed: &[PostureMatrices<'_>]) {
     if let Ok(fit) = LinearProblem::new(&matrix, &DVector::from_vec(right)).solve() {
         for (joint, compliance) in robot.joints.iter_mut().zip(fit.parameters.iter()) {
             let guess = 1.0 / compliance;
-            // The compliance of a joint with little effect on the receptances may come out negative or far off; then
-            // the given stiffness stays.
+            // The compliance of a joint with little effect on the receptances may come out negative, or its inverse far
+            // from the given stiffness; then the given stiffness stays.
             let known = joint.stiffness_nm_per_rad;
             let [least, most] = GUESSED_STIFFNESS_RATIO;
             if guess > least * known && guess < most * known {

@@ -141,8 +141,8 @@ impl Check<'_> {
         self.number(value, key, |x| x > 0.0, "a number greater than 0")
     }
 
-    /// A number within `[low, high]`, in `unit`. The error of a larger number suggests the number divided by `factor`,
-    /// as if it was given in the unit `smaller`.
+    /// A number within `[low, high]`, in `unit`. The error of a number of larger magnitude than `high` suggests the
+    /// number divided by `factor`, as if it was given in the unit `smaller`.
     fn sized(
         &self,
         value: &Number,

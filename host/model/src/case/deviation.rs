@@ -8,7 +8,8 @@
 pub struct Deviation {
     /// The uncertain parameter.
     pub parameter: Parameter,
-    /// Standard deviation of the parameter, positive, in the unit of the parameter.
+    /// Standard deviation of the parameter, in the unit of the parameter. It is positive in a case; among parameters
+    /// that vary together, a negative one belongs to a parameter that falls when the others rise.
     pub std: f64,
 }
 
@@ -29,9 +30,11 @@ pub enum Parameter {
     Frequency(usize),
     /// Damping ratio of a mode.
     DampingRatio(usize),
-    /// Real (false) or imaginary (true) part of one entry of a left mode shape: index of the mode, index of the entry, part.
+    /// Real (false) or imaginary (true) part of one entry of a left mode shape: index of the mode, index of the entry,
+    /// part.
     Left(usize, usize, bool),
-    /// Real (false) or imaginary (true) part of one entry of a right mode shape: index of the mode, index of the entry, part.
+    /// Real (false) or imaginary (true) part of one entry of a right mode shape: index of the mode, index of the entry,
+    /// part.
     Right(usize, usize, bool),
     /// Stiffness of a robot joint.
     JointStiffness(usize),

@@ -49,7 +49,7 @@ pub enum CaseError {
         /// The fault.
         error: EffectError,
     },
-    /// A missing table that the task requires.
+    /// A section of the case that the requested task requires is missing.
     #[error("{}: there is no [{section}]; {what_for}{}", path.display(), keys_of(section))]
     MissingSection {
         /// The file.

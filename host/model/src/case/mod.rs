@@ -1,7 +1,8 @@
 //! The case file: structure, tool, material and cut of one machine and job.
 //!
-//! A section may be missing if a command does not need it; an unknown key is an error. x, y and z are the machine's axes, z that of the
-//! tool. Angles are in degrees, lengths of tool and cut in mm, all other quantities in SI units unless the key names another unit.
+//! A section may be missing if a command does not need it; an unknown key is an error. x, y and z are the machine's
+//! axes, z that of the tool. Angles are in degrees, lengths of tool and cut in mm, all other quantities in SI units
+//! unless the key names another unit.
 
 mod check;
 mod deviation;
@@ -32,8 +33,8 @@ pub struct Case {
     pub path: PathBuf,
     /// Name of the case: key `name`, otherwise the file name without extension.
     pub name: String,
-    /// Structure of the machine; `None` if the case has no section `[structure]`. Its values are finite and its matrices and mode shapes
-    /// have consistent sizes. [`Structure::check`] tests whether the matrices are definite.
+    /// Structure of the machine; `None` if the case has no section `[structure]`. Its values are finite and its
+    /// matrices and mode shapes have consistent sizes. [`Structure::check`] tests whether the matrices are definite.
     pub structure: Option<Structure>,
     /// The tool.
     pub tool: Option<Tool>,
@@ -47,8 +48,8 @@ pub struct Case {
     pub posture: Posture,
     /// Standard deviations of the parameters of the case (keys `…_std`).
     pub deviations: Vec<Deviation>,
-    /// Tables `[extension.NAME]` by name. Their names, keys and values agree with the [`EffectSpec`]s; whether the structure has the
-    /// direction of an effect is checked when the effect is applied.
+    /// Tables `[extension.NAME]` by name. Their names, keys and values agree with the [`EffectSpec`]s; whether the
+    /// structure has the direction of an effect is checked when the effect is applied.
     pub extensions: BTreeMap<String, toml::Table>,
 }
 

@@ -16,8 +16,8 @@ impl Parameter {
     /// Adds `by` to the value of the parameter in a case.
     ///
     /// Start and exit angle are limited to 0 to 180 degrees, since a tooth cuts no chip beyond. Returns false if the
-    /// case lacks the parameter, or if the new value is outside its physical range; the latter case keeps the new
-    /// value.
+    /// case lacks the parameter, if its new value is outside its physical range, or if the start angle is not below the
+    /// exit angle; in the last two cases the new value stays in the case.
     pub fn shift(self, case: &mut Case, by: f64) -> bool {
         let Some(value) = self.slot(case) else {
             return false;

@@ -1,4 +1,5 @@
-//! Required keys of the sections of a case, with units and example values: what a message says of a missing section or key.
+//! Required keys of the sections of a case, with units and example values: what a message says of a missing section or
+//! key.
 
 /// A section of a case with its required keys.
 pub(super) struct Section {
@@ -42,12 +43,13 @@ const SECTIONS: [Section; 4] = [
 ];
 
 impl Section {
-    /// The section of this name; `None` if its keys depend on the case.
+    /// The section of this name; `None` if its keys depend on the case or if there is no such section.
     pub(super) fn of(name: &str) -> Option<&'static Self> {
         SECTIONS.iter().find(|section| section.name == name)
     }
 
-    /// The section whose header stands last before `line` (from 1) of the text of a case.
+    /// The section whose header is the last one among the first `line` lines of the text of a case; `None` if there
+    /// is none, or if its keys depend on the case.
     pub(super) fn at(text: &str, line: usize) -> Option<&'static Self> {
         let headers = text.lines().take(line).filter_map(|line| {
             let header = line.trim().strip_prefix('[')?;
@@ -64,7 +66,8 @@ impl Section {
             .collect()
     }
 
-    /// Message part: all required keys that the section lacks in the text of a case, with units, and lines to paste; `None` if it lacks none.
+    /// Message part: all required keys that the section lacks in the text of a case, with units, and lines to paste;
+    /// `None` if it lacks none, or if the text is no TOML or has no such section.
     pub(super) fn lacks(&self, text: &str) -> Option<String> {
         let case: toml::Table = text.parse().ok()?;
         let missing = self.missing(case.get(self.name)?.as_table()?);

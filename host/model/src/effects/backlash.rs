@@ -141,8 +141,8 @@ impl RestoringForce for BacklashSpring {
         match before {
             None if x > self.half_gap_m => ABOVE,
             None if x < -self.half_gap_m => BELOW,
-            // In the middle regime the displacement has reached an edge of the gap and continues beyond it; from outside, it returns into
-            // the gap.
+            // In the middle regime the displacement has reached an edge of the gap and continues beyond it; from
+            // outside, it returns into the gap.
             Some(WITHIN) if x > 0.0 => ABOVE,
             Some(WITHIN) => BELOW,
             _ => WITHIN,

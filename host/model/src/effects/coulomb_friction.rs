@@ -1,10 +1,10 @@
 //! Dry friction: f_r += fc·sign(v); at rest, f_r balances any other force within ±fc.
 //!
-//! With a backlash of total width g in series, the friction acts on a slider at the position w, which the tool moves only while
-//! |x − w| = g/2: after each reversal of the motion there is no force until the backlash is crossed.
+//! With a backlash of total width g in series, the friction acts on a slider at the position w, which the tool moves
+//! only while |x − w| = g/2: after each reversal of the motion there is no force until the backlash is crossed.
 //!
-//! With a clearance whose contact is soft, the contact is indented by δ before it transmits fc, by Hertz's law for contacts of
-//! non-conforming bodies (Lankarani & Nikravesh, J. Mech. Design 112, 1990; without their damping):
+//! With a clearance whose contact is soft, the contact is indented by δ before it transmits fc, by Hertz's law for
+//! contacts of non-conforming bodies (Lankarani & Nikravesh, J. Mech. Design 112, 1990; without their damping):
 //! f_r = fc·((|x − w| − g/2)/δ)^1.5·sgn(x − w) for |x − w| ≥ g/2. The tool moves the slider while |x − w| = g/2 + δ.
 
 use std::f64::consts::PI;
@@ -88,11 +88,12 @@ fn describing_function(at: Harmonic) -> [Complex64; 2] {
     [Complex64::new(0.0, 4.0 / (PI * at.amplitude_m)), Complex64::ZERO]
 }
 
-/// Moves gap and contact of a backlash in series with friction (`[extension.backlash]` with `before = "coulomb-friction"`) to the values
-/// of the friction.
+/// Moves gap and contact of a backlash in series with friction (`[extension.backlash]` with
+/// `before = "coulomb-friction"`) to the values of the friction.
 ///
 /// # Errors
-/// The key `before` is no word or names another effect, there is no friction, or gap or contact are missing or not possible.
+/// The key `before` is no word or names another effect, there is no friction, the gap is missing, or gap or contact are
+/// not possible.
 pub(super) fn take_backlash(all: &mut Vec<Values>) -> Result<(), EffectError> {
     let Some(index) = all
         .iter()
@@ -158,8 +159,8 @@ struct FrictionBehindBacklash {
 #[derive(Debug)]
 struct FrictionBehindClearance {
     friction: Friction,
-    /// Slider of the friction. Its `reach_m` is half the clearance plus the largest depth to which the friction force indents the contact,
-    /// m.
+    /// Slider of the friction. Its `reach_m` is half the clearance plus the largest depth to which the friction force
+    /// indents the contact, m.
     slider: Slider,
     contact_m: f64,
 }
@@ -214,7 +215,8 @@ impl RestoringForce for Friction {
         self.sliding(regime)
     }
 
-    /// If the friction force differs between the two directions of motion, the fundamental of the force is that of the mean friction force.
+    /// If the friction force differs between the two directions of motion, the fundamental of the force is that of the
+    /// mean friction force.
     fn describing_function(&self, amplitude_m: f64, omega: f64) -> Option<Complex64> {
         let at = Harmonic::new(amplitude_m, omega);
         Some(0.5 * (self.plus_n + self.minus_n) * describing_function(at)[0])
@@ -238,8 +240,8 @@ impl RestoringForce for Friction {
 
     fn next(&self, before: Option<Regime>, at: &MotionState, _: &[f64], holding_n: f64) -> Regime {
         let moving = before.is_none() && at.v[self.axis] != 0.0;
-        // The integrator finds the end of stick, where the holding force equals fc, only to rounding. At the end of stick the threshold is
-        // therefore fc·(1 − 1e-9), so that slip follows.
+        // The integrator finds the end of stick, where the holding force equals fc, only to rounding. At the end of
+        // stick the threshold is therefore fc·(1 − 1e-9), so that slip follows.
         let rounding = if before == Some(STICK) { -1e-9 } else { 0.0 };
         if moving {
             if at.v[self.axis] > 0.0 {
@@ -263,14 +265,15 @@ impl Slider {
         at.x[self.axis] - own[0]
     }
 
-    /// Initial position of the slider: if the tool moves, it trails the tool by `reach_m`; if the tool is at rest, it is taken to be at the
-    /// tool.
+    /// Initial position of the slider: if the tool moves, it trails the tool by `reach_m`; if the tool is at rest, it
+    /// is taken to be at the tool.
     fn begin(&self, at: &MotionState, own: &mut [f64]) {
         let moving = at.v[self.axis].signum() * f64::from(u8::from(at.v[self.axis] != 0.0));
         own[0] = at.x[self.axis] - self.reach_m * moving;
     }
 
-    /// The play operator: the slider stays at rest while the tool is within `reach_m` of it, with a relative margin of 1e-9 for rounding.
+    /// The play operator: the slider stays at rest while the tool is within `reach_m` of it, with a relative margin of
+    /// 1e-9 for rounding.
     fn follow(&self, at: &MotionState, own: &mut [f64]) {
         let reach_m = self.reach_m * (1.0 + 1e-9);
         let x = at.x[self.axis];
@@ -292,7 +295,8 @@ impl Slider {
         }
     }
 
-    /// Slip regime in which the tool moves the friction's slider, if their distance has reached `reach_m`; `None` within the backlash.
+    /// Slip regime in which the tool moves the friction's slider, if their distance has reached `reach_m`; `None`
+    /// within the backlash.
     fn dragged(&self, at: &MotionState, own: &[f64]) -> Option<Regime> {
         let lead_m = self.lead_m(at, own);
         let is_at_end = lead_m.abs() >= self.reach_m * (1.0 - 1e-9);

@@ -1,7 +1,7 @@
 //! Describing functions of restoring forces, as part of the specification of an effect.
 //!
-//! Under x = X·sin ωt the fundamental of f_r is N(X, ω)·x: the real part of N is in phase with the displacement, the imaginary part in
-//! phase with the velocity.
+//! Under x = X·sin ωt the fundamental of f_r is N(X, ω)·x: the real part of N is in phase with the displacement, the
+//! imaginary part in phase with the velocity.
 
 use num_complex::Complex64;
 
@@ -12,7 +12,8 @@ pub struct Harmonic {
     pub amplitude_m: f64,
     /// Angular frequency ω, rad/s.
     pub omega: f64,
-    /// Displacement at which the force law bends, m: half of a gap, or the yield displacement. Force laws without a bend do not use it.
+    /// Displacement at which the force law bends, m: half of a gap, or the yield displacement. Force laws without a
+    /// bend do not use it.
     pub bend_m: f64,
 }
 
@@ -33,6 +34,6 @@ impl Harmonic {
     }
 }
 
-/// Describing functions N(X, ω) of the terms of a restoring force, each for a unit coefficient. The terms stand in the order of the linear
-/// parameters; the second is zero if the force has only one term.
+/// Describing functions N(X, ω) of the terms of a restoring force, each for a unit coefficient. The terms stand in the
+/// order of the linear parameters; the second is zero if the force has only one term.
 pub type DescribingFunction = fn(Harmonic) -> [Complex64; 2];

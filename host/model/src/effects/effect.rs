@@ -7,7 +7,8 @@ use super::{EffectError, EffectName};
 use crate::structure::Structure;
 use crate::{Cutter, Dynamics, ModelError, RestoringForce, Spindle};
 
-/// An effect with values for its parameters. It acts through one or more of the methods that change a model; by default they do nothing.
+/// An effect with values for its parameters. It acts through one or more of the methods that change a model; by default
+/// they do nothing.
 pub trait Effect: Debug + Send + Sync {
     /// Entry of the effect in the list of all effects.
     fn id(&self) -> EffectName;
@@ -36,7 +37,8 @@ pub trait Effect: Debug + Send + Sync {
     /// Restoring forces that the effect adds to the equation of motion of `structure`.
     ///
     /// # Errors
-    /// The direction of the effect cannot be used (see [`EffectError::Direction`]), or the static stiffness of the structure is not known.
+    /// The direction of the effect cannot be used (see [`EffectError::Direction`]), or the static stiffness of the
+    /// structure is not known.
     fn restoring_forces(&self, _structure: &Structure) -> Result<Vec<Box<dyn RestoringForce>>, EffectError> {
         Ok(Vec::new())
     }

@@ -35,7 +35,8 @@ pub enum EffectError {
         /// The key to give instead.
         key: &'static str,
     },
-    /// A value that is not possible for its key, such as a negative damping ratio, or not possible beside the other given values.
+    /// A value that is not possible for its key, such as a negative damping ratio, or not possible beside the other
+    /// given values.
     #[error("effect `{name}{dot}{key}`: `{found}` is not possible; {needed} is needed", dot = if .key.is_empty() { "" } else { "." })]
     Value {
         /// The effect.
@@ -47,8 +48,8 @@ pub enum EffectError {
         /// Description of the possible values.
         needed: &'static str,
     },
-    /// A direction of an effect that cannot be used: for example one that the structure does not have, a rotation instead of an axis, or
-    /// none although the structure has several.
+    /// A direction of an effect that cannot be used: for example one that the structure does not have, a rotation
+    /// instead of an axis, or none although the structure has several.
     #[error("effect `{name}`: {what}; the structure has the directions {directions}")]
     Direction {
         /// The effect.
@@ -58,8 +59,8 @@ pub enum EffectError {
         /// The directions of the structure.
         directions: String,
     },
-    /// An effect that this structure does not allow: for example with a parameter that this kind of structure does not have, or if its
-    /// static stiffness is not known.
+    /// An effect that this structure does not allow: for example with a parameter that this kind of structure does not
+    /// have, or if its static stiffness is not known.
     #[error("effect `{name}`: {what}")]
     Structure {
         /// The effect.
@@ -84,7 +85,8 @@ pub enum EffectError {
 }
 
 impl EffectError {
-    /// Name of the effect and key that are at fault; the key is empty if no single key is known to be. `None` if the effect is not known.
+    /// Name of the effect and key that are at fault; the key is empty if the error does not record one. An unknown
+    /// effect is given by the name that was found; `None` for a text without `=`.
     pub fn location(&self) -> Option<(&str, &str)> {
         match self {
             Self::Form(_) => None,

@@ -2,8 +2,8 @@
 
 use num_complex::Complex64;
 
-/// A first-order section H(s) = (b₀ + b₁·s)/(1 + T·s) of the transfer function from the measured quantity to the reading. With b₁ = 0 it
-/// is a low pass, with b₀ = 0 the high pass of a coupling capacitor.
+/// A first-order section H(s) = (b₀ + b₁·s)/(1 + T·s) of the transfer function from the measured quantity to the
+/// reading. With b₁ = 0 it is a low pass, with b₀ = 0 the high pass of a coupling capacitor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FirstOrderSection {
     /// Gain b₀ at the frequency 0.

@@ -71,20 +71,22 @@ const ZERO_TO_ONE: Prior = Prior {
     ..Prior::open(0.0, 1.0, "a number from 0 to 1")
 };
 
-/// Describing function of z − x, a Bouc–Wen element of stiffness 1 N/m minus the linear spring, for n = 1 and γ = β = ½.
+/// Describing function of z − x, a Bouc–Wen element of stiffness 1 N/m minus the linear spring, for n = 1 and
+/// γ = β = ½.
 ///
 /// With n = 1 and γ = β the element is linear while it unloads, and saturates exponentially while it loads.
 fn describing_function(at: Harmonic) -> [Complex64; 2] {
     let (amplitude, yield_m) = (at.amplitude_m, at.bend_m);
-    // Half a period from the upper to the lower peak of x: z unloads from +z₀ with slope 1 to 0, then loads over the rest s of the
-    // stroke as z = −z_y(1 − e^{−s/z_y}), to −z₀. The peak z₀ is the fixed point of this map.
+    // Half a period from the upper to the lower peak of x: z unloads from +z₀ with slope 1 to 0, then loads over the
+    // rest s of the stroke as z = −z_y(1 − e^{−s/z_y}), to −z₀. The peak z₀ is the fixed point of this map.
     let stroke = 2.0 * amplitude;
     let reached = |z: f64| -yield_m * (-(stroke - z) / yield_m).exp_m1();
     let [low, high] = bisection([0.0, yield_m.min(stroke)], 0.0, |z| reached(z) > z);
     let top = 0.5 * (low + high);
     let count = 256;
     let mut sum = Complex64::ZERO;
-    // Fourier integral over half a period, x = X·cos p from the upper peak down; the other half contributes the same by symmetry.
+    // Fourier integral over half a period, x = X·cos p from the upper peak down; the other half contributes the same by
+    // symmetry.
     for k in 0..count {
         let p = PI * (f64::from(k) + 0.5) / f64::from(count);
         let gone = amplitude * (1.0 - p.cos());
@@ -161,8 +163,8 @@ impl RestoringForce for BoucWen {
             gamma,
             ..
         } = self.effect;
-        // Within a regime of the Bouc–Wen law the sign of z is constant. The signed power |z/z_y|ⁿ·sgn continues the law smoothly if a
-        // stage of the integrator lies beyond the end of the regime.
+        // Within a regime of the Bouc–Wen law the sign of z is constant. The signed power |z/z_y|ⁿ·sgn continues the
+        // law smoothly if a stage of the integrator lies beyond the end of the regime.
         let share = of_z * own[0] / yield_m;
         let power = share.signum() * share.abs().powf(exponent);
         let shape = gamma * of_velocity * of_z + (1.0 - gamma);
@@ -176,7 +178,8 @@ impl RestoringForce for BoucWen {
 
     fn margin(&self, regime: Regime, at: &MotionState, own: &[f64], _: f64) -> f64 {
         let (of_velocity, of_z) = Self::signs(regime);
-        // The smaller of two quantities of different units, velocity and hysteretic displacement: only the sign of this margin is used.
+        // The smaller of two quantities of different units, velocity and hysteretic displacement: only the sign of this
+        // margin is used.
         (of_velocity * at.v[self.axis]).min(of_z * own[0])
     }
 
@@ -189,7 +192,8 @@ impl RestoringForce for BoucWen {
             regime |= NEGATIVE;
         }
         let Some(before) = before else { return regime };
-        // A Bouc–Wen regime ends where velocity or z becomes zero; in the next regime the smaller of the two has changed its sign.
+        // A Bouc–Wen regime ends where velocity or z becomes zero; in the next regime the smaller of the two has
+        // changed its sign.
         let (of_velocity, of_z) = Self::signs(before);
         let (v, z) = (of_velocity * at.v[self.axis], of_z * own[0]);
         if v * self.effect.yield_m.recip() < z * self.effect.yield_m.recip() {

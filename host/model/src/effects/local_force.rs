@@ -20,7 +20,7 @@ pub(super) struct LocalForce {
     pub(super) law: Law,
     /// Derivatives ∂f_r/∂x, N/m, and ∂f_r/∂v, N s/m, of the force law.
     pub(super) slopes: fn([f64; 2], f64, f64) -> [f64; 2],
-    /// True if a derivative of the force law jumps where the velocity is zero.
+    /// True if a derivative of the force law jumps at zero velocity, as the second derivative of c2·|v|·v does.
     pub(super) bends_at_rest: bool,
     /// Direction of the force; `None` means the only axis of the structure.
     pub(super) direction: Option<Direction>,
@@ -36,7 +36,8 @@ struct ForceAlongAxis {
     axis: usize,
 }
 
-/// Regime of motion towards positive displacement; also the only regime of a force law without a jump in its derivatives.
+/// Regime of motion towards positive displacement; also the only regime of a force law without a jump in its
+/// derivatives.
 const FORWARD: Regime = 0;
 const BACKWARD: Regime = 1;
 
@@ -76,8 +77,8 @@ impl RestoringForce for ForceAlongAxis {
         Some(self.coefficients[0] * first + self.coefficients[1] * second)
     }
 
-    /// Ends a regime where the velocity changes its sign, if a derivative of the force law jumps there: an integration step over that jump
-    /// has an error that the step's error estimate does not contain.
+    /// Ends a regime where the velocity changes its sign, if a derivative of the force law jumps there: an integration
+    /// step over that jump has an error that the step's error estimate does not contain.
     fn margin(&self, regime: Regime, at: &MotionState, _: &[f64], _: f64) -> f64 {
         match regime {
             _ if !self.bends_at_rest => f64::INFINITY,

@@ -1,4 +1,5 @@
-//! One more mode in the receptance of a direction: H += 1/(m·(ω² − Ω² + 2iζωΩ)).
+//! One more mode in the receptance of a direction: H += 1/(m·(ω_m² − ω² + 2iζω_m·ω)) at the frequency ω, with the
+//! mode's natural frequency ω_m, damping ratio ζ and modal mass m.
 
 use std::sync::Arc;
 

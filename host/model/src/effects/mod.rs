@@ -1,8 +1,9 @@
-//! Effects: deviations of a machine, a cut or a sensor from the linear model of the case. Each effect has one file with its [`EffectSpec`]
-//! and its physics.
+//! Effects: deviations of a machine, a cut or a sensor from the linear model of the case. Each effect has one file with
+//! its [`EffectSpec`] and its physics; effects with the same physics share further files.
 //!
-//! [`EffectName`] is the only list. Names, keys, help, the table of the documentation, the checks of cases, simulation and the treatment
-//! in stability follow from it. To add an effect: write its file and name it twice below, as a module and in the list.
+//! [`EffectName`] is the only list of effects. Names, keys, help, the table of the documentation, the checks of cases,
+//! the simulation and the treatment in stability computations follow from it. To add an effect: write its file and name
+//! it twice in `effects/mod.rs`, as a module and in the list.
 
 mod axial_depth_modulation;
 mod backlash;

@@ -1,6 +1,7 @@
-//! Two directions that share a nonlinear potential: ½·k_xxyy·x²y² or k_xxy·x²y, with x and y the two directions.
+//! Two directions that share a nonlinear potential V = ½·k_xxyy·x²y² + k_xxy·x²y, with x and y the displacements along
+//! them; either coefficient may be zero.
 //!
-//! f_r += (k_xxyy·x·y², k_xxyy·x²·y), or (2·k_xxy·x·y, k_xxy·x²).
+//! f_r += (k_xxyy·x·y² + 2·k_xxy·x·y, k_xxyy·x²·y + k_xxy·x²).
 
 use std::sync::Arc;
 

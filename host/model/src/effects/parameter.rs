@@ -3,7 +3,8 @@
 /// One parameter of an effect.
 #[derive(Clone, Copy, Debug)]
 pub struct Parameter {
-    /// Key of the parameter in cases and answers; empty if only the command line has the parameter, as the VALUE of the effect.
+    /// Key of the parameter in cases and answers; empty if only the command line has the parameter, as the VALUE of the
+    /// effect.
     pub key: &'static str,
     /// Unit of the parameter; empty for words, switches and dimensionless numbers.
     pub unit: &'static str,
@@ -65,7 +66,8 @@ impl Parameter {
 /// The type of a value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ValueKind {
-    /// The value is one number; a list of numbers if the effect acts at several locations.
+    /// The value is one number. At several locations of the effect it holds for all of them, or is a list with one
+    /// number for each.
     Number,
     /// The value is one number for all modes of the structure, or a list with one number for each mode.
     NumberPerMode,

@@ -5,17 +5,18 @@ use quietcut_recording::Quantity;
 
 use super::FirstOrderSection;
 
-/// The reading of a channel: a weighted sum of the machine's axes, delayed, and filtered by the dynamics of the sensor.
+/// The reading of a channel: a weighted sum of the measured quantity along the machine's axes, delayed, and filtered by
+/// the dynamics of the sensor.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Pickup {
     /// Name of the channel, such as `ax`, `y` or `fx`.
     pub name: String,
     /// The measured quantity, such as force, displacement, velocity or acceleration.
     pub quantity: Quantity,
-    /// Weights of the machine's x, y and z in the reading, gain included.
+    /// Weights of the measured quantity along the machine's x, y and z in the reading, gain included.
     pub weights: [f64; 3],
-    /// For each mode of a structure given by modes: ratio of the motion of the sensor to that of the tool. Empty if no mode has
-    /// a ratio of its own.
+    /// For each mode of a structure given by modes: ratio of the motion of the sensor to that of the tool. Empty if no
+    /// mode has a ratio of its own.
     pub modes: Vec<f64>,
     /// Delay of the reading behind the measured quantity, s.
     pub delay_s: f64,
@@ -44,7 +45,8 @@ impl Pickup {
         }
     }
 
-    /// Transfer function of the sensor's dynamics at s: the product of its [sections](Self::sections), without gain and delay.
+    /// Transfer function of the sensor's dynamics at s, rad/s: the product of its [sections](Self::sections), without
+    /// gain and delay.
     pub fn dynamics(&self, s: Complex64) -> Complex64 {
         self.sections
             .iter()

@@ -1,5 +1,6 @@
-//! The flank rubs on the wave that the edge has just cut. The force on the edge along the chip thickness is −(C/V)·b·v_n, with the
-//! cutting speed V and the velocity v_n of the edge in that direction; the tangential force is the friction coefficient times it.
+//! The flank rubs on the wave that the edge has just cut. The force on the edge along the chip thickness is
+//! −(C/V)·b·v_n, with the process damping coefficient C, the cutting speed V, the axial depth b and the velocity v_n of
+//! the edge in that direction; the tangential force is the friction coefficient times it.
 
 use std::sync::Arc;
 

@@ -17,7 +17,8 @@ pub(super) const QUADRATIC_DAMPING: EffectSpec = EffectSpec {
     parameters: &[Parameter::number("c2_ns2_per_m2", "N s²/m²", "quadratic damping")
         .linear()
         .main()],
-    // The force is smooth enough for a Jacobian: the derivative 2·|v| of |v|·v is continuous. Its slope jumps at v = 0.
+    // The force is smooth enough for a Jacobian: the derivative 2·|v| of |v|·v is continuous. Only the second
+    // derivative of |v|·v jumps, at v = 0.
     treatment: Treatment::Smooth,
     candidates: &["one law along one direction, or a law along each"],
     shares_term_with: &[],
@@ -40,7 +41,8 @@ pub(super) const QUADRATIC_DAMPING: EffectSpec = EffectSpec {
     },
 };
 
-/// Describing function of c2·|v|·v for c2 = 1: (8/3π)·ω²·X in phase with the velocity, which is an equivalent damping of (8/3π)·ω·X.
+/// Describing function of c2·|v|·v for c2 = 1: (8/3π)·ω²·X in phase with the velocity, which is an equivalent damping
+/// of (8/3π)·ω·X.
 fn describing_function(at: Harmonic) -> [Complex64; 2] {
     let damping = 8.0 / (3.0 * PI) * at.omega * at.omega * at.amplitude_m;
     [Complex64::new(0.0, damping), Complex64::ZERO]

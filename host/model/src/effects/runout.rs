@@ -1,4 +1,5 @@
-//! Runout: tooth j on the radius R + e·cos(ψ + 2πj/N).
+//! Runout: the tool axis is offset by e from the spindle axis, so that tooth j of N, from 0, is on the radius R +
+//! e·cos(ψ + 2πj/N).
 
 use std::sync::Arc;
 

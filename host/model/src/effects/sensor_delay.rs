@@ -1,4 +1,4 @@
-//! A channel, or without a name every channel of motion, is late by τ: y(t) = y_t(t − τ).
+//! A channel, or without a name every channel of motion, is late by τ: y(t) = y_t(t − τ), with the true value y_t.
 
 use std::sync::Arc;
 

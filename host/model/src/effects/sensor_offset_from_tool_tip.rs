@@ -1,6 +1,8 @@
-//! The sensor sits away from the tool tip, so that it reads each mode with the ratio of the mode shape at the sensor to that at the tool.
+//! The sensor sits away from the tool tip, so that it reads each mode with the ratio of the mode shape at the sensor to
+//! that at the tool.
 //!
-//! y = Σ ratio_r·u_r with u_r the displacement of the tool in mode r. A structure that is not given by modes has one ratio for all motion.
+//! y = Σ ratio_r·u_r with u_r the displacement of the tool in mode r. A structure that is not given by modes has one
+//! ratio for all motion.
 
 use std::sync::Arc;
 

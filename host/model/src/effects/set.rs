@@ -17,17 +17,17 @@ impl Effects {
     /// Effects from `NAME=VALUE` and `NAME.KEY=VALUE`, in any order.
     ///
     /// # Errors
-    /// A text of another form, an unknown name or key, a missing key, or a value that is not possible. Drift and wear by VALUE, since the
-    /// length of the recording is not known: see [`Self::parse_over`].
+    /// A text of another form, an unknown name or key, a missing key, or a value that is not possible. Drift or wear
+    /// given by VALUE, since the length of the recording is not known: see [`Self::parse_over`].
     pub fn parse<'a>(texts: impl IntoIterator<Item = &'a str>) -> Result<Self, EffectError> {
         Self::parse_over(texts, None)
     }
 
-    /// Effects from `NAME=VALUE` and `NAME.KEY=VALUE` for a recording of the length `record_s`, s. The VALUE of drift and wear is the change
-    /// over the whole recording.
+    /// Effects from `NAME=VALUE` and `NAME.KEY=VALUE` for a recording of the length `record_s`, s. The VALUE of drift
+    /// and wear is the change over the whole recording.
     ///
     /// # Errors
-    /// As [`Self::parse`]; drift and wear by VALUE only if `record_s` is `None`.
+    /// As [`Self::parse`]; drift or wear given by VALUE only if `record_s` is `None`.
     pub fn parse_over<'a>(
         texts: impl IntoIterator<Item = &'a str>,
         record_s: Option<f64>,
@@ -60,7 +60,8 @@ impl Effects {
         Self::build(vec![extension(name, table)?])
     }
 
-    /// The effects of several tables `[extension.NAME]`; a backlash may be in series with the friction of another table.
+    /// The effects of several tables `[extension.NAME]`; a backlash may be in series with the friction of another
+    /// table.
     ///
     /// # Errors
     /// An unknown extension, an unknown or missing key, or a value that is not possible.
@@ -98,7 +99,8 @@ impl Effects {
         self
     }
 
-    /// `structure` with the parameters that these effects change; restoring forces and additional modes are not part of it.
+    /// `structure` after these effects have changed its parameters; restoring forces and modes that they add are not
+    /// part of it.
     ///
     /// # Errors
     /// An effect that the structure cannot have.
@@ -113,7 +115,8 @@ impl Effects {
     /// The equation of motion of `structure` with these effects, and the restoring forces that they add.
     ///
     /// # Errors
-    /// An effect that is not possible for this structure, or a structure that is refused: see [`ModelError::Structure`].
+    /// An effect that is not possible for this structure, or a structure that is refused: see
+    /// [`ModelError::Structure`].
     pub fn dynamics(
         &self,
         structure: &Structure,

@@ -43,7 +43,7 @@ pub(super) const SOFTENING_HARDENING: EffectSpec = EffectSpec {
     },
 };
 
-/// Describing functions of k3·x³ for k3 = 1, and of k5·x⁵ for k5 = 1: ⅝X⁴.
+/// Describing functions at the displacement amplitude X: ¾X² of k3·x³ for k3 = 1, and ⅝X⁴ of k5·x⁵ for k5 = 1.
 fn describing_function(at: Harmonic) -> [Complex64; 2] {
     let [cubic, _] = cubic_stiffness::describing_function(at);
     [cubic, Complex64::new(0.625 * at.amplitude_m.powi(4), 0.0)]

@@ -23,7 +23,8 @@ pub struct EffectSpec {
     pub treatment: Treatment,
     /// Forms of the effect, such as different friction laws, that compete as candidate models in a diagnosis.
     pub candidates: &'static [&'static str],
-    /// Effects that share a term of the equation with this one, so that the two are not identifiable together at one location.
+    /// Effects that share a term of the equation with this one, so that the two are not identifiable together at one
+    /// location.
     pub shares_term_with: &'static [EffectName],
     /// The effect in one sentence.
     pub summary: &'static str,
@@ -37,7 +38,8 @@ pub struct EffectSpec {
     pub source: &'static str,
     /// Example: the lines of a table `[extension.NAME]` of a case.
     pub example: &'static str,
-    /// Describing function of the effect's restoring force; `None` for an effect without one, or without a closed form of it.
+    /// Describing function of the effect's restoring force; `None` for an effect without one, or without a closed form
+    /// of it.
     pub describing_function: Option<DescribingFunction>,
     /// Builds the effect from the given values and removes from them those that it uses; a key left over is an error.
     pub(super) build: fn(&mut Values) -> Result<Arc<dyn Effect>, EffectError>,
@@ -109,8 +111,8 @@ pub enum Argument {
 /// Locations at which an effect can act, and the keys that set them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Locations {
-    /// Location of an effect along one direction, or along each of a list of directions. In a structure with a single direction the key may
-    /// be missing.
+    /// Location of an effect along one direction, or along each of a list of directions. In a structure with only one
+    /// of the axes x, y and z the key may be missing.
     EachDirection,
     /// Location of an effect on the whole structure, or only along the given directions.
     WholeOrDirection,
@@ -120,7 +122,8 @@ pub enum Locations {
     Cut,
     /// Location of a sensor effect: the named channels of a recording; without a name, every channel of motion.
     Channels,
-    /// Location of a cross-axis effect: the named channels of a recording, which also read the motion of another direction.
+    /// Location of a cross-axis effect: the direction that channels also read, and the names of these channels; without
+    /// a name, every channel of motion that does not already read that direction.
     ChannelsFromDirection,
 }
 
@@ -144,17 +147,19 @@ pub enum Treatment {
     LinearStructure,
     /// The effect changes coefficients or geometry of the linear cutting process.
     LinearProcess,
-    /// The effect changes coefficients of the linear cutting process with the spindle speed: they are evaluated at each speed.
+    /// The effect changes coefficients of the linear cutting process with the spindle speed: they are evaluated at each
+    /// speed.
     ProcessOfSpeed,
     /// A smooth restoring force: it is linearized about the forced periodic orbit.
     Smooth,
-    /// The cutting force has either a power law of the chip thickness, linearized about the chip thickness by the feed alone, or process
-    /// damping, which is linear in the velocity.
+    /// The cutting force has either a power law of the chip thickness, linearized about the chip thickness by the feed
+    /// alone, or process damping, which is linear in the velocity.
     ChipLaw,
-    /// A restoring force that is not smooth. Stability computations replace it by its equivalent stiffness and damping at the amplitude of
-    /// the forced periodic orbit.
+    /// A restoring force that is not smooth. Stability computations replace it by its equivalent stiffness and damping
+    /// along the forced periodic orbit.
     Equivalent,
-    /// The effect changes with time, so that stability limits hold for one moment only. The text names what to give instead.
+    /// The effect changes with time, so that stability limits hold for one moment only. The text names what to give
+    /// instead.
     OfMoment(&'static str),
     /// No stability limits are computed with this effect. The text states the reason.
     Refused(&'static str),

@@ -20,7 +20,8 @@ pub enum Value {
 }
 
 impl Value {
-    /// Value of a text from the command line: a number if the text is one, a list of numbers or words if it has commas, otherwise a word.
+    /// Value of a text from the command line: a number if the text is one, a list of numbers or words if it has commas,
+    /// otherwise a word.
     pub fn of_text(text: &str) -> Self {
         let text = text.trim();
         if let Ok(number) = text.parse() {
@@ -78,7 +79,7 @@ pub struct Values {
     effect: EffectName,
     /// Values by the key of the parameter; the VALUE of the command line has the empty key.
     by_key: BTreeMap<String, Value>,
-    /// Length of the recording, s, over which VALUE changes drift and wear; `None` if it is not known.
+    /// Length of the recording, s, to which the VALUE of drift and wear refers; `None` if it is not known.
     record_s: Option<f64>,
 }
 
@@ -91,7 +92,8 @@ impl Values {
         }
     }
 
-    /// These values, for a recording of the length `record_s`, s, over which VALUE changes drift and wear.
+    /// These values for a recording of the length `record_s`, s; the VALUE of drift and wear is the relative change
+    /// over that length.
     pub(super) fn over(mut self, record_s: Option<f64>) -> Self {
         self.record_s = record_s;
         self
@@ -128,12 +130,13 @@ impl Values {
         }
     }
 
-    /// Splits values whose `direction` or `channel` is a list into one set of values for each location. A list of numbers has one number for
-    /// each location; a single number applies to all. An effect with one number per mode acts on one channel, so that its channels are not
-    /// split.
+    /// Splits values whose `direction` or `channel` is a list into one set of values for each location. A list of
+    /// numbers has one number for each location; a single number applies to all. An effect with one number per mode
+    /// acts on one channel, so that its channels are not split.
     ///
     /// # Errors
-    /// The number of values in a list differs from the number of locations, or the list of locations is empty or names one twice.
+    /// The number of values in a list differs from the number of locations, or the list of locations is empty or names
+    /// one twice.
     pub(super) fn by_location(self) -> Result<Vec<Self>, EffectError> {
         let has_number_per_mode = self
             .effect
@@ -185,7 +188,8 @@ impl Values {
         }
     }
 
-    /// Values of a main parameter with one number for each mode or one for all, given by its key or as VALUE of `--effect NAME=VALUE`.
+    /// Values of a main parameter with one number for each mode or one for all, given by its key or as VALUE of
+    /// `--effect NAME=VALUE`.
     pub(super) fn main_numbers(&mut self, key: &'static str) -> Result<Vec<f64>, EffectError> {
         let given = if self.by_key.contains_key("") { "" } else { key };
         match self.by_key.remove(given) {
@@ -198,8 +202,8 @@ impl Values {
         }
     }
 
-    /// State of an on/off parameter, given by its key or as VALUE of `--effect NAME=VALUE`: 1 or 0. True and
-    /// false of a case are stored as 1 and 0.
+    /// State of an on/off parameter, given by its key or as VALUE of `--effect NAME=VALUE`: true for 1, false for 0.
+    /// True and false of a case are stored as 1 and 0.
     pub(super) fn switch(&mut self, key: &'static str) -> Result<bool, EffectError> {
         let given = if self.by_key.contains_key("") { "" } else { key };
         match self.by_key.remove(given) {
@@ -209,7 +213,8 @@ impl Values {
         }
     }
 
-    /// Relative rate of drift or wear, 1/s: given by its key, or as VALUE, which is the relative change over the whole recording.
+    /// Relative rate of drift or wear, 1/s: given by its key, or as VALUE, which is the relative change over the whole
+    /// recording.
     pub(super) fn rate(&mut self, key: &'static str) -> Result<f64, EffectError> {
         match (self.number("")?, self.record_s) {
             (Some(change), Some(record_s)) => Ok(change / record_s),
@@ -221,7 +226,8 @@ impl Values {
         }
     }
 
-    /// Removes the number with this key from the given values and returns it; an error if it is missing or not possible.
+    /// Removes the number with this key from the given values and returns it; an error if it is missing or not
+    /// possible.
     pub(super) fn needed(&mut self, key: &'static str) -> Result<f64, EffectError> {
         self.number(key)?.ok_or_else(|| self.missing(key))
     }

@@ -2,8 +2,8 @@
 
 /// Radial immersion and feed of a cut. Spindle speed and axial depth are not part of it: stability charts vary them.
 ///
-/// The immersion angle is measured clockwise from the normal of the feed: up-milling runs from 0° to the exit angle, down-milling from
-/// the start angle to 180°.
+/// The immersion angle is measured clockwise from the normal of the feed: up-milling runs from 0° to the exit angle,
+/// down-milling from the start angle to 180°.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cut {
     /// Start angle: immersion angle at which a tooth enters, degrees, in [0, 180).

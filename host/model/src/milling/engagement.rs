@@ -4,15 +4,16 @@ use std::f64::consts::PI;
 
 use super::{Cut, Tool};
 
-/// Length of a subinterval of the tooth-passing period, as a fraction of the pitch angle, below which the subinterval is dropped: it comes
-/// from rounding of angles in degrees. The value lies far above the rounding of a double, 2e-16, and far below the digits of a case file.
+/// Length of a subinterval of the tooth-passing period, as a fraction of the pitch angle, below which the subinterval
+/// is dropped: it comes from rounding of angles in degrees. The value lies far above the rounding of a double, 2e-16,
+/// and far below the digits of a case file.
 const NEGLIGIBLE: f64 = 1e-9;
 
 /// The teeth that cut during one tooth-passing period of a tool with equal pitch.
 ///
-/// The tooth-passing period starts when a tooth enters. At phase ψ from 0 to the pitch angle θ, tooth k is at the immersion angle
-/// start + kθ + ψ, and cuts while that angle is below the exit angle. The period therefore has two subintervals: in the first, one
-/// more tooth cuts than in the second. The first subinterval may be empty.
+/// The tooth-passing period starts when a tooth enters. At phase ψ from 0 to the pitch angle θ, tooth k is at the
+/// immersion angle start + kθ + ψ, and cuts while that angle is below the exit angle. The period therefore has two
+/// subintervals: in the first, one more tooth cuts than in the second. The first subinterval may be empty.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Engagement {
     /// Immersion angle of entry, rad.
@@ -74,7 +75,8 @@ impl Engagement {
         subintervals
     }
 
-    /// Immersion angle, rad, of tooth number `tooth` in cut at a phase, rad: the tooth that entered that many periods ago.
+    /// Immersion angle, rad, of tooth number `tooth` in cut at the phase `phase` of the tooth-passing period, rad.
+    /// Tooth 0 enters at the start of this period, tooth k has entered k periods before.
     pub fn angle(&self, tooth: usize, phase: f64) -> f64 {
         self.start + tooth as f64 * self.pitch + phase
     }

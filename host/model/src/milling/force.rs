@@ -1,10 +1,12 @@
-//! The force on a tooth, and its average over the cut (thesis eqs 3.1–3.8, 7.1–7.2).
+//! The force on a tooth, and the average of the force of all teeth over a tooth-passing period (thesis eqs 3.1–3.8,
+//! 7.1–7.2).
 
 use nalgebra::{Matrix3, Vector3};
 
 use super::{EdgeAngle, Engagement, Immersion, Material};
 
-/// A vector that rotates with a tooth: v(φ) = constant + cosine·cos φ + sine·sin φ, in feed, normal and axial direction.
+/// A vector that rotates with a tooth: v(φ) = constant + cosine·cos φ + sine·sin φ, in feed, normal and axial
+/// direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RotatingVector {
     /// Constant part, independent of φ.
@@ -16,7 +18,8 @@ pub struct RotatingVector {
 }
 
 impl RotatingVector {
-    /// The coefficients of a vector function of the immersion angle φ that is linear in (sin φ, cos φ) with a constant, from its values.
+    /// The coefficients of a vector function of the immersion angle φ that is linear in (sin φ, cos φ) with a constant,
+    /// from its values.
     fn of(of: impl Fn(Immersion) -> [f64; 3]) -> Self {
         let at = |sin: f64, cos: f64| {
             Vector3::from(of(Immersion {
@@ -76,8 +79,9 @@ impl RotatingVector {
 /// The force on one tooth of axial depth a with chip thickness h at immersion angle φ:
 /// F = a·(cutting(φ)·h + edge(φ)), on the tool, in feed, normal and axial direction.
 ///
-/// The chip thickness is h = normal(φ)ᵀ(f_t e_x + u − u_τ), where u is the displacement of the tool and u_τ that one tooth-passing period
-/// before, when the preceding tooth was at the same angle. The coefficients are forces per axial depth, in N/m² and N/m.
+/// The chip thickness is h = normal(φ)ᵀ(f_t e_x + u − u_τ), where u is the displacement of the tool and u_τ that one
+/// tooth-passing period before, when the preceding tooth was at the same angle. The coefficients are forces per axial
+/// depth, in N/m² and N/m.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ToothForce {
     /// K_tc times the direction of the cutting force, Pa: thesis eq. 7.2 with +k_rc cos γ in row 3.
@@ -116,7 +120,8 @@ impl ToothForce {
         self.cutting.at(angle) * (self.normal.at(angle).x * feed_per_tooth_m) + self.edge.at(angle)
     }
 
-    /// The averages over a tooth-passing period, which zeroth-order approximation and Nyquist criterion use.
+    /// Directional coefficients and force per axial depth, averaged over a tooth-passing period, which zeroth-order
+    /// approximation and Nyquist criterion use.
     pub fn averaged(&self, engagement: &Engagement, feed_per_tooth_m: f64) -> Averaged {
         let Engagement { start, exit, pitch } = *engagement;
         let directional = self.cutting.product_integral(&self.normal, start, exit) / pitch;
@@ -125,7 +130,8 @@ impl ToothForce {
     }
 }
 
-/// Directional coefficients and force per axial depth, summed over the teeth in cut and averaged over one tooth-passing period.
+/// Directional coefficients and force per axial depth, summed over the teeth in cut and averaged over one tooth-passing
+/// period.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Averaged {
     /// Averaged directional coefficient matrix K_tc α₀, Pa.

@@ -13,7 +13,8 @@ pub struct Process {
     pub engagement: Engagement,
     /// Feed per tooth, m.
     pub feed_per_tooth_m: f64,
-    /// True if the axial depth follows the axial vibration z: the cutting force then contains −(β_e + β_f) z (thesis eq. 3.7).
+    /// True if the axial depth follows the axial vibration z: the cutting force then contains −(β_e + β_f) z (thesis
+    /// eq. 3.7).
     pub axial_depth_modulation: bool,
 }
 
@@ -28,8 +29,8 @@ impl Process {
         }
     }
 
-    /// Force per axial depth, N/m, of the `teeth` in cut at a phase of the tooth-passing period, rad, at the chip thickness of the feed. On
-    /// an orbit with the tooth-passing period the vibration cancels in the chip thickness.
+    /// Force per axial depth, N/m, of the `teeth` in cut at a phase of the tooth-passing period, rad, at the chip
+    /// thickness of the feed. On an orbit with the tooth-passing period the vibration cancels in the chip thickness.
     pub fn forced(&self, teeth: usize, phase: f64) -> Vector3<f64> {
         (0..teeth)
             .map(|tooth| {

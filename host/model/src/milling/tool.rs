@@ -4,18 +4,19 @@ use std::f64::consts::TAU;
 
 use crate::criteria::VARIABLE_PITCH_DEG;
 
-/// A milling tool without helix: each cutting edge is straight, in a plane with the tool axis, at the edge angle to the normal plane of
-/// that axis.
+/// A milling tool without helix: each cutting edge is straight, in a plane with the tool axis, at the edge angle to the
+/// normal plane of that axis.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tool {
     /// Number of teeth, at least 1.
     pub teeth: usize,
-    /// Edge angle γ between the cutting edge and the normal plane of the tool axis, degrees, in (0, 90], at the midpoint of the engaged
-    /// length; 90 is a square end mill.
+    /// Edge angle γ between the cutting edge and the normal plane of the tool axis, degrees, in (0, 90], at the
+    /// midpoint of the engaged length; 90 is a square end mill.
     pub edge_angle_deg: f64,
     /// Diameter of the tool, mm; `None` if the case does not give it.
     pub diameter_mm: Option<f64>,
-    /// Pitch angles between successive teeth, degrees; `teeth` values with the sum 360.
+    /// Pitch angles between successive teeth, degrees; `teeth` values with the sum 360. Entry j is the angle from tooth
+    /// j − 1 to tooth j, entry 0 that from the last tooth to the first.
     pub pitch_deg: Vec<f64>,
     /// Offset of the tool axis from the spindle axis; `None` without runout.
     pub runout: Option<Runout>,
@@ -52,7 +53,7 @@ impl Tool {
             .any(|pitch| (pitch - equal).abs() > VARIABLE_PITCH_DEG)
     }
 
-    /// Tooth-passing period at equal pitch, s.
+    /// Tooth-passing period at equal pitch, s, at the spindle speed `spindle_rpm`, rev/min.
     pub fn tooth_period_s(&self, spindle_rpm: f64) -> f64 {
         60.0 / (spindle_rpm * self.teeth as f64)
     }

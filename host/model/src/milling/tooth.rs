@@ -1,4 +1,5 @@
-//! Geometry of one tooth: from the immersion angle to the chip-thickness direction and the force directions (thesis eqs 3.1 and 3.4).
+//! Geometry of one tooth: from the immersion angle to the chip-thickness direction and the force directions (thesis eqs
+//! 3.1 and 3.4).
 //!
 //! At the immersion angle φ, in feed, normal and axial direction, with the edge angle γ:
 //!
@@ -7,7 +8,8 @@
 //!   chip-thickness direction     n = o·sin γ − e_z·cos γ
 //!   force                        F = F_t·t − (F_r·sin γ + F_a·cos γ)·o + (F_r·cos γ − F_a·sin γ)·e_z
 //!
-//! Each is linear in (sin φ, cos φ) up to a constant: [`RotatingVector`](super::RotatingVector) holds their coefficients.
+//! Each is linear in (sin φ, cos φ) up to a constant: [`RotatingVector`](super::RotatingVector) holds their
+//! coefficients.
 
 /// Sine and radial direction at one immersion angle φ.
 #[derive(Clone, Copy, Debug)]
@@ -19,7 +21,7 @@ pub struct Immersion {
 }
 
 impl Immersion {
-    /// Immersion angle φ, rad, in feed and normal direction.
+    /// Sine and radial direction at the immersion angle `phi_rad`, rad, in feed and normal direction.
     pub fn new(phi_rad: f64) -> Self {
         let (sin, cos) = phi_rad.sin_cos();
         Self {
@@ -28,7 +30,8 @@ impl Immersion {
         }
     }
 
-    /// The radial direction of the same immersion in the machine's x and y; `[a, b]` is the unit vector of the feed in these axes.
+    /// The radial direction of the same immersion in the machine's x and y; `[a, b]` is the unit vector of the feed in
+    /// these axes.
     pub(crate) fn in_machine(self, [a, b]: [f64; 2]) -> Self {
         let [sin, cos] = self.outward;
         Self {
@@ -47,7 +50,8 @@ pub struct EdgeAngle {
 }
 
 impl EdgeAngle {
-    /// An edge angle in degrees. Sine and cosine of 90 degrees are exact: axial vibration then has no influence on the chip thickness.
+    /// An edge angle in degrees. Sine and cosine of 90 degrees are exact: axial vibration then has no influence on the
+    /// chip thickness.
     pub fn new(degrees: f64) -> Self {
         let (sin, cos) = if degrees == 90.0 {
             (1.0, 0.0)
@@ -77,8 +81,8 @@ impl EdgeAngle {
         [at.outward[0] * self.sin, at.outward[1] * self.sin, -self.cos]
     }
 
-    /// Position of an edge along the chip thickness, m, at the displacement `x`, m, of a tool whose tooth has the radial runout `radial_m`,
-    /// m: n·x + r·sin γ, thesis eq. 3.1 without feed.
+    /// Position of an edge along the chip thickness, m, at the displacement `x`, m, of a tool whose tooth has the
+    /// radial runout `radial_m`, m: n·x + r·sin γ, thesis eq. 3.1 without feed.
     pub fn reach_m(self, at: Immersion, radial_m: f64, x: [f64; 3]) -> f64 {
         let outward = at.outward[0] * x[0] + at.outward[1] * x[1];
         (outward + radial_m) * self.sin - x[2] * self.cos
@@ -89,7 +93,8 @@ impl EdgeAngle {
         feed_m * at.sin * self.sin
     }
 
-    /// Force on an edge from its tangential, radial and axial component.
+    /// Force on an edge, with components along tool radius and tool axis, from the tangential, radial and axial
+    /// component of the force law.
     pub fn force(self, [tangential, radial, axial]: [f64; 3]) -> EdgeForce {
         EdgeForce {
             tangential,
@@ -98,8 +103,9 @@ impl EdgeAngle {
         }
     }
 
-    /// Directions of process damping, (n − μ·t)·nᵀ: a unit force on the flank against the velocity along the chip thickness, and its friction
-    /// μ against the spindle rotation. Rows force, columns velocity.
+    /// Directions (n − μ·t)·nᵀ of process damping, rows force, columns velocity. Minus this matrix times the velocity
+    /// is the force on the flank for a unit coefficient: against the velocity along the chip thickness, with its
+    /// friction μ against the spindle rotation.
     pub fn flank(self, friction: f64, at: Immersion) -> [[f64; 3]; 3] {
         let normal = self.normal(at);
         let force = self.force([friction, 1.0, 0.0]).at(at);
@@ -119,8 +125,8 @@ pub struct EdgeForce {
 }
 
 impl EdgeForce {
-    /// Force vector on the tool at an immersion, in the unit of the components: in feed, normal and axial direction, or in the machine's x,
-    /// y, z, as `at` is given.
+    /// Force vector on the tool at an immersion, in the unit of the components: in feed, normal and axial direction, or
+    /// in the machine's x, y, z, as `at` is given.
     pub fn at(self, at: Immersion) -> [f64; 3] {
         let [x, y] = at.outward;
         [

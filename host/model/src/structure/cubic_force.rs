@@ -15,7 +15,8 @@ pub struct CubicForce {
 }
 
 impl CubicForce {
-    /// Cubic terms in v̇ of the first-order form with the states (q, q̇/`scale`): M⁻¹C₃·scale² and M⁻¹K₃/scale.
+    /// Cubic terms of the first-order form with the states q and v = q̇/`scale`, which v̇ contains with a minus sign;
+    /// their matrices are M⁻¹C₃·scale² and M⁻¹K₃/scale.
     ///
     /// # Errors
     /// The mass matrix is singular.
@@ -36,8 +37,8 @@ impl CubicForce {
         })
     }
 
-    /// Cubic terms on the tool along the machine's x, y and z, in SI units; `None` unless the structure is given by matrices with cubic
-    /// terms. Rows and columns of rotations are left out.
+    /// Cubic terms on the tool along the machine's x, y and z, in SI units; `None` unless the structure is given by
+    /// matrices with cubic terms other than zero. Rows and columns of rotations are left out.
     pub fn along_axes(structure: &Structure) -> Option<Self> {
         let super::Form::Matrices(matrices) = &structure.form else {
             return None;
@@ -70,7 +71,8 @@ impl CubicForce {
         self.size
     }
 
-    /// The elements of the cubic force f₃(q, v) at displacements `q` and velocities `v`, in the order of the degrees of freedom.
+    /// The elements of the cubic force f₃(q, v) at displacements `q` and velocities `v`, in the order of the degrees of
+    /// freedom.
     pub fn at<'a>(&'a self, q: &'a [f64], v: &'a [f64]) -> impl Iterator<Item = f64> + 'a {
         let rows = self.damping.chunks_exact(self.size);
         rows.zip(self.stiffness.chunks_exact(self.size))

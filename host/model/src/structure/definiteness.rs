@@ -9,15 +9,17 @@ use crate::criteria::ZERO_EIGENVALUE;
 
 use super::{Direction, Matrices};
 
-/// An indefinite matrix, which no passive structure can have.
+/// A mass matrix that is not positive definite, or a damping or stiffness matrix that is not positive semidefinite,
+/// which no passive structure can have.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Indefinite {
     /// Name of the matrix: mass, damping or stiffness.
     pub matrix: &'static str,
-    /// Smallest eigenvalue of the indefinite matrix's symmetric part, in the unit of the matrix; NaN if it cannot be computed.
+    /// Smallest eigenvalue of the indefinite matrix's symmetric part, in the unit of the matrix; NaN if it cannot be
+    /// computed.
     pub eigenvalue: f64,
-    /// One or two entries whose change makes the matrix definite; empty if neither one reversed sign, nor one larger diagonal entry, nor
-    /// one of each does.
+    /// One or two entries whose change makes the matrix definite; empty if neither one reversed sign, nor one larger
+    /// diagonal entry, nor one of each does.
     pub remedy: Vec<Remedy>,
 }
 
@@ -93,8 +95,8 @@ impl fmt::Display for Remedy {
 
 /// The indefinite matrices of a structure, in the order mass, stiffness, damping.
 ///
-/// The test uses the symmetric parts, since only these store or dissipate energy. Mass must be positive definite, stiffness
-/// and damping at least positive semidefinite.
+/// The test uses the symmetric parts, since only these store or dissipate energy. Mass must be positive definite,
+/// stiffness and damping at least positive semidefinite.
 pub(super) fn indefinite(matrices: &Matrices, directions: &[Direction]) -> Vec<Indefinite> {
     let requirements = [
         ("mass", &matrices.mass, true),
@@ -125,7 +127,8 @@ fn violation(
     })
 }
 
-/// Tests a symmetric matrix after scaling its positive diagonal entries to 1, since translations and rotations have different units.
+/// Tests a symmetric matrix after scaling its positive diagonal entries to 1, since translations and rotations have
+/// different units.
 fn is_definite(symmetric: &DMatrix<f64>, strict: bool) -> bool {
     let scale = symmetric
         .diagonal()
@@ -149,11 +152,12 @@ fn smallest_eigenvalue(symmetric: &DMatrix<f64>) -> f64 {
     of_symmetric(symmetric.clone()).map_or(f64::NAN, |eigen| eigen.eigenvalues.min())
 }
 
-/// Searches for a change of one entry, then of two, that makes the matrix definite: a reversed sign, a larger diagonal entry, or both.
+/// Searches for a change of one entry, then of two, that makes the matrix definite: a reversed sign, a larger diagonal
+/// entry, or both.
 ///
-/// If entries (i,j), (j,k) and (i,k) have a product of the wrong sign, reversing any one of them corrects the product. Mass, damping and
-/// stiffness of a mechanism follow from diagonal matrices by the same change of coordinates, so entries whose sign differs from that in the
-/// mass matrix are tried first.
+/// If entries (i,j), (j,k) and (i,k) have a product of the wrong sign, reversing any one of them corrects the product.
+/// Mass, damping and stiffness of a mechanism follow from diagonal matrices by the same change of coordinates, so
+/// entries whose sign differs from that in the mass matrix are tried first.
 fn remedy(
     symmetric: &DMatrix<f64>,
     strict: bool,
@@ -206,8 +210,8 @@ fn with_reversed_sign(symmetric: &DMatrix<f64>, (i, j): (usize, usize)) -> DMatr
     reversed
 }
 
-/// Lower bound of the diagonal entry `row` for a definite matrix, sᵀ R⁻¹ s (Schur complement): s is the remainder of the row, R the matrix
-/// without row and column. `None` if R is not definite.
+/// Lower bound of the diagonal entry `row` for a definite matrix, sᵀ R⁻¹ s (Schur complement): s is the remainder of
+/// the row, R the matrix without row and column. `None` if R is not positive definite.
 fn least_diagonal(symmetric: &DMatrix<f64>, row: usize, strict: bool) -> Option<f64> {
     let rest = symmetric.clone().remove_row(row).remove_column(row);
     if rest.is_empty() {

@@ -38,7 +38,8 @@ impl Direction {
         }
     }
 
-    /// Index 0, 1, 2 of x, y, z; `None` for rotations, in which neither cutting force nor chip thickness acts.
+    /// Index 0, 1, 2 of x, y, z; `None` for rotations: the cutting force has no moment about the tool centre point, and
+    /// the chip thickness does not depend on rotations.
     pub fn axis(self) -> Option<usize> {
         match self {
             Self::X => Some(0),

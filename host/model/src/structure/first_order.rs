@@ -6,12 +6,13 @@ use num_complex::Complex64;
 use super::{Direction, Form, Matrices, Mode, Structure, StructureError, feed_axes};
 use quietcut_numerics::eigenvalues::{EigenvalueError, of_real};
 
-/// First-order form ẋ = A x + B F, u = C x; F is the force on the tool centre point and u its displacement, along x, y, z.
+/// First-order form ẋ = A x + B F, u = C x; F is the force on the tool centre point and u its displacement, along x, y,
+/// z.
 ///
-/// All n states are real. From matrices, x = (q, q̇/s) with s the larger of √‖M⁻¹K‖ and ‖M⁻¹C‖, so that all entries of A are frequencies.
-/// From complex modes, x holds real and imaginary part of each modal coordinate η̇ = λη + Ψᴸᵀ F, and u = 2 Re(Ψᴿ η). That is
-/// exact also if the residues do not sum to zero, so that no mass matrix exists.
-/// The structure is rigid in directions that it does not have: zero columns of B, zero rows of C.
+/// All n states are real. From matrices, x = (q, q̇/s) with s the larger of √‖M⁻¹K‖ and ‖M⁻¹C‖, so that all entries of
+/// A are frequencies. From complex modes, x holds real and imaginary part of each modal coordinate η̇ = λη + Ψᴸᵀ F, and
+/// u = 2 Re(Ψᴿ η). That is exact also if the residues do not sum to zero, so that no mass matrix exists. The structure
+/// is rigid in directions that it does not have: zero columns of B, zero rows of C.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FirstOrder {
     /// A, n × n, 1/s.
@@ -60,8 +61,9 @@ impl FirstOrder {
         }
     }
 
-    /// This structure with the motion of a sensor away from the tool as output u: `modes[r]` is the shape of mode r at the sensor divided by
-    /// its shape at the tool, 1 for modes beyond the list. Only for modal structures, whose two states per mode are adjacent.
+    /// This structure with the motion of a sensor away from the tool as output u: `modes[r]` is the shape of mode r at
+    /// the sensor divided by its shape at the tool, 1 for modes beyond the list. Only for modal structures, whose two
+    /// states per mode are adjacent.
     #[must_use]
     pub fn at_sensor(&self, modes: &[f64]) -> Self {
         let mut at_sensor = self.clone();
@@ -74,8 +76,8 @@ impl FirstOrder {
 
     /// Poles of the structure (eigenvalues of A), rad/s, sorted by imaginary part.
     ///
-    /// [`Structure::first_order`] refuses a structure whose poles cannot be computed. If an entry of A is set to a value that is
-    /// not finite afterwards, the list is empty.
+    /// [`Structure::first_order`] refuses a structure whose poles cannot be computed. If an entry of A is set to a
+    /// value that is not finite afterwards, the list is empty.
     pub fn poles(&self) -> Vec<Complex64> {
         self.try_poles().unwrap_or_default()
     }
@@ -124,8 +126,8 @@ fn from_second_order(matrices: &Matrices, jacobian: &Matrix3xX<f64>) -> Result<F
         .ok_or(StructureError::SingularMass)?;
     let stiffness = &inverse_mass * &matrices.stiffness;
     let damping = &inverse_mass * &matrices.damping;
-    // Scale s of the velocity states q̇/s, 1/s: the larger of √‖M⁻¹K‖ and ‖M⁻¹C‖, or 1/s for a structure without stiffness and
-    // damping.
+    // Scale s of the velocity states q̇/s, 1/s: the larger of √‖M⁻¹K‖ and ‖M⁻¹C‖, or one per second for a structure
+    // without stiffness and damping.
     let scale = match stiffness.norm().sqrt().max(damping.norm()) {
         scale if scale > 0.0 => scale,
         _ => 1.0,
@@ -204,7 +206,8 @@ mod tests {
                             residue / (s - mode.pole()) + residue.conj() / (s - mode.pole().conj())
                         })
                         .sum();
-                    // Error by rounding in the linear solve, whose condition is small: the poles differ by a factor of ten at most.
+                    // Error by rounding in the linear solve, whose condition is small: the poles differ by a factor of
+                    // ten at most.
                     assert!((h[(i, j)] - direct).norm() < 1e-12 * direct.norm().max(1e-7));
                 }
             }

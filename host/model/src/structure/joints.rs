@@ -1,12 +1,13 @@
 //! A robot of rigid links on compliant joints, linearized at a posture.
 //!
-//! Let q be the deviations of the joint angles from the posture q₀. Then M(q₀) q̈ + C q̇ + K q + C₃ q̇∘³ + K₃ q∘³ = Jᵀ F and u = J q.
-//! Where J has an inverse, these are the tool-space matrices J⁻ᵀ · J⁻¹ of thesis eq. 3.14. The equations also hold where J has none (a
-//! straight wrist), and for any number of joints.
+//! Let q be the deviations of the joint angles from the posture q₀. Then M(q₀) q̈ + C q̇ + K q + C₃ q̇∘³ + K₃ q∘³ = Jᵀ
+//! F and u = J q. Where J has an inverse, their linear part equals that of the tool-space matrices J⁻ᵀ M J⁻¹, J⁻ᵀ C J⁻¹
+//! and J⁻ᵀ K J⁻¹ of thesis eq. 3.14. The equations also hold where J has none (a straight wrist), and for any number of
+//! joints.
 //!
-//! Two things are neglected: the change of M and J within a vibration, and gravity. Gravity deflects the joints by about a milliradian from
-//! the commanded angles; q and its cubes count from the deflected position. For the robot of the cases that moves peaks of the receptance
-//! by 0.3 %, as a test shows.
+//! Two things are neglected: the change of M and J within a vibration, and gravity. Gravity deflects the joints by
+//! about a milliradian from the commanded angles; q and its cubes count from the deflected position. For the robot of
+//! the cases that moves peaks of the receptance by 0.3 %, as a test shows.
 
 use nalgebra::{DMatrix, Matrix3, Matrix3xX, Rotation3, Unit, Vector3};
 
@@ -33,7 +34,8 @@ pub struct Joint {
     pub mass_kg: f64,
     /// Centre of mass of the joint's link in the base frame, with all joint angles at zero, m.
     pub center_m: Vector3<f64>,
-    /// Inertia tensor of the link about its centre of mass along the axes of the base frame, with all joint angles at zero, kg m².
+    /// Inertia tensor of the link about its centre of mass along the axes of the base frame, with all joint angles at
+    /// zero, kg m².
     pub inertia_kg_m2: Matrix3<f64>,
 }
 
@@ -76,8 +78,8 @@ impl Robot {
                 rotation * joint.point_m + shift,
             ));
             let rotation_of_joint = Rotation3::from_axis_angle(&joint.axis, *angle);
-            // A rotation of this joint moves a point x to `rotation_of_joint`·(x − point) + point; the joints nearer to the base act after
-            // it.
+            // A rotation of this joint moves a point x to `rotation_of_joint`·(x − point) + point; the joints nearer to
+            // the base act after it.
             shift += rotation * (joint.point_m - rotation_of_joint * joint.point_m);
             rotation *= rotation_of_joint;
             links.push((rotation, rotation * joint.center_m + shift));
@@ -195,7 +197,8 @@ pub(crate) mod tests {
             let slope = (high.tool_m - low.tool_m) / (2.0 * h);
             // Errors of the central differences of lengths of some metres: 1e-12 by truncation, 1e-10 by rounding.
             assert!((slope - jacobian.column(joint)).norm() < 1e-8, "{joint}");
-            // Kinetic energy at 1 rad/s of one joint, summed over the links, from central differences of positions and rotations.
+            // Kinetic energy at 1 rad/s of one joint, summed over the links, from central differences of positions and
+            // rotations.
             let mut twice = robot.joints[joint].rotor_kg_m2;
             for (link, body) in robot.joints.iter().enumerate() {
                 let speed = (high.links[link].1 - low.links[link].1) / (2.0 * h);

@@ -25,8 +25,8 @@ pub use modes::Mode;
 /// The structure of a case, in the machine's directions.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Structure {
-    /// The direction of each degree of freedom (matrices) or of each entry of the mode shapes (modes). Cutting forces and chip thickness
-    /// depend on x, y and z only.
+    /// The direction of each degree of freedom (matrices) or of each entry of the mode shapes (modes). Cutting forces
+    /// and chip thickness depend on x, y and z only.
     pub directions: Vec<Direction>,
     /// Representation of the dynamics: matrices, modes or joints.
     pub form: Form,
@@ -44,14 +44,17 @@ pub enum Form {
 }
 
 impl Structure {
-    /// Checks that the mass matrix is positive definite, and damping and stiffness at least positive semidefinite.
+    /// Checks that the mass matrix of a structure given by matrices is positive definite, and damping and stiffness at
+    /// least positive semidefinite. Modes and joints pass unchecked.
     ///
     /// # Errors
-    /// Indefinite matrices, each with its smallest eigenvalue and, if they are found, the entries that make it indefinite.
+    /// Indefinite matrices, each with its smallest eigenvalue and, if they are found, the entries whose change makes it
+    /// definite.
     pub fn check(&self) -> Result<(), StructureError> {
         let found = match &self.form {
             Form::Matrices(matrices) => definiteness::indefinite(matrices, &self.directions),
-            // The matrices of a robot are definite, since each joint has positive mass and stiffness.
+            // The matrices of a robot are definite: a case gives each link a positive mass and inertia, and each joint
+            // a positive stiffness and a damping of 0 or more.
             Form::Modes(_) | Form::Joints(_) => Vec::new(),
         };
         if found.is_empty() {
@@ -61,7 +64,8 @@ impl Structure {
         }
     }
 
-    /// The equation of motion in physical coordinates, displacements or joint angles; `None` for modes, which have no such matrices.
+    /// The matrices of the equation of motion in physical coordinates, displacements or joint angles; `None` for modes,
+    /// which have no such matrices.
     pub fn equation(&self) -> Option<Cow<'_, Matrices>> {
         match &self.form {
             Form::Matrices(matrices) => Some(Cow::Borrowed(matrices)),

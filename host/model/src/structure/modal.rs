@@ -9,8 +9,9 @@ use super::FirstOrder;
 
 /// Modal part of A for one pole pair λ = −ζω + iω√(1 − ζ²).
 ///
-/// A = Σ_r λ_r P_r + conjugates, with projectors P_r. A change of the pole at constant mode shapes leaves P_r unchanged, and thus the residue
-/// right·leftᵀ of the receptance, for structures given by matrices and by modes. Repeated poles, as of a round tool, form one modal part.
+/// Without real poles A = Σ_r λ_r P_r + conjugates, with projectors P_r. A change of the pole at constant mode shapes
+/// leaves P_r unchanged, and thus the residue right·leftᵀ of the receptance, for structures given by matrices and by
+/// modes. Repeated poles, as of a round tool, form one modal part.
 #[derive(Clone, Debug)]
 pub struct ModalPart {
     /// Pole λ, rad/s, with positive imaginary part.
@@ -79,18 +80,20 @@ impl FirstOrder {
         let right = invariant(&self.a, pole, group.len())?;
         let left = invariant(&self.a.transpose(), pole, group.len())?;
         let projector = &right * (left.transpose() * &right).try_inverse()? * left.transpose();
-        // P is a projector (P² = P) by construction. A P = λ P holds only for a pole λ that has as many mode shapes as its multiplicity;
-        // others are excluded.
+        // P is a projector (P² = P) by construction. A P = λ P holds only for a pole λ that has as many mode shapes as
+        // its multiplicity; others are excluded.
         let miss = self.a.map(Complex64::from) * &projector - &projector * pole;
         (miss.norm() < DEFECTIVE * pole.norm() * projector.norm()).then_some(ModalPart { pole, projector })
     }
 }
 
-/// Orthonormal basis of the invariant subspace of `matrix` at the eigenvalue `pole`, from inverse iteration with `count` vectors.
+/// Orthonormal basis of the invariant subspace of `matrix` at the eigenvalue `pole`, from inverse iteration with
+/// `count` vectors.
 fn invariant(matrix: &DMatrix<f64>, pole: Complex64, count: usize) -> Option<DMatrix<Complex64>> {
     let size = matrix.nrows();
-    // A shift of 1e-7 away from the pole keeps the matrix of the inverse iteration regular. Each of the three iterations then reduces the
-    // parts of other eigenvectors by about 1e7.
+    // A shift away from the pole λ by 1e-7·|λ| keeps the matrix of the inverse iteration regular. Each of the three
+    // iterations then reduces the parts of eigenvectors whose poles differ from λ by about |λ| by a factor of about
+    // 1e7.
     let shift = pole * (1.0 + 1e-7);
     let lu = (matrix.map(Complex64::from) - DMatrix::identity(size, size) * shift).lu();
     let start =
@@ -162,7 +165,8 @@ mod tests {
                         .map(|pole| (pole - to).norm())
                         .fold(f64::INFINITY, f64::min)
                 };
-                // A is linear in λ at constant mode shapes: the error is rounding times the condition number of the shapes.
+                // A is linear in λ at constant mode shapes: the error is rounding times the condition number of the
+                // shapes.
                 assert!(near(&moved.poles(), expected) < 1e-8 * part.omega(), "{name}");
                 for other in structure.poles() {
                     if other.im > 0.0 && (other - part.pole).norm() > 1e-3 {

@@ -2,9 +2,11 @@
 
 use num_complex::Complex64;
 
-/// One complex mode. It contributes right·leftᵀ/(s − λ) to the receptance H(s), plus the complex conjugate term at the conjugate pole.
+/// One complex mode. It contributes right·leftᵀ/(s − λ) to the receptance H(s), plus the complex conjugate term at the
+/// conjugate pole.
 ///
-/// The pole is λ = −ζω + iω√(1 − ζ²) with ω = 2π·frequency. The residue right·leftᵀ has no conjugation and no further factor.
+/// The pole is λ = −ζω + iω√(1 − ζ²) with ω = 2π·frequency. The residue right·leftᵀ has no conjugation and no further
+/// factor.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mode {
     /// Natural frequency, Hz.

@@ -84,7 +84,8 @@ struct Krylov {
 
 impl Krylov {
     fn new(size: usize) -> Self {
-        // The start vector has a different component in each direction, so that it does not lie in an invariant subspace by accident.
+        // The start vector has a different component in each direction, so that it does not lie in an invariant
+        // subspace by accident.
         let start = DVector::from_fn(size, |i, _| Complex64::cis(1.0 + 2.399_963 * (i * i) as f64));
         let norm = start.norm();
         Self {
@@ -93,7 +94,8 @@ impl Krylov {
         }
     }
 
-    /// Extends the Krylov space by one dimension; true if the space is invariant. `None` if the new vector is not finite.
+    /// Extends the Krylov space by one dimension and the projected matrix by one column; true if the space is invariant
+    /// and thus not extended. `None` if the new vector is not finite.
     fn extend(&mut self, matrix: &DMatrix<Complex64>) -> Option<bool> {
         let mut next = matrix * self.basis.last()?;
         let size = next.norm();

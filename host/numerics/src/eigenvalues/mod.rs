@@ -7,11 +7,13 @@
 //! | complex, the largest only | [`dominant`] | Arnoldi, then as above |
 //! | real symmetric, Hermitian | [`of_symmetric`] | tridiagonal form, implicit QR with Wilkinson's shift |
 //! | symmetric pencil K v = λ M v | [`of_symmetric_pencil`] | Cholesky factor of M, then as above |
-//! | one eigenvector, a vector of the null space | [`eigenvector`], [`null_vector`]; [`inverse_iteration`] with a solver of one's own | inverse iteration |
+//! | one eigenvector | [`eigenvector`], or [`inverse_iteration`] with a solver of one's own | inverse iteration |
+//! | a vector of the null space | [`null_vector`] | inverse iteration |
 //! | polynomial | [`polynomial_roots`] | companion matrix |
 //!
-//! For a matrix with an entry that is not finite, or on which an iteration exceeds its bound, the functions for eigenvalues return an
-//! [`EigenvalueError`] that names the size; those for one eigenvector return `None`. Every function ends, and none panics on square matrices.
+//! For a matrix with an entry that is not finite, or on which an iteration exceeds its bound, the functions for
+//! eigenvalues return an [`EigenvalueError`] that names the size; those for one eigenvector return `None`. Every
+//! function ends, and none panics on square matrices.
 
 mod complex;
 mod error;

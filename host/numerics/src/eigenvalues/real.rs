@@ -1,7 +1,7 @@
 //! Eigenvalues of a real matrix by the Francis double-shift QR iteration.
 //!
-//! The QR iteration of nalgebra has no exceptional shifts and does not end for some matrices of period maps. Method: Wilkinson &
-//! Reinsch, Handbook for Automatic Computation II, procedures balance, orthes and hqr.
+//! The QR iteration of nalgebra has no exceptional shifts and does not end for some matrices of period maps. Method:
+//! Wilkinson & Reinsch, Handbook for Automatic Computation II, procedures balance, orthes and hqr.
 
 use nalgebra::DMatrix;
 use nalgebra::linalg::balancing::balance_parlett_reinsch;
@@ -10,13 +10,14 @@ use num_complex::Complex64;
 use super::error::{EigenvalueError, size_of};
 
 /// Largest number of QR iterations for one eigenvalue of a real matrix; more end the computation with an error. Three
-/// are usual; exceptional shifts in the iterations 10, 20, … break cycles.
+/// are usual; an exceptional shift after every ten iterations breaks cycles.
 const ITERATIONS_MAX: usize = 90;
 
-/// All eigenvalues of a real matrix, unordered: complex ones in exact conjugate pairs, real ones with the imaginary part zero.
+/// All eigenvalues of a real matrix, unordered: complex ones in exact conjugate pairs, real ones with the imaginary
+/// part zero.
 ///
-/// The method is backward stable: the results are the exact eigenvalues of a matrix that differs from the balanced one by a few rounding
-/// errors of its norm.
+/// The method is backward stable: the results are the exact eigenvalues of a matrix that differs from the balanced one
+/// by a few rounding errors of its norm.
 ///
 /// # Errors
 /// The matrix is not square, has an entry that is not finite, or the iteration exceeds its bound.
@@ -236,8 +237,8 @@ impl Rows {
         }
     }
 
-    /// Applies a Householder reflection of a QR step from the left to rows k, k + 1 and, if it is not beyond `last`, k
-    /// + 2.
+    /// Applies a Householder reflection of a QR step from the left to rows k and k + 1 and, if it is not beyond `last`,
+    /// to row k + 2.
     fn reflect_rows(&mut self, k: usize, last: usize, [q, r]: [f64; 2], [x, y, z]: [f64; 3]) {
         let n = self.size;
         let (row_k, rest) = self.entries[k * n..].split_at_mut(n);

@@ -10,7 +10,8 @@ const ITERATIONS_PER_EIGENVALUE: usize = 60;
 
 /// Eigenvalues (real) and orthonormal eigenvectors of a real symmetric or Hermitian matrix, unordered.
 ///
-/// Only the lower triangle of the matrix is used. The error of each eigenvalue is a few rounding errors of the norm of the matrix.
+/// Only the lower triangle of the matrix is used. The error of each eigenvalue is a few rounding errors of the norm of
+/// the matrix.
 ///
 /// # Errors
 /// The matrix is not square, has an entry that is not finite, or the iteration exceeds its bound.

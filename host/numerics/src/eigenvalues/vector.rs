@@ -3,8 +3,8 @@
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 
-/// Number of steps of the inverse iteration for an eigenvector. With a shift at the distance [`BESIDE`], each step amplifies
-/// the wanted eigenvector by about 1e8 relative to those of well separated eigenvalues.
+/// Number of steps of the inverse iteration for an eigenvector. With a shift at the distance [`BESIDE`], each step
+/// amplifies the wanted eigenvector by about 1e8 relative to those of well separated eigenvalues.
 const STEPS: usize = 3;
 
 /// Distance of the shift of an inverse iteration from the eigenvalue, relative to the eigenvalue; it keeps the shifted
@@ -32,8 +32,8 @@ pub fn null_vector(matrix: DMatrix<Complex64>) -> Option<DVector<Complex64>> {
     inverse_iteration(start, |vector| lu.solve_mut(vector))
 }
 
-/// Inverse iteration: `solve` replaces v by (A − σI)⁻¹ v, and v is scaled to length 1 after each of three steps. `None` if a step has
-/// no solution or leaves the range of numbers.
+/// Inverse iteration: `solve` replaces v by (A − σI)⁻¹ v, and v is scaled to length 1 after each of three steps. `None`
+/// if a step has no solution or leaves the range of numbers.
 pub fn inverse_iteration(
     start: DVector<Complex64>,
     mut solve: impl FnMut(&mut DVector<Complex64>) -> bool,

@@ -9,7 +9,8 @@ use super::LeastSquaresError;
 /// 1e-12.
 const RANK_TOLERANCE: f64 = 1e-12;
 
-/// Decomposition A D P = Q R of a matrix A, where D scales each column to length 1 and P orders the columns by their pivots.
+/// Decomposition A D P = Q R of a matrix A, where D scales each column to length 1 and P orders the columns by their
+/// pivots.
 #[derive(Clone, Debug)]
 pub(super) struct Factored {
     decomposed: ColPivQR<f64, Dyn, Dyn>,

@@ -5,11 +5,11 @@ use nalgebra::{DMatrix, DVector};
 use super::{Idle, NormalEquations};
 use crate::stop::Stop;
 
-/// A sum of squares ‖r(θ)‖² to be minimized, where the residuals r = measured − predicted are divided by the standard deviation of their
-/// noise.
+/// A sum of squares ‖r(θ)‖² to be minimized, where the residuals r = measured − predicted are divided by the standard
+/// deviation of their noise.
 ///
-/// The caller chooses the type of the parameters θ: a vector, or the parts of a model. Value and derivatives are computed by separate
-/// methods, since most trial steps need no derivatives.
+/// The caller chooses the type of the parameters θ: a vector, or the parts of a model. Value and derivatives are
+/// computed by separate methods, since most trial steps need no derivatives.
 pub trait Objective {
     /// Type of the parameters θ.
     type Point;
@@ -34,10 +34,11 @@ pub trait Objective {
     /// True if the sum of squares `next` is not larger than `now`, so that the step is accepted.
     fn is_no_worse(&self, next: &Self::Value, now: &Self::Value) -> bool;
 
-    /// True if the minimization has converged with a step of `length` = √(δᵀNδ), in standard deviations of the parameters, from the value
-    /// `now` to the value `next`.
+    /// True if the minimization has converged with a step of `length` = √(δᵀNδ), in standard deviations of the
+    /// parameters, from the value `now` to the value `next`.
     ///
-    /// The last step may increase the sum slightly: weights that depend on the parameters keep it from decreasing close to the minimum.
+    /// The last step may increase the sum slightly: weights that depend on the parameters keep it from decreasing close
+    /// to the minimum.
     fn has_converged(&self, length: f64, next: &Self::Value, now: &Self::Value) -> bool;
 
     /// True if the minimization is to be given up before it is linearized at `value`; `before` is the sum of squares at
@@ -71,7 +72,8 @@ pub struct Minimum<P, V> {
     pub point: P,
     /// Sum of squares at these parameters.
     pub value: V,
-    /// Normal equations of the last linearization, at these parameters or one step before; `None` if there was no linearization.
+    /// Normal equations of the last linearization, at these parameters or one step before; `None` if there was no
+    /// linearization.
     pub sums: Option<NormalSums>,
     /// Reason for which the iteration stopped.
     pub stop: Stop,
@@ -120,8 +122,8 @@ impl Damping {
     }
 }
 
-/// Damping λ of an accepted Levenberg–Marquardt step below which the next step is not damped if [`Damping::least`] is 0: λ
-/// would change a step by about a millionth only.
+/// Damping λ of an accepted Levenberg–Marquardt step below which the next step is not damped if [`Damping::least`] is
+/// 0: λ would change a step by about a millionth only.
 const UNDAMPED: f64 = 1e-6;
 
 /// Settings of the damped Gauss–Newton iteration of Levenberg and Marquardt (Marquardt, J. SIAM 11 (1963) 431).
@@ -141,7 +143,8 @@ pub struct LevenbergMarquardt {
 }
 
 impl LevenbergMarquardt {
-    /// Searches the parameters with the least sum of squares near `start`; `None` if the model is not valid at the start.
+    /// Searches the parameters with the least sum of squares near `start`; `None` if the model is not valid at the
+    /// start.
     ///
     /// The search always ends; [`Minimum::stop`] states the reason.
     pub fn minimize<O: Objective>(

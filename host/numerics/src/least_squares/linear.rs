@@ -7,7 +7,8 @@ use super::factored::Factored;
 
 /// Linear least squares: min over x of Σᵢ wᵢ (aᵢᵀx − bᵢ)² + Σⱼ pⱼ (xⱼ − x₀ⱼ)², where A has m rows aᵢᵀ and n columns.
 ///
-/// If the weights are inverse variances, wᵢ = 1/σᵢ², then [`LinearFit::covariance`] is the covariance of the parameters.
+/// If the weights are inverse variances, wᵢ = 1/σᵢ², then [`LinearFit::covariance`] is the covariance of the
+/// parameters.
 ///
 /// ```
 /// use nalgebra::{DMatrix, DVector};
@@ -33,7 +34,8 @@ pub struct LinearProblem<'a> {
 pub struct LinearFit {
     /// Parameters x, n entries.
     pub parameters: DVector<f64>,
-    /// (AᵀWA + P)⁻¹, n × n: covariance of the parameters if the weights are inverse variances; otherwise multiply by [`Self::variance`].
+    /// (AᵀWA + P)⁻¹, n × n: covariance of the parameters if the weights are inverse variances; otherwise multiply by
+    /// [`Self::variance`].
     pub covariance: DMatrix<f64>,
     /// Weighted sum of squared residuals Σᵢ wᵢ (aᵢᵀx − bᵢ)², without the term of the prior.
     pub sum_of_squares: f64,
@@ -45,7 +47,8 @@ pub struct LinearFit {
 }
 
 impl LinearFit {
-    /// Variance of the noise of a row of weight 1, estimated from the residuals; infinite or NaN without degrees of freedom.
+    /// Variance of the noise of a row of weight 1, estimated from the residuals; infinite or NaN without degrees of
+    /// freedom.
     pub fn variance(&self) -> f64 {
         self.sum_of_squares / self.degrees_of_freedom as f64
     }
@@ -81,8 +84,8 @@ impl<'a> LinearProblem<'a> {
         }
     }
 
-    /// Solution with the least sum of squares, from Householder QR with pivoting of the scaled columns (Golub and Van Loan, *Matrix
-    /// Computations*, 4th edition, 5.4.2).
+    /// Solution with the least sum of squares, from Householder QR with pivoting of the scaled columns (Golub and Van
+    /// Loan, *Matrix Computations*, 4th edition, 5.4.2).
     ///
     /// # Errors
     /// See [`LeastSquaresError`].

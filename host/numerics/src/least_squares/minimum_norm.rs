@@ -4,8 +4,8 @@ use nalgebra::{DMatrix, DVector, Dyn, SVD};
 
 use crate::singular_values::{SingularValueError, Vectors, decompose};
 
-/// Least-squares solution of A x = b for a matrix A with linearly dependent columns: of all x with the least ‖A x − b‖², that of least norm,
-/// from the singular value decomposition.
+/// Least-squares solution of A x = b for a matrix A with linearly dependent columns: of all x with the least ‖A x −
+/// b‖², that of least norm, from the singular value decomposition.
 ///
 /// The columns are not scaled, so that the solution depends on the units of the parameters.
 #[derive(Clone, Debug)]

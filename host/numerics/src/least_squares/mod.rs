@@ -8,8 +8,9 @@
 //! | AᴴA x = Aᴴb that was summed | [`NormalEquations`] | diagonal scaling, Cholesky |
 //! | min ‖r(θ)‖² | [`LevenbergMarquardt`] | Levenberg–Marquardt with the reason to stop |
 //!
-//! The columns of the matrix are scaled to length 1 first, since the parameters of one fit differ by many powers of ten. The rank is
-//! therefore independent of the units of the parameters. [`MinimumNorm`], and [`eliminated`] for y, take the columns as they are.
+//! The columns of the matrix are scaled to length 1 first, since the parameters of one fit differ by many powers of
+//! ten. The rank is therefore independent of the units of the parameters. [`MinimumNorm`], and [`eliminated`] for y,
+//! take the columns as they are.
 
 mod elimination;
 mod factored;

@@ -5,16 +5,18 @@ use nalgebra::{Cholesky, ComplexField, DMatrix, DVector, Dyn};
 /// Treatment of a parameter that has no effect on the prediction, so that its column of A is zero.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Idle {
-    /// A parameter without effect is refused: the equations have no solution.
+    /// A parameter without effect is refused: [`NormalEquations::new`] returns `None`.
     Refuse,
-    /// A parameter without effect, or whose diagonal entry of N is not finite, is fixed at zero, with a covariance of zero.
+    /// A parameter without effect, or whose diagonal entry of N is not finite, is fixed at zero, with a covariance of
+    /// zero.
     Hold,
 }
 
-/// Factored normal equations N x = g, for data that are given as sums or are too many to be held as a matrix.
+/// Factored normal equations N x = g of least squares, for data that are given as sums or are too many to be held as a
+/// matrix.
 ///
-/// The factors are D N D = L Lᴴ with D = diag(N)^(−1/2), since the parameters of one fit differ by many powers of ten. The condition number of
-/// N is the square of that of A: a [`super::LinearProblem`] loses only half as many digits.
+/// The factors are D N D = L Lᴴ with D = diag(N)^(−1/2), since the parameters of one fit differ by many powers of ten.
+/// The condition number of N is the square of that of A: a [`super::LinearProblem`] loses only half as many digits.
 ///
 /// ```
 /// use nalgebra::{DMatrix, DVector};
@@ -85,7 +87,8 @@ impl<T: ComplexField<RealField = f64>> NormalEquations<T> {
         solution
     }
 
-    /// Inverse N⁻¹: the covariance of the parameters if each row of A is divided by the standard deviation of its noise.
+    /// Inverse of N, with its ridge. Without a ridge it is the covariance of the parameters if each row of A is divided
+    /// by the standard deviation of its noise.
     pub fn inverse(&self) -> DMatrix<T> {
         let mut inverse = self.cholesky.inverse();
         for j in 0..self.scale.len() {

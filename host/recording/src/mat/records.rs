@@ -1,8 +1,9 @@
-//! Records in the variables of a MAT-file: vectors beside each other, matrices with a rate, structures, and arrays of structures.
+//! Records in the variables of a MAT-file: vectors beside each other, matrices with a rate, structures, and arrays of
+//! structures.
 //!
-//! The variables of the file are one record if vectors or matrices are among them. Otherwise each element of each structure with vectors is a
-//! record of its own: an array of impacts gives as many records. Two or more structures side by side that hold one signal each are channels of
-//! one record.
+//! The variables of the file are one record if vectors or matrices are among them. Otherwise each element of each
+//! structure with vectors is a record of its own: an array of impacts gives as many records. Two or more structures
+//! side by side that hold one signal each are channels of one record.
 
 use super::value::{Item, Value, Variable};
 use crate::raw::{FoundUnit, Raw, RawColumn};

@@ -1,7 +1,8 @@
 //! Reader of TDMS files of National Instruments: groups of channels with properties, in segments.
 //!
-//! Format: National Instruments, "TDMS File Format Internal Structure". Each group is a record. `wf_increment` states the sample interval,
-//! `unit_string` the unit. Raw data of DAQmx (unscaled, with a format of its own) is refused; one linear scale per channel is applied, any other scale is refused.
+//! Format: National Instruments, "TDMS File Format Internal Structure". Each group is a record. `wf_increment` states
+//! the sample interval, `unit_string` the unit. Raw data of DAQmx (unscaled, with a format of its own) is refused; one
+//! linear scale per channel is applied, any other scale is refused.
 //!
 //! Every size is checked against the length of the file before memory is taken.
 
@@ -137,7 +138,8 @@ impl Object {
         }
     }
 
-    /// Samples of a TDMS channel after the linear scale that its properties state: value = slope · sample + intercept.
+    /// Samples of a TDMS channel after the linear scale that its properties state, value = slope · sample + intercept;
+    /// unchanged without a scale or if they are scaled already.
     fn scaled(self, name: &str) -> Result<Vec<f64>, String> {
         let scales = self.number("NI_Number_Of_Scales").unwrap_or(0.0);
         if scales < 1.0 || self.text("NI_Scaling_Status") == Some("scaled") {

@@ -263,8 +263,8 @@ fn decode(bytes: &[u8], is_big_endian: bool) -> f64 {
     }
 }
 
-/// Reads the delimiter line `-1` that ends a binary UFF data set: on the same line as the data or after empty lines.
-/// The delimiter may be missing at the end of the file.
+/// Reads the delimiter line `-1` that ends a binary UFF data set: directly after the data, or after a line end and
+/// empty lines. The delimiter may be missing at the end of the file.
 fn end_of_binary<R: BufRead>(source: &mut Source<R>) -> Result<(), Fault> {
     match source.peek_filled(0)? {
         None => return Ok(()),

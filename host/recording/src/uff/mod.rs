@@ -1,8 +1,9 @@
 //! Universal file format (UFF), data set 58: functions at nodal degrees of freedom, as text and binary (58b).
 //!
-//! Format: Structural Dynamics Research Laboratory, University of Cincinnati. Each data set begins and ends with a delimiter line `-1`. The
-//! reader accepts empty lines between data sets, `D` exponents, both byte orders, data that look like the delimiter, several data sets per
-//! file, units from data set 164, and a missing last delimiter. It skips other data sets.
+//! Format: Structural Dynamics Research Laboratory, University of Cincinnati. Each data set begins and ends with a
+//! delimiter line `-1`. The reader accepts empty lines between data sets, `D` exponents, both byte orders, data that
+//! look like the delimiter, several data sets per file, units from data set 164, and a missing last delimiter. It skips
+//! other data sets.
 
 mod data;
 mod fault;
@@ -268,8 +269,8 @@ pub(super) fn read(path: &Path, finite: bool) -> Result<Raw, RecordingError> {
                 samples[at]
             )));
         }
-        // A negative direction in a UFF header means that the sensor measures against the axis, so the samples change
-        // their sign.
+        // A direction of −1 to −3 in a UFF header means that the sensor measures against the axis x, y or z, so the
+        // samples change their sign.
         if (-3..0).contains(&set.header.response.direction) {
             samples.iter_mut().for_each(|sample| *sample = -*sample);
         }

@@ -2,8 +2,8 @@
 
 /// Parses all numbers of a line and appends them to `values`.
 ///
-/// Accepted forms: `1.5D+02`, `1.5-102` (Fortran drops the letter of a three-digit exponent), `-1.0E+00-2.0E+00` (adjacent fields), commas
-/// between numbers, `NaN` and infinities.
+/// Accepted forms: `1.5D+02`, `1.5-102` (Fortran drops the letter of a three-digit exponent), `-1.0E+00-2.0E+00`
+/// (adjacent fields), commas between numbers, `NaN` and infinities.
 ///
 /// # Errors
 /// A message with the text that is not a number.

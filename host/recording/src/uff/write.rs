@@ -1,4 +1,4 @@
-//! Writer of UFF data sets 58: values as text with 13 digits, or as binary doubles.
+//! Writer of UFF data sets 58: ordinate values as text with 13 digits, or as binary doubles.
 
 use std::io::{self, Write};
 

@@ -1,4 +1,5 @@
-//! Virtual test rigs: a structure excited by a shaker, by hammer impacts or by a released static pull, and the sensors that record it.
+//! Virtual test rigs: a structure excited by a shaker, by hammer impacts or by a released static pull, and the sensors
+//! that record it.
 
 mod noise;
 mod signal;
@@ -23,8 +24,8 @@ pub struct Rig {
     pub direction: Direction,
     /// Commanded force over time.
     pub signal: Signal,
-    /// Force drop of a shaker without force control, N s/m: the true force is the commanded force minus this times the velocity of the
-    /// tool, so that it drops at resonance. The recording contains the true force.
+    /// Force drop of a shaker without force control, N s/m: the true force is the commanded force minus this times the
+    /// velocity of the tool, so that it drops at resonance. The recording contains the true force.
     pub drop_ns_per_m: f64,
     /// Sampling rate, Hz.
     pub sample_rate_hz: f64,
@@ -76,11 +77,12 @@ impl Rig {
         }
     }
 
-    /// Simulates the test from rest at t = 0 and returns the recording without noise; `path` is the path of the recording's file.
+    /// Simulates the test from rest at t = 0 and returns the recording without noise; `path` is the path of the
+    /// recording's file.
     ///
     /// # Errors
-    /// The structure is refused, lacks the direction, or the direction is a rotation; an effect does not apply to the structure; or an error
-    /// of [`Model::run`].
+    /// The structure is refused, lacks the direction, or the direction is a rotation; an effect does not apply to the
+    /// structure; or an error of [`Model::run`].
     pub fn record(
         &self,
         structure: &Structure,

@@ -78,7 +78,8 @@ pub struct Impact {
 }
 
 impl Signal {
-    /// A multisine with tones of equal amplitude and random phases from `seed`; a single tone gets the phase −π/2, a sine.
+    /// A multisine with tones of equal amplitude and random phases from `seed`; a single tone gets the phase −π/2, a
+    /// sine.
     pub fn tones(frequencies_hz: &[f64], [first_n, last_n]: [f64; 2], seconds: f64, seed: u64) -> Self {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let tones = match frequencies_hz {
@@ -114,8 +115,8 @@ impl Signal {
         }
     }
 
-    /// `count` impacts at intervals of `spacing_s`; the first is at 0.1·`spacing_s`. Peak forces are uniformly distributed within ± 20 %
-    /// of `peak_n`, as those of a manual hammer test.
+    /// `count` impacts at intervals of `spacing_s`; the first is at 0.1·`spacing_s`. Peak forces are uniformly
+    /// distributed within ± 20 % of `peak_n`, as those of a manual hammer test.
     pub fn impacts(count: usize, peak_n: f64, pulse_s: f64, spacing_s: f64, seed: u64) -> Self {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let impacts = (0..count)
@@ -195,7 +196,8 @@ impl Signal {
         }
     }
 
-    /// The longest step that resolves the force, s: a quarter of the shortest period. Pulses are resolved by their knots.
+    /// The longest step that resolves the force, s: a quarter of the shortest period. Pulses are resolved by their
+    /// knots.
     pub fn longest_step_s(&self) -> f64 {
         let highest_hz = match self {
             Self::Tones { tones, .. } => tones
@@ -212,14 +214,15 @@ impl Signal {
         0.25 / highest_hz
     }
 
-    /// The first time after `t`, s, at which the force or one of its lower derivatives is discontinuous.
+    /// The first time after `t`, s, at which the excitation force or one of its low-order time derivatives is
+    /// discontinuous.
     pub fn next_knot_s(&self, t: f64) -> f64 {
         match self {
             Self::Tones { .. } | Self::Sweep { .. } => f64::INFINITY,
             Self::StepSine { dwell_s, pause_s, .. } => {
                 let index = (t / (dwell_s + pause_s)).floor();
-                // Starts and ends of excitation in this step of the step sine and in the next two: rounding may place `index` on either
-                // side of a step's start.
+                // Starts and ends of excitation in this step of the step sine and in the next two: rounding may place
+                // `index` on either side of a step's start.
                 [0.0, 1.0, 2.0]
                     .iter()
                     .flat_map(|ahead| {

@@ -30,8 +30,9 @@ struct ColumnsAnswer {
     excitation: &'static str,
     recordings: usize,
     averages: f64,
-    /// Smallest singular value of the matrix of forces, each normalized to unit root mean square: 1 for independent forces, 0 for
-    /// linearly dependent ones.
+    /// Smallest singular value of the force spectra over the frequencies that are not left out, with each force divided
+    /// by its root mean square at the frequency: 1 for uncorrelated forces or a single force, 0 for linearly dependent
+    /// forces.
     least_singular_value: f64,
     left_out_hz: Vec<f64>,
     #[serde(rename = "blows", skip_serializing_if = "Option::is_none")]
@@ -178,23 +179,25 @@ impl ColumnsAnswer {
 }
 
 impl ReceptanceAnswer {
-    /// Peak magnitude of one receptance with its 90 % interval from the random error of the estimate and from aliasing.
+    /// Peak magnitude of one receptance with its 90 % interval from the random error of the estimate and from aliasing,
+    /// and the coherence at the peak and its median over all frequency lines.
     fn new(measurement: &Measurement, table: &FrfTable, index: usize) -> Self {
         let entry = &table.entries()[index];
         let size = |line: usize| entry.receptance[line].norm();
         let at = (0..entry.receptance.len())
             .max_by(|&a, &b| size(a).total_cmp(&size(b)))
             .unwrap_or(0);
-        // The standard deviation is divided by the receptance before the tool-tip calibration. The calibration
-        // multiplies both by the same factor, so that their ratio also holds after it.
+        // The standard deviation is known for the receptance before the tool-tip calibration, and is divided by this
+        // receptance. The calibration multiplies the contribution of each mode by one factor, so that the ratio also
+        // holds after it where one mode dominates, as at a peak.
         let before = measurement.table.entries()[index].receptance[at].norm();
         let relative = if before > 0.0 {
             measurement.deviation[index][at] / before
         } else {
             0.0
         };
-        // Half-width of the 90 % interval: the root of the sum of squares of the random error and the error by
-        // aliasing. The latter is a bound and does not average out.
+        // Half-width of the 90 % interval of the peak magnitude: the root of the sum of squares of 1.645 standard
+        // deviations of the random error and of the largest error by aliasing, which does not average out.
         let half = (NINETY_PERCENT * relative).hypot(measurement.folding[index][at]) * size(at);
         Self {
             name: entry.name(),

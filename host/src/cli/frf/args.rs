@@ -23,8 +23,8 @@ pub struct Args {
     /// Table or chart to write; the ending sets the format: csv, uff, svg or html. May be repeated.
     #[arg(long, value_name = "FILE", value_parser = OutputFile::parse)]
     pub(super) out: Vec<OutputFile>,
-    /// Estimator: h1 is unbiased by noise of the responses, h2 by noise of the forces, mean is (h1 + h2)/2. pseudo-inverse
-    /// combines several cuts, in each of which the forces are linearly dependent.
+    /// Estimator: h1 is unbiased by noise of the responses, h2 by noise of the forces, mean is (h1 + h2)/2.
+    /// pseudo-inverse combines several cuts, in each of which the forces are linearly dependent.
     #[arg(long, value_enum, default_value_t)]
     pub(super) method: Method,
     /// Kind of excitation in the recordings; overrides the key kind of the sidecar file.
@@ -46,8 +46,8 @@ pub struct Args {
     /// Channel to use where a recording has several forces, or several sensors of one direction; may be repeated.
     #[arg(long, value_name = "NAME")]
     pub(super) channel: Vec<String>,
-    /// Time constant τ in s of the exponential window on hammer impacts. The window adds 1/τ to the decay rate of every mode;
-    /// the written receptances have that damping taken off again.
+    /// Time constant τ in s of the exponential window on hammer impacts. The window adds 1/τ to the decay rate of every
+    /// mode; the written receptances have that damping taken off again.
     #[arg(long, value_name = "TAU", value_parser = positive, allow_negative_numbers = true)]
     pub(super) exponential_window_s: Option<f64>,
     /// Force level in N to use where a step-sine test has several levels.

@@ -26,13 +26,13 @@ pub(super) struct IdentifyOutput {
     /// Poles of the fitted receptance matrix that were rejected as structural modes, with the reason.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub(super) rejected: Vec<Rejected>,
-    /// Median coherence of each response.
+    /// Median over the identified frequency band of the coherence of each response.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub(super) coherence: BTreeMap<&'static str, f64>,
-    /// Measurement noise of each recorded channel, if the modes were fitted to the time records.
+    /// Measurement noise of each recorded channel, if the modes were fitted to the spectra of whole recordings.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub(super) noise: Vec<ChannelNoise>,
-    /// Identified parameters, grouped by direction or pair of directions.
+    /// Identified parameters, grouped by direction or pair of directions; cutting coefficients have no direction.
     pub(super) models: Vec<Model>,
     /// Root mean square of the residual of the identified model divided by the root mean square of the measured data.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -41,7 +41,8 @@ pub(super) struct IdentifyOutput {
     /// of parameters).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) misfit: Option<f64>,
-    /// Number of steady sine responses (dwells) that the method evaluated.
+    /// Number of steady sine responses (dwells) taken from the recordings; for `linearity` plus the windows of sines
+    /// with increasing force.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) dwells: Option<usize>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -59,14 +60,15 @@ pub(super) struct IdentifyOutput {
     pub(super) warnings: Vec<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) case: Option<PathBuf>,
-    /// Content of the case file that `joints` (robot joints), `inverse-stability` (modes) or `force-coefficients` (cutting)
-    /// writes; `None` for the other methods.
+    /// Content of the case file that `joints` (robot joints), `inverse-stability` (modes) or `force-coefficients`
+    /// (cutting) writes; `None` for the other methods, and for `force-coefficients` without a measured axial force.
     #[serde(skip)]
     pub(super) table: Option<toml::Table>,
-    /// Modal model of the structure that is written into the case file.
+    /// Modal model of the structure that `--method modes` writes into the case file; `None` for the other methods.
     #[serde(skip)]
     pub(super) modal: Option<ModalModel>,
-    /// Estimated parameters of the structure that are written into the case file.
+    /// Estimated parameters of the equation of motion or of the cutting force; the case file contains them if `table`
+    /// and `modal` are `None`.
     #[serde(skip)]
     pub(super) estimates: Vec<Estimate>,
     #[serde(skip)]
@@ -76,7 +78,8 @@ pub(super) struct IdentifyOutput {
     pub(super) messages: Vec<String>,
 }
 
-/// Identified parameters of one direction of the structure, or of a pair of directions.
+/// Identified parameters of one direction of the structure, of a pair of directions, or, without a direction, of the
+/// cutting force.
 #[derive(Debug, Serialize)]
 pub(super) struct Model {
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -115,7 +118,8 @@ pub(super) struct ComplexFigure {
 pub(super) struct Linearity {
     /// Whether all linearity checks agree with a linear structure.
     pub(super) linear: bool,
-    /// Linearity checks of steady sine responses, one entry for each direction of the force.
+    /// Linearity checks of steady sine responses and of sines with increasing force, one entry for each direction of
+    /// the force that has enough force levels.
     pub(super) tones: Vec<TonesLinearity>,
     /// Comparisons of two sine sweeps.
     pub(super) sweeps: Vec<SweepPair>,
@@ -127,8 +131,8 @@ pub(super) struct TonesLinearity {
     pub(super) direction: &'static str,
     #[serde(flatten)]
     pub(super) verdict: Verdict,
-    /// Regions of the displacement amplitude X over the force amplitude F of a sine with increasing force, at constant
-    /// frequency.
+    /// Ranges of the force amplitude F in which the amplitude X of the recorded motion along the force is a linear
+    /// function of F, from sines of constant frequency and increasing force.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub(super) regions: Vec<Region>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -143,7 +147,8 @@ pub(super) struct SweepPair {
     pub(super) comparison: Comparison,
 }
 
-/// Empirical maps of the nonlinear complex mode: coefficients of a(F), b(F), c(F) in a·(X/F)² + b·(X/F) + c, each in descending powers of F.
+/// Empirical maps of natural frequency and loss factor of a nonlinear complex mode over force F and receptance X/F:
+/// coefficients of a(F), b(F), c(F) in a·(X/F)² + b·(X/F) + c, each in descending powers of F.
 #[derive(Debug, Serialize)]
 pub(super) struct Maps {
     pub(super) frequency_hz: Coefficients,
@@ -166,7 +171,7 @@ pub(super) struct EstimatedMode {
     pub(super) damping_ratio: Figure,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) stiffness_n_per_m: Option<Figure>,
-    /// Names of the parameters of the mode that the data do not identify.
+    /// Keys of the parameters of the mode (frequency, damping ratio, stiffness) that the data do not identify.
     pub(super) cannot_tell: Vec<&'static str>,
 }
 
@@ -181,7 +186,8 @@ pub(super) struct EstimatedJoint {
 /// Results of cutting tests besides the fitted force coefficients: coefficients from mean forces, and runout.
 #[derive(Debug, Serialize)]
 pub(super) struct Cutting {
-    /// Force coefficients from the regression of mean forces on the feed (Altintas); `null` if all feeds are equal.
+    /// Force coefficients from the regression of mean forces on the feed (Altintas); `null` if all feeds are equal, or
+    /// if mean forces do not determine the coefficients.
     pub(super) averaged: Option<BTreeMap<&'static str, Figure>>,
     /// Radial runout of each tooth relative to the mean of all teeth, µm.
     pub(super) runout_um: Vec<Figure>,
@@ -189,7 +195,8 @@ pub(super) struct Cutting {
     pub(super) feeds: usize,
 }
 
-/// Stiffness and damping of the structure, from slices of the restoring-force surface.
+/// Linear and cubic stiffness of the structure from the slice of the restoring-force surface near zero velocity, and
+/// linear and cubic damping from the slice near zero displacement.
 #[derive(Debug, Serialize)]
 pub(super) struct Slices {
     pub(super) stiffness: BTreeMap<&'static str, Figure>,
@@ -224,7 +231,8 @@ impl Coefficients {
 }
 
 impl Model {
-    /// Text that precedes each parameter in the text output: its direction or pair of directions.
+    /// Text that precedes each parameter in the text output: its direction or pair of directions; empty without a
+    /// direction.
     pub(super) fn label(&self) -> String {
         match (&self.direction, &self.directions) {
             (Some(direction), _) => format!("{direction} "),
@@ -273,7 +281,8 @@ impl IdentifyOutput {
         }
     }
 
-    /// TOML text of the case file with the identified model; `other` contains the sections besides the structure.
+    /// TOML text of the case file with the identified model, named after `path`. The sections tool, material, cut and
+    /// limits that the case `other` has replace those of the identified model.
     pub(super) fn case(&self, path: &Path, other: Option<&toml::Table>) -> Result<String, Error> {
         let text = self.structure(path)?;
         match other {

@@ -17,8 +17,8 @@ use crate::identify::law::NonlinearTerm;
 )]
 pub struct Args {
     /// Recordings; for modes also a table of receptances; for inverse-stability a table of cuts with the columns
-    /// rpm,depth_mm,chatter_hz,verdict: the verdict is stable, chatter, hopf, period-doubling or marginal, and chatter_hz is empty for a
-    /// stable cut. The table that lobes --cuts reads is accepted too.
+    /// rpm,depth_mm,chatter_hz,verdict: the verdict is stable, chatter, hopf, period-doubling or marginal, and
+    /// chatter_hz is empty for a stable cut. The table that lobes --cuts reads is accepted too.
     #[arg(value_name = "REC", required = true)]
     pub(super) recordings: Vec<PathBuf>,
     /// Identification method.
@@ -67,8 +67,8 @@ pub struct Args {
     /// with cubic stiffness.
     #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u8).range(1..=2))]
     pub(super) degree: u8,
-    /// Case with the initial values. For joints: geometry and inertia of the links, and initial stiffness and damping. For
-    /// inverse-stability: tool, material and cut, and an initial structure.
+    /// Case with the initial values. For joints: geometry and inertia of the links, and initial stiffness and damping.
+    /// For inverse-stability: tool, material and cut, and an initial structure.
     #[arg(long, value_name = "CASE.toml")]
     pub(super) start: Option<PathBuf>,
     /// For joints: also estimate the mass of the last link, which includes tool and payload.
@@ -121,8 +121,8 @@ pub(super) enum Method {
     Ncma,
     /// Tests whether the structure is linear, and names the kind of nonlinearity if it is not.
     Linearity,
-    /// Stiffness and damping of robot joints from hammer or shaker tests at several postures; with --terms from step-sine
-    /// tests at several forces.
+    /// Stiffness and damping of robot joints from hammer or shaker tests at several postures; with --terms from
+    /// step-sine tests at several forces.
     Joints,
     /// Operational modal analysis: natural frequencies and damping ratios from motion under unmeasured excitation.
     OutputOnly,

@@ -16,8 +16,8 @@ use crate::identify::sweep::{Spectra, compare};
 use crate::recording::{Quantity, Recording, TestKind};
 use crate::structure::Direction;
 
-/// Tests a structure for linearity from steady sine responses (levels, harmonics, homogeneity, reciprocity), and
-/// compares pairs of sweeps.
+/// Tests a structure for linearity from steady sine responses (force levels, harmonics, reciprocity) and from sines
+/// with increasing force (homogeneity), and compares pairs of sine sweeps.
 pub(super) fn linearity(args: &Args, recordings: &[Recording]) -> Result<IdentifyOutput, Error> {
     let harmonics = usize::from(args.harmonics).max(3);
     let of_kind = |kind| {
@@ -96,7 +96,7 @@ pub(super) fn linearity(args: &Args, recordings: &[Recording]) -> Result<Identif
     })
 }
 
-/// Length of the analysis window on a sine of constant frequency and increasing force, in periods of the sine: a
+/// Length of the analysis windows on a sine of constant frequency and increasing force, in periods of the sine: a
 /// choice.
 const PERIODS: f64 = 10.0;
 
@@ -109,8 +109,8 @@ fn response(dwell: &Dwell) -> Option<(f64, f64)> {
     Some((force.amplitude(1), motion.amplitude(1)))
 }
 
-/// Compares every later sine sweep with the first sweep of its direction and quantity. The returned texts name the pairs that
-/// cannot be compared.
+/// Compares every later sine sweep with the first sweep of the same force direction and motion quantity. The returned
+/// texts name the pairs of sweeps that cannot be compared.
 fn compare_sweeps(sweeps: &[&Recording]) -> Result<(Vec<SweepPair>, Vec<String>), Error> {
     let mut known: Vec<((Direction, Quantity), PathBuf, Spectra)> = Vec::new();
     let (mut found, mut refused) = (Vec::new(), Vec::new());

@@ -1,11 +1,13 @@
-//! Comments of a case that is written anew: they stay where their sections and keys stay.
+//! Comments of a case file that is written anew: the comments of sections and keys that the new case also has are kept.
 
 use toml_edit::{DocumentMut, Item, Table};
 
-/// The text of a case with new values, and with the comments, the order and the blank lines of the text that it replaces.
+/// Text of a case file with the values of `after`, and with the comments, the order and the blank lines of `before`,
+/// the text that it replaces.
 ///
-/// Sections and keys that the new text lacks are removed with their comments. Without comments, or if one of the texts is not TOML, the
-/// new text stays as it is.
+/// Sections and keys that `after` lacks are removed with their comments; comments within arrays and within the tables
+/// of an array (`[[structure.mode]]`) are lost. The result is `after` itself if `before` has no comment, or if one of
+/// the texts is not TOML.
 pub(super) fn kept(before: &str, after: &str) -> String {
     let has_comment = before.lines().any(|line| line.contains('#'));
     let (Ok(mut case), Ok(values)) = (before.parse::<DocumentMut>(), after.parse::<DocumentMut>()) else {
@@ -16,7 +18,7 @@ pub(super) fn kept(before: &str, after: &str) -> String {
     }
     merge(case.as_table_mut(), values.as_table());
     let merged = case.to_string();
-    // The values decide: a text that does not hold exactly the new ones is not written.
+    // The merged text is used only if its keys and values are exactly those of `after`.
     let same = |text: &str| text.parse::<toml::Table>().ok();
     if same(&merged) == same(after) {
         merged
@@ -25,7 +27,7 @@ pub(super) fn kept(before: &str, after: &str) -> String {
     }
 }
 
-/// Gives `table` the keys and values of `values`; keys that stay keep their comments.
+/// Gives `table` the keys and values of `values`. The comments of keys that stay are kept, except within arrays.
 fn merge(table: &mut Table, values: &Table) {
     let gone: Vec<String> = table
         .iter()

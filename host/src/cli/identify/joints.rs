@@ -21,7 +21,7 @@ use crate::recording::{Recording, TestKind};
 use crate::structure::{Direction, Form, Robot, Structure};
 use quietcut_numerics::statistics::NINETY_PERCENT;
 
-/// Recordings at one posture of the robot.
+/// Joint angles of one posture of the robot, with the recordings made there.
 struct AtPosture {
     joints_deg: Vec<f64>,
     recordings: Vec<Recording>,
@@ -33,7 +33,6 @@ impl AtPosture {
     }
 }
 
-/// Identified joint parameters of a robot.
 struct JointFit {
     robot: Robot,
     estimates: Vec<(JointParameter, Figure, f64)>,
@@ -86,7 +85,8 @@ fn postures(recordings: &[Recording]) -> Result<Vec<AtPosture>, Error> {
     Ok(postures)
 }
 
-/// Steady sine responses at every posture of the robot, with warnings about recordings that contain none.
+/// Steady sine responses at every posture of the robot, with warnings, such as of recordings or dwells that are left
+/// out.
 fn dwells(args: &Args, postures: &[AtPosture], settling: Settling) -> Vec<(PostureDwells, Vec<String>)> {
     postures
         .iter()
@@ -101,7 +101,8 @@ fn dwells(args: &Args, postures: &[AtPosture], settling: Settling) -> Vec<(Postu
         .collect()
 }
 
-/// Whether the steady responses `dwells` contain two different force amplitudes in the same direction.
+/// Whether two of the steady responses `dwells` have forces in the same direction whose amplitudes differ by more than
+/// the factor [`DIFFERENT_LEVELS`].
 fn has_levels(dwells: &[Dwell]) -> bool {
     let forces: Vec<(Direction, f64)> = dwells
         .iter()
@@ -212,8 +213,8 @@ fn from_receptances(args: &Args, start: &Robot, postures: &[AtPosture]) -> Resul
     let estimates = fit.parameters.iter().enumerate().map(|(index, parameter)| {
         let value = parameter.value(&fit.robot);
         let share = fit.covariance[(index, index)].max(0.0).sqrt();
-        // `share` is the standard deviation of the logarithm of the parameter, so the interval is value/factor to
-        // value·factor.
+        // `share` is the standard deviation of the logarithm of the parameter, so the 90 % interval of the parameter is
+        // value/factor to value·factor.
         let factor = (NINETY_PERCENT * share).exp();
         let figure = Figure {
             value,

@@ -168,8 +168,8 @@ pub(super) fn hfrf(args: &Args, recordings: &[Recording]) -> Result<IdentifyOutp
     };
     let predicted = data.relative_error(&fit.theta);
     let mut warnings = found.warnings;
-    // A parameter set that is correct within the noise predicts the steady responses about as well as the least-squares
-    // fit does. A larger prediction error shows that the parameters from higher-order FRFs are biased.
+    // Parameters that are correct within the noise predict the steady responses about as well as those of the
+    // harmonic-balance fit. A much larger prediction error shows that the parameters from higher-order FRFs are biased.
     if predicted > BIASED_PREDICTION.0 * found.fit.relative_error + BIASED_PREDICTION.1 {
         let mut shifts = Vec::new();
         for role in [Role::CubicDamping(0), Role::CubicStiffness(0)] {
@@ -204,7 +204,7 @@ pub(super) fn ncma(args: &Args, recordings: &[Recording]) -> Result<IdentifyOutp
     let curves = curves(&taken.dwells);
     let points: Vec<_> = curves.iter().flat_map(|curve| curve.linearized(0.4)).collect();
     // A map (natural frequency or loss factor over force and receptance) that is quadratic in the force needs three
-    // force levels; with two levels it is linear in the force.
+    // force levels; with fewer levels it is linear in the force.
     let degree = if curves.len() >= 3 { args.degree.into() } else { 1 };
     let maps = Map::fit(&points, degree, |point| point.omega / TAU)
         .zip(Map::fit(&points, degree, |point| point.loss_factor));
@@ -255,7 +255,7 @@ pub(super) fn ncma(args: &Args, recordings: &[Recording]) -> Result<IdentifyOutp
     })
 }
 
-/// Receptances at constant force amplitude: dwells grouped by force level.
+/// Receptances over frequency at constant force amplitude, one curve for each force level of the dwells.
 fn curves(dwells: &[Dwell]) -> Vec<Curve> {
     let mut curves: Vec<Curve> = Vec::new();
     for response in higher_order::responses(dwells, 0.0) {

@@ -20,7 +20,8 @@ pub(super) struct ModeOptions {
     /// Frequency resolution in Hz of the receptances that are estimated from recordings, like the option of frf.
     #[arg(long, value_name = "D", value_parser = positive, allow_negative_numbers = true)]
     pub(super) resolution_hz: Option<f64>,
-    /// Use the pseudo-inverse estimator of frf: the recordings are several cuts, in each of which the forces are linearly dependent.
+    /// Use the pseudo-inverse estimator of frf: the recordings are several cuts, in each of which the forces are
+    /// linearly dependent.
     #[arg(long)]
     pub(super) pseudo_inverse: bool,
 }

@@ -1,4 +1,4 @@
-//! `--method modes`: complex modes from receptances.
+//! `--method modes`: complex modes from receptances or from recordings of force and response.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -58,12 +58,13 @@ pub(super) fn modes(args: &Args, understood: &mut Vec<Understood>) -> Result<Ide
     })
 }
 
-/// Receptances from which the modes are identified, with their standard deviations and coherence.
+/// Receptances from which the modes are identified, with their standard deviations (`None` if unknown) and coherence.
 struct Source {
     table: FrfTable,
     deviation: Option<Vec<Vec<f64>>>,
     warnings: Vec<String>,
-    /// Spectra of the recorded forces and responses; `None` for a table, or if a record is a hammer or step-sine test.
+    /// Spectra of the recorded forces and responses; `None` for a table of receptances, or if a recording is a hammer
+    /// or step-sine test.
     records: Option<Vec<RecordSpectra>>,
 }
 
@@ -118,11 +119,11 @@ fn source(args: &Args, understood: &mut Vec<Understood>) -> Result<Source, Error
     })
 }
 
-/// Reads the table of receptances in a file. The inner error is for a file that holds no table: the reason in a UFF
-/// file, and `None` in a file that is certainly a recording.
+/// Reads the table of receptances in a file. The inner error means that the file may be a recording: for a UFF file the
+/// reason why no table was read, and `None` for another file that does not have the head of a table of receptances.
 ///
 /// # Errors
-/// The file cannot be read, or it has the head of a table of receptances but wrong content.
+/// A file that is not UFF cannot be read, or has the head of a table of receptances but wrong content.
 fn table(path: &Path, import: &Import) -> Result<Result<ImportedTable, Option<FrfError>>, Error> {
     match crate::file::ending(path).as_str() {
         "uff" | "unv" | "bunv" => Ok(FrfTable::import(path, import).map_err(Some)),
@@ -131,7 +132,8 @@ fn table(path: &Path, import: &Import) -> Result<Result<ImportedTable, Option<Fr
     }
 }
 
-/// Median over a frequency band of the coherence of each response.
+/// Median over a frequency band of the coherence of each response; the last receptance of the response in the table
+/// counts.
 fn coherence(table: &FrfTable, [from_hz, to_hz]: [f64; 2]) -> BTreeMap<&'static str, f64> {
     let mut medians = BTreeMap::new();
     for entry in table.entries() {
@@ -173,7 +175,8 @@ fn of_mode(model: &ModalModel, found: &IdentifiedMode) -> ComplexMode {
     }
 }
 
-/// Warning about directions of the identified modes that the case file does not contain; `None` if it contains all.
+/// Warning about directions of forces or responses that the written case file does not contain, since a case needs
+/// directions that are both excited and measured; `None` if it contains all, or if no case file is written.
 fn not_in_case(args: &Args, model: &ModalModel) -> Option<String> {
     args.out.as_ref()?;
     let directions = model.directions();

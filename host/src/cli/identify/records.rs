@@ -10,7 +10,8 @@ use crate::identify::restoring_force::{ForceTerm, Options, Record, Slice, Surfac
 use crate::recording::{Quantity, Recording};
 use crate::structure::Direction;
 
-/// Identifies parameters by harmonic balance of the last period, of `samples` samples, of each multisine recording.
+/// Identifies parameters by harmonic balance from the last `samples` samples of each multisine recording, which are one
+/// period of the multisine.
 pub(super) fn multisine(
     args: &Args,
     recordings: &[Recording],
@@ -110,7 +111,7 @@ pub(super) fn restoring_force(args: &Args, recordings: &[Recording]) -> Result<I
         terms: args.surface.iter().map(|term| term.term()).collect(),
         mass_kg: args.mass_kg,
         band_hz,
-        // Duration cut off at both ends of the record, s: two seconds, or a tenth of a record shorter than 20 s. A
+        // Duration cut off at each end of the record, s: two seconds, or a tenth of a record shorter than 20 s. A
         // choice; it should contain several periods of the lowest frequency in the band.
         trim_s: (0.1 * recording.len() as f64 / recording.sample_rate_hz).min(2.0),
     };
@@ -190,8 +191,8 @@ pub(super) struct ForceAndMotion<'a> {
     pub(super) quantity: Quantity,
 }
 
-/// Force and motion of the first direction that has both, displacement before velocity before acceleration; without any
-/// recorded force, the first motion with zero force (free decay).
+/// Force and motion of the first direction that has both; a displacement in any direction comes before a velocity, and
+/// this before an acceleration. Without any recorded force, the first motion with zero force (free decay).
 pub(super) fn force_and_motion(recording: &Recording) -> Result<ForceAndMotion<'_>, Error> {
     // A displacement channel has priority: integrating velocity or acceleration to displacement loses the low
     // frequencies.

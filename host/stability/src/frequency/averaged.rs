@@ -1,5 +1,5 @@
-//! Loop with averaged directional coefficients: one frequency, no dependence on the phase of the period (thesis eqs
-//! 3.8–3.12).
+//! Loop of cut and structure with directional coefficients averaged over a tooth period: one frequency, no dependence
+//! on the immersion angle (thesis eqs 3.8–3.12).
 
 use nalgebra::{DMatrix, Matrix3, Vector3};
 use num_complex::Complex64;
@@ -14,7 +14,7 @@ use quietcut_numerics::eigenvalues;
 /// tooth period.
 ///
 /// β₀ does not depend on the depth. With H̃ = (I + H β₀)⁻¹ H, u = κ H̃ α₀ u, and the eigenvalues of H̃ α₀ determine the
-/// limits. Only displacements that change the chip thickness enter.
+/// limits. Only displacements that change the chip thickness enter the eigenvalue problem.
 pub(crate) struct AveragedLoop<'a> {
     problem: &'a FrequencyProblem,
     /// Regenerative delay, s; `None` if the displacement one tooth period ago is neglected.
@@ -57,8 +57,8 @@ impl<'a> AveragedLoop<'a> {
     /// is already below 1 at the last line. A mode above the table remains undetected, however small the gain.
     ///
     /// # Errors
-    /// The gain at the last line, with the displacement and its past in opposite phase, is 1 or more at that depth, or cannot be
-    /// computed.
+    /// The gain at the last line, with the displacement and its past in opposite phase, is 1 or more at that depth, or
+    /// cannot be computed.
     pub(crate) fn check_reach(
         problem: &FrequencyProblem,
         rpm: f64,

@@ -1,4 +1,4 @@
-//! Loop with periodic directional coefficients: the truncated harmonic transfer matrix.
+//! Loop of cut and structure with periodic directional coefficients: the truncated harmonic transfer matrix.
 
 use nalgebra::{DMatrix, Matrix3, Vector3};
 use num_complex::Complex64;
@@ -60,8 +60,8 @@ impl<'a> HarmonicLoop<'a> {
         }
     }
 
-    /// Least number K of harmonics with which the frequencies of the loop reach 25 % beyond every resonance, plus four
-    /// further ones.
+    /// Number K of harmonics of the tooth-passing frequency with which the loop is first computed: the least whose
+    /// highest frequency KΩ reaches 25 % beyond every resonance, plus four.
     pub(crate) fn least_harmonics(problem: &FrequencyProblem, rpm: f64) -> usize {
         let fastest = problem
             .resonances()

@@ -25,7 +25,7 @@ pub(crate) struct AxisCrossing {
     pub(crate) outward: bool,
 }
 
-/// All crossings of the imaginary axis up to an axial depth (m), by depth.
+/// All crossings of the imaginary axis by roots of a loop up to an axial depth (m), by depth.
 ///
 /// # Errors
 /// Receptances are infinite, a result is not finite, an eigenvalue iteration fails, or a crossing is not found in an
@@ -86,8 +86,9 @@ pub(crate) fn limits(open_loop: &impl OpenLoop, depth_m: f64) -> Result<Vec<Axis
 /// Number of roots with Re s > `sigma` (1/s) at an axial depth (m), by the Nyquist criterion on the determinant D(s).
 ///
 /// The zeros of D are the roots, its poles the poles of the structure. Along the line Re s = `sigma` from the real axis
-/// to infinity the argument of D grows by π (P − N) for P poles and N roots right of the line, conjugates included.
-/// `None` if the number cannot be told, for example since the line meets a root or passes close to one.
+/// to the end of the frequency range (infinity, or half the tooth-passing frequency for periodic coefficients) the
+/// argument of D grows by π (P − N) for P poles and N roots right of the line, conjugates included. `None` if the
+/// number cannot be told, for example since the line meets a root or passes close to one.
 pub(crate) fn unstable_roots(open_loop: &impl OpenLoop, depth_m: f64, sigma: f64) -> Option<i32> {
     let grid = open_loop.grid(depth_m.max(1e-9).recip()).ok()?;
     let determinant = |omega: f64| {

@@ -27,8 +27,8 @@ pub(crate) struct Crossing {
     pub(crate) rises: bool,
 }
 
-/// Characteristic loci: function of the frequency (rad/s) that returns all eigenvalues of a loop of absolute value
-/// `floor` and above.
+/// Function of the frequency (rad/s) that returns the values of the characteristic loci of a loop there, 1/m, all
+/// except those below a floor that the function itself knows.
 pub(crate) trait Loci: Fn(f64) -> Result<Vec<Complex64>, Breakdown> {}
 impl<F: Fn(f64) -> Result<Vec<Complex64>, Breakdown>> Loci for F {}
 
@@ -294,10 +294,10 @@ pub(crate) fn zero(
     None
 }
 
-/// Increase of the argument of a function over a grid, rad. Intervals are halved, at most twenty times, until the
-/// argument changes by less than π/5 in each half.
+/// Increase of the argument of a complex function of the frequency over a frequency grid, rad. Each interval of the
+/// grid is halved, at most twenty times, until the argument changes by less than π/5 in each half.
 ///
-/// `None` if the function returns `None` or vanishes.
+/// `None` if the function returns `None`, vanishes or is not finite.
 pub(crate) fn argument_increase(function: &impl Fn(f64) -> Option<Complex64>, grid: &[f64]) -> Option<f64> {
     let mut sum = 0.0;
     let Some((&first, rest)) = grid.split_first() else {

@@ -65,7 +65,7 @@ impl FrequencyProblem {
         })
     }
 
-    /// Builds the problem with measured receptances in place of the structure of a case, which may be missing.
+    /// Builds the problem of a case with measured receptances in place of its structure; the case needs no structure.
     ///
     /// # Errors
     /// The case lacks a section or has a feature that the equations do not cover, or the table has fewer than four
@@ -193,7 +193,8 @@ impl FrequencyProblem {
     }
 }
 
-/// Peaks of a table of receptances of at least [`PEAK_SHARE`] times the highest, with their half bandwidth.
+/// Peaks of the norm of the receptance matrix in a table, of at least [`PEAK_SHARE`] times its largest norm, with their
+/// half bandwidth.
 ///
 /// Peaks due to noise are harmless and only cost computing time.
 fn peaks(interpolation: &Interpolation) -> Vec<Resonance> {

@@ -1,5 +1,5 @@
-//! The rightmost root at one speed and depth, and the dominant Floquet multiplier (characteristic multiplier) that
-//! belongs to it.
+//! The rightmost root of the loop of cut and structure at one spindle speed and axial depth, and the dominant Floquet
+//! multiplier (characteristic multiplier) that belongs to it.
 
 use num_complex::Complex64;
 use quietcut_numerics::Stop;
@@ -20,7 +20,7 @@ use crate::spectrum::stability_loss::StabilityLoss;
 /// Text for the error that the dominant multiplier is not found from receptances.
 pub(crate) const NO_ROOT: &str = "the rightmost root cannot be found from receptances; limits can";
 
-/// Rightmost root s, 1/s, with Im s ≥ 0, at an axial depth, m.
+/// Rightmost root s of a loop, 1/s, with Im s ≥ 0, at an axial depth, m.
 ///
 /// First, the poles of a modelled structure are the starting values of roots. Then loci are traced along lines Re s =
 /// σ: if one passes near 1/w, its linear continuation away from the line predicts a root, which is then solved for. The
@@ -37,7 +37,7 @@ pub(crate) fn rightmost(open_loop: &impl OpenLoop, depth_m: f64) -> Result<Compl
         .iter()
         .map(|resonance| resonance.width)
         .fold(f64::INFINITY, f64::min);
-    // Without resonances there is no slowest decay rate: all lines Re s = σ coincide with the imaginary axis.
+    // Without resonances there is no slowest decay rate: all lines Re s = σ then coincide with the imaginary axis.
     let decay = if decay.is_finite() { decay } else { 0.0 };
     let mut best = from_poles(open_loop, depth_m);
     if let Some(root) = best

@@ -1,9 +1,11 @@
-//! Lines at further spindle speeds of a chart, so that straight lines between neighbouring speeds draw the limits.
+//! Stability limits at further spindle speeds of a chart, so that straight lines between neighbouring speeds draw the
+//! limits. A line of the chart ([`SpeedLine`]) holds the limits at one spindle speed.
 //!
-//! A gap between two speeds is accepted if the straight line between the ends of each stable interval is right to
-//! [`CHART_DEPTH`] of the depth, or to [`CHART_SPEED`] of the speed where a limit is steep. The error of the straight line
-//! over a gap follows from the two neighbouring gaps. Extrapolation of the left neighbour to the right end of the gap
-//! misses by e_r, of the right neighbour to the left end by e_l. A kink within the gap, where two lobes meet, then lies
+//! A gap between two neighbouring speeds is accepted if the straight line over it between the ends of each stable depth
+//! interval is right to [`CHART_DEPTH`] of the depth, or to [`CHART_SPEED`] of the speed where a limit is steep. The
+//! error of the straight line over a gap follows from the two neighbouring gaps. Extrapolation of the limit from the
+//! left neighbour to the right end of the gap misses by e_r, from the right neighbour to the left end by e_l. A kink
+//! within the gap, where two lobes meet, then lies
 //!
 //!   e_r e_l/(e_r + e_l)
 //!
@@ -16,8 +18,8 @@
 //! speeds that are close compared with the lobes, which repeat when the number of vibrations in a tooth period changes
 //! by one: gaps are first divided so that each lobe has [`LINES_OF_LOBE`] lines, and so that none is wider than
 //! [`CHART_GAP`]. Two lightly damped modes whose frequencies add up to a multiple of the tooth-passing frequency become
-//! unstable in a narrow tongue, which may end within a gap. A line beside it shows a maximum of |μ| over the depth: a
-//! gap beside such a line is halved down to [`TONGUE_GAP`].
+//! unstable in a narrow tongue, which may end within a gap. The line at a speed beside the tongue shows a maximum of
+//! |μ| over the depth: a gap beside such a speed is halved down to [`TONGUE_GAP`].
 //!
 //! Lobe tables are refined by another rule, [`Chart::refined`]; the head of its file says why.
 
@@ -32,11 +34,12 @@ use crate::error::StabilityError;
 use crate::spectrum::verdict::Verdict;
 
 impl Chart {
-    /// Adds lines at further speeds until straight lines between all of them draw the limits, or until
-    /// `CHART_LINES_MAX` lines are added: see [`Resolution`].
+    /// Adds limits at further spindle speeds until straight lines between neighbouring speeds draw the limits, until
+    /// the remaining gaps are at most `CHART_SPEED` wide, or until a further round would exceed `CHART_LINES_MAX` added
+    /// speeds: see [`Resolution`].
     ///
-    /// `samples` is the number of steps in depth that the requested lines have, `teeth` the number of teeth of the tool.
-    /// The result does not depend on the number of threads.
+    /// `samples` is the number of steps in depth of the limits at the requested speeds, `teeth` the number of teeth of
+    /// the tool. The result does not depend on the number of threads.
     ///
     /// # Errors
     /// As [`Method::line`], for the first speed that fails.
@@ -51,8 +54,8 @@ impl Chart {
         lines.sort_by(|a, b| a.rpm.total_cmp(&b.rpm));
         lines.dedup_by(|a, b| a.rpm == b.rpm);
         let asked = lines.len();
-        // Added speeds have at most as many steps in depth as the requested ones. Their steps are steps of the
-        // requested ones too, so that |μ| of both can be compared.
+        // Added speeds have at most as many steps in depth as the requested ones. Their sampled depths are sampled
+        // depths of the requested speeds too, so that |μ| of both can be compared.
         let stride = stride(samples);
         for line in &mut lines {
             line.largest = line.largest.iter().step_by(stride).copied().collect();
@@ -82,9 +85,9 @@ impl Chart {
         Ok(self)
     }
 
-    /// Verdict that the chart draws at a spindle speed and an axial depth: from the straight lines between the two
-    /// neighbouring speeds, or, over an unresolved gap, the verdict in which both speeds agree. `None` outside the
-    /// speeds of the chart.
+    /// Verdict that the chart draws at a spindle speed and an axial depth, from the straight lines between the two
+    /// neighbouring speeds. Over an unresolved gap, or where the stable intervals differ in number, it is the verdict
+    /// at both speeds if they agree, otherwise `Undecided`. `None` outside the speeds of the chart.
     pub fn verdict(&self, rpm: f64, depth_mm: f64) -> Option<Verdict> {
         let lines = self.lines();
         let right = lines.partition_point(|line| line.rpm < rpm);
@@ -114,7 +117,7 @@ impl Chart {
         })
     }
 
-    /// All lines of the chart, requested and added, by ascending speed.
+    /// Limits at all spindle speeds of the chart, requested and added, by ascending speed.
     pub fn lines(&self) -> Vec<&SpeedLine> {
         let mut lines: Vec<&SpeedLine> = self.speeds.iter().chain(&self.refined).collect();
         lines.sort_by(|a, b| a.rpm.total_cmp(&b.rpm));
@@ -122,8 +125,8 @@ impl Chart {
     }
 }
 
-/// Largest divisor of the number of steps in depth that leaves at least [`CHART_SAMPLES_MIN`] steps; 1 if there are
-/// fewer steps.
+/// Largest divisor d of the number `samples` of steps in depth for which `samples`/d is at least [`CHART_SAMPLES_MIN`];
+/// 1 if there is none.
 fn stride(samples: usize) -> usize {
     (1..=samples / CHART_SAMPLES_MIN)
         .rev()
@@ -146,7 +149,7 @@ fn contains(intervals: &[[f64; 2]], depth_mm: f64) -> bool {
 }
 
 /// Spindle speeds at which a gap between two speeds of a chart is to be divided, rev/min; none if straight lines draw
-/// the limits in it and it is narrow enough for its lobes, or if it is at most [`CHART_SPEED`] wide.
+/// the limits in it and it is narrow enough for its lobes, or if its relative width is at most [`CHART_SPEED`].
 fn speeds_within(lines: &[SpeedLine], right: usize, teeth: usize) -> Vec<f64> {
     let (left, right_line) = (&lines[right - 1], &lines[right]);
     let width = right_line.rpm / left.rpm - 1.0;
@@ -161,14 +164,15 @@ fn speeds_within(lines: &[SpeedLine], right: usize, teeth: usize) -> Vec<f64> {
     } else {
         2.0
     };
-    // The intervals are at least half as wide as [`CHART_SPEED`], which bounds their number.
+    // The parts of the gap are at least half as wide as [`CHART_SPEED`], which bounds their number.
     let parts = parts.min((width / CHART_SPEED).ceil()) as usize;
     let step_rpm = (right_line.rpm - left.rpm) / parts as f64;
     (1..parts).map(|part| left.rpm + step_rpm * part as f64).collect()
 }
 
-/// Widest relative gap in speed, at most [`CHART_GAP`], at which every lobe has [`LINES_OF_LOBE`] lines. Lobes repeat in speed by 1/k of the
-/// speed, with k vibrations in a tooth period; the fastest chatter at an end of a stable interval sets k.
+/// Widest relative gap between two speeds, at most [`CHART_GAP`], at which every lobe has [`LINES_OF_LOBE`] speeds.
+/// Lobes repeat in speed by 1/k of the speed, with k vibrations in a tooth period; the fastest chatter at an end of a
+/// stable interval at either speed sets k.
 fn coarsest(left: &SpeedLine, right: &SpeedLine, teeth: usize) -> f64 {
     let vibrations = |line: &SpeedLine| {
         let ends = line.switches.iter().filter(|switch| {
@@ -181,8 +185,8 @@ fn coarsest(left: &SpeedLine, right: &SpeedLine, teeth: usize) -> f64 {
     (1.0 / (LINES_OF_LOBE * vibrations(left).max(vibrations(right)))).min(CHART_GAP)
 }
 
-/// True if straight lines over the gap draw every stable interval, and if no sign shows of a region of stability or of
-/// chatter within the gap.
+/// True if straight lines over the gap between two neighbouring speeds draw every stable depth interval, and if no sign
+/// shows of a region of stability or of chatter within the gap.
 fn is_drawn(lines: &[SpeedLine], right: usize) -> bool {
     let gap = Gap {
         before: right.checked_sub(2).map(|index| &lines[index]),
@@ -193,7 +197,7 @@ fn is_drawn(lines: &[SpeedLine], right: usize) -> bool {
     gap.is_straight() && !gap.may_hide_a_region() && !gap.may_hide_a_tongue()
 }
 
-/// Gap between two neighbouring speeds of a chart: the lines at both ends, and the lines beside them.
+/// Gap between two neighbouring speeds of a chart: the limits at both of them, and at the next speeds on either side.
 struct Gap<'a> {
     before: Option<&'a SpeedLine>,
     left: &'a SpeedLine,
@@ -202,8 +206,8 @@ struct Gap<'a> {
 }
 
 impl Gap<'_> {
-    /// True if the straight line over the gap between the ends of each stable interval is right to the accuracy of the
-    /// chart.
+    /// True if both speeds have the same number of stable depth intervals, and if the straight line over the gap
+    /// between the ends of each interval is right to [`CHART_DEPTH`] of the depth or to [`CHART_SPEED`] of the speed.
     fn is_straight(&self) -> bool {
         let count = self.left.stable_mm.len();
         if self.right.stable_mm.len() != count {
@@ -225,8 +229,9 @@ impl Gap<'_> {
         })
     }
 
-    /// Prediction errors of linear extrapolation at both ends of the gap: (right end, left end). Each is the value at
-    /// that end less the value of the straight line through the other end and the neighbouring speed beyond it.
+    /// Prediction errors of linear extrapolation at both ends of the gap: (right end, left end). Each is the value of a
+    /// limit, or of ln|μ|, at that end less the value of the straight line through the other end and the next speed
+    /// beyond that other end.
     fn misses(&self, before: Option<f64>, left: f64, right: f64, after: Option<f64>) -> [Option<f64>; 2] {
         let width = self.right.rpm - self.left.rpm;
         let at_right = self.before.zip(before).map(|(line, value)| {
@@ -240,8 +245,8 @@ impl Gap<'_> {
         [at_right, at_left]
     }
 
-    /// True if |μ| may cross the unit circle and return within the gap between two speeds, at a step in depth where
-    /// both speeds lie on one side of the circle.
+    /// True if the largest multiplier may cross the unit circle and return within the gap between two speeds, at a step
+    /// in depth where it lies on one side of the circle at both speeds.
     fn may_hide_a_region(&self) -> bool {
         let (left, right) = (&self.left.largest, &self.right.largest);
         let steps = left.len().min(right.len());
@@ -268,8 +273,8 @@ impl Gap<'_> {
 }
 
 impl Gap<'_> {
-    /// True if a tongue of instability may lie between two speeds: their gap is wider than [`TONGUE_GAP`], and at one of
-    /// them |μ| over the depth has a maximum closely below 1.
+    /// True if a tongue of instability may lie between two speeds: their gap is wider than [`TONGUE_GAP`], and at one
+    /// of them the largest |μ| has a maximum over the depth closely below 1.
     fn may_hide_a_tongue(&self) -> bool {
         self.right.rpm > self.left.rpm * (1.0 + TONGUE_GAP)
             && [self.left, self.right]
@@ -291,7 +296,8 @@ fn shows_a_tongue(largest: &[f64]) -> bool {
 }
 
 /// Distance by which a kink within a gap lies off the straight line between the ends of the gap, from the prediction
-/// errors of both extrapolations; from one error alone, an upper bound. `None` if neither neighbour exists.
+/// errors of the extrapolations from both sides; from one error alone, an upper bound. `None` if neither error is
+/// known.
 fn kink_between(misses: [Option<f64>; 2]) -> Option<f64> {
     match misses {
         [Some(right), Some(left)] => {
@@ -307,8 +313,8 @@ fn kink_between(misses: [Option<f64>; 2]) -> Option<f64> {
     }
 }
 
-/// Largest change of ln|μ| towards the unit circle within a step in depth beside a sample, beyond the values at both ends
-/// of the step: that of the parabola through three samples, (second difference)/8.
+/// Distance by which ln|μ| comes closer to the unit circle within a step in depth beside a sample than at both ends of
+/// the step: that of the parabola through three samples, (second difference)/8, or 0 if it bends away.
 fn bend(largest: &[f64], step: usize, side: f64) -> f64 {
     let at = |index: usize| largest.get(index).map(|size| side * logarithm(*size));
     let three = step
@@ -324,8 +330,8 @@ fn logarithm(size: f64) -> f64 {
     size.max(1e-3).ln()
 }
 
-/// Width of the narrowest region of stability or of chatter that begins and ends between the first and the last speed,
-/// rev/min.
+/// Width in speed of the narrowest region of stability or of chatter that begins and ends between the first and the
+/// last speed of a chart, rev/min; `None` if there is none.
 fn narrowest_island_rpm(lines: &[SpeedLine], depth_mm: f64) -> Option<f64> {
     let stable = |line: &SpeedLine| line.stable_mm.clone();
     let unstable = |line: &SpeedLine| complement(&line.stable_mm, depth_mm);
@@ -349,11 +355,12 @@ fn complement(intervals: &[[f64; 2]], depth_mm: f64) -> Vec<[f64; 2]> {
         .collect()
 }
 
-/// Widths in speed of all connected regions that touch neither the first nor the last line, rev/min. Intervals of
-/// neighbouring lines belong to one region if they overlap in depth. A region extends half way to the next lines.
+/// Widths in speed of all connected regions that touch neither the first nor the last speed of a chart, rev/min. Depth
+/// intervals at neighbouring speeds belong to one region if they overlap in depth. A region extends half way to the
+/// next speeds.
 fn island_widths_rpm(lines: &[SpeedLine], intervals: &dyn Fn(&SpeedLine) -> Vec<[f64; 2]>) -> Vec<f64> {
-    // Regions that reach the newest line, each with the index of its first line and its depth intervals at the newest
-    // line.
+    // Regions that reach the latest speed, each with the index of its first speed and its depth intervals at the
+    // latest.
     let mut open: Vec<(usize, Vec<[f64; 2]>)> = Vec::new();
     let mut widths = Vec::new();
     for (index, line) in lines.iter().enumerate() {

@@ -25,7 +25,7 @@ impl Cell {
     }
 
     /// Cell from a multiplier that Newton's method on the characteristic matrix confirmed, with the error
-    /// [`LEAST_ERROR`].
+    /// [`LEAST_ERROR`] × max(1, |μ|).
     pub(super) fn exact(multiplier_abs: f64) -> Self {
         Self::new(multiplier_abs, LEAST_ERROR * multiplier_abs.max(1.0))
     }

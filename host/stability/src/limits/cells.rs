@@ -1,9 +1,9 @@
 //! Cells at one speed: the dominant Floquet multiplier (characteristic multiplier) at many depths from samples at few.
 //!
-//! All multipliers are computed at a few depths only. Between two of them each multiplier that may be dominant is
-//! interpolated by a cubic in depth through both ends with their derivatives. One or two Newton steps on the
-//! characteristic matrix at the middle cell give the error of the cubic there. If it is too large, or if multipliers
-//! cannot be told apart, the interval is halved, down to single cells.
+//! All multipliers are computed at a few depths only. Between two of these depths each multiplier that may be dominant
+//! is interpolated by a cubic in depth through both ends with their derivatives. One or two Newton steps on the
+//! characteristic matrix at the middle cell give the error of the cubic there. If the error is too large, or if
+//! multipliers cannot be told apart, the depth interval is halved, down to single cells.
 
 use num_complex::Complex64;
 
@@ -17,16 +17,16 @@ use crate::spectrum::along_depth::Spectrum;
 use crate::spectrum::root::Root;
 use crate::spectrum::verdict::Verdict;
 
-/// Largest number of depth intervals of a cell chart at whose ends all multipliers are computed first. If there are no
-/// more cells than this, all are computed directly. A choice.
+/// Largest number of depth intervals of a cell chart at whose ends all multipliers are computed first. If a spindle
+/// speed has no more cells than this, all are computed directly. A choice.
 const INTERVALS: usize = 10;
 
 /// Share of the largest depth of a cell chart for which the first mesh of the period is built. Each further mesh covers
 /// twice the depth of the one before, or more if the next cell lies deeper, but no more than the largest depth.
 const FIRST_SHARE: f64 = 0.125;
 
-/// Implements [`Method::cells`] for a method with a spectrum. `spectrum` returns the multipliers at this spindle speed,
-/// valid up to the axial depth (m) that is its argument.
+/// Implements [`Method::cells`] for a method that gives a [`Spectrum`]. The function `spectrum` gives the multipliers
+/// at this spindle speed, valid up to the axial depth (m) that is its argument.
 pub(crate) fn cells_of<S: Spectrum>(
     rpm: f64,
     depths_mm: &[f64],
@@ -230,7 +230,7 @@ impl<S: Spectrum> Column<S> {
         }
     }
 
-    /// Floquet multiplier near a guess, from one Newton step, or two if the first was long.
+    /// Floquet multiplier near a guess, from one Newton step, or two if the first is 1e-5 of the guess or longer.
     fn polished(&mut self, guess: Complex64, depth_m: f64) -> Option<Root> {
         let root = self.spectrum.root_near(guess, depth_m)?;
         // After a relative Newton step below 1e-5 the remaining relative error is about its square: 1e-10.
@@ -314,7 +314,7 @@ fn curves(low: &Sample, high: &Sample) -> Option<Vec<Curve>> {
         .fold(0.0, f64::max);
     let least = half_way.min(low.largest()).min(high.largest());
     // A multiplier without a partner at the other depth must stay smaller than the dominant one over the depth
-    // interval, even if it moves twice as fast.
+    // interval, even if it moves twice as far as its derivative predicts.
     let reach = |root: &Root| root.multiplier.norm() + 2.0 * root.slope.norm() * step_m;
     strays.iter().all(|root| reach(root) < least).then_some(curves)
 }

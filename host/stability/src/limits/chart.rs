@@ -1,12 +1,13 @@
-//! Stability charts: the line of every spindle speed, by any method.
+//! Stability charts: the limits at many spindle speeds, by any method.
 //!
-//! Two refinements in speed exist, since a table and a chart ask for different things. [`Chart::refined`] serves lobe tables:
-//! the device interpolates between the stored speeds, so that each gap is tested at its middle, against one tolerance in
-//! depth, until the table has its size. [`Chart::with_lines_between`] serves charts that are drawn: its tolerance is relative
-//! to the limit, a steep limit may be off in speed instead, and regions within a gap must be found although no limit at its
-//! ends shows them. It predicts all this from neighbouring gaps and from |μ| of every line, which costs no line for a gap
-//! that is straight. Under that rule the smallest limit would set the number of speeds of a table, not its size; a chart that
-//! is tested at middles alone would miss regions within a gap.
+//! Two refinements in speed exist, since a lobe table and a drawn chart need different speeds. [`Chart::refined`]
+//! serves lobe tables: the device interpolates between the stored speeds, so that each gap is tested at its middle,
+//! against one tolerance in depth, until all gaps pass or the table has its size. [`Chart::with_lines_between`] serves
+//! charts that are drawn: its tolerance is relative to the limit, a steep limit may be off in speed instead, and
+//! regions within a gap must be found although no limit at its ends shows them. It predicts the errors from
+//! neighbouring gaps and from |μ| at every speed, so that a straight gap costs no further speed. For a table, a
+//! tolerance relative to the limit would let the smallest limit set the number of speeds; a chart tested only at the
+//! middles of gaps would miss regions within a gap.
 
 use rayon::prelude::*;
 use serde::Serialize;
@@ -25,23 +26,24 @@ pub struct Chart {
     /// Label of the method that computed the stability chart.
     #[serde(flatten)]
     pub label: Label,
-    /// One line of limits per spindle speed of the chart, in the requested order.
+    /// Limits at each spindle speed of the chart, in the requested order.
     pub speeds: Vec<SpeedLine>,
-    /// Lines of limits at speeds between the requested ones, ascending, so that straight lines through both draw the
-    /// limits; empty if not requested or not needed.
+    /// Limits at spindle speeds between the requested ones, ascending, so that straight lines between neighbouring
+    /// speeds draw the limits; empty if not requested or not needed.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub refined: Vec<SpeedLine>,
-    /// Accuracy of the limits between the speeds of the chart; `None` if no lines between the requested ones were
-    /// requested.
+    /// Accuracy of the limits between the speeds of the chart; `None` if no speeds between the requested ones were
+    /// asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub resolution: Option<Resolution>,
-    /// Depths of cells, mm, at which every line at a requested speed states the share of drawn machines that are
-    /// stable; empty if not requested.
+    /// Depths of cells, mm, at which the share of stable machines among those drawn is stated for every requested
+    /// speed; empty if not requested.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub cells_mm: Vec<f64>,
 }
 
-/// Lines at given speeds, from depth 0 to `depth_mm`, with at least `samples` steps in depth.
+/// Computes a stability chart: the limits at the given spindle speeds (rev/min) from axial depth 0 to `depth_mm`, with
+/// `samples` steps in depth, but at least `CHART_SAMPLES_MIN`. Methods that do not scan the depth ignore the steps.
 ///
 /// The result does not depend on the number of threads.
 ///
@@ -68,15 +70,15 @@ pub struct Refinement {
     /// Largest difference between a limit at the middle of a gap between two speeds and the straight line between the
     /// limits at both, as a share of the largest depth, up to which the halves of the gap are not divided.
     pub tolerance: f64,
-    /// Least distance of an added speed from its neighbours in the chart, relative to the speed: a gap narrower than twice
-    /// this gets no further speed.
+    /// Least distance of an added speed from its neighbours in the chart, relative to the speed: a gap no wider than
+    /// twice this gets no further speed.
     pub least_step: f64,
     /// Number of speeds of the chart from which no further round of refinement begins.
     pub most_speeds: usize,
 }
 
 impl Chart {
-    /// Adds the spread of the limit to every line at a requested speed: see [`Uncertainty::spread`].
+    /// Adds the spread of the limit over drawn machines at every requested speed: see [`Uncertainty::spread`].
     ///
     /// The result does not depend on the number of threads.
     ///
@@ -100,8 +102,9 @@ impl Chart {
         Ok(self)
     }
 
-    /// Adds one speed in every gap that is wide enough, and further ones where limits bend, where the kind of stability
-    /// loss changes, and where islands begin or end. Speeds must be ascending.
+    /// Adds one speed in every gap that is wide enough, and further ones where limits bend, where the kind of the first
+    /// stability loss changes, and where the number of stable depth intervals changes. No round begins with
+    /// `most_speeds` or more. Speeds must be ascending.
     ///
     /// # Errors
     /// As [`Method::line`].
@@ -113,7 +116,7 @@ impl Chart {
     ) -> Result<Self, StabilityError> {
         let tolerance_mm = refinement.tolerance * depth_mm;
         // The first round halves every gap between two speeds that is wide enough; later rounds halve only the halves
-        // of a gap whose middle deviated from the straight line.
+        // of a gap whose middle fails [`is_between`].
         let mut open: Vec<bool> = vec![true; self.speeds.len().saturating_sub(1)];
         while open.iter().any(|&is_open| is_open) && self.speeds.len() < refinement.most_speeds {
             let middles: Vec<f64> = self
@@ -154,7 +157,8 @@ impl Chart {
 }
 
 /// True if the middle speed has as many stable intervals and the same kind of first stability loss as both outer
-/// speeds, and if each end of an interval lies near the straight line between the outer speeds.
+/// speeds, and if each end of a stable interval lies within `tolerance_mm` of the straight line between the outer
+/// speeds.
 fn is_between(left: &SpeedLine, middle: &SpeedLine, right: &SpeedLine, tolerance_mm: f64) -> bool {
     let share = (middle.rpm - left.rpm) / (right.rpm - left.rpm);
     let (a, m, b) = (&left.stable_mm, &middle.stable_mm, &right.stable_mm);

@@ -18,20 +18,21 @@ use crate::spectrum::root::Root;
 use crate::spectrum::stability_loss::StabilityLoss;
 
 /// Share of the largest depth of a line for which the first mesh of the period is built. Each further mesh covers twice
-/// the depth of the one before.
+/// the depth of the one before, or more if the next sampled depth lies deeper, but no more than the largest depth.
 const FIRST_SHARE: f64 = 0.125;
 
 /// Relative error of the depth of a crossing on a given mesh, due to the tolerance of Newton's method.
 const ROOT: f64 = 1e-9;
 
-/// All crossings of the unit circle from depth 0 to `depth_mm`, sampled at `samples` equal steps and finer where
-/// needed.
+/// All crossings of the unit circle by Floquet multipliers at one spindle speed (rev/min), from axial depth 0 to
+/// `depth_mm`, sampled at `samples` equal steps and finer where needed.
 ///
-/// Crossings are computed with the characteristic matrix, to about 1e-9 relative. Between samples each multiplier near
-/// the circle is followed with its derivative. If the cubic through both ends may reach the circle and return, or if a
-/// multiplier cannot be followed, the interval is halved, up to 12 times. At every sample the number of multipliers
-/// outside must agree with the crossings found. Where it does not after 12 halvings, one crossing is found by bisection
-/// on that number.
+/// Crossings are computed with the characteristic matrix, to about 1e-9 relative. Between two sampled depths each
+/// multiplier near the unit circle is followed with its derivative. If the cubic interpolant of |μ| − 1 may reach 0 and
+/// return, or if a multiplier cannot be followed, the depth interval is halved, up to 12 times. At every sample the
+/// number of multipliers outside the circle must agree with the crossings found. If it does not after 12 halvings, or
+/// if a multiplier still cannot be followed, one crossing is found by bisection on that number, and none if the number
+/// is the same at both ends.
 ///
 /// # Errors
 /// Speed or depth out of range, too many vibrations in a tooth period, or a computation that breaks down, for example
@@ -43,8 +44,8 @@ pub fn line(problem: &Problem, rpm: f64, depth_mm: f64, samples: usize) -> Resul
     })
 }
 
-/// Implements [`line()`] for a method with a spectrum. `spectrum` returns the multipliers at this spindle speed, valid
-/// up to the axial depth (m) that is its argument.
+/// Implements [`line()`] for a method that gives a [`Spectrum`]. The function `spectrum` gives the multipliers at this
+/// spindle speed, valid up to the axial depth (m) that is its argument.
 pub(crate) fn line_of<S: Spectrum>(
     rpm: f64,
     depth_mm: f64,
@@ -148,8 +149,9 @@ impl<S: Spectrum> Scan<S> {
         })
     }
 
-    /// Floquet multiplier with its derivative dμ/dw. Near the unit circle Newton's method, if it converges, refines it
-    /// first, so that it counts on the right side of the circle.
+    /// Floquet multiplier with its derivative dμ/dw over the axial depth, stated as 0 if |μ| is at least [`LINE_FAR`]
+    /// from 1 or if there is no derivative. Near the unit circle the multiplier is computed anew, by Newton's method in
+    /// collocation, so that it counts on the right side of the circle.
     fn root(&mut self, coarse: Complex64, depth_m: f64) -> Root {
         let spectrum = &mut self.spectrum;
         let multiplier = if (coarse.norm() - 1.0).abs() < LINE_POLISHED {
@@ -295,10 +297,10 @@ impl<S: Spectrum> Scan<S> {
     }
 
     /// Error of the depth of a crossing, m: a distance at which |μ| of its branch differs from 1 by at least the error
-    /// of the multiplier, on both sides.
+    /// of the multiplier, on both sides in depth.
     ///
     /// The first try is slightly more than that error divided by d|μ|/dw; the distance doubles until |μ| confirms it.
-    /// `deepest_m` if no distance does.
+    /// `deepest_m` if no smaller distance does.
     ///
     /// # Errors
     /// The error of the multiplier, or its derivative over the depth, cannot be computed.

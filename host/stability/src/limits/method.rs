@@ -10,7 +10,7 @@ use crate::error::StabilityError;
 
 /// Stability method together with its problem: a case, or a case with a table of receptances.
 ///
-/// The constructor of a method refuses cases for which it is not defined, with the reason.
+/// Cases for which a method is not defined are refused when the method or its problem is constructed, with the reason.
 pub trait Method: Sync {
     /// Name in results and captions.
     fn name(&self) -> &'static str;
@@ -25,25 +25,28 @@ pub trait Method: Sync {
         None
     }
 
-    /// True if one spindle speed takes seconds to compute. The command `lobes` then adds no lines between the requested
-    /// speeds.
+    /// True if the limits at one spindle speed take seconds to compute. The command `lobes` then adds no speeds between
+    /// the requested ones.
     fn takes_seconds(&self) -> bool {
         false
     }
 
     /// Dominant Floquet multiplier at a spindle speed (rev/min) and an axial depth (mm), with its error.
     ///
-    /// The error is the numerical error with respect to the full linear problem, if the method converges to it. For a
-    /// method of order p in its step it is estimated from the changes with half and a quarter of the step (Richardson),
-    /// times a safety factor. Effects that the method neglects are not included.
+    /// The error is the numerical error with respect to the delay equation (linearized about the forced orbit if limits
+    /// depend on it), if the method converges to its solution. For a method of order p in its step it is estimated from
+    /// the changes with half and a quarter of the step (Richardson), times a safety factor. With equivalent stiffness
+    /// and damping of friction, backlash or hysteresis it is the distance from the multiplier that a small disturbance
+    /// of the orbit has. Effects that the method neglects are not included.
     ///
     /// # Errors
     /// Speed not positive, depth negative, or a computation that breaks down, for example because it leaves the range
     /// of numbers or of measured frequencies.
     fn point(&self, rpm: f64, depth_mm: f64) -> Result<CutStability, StabilityError>;
 
-    /// All crossings of the unit circle from depth 0 to `depth_mm`, sampled at `samples` equal steps and finer where
-    /// needed. Methods that do not scan the depth ignore `samples`.
+    /// All crossings of the unit circle by Floquet multipliers at a spindle speed (rev/min), from axial depth 0 to
+    /// `depth_mm`, sampled at `samples` equal steps and finer where needed. Methods that do not scan the depth ignore
+    /// `samples`.
     ///
     /// # Errors
     /// As [`point()`](Self::point).
@@ -61,9 +64,10 @@ pub trait Method: Sync {
             .collect()
     }
 
-    /// Lines at many spindle speeds, in the given order; independent of the number of threads.
+    /// Limits at many spindle speeds (rev/min) up to an axial depth (mm), in the given order; independent of the number
+    /// of threads.
     ///
-    /// A method that can reuse one speed for the next overrides this, in groups that do not depend on the threads.
+    /// A method that can use intermediate results for several speeds overrides this.
     ///
     /// # Errors
     /// As [`line()`](Self::line), for the first speed that fails.

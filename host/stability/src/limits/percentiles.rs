@@ -46,8 +46,8 @@ impl Limits {
     }
 }
 
-/// First depth at one spindle speed that is not certainly stable, mm: where stability is lost, or where a second stable
-/// orbit begins.
+/// Depth, mm, up to which cuts at one spindle speed are stable with a single stable orbit: where stability is first
+/// lost, or where a second stable orbit begins. `None` if this holds to the last depth.
 pub(crate) fn limit_of(line: &SpeedLine) -> Option<f64> {
     // A machine that is unstable at depth 0 has the limit 0.
     if line.stable_mm.first().is_none_or(|interval| interval[0] > 0.0) {
@@ -89,8 +89,8 @@ impl Sorted {
         0.5 * (below + up_to) as f64 / self.0.len().max(1) as f64
     }
 
-    /// Quantile of the first limits at `share`, mm, interpolated between ranks at (i + 1/2)/n (Hazen); `None` if
-    /// infinite.
+    /// Quantile of the first limits at `share`, mm, interpolated between ranks at (i + 1/2)/n (Hazen); `None` if it is
+    /// infinite or there are no machines.
     pub(super) fn quantile(&self, share: f64) -> Option<f64> {
         sample_quantile(&self.0, share).filter(|value| value.is_finite())
     }

@@ -1,5 +1,5 @@
-//! Limits as linear functions (planes) of the uncertain variables of a case, from exact derivatives at every loss of
-//! stability.
+//! Limits as linear functions (planes) of the uncertain variables of a case, from their derivatives at every stability
+//! switch at which a multiplier leaves the unit circle.
 
 use std::f64::consts::TAU;
 
@@ -28,12 +28,13 @@ pub struct Linearized {
     tangents: Vec<Tangent>,
 }
 
-/// Loss of stability as a linear function of the uncertain variables of a case.
+/// Crossing out of the unit circle by a multiplier: its axial depth and chatter frequency as linear functions of the
+/// uncertain variables of a case.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plane {
-    /// Axial depth at which the nominal machine loses stability, mm.
+    /// Axial depth of the crossing on the nominal machine, mm.
     pub depth_mm: f64,
-    /// Gradient of the limiting depth over the uncertain variables, mm per standard deviation.
+    /// Gradient of the depth of the crossing over the uncertain variables, mm per standard deviation.
     pub gradient: DVector<f64>,
     /// Chatter frequency, Hz, with its gradient, Hz per standard deviation; `None` at a flip, whose frequency follows
     /// from the spindle speed alone.
@@ -44,7 +45,7 @@ impl Linearized {
     /// Linearizes the delay problem of a case along its uncertain variables.
     ///
     /// # Errors
-    /// The linear part of the case is not covered, or the cases varied along a variable are not valid on both sides.
+    /// The linear part of the case is not covered, or the case varied along a variable is valid on neither side.
     pub fn new(case: &Case, variables: &[Variable]) -> Result<Self, StabilityError> {
         let problem = Problem::new(case, CubicTerms::LeaveOut)?;
         let tangents = variables.iter().map(|variable| {
@@ -70,8 +71,8 @@ impl Linearized {
         Ok(Self { problem, tangents })
     }
 
-    /// Crossings out of the unit circle at one spindle speed, each linearized over the uncertain variables, by depth. A
-    /// limit without derivative has the reason.
+    /// Crossings out of the unit circle by multipliers at one spindle speed, each linearized over the uncertain
+    /// variables, by depth. `Err` is the reason why a crossing has no derivative.
     pub fn planes(&self, line: &SpeedLine) -> Vec<Result<Plane, StabilityError>> {
         let losses = line.switches.iter().filter(|switch| !switch.gain);
         losses.map(|switch| self.plane(line.rpm, switch)).collect()

@@ -22,8 +22,8 @@ pub struct CutStability {
     pub rpm: f64,
     /// Axial depth, mm.
     pub depth_mm: f64,
-    /// Dominant Floquet multiplier over one tooth period, or over the revolution with unequal teeth; of a conjugate
-    /// pair the one above the real axis.
+    /// Dominant Floquet multiplier over one tooth period, or over the revolution if that is the period of the method's
+    /// equation (unequal teeth); of a conjugate pair the one above the real axis.
     #[serde(serialize_with = "as_pair")]
     pub multiplier: Complex64,
     /// Absolute value |μ| of the dominant multiplier.
@@ -38,7 +38,7 @@ pub struct CutStability {
     pub verdict: Verdict,
     /// Kind of stability loss: how the dominant multiplier leaves the unit circle, or would leave it if it grew.
     pub kind: StabilityLoss,
-    /// Frequency of the vibration that belongs to the dominant multiplier, Hz.
+    /// Frequency of the vibration that belongs to the dominant multiplier, Hz; `None` if it cannot be computed.
     pub chatter_hz: Option<f64>,
 }
 
@@ -123,8 +123,8 @@ struct Solution {
     verdict: Option<Verdict>,
 }
 
-/// Error of a multiplier from its change between the working and a finer mesh; at least `least`, relative to max(1,
-/// |μ|).
+/// Error of a multiplier: [`MESH_ROOM`] times its change between the working and a finer mesh, and at least `least`,
+/// relative to max(1, |μ|).
 fn error(coarse: Complex64, fine: Complex64, least: f64) -> f64 {
     (MESH_ROOM * (coarse - fine).norm()).max(least * fine.norm().max(1.0))
 }
@@ -196,8 +196,8 @@ fn of_maps(problem: &Problem, rpm: f64, depth_m: f64, rough: &ScannedMultipliers
     })
 }
 
-/// Dominant Floquet multiplier of a cut if period maps are not reliable: the largest one found, and a radius beyond
-/// which a winding number counts none.
+/// Dominant Floquet multiplier of a cut if period maps are not reliable: the largest one found. Its error reaches to a
+/// radius beyond which a winding number counts no multiplier. `None` if there is no such radius.
 fn searched(problem: &Problem, rpm: f64, depth_m: f64, candidates: &[Complex64]) -> Option<Solution> {
     let kappa_m = (1.0 + WOUND.recip()) * depth_m;
     let working = Period::new(problem, rpm, kappa_m, Resolution::WORKING);
@@ -207,7 +207,7 @@ fn searched(problem: &Problem, rpm: f64, depth_m: f64, candidates: &[Complex64])
         return None;
     }
     let Some(coarse) = beyond.multiplier else {
-        // All multipliers lie within this radius. It may remain open which of the candidates is the largest.
+        // All multipliers lie within `beyond.radius`. It may remain open which of the candidates is the largest.
         let within = |candidate: &&Complex64| candidate.norm() < beyond.radius;
         return Some(Solution {
             multiplier: *candidates.iter().find(within)?,
@@ -230,8 +230,8 @@ fn searched(problem: &Problem, rpm: f64, depth_m: f64, candidates: &[Complex64])
     })
 }
 
-/// Largest Floquet multiplier near any of the guesses, by Newton's method; `None` if it does not converge from one of
-/// them.
+/// Largest of the Floquet multipliers to which Newton's method converges from the guesses; `None` if it fails from one
+/// of them, or moves by more than 5 % of it.
 fn dominant_of(period: &Period, kappa_m: f64, depth_m: f64, guesses: &[Complex64]) -> Option<Complex64> {
     let characteristic = Characteristic::new(period, kappa_m);
     let mut work = characteristic.workspace();

@@ -60,7 +60,8 @@ impl Variable {
     }
 }
 
-/// The mirrored entry (j, i) of a structural matrix for its entry (i, j); `None` for other parameters.
+/// The mirrored entry (j, i) of a structural matrix for its entry (i, j); `None` for diagonal entries and other
+/// parameters.
 fn mirrored(parameter: Parameter) -> Option<Parameter> {
     match parameter {
         Parameter::Mass(i, j) if i != j => Some(Parameter::Mass(j, i)),
@@ -126,7 +127,7 @@ impl Basis {
         let size = self.vectors.len();
         let n = f64::from(count);
         // Position of this batch in the slices along the first basis vector: the radical inverse 0, 1/2, 1/4, 3/4 … of
-        // its number. With 1/8 added, four batches lie at the middles of their slices.
+        // its number. With 1/8 added, the points of four batches lie at the middles of the quarters of each slice.
         let first = f64::from(batch.reverse_bits()) / 2.0_f64.powi(32) + 0.125;
         let second: f64 = rng.random();
         let mut latin: Vec<Vec<f64>> = Vec::with_capacity(size.saturating_sub(2));

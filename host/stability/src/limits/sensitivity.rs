@@ -1,7 +1,9 @@
-//! Exact derivatives of a limit with respect to all parameters of the problem, from one pair of motions.
+//! Exact derivatives of a limit with respect to all parameters of the delay problem, from one Floquet mode and its
+//! adjoint.
 //!
-//! At a crossing of a Floquet multiplier, F = lᵀ(Φ(κ; p) − μ)r = 0 with κ = w (1 − 1/μ) and μ = e^{iθ}. Along a change
-//! dp of a parameter
+//! At a crossing of the unit circle by a Floquet multiplier, F = lᵀ(Φ(κ; p) − μ)r = 0 with the transition matrix Φ over
+//! the tooth period, its left and right eigenvectors l and r, the complex depth κ = w (1 − 1/μ), and μ = e^{iθ}. Along
+//! a change dp of a parameter
 //!
 //!   lᵀΦ_κ r [(1 − 1/μ) dw + (w/μ) i dθ] + lᵀΦ_p r dp − iμ lᵀr dθ = 0,
 //!
@@ -115,7 +117,7 @@ fn slope(low: &RotatingVector, high: &RotatingVector, length: f64) -> RotatingVe
 /// Derivatives of depth and angle of a crossing of the unit circle by a multiplier, per unit of a parameter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Slope {
-    /// dw/dp, mm.
+    /// Derivative dw/dp of the axial depth w of the crossing, mm per unit of the parameter p.
     pub depth_mm: f64,
     /// Derivative dθ/dp of the angle θ of the multiplier e^{iθ} at the crossing, rad per unit of the parameter p; 0 at
     /// a flip.
@@ -131,15 +133,17 @@ pub struct Sensitivity<'a> {
     depth_m: f64,
     multiplier: Complex64,
     motion: FloquetMode,
-    /// Coefficient lᵀΦ_κ r, 1/m.
+    /// Coefficient lᵀΦ_κ r, 1/m: derivative of the transition matrix Φ over the complex depth κ, between the left and
+    /// right eigenvectors l and r.
     by_kappa: Complex64,
 }
 
 impl<'a> Sensitivity<'a> {
-    /// Derivatives of one of the stability switches found by [`line`](crate::line()).
+    /// Prepares the derivatives of one of the stability switches found by [`line`](crate::line()).
     ///
     /// # Errors
-    /// The switch is a fold or does not belong to this problem: there is no Floquet mode for it.
+    /// The switch is a fold, has no chatter frequency, or does not belong to this problem: there is no Floquet mode for
+    /// it.
     pub fn new(problem: &'a Problem, rpm: f64, switch: &Switch) -> Result<Self, StabilityError> {
         let broke_down = StabilityError::BrokeDown {
             rpm,
@@ -153,7 +157,8 @@ impl<'a> Sensitivity<'a> {
                 let angle = std::f64::consts::TAU * (hz * problem.tooth_period_s(rpm)).fract();
                 Complex64::new(angle.cos(), angle.sin().abs())
             }
-            // At a fold μ = 1 and κ = w (1 − 1/μ) = 0: the depth has no influence, so that no such limit exists.
+            // A fold has μ = 1 and κ = w (1 − 1/μ) = 0: the depth has no influence, so that no such limit exists. A
+            // Hopf switch without a chatter frequency does not give the multiplier.
             _ => return Err(broke_down),
         };
         Self::of_crossing(problem, rpm, switch.depth_mm * 1e-3, multiplier).ok_or(broke_down)
@@ -249,7 +254,8 @@ impl<'a> Sensitivity<'a> {
         coupling
     }
 
-    /// Coefficient lᵀΦ_p r.
+    /// Coefficient lᵀΦ_p r: derivative of the transition matrix Φ along the parameter p, between the left and right
+    /// eigenvectors l and r.
     fn by_parameter(&self, tangent: &Tangent) -> Complex64 {
         let mut sum = self.along(|node| self.integrand(tangent, node));
         // A later entry angle removes the force of a tooth at the start angle; a later exit angle adds that of a tooth

@@ -10,16 +10,17 @@ use crate::spectrum::stability_loss::StabilityLoss;
 pub struct Switch {
     /// Axial depth, mm.
     pub depth_mm: f64,
-    /// Error estimate of the depth, mm: within it |μ| differs from 1 by no more than the error of the multiplier.
-    /// `None` if the method has no estimate.
+    /// Error estimate of the depth, mm: a distance in depth at which |μ| differs from 1 by at least the error of the
+    /// multiplier, or the change of the depth between two computations. `None` if the method has no estimate.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error_mm: Option<f64>,
     /// Kind of crossing.
     pub kind: StabilityLoss,
-    /// True if the multiplier moves into the unit circle with growing depth: stability is gained, provided that no
-    /// other multiplier is outside.
+    /// True if the multiplier moves into the unit circle with growing depth (on a branch of forced orbits: along the
+    /// branch). Stability is gained if no other multiplier is outside.
     pub gain: bool,
-    /// Frequency of the vibration that begins or ends at the depth of the switch, Hz.
+    /// Frequency of the vibration that begins or ends at the depth of the switch, Hz; `None` if there is none or if it
+    /// cannot be computed.
     pub chatter_hz: Option<f64>,
 }
 
@@ -28,8 +29,7 @@ pub struct Switch {
 pub struct Limit {
     /// Axial depth, mm.
     pub depth_mm: f64,
-    /// Error estimate of the limiting depth, mm: within it |μ| differs from 1 by no more than the error of the
-    /// multiplier.
+    /// Error estimate of the limiting depth, mm, as that of a [`Switch`]; `None` if the method has no estimate.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error_mm: Option<f64>,
     /// Kind of stability loss.
@@ -56,14 +56,14 @@ pub struct SpeedLine {
     /// Limit at which stability is first lost at this spindle speed; `None` if no stable interval ends before the last
     /// depth.
     pub first_limit: Option<Limit>,
-    /// Every crossing of the unit circle by a multiplier, by depth, including those while another multiplier is
-    /// outside.
+    /// Every crossing of the unit circle by a multiplier, including those while another multiplier is outside: by
+    /// depth, or, for a branch of forced orbits, in the order of the branch.
     pub switches: Vec<Switch>,
     /// Spread of the first limit over drawn machines; `None` if the case has no deviations, or if it was not requested.
     #[serde(flatten)]
     pub spread: Option<LimitSpread>,
-    /// Absolute value of the largest Floquet multiplier at the equal steps in depth of the scan, from depth 0 to the last;
-    /// empty if the method finds limits without multipliers.
+    /// Absolute value of the largest Floquet multiplier at the equal steps in depth of the scan, from depth 0 to the
+    /// last; empty for methods without such a scan.
     #[serde(skip)]
     pub(crate) largest: Vec<f64>,
     /// For each switch whose error cannot be computed, and is therefore stated as the last depth, the reason.

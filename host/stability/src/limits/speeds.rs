@@ -9,14 +9,16 @@ use quietcut_model::structure::FirstOrder;
 /// tooth passings per vibration period of the most flexible mode.
 pub fn default_speeds(case: &Case, structure: &FirstOrder, teeth: usize) -> (f64, f64) {
     if let Some(limits) = case.limits {
-        // A lowest speed of 0 is replaced by a hundredth of the highest speed, since no cut exists at 0.
+        // A lowest speed below a hundredth of the highest speed is replaced by that hundredth, since no cut exists at
+        // 0.
         return (limits.rpm_min.max(0.01 * limits.rpm_max), limits.rpm_max);
     }
     let rpm = most_flexible_hz(structure) * 60.0 / teeth as f64;
     (0.5 * rpm, 5.0 * rpm)
 }
 
-/// Frequency, Hz, of the structure's pole at which the receptance is largest.
+/// Natural frequency |s|/2π, Hz, of the structure's pole s at which the norm of the receptance matrix is largest; 1 Hz
+/// if there is no pole.
 fn most_flexible_hz(structure: &FirstOrder) -> f64 {
     let size = |omega: f64| structure.receptance(omega).map_or(f64::INFINITY, |h| h.norm());
     structure

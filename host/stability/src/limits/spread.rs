@@ -57,9 +57,10 @@ pub struct LimitSpread {
     pub limit_percentiles_mm: Percentiles,
     /// Confidence intervals (90 %) of the percentiles of the first limit, mm.
     pub limit_percentiles_ci90_mm: PercentileIntervals,
-    /// Number of machines drawn.
+    /// Number of machines drawn, those that are not physical included.
     pub machines: usize,
-    /// Share of drawn machines that are stable at each requested depth; empty if none was requested.
+    /// Share of stable machines at each requested depth, among the drawn machines that are physical; empty if no depth
+    /// was requested.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub stable_share: Vec<f64>,
 }

@@ -2,9 +2,9 @@
 //!
 //! Limits have cusps where lobes cross, and islands appear and vanish, so that linearization alone is wrong there.
 //! Therefore machines are drawn from the distribution of the parameters, and the method computes the first limit of
-//! each. Exact derivatives reduce the number of draws: the parameter space is rotated so that its first axes are those
-//! along which the limits move, and draws are stratified along these. The derivatives also predict how deep a line must
-//! be searched.
+//! each. Derivatives of the limits reduce the number of draws: the parameter space is rotated so that its first axes
+//! are those along which the limits move, and draws are stratified along these. The derivatives also predict down to
+//! which depth the limit of a machine must be searched.
 //!
 //! Where limits jump (machines with and without a flip island at the same speed), derivatives at the nominal machine
 //! are not sufficient. The first batches are therefore a pilot: by Stein's lemma, the mean of the machines whose limit
@@ -13,7 +13,8 @@
 //!
 //! Confidence intervals of percentiles follow Woodruff's method: the scatter between batches of the share below gives
 //! the ranks between which the percentile lies. This also holds if the distribution has a gap, in which no percentile
-//! is well defined; the interval is as wide as the gap there. Batches are drawn until the intervals are narrow.
+//! is well defined; the interval is as wide as the gap there. Batches are drawn until the intervals are narrow, up to a
+//! largest number.
 
 use nalgebra::DVector;
 use rayon::prelude::*;
@@ -75,7 +76,7 @@ impl<'a> Uncertainty<'a> {
     /// The result depends on the seed and the speed, not on the number of threads.
     ///
     /// # Errors
-    /// The line of a machine cannot be computed, or more than a fifth of the machines are not physical.
+    /// The limits of a machine cannot be computed, or more than a fifth of the machines are not physical.
     pub fn spread(
         &self,
         nominal: &SpeedLine,
@@ -127,8 +128,8 @@ impl<'a> Uncertainty<'a> {
         })
     }
 
-    /// Draws batches of machines and computes their limits at the speed of the nominal line: at least `least` batches,
-    /// and more until the percentiles at the given shares have settled.
+    /// Draws batches of machines and computes their limits at the spindle speed of `nominal`: at least `least` batches,
+    /// and more, up to the most of [`BATCHES`], until the percentiles at the given shares have settled.
     fn batches(
         &self,
         nominal: &SpeedLine,
@@ -141,7 +142,7 @@ impl<'a> Uncertainty<'a> {
             .linear
             .as_ref()
             .map_or_else(Vec::new, |linear| linear.planes(nominal));
-        // A limit without a derivative, at the tip of an island, gives no direction of stratification.
+        // A limit without a derivative, for example at the tip of an island, gives no direction of stratification.
         let planes: Vec<Plane> = planes.into_iter().filter_map(Result::ok).collect();
         let gradients: Vec<DVector<f64>> = planes.iter().map(|plane| plane.gradient.clone()).collect();
         let mut basis = Basis::new(self.variables.len(), &gradients);
@@ -210,8 +211,8 @@ impl<'a> Uncertainty<'a> {
             .iter()
             .map(|plane| plane.depth_mm + plane.gradient.dot(machine))
             .fold(f64::INFINITY, f64::min);
-        // Linearization may predict a limit below depth 0 where a limit is steep; a share of the nominal limit is
-        // searched then.
+        // Linearization may predict a limit below depth 0 where a limit is steep; at least a share of the nominal limit
+        // is searched.
         let shallowest_mm = planes
             .first()
             .map_or(depth_mm, |plane| SHALLOWEST_SEARCH * plane.depth_mm);

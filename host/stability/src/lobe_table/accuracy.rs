@@ -11,9 +11,10 @@ use crate::criteria::{CHECK_GROWTH, CHECK_STEP, LEAST_CHECKS, SUSPECT, TABLE_ROO
 use crate::error::StabilityError;
 use crate::limits::speed_line::SpeedLine;
 
-/// Position of a checked speed within its part of a gap between two speeds of a table (0 to 1), alternating from gap to
-/// gap. It avoids the middle, which refinement has tested, and is not symmetric, so that lobes symmetric about the gap
-/// are detected.
+/// Fractions that place the checked speeds in a gap between two speeds of a table, alternating from gap to gap: the gap
+/// is divided into as many equal parts as it has checked speeds, and each checked speed lies at this fraction of its
+/// part. The fractions avoid the middle of the gap, which refinement has tested, and are not symmetric about it, so
+/// that lobes that are symmetric about the middle are detected.
 const OFFSETS: [f64; 2] = [0.38, 0.62];
 
 /// Largest number of times that a suspect gap between two speeds of a table is checked at further speeds, half way
@@ -27,7 +28,8 @@ pub(super) struct Disagreement {
     /// Largest distance, mm, from a depth that is stable in the table only to the nearest limit of the method (unsafe
     /// side).
     pub(super) unsafe_mm: f64,
-    /// Largest distance, mm, from a depth that is stable by the method only to its nearest limit (cautious side).
+    /// Largest distance, mm, from a depth that is stable by the method only to the nearest limit of the method
+    /// (cautious side).
     pub(super) cautious_mm: f64,
 }
 
@@ -89,12 +91,13 @@ pub(super) struct Checks<'a> {
     checked_layers: &'a [CheckedLayers],
     speeds: &'a [f64],
     depth_mm: f64,
-    /// Lines of the method at the checked speeds, by checked layers and gap of the table, each by ascending speed.
+    /// Limits by the method at the checked speeds, by checked layers and gap of the table, each by ascending speed.
     lines: Vec<Vec<Vec<SpeedLine>>>,
 }
 
 impl<'a> Checks<'a> {
-    /// Computes lines of the method at two spindle speeds in every gap of the table, or more if the gap is wide.
+    /// Computes the limits by the method at two spindle speeds in every gap of the table, or at more if the gap is
+    /// wide.
     pub(super) fn new(
         checked_layers: &'a [CheckedLayers],
         speeds: &'a [f64],
@@ -124,7 +127,8 @@ impl<'a> Checks<'a> {
         Ok(checks)
     }
 
-    /// Computes lines of the method for checked layers at further spindle speeds, given by gap of the table.
+    /// Computes the limits by the method for one of the checked layers at further spindle speeds, given by gap of the
+    /// table.
     fn add(&mut self, layers: usize, places: &[Vec<f64>]) -> Result<(), StabilityError> {
         let all: Vec<f64> = places.iter().flatten().copied().collect();
         let lines = self.checked_layers[layers]
@@ -138,11 +142,12 @@ impl<'a> Checks<'a> {
         Ok(())
     }
 
-    /// Checks suspect gaps of the table at more speeds, until the largest disagreement grows by no more than
-    /// [`CHECK_GROWTH`], at most [`ROUNDS`] times.
+    /// Checks suspect gaps of the table at more speeds, until the largest disagreement between table and method in a
+    /// gap grows by no more than the factor [`CHECK_GROWTH`], at most [`ROUNDS`] times. A gap is suspect if they
+    /// disagree by more than [`SUSPECT`] of the tolerance.
     ///
     /// # Errors
-    /// The method cannot compute a line.
+    /// The method cannot compute the limits at a checked speed.
     pub(super) fn resolve(&mut self, table: &LobeTable<'_>, tolerance_mm: f64) -> Result<(), StabilityError> {
         let least = Disagreement {
             unsafe_mm: SUSPECT * tolerance_mm,
@@ -173,7 +178,7 @@ impl<'a> Checks<'a> {
         Ok(())
     }
 
-    /// Speeds half way between neighbouring checked speeds of a gap, the ends of the gap included.
+    /// Speeds half way between neighbouring checked speeds of a gap of the table; the ends of the gap count as checked.
     fn middles(&self, layers: usize, gap: usize) -> Vec<f64> {
         let mut known = vec![self.speeds[gap]];
         known.extend(self.lines[layers][gap].iter().map(|line| line.rpm));
@@ -204,12 +209,12 @@ impl<'a> Checks<'a> {
     }
 
     /// Corrects gaps in which `table` calls depths stable that are unstable, by more than `tolerance_mm`. The entries
-    /// around such a gap become unstable wherever one of them or the method in the gap is: this covers steep flanks and
-    /// islands between entries.
+    /// at both ends of such a gap become unstable at every depth at which one of them is, or the method at a checked
+    /// speed in the gap: this covers steep flanks and islands between entries.
     ///
     /// Lookups in such a gap, and in its neighbours, then err on the safe side. `entries` are by layer and speed.
-    /// Returns the corrected gaps by checked layers: their lines have shaped entries and are no independent check, so that
-    /// [`check_again`](Self::check_again) adds others.
+    /// Returns the corrected gaps by checked layers: the limits at their checked speeds have shaped entries and are no
+    /// independent check, so that [`check_again`](Self::check_again) adds other speeds.
     pub(super) fn guard(
         &self,
         table: &LobeTable<'_>,
@@ -249,7 +254,7 @@ impl<'a> Checks<'a> {
     /// Checks gaps of the table (by checked layers) at more speeds, half way between the checked ones.
     ///
     /// # Errors
-    /// The method cannot compute a line.
+    /// The method cannot compute the limits at a checked speed.
     pub(super) fn check_again(&mut self, gaps: &[Vec<bool>]) -> Result<(), StabilityError> {
         for (layers, gaps) in gaps.iter().enumerate() {
             let places = gaps.iter().enumerate();
@@ -271,9 +276,9 @@ impl<'a> Checks<'a> {
     ///
     /// Error in depth: the largest distance by which stable depths of the table lie beyond limits of the method. In
     /// gaps where the table is cautious by no more than twice the tolerance, that distance counts as well. The result
-    /// is multiplied by [`TABLE_ROOM`], plus the rounding of the entries. Error in speed: the largest width, relative
-    /// to the speed, of a gap together with its neighbours in which the table at a layer is cautious by more than twice
-    /// the tolerance; such gaps half way between layers do not count.
+    /// is multiplied by [`TABLE_ROOM`], plus the depth step to which entries are rounded. Error in speed: the largest
+    /// width, relative to the speed, of a gap together with its neighbours in which the table at a layer is cautious by
+    /// more than twice the tolerance; such gaps half way between layers do not count.
     pub(super) fn stated(&self, table: &LobeTable<'_>, tolerance_mm: f64) -> InterpolationError {
         let (mut depth, mut speed) = (0.0_f64, 0.0_f64);
         for (index, checked) in self.checked_layers.iter().enumerate() {
@@ -296,7 +301,7 @@ impl<'a> Checks<'a> {
     }
 }
 
-/// Column of the lobe table at the speed of a checked line. `None` if the table has none there, which counts as
+/// Column of the lobe table at the checked speed `rpm`, rev/min. `None` if the table has none there, which counts as
 /// unstable at every depth, as on the device.
 fn column_of(table: &LobeTable<'_>, table_layer: &TableLayer, rpm: f64) -> Option<Column> {
     let point = WorkingPoint {

@@ -22,8 +22,8 @@ const BYTES: usize = 32 * 1024;
 /// Default number of speeds of a lobe table before refinement. A choice.
 const SPEEDS: usize = 121;
 
-/// Largest number of corrections of entries to the safe side. The speeds checked in a correction need not be the worst
-/// of a gap; corrections after the third change little.
+/// Largest number of corrections of entries to the safe side. The speeds checked in a correction need not be those with
+/// the largest disagreement in a gap; corrections after the third change little.
 const GUARDED: usize = 3;
 
 /// Lobe table as it is written to a file, with what its user should know.
@@ -38,12 +38,12 @@ pub struct BuiltTable {
 /// Builds a lobe table with one layer per case, feed and feed direction.
 ///
 /// Speeds are added until every limit half way between two speeds differs from the straight line between them by at
-/// most 0.3 % of the largest depth, until they lie too close for more, or until the table has its target size. Feeds
-/// and directions are added likewise, up to a number of layers. Then every gap between speeds is checked against the
-/// method at two more speeds or more, and at further ones if these disagree with the table, in every layer and half way
-/// between layers. If the table is too deep there, on flanks too steep for its speeds, the surrounding entries become
-/// as shallow as the gap; see [`InterpolationError`] for the stated error. Depths with two stable orbits, which only
-/// nonlinear cases have, count as unstable.
+/// most 0.3 % of the largest depth, until they lie too close for more, or until the table has its target size of 32
+/// KiB. Feeds and directions are added likewise, up to a number of layers. Then every gap between speeds is checked
+/// against the method at two more speeds or more, and at further ones if these disagree with the table, in every layer
+/// and half way between layers. If the table is too deep there, on flanks too steep for its speeds, the surrounding
+/// entries become as shallow as the gap; see [`InterpolationError`] for the stated error. Depths with two stable
+/// orbits, which only nonlinear cases have, count as unstable.
 ///
 /// # Errors
 /// No case, different numbers of teeth, a request that does not fit a case, two layers for the same cut, or a case

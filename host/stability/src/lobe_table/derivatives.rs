@@ -16,7 +16,7 @@ use quietcut_model::structure::ModalPart;
 
 /// Derivatives of the stability limits in the entries of one layer, with respect to modes and cutting force.
 pub(super) struct Derivatives {
-    /// Modes, by ascending frequency.
+    /// Modes with respect to which the limits are differentiated, by ascending frequency.
     pub(super) modes: Vec<LayerMode>,
     pub(super) by_speed: Vec<SlopesOfLine>,
     /// Warning about limits for which no derivative exists, so that their entries state 0; `None` if every limit has
@@ -29,7 +29,8 @@ pub(super) struct Derivatives {
 pub(super) struct SlopesOfLine(Vec<(f64, Slopes)>);
 
 impl SlopesOfLine {
-    /// Derivatives of the depths at both ends of an entry (an unstable depth interval); 0 for an end that is no limit.
+    /// Derivatives of the depths at both ends of an entry (an unstable depth interval); 0 for an end that is no limit
+    /// or has no derivative.
     pub(super) fn of(&self, entry: &Entry) -> IntervalSlopes {
         let at = |depth_mm: f64| {
             let found = self.0.iter().find(|(switch_mm, _)| *switch_mm == depth_mm);
@@ -42,7 +43,8 @@ impl SlopesOfLine {
     }
 }
 
-/// Number of modes for whose parameters every layer of the table has derivatives.
+/// Number of modes with respect to which every layer of the table is differentiated: the least number of oscillatory
+/// modes of a layer, at most [`MODES_MAX`].
 pub(super) fn mode_count(table_layers: &[TableLayer]) -> Result<usize, BuildError> {
     let counts = table_layers
         .iter()
@@ -57,8 +59,8 @@ pub(super) fn mode_count(table_layers: &[TableLayer]) -> Result<usize, BuildErro
     }
 }
 
-/// Derivatives of one limiting depth with respect to natural frequency and damping of each mode and to the cutting
-/// force, mm per relative change.
+/// Derivatives of one limiting depth with respect to natural frequency and damping ratio of each mode and to the
+/// cutting coefficient K_tc, mm per relative change.
 struct SwitchDerivatives {
     depth_mm: f64,
     by_mode: Vec<[f64; 2]>,
@@ -132,7 +134,8 @@ impl SwitchDerivatives {
     }
 }
 
-/// Warning that counts the limits without derivatives and gives the reason of the first; `None` if every limit has them.
+/// Warning that counts the limits without derivatives and gives the reason of the first; `None` if every limit has
+/// them.
 fn warning(
     table_layer: &TableLayer,
     found: &[Vec<Result<SwitchDerivatives, StabilityError>>],

@@ -13,7 +13,7 @@ use super::error::BuildError;
 use super::layers::TableLayer;
 use quietcut_model::case::Case;
 
-/// The lobe table for cuts in a given feed direction; unchanged if the direction is not known.
+/// The lobe table for cuts in the feed direction `direction_deg`, degrees; unchanged if that is `None`.
 pub(super) fn towards<'a>(table: &LobeTable<'a>, direction_deg: Option<f64>) -> LobeTable<'a> {
     match direction_deg {
         Some(degrees) => table.towards(Degrees(degrees as f32)),

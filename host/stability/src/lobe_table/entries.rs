@@ -14,8 +14,8 @@ pub(super) struct Entry {
     pub(super) to_mm: f64,
 }
 
-/// Depths of a line up to `depth_mm` that have a single stable orbit. Where two stable orbits exist, stability depends
-/// on how the cut began.
+/// Depth intervals, mm, up to `depth_mm` that are stable with a single stable orbit. Where two stable orbits exist,
+/// stability depends on how the cut began.
 pub(super) fn surely_stable(line: &SpeedLine, depth_mm: f64) -> Vec<[f64; 2]> {
     // Stable depths are cut at `depth_mm`, since a branch of forced orbits may extend one step beyond.
     let mut stable: Vec<[f64; 2]> = line
@@ -34,7 +34,7 @@ pub(super) fn surely_stable(line: &SpeedLine, depth_mm: f64) -> Vec<[f64; 2]> {
     stable
 }
 
-/// Entries for the unstable depths of a line up to `depth_mm`, ascending.
+/// Entries for the depths up to `depth_mm` at one spindle speed that are unstable or have two stable orbits, ascending.
 pub(super) fn unstable(line: &SpeedLine, depth_mm: f64) -> Vec<Entry> {
     let mut entries: Vec<Entry> = Vec::new();
     let mut from_mm = 0.0;
@@ -44,8 +44,8 @@ pub(super) fn unstable(line: &SpeedLine, depth_mm: f64) -> Vec<Entry> {
     for [stable_from, stable_to] in ends {
         if stable_from > from_mm {
             let switch = line.switches.iter().find(|switch| switch.depth_mm == from_mm);
-            // At the depth where a second stable orbit begins the line has no switch: the jump to that orbit counts as
-            // a fold.
+            // If a second stable orbit begins at a depth without a stability switch, the jump to that orbit counts as a
+            // fold.
             let is_jump = line.bistable_mm.iter().any(|interval| interval[0] == from_mm);
             let kind = match switch {
                 Some(switch) => table_kind(switch.kind),
@@ -68,8 +68,8 @@ pub(super) fn unstable(line: &SpeedLine, depth_mm: f64) -> Vec<Entry> {
     limited(entries)
 }
 
-/// Union of the unstable depths of `entries` and `others`; where both overlap, the kind of stability loss is that of
-/// `entries`.
+/// Union of the unstable depths of `entries` and `others`, limited to the capacity of a column; where both overlap, the
+/// kind of stability loss is that of `entries`.
 pub(super) fn with_all_of(entries: &[Entry], others: &[Entry]) -> Vec<Entry> {
     let mut all = entries.to_vec();
     for other in others {
@@ -86,7 +86,7 @@ pub(super) fn with_all_of(entries: &[Entry], others: &[Entry]) -> Vec<Entry> {
 }
 
 impl Entry {
-    /// Part of this unstable interval between two depths; `None` if there is no overlap.
+    /// This entry with other ends, mm; `None` unless the first lies below the second.
     fn part(&self, from_mm: f64, to_mm: f64) -> Option<Self> {
         (from_mm < to_mm).then_some(Self {
             interval: Interval {

@@ -31,8 +31,8 @@ const SEED: u64 = 1;
 /// One layer of a lobe table: its case, the method that computes its limits, and the cuts for which it is valid.
 pub(super) struct TableLayer {
     pub(super) method: Box<dyn Method>,
-    /// Linear delay problem of the layer's case with the mean pitch; equal to the problem of the method if structure
-    /// and pitch allow.
+    /// Linear delay problem of the layer's case with the mean pitch. It is the problem of the method itself if that
+    /// needs no forced orbit and the pitch is equal.
     pub(super) linear: Problem,
     pub(super) validity: Validity,
     /// Feed direction of the layer, degrees; `None` if the table does not state it.
@@ -98,16 +98,16 @@ impl TableLayer {
         (a.posture, a.start, a.exit) == (b.posture, b.start, b.exit)
     }
 
-    /// Difference of the feeds per tooth, mm, if this layer has the larger feed and equals the other in all else;
-    /// otherwise `None`.
+    /// Difference of the feeds per tooth, mm, if this layer has the larger feed and is for the same immersion, posture
+    /// and feed direction; otherwise `None`.
     fn feeds_beyond(&self, other: &Self) -> Option<f64> {
         let more_mm = self.feed_mm() - other.feed_mm();
         let is_same = self.is_of_cut(other) && self.direction_deg == other.direction_deg;
         (is_same && depends_on_feed(&self.case) && more_mm > 0.0).then_some(more_mm)
     }
 
-    /// Angle between the feed directions of two layers, degrees, if the layers are equal in all else; `None` if lookups
-    /// of the device do not interpolate over it.
+    /// Angle from the feed direction of the other layer to that of this one, degrees, if the layers are equal in all
+    /// else; `None` if lookups of the device do not interpolate over it.
     fn turned_from(&self, other: &Self) -> Option<f64> {
         let turn = (self.direction_deg? - other.direction_deg?).rem_euclid(360.0);
         let is_same = self.is_of_cut(other) && self.feed_mm() == other.feed_mm();
@@ -119,8 +119,8 @@ impl TableLayer {
         self.lines_with_known(Vec::new(), speeds_rpm, depth_mm)
     }
 
-    /// Stability at these spindle speeds like [`lines`](Self::lines). `known` contains lines of the method at some of
-    /// them, which are not computed again.
+    /// Stability at these spindle speeds like [`lines`](Self::lines). `known` contains the limits by the method at some
+    /// of them, which are not computed again.
     pub(super) fn lines_with_known(
         &self,
         known: Vec<SpeedLine>,
@@ -151,8 +151,8 @@ impl TableLayer {
     }
 }
 
-/// Line that is stable up to a percentile of the limit only; the kind of stability loss is that of the nominal first
-/// limit.
+/// Stability of a layer at one speed, stable only up to a percentile of the first limit over drawn machines; the kind
+/// of stability loss is that of the nominal first limit.
 fn up_to(line: SpeedLine, percentile: &Percentile, depth_mm: f64) -> SpeedLine {
     let error_mm = percentile.error_mm(depth_mm);
     let limit = percentile.depth_mm.and_then(|depth_mm| {
@@ -242,7 +242,8 @@ pub(super) fn checked_layers(table_layers: &[TableLayer]) -> Result<Vec<CheckedL
     Ok(checked_layers)
 }
 
-/// Index of the layer with the least distance from the layer `index`; `None` if no distance is defined.
+/// Index of the layer, other than `index`, for which the function `distance` gives the least value; `None` if it gives
+/// none.
 fn nearest(
     table_layers: &[TableLayer],
     index: usize,
@@ -346,8 +347,9 @@ fn divisions(cases: &[Case], request: &TableRequest) -> Result<Vec<Division>, Bu
 }
 
 /// Adds feeds and feed directions between the requested ones. It stops when the first limits half way between two
-/// layers differ from the mean of both by less than `tolerance_mm` at the probe speeds, or when the number of layers is
-/// exhausted. Directions too far apart for interpolation are divided in any case.
+/// layers differ from the mean of both by no more than `tolerance_mm` at the probe speeds, or when the number of layers
+/// is exhausted. Feeds are tested in the first direction, directions at the smallest feed. Directions too far apart for
+/// interpolation are divided in any case.
 pub(super) fn refined(
     cases: &[Case],
     request: &TableRequest,
@@ -396,7 +398,8 @@ struct Axis {
 
 impl Axis {
     /// Feeds or directions of the layers, ascending: the given ones, and others between them until the limits half way
-    /// agree with the mean of both sides or the number of layers is exhausted.
+    /// between two neighbours agree with the mean of the limits at both, or the number of layers is exhausted.
+    /// Neighbours further apart than `widest` always get one between them.
     fn filled(
         &self,
         values: &[f64],

@@ -1,12 +1,13 @@
 //! The request for a lobe table: speeds, depths and layers.
 
-/// Speeds, depths and layers of a lobe table. Values that are not set follow from the first case.
+/// Speeds, depths and layers of a lobe table. Values that are not set follow from the cases.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TableRequest {
     /// Lowest and highest spindle speed of the table, rev/min. Default: the speed limits of the spindle if the case has
     /// them, otherwise 1/2 to 5 tooth passings per vibration period of the most flexible mode.
     pub rpm: Option<(f64, f64)>,
-    /// Largest axial depth of the table, mm. Default: four times the lowest limit, or 500 mm if no limit is found.
+    /// Largest axial depth of the table, mm. Default: four times the lowest first limit of all layers, or 500 mm if no
+    /// limit is found.
     pub depth_mm: Option<f64>,
     /// Feeds per tooth, mm, one layer each; more are added between them where limits bend. Default: the feed of each
     /// case. Without axial-depth modulation and nonlinear effects limits do not depend on the feed, and one layer holds
@@ -20,6 +21,6 @@ pub struct TableRequest {
     /// True to store the derivatives of the limits in every entry.
     pub derivatives: bool,
     /// Percentile, percent: entries are the depth up to which all but this share of the machines described by the
-    /// deviations are stable, in place of the limits of the case. Stable depths above that limit are omitted.
+    /// deviations are stable, in place of the limits of the case. Stable depths above that depth are omitted.
     pub percentile: Option<f64>,
 }

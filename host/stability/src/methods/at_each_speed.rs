@@ -8,14 +8,15 @@ use crate::limits::speed_line::SpeedLine;
 use crate::process::speed_dependence::at_speed;
 use quietcut_model::case::Case;
 
-/// Spindle speed, rev/min, at which the constructor tries the method: an arbitrary choice, since refusals, name and settings of the method
-/// do not depend on the speed.
+/// Spindle speed, rev/min, at which the constructor tries the method: an arbitrary choice, since refusals, name and
+/// settings of the method do not depend on the speed.
 const TRIED_RPM: f64 = 1000.0;
 
 /// Gives the method of a case whose cutting coefficients do not depend on the spindle speed.
 type MethodOf = fn(&Case) -> Result<Box<dyn Method>, StabilityError>;
 
-/// A case whose cutting coefficients depend on the spindle speed. Each speed has its own linear problem.
+/// Stability method of a case whose cutting coefficients depend on the spindle speed. Each speed has its own problem
+/// and method.
 pub(crate) struct AtEachSpeed {
     case: Case,
     method_of: MethodOf,

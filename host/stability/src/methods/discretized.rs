@@ -35,7 +35,8 @@ pub struct Discretized<D> {
     pub pitched: Pitched,
     /// Scheme of one time step.
     pub discretization: D,
-    /// Number of time steps in each tooth period, at least 1.
+    /// Number of time steps per tooth period, at least 1; in every interval between entries and exits of teeth it is
+    /// rounded up.
     pub steps: usize,
 }
 
@@ -74,8 +75,8 @@ impl<D: Discretization> Discretized<D> {
         })
     }
 
-    /// Error of a multiplier computed with the configured number of steps, from the results with twice and four times
-    /// as many steps.
+    /// Error of a multiplier computed with the configured number of steps, from the nearest multipliers with twice and
+    /// four times as many steps.
     fn error(&self, rpm: f64, depth_mm: f64, multiplier: Complex64) -> Result<f64, StabilityError> {
         let finer = |times: usize| {
             with_dominant(self, rpm, depth_mm, times * self.steps, |dominant, _| {

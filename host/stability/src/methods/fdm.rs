@@ -15,7 +15,7 @@ use super::discretized::{Discretization, Discretized};
 use super::stepped::{Mesh, Step, Stepped, moments, pushed};
 use crate::problem::pitched::Pitched;
 
-/// First-order full discretization (Ding et al. 2010).
+/// Full discretization with linear interpolation within a step (Ding et al. 2010).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct FullDiscretization;
 
@@ -27,11 +27,11 @@ pub type Fdm = Discretized<FullDiscretization>;
 struct Weights {
     duration_s: f64,
     flow: DMatrix<f64>,
-    /// Integral over the step with p = (1 − σ)².
+    /// Integral ∫ e^{A(h−s)} B p(σ) ds over the step with p = (1 − σ)².
     start: DMatrix<f64>,
-    /// Integral over the step with p = σ (1 − σ).
+    /// Integral ∫ e^{A(h−s)} B p(σ) ds over the step with p = σ (1 − σ).
     mixed: DMatrix<f64>,
-    /// Integral with p = σ².
+    /// Integral ∫ e^{A(h−s)} B p(σ) ds over the step with p = σ².
     end: DMatrix<f64>,
 }
 

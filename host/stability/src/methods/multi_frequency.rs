@@ -38,7 +38,7 @@ impl MultiFrequency {
         HarmonicLoop::new(&self.problem, rpm, harmonics)
     }
 
-    /// Loop with as many harmonics as the limits need to settle, its limits, and the limits with half as many
+    /// Harmonic loop with as many harmonics as the limits need to settle, its limits, and the limits with half as many
     /// harmonics. If the user sets the number K: loop and limits with K, and the limits with 2K + 1.
     fn settled(&self, rpm: f64, depth_mm: f64) -> Result<Settled<'_>, StabilityError> {
         let broke_down = |what| StabilityError::BrokeDown { rpm, depth_mm, what };
@@ -113,8 +113,9 @@ impl Method for MultiFrequency {
         true
     }
 
-    /// Computes the dominant multiplier with 2K + 1 harmonics, and doubles further until it settles if K is not set.
-    /// Its error contains the change by the last doubling.
+    /// Computes the dominant multiplier with 2K + 1 harmonics. If K is not set, it starts from the least number and is
+    /// doubled further until the multiplier settles or `HARMONICS_MAX` is reached. The error contains the change by the
+    /// last doubling.
     fn point(&self, rpm: f64, depth_mm: f64) -> Result<CutStability, StabilityError> {
         check_speed(rpm)?;
         check_depth(depth_mm)?;
@@ -177,8 +178,8 @@ impl MultiFrequency {
             }
             None => 0.0,
         };
-        // A multiplier within 1e-9 of the real axis, which truncation may cause, is taken as real: a flip lies exactly
-        // on the axis.
+        // A multiplier within 1e-9 |μ| of the real axis, which truncation may cause, is taken as real: a flip lies
+        // exactly on the axis.
         let is_real = multiplier.im.abs() <= 1e-9 * multiplier.norm();
         let multiplier = if is_real {
             Complex64::from(multiplier.re)

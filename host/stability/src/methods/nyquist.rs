@@ -21,7 +21,7 @@ use crate::limits::speed_line::SpeedLine;
 /// averaged cut. With K > 0 the coefficients are periodic: s runs from 0 to iΩ/2, with the determinant of the harmonic
 /// transfer matrix with harmonics up to K (Wereley & Hall); the only error beside that of a table is truncation.
 /// Between every two limits, and behind the last, the number of unstable roots is verified by a count that does not use
-/// the loci, unless the interval is too short.
+/// the loci, unless the depth interval is too short.
 #[derive(Clone, Debug)]
 pub struct Nyquist {
     /// Receptances and cutting process.
@@ -63,8 +63,8 @@ impl Nyquist {
     }
 }
 
-/// Limits up to an axial depth. Between every two of them, and behind the last, a count of unstable roots must agree
-/// with the crossings of the loci.
+/// Stability limits up to an axial depth, mm. Between every two of them, and behind the last, a count of unstable roots
+/// must agree with the crossings of the real axis by the characteristic loci.
 fn confirmed(
     open_loop: &impl OpenLoop,
     rpm: f64,

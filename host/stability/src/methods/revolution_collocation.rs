@@ -18,10 +18,10 @@ use crate::spectrum::krylov::Dominant;
 use crate::spectrum::map_spectrum::{self, MapSpectrum, PeriodMap};
 use crate::spectrum::revolution_map::RevolutionMap;
 
-/// Collocation over the revolution, for teeth at any pitch.
+/// Collocation over the period of `pitched`: the revolution for unequal pitch.
 ///
-/// Floquet multipliers are those over one revolution: with N equal pitches they are the N-th powers of those over the
-/// tooth period. Hopf, flip and fold refer to the revolution.
+/// Floquet multipliers are those over this period. If it is the revolution of N teeth with equal pitch, they are the
+/// N-th powers of those over the tooth period; Hopf, flip and fold then refer to the revolution.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RevolutionCollocation {
     /// Milling problem of the method, with equal or unequal pitch.
@@ -29,7 +29,7 @@ pub struct RevolutionCollocation {
 }
 
 impl RevolutionCollocation {
-    /// Error of the multiplier at a limit: [`error`] from the nearest multiplier on the fine mesh.
+    /// Error of the multiplier at a limit: the [`error`] from its change to the nearest multiplier on the finer mesh.
     fn limit_error(&self, rpm: f64, depth_m: f64, multiplier: Complex64) -> Result<f64, StabilityError> {
         let depth_mm = depth_m * 1e3;
         let broke_down = |cause: Breakdown| cause.at(rpm, depth_mm, NO_DOMINANT);
@@ -92,8 +92,8 @@ impl Method for RevolutionCollocation {
 }
 
 /// Error estimate of a multiplier on either mesh: [`MESH_ROOM`] times the change from the coarse to the fine mesh, and
-/// at least [`LEAST_ERROR`]. The coarse mesh errs by far more than the fine one, so that the change is about its error
-/// and bounds that of the fine one.
+/// at least [`LEAST_ERROR`] × max(1, |μ|). The coarse mesh errs by far more than the fine one, so that the change is
+/// about its error and bounds that of the fine one.
 fn error(coarse: Complex64, fine: Complex64) -> f64 {
     (MESH_ROOM * (coarse - fine).norm()).max(LEAST_ERROR * fine.norm().max(1.0))
 }

@@ -1,4 +1,5 @@
-//! Richardson's error estimate of a Floquet multiplier (characteristic multiplier), for a method of known order in its step.
+//! Richardson's error estimate of a Floquet multiplier (characteristic multiplier), for a method of known order in its
+//! step.
 
 use num_complex::Complex64;
 

@@ -1,8 +1,8 @@
-//! Map of one period in time steps, x_{i+1} = P_i x_i + Σ_j R_ij y_j with y = C x at earlier steps; shared by
-//! semi-discretization and full discretization.
+//! Map of the delayed state over one period in time steps, x_{i+1} = P_i x_i + Σ_j R_ij y_j with y = C x at earlier
+//! steps; shared by semi-discretization and full discretization.
 //!
-//! Only displacements of the delayed state act. The period map is applied without its matrix: a step updates n states
-//! and appends one displacement to those before.
+//! Of the past only displacements act. The period map is applied without forming its matrix: a step updates the n
+//! states of the structure and appends one displacement vector to those before.
 
 use nalgebra::{DMatrix, DVector, Matrix3};
 use num_complex::Complex64;
@@ -80,8 +80,8 @@ impl Mesh {
         Coefficients::mean(pitched, &self.passages, start_s + 0.5 * duration_s, node)
     }
 
-    /// The two time steps adjacent to a time (at most the period, or negative), with their weights in linear
-    /// interpolation. Negative indices are steps of the preceding period.
+    /// Indices of the two times of the mesh on either side of a time, s (at most the period, possibly negative), with
+    /// their weights in linear interpolation. Negative indices lie in the preceding period.
     fn around(&self, time_s: f64) -> [(isize, f64); 2] {
         let (period_s, count) = (self.passages.period_s, self.count() as isize);
         let turns = (time_s / period_s).floor();
@@ -108,7 +108,8 @@ impl Mesh {
 pub(crate) struct Step {
     /// Matrix P of the step, n × n, by which the state at its start acts on the state at its end.
     pub(crate) flow: DMatrix<f64>,
-    /// Indices of earlier steps whose displacements act on this step, with their matrices R, n × 3.
+    /// Indices of earlier times of the mesh at which the displacement acts on this step, with their matrices R, n × 3;
+    /// n × d once a [`Stepped`] contains the step.
     past: Vec<(isize, DMatrix<f64>)>,
 }
 
@@ -122,7 +123,7 @@ impl Step {
     }
 
     /// Lets the displacement at a time, s, act on this step through the matrix `response` (n × 3); the displacement is
-    /// interpolated linearly between steps.
+    /// interpolated linearly between the times of the mesh.
     pub(crate) fn add_past(&mut self, mesh: &Mesh, time_s: f64, response: &DMatrix<f64>) {
         for (index, share) in mesh.around(time_s) {
             if share == 0.0 {

@@ -19,8 +19,8 @@ use crate::limits::point::CutStability;
 use crate::limits::speed_line::SpeedLine;
 use crate::spectrum::stability_loss::StabilityLoss;
 
-/// Tolerance, rad, to which the phase condition ωτ = π − 2 arg(1/λ) + 2πk is solved; depths have the same relative
-/// error.
+/// Tolerance, rad, to which the phase condition ωτ = π − 2 arg(1/λ) + 2πk is solved; depths have about the same
+/// relative error.
 const CLOSED: f64 = 1e-11;
 
 /// Zeroth-order approximation on modelled or measured receptances.

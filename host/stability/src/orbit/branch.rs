@@ -12,7 +12,8 @@ use crate::spectrum::stability_loss::StabilityLoss;
 pub struct BranchPoint {
     /// Axial depth, mm.
     pub depth_mm: f64,
-    /// Half the peak-to-peak displacement of the orbit in feed, normal and axial direction, mm.
+    /// Half the peak-to-peak displacement of the tool on the orbit, at the collocation nodes, in feed, normal and axial
+    /// direction, mm.
     pub amplitude_mm: [f64; 3],
     /// Absolute value of the largest Floquet multiplier of the orbit.
     pub multiplier_abs: f64,
@@ -25,8 +26,9 @@ pub struct BranchPoint {
 pub struct Event {
     /// Axial depth, mm.
     pub depth_mm: f64,
-    /// Error estimate of the depth of the bifurcation, mm: within it |μ| differs from 1 by no more than the error of
-    /// the multiplier.
+    /// Error estimate of the depth of the bifurcation, mm: the change of depth along the branch over which the
+    /// multiplier moves by its error, plus a multiple of the change of the depth on a finer mesh; the largest depth of
+    /// the branch if this cannot be computed.
     pub error_mm: f64,
     /// Kind of bifurcation; at a fold the branch turns back in depth. With unequal teeth the kind is that of the
     /// multiplier over the revolution.
@@ -114,7 +116,7 @@ impl Branch {
         both
     }
 
-    /// The branch as a line of a stability chart.
+    /// Stability at the spindle speed of the branch, as in a stability chart.
     ///
     /// The first limit is the first loss of stability along a branch that begins stable. A depth is stable if some
     /// forced orbit there is stable.

@@ -9,12 +9,13 @@ use quietcut_numerics::quadrature::Gauss;
 pub(super) struct Advanced {
     /// States at the nodes of the subinterval, n states × m nodes.
     pub(super) states: DMatrix<f64>,
-    /// State at the end.
+    /// State at the end of the subinterval.
     pub(super) end: DVector<f64>,
-    /// Derivatives of the states at the nodes of the subinterval with respect to the start of the period and the depth,
-    /// (n m) × number of these variables.
+    /// Derivatives of the states at the nodes of the subinterval with respect to the state at the start of the period
+    /// and the depth, (n m) × number of these variables.
     pub(super) values: DMatrix<f64>,
-    /// Derivatives of the state at the end of the subinterval with respect to the start of the period and the depth.
+    /// Derivatives of the state at the end of the subinterval with respect to the state at the start of the period and
+    /// the depth.
     pub(super) end_by: DMatrix<f64>,
     /// Largest change of a state at a node by the Newton step, relative to the largest state in the subinterval.
     pub(super) moved: f64,
@@ -74,9 +75,9 @@ impl<'a> Linearized<'a> {
         sum
     }
 
-    /// Newton step of a subinterval from a start with derivatives `by`. `states` are the states at the nodes, `rates`
-    /// their time derivatives, and `forces` the explicit derivatives of the rates (those not through the states), n ×
-    /// number of variables each.
+    /// Newton step of a subinterval from the state `start` at its start, with the derivatives `by` of that state.
+    /// `states` are the states at the nodes, `rates` their time derivatives, and `forces` the explicit derivatives of
+    /// the rates (those not through the states), n × number of variables each.
     ///
     /// `None` if the equations are singular or a result is not finite.
     pub(super) fn advance(
@@ -125,7 +126,8 @@ impl<'a> Linearized<'a> {
         })
     }
 
-    /// Derivatives of the states at the nodes and at the end of the subinterval with respect to the state at its start.
+    /// Derivatives of the states at the nodes and at the end of the subinterval with respect to the state at its start;
+    /// `None` if the collocation equations are singular.
     pub(super) fn flow(&self) -> Option<(DMatrix<f64>, DMatrix<f64>)> {
         let (order, nodes) = (self.order(), self.gauss.nodes.len());
         let start = DMatrix::from_fn(order * nodes, order, |row, column| {

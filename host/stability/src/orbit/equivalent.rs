@@ -48,8 +48,8 @@ const REMEMBERED: usize = 5;
 /// last depth.
 const CROSSING: f64 = 1e-6;
 
-/// Axial depth, mm, that replaces a depth of 0: there the tool is at rest, and equivalent stiffness and damping are not
-/// defined.
+/// Axial depth, mm, that replaces depth 0, and smaller depths of a single cut: at depth 0 the tool is at rest, and
+/// equivalent stiffness and damping are not defined.
 const NONE_MM: f64 = 1e-4;
 
 /// Stability problem of a case with friction, backlash or hysteresis, which act through equivalent springs and dampers.
@@ -59,9 +59,9 @@ pub struct EquivalentProblem {
     smooth: ForcedProblem,
     terms: Vec<Box<dyn RestoringForce>>,
     feed_direction_deg: f64,
-    /// Matrix from the states of the structure to the displacement along the machine's axes, 3 × n.
+    /// Matrix from the states of the structure to the displacement of the tool along the machine's axes, 3 × n.
     displacement: DMatrix<f64>,
-    /// Matrix from the states of the structure to the velocity along the machine's axes, 3 × n.
+    /// Matrix from the states of the structure to the velocity of the tool along the machine's axes, 3 × n.
     velocity: DMatrix<f64>,
     /// Static stiffness of the structure along each axis, N/m; 0 for a rigid axis.
     stiffness: [f64; 3],
@@ -80,7 +80,8 @@ struct Settled {
 #[derive(Clone)]
 struct Sample {
     settled: Settled,
-    /// Floquet multipliers of the orbit in the upper half plane or on the real axis, largest first.
+    /// Floquet multipliers of the orbit above [`EQUIVALENT_FOLLOWED`], in the upper half plane or on the real axis,
+    /// largest first.
     roots: Vec<Complex64>,
 }
 
@@ -94,7 +95,7 @@ impl Sample {
         outside.map(|root| StabilityLoss::of(*root).count()).sum()
     }
 
-    /// Distance |μ| − 1 of the orbit's largest multiplier from the unit circle.
+    /// Distance |μ| − 1 of the orbit's largest multiplier from the unit circle; −1 if none is followed.
     fn excess(&self) -> f64 {
         self.roots.first().map_or(-1.0, |root| root.norm() - 1.0)
     }
@@ -104,7 +105,8 @@ impl EquivalentProblem {
     /// Builds the stability problem of a case with friction, backlash or hysteresis.
     ///
     /// # Errors
-    /// As [`ForcedProblem::new`], or the structure has no mass at the tool, or the teeth have runout or unequal pitch.
+    /// As [`ForcedProblem::new`], or the structure has no mass at the tool, or the teeth have unequal pitch, or they
+    /// have runout and the structure has smooth nonlinear terms.
     pub fn new(case: &Case) -> Result<Self, StabilityError> {
         let mut rest = case.clone();
         for spec in ALL
@@ -198,7 +200,7 @@ impl<'a> Follower<'a> {
         Samples::new(&self.map.subinterval_nodes(), orbit, self.period_s, seen)
     }
 
-    /// Rest, with zero springs.
+    /// Rest of the tool, with zero equivalent springs.
     fn rest(&self) -> Settled {
         Settled {
             springs: [Spring::default(); 3],
@@ -260,7 +262,8 @@ impl<'a> Follower<'a> {
         Ok(Sample { settled, roots })
     }
 
-    /// Floquet multipliers about an orbit with given equivalent springs.
+    /// Floquet multipliers with |μ| above [`EQUIVALENT_FOLLOWED`] about an orbit with given equivalent springs, in the
+    /// upper half plane or on the real axis, largest first.
     fn roots(&self, springs: &[Spring; 3], orbit: &Orbit) -> Result<Vec<Complex64>, StabilityError> {
         let problem = self.problem.with(springs);
         let singular = "the equations of the forced orbit are singular";
@@ -278,8 +281,8 @@ impl<'a> Follower<'a> {
         self.map.of(&problem).chatter_hz(&sample.settled.orbit, root)
     }
 
-    /// Error of |μ|: the distance from the multiplier with the incremental stiffness and damping that a small
-    /// disturbance of the orbit sees.
+    /// Error of |μ|: the distance of the multiplier `root` from the nearest one with the incremental stiffness and
+    /// damping that a small disturbance of the orbit sees.
     fn error(
         &self,
         sample: &Sample,
@@ -300,7 +303,7 @@ impl<'a> Follower<'a> {
             .iter()
             .map(|other| (other - root).norm())
             .fold(f64::INFINITY, f64::min);
-        // If no multiplier of the small disturbance exceeds [`EQUIVALENT_FOLLOWED`], the error is |μ| itself.
+        // The error is at most |μ|, also if no multiplier of the small disturbance exceeds [`EQUIVALENT_FOLLOWED`].
         Ok(nearest.min(root.norm()).max(LEAST_ERROR * root.norm().max(1.0)))
     }
 
@@ -337,7 +340,7 @@ impl<'a> Follower<'a> {
         Ok(switches)
     }
 
-    /// Stability switch between two depths that have been narrowed to the tolerance of the depth.
+    /// Stability switch between two depths that differ by no more than [`CROSSING`] of the last depth.
     fn switch(&self, low: &Sample, high: &Sample, last_m: f64) -> Result<Switch, StabilityError> {
         let gain = high.outside() < low.outside();
         let outer = if gain { low } else { high };
@@ -426,8 +429,8 @@ impl Method for EquivalentProblem {
         "collocation about the forced orbit, with equivalent stiffness and damping of non-smooth forces"
     }
 
-    /// Evaluates the orbit that is reached when the depth grows from 0. The error is the distance to the multiplier
-    /// with the stiffness and damping that a small disturbance sees.
+    /// Evaluates the orbit that is reached when the depth grows from 0. The error is the distance of the multiplier
+    /// from that with the stiffness and damping that a small disturbance of the orbit sees.
     fn point(&self, rpm: f64, depth_mm: f64) -> Result<CutStability, StabilityError> {
         check_speed(rpm)?;
         check_depth(depth_mm)?;

@@ -111,7 +111,8 @@ pub(super) fn size_at(map: &impl PeriodMap, depth_m: f64) -> f64 {
             let by_depth = integration.by.column(map.size()) * depth_m;
             integration.periodic().lu().solve(&by_depth)
         });
-    // Without feed and edge forces the orbit is rest, and any unit of its size serves.
+    // Without feed and edge forces the orbit is rest, and any unit of its size serves; so it does if the linearized
+    // equation is singular.
     linear
         .map(|state| state.norm())
         .filter(|size| *size > 0.0)
@@ -146,7 +147,7 @@ impl Sample {
 
 impl<M: PeriodMap> Follower<M> {
     pub(super) fn new(map: M, rpm: f64, depth_m: f64) -> Self {
-        // The depth is the unit of steps in depth along the branch; at depth 0 any positive unit serves.
+        // The requested depth is the unit of steps in depth along the branch; at depth 0 any positive unit serves.
         let depth_m = if depth_m > 0.0 { depth_m } else { 1e-3 };
         let scale = Scale {
             state: size_at(&map, depth_m),
@@ -269,7 +270,8 @@ impl<M: PeriodMap> Follower<M> {
     }
 
     /// Crossing of the unit circle by the multiplier that moves from one value to another over a step, with the length
-    /// of the step to it. Regula falsi with the weights of Anderson and Björck keeps the crossing enclosed.
+    /// of the step along the branch to it. Regula falsi with the weights of Anderson and Björck keeps the crossing
+    /// enclosed.
     fn refine(&self, here: &Sample, step: f64, from: Complex64, to: Complex64) -> Option<(f64, Event)> {
         let outward = to.norm() > 1.0;
         let mut bracket = SignChange::new([0.0, from.norm() - 1.0], [step, to.norm() - 1.0]);
@@ -306,9 +308,9 @@ impl<M: PeriodMap> Follower<M> {
         Some((bracket.ends()[0], event))
     }
 
-    /// Error of the depth of a crossing, m: the change of depth along the branch that moves the multiplier by its error
-    /// to either side, plus [`ORBIT_ROOM`] times the change of the depth on a finer mesh. `None` if it cannot be
-    /// computed, or if the multiplier hardly moves along the branch.
+    /// Error of the depth of a crossing, m: the change of depth along the branch over which the multiplier moves by its
+    /// error, the larger one of both directions, plus [`ORBIT_ROOM`] times the change of the depth on a finer mesh.
+    /// `None` if it cannot be computed, or if the multiplier hardly moves along the branch.
     fn error_m(&self, at: &Sample, root: Complex64) -> Option<f64> {
         let order = self.map.problem().order();
         let finer = Follower {
@@ -338,8 +340,8 @@ impl<M: PeriodMap> Follower<M> {
         let depth_m = at.orbit.depth_m;
         let shift_m = |step: f64| Some((self.depth_m(at, step).ok()? - depth_m).abs());
         let along_m = shift_m(reach)?.max(shift_m(-reach)?);
-        // At a fold the depth is stationary along the branch, so that its change vanishes; the error is then at least
-        // [`LEAST_ERROR`] of the depth.
+        // At a fold the depth is stationary along the branch, so that its change vanishes. At least [`LEAST_ERROR`] of
+        // the depth is therefore stated.
         Some(along_m.max(LEAST_ERROR * depth_m) + ORBIT_ROOM * (there.orbit.depth_m - depth_m).abs())
     }
 

@@ -26,7 +26,7 @@ use quietcut_model::{ChipLaw, MotionState, ProcessDamping, RestoringForce};
 ///
 /// With unequal pitch, or runout on a nonlinear structure, an orbit has the period of the revolution. Its chip is n_x
 /// f_j + n(u − u(t − τ_j)) + (r_j − r_{j−1}) sin γ, with the feed f_j during the delay τ_j. The force is linear in the
-/// chip through zero: a tooth that would leave the surface pulls, as in the linear problem.
+/// chip thickness through zero: a tooth that would leave the surface pulls, as in the linear problem.
 ///
 /// Extensions of the case add smooth restoring forces −B f_r(u, u̇), a chip law in place of n_x f_t, and process
 /// damping −w D(φ) u̇.
@@ -34,7 +34,7 @@ use quietcut_model::{ChipLaw, MotionState, ProcessDamping, RestoringForce};
 pub struct ForcedProblem {
     /// Linear part of the structure and cutting process, with the mean pitch of the teeth.
     pub linear: Problem,
-    /// Unequal pitch or runout of the teeth; `None` if all teeth are alike.
+    /// Unequal pitch or runout of the teeth; `None` if all teeth are alike, or if the equation of the orbit is linear.
     pub(super) uneven: Option<Uneven>,
     /// Cubic stiffness and damping terms; `None` for a linear structure.
     pub(super) cubic: Option<CubicForce>,
@@ -245,13 +245,13 @@ impl ForcedProblem {
         self.inertial
     }
 
-    /// True if forced orbits have the period of the revolution, not of a tooth. One spindle speed then takes about a
-    /// hundred times the computing time.
+    /// True if forced orbits have the period of the revolution, not the tooth period. One spindle speed then takes
+    /// about a hundred times the computing time.
     pub fn is_over_revolution(&self) -> bool {
         self.uneven.is_some()
     }
 
-    /// True if the equation of the orbit is linear.
+    /// True if the equation of the orbit is linear: without cubic terms and smooth restoring forces.
     pub(super) fn is_linear(&self) -> bool {
         self.cubic.is_none() && self.smooth.is_none()
     }
@@ -283,8 +283,8 @@ impl ForcedProblem {
         &self.linear.structure.b * damping * &flank.velocity
     }
 
-    /// Slope of the chip law, the derivative of effective over geometric chip thickness, at the forced chip thickness
-    /// at an immersion angle (rad).
+    /// Slope of the chip law, the derivative of effective over geometric chip thickness, at the chip thickness of the
+    /// feed at an immersion angle (rad); 1 without a chip law.
     pub(super) fn chip_slope(&self, angle: f64) -> f64 {
         let process = &self.linear.process;
         self.chip.map_or(1.0, |chip| {
@@ -351,8 +351,8 @@ impl ForcedProblem {
         }
     }
 
-    /// Jacobian of the equation of a forced orbit at a state, A − ∂N/∂x − B ∂f_r/∂x − (force per depth)·∂z/∂x, without
-    /// process damping.
+    /// Jacobian of the equation of a forced orbit at a state, A − ∂N/∂x − B ∂f_r/∂x − B·(force per depth)·∂z/∂x,
+    /// without process damping.
     pub(super) fn jacobian(&self, state: &[f64], force_per_depth: &Vector3<f64>) -> DMatrix<f64> {
         let structure = &self.linear.structure;
         let mut jacobian = structure.a.clone();

@@ -27,7 +27,7 @@ impl Method for ForcedProblem {
     }
 
     /// Evaluates the orbit that is reached when the depth grows from 0; the error of its multiplier is `ORBIT_ROOM`
-    /// times the change with a finer mesh.
+    /// times the change with a finer mesh, and at least `LEAST_ERROR` × max(1, |μ|).
     fn point(&self, rpm: f64, depth_mm: f64) -> Result<CutStability, StabilityError> {
         let fail = |cause| broke_down(rpm, depth_mm, cause);
         let [coarse, fine] = multiplier_at(self, rpm, depth_mm).map_err(fail)?;

@@ -13,8 +13,8 @@ pub(super) const FOLLOWED: f64 = 1.0 - 2.5 * MULTIPLIER_MOVE_MAX;
 /// Pairs the multipliers of two neighbouring orbits of a branch; `None` if a multiplier near the unit circle cannot be
 /// identified.
 ///
-/// With `anyhow` each multiplier is paired with the nearest one, at any distance. Two real multipliers that meet and
-/// leave the real axis move infinitely fast there, so that no step is short enough.
+/// With `anyhow` each multiplier is paired with the nearest one of the other orbit, at any distance. Two real
+/// multipliers that meet and leave the real axis move infinitely fast there, so that no step is short enough.
 pub(super) fn pair(
     from: &[Complex64],
     to: &[Complex64],
@@ -39,7 +39,8 @@ pub(super) fn pair(
                 pairs.push((root, next));
                 free.swap_remove(index);
             }
-            // The multiplier has become smaller than [`FOLLOWED`], or belongs to a pair that met on the real axis.
+            // No multiplier of the next orbit is left for this one: its partner has become smaller than [`FOLLOWED`],
+            // or it belongs to a pair that met on the real axis.
             None if is_far(root) || anyhow => {}
             _ if is_far(root) => {}
             _ => return None,

@@ -72,8 +72,8 @@ pub(super) struct PeriodIntegration {
     pub(super) by: DMatrix<f64>,
     /// States at the nodes of each subinterval after the Newton step over the period.
     pub(super) states: Vec<DMatrix<f64>>,
-    /// Derivatives of the states at the nodes of each subinterval with respect to start and depth, (n m) × number of
-    /// these variables.
+    /// Derivatives of the states at the nodes of each subinterval with respect to the state at the start of the period
+    /// and the depth, (n m) × number of these variables.
     pub(super) values: Vec<DMatrix<f64>>,
     /// Largest change of a state at a node by the Newton step, relative to the largest state in its subinterval.
     pub(super) moved: f64,
@@ -92,7 +92,7 @@ impl PeriodIntegration {
         }
     }
 
-    /// Advances over a subinterval.
+    /// Appends the result of the next subinterval.
     pub(super) fn take(&mut self, subinterval: Advanced) {
         self.end = subinterval.end;
         self.by = subinterval.end_by;
@@ -246,13 +246,14 @@ impl Orbit {
         }
     }
 
-    /// Corrects a predicted orbit on the hyperplane ⟨normal, (start/size, depth/depth_size) − guess⟩ = 0.
+    /// Corrects a predicted orbit on the hyperplane ⟨normal, z − z_guess⟩ = 0, where z holds the start state and the
+    /// depth, each divided by its unit in `scale`.
     ///
     /// With a normal along the depth this is Newton's method at fixed depth; with the tangent it passes folds. States
     /// at the nodes are corrected together with the start. Returns the orbit and its tangent, oriented along `normal`.
     ///
-    /// The iteration is not that of `quietcut_numerics::newton`: the states at the nodes are unknowns without equations of
-    /// their own, and the last decomposition gives the tangent.
+    /// The iteration is not that of `quietcut_numerics::newton`: the states at the nodes are unknowns without equations
+    /// of their own, and the last decomposition gives the tangent.
     pub(super) fn correct(
         map: &impl PeriodMap,
         guess: &Self,
@@ -320,7 +321,7 @@ fn shaped(values: DVector<f64>, order: usize) -> DMatrix<f64> {
     DMatrix::from_column_slice(order, nodes, values.as_slice())
 }
 
-/// Units of state and depth in which the arc length along a branch is measured.
+/// Units of the start state and of the depth (m) in which the arc length along a branch of forced orbits is measured.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Scale {
     pub(super) state: f64,

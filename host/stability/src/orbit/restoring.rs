@@ -16,8 +16,8 @@ const PER_SUBINTERVAL: usize = 128;
 /// Least number of samples of the orbit in a period for the forces of friction, backlash and hysteresis. A choice.
 const LEAST: usize = 1024;
 
-/// Number of periods after which the hysteresis loop of a term with internal states is taken as closed at the latest. A
-/// choice.
+/// Number of periods after which the hysteresis loop of a restoring force with internal states is taken as closed at
+/// the latest. A choice.
 const PERIODS: usize = 64;
 
 /// Change of an internal state over a period, relative to the largest displacement of the orbit, at which a hysteresis
@@ -44,8 +44,8 @@ pub(super) struct Samples {
 }
 
 impl Samples {
-    /// Samples the orbit by interpolation between the nodes; `seen` are the matrices from states to displacement and to
-    /// velocity.
+    /// Samples the orbit at the middles of equal time steps, by interpolation between the nodes; `seen` are the
+    /// matrices from states to displacement and to velocity of the tool.
     pub(super) fn new(
         subintervals: &[SubintervalNodes<'_>],
         orbit: &Orbit,
@@ -78,13 +78,13 @@ impl Samples {
         self.x[0].len()
     }
 
-    /// Largest displacement, m.
+    /// Largest absolute displacement of the tool on the orbit along any axis, m.
     pub(super) fn largest_m(&self) -> f64 {
         self.x.iter().flatten().fold(0.0, |most, x| x.abs().max(most))
     }
 
-    /// Sampled motion over `periods` periods of the orbit, with a disturbance of displacement and velocity added to one
-    /// axis.
+    /// Sampled motion of the tool over `periods` periods of the orbit; `added` gives the disturbance of displacement
+    /// and velocity along `axis` at a time, s.
     fn motion(&self, periods: usize, axis: usize, added: impl Fn(f64) -> [f64; 2]) -> SampledMotion {
         let count = self.len();
         let mut x: [Vec<f64>; 3] = std::array::from_fn(|axis| self.x[axis].repeat(periods));
@@ -94,8 +94,8 @@ impl Samples {
             x[axis][sample] += by_x;
             v[axis][sample] += by_v;
         }
-        // Speed below which friction acts with its mean over a time step: half of the largest change of velocity in a
-        // step, since the velocity may change sign within the step.
+        // Speed below which friction acts with its mean over a time step: half of the largest change of velocity from
+        // one sample to the next, since the velocity may change sign within a step.
         let rest_m_per_s = std::array::from_fn(|axis| {
             let velocity = &self.v[axis];
             let steps = (0..count).map(|n| (velocity[(n + 1) % count] - velocity[n]).abs());
@@ -110,8 +110,8 @@ impl Samples {
         }
     }
 
-    /// Restoring force of a term along the orbit over one period, N, once its hysteresis loop is closed, or after
-    /// [`PERIODS`] periods.
+    /// Restoring force of a term along the orbit over one period, N, by axis of the machine, once its hysteresis loop
+    /// is closed, or after [`PERIODS`] periods.
     ///
     /// The internal states are the fixed point of their map over a period, found by repetition; for a single state,
     /// secant steps shorten it.

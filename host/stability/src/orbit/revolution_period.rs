@@ -34,7 +34,7 @@ struct Tooth {
     chip_m: f64,
 }
 
-/// Forces in a subinterval.
+/// Forces of cutting and process damping at the nodes of a subinterval of the revolution.
 struct Forces {
     /// Cutting teeth at all nodes of the subinterval, node by node.
     teeth: Vec<Tooth>,
@@ -49,7 +49,7 @@ pub(super) struct RevolutionPeriod<'a> {
     rpm: f64,
     depth_m: f64,
     mesh: RevolutionMesh,
-    /// Forces in each subinterval.
+    /// Forces in each subinterval of the revolution.
     forces: Vec<Forces>,
 }
 
@@ -86,7 +86,7 @@ impl<'a> RevolutionPeriod<'a> {
     }
 
     /// Delayed displacement at every port (cutting tooth at a node) of a subinterval, ports × 1, with its derivatives
-    /// with respect to start and depth, ports × (size + 1).
+    /// with respect to the map's state at the start of the revolution and the depth, ports × (size + 1).
     fn past(
         &self,
         subinterval: &Subinterval,
@@ -250,7 +250,8 @@ impl Forces {
         (0..nodes).map(at).collect()
     }
 
-    /// Displacement p along the chip normal at every port (cutting tooth at a node), with its derivatives.
+    /// Displacement p along the chip normal at every port (cutting tooth at a node) of a subinterval, with its
+    /// derivatives with respect to the map's state at the start of the revolution and the depth.
     fn seen(&self, states: &DMatrix<f64>, values: &DMatrix<f64>) -> (DVector<f64>, DMatrix<f64>) {
         let (order, nodes) = states.shape();
         let mut seen = DVector::zeros(self.teeth.len());

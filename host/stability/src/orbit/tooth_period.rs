@@ -69,7 +69,8 @@ impl<'a> ToothPeriod<'a> {
         }
     }
 
-    /// Mesh of the tooth period whose subintervals are so short that no motion rotates by more than a phase angle, rad.
+    /// Mesh of the tooth period whose subintervals are so short that the fastest motion rotates by no more than the
+    /// phase angle `subinterval_angle`, rad.
     pub(super) fn with_subintervals(problem: &'a ForcedProblem, rpm: f64, subinterval_angle: f64) -> Self {
         let linear = &problem.linear;
         let engagement = &linear.process.engagement;
@@ -85,8 +86,8 @@ impl<'a> ToothPeriod<'a> {
         let mut subintervals = Vec::new();
         for interval in engagement.subintervals() {
             let length = interval.to - interval.from;
-            // Phase angle over the whole interval: that of the fastest pole, plus that of the directional coefficients,
-            // which oscillate at twice the rotation of the tool.
+            // Phase angle over the whole interval between entry and exit of teeth: that of the fastest pole, plus that
+            // of the directional coefficients, which oscillate at twice the rotation of the tool.
             let angle = fastest * length * seconds_per_radian + 2.0 * length;
             let count = (angle / subinterval_angle).ceil().max(1.0);
             let turn = length / count;

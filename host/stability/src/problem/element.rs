@@ -6,9 +6,9 @@ use super::exponential::Exponential;
 use super::linear::Problem;
 use quietcut_numerics::quadrature::Gauss;
 
-/// Collocated element: p = E x + Q f and x⁺ = G x + T f, with x and x⁺ the states at its start and end, p the
-/// displacements along the chip normals at the nodes, p_τ those of the preceding tooth, and f = w (p − p_τ) with the
-/// axial depth w.
+/// Collocated element: p = E x + Q f and x⁺ = G x + T f, with x and x⁺ the states of the structure at the start and end
+/// of the element, p the displacements along the chip normals at the nodes, p_τ those of the preceding tooth, and f = w
+/// (p − p_τ) with the axial depth w.
 #[derive(Clone, Debug)]
 pub(crate) struct Element {
     /// State transition G from the start to the end of the element without regenerative force, n × n.
@@ -45,7 +45,7 @@ pub(crate) struct Axial {
 pub(crate) struct Port {
     /// Time of the node from the start of the period, s.
     pub(crate) time_s: f64,
-    /// Quadrature weight, s.
+    /// Quadrature weight of the node in integrals over time, s.
     pub(crate) weight_s: f64,
     /// Force on the tool, Pa, per axial depth and per displacement along the chip normal. In [`Axial`]: force per axial
     /// displacement, N/m.

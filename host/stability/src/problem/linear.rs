@@ -13,7 +13,7 @@ use quietcut_model::structure::FirstOrder;
 ///   ẋ = A x + B F,   u = C x,   F = w K α(φ)(u − u_τ) − (β_e + β_f)(φ) u   (eqs 3.7, 7.1).
 ///
 /// All vectors are in feed, normal and axial direction. The delay τ is the tooth period, and u_τ the displacement one
-/// tooth period earlier. Signs of α and symbols are those of the page of the crate.
+/// tooth period earlier. Symbols and the sign of α are those of the crate's front page.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Problem {
     /// Structure in first-order form (matrices A, B and C), rotated into the feed direction.
@@ -84,7 +84,7 @@ impl Problem {
         })
     }
 
-    /// Tooth-passing period τ at a spindle speed in rev/min, s.
+    /// Tooth period τ at a spindle speed in rev/min, s.
     pub fn tooth_period_s(&self, rpm: f64) -> f64 {
         60.0 / (rpm * self.teeth as f64)
     }

@@ -9,10 +9,10 @@
 //!
 //!   p = E x₀ + Q f,   x₁ = G x₀ + T f,
 //!
-//! with p and f the values of all cutting teeth at all nodes. The free motion of the structure is exact (matrix
-//! exponentials); only the product of motion and rotating directional coefficients is interpolated. The forces −β(φ) u
-//! of edge and feed are eliminated within the element, so that the same four matrices E, Q, G and T describe it. In
-//! free flight (no tooth cuts) G = e^{Ah}.
+//! with p and f the values of all cutting teeth at all nodes, and D the force directions of these teeth. The free
+//! motion of the structure is exact (matrix exponentials); only the product of motion and rotating directional
+//! coefficients is interpolated. The forces −β(φ) u of edge and feed are eliminated within the element, so that the
+//! same four matrices E, Q, G and T describe it. In free flight (no tooth cuts) G = e^{Ah}.
 
 use nalgebra::DMatrix;
 
@@ -65,7 +65,8 @@ const NODES_MAX: u32 = 40;
 /// Refuses speeds and depths (mm) at which the motion oscillates or decays too fast to be followed over a tooth period.
 ///
 /// # Errors
-/// [`StabilityError::BrokeDown`] with the reason. The signs of speed and depth are not checked here, but by the methods.
+/// [`StabilityError::BrokeDown`] with the reason. The signs of speed and depth are not checked here, but by the
+/// methods.
 pub(crate) fn check_length(problem: &Problem, rpm: f64, depth_mm: f64) -> Result<(), StabilityError> {
     let rate = Rates::new(problem).at(2e-3 * depth_mm) + problem.fastest_decay();
     if rate * problem.tooth_period_s(rpm) > ELEMENTS_MAX * Resolution::WORKING.angle {
@@ -84,8 +85,8 @@ pub(crate) fn check_length(problem: &Problem, rpm: f64, depth_mm: f64) -> Result
 pub(crate) struct Period {
     /// Elements of the period during which teeth cut, in order of time.
     pub(crate) elements: Vec<Element>,
-    /// State transition e^{Ah} of the free flight after the elements, n × n; the identity if teeth cut until the end of
-    /// the period.
+    /// State transition of the free flight after the elements, n × n: e^{Ah} for a linear structure; the identity if
+    /// teeth cut until the end of the period.
     pub(crate) flight: DMatrix<f64>,
 }
 

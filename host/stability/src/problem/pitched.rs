@@ -12,7 +12,8 @@ use quietcut_model::case::Case;
 /// unequal pitch the period of the equation is the revolution, otherwise the tooth period.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Pitched {
-    /// Problem with the mean pitch. If the period is the revolution, its tooth period is not used.
+    /// Problem with the mean pitch. If the period is the revolution, the mean tooth period of this problem only sets
+    /// the number of time steps.
     pub(crate) problem: Problem,
     /// Angles between the teeth as in [`Tool::pitch_deg`](quietcut_model::milling::Tool), rad; `None` for equal pitch
     /// with the tooth period as period.

@@ -1,5 +1,5 @@
-//! Collocation of one revolution of a tool with variable pitch. The delayed displacement lies between nodes and is
-//! interpolated.
+//! Collocation of the delay equation over one revolution of a tool with variable pitch. The delayed displacement lies
+//! between nodes and is interpolated.
 //!
 //! The state of the delay equation is x at the start of the revolution, and the displacements p along the chip normals
 //! in those subintervals of the preceding revolution whose surface the present revolution cuts.
@@ -26,8 +26,8 @@ impl<'a> Revolution<'a> {
         let mesh = RevolutionMesh::new(pitched, rpm, depth_m, fineness, Flight::Whole)?;
         let exponential = Exponential::new(&pitched.problem.structure.a);
         let mut elements: Vec<Element> = Vec::with_capacity(mesh.subintervals.len());
-        // Subintervals between the same two kinks of the displacement have equal lengths: the response of the free
-        // structure over one of them serves for all.
+        // Kinks of the displacement lie at entries and exits of teeth, and delays later. All subintervals between two
+        // neighbouring kinks have equal lengths: the response of the free structure over one of them serves for all.
         let mut step: Option<(usize, f64, Step<'_>)> = None;
         for subinterval in &mesh.subintervals {
             if subinterval.cutting.is_empty() {

@@ -44,7 +44,8 @@ impl Fineness {
 /// Subdivision of the times at which no tooth cuts (free flight).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Flight {
-    /// Each free flight is one subinterval; its nodes are not used, since the free motion is known in closed form.
+    /// Between two kinks of the displacement, free flight is one subinterval; its nodes are not used, since the free
+    /// motion is known in closed form.
     Whole,
     /// Free flight is divided as finely as the cutting times.
     Cut,
@@ -53,7 +54,7 @@ pub(crate) enum Flight {
 /// Displacements p along the chip normal of one tooth at all nodes of one subinterval.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Series {
-    /// Index of the subinterval.
+    /// Index of the subinterval in the mesh of the revolution.
     pub(crate) subinterval: usize,
     /// Index of the tooth among those that cut in its subinterval.
     pub(crate) tooth: usize,
@@ -74,7 +75,8 @@ pub(crate) enum Source {
 #[derive(Clone, Debug)]
 pub(crate) struct DelayedDisplacement {
     pub(crate) source: Source,
-    /// Weights of the nodes at which the preceding tooth cut the surface: their Lagrange polynomials at the delayed time.
+    /// Weights of the nodes at which the preceding tooth cut the surface: their Lagrange polynomials at the delayed
+    /// time.
     pub(crate) weights: Vec<f64>,
 }
 
@@ -236,8 +238,7 @@ fn kinks(passages: &ToothPassages, generations: u32) -> Vec<f64> {
 }
 
 /// Fewest Gauss nodes, but at least 4, that interpolate e^{iz} over a phase angle z to a tolerance; 40 if fewer do not
-/// reach it. The error is z^m/m!
-/// times the maximum (m!)²/(2m)! of the monic Legendre polynomial on [0, 1].
+/// reach it. The error is z^m/m! times the maximum (m!)²/(2m)! of the monic Legendre polynomial on [0, 1].
 fn nodes_for(angle: f64, tolerance: f64) -> usize {
     let mut error = 1.0;
     for m in 1..=40_u32 {

@@ -17,15 +17,16 @@ pub(crate) struct ToothPassage {
     pub(crate) delay_s: f64,
     /// Feed of the tool during the regenerative delay of this tooth, m.
     pub(crate) feed_m: f64,
-    /// Index of the tooth on the tool; 0 if all teeth are alike.
+    /// Index of the tooth on the tool; 0 if the period is the tooth period.
     pub(crate) tooth: usize,
-    /// Index of the tooth that cut the surface in front of this one; 0 if all teeth are alike.
+    /// Index of the tooth that cut the surface in front of this one; 0 if the period is the tooth period.
     pub(crate) before: usize,
 }
 
 /// Passages of all teeth that cut within one period, at one spindle speed.
 ///
-/// The period is the tooth period for equal pitch, otherwise the revolution. It starts at the entry of a tooth.
+/// The period is the tooth period, or the revolution if the problem has it as its period (as for unequal pitch). It
+/// starts at the entry of a tooth.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct ToothPassages {
     /// Period T, s.

@@ -9,7 +9,7 @@ use quietcut_model::milling::Material;
 use quietcut_model::structure::FirstOrder;
 use quietcut_model::{Cutter, Effects, ForceLaw, ModelError, RestoringForce};
 
-/// Effects of the extensions of a case whose specification fulfils `wanted`.
+/// Effects of those extensions of a case whose specification fulfils `wanted`.
 fn effects(case: &Case, wanted: impl Fn(&EffectSpec) -> bool) -> Result<Effects, StabilityError> {
     let all = Effects::of_case(case).map_err(|cause| wrong(case, cause.into()))?;
     Ok(Effects(
@@ -47,7 +47,8 @@ pub(crate) fn structure(case: &Case) -> Result<FirstOrder, StabilityError> {
     })
 }
 
-/// Cutting coefficients of a case, after its extensions of the cutting force.
+/// Cutting coefficients of a case with its linear extensions of the cutting force that do not depend on the spindle
+/// speed.
 pub(crate) fn material(case: &Case) -> Result<Material, StabilityError> {
     let has_own =
         |spec: &EffectSpec| spec.treatment == Treatment::LinearProcess && spec.class == Class::CuttingForce;
@@ -71,7 +72,7 @@ fn law(case: &Case, wanted: impl Fn(&EffectSpec) -> bool) -> Result<ForceLaw, St
     Ok(cutter(case, None, wanted)?.force)
 }
 
-/// Tool and force law of a case with the extensions that fulfil `wanted`, at a spindle speed, rev/min, if that matters.
+/// Tool and force law of a case with the extensions that fulfil `wanted`, at a spindle speed, rev/min, if one is given.
 fn cutter(
     case: &Case,
     rpm: Option<f64>,

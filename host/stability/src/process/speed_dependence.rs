@@ -16,7 +16,8 @@ pub fn depends_on_speed(case: &Case) -> bool {
 /// # Errors
 /// A section is missing, or an extension cannot be applied to the case.
 pub(crate) fn at_speed(case: &Case, rpm: f64) -> Result<Case, StabilityError> {
-    // Coefficients that do not depend on speed are replaced too, since extensions act one after the other.
+    // Extensions of the cutting force that do not depend on the speed are replaced too, since extensions act one after
+    // the other.
     let changes_coefficients = |spec: &EffectSpec| match spec.treatment {
         Treatment::ProcessOfSpeed => true,
         treatment => treatment == Treatment::LinearProcess && spec.class == Class::CuttingForce,

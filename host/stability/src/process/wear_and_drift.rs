@@ -6,8 +6,8 @@ use quietcut_model::Effects;
 use quietcut_model::case::Case;
 use quietcut_model::effects::EffectName;
 
-/// The case after `after_s` seconds of operation, with drift and wear replaced by the stiffness, the cutting coefficients
-/// and the process damping of that moment.
+/// The case after `after_s` seconds of operation, with drift and wear replaced by the stiffness, the cutting
+/// coefficients and the process damping of that moment.
 ///
 /// # Errors
 /// Drift together with an extension of the stiffness, drift in several directions, forces or stiffness that have fallen

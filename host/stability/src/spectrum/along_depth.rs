@@ -15,9 +15,10 @@ pub(crate) trait Spectrum {
     /// The equations have no finite solution, or the eigenvalues cannot be computed.
     fn multipliers(&mut self, depth_m: f64) -> Result<Vec<Complex64>, Breakdown>;
 
-    /// Floquet multiplier near a guess, to rounding; a real guess gives a real multiplier.
+    /// Floquet multiplier near a guess at an axial depth (m), to the accuracy of the method; a real guess gives a real
+    /// multiplier.
     ///
-    /// `None` if no multiplier lies within the distance `reach`.
+    /// `None` if no multiplier is found within the distance `reach` of the guess.
     fn multiplier_near(&mut self, guess: Complex64, depth_m: f64, reach: f64) -> Option<Complex64>;
 
     /// Derivative dμ/dw of a Floquet multiplier μ over the axial depth w, 1/m, along its branch through (μ, w).
@@ -26,8 +27,8 @@ pub(crate) trait Spectrum {
     /// Floquet multiplier near a guess, with its derivative dμ/dw; a real guess gives a real multiplier.
     ///
     /// The guess must be correct to about 1e-4. The error of the result is about the square of that, plus the error of
-    /// the discretized equations. `None` if no multiplier is found within 5 % of |guess|, or if
-    /// `sensitivity` has no derivative for it.
+    /// the discretized equations. `None` if no multiplier is found near the guess (here within 5 % of |guess|), or if
+    /// it has no derivative.
     fn root_near(&mut self, guess: Complex64, depth_m: f64) -> Option<Root> {
         let multiplier = self.multiplier_near(guess, depth_m, 0.05 * guess.norm())?;
         let slope = self.sensitivity(multiplier, depth_m)?;

@@ -275,7 +275,7 @@ impl Characteristic {
         })
     }
 
-    /// True if the transition matrix Φ at (μ, w) is finite.
+    /// True if the transition matrix Φ(κ) and its derivative are finite at the multiplier μ and the axial depth w.
     fn is_finite_at(&self, multiplier: Complex64, depth_m: f64, work: &mut Workspace) -> bool {
         self.evaluate((Complex64::ONE - inverse(multiplier)) * depth_m, work);
         work.value

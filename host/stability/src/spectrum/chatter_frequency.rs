@@ -22,7 +22,8 @@ const CYCLIC_MAX: usize = 256;
 ///
 /// The motion contains the frequencies |Im ln μ + 2πk|/(2πτ). The result is the one whose harmonic of the tool
 /// displacement, û_k = 1/τ ∫₀^τ u(t) e^{−s_k t} dt, has the largest norm. With F̂_k the k-th harmonic of all forces
-/// along the Floquet mode, û_k = H(s_k) F̂_k; without forces the motion is free and has the frequency of its mode.
+/// along the Floquet mode, û_k = H(s_k) F̂_k; without forces the motion is free and has the frequency of a structural
+/// mode.
 pub(crate) fn chatter_hz(
     problem: &Problem,
     rpm: f64,

@@ -37,7 +37,7 @@ pub(crate) struct Node {
     pub(crate) weight_s: f64,
     /// Phase of the tooth period at this node, rad.
     pub(crate) phase: f64,
-    /// Number of cutting teeth.
+    /// Number of cutting teeth at this node.
     pub(crate) teeth: usize,
     /// Floquet mode x (right).
     pub(crate) right: DVector<Complex64>,
@@ -160,8 +160,8 @@ impl FloquetMode {
     }
 }
 
-/// Transitions over all subintervals: of the structure, and of the transposed structure in reversed time with directions
-/// of observation and of force exchanged. `None` if a collocation is singular.
+/// Transitions over all subintervals: of the structure, and of the transposed structure in reversed time with
+/// directions of observation and of force exchanged. `None` if a collocation is singular.
 fn factors(
     structure: &FirstOrder,
     bases: &[Basis],
@@ -277,7 +277,8 @@ struct MapFactor {
 }
 
 impl MapFactor {
-    /// Collocates x(t) = e^{At}(x₀ + ∫ e^{−As} B f ds) with f = force·seenᵀ C x at the nodes.
+    /// Collocates x(t) = e^{At}(x₀ + ∫ e^{−As} B f ds) with f = force·seenᵀ C x at the nodes; `None` if the collocation
+    /// is singular.
     fn new(structure: &FirstOrder, basis: &Basis, ports: &[Ports]) -> Option<Self> {
         let order = structure.order();
         let nodes = basis.gauss.nodes.len();

@@ -143,7 +143,7 @@ pub(crate) struct Largest {
 /// Eigenvalues of a linear map of at least `share` times the size of the largest, at most [`CROWD`] of them.
 ///
 /// # Errors
-/// A result is not finite.
+/// The map gives no image, a result is not finite, or the eigenvalues cannot be computed.
 pub(crate) fn largest(map: &impl LinearMap, share: f64) -> Result<Largest, Breakdown> {
     let most = (map.size() / 2).min(ROUGH_SPACE_MAX);
     let found = arnoldi(map, most, ROUGH, &|values| {
@@ -183,7 +183,7 @@ struct ArnoldiResult {
 /// first) have converged, once the map gives no new direction, or once the space would exceed `most` vectors.
 ///
 /// # Errors
-/// A result is not finite.
+/// The map gives no image, a result is not finite, or the eigenvalues cannot be computed.
 fn arnoldi(
     map: &impl LinearMap,
     most: usize,

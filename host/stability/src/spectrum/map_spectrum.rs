@@ -11,8 +11,9 @@ use super::stability_loss::StabilityLoss;
 use crate::criteria::MAPPED;
 use crate::error::{Breakdown, StabilityError};
 
-/// Depth step of the difference quotient dμ/dw, as a share of the largest depth. Its truncation error, and the rounding
-/// of multipliers divided by the step, are then both near 1e-6. Derivatives serve as predictions only.
+/// Step in axial depth w of the difference quotient dμ/dw of a Floquet multiplier μ, as a share of the largest depth to
+/// be computed. Its truncation error, and the rounding of multipliers divided by the step, are then both near 1e-6. The
+/// derivatives only predict multipliers and the steps of Newton's method.
 const DIFFERENCE: f64 = 1e-6;
 
 /// Map over one period at one axial depth; its eigenvalues are the Floquet multipliers.
@@ -25,12 +26,13 @@ pub(crate) trait PeriodMap: LinearMap {
 struct MultipliersAtDepth {
     depth_m: f64,
     dominant: Dominant,
-    /// Floquet multipliers at a slightly larger depth, for the difference quotient dμ/dw.
+    /// Floquet multipliers at the depth `depth_m` plus `MapSpectrum::step_m`, for the difference quotient dμ/dw; `None`
+    /// until it is requested.
     deeper: Option<Vec<Complex64>>,
 }
 
-/// Floquet multipliers of maps at any axial depth: `map` returns the map at a depth (m), `error` the error of a
-/// multiplier at a depth (m).
+/// Floquet multipliers of period maps at any axial depth: `map` returns the period map at a depth (m), `error` the
+/// error estimate of a multiplier at a depth (m).
 pub(crate) struct MapSpectrum<F, E> {
     map: F,
     error: E,
@@ -63,13 +65,15 @@ impl<M: PeriodMap, F: Fn(f64) -> Option<M>, E: Fn(Complex64, f64) -> Result<f64,
         self.known.as_mut().ok_or(Breakdown::NoSolution)
     }
 
-    /// Floquet multiplier nearest to a guess at a depth: a real one for a real guess, a complex one for a complex guess.
+    /// Floquet multiplier nearest to a guess at an axial depth: a real one for a real guess, a complex one for a
+    /// complex guess; `None` if there is none of that kind.
     fn nearest(&mut self, guess: Complex64, depth_m: f64) -> Option<Complex64> {
         nearest(&self.at(depth_m).ok()?.dominant.eigenvalues, guess)
     }
 }
 
-/// Floquet multiplier of a list nearest to a guess: a real one for a real guess, a complex one for a complex guess.
+/// Floquet multiplier of a list nearest to a guess: a real one for a real guess, a complex one for a complex guess;
+/// `None` if the list has none of that kind.
 pub(crate) fn nearest(multipliers: &[Complex64], guess: Complex64) -> Option<Complex64> {
     multipliers
         .iter()
@@ -100,17 +104,19 @@ impl<M: PeriodMap, F: Fn(f64) -> Option<M>, E: Fn(Complex64, f64) -> Result<f64,
             self.at(depth_m).ok()?.deeper = Some(deeper);
         }
         let deeper = self.at(depth_m).ok()?.deeper.as_deref()?;
-        // If two real multipliers meet between the depths w and w + step, the derivative does not exist.
+        // Two real multipliers may meet between the depths w and w + step and become a complex pair. If there is then
+        // no real one at w + step, there is no derivative.
         Some((nearest(deeper, own)? - own) / step_m)
     }
 
-    /// Newton's method for |μ| = 1 along the branch. Its derivative is a difference quotient, so that the last step is
-    /// not applied: the crossing is the depth at which the multiplier was computed.
+    /// Newton's method in the axial depth for |μ| = 1 of one Floquet multiplier μ. Its derivative is a difference
+    /// quotient, so that the last step is not applied: the crossing lies at the depth at which the multiplier was last
+    /// computed.
     fn crossing_near(&mut self, guess: Crossing, low_m: f64, high_m: f64) -> Option<Crossing> {
         let margin_m = 0.5 * (high_m - low_m);
         let allowed_m = (low_m - margin_m).max(0.0)..=high_m + margin_m;
         let (mut expected, mut last) = (guess.multiplier, guess);
-        // The unknown is the depth as a share of the larger depth.
+        // The unknown of Newton's method is the axial depth as a share of `high_m`.
         Newton::new(20, 1e-9)
             .with_least_size(1.0)
             .solve(guess.depth_m / high_m, |share: &f64| {

@@ -1,5 +1,5 @@
-//! The collocated map over one tooth period, for many Floquet multipliers (characteristic multipliers) at one speed and
-//! depth.
+//! The collocated map over one tooth period, for many Floquet multipliers (characteristic multipliers) at one spindle
+//! speed and axial depth.
 
 use nalgebra::linalg::LU;
 use nalgebra::{DMatrix, Dyn};
@@ -11,17 +11,18 @@ use crate::error::Breakdown;
 use crate::problem::period::Period;
 use quietcut_numerics::eigenvalues;
 
-/// Largest size of a period map for which all eigenvalues are computed from its matrix without trying block Arnoldi,
-/// which is not faster there.
+/// Largest size (number of rows) of a period map for which all eigenvalues are computed from its matrix without trying
+/// block Arnoldi, which is not faster there.
 const WHOLE: usize = 110;
 
-/// Largest size of a period map for which [`largest`] computes all eigenvalues if block Arnoldi does not converge:
-/// about one second.
+/// Largest size (number of rows) of a period map for which [`largest`] computes all eigenvalues if block Arnoldi does
+/// not converge: about one second.
 const UNSETTLED_WHOLE_MAX: usize = 400;
 
 /// Matrix of the map (x, p_τ) → (x⁺, p) over one tooth period at an axial depth, m.
 ///
-/// p are the displacements along the chip normals at the collocation nodes while teeth cut. `None` if the collocation
+/// x is the state of the structure at the start of the period, x⁺ that at its end. p are the displacements along the
+/// chip normals at the collocation nodes while teeth cut, p_τ those one tooth period earlier. `None` if the collocation
 /// equations are singular, which happens at large depths only.
 pub(crate) fn monodromy(period: &Period, depth_m: f64) -> Option<DMatrix<f64>> {
     let order = period.order();
@@ -104,7 +105,7 @@ pub(crate) fn largest(period: &Period, depth_m: f64, share: f64) -> Result<Candi
         }
     };
     // Multipliers from the transition matrix Φ(w), which is the map without the surface of the preceding tooth (κ = w);
-    // `None` unless one is so large that this surface does not act.
+    // `None` unless the largest exceeds `GROWN`, so that this surface does not act, and rounding does not move them.
     let grown = |transition: DMatrix<f64>| {
         let norm = transition.amax();
         let multipliers = of_matrix(transition).ok()?;

@@ -1,5 +1,5 @@
-//! Map of the state over one revolution of a tool with variable pitch; its eigenvalues are the Floquet multipliers
-//! (characteristic multipliers).
+//! Map of the state of structure and history over one revolution of a tool with variable pitch; its eigenvalues are the
+//! Floquet multipliers (characteristic multipliers).
 
 use std::rc::Rc;
 
@@ -12,7 +12,8 @@ use super::map_spectrum::PeriodMap;
 use crate::problem::revolution::Revolution;
 use crate::problem::revolution_mesh::{Series, Source};
 
-/// Map of the delayed state over one revolution at one axial depth.
+/// Map over one revolution at one axial depth, of the state of the structure and of the past displacements along the
+/// chip normals on which later chips depend.
 pub(crate) struct RevolutionMap<'a> {
     revolution: Rc<Revolution<'a>>,
     depth_m: f64,
@@ -32,8 +33,8 @@ struct Trace {
 }
 
 impl<'a> RevolutionMap<'a> {
-    /// Map of the delayed state over one revolution at an axial depth, m; `None` if the collocation equations are
-    /// singular.
+    /// Map of the structure's state and of past displacements along the chip normals over one revolution at an axial
+    /// depth, m; `None` if the collocation equations are singular.
     pub(crate) fn new(revolution: Rc<Revolution<'a>>, depth_m: f64) -> Option<Self> {
         let factors = revolution.elements.iter().map(|element| {
             let size = element.kernel.nrows();
@@ -71,7 +72,7 @@ impl<'a> RevolutionMap<'a> {
                         Source::Earlier(first) => before.column(first + node),
                         Source::Own(Series { subinterval, tooth }) => {
                             // No value is known yet if a delay is shorter than a subinterval, so that the delayed time
-                            // lies in the subinterval itself.
+                            // lies in the subinterval itself; the map then has no image.
                             let values = trace.seen.get(subinterval)?;
                             values.column(node * subintervals[subinterval].cutting.len() + tooth)
                         }

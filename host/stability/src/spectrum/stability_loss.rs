@@ -10,15 +10,15 @@ pub enum StabilityLoss {
     /// Complex pair (Neimark–Sacker, secondary Hopf, torus): chatter at a frequency independent of the tooth-passing
     /// frequency.
     Hopf,
-    /// Through −1 (period doubling).
+    /// A real multiplier leaves through −1 (period doubling).
     Flip,
-    /// Through +1.
+    /// A real multiplier leaves through +1.
     Fold,
 }
 
 impl StabilityLoss {
-    /// Kind of stability loss from the imaginary part of a multiplier and the sign of its real part. A real multiplier must have an imaginary
-    /// part of exactly 0.
+    /// Kind of stability loss by a Floquet multiplier: Hopf if its imaginary part is not exactly 0, otherwise flip if
+    /// its real part is negative and fold if it is not.
     pub fn of(multiplier: Complex64) -> Self {
         if multiplier.im != 0.0 {
             Self::Hopf

@@ -10,12 +10,12 @@ pub enum Verdict {
     Stable,
     /// |μ| − error > 1.
     Unstable,
-    /// The error interval contains 1.
+    /// The interval from |μ| − error to |μ| + error contains 1.
     Undecided,
 }
 
 impl Verdict {
-    /// Verdict on a cut whose dominant multiplier has this absolute value and error.
+    /// Verdict on a cut whose dominant Floquet multiplier has the absolute value `multiplier_abs` with this error.
     pub fn of(multiplier_abs: f64, error: f64) -> Self {
         if multiplier_abs + error < 1.0 {
             Self::Stable

@@ -2,8 +2,8 @@
 //! method, completeness by a winding number.
 //!
 //! The period map fails in two cases. If motions grow within a period by far more than over the whole of it, the map is
-//! so non-normal that rounding moves its eigenvalues. If very many eigenvalues have nearly one size, Krylov spaces do
-//! not converge. With z = 1/μ
+//! so non-normal that rounding moves its eigenvalues. If very many eigenvalues have nearly the same absolute value,
+//! Krylov spaces do not converge. With z = 1/μ
 //!
 //!   G(z) = det(I − z Φ(w (1 − z)))
 //!
@@ -27,15 +27,18 @@ const POINTS_MAX: usize = 8192;
 /// Largest number of candidate multipliers from which Newton's method starts: a limit on computing time.
 const CANDIDATES_MAX: usize = 6;
 
-/// Largest number of multipliers beyond a radius that are searched one by one: a limit on computing time.
+/// Largest number of known multipliers that a search by winding number deflates to find a larger one: a limit on
+/// computing time.
 const ROOTS_MAX: usize = 12;
 
-/// Largest Floquet multiplier found, and the radius beyond which the winding number counts none.
+/// Largest Floquet multiplier that a search has found, and the radius beyond which the winding number counts none.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LargestMultiplier {
-    /// Largest Floquet multiplier found, if larger than [`WOUND`]; of a conjugate pair the upper one.
+    /// Largest Floquet multiplier found, of a conjugate pair the upper one; `None` if none with |μ| of at least
+    /// [`WOUND`] was found.
     pub(crate) multiplier: Option<Complex64>,
-    /// Radius beyond which the winding number counts no multiplier; infinite if no count gives zero.
+    /// Radius about 0 in the plane of the multipliers beyond which the winding number counts no multiplier; infinite if
+    /// no count gives zero.
     pub(crate) radius: f64,
 }
 
@@ -48,8 +51,8 @@ pub(crate) struct Search<'a> {
 }
 
 impl<'a> Search<'a> {
-    /// Search for the largest multiplier at an axial depth, m; the characteristic matrix must be valid for five times
-    /// that depth.
+    /// Search for the largest multiplier at an axial depth, m; the characteristic matrix must be valid for complex
+    /// depths of up to five times that depth.
     pub(crate) fn new(characteristic: &'a Characteristic, depth_m: f64) -> Self {
         Self {
             characteristic,
@@ -59,21 +62,22 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Logarithmic derivative z G'/G of the characteristic function at z; `None` at a zero, if the result is not
-    /// finite, or if no evaluations are left.
+    /// Logarithmic derivative z G'/G at z of the characteristic function G(z) = det(I − z Φ(w (1 − z))); `None` at a
+    /// zero of G, if the result is not finite, or if no evaluations are left.
     fn slope(&mut self, z: Complex64) -> Option<Complex64> {
         self.evaluations_left = self.evaluations_left.checked_sub(1)?;
         let multiplier = z.inv();
         let found = self
             .characteristic
             .logarithmic(multiplier, self.depth_m, &mut self.work)?;
-        // G(z) = (−z)ⁿ F(1/z)
+        // G(z) = (−z)ⁿ F(1/z) with F(μ) = det(Φ − μ I), whose logarithmic derivative ∂ ln F/∂μ is `by_multiplier`.
         let slope = self.characteristic.order() as f64 - multiplier * found.by_multiplier;
         slope.is_finite().then_some(slope)
     }
 
-    /// Number of Floquet multipliers with |μ| larger than a radius; `None` if one lies so close to that circle that the
-    /// largest number of points does not resolve it, if evaluations run out, or if a result is not finite.
+    /// Number of Floquet multipliers with |μ| larger than `radius`; `None` if one lies so close to the circle |μ| =
+    /// `radius` that the largest number of points does not resolve it, if evaluations run out, or if a result is not
+    /// finite.
     pub(crate) fn count_beyond(&mut self, radius: f64) -> Option<usize> {
         use std::f64::consts::PI;
         let at = |angle: f64| Complex64::from_polar(radius.recip(), angle);
@@ -106,8 +110,8 @@ impl<'a> Search<'a> {
         None
     }
 
-    /// Floquet multiplier beyond a radius that is not among the known ones, by Newton's method with the known ones
-    /// deflated; `None` if none of the starting values leads to one.
+    /// Floquet multiplier with |μ| larger than `radius` that is not among the `known` ones, by Newton's method with the
+    /// known ones deflated; `None` if none of the starting values leads to one.
     fn another_beyond(&mut self, radius: f64, known: &[Complex64]) -> Option<Complex64> {
         const ANGLES: usize = 6;
         for share in [0.95, 0.7, 0.3] {
@@ -124,10 +128,10 @@ impl<'a> Search<'a> {
         None
     }
 
-    /// Floquet multiplier μ = 1/z to which Newton's method converges from z = `start`, with the known ones deflated; of
-    /// a conjugate pair the upper one.
+    /// Floquet multiplier μ = 1/z to which Newton's method converges from z = `start`, with the `known` multipliers
+    /// deflated; of a conjugate pair the upper one. `None` without convergence, or if |μ| is below [`WOUND`].
     fn newton(&mut self, start: Complex64, known: &[Complex64]) -> Option<Complex64> {
-        // The polynomials of the elements in the complex depth w (1 − z) are not valid for larger |z|.
+        // The polynomials of the elements in the complex depth w (1 − z) are not valid for |z| larger than 1/`WOUND`.
         let is_valid = |z: Complex64| z.is_finite() && z.norm() <= WOUND.recip();
         let found = Newton::new(15, 1e-9).solve(start, |&z: &Complex64| {
             if z != start && !is_valid(z) {
@@ -149,8 +153,9 @@ impl<'a> Search<'a> {
         Some(Complex64::new(multiplier.re, im))
     }
 
-    /// Largest Floquet multiplier found, and the radius beyond which the winding number counts none; `candidates` are
-    /// starting values of Newton's method.
+    /// Largest Floquet multiplier found, and the radius beyond which the winding number counts none. `candidates` are
+    /// approximate multipliers from which Newton's method starts: the first `CANDIDATES_MAX` of those that exceed
+    /// [`WOUND`] and lie on the real axis or above it.
     pub(crate) fn largest(&mut self, candidates: &[Complex64]) -> LargestMultiplier {
         let mut known: Vec<Complex64> = Vec::new();
         let mut best: Option<Complex64> = None;
@@ -164,8 +169,8 @@ impl<'a> Search<'a> {
         }
         let mut radius = f64::INFINITY;
         for margin in MARGINS.into_iter().chain(FINE_MARGINS) {
-            // The verdict on the cut follows from a multiplier outside the unit circle, or from a bound on all
-            // multipliers inside it.
+            // A multiplier outside the unit circle, or a radius below 1 beyond which no multiplier lies, decides the
+            // verdict on the cut; the finer margins are then not needed.
             let is_decided = radius < 1.0 || best.is_some_and(|best| best.norm() > 1.0);
             if FINE_MARGINS.contains(&margin) && is_decided {
                 break;

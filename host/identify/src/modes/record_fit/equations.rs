@@ -148,7 +148,7 @@ pub(super) fn of_force_noise(
 }
 
 /// Derivatives of the predicted response sⁿ H F + T, with the force F and the transient T, by the parameters of the
-/// structure. T is included only if F is the force of the line itself.
+/// structure. The derivative of T by the poles is included only if F is the estimated force of the line itself.
 fn of_structure(
     data: &Data<'_>,
     record: usize,
@@ -216,8 +216,8 @@ fn of_structure(
     }
 }
 
-/// Derivatives of the predicted response by the transient parameters; their entries in `row` follow those of the
-/// structure.
+/// Derivatives of a record's predicted responses by the parameters of its transient; their entries in `row` follow
+/// those of the structure.
 fn of_transient(
     data: &Data<'_>,
     record: usize,

@@ -79,7 +79,8 @@ pub(super) fn of_forces(variances: &Variances) -> Vector3<Complex64> {
     Vector3::from_fn(|q, _| Complex64::from(variances.measured.get(q).copied().unwrap_or(0.0)))
 }
 
-/// FRF matrix sⁿ H of the measured responses at s, with their number n of time derivatives.
+/// FRF matrix sⁿ H between forces and measured responses of a record at s, with the number n of time derivatives that
+/// each response measures.
 pub(super) fn gain(data: &Data<'_>, record: usize, unknowns: &Unknowns, s: Complex64) -> Matrix3<Complex64> {
     let (responses, forces) = &data.axes[record];
     let mut gain = Matrix3::zeros();

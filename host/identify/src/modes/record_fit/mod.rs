@@ -161,8 +161,8 @@ fn least_squares(data: &Data<'_>, variances: &[Variances], unknowns: Unknowns) -
     is_found.then_some(found.point)
 }
 
-/// Result of the fit with its covariance B⁻¹ M B⁻¹. M is the covariance of the gradient of half the cost and B its
-/// curvature; the uncertainty of the estimated forces makes M larger than B.
+/// Result of the fit with its covariance B⁻¹ M B⁻¹. M is the covariance of the gradient of half the cost Σ eᴴ C⁻¹ e,
+/// and B is the curvature of half the cost; the uncertainty of the estimated forces makes M larger than B/2.
 fn finished(data: &Data<'_>, variances: &[Variances], mut unknowns: Unknowns) -> Option<Refined> {
     let directions = unknowns
         .structure

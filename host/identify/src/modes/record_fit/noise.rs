@@ -1,7 +1,9 @@
-//! Noise variances of the channels, estimated from the residual of a fit.
+//! Noise variances of the channels of a record, estimated from the residual of a modal fit to whole records.
 //!
-//! The residual e is Gaussian with covariance C = Σ_c v_c B_c. B_c is one diagonal entry for the noise of a response, and g gᴴ for the noise
-//! of a force with the column g of sⁿ H. So resonances in the residual indicate force noise. The likelihood is maximized by Fisher scoring: v = A⁻¹ b, A_cd = Σ tr(C⁻¹B_cC⁻¹B_d), b_c = Σ eᴴC⁻¹B_cC⁻¹e over the lines.
+//! The residual e is Gaussian with covariance C = Σ_c v_c B_c. B_c is one diagonal entry for the noise of a response,
+//! and g gᴴ for the noise of a force with the column g of sⁿ H. So resonances in the residual indicate force noise. The
+//! likelihood is maximized by Fisher scoring for the variances v_c: v = A⁻¹ b, A_cd = Σ tr(C⁻¹B_cC⁻¹B_d), b_c = Σ
+//! eᴴC⁻¹B_cC⁻¹e over the lines.
 
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use num_complex::Complex64;
@@ -34,11 +36,12 @@ const EIGENVALUE: f64 = 0.5;
 /// the rounding error.
 const RIDGE: f64 = 1e-12;
 
-/// Smallest start value of the noise variance of a force, relative to the mean square of its transform in the band. A
-/// choice.
+/// Smallest start value of the noise variance of a force channel, relative to the mean square of its transform in the
+/// band. A choice.
 const FORCE_START: f64 = 1e-6;
 
-/// Start values of the noise variances of a record: the whole residual is attributed to noise of the responses.
+/// Start values of the noise variances of a record: the whole residual is attributed to noise of the responses, and the
+/// variances of the forces start at their lower bounds.
 pub(super) fn start(data: &Data<'_>, record: usize, unknowns: &Unknowns) -> Variances {
     let spectra = &data.records[record];
     let mut variances = Variances {

@@ -18,7 +18,7 @@ pub struct ChannelNoise {
     pub percent: f64,
 }
 
-/// Noise variances of the channels of one record, per frequency line.
+/// Noise variances of the channels of one record, in each frequency line of their transforms.
 #[derive(Clone, Debug)]
 pub(super) struct Variances {
     /// Noise variances of the responses.

@@ -1,4 +1,4 @@
-//! Tables `[extension.NAME]`: names, keys and values are those of [`EffectSpec`].
+//! Check of the tables `[extension.NAME]` of a case: the names, keys and values that [`EffectSpec`] allows.
 
 use std::collections::BTreeMap;
 
