@@ -112,6 +112,10 @@ pub fn measure(recordings: &[Recording], settings: &MeasurementSettings) -> Resu
             ),
         });
     }
+    let has_periodic_force = groups
+        .iter()
+        .flat_map(|(excitation, members)| members.iter().map(|member| (*excitation, member)))
+        .any(|(excitation, channels)| test_plausibility::is_periodic(excitation, channels));
     let doubts: Vec<String> = groups
         .iter()
         .flat_map(|(excitation, members)| members.iter().map(|member| (*excitation, member)))
@@ -126,7 +130,7 @@ pub fn measure(recordings: &[Recording], settings: &MeasurementSettings) -> Resu
         .map_or(Path::new(""), |recording| &recording.path);
     let mut measurement = merged(path, measured)?;
     measurement.warnings.extend(doubts);
-    let of_table = test_plausibility::of_table(&measurement.table);
+    let of_table = test_plausibility::of_table(&measurement.table, has_periodic_force);
     measurement.warnings.extend(of_table);
     let slowest_hz = recordings
         .iter()

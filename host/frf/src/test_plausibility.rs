@@ -138,14 +138,25 @@ pub(super) fn of_channels(excitation: Excitation, channels: &TestChannels<'_>) -
     warnings
 }
 
-/// Appends a warning if every force consists of single frequency lines, as in a cut; true if so.
-fn has_lines(channels: &TestChannels<'_>, warnings: &mut Vec<String>) -> bool {
-    let sidecar = &channels.recording.sidecar;
+/// True if the forces of a record that is taken as random excitation consist of single frequency lines, as in a cut.
+/// Receptances from such a record are noise between the lines, and so are their signs.
+pub(super) fn is_periodic(excitation: Excitation, channels: &TestChannels<'_>) -> bool {
+    excitation == Excitation::Random && least_share_of_lines(channels) >= SHARE_OF_LINES
+}
+
+/// Least share of energy in single frequency lines over all forces of a record.
+fn least_share_of_lines(channels: &TestChannels<'_>) -> f64 {
     let shares = channels
         .forces
         .iter()
         .map(|(_, force)| share_of_lines(&force.samples));
-    let share = shares.fold(1.0, f64::min);
+    shares.fold(1.0, f64::min)
+}
+
+/// Appends a warning if every force consists of single frequency lines, as in a cut; true if so.
+fn has_lines(channels: &TestChannels<'_>, warnings: &mut Vec<String>) -> bool {
+    let sidecar = &channels.recording.sidecar;
+    let share = least_share_of_lines(channels);
     if share < SHARE_OF_LINES {
         return false;
     }
@@ -299,8 +310,9 @@ fn spike(samples: &[f64]) -> Option<usize> {
 }
 
 /// Warnings about measured receptances: a drive point that feeds energy in, a response that the force does not cause,
-/// and peaks beyond those of any machine.
-pub(super) fn of_table(table: &FrfTable) -> Vec<String> {
+/// and peaks beyond those of any machine. The sign of a drive point says nothing if a force was periodic
+/// (`has_periodic_force`): between its lines the receptance is noise.
+pub(super) fn of_table(table: &FrfTable, has_periodic_force: bool) -> Vec<String> {
     let frequency_hz = table.frequency_hz();
     let mut warnings = Vec::new();
     for entry in table.entries() {
@@ -327,7 +339,7 @@ pub(super) fn of_table(table: &FrfTable) -> Vec<String> {
                  sensor in {} (dead, loose, wrong channel), the cable, and the length of the record",
                 entry.response
             ));
-        } else if entry.response == entry.force && phase > INVERTED_PHASE {
+        } else if !has_periodic_force && entry.response == entry.force && phase > INVERTED_PHASE {
             warnings.push(format!(
                 "H{name} has the sign of an inverted sensor: its imaginary part is positive at {:.3} Hz, where a drive point takes up energy \
                  and has a negative one; if force and sensor sit at one point, one of them points against its axis: add --map \

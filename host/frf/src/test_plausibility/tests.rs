@@ -201,4 +201,18 @@ fn an_ordinary_cut_is_no_test_of_a_structure() {
             "{found}"
         );
     }
+    // An acceleration of −df/dt gives the receptance i/ω, which has the sign of an inverted sensor. In a cut the receptance
+    // between the lines is noise, and its sign says nothing: no second warning stands beside the first.
+    let rate_of = |signal: &[f64]| -> Vec<f64> {
+        let next = signal.iter().cycle().skip(1);
+        signal.iter().zip(next).map(|(now, next)| now - next).collect()
+    };
+    let found = said(force.clone(), rate_of(&force), Some(TestKind::Cutting)).unwrap();
+    assert!(
+        found.contains("periodic") && !found.contains("inverted"),
+        "{found}"
+    );
+    let (impacts, _) = tap();
+    let found = said(impacts.clone(), rate_of(&impacts), Some(TestKind::Hammer)).unwrap();
+    assert!(found.contains("inverted"), "{found}");
 }
