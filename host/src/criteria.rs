@@ -15,6 +15,10 @@ pub(crate) const LARGEST_FOLDING: f64 = 0.1;
 /// from folding, however small.
 pub(crate) const SMALL_FOLDING: f64 = 0.01;
 
+/// Largest ratio of the frequencies of a peak in two tables up to which it counts as the same peak, after a change of the tool. A third of the
+/// overhang of a tool changes its frequency by a factor of two; smaller changes are compared. Unfounded.
+pub(crate) const SAME_PEAK: f64 = 1.2;
+
 // Identification
 
 /// Relative difference of two frequencies up to which they belong to the same step of a step-sine test. Unfounded.

@@ -210,3 +210,70 @@ pub(crate) const LINE_ABOVE_NEIGHBOURS: f64 = 50.0;
 /// Smallest share of the energy of a force in single lines that makes it periodic. A random force has none, the force
 /// of a steady cut all but its noise. A choice.
 pub(crate) const SHARE_OF_LINES: f64 = 0.9;
+
+// Periodic excitation
+
+/// Smallest number of whole periods in a record of periodic excitation: two that may hold the transient, and two whose difference is the
+/// noise that the transient is compared with.
+pub(crate) const PERIODS_RECORDED_MIN: usize = 4;
+
+/// Largest distance of a line of a periodic force from its line of the transform, in line spacings. A line leaks the same fraction into its
+/// neighbours, and that fraction of the FRF is the error.
+pub(crate) const PERIOD_SHIFT: f64 = 1e-3;
+
+/// Standard deviations by which the period of a force must differ from a whole number of samples to be refused: Gaussian noise
+/// reaches it in one of 16 000 records.
+pub(crate) const PERIOD_SHIFT_ERRORS: f64 = 4.0;
+
+/// Smallest number of lines in the band with which a periodic force is taken for a multisine without being told. A sine has one, the force
+/// of a cut in a band of some tooth-passing frequencies a few. Unfounded.
+pub(crate) const MULTISINE_LINES_MIN: usize = 10;
+
+/// Energy of the difference between two consecutive periods of a force, as a multiple of its median over all pairs, from which the force
+/// changes there, as at its start and its end. The ratio of the noise energies of two periods of a hundred samples exceeds 2 in one of 1e4.
+/// Unfounded above that.
+pub(crate) const FORCE_CHANGE: f64 = 10.0;
+
+/// Smallest power of an excited line of a periodic force over the variance of its mean over the periods. Noise alone
+/// exceeds it with the probability e⁻¹⁶ per line.
+pub(crate) const LINE_ABOVE_NOISE: f64 = 16.0;
+
+/// Probability with which noise alone is taken for a transient, a distortion or a difference of realizations: once in a thousand tests, as
+/// in the bands of the project's rates.
+pub(crate) const FALSE_ALARM: f64 = 1e-3;
+
+/// Smallest distortion that is reported, relative to the response. Rounding in a file of five digits is as large.
+pub(crate) const LEAST_DISTORTION: f64 = 1e-5;
+
+/// Largest correlation of the spectra of two periodic forces that have different phases. The correlation of n lines of random phases exceeds
+/// c at one of the n independent shifts with the probability n·exp(−n c²): 1e-3 with 10 lines, 5e-11 with 30.
+pub(crate) const SAME_PHASES: f64 = 0.95;
+
+// Mass of the accelerometer
+
+/// Smallest number of lines between the half-power points of a peak from which its modal mass is estimated: one more than the two
+/// unknowns of a straight line.
+pub(crate) const PEAK_LINES_MIN: usize = 3;
+
+/// Mass of an accelerometer that is assumed for its effect if none is given, kg. Sensors for taps of tools weigh 0.5 to 10 g; a choice between.
+pub(crate) const ASSUMED_ACCELEROMETER_KG: f64 = 5e-3;
+
+/// Smallest relative shift of a peak by that mass that is warned of. Charts resolve the speed to 0.1 %, and lobes move with the frequency.
+pub(crate) const LEAST_PEAK_SHIFT: f64 = 1e-3;
+
+// Peaks of a receptance
+
+/// Smallest peak that is fitted in a comparison, as a fraction of the largest of the receptance. The limit from a peak is inversely
+/// proportional to it: lower peaks limit at ten times the depth.
+pub(crate) const LEAST_COMPARED_PEAK: f64 = 0.1;
+
+/// Standard deviations that the damping ratio and the size of a fitted peak must exceed. Gaussian noise exceeds both together in far fewer than
+/// one of 30 000 maxima.
+pub(crate) const PEAK_ABOVE_NOISE: f64 = 4.0;
+
+/// Smallest |H| of the lines of a fit of one peak, as a fraction of the peak. At the half the residual of other modes is still a straight line
+/// over the band, 1.7 half-power bandwidths. Unfounded.
+pub(crate) const FITTED_PART: f64 = 0.5;
+
+/// Smallest number of lines of a fit of one peak: its four complex unknowns, and as many for the scatter.
+pub(crate) const FITTED_LINES_MIN: usize = 8;

@@ -210,7 +210,7 @@ fn multiply(
 }
 
 /// Fourier transform of the real samples of a segment, with its buffers.
-struct Transform {
+pub(super) struct Transform {
     plan: Arc<dyn RealToComplex<f64>>,
     time: Vec<f64>,
     lines: Vec<Complex64>,
@@ -218,7 +218,7 @@ struct Transform {
 }
 
 impl Transform {
-    fn new(length: usize) -> Self {
+    pub(super) fn new(length: usize) -> Self {
         let plan = RealFftPlanner::new().plan_fft_forward(length);
         Self {
             time: plan.make_input_vec(),
@@ -230,7 +230,7 @@ impl Transform {
 
     /// Fourier transform of the weighted samples, with their mean subtracted first if `without_mean`, padded with zeros
     /// to the transform length.
-    fn of(&mut self, samples: &[f64], weights: &[f64], without_mean: bool) -> &[Complex64] {
+    pub(super) fn of(&mut self, samples: &[f64], weights: &[f64], without_mean: bool) -> &[Complex64] {
         let mean = if without_mean {
             samples.iter().sum::<f64>() / samples.len().max(1) as f64
         } else {

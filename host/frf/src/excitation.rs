@@ -13,6 +13,8 @@ pub enum Excitation {
     Hammer,
     /// Step sine: one phasor ratio response/force at each frequency step.
     StepSine,
+    /// Multisine or another signal of whole periods: averages over the periods, evaluated at the excited lines.
+    Multisine,
 }
 
 impl Excitation {
@@ -38,6 +40,7 @@ impl Excitation {
             Self::Sweep => "sweep",
             Self::Hammer => "hammer",
             Self::StepSine => "step-sine",
+            Self::Multisine => "multisine",
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Frequency response functions: measured from recordings, tabulated in a file, and interpolated between the lines of a
 //! table.
 //!
-//! Main types: [`measure`] turns recordings of shaker, hammer, sweep or step-sine tests into a [`Measurement`]
+//! Main types: [`measure`] turns recordings of shaker, multisine, hammer, sweep or step-sine tests into a [`Measurement`]
 //! (receptances with coherence and standard deviation; estimators H1, H2, their mean and the pseudo-inverse,
 //! [`Estimator`]); [`FrfTable`] holds receptances in m/N and reads and writes CSV and UFF 58, and reads the text tables
 //! of other programs; [`Interpolation`] evaluates a table between its lines.
@@ -39,6 +39,7 @@
 //! Of a structure, this crate uses only its directions and the axes of the feed: no modal model, no cutting force, no
 //! stability.
 
+mod accelerometer_mass;
 mod criteria;
 mod cross_spectra;
 mod error;
@@ -50,6 +51,10 @@ mod hammer;
 mod interpolation;
 mod measurement;
 mod measurement_settings;
+mod peak_fit;
+mod period;
+mod period_average;
+mod periodic_test;
 pub mod rational_fit;
 mod record_spectra;
 mod small_matrix;
@@ -64,6 +69,7 @@ mod test_plausibility;
 mod tool_tip;
 mod window;
 
+pub use accelerometer_mass::{PeakShift, peak_shift, without_accelerometer_mass};
 pub use error::FrfError;
 pub use estimate::Estimator;
 pub use excitation::Excitation;
@@ -71,6 +77,8 @@ pub use hammer::{HammerWindows, MeasuredImpact};
 pub use interpolation::Interpolation;
 pub use measurement::{Measurement, RecordingGroup, measure};
 pub use measurement_settings::MeasurementSettings;
+pub use peak_fit::{FittedPeak, fitted_peaks};
+pub use periodic_test::{DistortionLevel, PeriodicTest, ResponseDistortion};
 pub use record_spectra::{ChannelLines, RecordSpectra, record_spectra};
 pub use table::{Frf, FrfTable};
 pub use table_found::ImportedTable;

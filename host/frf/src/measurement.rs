@@ -1,9 +1,14 @@
 //! Measurement of receptances from recordings, with coherence and random error.
 
+mod distortion;
 mod folding;
 #[cfg(test)]
 mod folding_tests;
+mod periodic;
+#[cfg(test)]
+mod periodic_tests;
 mod recording_group;
+mod sensor_mass;
 mod steady;
 mod stepped;
 mod struck;
@@ -27,9 +32,12 @@ use super::measurement_settings::MeasurementSettings;
 use super::table::{Frf, FrfTable};
 use super::test_channels::TestChannels;
 use super::test_plausibility;
+use periodic::{periodic, recognized};
 use quietcut_model::structure::Direction;
+use quietcut_numerics::statistics::{NINETY_PERCENT, student_ninety_percent};
 use quietcut_recording::Recording;
 use recording_group::{MeasuredEntry, MeasuredGroup, receptances};
+use sensor_mass::{accelerated, roving, sensor_mass};
 use steady::steady;
 use stepped::stepped;
 use struck::struck;
@@ -46,6 +54,8 @@ pub struct Measurement {
     /// One value per entry of the table. False if its standard deviation is meaningless, since it comes from fewer than
     /// three impacts of a hammer.
     pub has_deviation: Vec<bool>,
+    /// Degrees of freedom of the standard deviations of each entry of the table, if these are few.
+    pub freedoms: Vec<Option<usize>>,
     /// Largest relative error of each entry of the table at each frequency by aliasing of content above half the sample
     /// rate. It is estimated for hammer tests only, and 0 for all other excitation.
     pub folding: Vec<Vec<f64>>,
@@ -53,6 +63,18 @@ pub struct Measurement {
     pub groups: Vec<RecordingGroup>,
     /// Warnings for the user, such as of double impacts or of responses that had not settled.
     pub warnings: Vec<String>,
+}
+
+impl Measurement {
+    /// Half the width of the 90 % interval of an entry of the table, in its standard deviations: 1.645, or more where few degrees of freedom
+    /// determine these.
+    pub fn ninety_percent(&self, entry: usize) -> f64 {
+        self.freedoms
+            .get(entry)
+            .copied()
+            .flatten()
+            .map_or(NINETY_PERCENT, student_ninety_percent)
+    }
 }
 
 /// Measures receptances, m/N, from recordings.
@@ -69,12 +91,13 @@ pub fn measure(recordings: &[Recording], settings: &MeasurementSettings) -> Resu
         .iter()
         .map(|recording| TestChannels::of(recording, &settings.channels))
         .collect::<Result<Vec<_>, _>>()?;
+    let (accelerated, roving) = (accelerated(&channels), roving(&channels));
     let mut groups: Vec<(Excitation, Vec<TestChannels<'_>>)> = Vec::new();
     for channels in channels {
-        let excitation = settings
+        let stated = settings
             .excitation
             .unwrap_or_else(|| Excitation::of(&channels.recording.sidecar));
-        if matches!(excitation, Excitation::Random | Excitation::Hammer)
+        if matches!(stated, Excitation::Random | Excitation::Hammer)
             && let Some(what) = test_plausibility::swapped(&channels)
         {
             return Err(FrfError::Content {
@@ -82,6 +105,13 @@ pub fn measure(recordings: &[Recording], settings: &MeasurementSettings) -> Resu
                 what,
             });
         }
+        let is_multisine =
+            settings.excitation.is_none() && stated == Excitation::Random && recognized(&channels, settings);
+        let excitation = if is_multisine {
+            Excitation::Multisine
+        } else {
+            stated
+        };
         let same = groups.iter_mut().find(|(other, members)| {
             members[0].force_directions() == channels.force_directions()
                 && members[0].response_kinds() == channels.response_kinds()
@@ -145,6 +175,8 @@ pub fn measure(recordings: &[Recording], settings: &MeasurementSettings) -> Resu
         measurement.table =
             without_exponential_window(&measurement.table, &mut measurement.deviation, exponential_s)?;
     }
+    measurement.warnings.extend(roving);
+    sensor_mass(&mut measurement, settings.accelerometer_mass_kg, &accelerated)?;
     Ok(measurement)
 }
 
@@ -199,6 +231,7 @@ fn merged(path: &Path, measured: Vec<MeasuredGroup>) -> Result<Measurement, FrfE
         table: FrfTable::new(path, vec![0.0], vec![placeholder()])?,
         deviation: Vec::new(),
         has_deviation: Vec::new(),
+        freedoms: Vec::new(),
         folding: Vec::new(),
         groups: Vec::new(),
         warnings: Vec::new(),
@@ -231,6 +264,7 @@ fn merged(path: &Path, measured: Vec<MeasuredGroup>) -> Result<Measurement, FrfE
             measurement.deviation.push(common(&deviation));
             measurement.folding.push(common(&folding));
             measurement.has_deviation.push(has_deviation);
+            measurement.freedoms.push(group.group.freedoms);
         }
         measurement.groups.push(group.group);
         measurement.warnings.extend(group.warnings);
@@ -279,6 +313,8 @@ fn measure_group(
         left_out_hz: Vec::new(),
         least_singular: 1.0,
         impacts: None,
+        freedoms: None,
+        periodic: None,
     };
     let mut warnings: Vec<String> = members
         .iter()
@@ -286,6 +322,9 @@ fn measure_group(
         .collect();
     if excitation == Excitation::StepSine {
         return stepped(group, members, settings, warnings);
+    }
+    if excitation == Excitation::Multisine {
+        return periodic(group, members, settings, warnings);
     }
     let counts = ChannelCounts {
         forces: first.forces.len(),

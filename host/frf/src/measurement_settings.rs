@@ -29,6 +29,10 @@ pub struct MeasurementSettings {
     pub channels: Vec<String>,
     /// Segment length and exponential window of hammer tests.
     pub hammer: HammerWindows,
+    /// Mass of the accelerometer at the drive point, kg, whose effect is removed; `None` if it is not known.
+    pub accelerometer_mass_kg: Option<f64>,
+    /// Period of periodic excitation, s; `None` finds it from the force.
+    pub period_s: Option<f64>,
     /// Force level to evaluate in a step-sine test with several levels, N; `None` if the test has one level.
     pub force_n: Option<f64>,
 }
@@ -44,6 +48,8 @@ impl Default for MeasurementSettings {
             band_hz: None,
             channels: Vec::new(),
             hammer: HammerWindows::default(),
+            accelerometer_mass_kg: None,
+            period_s: None,
             force_n: None,
         }
     }

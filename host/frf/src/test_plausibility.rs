@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 
 use realfft::RealFftPlanner;
 
-use quietcut_recording::{Channel, ChannelSummary, Quantity, RecordedCut, TestKind};
+use quietcut_recording::{Channel, ChannelSummary, Quantity, RecordedCut, Recording, TestKind};
 
 use super::criteria::{
     HUM_SHARE, INVERTED_PHASE, LINE_ABOVE_NEIGHBOURS, ONE_SIGN, PLAUSIBLE_RECEPTANCE, PULSE_SHORTER,
@@ -131,7 +131,10 @@ pub(super) fn of_channels(excitation: Excitation, channels: &TestChannels<'_>) -
         }
     }
     let is_periodic = excitation == Excitation::Random && has_lines(channels, &mut warnings);
-    let by_tone = matches!(excitation, Excitation::Sweep | Excitation::StepSine);
+    let by_tone = matches!(
+        excitation,
+        Excitation::Sweep | Excitation::StepSine | Excitation::Multisine
+    );
     if !is_periodic && !by_tone {
         warnings.extend(hum(channels));
     }
@@ -155,26 +158,30 @@ fn least_share_of_lines(channels: &TestChannels<'_>) -> f64 {
 
 /// Appends a warning if every force consists of single frequency lines, as in a cut; true if so.
 fn has_lines(channels: &TestChannels<'_>, warnings: &mut Vec<String>) -> bool {
-    let sidecar = &channels.recording.sidecar;
     let share = least_share_of_lines(channels);
     if share < SHARE_OF_LINES {
         return false;
     }
-    let is_cut = sidecar.kind == Some(TestKind::Cutting)
-        || sidecar.cut.is_some_and(|cut| cut != RecordedCut::default())
-        || channels.recording.channel("tacho").is_some();
-    let remedy = if is_cut {
+    let remedy = if is_cut(channels.recording) {
         "an ordinary cut shows nothing between the tooth passings, where these receptances are noise: compare the cut with a case by quietcut \
          diagnose CASE REC, or look for chatter by quietcut replay REC"
     } else {
-        "between its lines nothing is excited, and the receptances there are noise: for a stepped sine say --excitation step-sine, for a cut \
-         use quietcut diagnose CASE REC or quietcut replay REC"
+        "between its lines nothing is excited, and the receptances there are noise: for a stepped sine say --excitation step-sine, for a \
+         multisine of whole periods --excitation multisine, for a cut use quietcut diagnose CASE REC or quietcut replay REC"
     };
     warnings.push(format!(
         "the force has no impact and is no broad-band force, but periodic: {:.0} % of its energy is in single lines; {remedy}",
         100.0 * share
     ));
     true
+}
+
+/// True if a recording is of a cut: by its kind, its parameters or its tachometer.
+pub(super) fn is_cut(recording: &Recording) -> bool {
+    let sidecar = &recording.sidecar;
+    sidecar.kind == Some(TestKind::Cutting)
+        || sidecar.cut.is_some_and(|cut| cut != RecordedCut::default())
+        || recording.channel("tacho").is_some()
 }
 
 /// Largest number of samples of a record that are searched for frequency lines (its middle) and for hum (its start); a

@@ -10,7 +10,7 @@ use super::{Error, Output, Range, non_negative, positive};
 use crate::case::Case;
 use crate::recording::Quantity;
 use crate::simulate::Effects;
-use crate::simulate::rig::{Rig, Signal};
+use crate::simulate::rig::{MultisineLines, Rig, Signal};
 use crate::structure::{Direction, Structure};
 
 /// Options of a simulated vibration test: excitation, force levels, durations.
@@ -24,11 +24,11 @@ pub(super) struct Experiment {
     #[arg(long, value_name = "x|y|z")]
     direction: Option<Direction>,
     /// Frequencies in Hz, first:last:count or first:last: the steps of step-sine, the first and last frequency of a
-    /// sweep, or the tones of a shaker.
+    /// sweep or a multisine, or the tones of a shaker.
     #[arg(long, value_name = "R", value_parser = Range::positive, allow_negative_numbers = true)]
     frequency_hz: Option<Range>,
-    /// Force in N: amplitude of a sine, peak of an impact, or static force before a free decay. With commas: the levels
-    /// of step-sine, or the first and last amplitude of a shaker.
+    /// Force in N: amplitude of a sine, root mean square of a multisine, peak of an impact, or static force before a free
+    /// decay. With commas: the levels of step-sine, or the first and last amplitude of a shaker.
     #[arg(long, value_name = "F,…", value_parser = positive, allow_negative_numbers = true, value_delimiter = ',')]
     force_n: Vec<f64>,
     /// Duration of the excitation at each step of step-sine, in s.
@@ -43,6 +43,12 @@ pub(super) struct Experiment {
     /// Sweep downwards, from the last frequency of --frequency-hz to the first.
     #[arg(long)]
     backward: bool,
+    /// Period of a multisine in s; its lines are the multiples of the reciprocal.
+    #[arg(long, value_name = "T", value_parser = positive, allow_negative_numbers = true)]
+    period_s: Option<f64>,
+    /// Lines of a multisine that are excited. Nonlinear distortion shows at the others.
+    #[arg(long, value_name = "KIND", value_enum, default_value_t)]
+    lines: LineKind,
     /// Number of hammer impacts.
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u16).range(1..))]
     impacts: u16,
@@ -64,6 +70,8 @@ pub(super) enum ExperimentKind {
     Shaker,
     /// Stepped sine: one frequency after the other at each force level.
     StepSine,
+    /// Shaker with a periodic signal of equal lines and random phases, which come from --seed.
+    Multisine,
     /// Sine whose frequency changes linearly with time.
     Sweep,
     /// Hammer impacts.
@@ -74,6 +82,18 @@ pub(super) enum ExperimentKind {
     Porous,
     /// Cut at a spindle speed that changes linearly. An identification needs recordings at three or more immersions.
     SpeedSweep,
+}
+
+/// Lines of a multisine.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+enum LineKind {
+    /// All lines of the band.
+    #[default]
+    All,
+    /// Odd lines: even distortion shows between them.
+    Odd,
+    /// Odd lines without one of each three: even and odd distortion show between them.
+    OddSparse,
 }
 
 /// Options of `quietcut simulate` that a simulated vibration test shares with a simulated cut.
@@ -180,6 +200,9 @@ fn direction(options: &Experiment, structure: &Structure) -> Result<Direction, S
         .ok_or_else(|| "the structure has no direction in which a force can act".into())
 }
 
+/// Default number of periods of a multisine. A choice: some for the transient, and six for the scatter.
+const PERIODS: f64 = 8.0;
+
 /// Default sampling rate of a simulated vibration test in Hz: the smallest power of two of at least 20 times the
 /// highest excited frequency, so that the eighth harmonic of this frequency lies below the Nyquist frequency. The
 /// highest excited frequency is that of `--frequency-hz`, 30 Hz without this option; an impact of duration T excites up
@@ -212,6 +235,27 @@ fn signal(kind: ExperimentKind, options: &Experiment, common: &Common<'_>) -> Re
                 .ok_or_else(|| Error::input("--seconds is needed for a shaker"))?;
             let levels = [force[0], force[force.len() - 1]];
             Signal::tones(&frequencies()?.values(), levels, seconds, common.seed)
+        }
+        ExperimentKind::Multisine => {
+            let range = frequencies()?;
+            let period_s = options
+                .period_s
+                .ok_or_else(|| Error::input("--period-s is needed for a multisine, such as 4"))?;
+            let rms_n = force(1..=1, "a multisine has one root mean square")?[0];
+            let lines = match options.lines {
+                LineKind::All => MultisineLines::All,
+                LineKind::Odd => MultisineLines::Odd,
+                LineKind::OddSparse => MultisineLines::OddSparse,
+            };
+            let seconds = common.seconds.unwrap_or(PERIODS * period_s);
+            let ends = [range.first().min(range.last()), range.first().max(range.last())];
+            let signal = Signal::multisine(ends, period_s, lines, rms_n, seconds, common.seed);
+            if matches!(&signal, Signal::Tones { tones, .. } if tones.is_empty()) {
+                return Err(Error::input(format!(
+                    "--frequency-hz {range}: no line of a period of {period_s} s lies in this band; take a longer period"
+                )));
+            }
+            signal
         }
         ExperimentKind::StepSine => {
             let levels = force(1..=1000, "one or more levels are needed")?;

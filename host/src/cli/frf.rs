@@ -2,6 +2,9 @@
 
 mod answer;
 mod args;
+mod compare;
+mod figure;
+mod multisine_answer;
 
 use std::path::PathBuf;
 
@@ -22,6 +25,9 @@ use args::{FileFormat, OutputFile};
 
 /// Runs the verb.
 pub fn run(args: Args) -> Result<(), Error> {
+    if let [before, after] = args.compare.as_slice() {
+        return compare::run(&args, before, after);
+    }
     for target in &args.out {
         let inputs = args.recordings.iter().chain(&args.housing).chain(&args.tip);
         keep_inputs(inputs.map(PathBuf::as_path), &target.path)?;

@@ -6,6 +6,7 @@ pub mod comparison;
 pub mod diagnosis;
 pub mod digits;
 pub mod frf_chart;
+pub mod frf_comparison_chart;
 pub mod lobe_chart;
 pub mod lobes_change;
 pub mod marks;

@@ -6,6 +6,7 @@ use crate::criteria::IMPACTS_MIN;
 use crate::estimate::FrfLine;
 use crate::excitation::Excitation;
 use crate::hammer::MeasuredImpact;
+use crate::periodic_test::PeriodicTest;
 use crate::table::Frf;
 use crate::test_channels::TestChannels;
 use quietcut_model::structure::Direction;
@@ -29,6 +30,10 @@ pub struct RecordingGroup {
     pub least_singular: f64,
     /// Single impacts (used) and double impacts (left out) of a hammer test; `None` for other excitation.
     pub impacts: Option<(Vec<MeasuredImpact>, Vec<MeasuredImpact>)>,
+    /// Degrees of freedom of the standard deviations, if these are few; `None` for normal quantiles.
+    pub freedoms: Option<usize>,
+    /// Periods, realizations and distortion of a test with periodic excitation; `None` for other excitation.
+    pub periodic: Option<PeriodicTest>,
 }
 
 impl RecordingGroup {

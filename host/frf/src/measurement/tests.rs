@@ -11,7 +11,7 @@ use super::*;
 use crate::{HammerWindows, Window};
 use quietcut_recording::{Channel, Quantity, Sidecar, TestKind};
 
-const RATE: f64 = 512.0;
+pub(super) const RATE: f64 = 512.0;
 
 /// A mode: natural frequency, damping ratio, modal mass, mode shape in x, y, z.
 struct Mode {
@@ -39,7 +39,7 @@ const MODES: [Mode; 2] = [
 
 /// Receptance H_pq(f) of the structure times sinc²(f/rate): the factor between the spectrum of the samples and that of a force that is linear
 /// between them.
-fn receptance(hertz: f64, p: usize, q: usize) -> Complex64 {
+pub(super) fn receptance(hertz: f64, p: usize, q: usize) -> Complex64 {
     let omega = TAU * hertz;
     let half = std::f64::consts::PI * hertz / RATE;
     let linear = (half.sin() / half).powi(2);
@@ -82,13 +82,13 @@ fn displacements(forces: &[Vec<f64>; 3]) -> [Vec<f64>; 3] {
     moved
 }
 
-fn random(seed: u64) -> ChaCha8Rng {
+pub(super) fn random(seed: u64) -> ChaCha8Rng {
     println!("seed {seed}");
     ChaCha8Rng::seed_from_u64(seed)
 }
 
 /// Random force with little power near half the sampling rate: white noise after a two-pole low pass.
-fn force_noise(random: &mut ChaCha8Rng, samples: usize, size: f64) -> Vec<f64> {
+pub(super) fn force_noise(random: &mut ChaCha8Rng, samples: usize, size: f64) -> Vec<f64> {
     let (mut a, mut b) = (0.0, 0.0);
     (0..samples)
         .map(|_| {
@@ -112,7 +112,12 @@ fn with_noise(signal: &[f64], part: f64, random: &mut ChaCha8Rng) -> Vec<f64> {
 }
 
 /// A recording of forces, and of displacements with noise; a force that is zero throughout has no channel.
-fn record(kind: TestKind, forces: [Vec<f64>; 3], noise: f64, random: &mut ChaCha8Rng) -> Recording {
+pub(super) fn record(
+    kind: TestKind,
+    forces: [Vec<f64>; 3],
+    noise: f64,
+    random: &mut ChaCha8Rng,
+) -> Recording {
     let moved = displacements(&forces);
     let channel = |name: &str, quantity, samples| Channel {
         name: name.into(),
@@ -145,7 +150,7 @@ fn record(kind: TestKind, forces: [Vec<f64>; 3], noise: f64, random: &mut ChaCha
     }
 }
 
-fn along_y(force: Vec<f64>) -> [Vec<f64>; 3] {
+pub(super) fn along_y(force: Vec<f64>) -> [Vec<f64>; 3] {
     let rest = vec![0.0; force.len()];
     [rest.clone(), force, rest]
 }
@@ -158,7 +163,7 @@ fn in_band() -> MeasurementSettings {
 }
 
 /// Largest error of a measured receptance, as a fraction of the peak of the true receptance.
-fn error(measurement: &Measurement, name: &str) -> f64 {
+pub(super) fn error(measurement: &Measurement, name: &str) -> f64 {
     let entry = measurement
         .table
         .entries()

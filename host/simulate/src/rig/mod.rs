@@ -1,6 +1,7 @@
 //! Virtual test rigs: a structure excited by a shaker, by hammer impacts or by a released static pull, and the sensors
 //! that record it.
 
+mod multisine;
 mod noise;
 mod signal;
 
@@ -9,6 +10,7 @@ mod tests;
 
 use std::path::Path;
 
+pub use multisine::MultisineLines;
 pub use noise::Noise;
 pub use signal::{Impact, Signal, Step};
 

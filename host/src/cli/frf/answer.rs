@@ -6,9 +6,9 @@ use std::path::PathBuf;
 use serde::Serialize;
 
 use super::args::{Args, Method};
+use super::multisine_answer::MultisineAnswer;
 use crate::frf::{FrfTable, Measurement, ModeRatio, RecordingGroup};
 use crate::report::digits::significant;
-use quietcut_numerics::statistics::NINETY_PERCENT;
 
 /// Output of `quietcut frf --json`.
 #[derive(Serialize)]
@@ -37,6 +37,8 @@ struct ColumnsAnswer {
     left_out_hz: Vec<f64>,
     #[serde(rename = "blows", skip_serializing_if = "Option::is_none")]
     impacts: Option<ImpactCounts>,
+    #[serde(flatten)]
+    multisine: Option<MultisineAnswer>,
 }
 
 #[derive(Serialize)]
@@ -144,6 +146,9 @@ impl FrfOutput {
                 );
             }
         }
+        for part in self.parts.iter().filter_map(|part| part.multisine.as_ref()) {
+            text += &part.text();
+        }
         for ratio in &self.calibration {
             let _ = write!(
                 text,
@@ -170,6 +175,7 @@ impl ColumnsAnswer {
             averages: part.averages,
             least_singular_value: part.least_singular,
             left_out_hz: part.left_out_hz.clone(),
+            multisine: part.periodic.as_ref().map(MultisineAnswer::new),
             impacts: part.impacts.as_ref().map(|(used, double)| ImpactCounts {
                 used: used.len(),
                 double_s: double.iter().map(|impact| impact.time_s).collect(),
@@ -196,9 +202,10 @@ impl ReceptanceAnswer {
         } else {
             0.0
         };
-        // Half-width of the 90 % interval of the peak magnitude: the root of the sum of squares of 1.645 standard
-        // deviations of the random error and of the largest error by aliasing, which does not average out.
-        let half = (NINETY_PERCENT * relative).hypot(measurement.folding[index][at]) * size(at);
+        // Half-width of the 90 % interval of the peak magnitude: the root of the sum of squares of the 90 %
+        // interval of the random error and of the largest error by aliasing, which does not average out.
+        let half =
+            (measurement.ninety_percent(index) * relative).hypot(measurement.folding[index][at]) * size(at);
         Self {
             name: entry.name(),
             peak_hz: table.frequency_hz()[at],

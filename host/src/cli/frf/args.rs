@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use crate::cli::range::non_negative_ends;
 use crate::cli::segment::RecordedSegment;
-use crate::cli::{Endings, Output, finite, positive};
+use crate::cli::{Endings, Output, finite, non_negative, positive};
 use crate::file;
 use crate::frf::{Estimator, Excitation, HammerWindows, MeasurementSettings, Window};
 
@@ -18,8 +18,12 @@ use crate::frf::{Estimator, Excitation, HammerWindows, MeasurementSettings, Wind
 )]
 pub struct Args {
     /// The recordings: CSV, UFF 58, WAV or MAT.
-    #[arg(value_name = "REC", required = true)]
+    #[arg(value_name = "REC", required_unless_present = "compare")]
     pub(super) recordings: Vec<PathBuf>,
+    /// Instead of recordings, compare the peaks of two tables of receptances, such as before and after a change of the tool:
+    /// frequency, damping and size with 90 % intervals. --out draws both.
+    #[arg(long, value_names = ["BEFORE", "AFTER"], num_args = 2, conflicts_with = "recordings")]
+    pub(super) compare: Vec<PathBuf>,
     /// Table or chart to write; the ending sets the format: csv, uff, svg or html. May be repeated.
     #[arg(long, value_name = "FILE", value_parser = OutputFile::parse)]
     pub(super) out: Vec<OutputFile>,
@@ -50,6 +54,12 @@ pub struct Args {
     /// mode; the written receptances have that damping taken off again.
     #[arg(long, value_name = "TAU", value_parser = positive, allow_negative_numbers = true)]
     pub(super) exponential_window_s: Option<f64>,
+    /// Period in s of a multisine or of another signal that repeats. Default: found from the force of a shaker.
+    #[arg(long, value_name = "T", value_parser = positive, allow_negative_numbers = true)]
+    pub(super) period_s: Option<f64>,
+    /// Mass in g of the accelerometer at the drive point; its effect is removed from the receptances. 0 for a sensor without contact.
+    #[arg(long, value_name = "M", value_parser = non_negative, allow_negative_numbers = true)]
+    pub(super) accelerometer_mass_g: Option<f64>,
     /// Force level in N to use where a step-sine test has several levels.
     #[arg(long, value_name = "F", value_parser = positive, allow_negative_numbers = true)]
     pub(super) force_n: Option<f64>,
@@ -83,6 +93,7 @@ pub(super) enum ExcitationKind {
     Sweep,
     Hammer,
     StepSine,
+    Multisine,
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
@@ -138,6 +149,7 @@ impl Args {
                 ExcitationKind::Sweep => Excitation::Sweep,
                 ExcitationKind::Hammer => Excitation::Hammer,
                 ExcitationKind::StepSine => Excitation::StepSine,
+                ExcitationKind::Multisine => Excitation::Multisine,
             }),
             estimator: match self.method {
                 Method::H1 => Estimator::H1,
@@ -158,6 +170,8 @@ impl Args {
                 segment_s: None,
                 exponential_s: self.exponential_window_s,
             },
+            accelerometer_mass_kg: self.accelerometer_mass_g.map(|grams| 1e-3 * grams),
+            period_s: self.period_s,
             force_n: self.force_n,
         }
     }

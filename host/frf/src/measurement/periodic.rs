@@ -1,0 +1,282 @@
+//! Receptances of periodic excitation: best linear approximation with the variances of noise and of nonlinear distortion.
+//!
+//! Robust method of Pintelon and Schoukens, System Identification, 2nd ed. (2012), ch. 4: the scatter over the periods of one realization is
+//! noise, the scatter over realizations with other random phases is noise and nonlinear distortion.
+
+use num_complex::Complex64;
+
+use super::distortion::distortion;
+use super::recording_group::{MeasuredGroup, RecordingGroup, receptances};
+use crate::criteria::{MULTISINE_LINES_MIN, SAME_FORCE, SAME_PHASES};
+use crate::error::FrfError;
+use crate::estimate::{Estimator, FrfLine};
+use crate::measurement_settings::{MeasurementSettings, band};
+use crate::period::period;
+use crate::period_average::{PeriodAverage, period_average};
+use crate::periodic_test::PeriodicTest;
+use crate::small_matrix::ZERO;
+use crate::test_channels::TestChannels;
+use crate::test_plausibility::is_cut;
+use quietcut_recording::TestKind;
+
+/// True if the force of a shaker is periodic with several lines in the band to evaluate, so that averages over periods replace windows.
+pub(in crate::measurement) fn recognized(
+    channels: &TestChannels<'_>,
+    settings: &MeasurementSettings,
+) -> bool {
+    let ([(_, force)], recording) = (&channels.forces[..], channels.recording) else {
+        return false;
+    };
+    if !matches!(recording.sidecar.kind, Some(TestKind::Shaker) | None) || is_cut(recording) {
+        return false;
+    }
+    if settings.period_s.is_some() {
+        return true;
+    }
+    let Ok(samples) = period(&force.samples, None) else {
+        return false;
+    };
+    let lines = band(settings, recording.sample_rate_hz, samples);
+    period_average(&force.samples, &[], samples, lines, &[])
+        .is_some_and(|average| average.is_excited.iter().filter(|is| **is).count() >= MULTISINE_LINES_MIN)
+}
+
+/// The stated period in samples; an error if it is no whole number.
+fn stated_samples(
+    channels: &TestChannels<'_>,
+    settings: &MeasurementSettings,
+) -> Result<Option<usize>, String> {
+    let Some(seconds) = settings.period_s else {
+        return Ok(None);
+    };
+    let rate = channels.recording.sample_rate_hz;
+    let samples = seconds * rate;
+    // A period that is written with six digits.
+    if (samples - samples.round()).abs() > 1e-5 * samples || samples.round() < 2.0 {
+        return Err(format!(
+            "a period of {seconds} s is {samples:.3} samples at {rate} Hz; a whole number of two or more is needed"
+        ));
+    }
+    Ok(Some(samples.round() as usize))
+}
+
+/// Measures the receptances of a group of recordings with periodic excitation, at the excited lines.
+pub(in crate::measurement) fn periodic(
+    mut group: RecordingGroup,
+    members: &[TestChannels<'_>],
+    settings: &MeasurementSettings,
+    mut warnings: Vec<String>,
+) -> Result<MeasuredGroup, FrfError> {
+    let first = &members[0];
+    let rate = first.recording.sample_rate_hz;
+    let mut samples = None;
+    let mut averages: Vec<PeriodAverage> = Vec::with_capacity(members.len());
+    for channels in members {
+        let refused = |what: String| FrfError::Content {
+            path: channels.recording.path.clone(),
+            what,
+        };
+        let force = channels.only_force("a record of periodic excitation")?;
+        let stated = stated_samples(channels, settings).map_err(refused)?;
+        let found = period(&force.samples, stated).map_err(|reason| refused(reason.sentence(rate)))?;
+        let common = *samples.get_or_insert(found);
+        if found != common {
+            return Err(refused(format!(
+                "a period of {found} samples, but {} has {common}; recordings that are averaged must have one period",
+                first.recording.path.display()
+            )));
+        }
+        let responses: Vec<&[f64]> = channels.signals().split_off(1);
+        let average = period_average(
+            &force.samples,
+            &responses,
+            found,
+            band(settings, rate, found),
+            &[],
+        )
+        .ok_or_else(|| {
+            refused(format!(
+                "the force changes from period to period; fewer than two periods of {found} samples repeat"
+            ))
+        })?;
+        if !average.is_settled {
+            warnings.push(format!(
+                "{}: the response had not settled: it changes between the last periods by more than the noise, which is in the interval; record \
+                 more periods",
+                channels.recording.path.display()
+            ));
+        }
+        averages.push(average);
+    }
+    let refused = |what: String| FrfError::Content {
+        path: first.recording.path.clone(),
+        what,
+    };
+    if settings.estimator != Estimator::H1 {
+        warnings.push(
+            "--method has no effect on periodic excitation, where averages over periods are free of the bias by noise"
+                .into(),
+        );
+    }
+    if settings.resolution_hz.is_some() {
+        warnings.push(
+            "--resolution-hz has no effect on periodic excitation: its lines are those of the force; --excitation random averages over them"
+                .into(),
+        );
+    }
+    let excited = common_lines(&averages).map_err(refused)?;
+    warnings.extend(levels_differ(&averages));
+    let realizations = realizations(&averages);
+    if realizations > 1 && realizations < averages.len() {
+        // The scatter over recordings of which some share their phases is no variance of the distortion.
+        return Err(refused(format!(
+            "{} recordings with {realizations} different sets of phases; take one recording of each realization, or only repetitions of one",
+            averages.len()
+        )));
+    }
+    if averages.len() > 1 && realizations == 1 {
+        warnings.push(
+            "all recordings have the same phases, so that their nonlinear distortion is the same and in no interval; take another realization \
+             of random phases for each"
+                .into(),
+        );
+    }
+    let spacing_hz = rate / samples.unwrap_or(1) as f64;
+    let lines = lines(&averages, &excited, spacing_hz, first.responses.len());
+    let test = PeriodicTest {
+        period_s: 1.0 / spacing_hz,
+        period_samples: samples.unwrap_or(0),
+        used: averages.iter().map(|average| average.used).collect(),
+        dropped: averages.iter().map(|average| average.dropped).collect(),
+        realizations,
+        distortions: distortion(&averages, &excited, &lines, first, realizations),
+    };
+    warnings.extend(test.warning());
+    group.averages = averages.iter().map(|average| average.used as f64).sum();
+    group.freedoms = Some(freedoms(&averages));
+    group.periodic = Some(test);
+    Ok(receptances(group, &lines, first, warnings))
+}
+
+/// Degrees of freedom of the deviations: two for each realization or, with one recording, for each period, less one.
+fn freedoms(averages: &[PeriodAverage]) -> usize {
+    match averages {
+        [only] => 2 * (only.used - 1),
+        several => 2 * (several.len() - 1),
+    }
+}
+
+/// Indices of the lines that all recordings excite. An error if these are fewer than half of those of any.
+fn common_lines(averages: &[PeriodAverage]) -> Result<Vec<usize>, String> {
+    let count = |average: &PeriodAverage| average.is_excited.iter().filter(|is| **is).count();
+    let most = averages.iter().map(count).max().unwrap_or(0);
+    let lines = averages.first().map_or(0, |average| average.is_excited.len());
+    let common: Vec<usize> = (0..lines)
+        .filter(|&line| averages.iter().all(|average| average.is_excited[line]))
+        .collect();
+    if common.is_empty() || 2 * common.len() < most {
+        return Err(format!(
+            "of {most} excited lines the recordings have {} in common; realizations of a multisine must excite the same lines in the band",
+            common.len()
+        ));
+    }
+    Ok(common)
+}
+
+/// Warning of recordings with different force levels.
+fn levels_differ(averages: &[PeriodAverage]) -> Option<String> {
+    let level = |average: &PeriodAverage| average.force.iter().map(|u| u.norm_sqr()).sum::<f64>().sqrt();
+    let levels: Vec<f64> = averages.iter().map(level).collect();
+    let least = levels.iter().copied().fold(f64::INFINITY, f64::min);
+    let most = levels.iter().copied().fold(0.0, f64::max);
+    (most > SAME_FORCE * least).then(|| {
+        format!(
+            "the forces of the recordings differ by a factor of {:.2}: the best linear approximation of a nonlinear structure is another for \
+             each level",
+            most / least
+        )
+    })
+}
+
+/// Number of different sets of phases among the recordings, whatever their shifts in time.
+fn realizations(averages: &[PeriodAverage]) -> usize {
+    let mut different: Vec<&PeriodAverage> = Vec::new();
+    for average in averages {
+        if !different.iter().any(|other| have_same_phases(other, average)) {
+            different.push(average);
+        }
+    }
+    different.len()
+}
+
+/// True if two forces are the same signal at different times: their correlation over all shifts in time exceeds [`SAME_PHASES`].
+fn have_same_phases(a: &PeriodAverage, b: &PeriodAverage) -> bool {
+    let products: Vec<(f64, Complex64)> = (0..a.force.len())
+        .filter(|&line| a.is_excited[line] && b.is_excited[line])
+        .map(|line| ((a.first_line + line) as f64, a.force[line] * b.force[line].conj()))
+        .collect();
+    let whole: f64 = products.iter().map(|(_, product)| product.norm()).sum();
+    let highest = products.last().map_or(1.0, |(line, _)| *line);
+    // Sixteen shifts per period of the highest line: half a shift turns a line by 0.2 rad at most, which costs 2 % of its part.
+    let shifts = (16.0 * highest).ceil() as usize;
+    (0..shifts).any(|shift| {
+        let turn = std::f64::consts::TAU * shift as f64 / shifts as f64;
+        let sum: Complex64 = products
+            .iter()
+            .map(|(line, product)| product * Complex64::from_polar(1.0, turn * line))
+            .sum();
+        sum.norm() > SAME_PHASES * whole
+    })
+}
+
+/// FRF lines at the `excited` lines: mean over the recordings of G = Ȳ/Ū, with its standard deviation.
+///
+/// Of one recording with M periods, var G = Σ|Y − Ȳ − G(U − Ū)|²/(M(M − 1)|Ū|²); of R recordings it is Σ|G_r − Ḡ|²/(R(R − 1)), which
+/// includes noise and nonlinear distortion. The variance of |G| is half of it.
+fn lines(averages: &[PeriodAverage], excited: &[usize], spacing_hz: f64, responses: usize) -> Vec<FrfLine> {
+    let first_line = averages.first().map_or(0, |average| average.first_line);
+    let count = averages.len() as f64;
+    excited
+        .iter()
+        .map(|&line| {
+            let mut found = FrfLine {
+                frequency_hz: (first_line + line) as f64 * spacing_hz,
+                h: ZERO,
+                coherence: [0.0; 3],
+                deviation: [[0.0; 3]; 3],
+                folding: [0.0; 3],
+                singular: (1.0, 1.0),
+            };
+            for response in 0..responses {
+                let gains: Vec<Complex64> = averages
+                    .iter()
+                    .map(|average| average.gain(response, line))
+                    .collect();
+                let mean = gains.iter().sum::<Complex64>() / count;
+                let variance = match averages {
+                    [only] => only.noise_variance(response, line),
+                    _ => {
+                        gains.iter().map(|gain| (gain - mean).norm_sqr()).sum::<f64>() / (count - 1.0) / count
+                    }
+                };
+                // Part of the power of the response that is linear in the force, over all periods of all recordings.
+                let linear: f64 = averages
+                    .iter()
+                    .map(|average| average.used as f64 * (mean * average.force[line]).norm_sqr())
+                    .sum();
+                let all: f64 = averages
+                    .iter()
+                    .map(|average| average.used as f64 * average.responses[response].power[line])
+                    .sum();
+                found.h[response][0] = mean;
+                found.deviation[response][0] = (0.5 * variance).sqrt();
+                found.coherence[response] = if all > 0.0 {
+                    (linear / all).clamp(0.0, 1.0)
+                } else {
+                    0.0
+                };
+            }
+            found
+        })
+        .collect()
+}

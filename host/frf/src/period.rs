@@ -1,0 +1,315 @@
+//! Period of a periodic force, in whole samples.
+
+use std::f64::consts::TAU;
+
+use num_complex::Complex64;
+use realfft::RealFftPlanner;
+
+use super::criteria::{PERIOD_SHIFT, PERIOD_SHIFT_ERRORS, PERIODS_RECORDED_MIN, SHARE_OF_LINES};
+use super::cross_spectra::Transform;
+use super::window::fast_length;
+
+/// Reason why a force has no period of whole samples.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum NoPeriod {
+    /// The record holds fewer than [`PERIODS_RECORDED_MIN`] periods of the `samples` that were stated.
+    TooShort {
+        /// Stated period, samples.
+        samples: usize,
+        /// Whole periods in the record.
+        periods: usize,
+    },
+    /// The force does not repeat at any lag up to a quarter of the record.
+    DoesNotRepeat {
+        /// Lag at which the force repeats best, samples; `None` if it has no zero crossing of its autocorrelation.
+        best: Option<usize>,
+        /// Share of the energy of the force that does not repeat at that lag.
+        unrepeated: f64,
+    },
+    /// The force repeats, but not after a whole number of samples.
+    NotWhole {
+        /// Period of the force, samples.
+        samples: f64,
+    },
+}
+
+impl NoPeriod {
+    /// Sentence that says what was found at the sample rate `rate`, Hz, and what would be right.
+    pub(super) fn sentence(self, rate: f64) -> String {
+        match self {
+            Self::TooShort { samples, periods } => format!(
+                "{periods} whole periods of {samples} samples ({:.4} s); at least {PERIODS_RECORDED_MIN} are needed, two for the transient and \
+                 two for its absence: record longer, or take a shorter period",
+                samples as f64 / rate
+            ),
+            Self::DoesNotRepeat { best, unrepeated } => {
+                let best = best.map_or_else(String::new, |lag| {
+                    format!(
+                        "; the best is {lag} samples ({:.4} s), where {:.0} % of its energy does not repeat",
+                        lag as f64 / rate,
+                        100.0 * unrepeated
+                    )
+                });
+                format!(
+                    "the force has no period of which the record holds {PERIODS_RECORDED_MIN}{best}: record more periods, or say --excitation random"
+                )
+            }
+            Self::NotWhole { samples } => format!(
+                "the force repeats after {samples:.3} samples, which is no whole number: its lines leak into each other; let generator and \
+                 recorder share one clock, and choose a period of whole samples, or say --excitation random"
+            ),
+        }
+    }
+}
+
+/// Period of `force` in samples: the stated one, or the smallest lag at which the force repeats.
+///
+/// The lag is the first at which the normalized autocorrelation r reaches its largest value over all lags from its first zero crossing to a
+/// quarter of the record, within half of its distance from 1. The phases of the lines, which turn by ω·δ per period if the period is δ samples
+/// longer than the lag, check that it is whole.
+///
+/// # Errors
+/// See [`NoPeriod`].
+pub(super) fn period(force: &[f64], stated: Option<usize>) -> Result<usize, NoPeriod> {
+    let samples = match stated {
+        Some(samples) => {
+            let periods = force.len() / samples.max(1);
+            if periods < PERIODS_RECORDED_MIN {
+                return Err(NoPeriod::TooShort { samples, periods });
+            }
+            samples.max(1)
+        }
+        None => repetition(force)?,
+    };
+    let mut samples = samples;
+    // A noisy autocorrelation of a smooth force has its largest value some samples beside the period.
+    for _ in 0..3 {
+        let shift = period_shift(force, samples);
+        let whole = shift.samples.round();
+        if whole == 0.0 || stated.is_some() {
+            return if shift.is_whole() {
+                Ok(samples)
+            } else {
+                Err(NoPeriod::NotWhole {
+                    samples: samples as f64 + shift.samples,
+                })
+            };
+        }
+        samples = ((samples as f64 + whole).max(2.0) as usize).min(force.len() / PERIODS_RECORDED_MIN);
+    }
+    Err(NoPeriod::NotWhole {
+        samples: samples as f64 + period_shift(force, samples).samples,
+    })
+}
+
+/// Smallest lag, in samples, at which `force` repeats as well as at any other.
+fn repetition(force: &[f64]) -> Result<usize, NoPeriod> {
+    let longest = force.len() / PERIODS_RECORDED_MIN;
+    let correlation = normalized_autocorrelation(force, longest);
+    let nowhere = NoPeriod::DoesNotRepeat {
+        best: None,
+        unrepeated: 1.0,
+    };
+    let zero = correlation.iter().position(|r| *r <= 0.0).ok_or(nowhere)?;
+    let best = (zero..correlation.len())
+        .max_by(|&a, &b| correlation[a].total_cmp(&correlation[b]))
+        .ok_or(nowhere)?;
+    let unrepeated = 1.0 - correlation[best];
+    if unrepeated > 1.0 - SHARE_OF_LINES {
+        return Err(NoPeriod::DoesNotRepeat {
+            best: Some(best),
+            unrepeated,
+        });
+    }
+    let enough = 1.0 - (1.5 * unrepeated + ROUNDING);
+    let mut lag = (zero..best)
+        .find(|&lag| correlation[lag] >= enough)
+        .unwrap_or(best);
+    while lag < best && correlation[lag + 1] > correlation[lag] {
+        lag += 1;
+    }
+    Ok(lag)
+}
+
+/// Share of the energy of a force that rounding in a file of five digits keeps from repeating, with some reserve.
+const ROUNDING: f64 = 1e-8;
+
+/// Autocorrelation r(lag) = Σ f_k f_{k+lag} / √(Σ f_k² Σ f_{k+lag}²) of a force without its mean, for lags up to `longest`.
+fn normalized_autocorrelation(force: &[f64], longest: usize) -> Vec<f64> {
+    let mean = force.iter().sum::<f64>() / force.len().max(1) as f64;
+    let length = fast_length(force.len() + longest + 1);
+    let mut planner = RealFftPlanner::new();
+    let (forward, back) = (planner.plan_fft_forward(length), planner.plan_fft_inverse(length));
+    let (mut time, mut lines) = (forward.make_input_vec(), forward.make_output_vec());
+    for (padded, sample) in time.iter_mut().zip(force) {
+        *padded = sample - mean;
+    }
+    // Energy of the first k samples, for the energies of both factors.
+    let mut energy = Vec::with_capacity(force.len() + 1);
+    energy.push(0.0);
+    let mut sum = 0.0;
+    for sample in &time[..force.len()] {
+        sum += sample * sample;
+        energy.push(sum);
+    }
+    let is_done = forward.process(&mut time, &mut lines).is_ok();
+    for line in &mut lines {
+        *line = Complex64::from(line.norm_sqr());
+    }
+    if !is_done || back.process(&mut lines, &mut time).is_err() {
+        return Vec::new();
+    }
+    let count = force.len();
+    (0..=longest.min(count))
+        .map(|lag| {
+            let both = (energy[count - lag] * (energy[count] - energy[lag])).sqrt();
+            if both > 0.0 {
+                time[lag] / length as f64 / both
+            } else {
+                0.0
+            }
+        })
+        .collect()
+}
+
+/// Difference between the period of a force and a whole number of samples.
+struct PeriodShift {
+    /// Period minus the whole number, samples.
+    samples: f64,
+    /// Standard deviation of `samples`.
+    deviation: f64,
+    /// Shift of the highest strong line against its line of the transform, in line spacings.
+    lines: f64,
+}
+
+impl PeriodShift {
+    /// True if no line leaks, or if the noise leaves that open.
+    fn is_whole(&self) -> bool {
+        self.lines.abs() <= PERIOD_SHIFT || self.samples.abs() <= PERIOD_SHIFT_ERRORS * self.deviation
+    }
+}
+
+/// Estimates the period of `force` near `period` samples from the mean phase advance of its lines from each period to the next.
+fn period_shift(force: &[f64], period: usize) -> PeriodShift {
+    let mut transform = Transform::new(period);
+    let weights = vec![1.0; period];
+    let periods = force.len() / period;
+    let first = force.len() - periods * period;
+    let mut before: Vec<Complex64> = Vec::new();
+    let mut advance = vec![Complex64::ZERO; period / 2 + 1];
+    for index in 0..periods {
+        let start = first + index * period;
+        let lines = transform.of(&force[start..start + period], &weights, true);
+        for ((sum, line), before) in advance.iter_mut().zip(lines).zip(&before) {
+            *sum += line * before.conj();
+        }
+        before.clear();
+        before.extend_from_slice(lines);
+    }
+    let largest = advance.iter().map(|sum| sum.norm()).fold(0.0, f64::max);
+    let (mut weight, mut moment, mut square) = (0.0, 0.0, 0.0);
+    let mut strong: Vec<(f64, f64, f64)> = Vec::new();
+    for (line, sum) in advance.iter().enumerate().skip(1) {
+        // A tenth of the largest power: weaker lines have phases that are mostly noise.
+        if sum.norm() < 0.1 * largest || largest == 0.0 {
+            continue;
+        }
+        let omega = TAU * line as f64 / period as f64;
+        let (w, angle) = (sum.norm(), sum.arg());
+        weight += w;
+        moment += w * omega * angle;
+        square += w * omega * omega;
+        strong.push((omega, angle, w));
+    }
+    if strong.is_empty() || square <= 0.0 {
+        return PeriodShift {
+            samples: 0.0,
+            deviation: 0.0,
+            lines: 0.0,
+        };
+    }
+    // A force that comes δ samples late turns its lines by −ωδ.
+    let samples = -moment / square;
+    let scatter: f64 = strong
+        .iter()
+        .map(|(omega, angle, w)| w * (angle + omega * samples).powi(2))
+        .sum();
+    let count = strong.len() as f64;
+    let highest = strong.last().map_or(0.0, |(omega, _, _)| *omega) / TAU * period as f64;
+    PeriodShift {
+        samples,
+        deviation: (scatter / weight / (count - 1.0).max(1.0) / (square / weight)).sqrt(),
+        lines: highest * samples / period as f64,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    use super::*;
+
+    /// Multisine of the lines `lines` with a period of `period` samples (not necessarily whole), with uniform noise.
+    fn multisine(
+        lines: std::ops::Range<usize>,
+        step: usize,
+        period: f64,
+        count: usize,
+        noise: f64,
+    ) -> Vec<f64> {
+        let mut random = ChaCha8Rng::seed_from_u64(7);
+        let tones: Vec<(f64, f64)> = lines
+            .step_by(step)
+            .map(|line| (line as f64, random.random_range(0.0..TAU)))
+            .collect();
+        (0..count)
+            .map(|k| {
+                let sum: f64 = tones
+                    .iter()
+                    .map(|(line, phase)| (TAU * line * k as f64 / period + phase).cos())
+                    .sum();
+                sum + noise * random.random_range(-1.0..1.0)
+            })
+            .collect()
+    }
+
+    #[test]
+    fn whole_periods_are_found_with_and_without_noise() {
+        for (step, noise) in [(1, 0.0), (2, 0.0), (1, 1.0), (2, 1.0)] {
+            // An odd multisine has the correlation −1 at half its period.
+            let force = multisine(21..91, step, 1000.0, 8300, noise);
+            assert_eq!(period(&force, None), Ok(1000), "{step} {noise}");
+        }
+        // A period of 500.5 samples is one of 1001 samples for the transform.
+        assert_eq!(period(&multisine(10..40, 1, 500.5, 8000, 0.0), None), Ok(1001));
+        // Lines 16 to 18 alone: at a lag of one oscillation the force nearly repeats.
+        assert_eq!(
+            period(&multisine(160..181, 1, 2000.0, 16_000, 0.05), None),
+            Ok(2000)
+        );
+    }
+
+    #[test]
+    fn periods_of_no_whole_samples_and_noise_are_refused() {
+        let force = multisine(21..91, 1, 1000.3, 8300, 0.1);
+        let Err(NoPeriod::NotWhole { samples }) = period(&force, Some(1000)) else {
+            panic!("{:?}", period(&force, Some(1000)));
+        };
+        // The advance of a thousandth of a radian is far below the noise; half a hundredth of a sample is what it allows.
+        assert!((samples - 1000.3).abs() < 5e-3, "{samples}");
+        let mut random = ChaCha8Rng::seed_from_u64(8);
+        let noise: Vec<f64> = (0..8192).map(|_| random.random_range(-1.0..1.0)).collect();
+        assert!(matches!(
+            period(&noise, None),
+            Err(NoPeriod::DoesNotRepeat { .. })
+        ));
+        assert_eq!(
+            period(&noise, Some(3000)),
+            Err(NoPeriod::TooShort {
+                samples: 3000,
+                periods: 2
+            })
+        );
+    }
+}
