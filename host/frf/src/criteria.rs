@@ -186,6 +186,10 @@ pub(crate) const SPIKE_ABOVE: f64 = 3.0;
 /// with fewer than three samples are larger. A choice.
 pub(crate) const SPIKE_NEIGHBOURS: f64 = 0.05;
 
+/// Largest share of clipped segments, periods or impacts of a record of which the others are evaluated. With more than one half the median part
+/// is clipped: those that remain are the weakest, and their level is not that of the test.
+pub(crate) const CLIPPED_PARTS: f64 = 0.5;
+
 /// Coherence below which noise has more energy than the response to the force: γ² = S/(S + N) with S = N.
 pub(crate) const UNRELATED: f64 = 0.5;
 

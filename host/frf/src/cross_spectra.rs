@@ -76,6 +76,14 @@ impl Segments {
             without_mean: true,
         }
     }
+
+    /// Leaves out the segments for which `is_left_out` holds, and returns their number. The averages are reduced in proportion.
+    pub(super) fn leave_out(&mut self, is_left_out: impl Fn(Range<usize>) -> bool) -> usize {
+        let (before, length) = (self.starts.len(), self.weights.len());
+        self.starts.retain(|&start| !is_left_out(start..start + length));
+        self.averages *= self.starts.len() as f64 / before.max(1) as f64;
+        before - self.starts.len()
+    }
 }
 
 /// Cross-spectra of `signals` (all of one length), summed over their `segments`, at the transform lines `lines` as far

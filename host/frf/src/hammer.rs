@@ -3,6 +3,7 @@
 use quietcut_numerics::statistics::median;
 
 use super::FrfError;
+use super::clipping::Clipping;
 use super::criteria::{
     BOUNCE_S, LEAST_IMPACT, PULSE_ABOVE_NOISE, PULSE_END, PULSE_END_ABOVE_NOISE, SECOND_PULSE,
 };
@@ -51,6 +52,8 @@ pub(super) struct ImpactSegments {
     pub(super) used: Vec<MeasuredImpact>,
     /// Double impacts, whose segments are not evaluated.
     pub(super) double: Vec<MeasuredImpact>,
+    /// Impacts with clipped samples in their segments, which are not evaluated.
+    pub(super) clipped: Vec<MeasuredImpact>,
     /// Impacts too close to the start or end of the record for a segment, which are not evaluated.
     pub(super) cut_short: Vec<MeasuredImpact>,
     /// Largest amplitude of a windowed response at the end of a segment, as a fraction of the peak of that response in
@@ -58,12 +61,12 @@ pub(super) struct ImpactSegments {
     pub(super) end_amplitude: f64,
 }
 
-/// Cuts a record into one windowed segment per single impact; double impacts, and impacts without a whole segment in
-/// the record, are left out.
+/// Cuts a record into one windowed segment per single impact; double and clipped impacts, and impacts without a whole
+/// segment in the record, are left out.
 ///
 /// # Errors
-/// The record has several forces, no impact, or no impact with a whole segment; all impacts with a segment are double;
-/// or the segments have fewer than 16 samples.
+/// The record has several forces, no impact, or no impact with a whole segment; all impacts with a segment are clipped
+/// or double; or the segments have fewer than 16 samples.
 pub(super) fn segments(
     channels: &TestChannels<'_>,
     windows: HammerWindows,
@@ -90,12 +93,25 @@ pub(super) fn segments(
     let before = (BEFORE * length as f64) as usize;
     let has_segment =
         |impact: &MeasuredImpact| impact.first >= before && impact.first - before + length <= samples;
-    let (mut impacts, cut_short): (Vec<_>, Vec<_>) = impacts.into_iter().partition(has_segment);
+    let (impacts, cut_short): (Vec<_>, Vec<_>) = impacts.into_iter().partition(has_segment);
     if length < 16 || impacts.is_empty() {
         return Err(refused(format!(
             "no impact has {:.3} s of record after it; the impacts are {:.3} s apart at least",
             length as f64 / rate,
             longest as f64 / rate
+        )));
+    }
+    let clipping = Clipping::of(channels);
+    let is_clipped = |impact: &MeasuredImpact| {
+        let start = impact.first - before;
+        clipping.holds(start..start + length)
+    };
+    let (clipped, mut impacts): (Vec<_>, Vec<_>) = impacts.into_iter().partition(is_clipped);
+    if impacts.is_empty() {
+        return Err(refused(format!(
+            "{}, in all {} impacts; strike softer, or take a larger range of the sensor",
+            clipping.names(),
+            clipped.len()
         )));
     }
     for impact in &mut impacts {
@@ -125,6 +141,7 @@ pub(super) fn segments(
         used: Vec::new(),
         double,
         cut_short,
+        clipped,
     };
     for impact in used {
         let start = impact.first - before;
@@ -240,6 +257,12 @@ fn impacts(force: &[f64], rate: f64) -> Vec<MeasuredImpact> {
         k = last + 1;
     }
     impacts
+}
+
+/// Peaks of the impacts in a force signal, N, without sign.
+pub(super) fn force_peaks(force: &[f64], rate: f64) -> Vec<f64> {
+    let impacts = impacts(force, rate);
+    impacts.iter().map(|impact| impact.peak_n.abs()).collect()
 }
 
 /// Largest second force pulse before sample `end`: delay after the peak of the impact, s, and height as a fraction of

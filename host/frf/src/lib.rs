@@ -40,12 +40,15 @@
 //! stability.
 
 mod accelerometer_mass;
+mod clipping;
 mod criteria;
 mod cross_spectra;
 mod error;
 mod estimate;
 mod excitation;
 mod exponential_window;
+mod force_level;
+mod force_levels;
 mod frf_unit;
 mod hammer;
 mod interpolation;
@@ -73,6 +76,7 @@ pub use accelerometer_mass::{PeakShift, peak_shift, without_accelerometer_mass};
 pub use error::FrfError;
 pub use estimate::Estimator;
 pub use excitation::Excitation;
+pub use force_levels::{LevelMeasurement, measure_levels};
 pub use hammer::{HammerWindows, MeasuredImpact};
 pub use interpolation::Interpolation;
 pub use measurement::{Measurement, RecordingGroup, measure};

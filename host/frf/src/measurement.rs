@@ -28,6 +28,7 @@ use super::error::FrfError;
 use super::estimate::{self, ChannelCounts, Estimator, FrfLine};
 use super::excitation::Excitation;
 use super::exponential_window::without_exponential_window;
+use super::force_level::averaged_levels;
 use super::measurement_settings::MeasurementSettings;
 use super::table::{Frf, FrfTable};
 use super::test_channels::TestChannels;
@@ -92,36 +93,7 @@ pub fn measure(recordings: &[Recording], settings: &MeasurementSettings) -> Resu
         .map(|recording| TestChannels::of(recording, &settings.channels))
         .collect::<Result<Vec<_>, _>>()?;
     let (accelerated, roving) = (accelerated(&channels), roving(&channels));
-    let mut groups: Vec<(Excitation, Vec<TestChannels<'_>>)> = Vec::new();
-    for channels in channels {
-        let stated = settings
-            .excitation
-            .unwrap_or_else(|| Excitation::of(&channels.recording.sidecar));
-        if matches!(stated, Excitation::Random | Excitation::Hammer)
-            && let Some(what) = test_plausibility::swapped(&channels)
-        {
-            return Err(FrfError::Content {
-                path: channels.recording.path.clone(),
-                what,
-            });
-        }
-        let is_multisine =
-            settings.excitation.is_none() && stated == Excitation::Random && recognized(&channels, settings);
-        let excitation = if is_multisine {
-            Excitation::Multisine
-        } else {
-            stated
-        };
-        let same = groups.iter_mut().find(|(other, members)| {
-            members[0].force_directions() == channels.force_directions()
-                && members[0].response_kinds() == channels.response_kinds()
-                && *other == excitation
-        });
-        match same {
-            Some((_, members)) => members.push(channels),
-            None => groups.push((excitation, vec![channels])),
-        }
-    }
+    let groups = grouped(channels, settings)?;
     for recording in recordings {
         check_band(recording, settings)?;
     }
@@ -178,6 +150,49 @@ pub fn measure(recordings: &[Recording], settings: &MeasurementSettings) -> Resu
     measurement.warnings.extend(roving);
     sensor_mass(&mut measurement, settings.accelerometer_mass_kg, &accelerated)?;
     Ok(measurement)
+}
+
+/// Groups recordings with the same force directions, the same measured responses and the same kind of excitation.
+///
+/// The excitation is that of the settings or of the sidecar, or a multisine if the force of a shaker is periodic with several lines.
+///
+/// # Errors
+/// The force and a response of a recording are swapped.
+fn grouped<'a>(
+    channels: Vec<TestChannels<'a>>,
+    settings: &MeasurementSettings,
+) -> Result<Vec<(Excitation, Vec<TestChannels<'a>>)>, FrfError> {
+    let mut groups: Vec<(Excitation, Vec<TestChannels<'a>>)> = Vec::new();
+    for channels in channels {
+        let stated = settings
+            .excitation
+            .unwrap_or_else(|| Excitation::of(&channels.recording.sidecar));
+        if matches!(stated, Excitation::Random | Excitation::Hammer)
+            && let Some(what) = test_plausibility::swapped(&channels)
+        {
+            return Err(FrfError::Content {
+                path: channels.recording.path.clone(),
+                what,
+            });
+        }
+        let is_multisine =
+            settings.excitation.is_none() && stated == Excitation::Random && recognized(&channels, settings);
+        let excitation = if is_multisine {
+            Excitation::Multisine
+        } else {
+            stated
+        };
+        let same = groups.iter_mut().find(|(other, members)| {
+            members[0].force_directions() == channels.force_directions()
+                && members[0].response_kinds() == channels.response_kinds()
+                && *other == excitation
+        });
+        match same {
+            Some((_, members)) => members.push(channels),
+            None => groups.push((excitation, vec![channels])),
+        }
+    }
+    Ok(groups)
 }
 
 /// Refuses a frequency band to evaluate that begins at or above half the sample rate of a recording.
@@ -320,6 +335,7 @@ fn measure_group(
         .iter()
         .flat_map(|channels| channels.warnings.clone())
         .collect();
+    warnings.extend(averaged_levels(excitation, members));
     if excitation == Excitation::StepSine {
         return stepped(group, members, settings, warnings);
     }
@@ -350,7 +366,7 @@ fn measure_group(
         }
         _ => members
             .iter()
-            .map(|channels| steady(excitation, channels, members, settings))
+            .map(|channels| steady(excitation, channels, members, settings, &mut warnings))
             .collect::<Result<Vec<_>, _>>()?,
     };
     group.averages = spectra.iter().map(|test| test.averages).sum();

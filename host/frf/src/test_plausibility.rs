@@ -113,10 +113,12 @@ pub(super) fn of_channels(excitation: Excitation, channels: &TestChannels<'_>) -
     let forces = channels.forces.iter().map(|(_, channel)| *channel);
     let responses = channels.responses.iter().map(|response| response.channel);
     let mut warnings = Vec::new();
+    // Of these two excitations no part can be left out; of the others, parts with clipped samples are.
+    let is_whole = matches!(excitation, Excitation::Sweep | Excitation::StepSine);
     for channel in forces.chain(responses) {
         let name = &channel.name;
         let clipped = ChannelSummary::of(channel, rate, start_s).clipped;
-        if clipped > 0 {
+        if clipped > 0 && is_whole {
             warnings.push(format!(
                 "{name} is clipped: {clipped} samples stay at its largest or smallest value; receptances from it are wrong: record again with \
                  a larger range of the sensor, or leave the part out with --from-s or --until-s"

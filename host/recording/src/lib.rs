@@ -82,7 +82,7 @@ pub use recording::{Channel, Recording};
 pub use segment::Segment;
 pub use sidecar::{RecordedChannel, RecordedCut, RecordedPosture, Sidecar, TestKind};
 pub use spindle_angle::SpindleAngle;
-pub use summary::{ChannelSummary, envelope};
+pub use summary::{ChannelSummary, clipping_levels, envelope};
 pub use tachometer::TachometerEdges;
 pub use text_table::{TextColumn, TextTable};
 pub use uff::UffForm;

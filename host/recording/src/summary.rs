@@ -48,19 +48,12 @@ impl ChannelSummary {
         let constant = minimum == maximum;
         let runs = runs(samples);
         let is_extreme = |value: f64| value == minimum || value == maximum;
-        let rest = median(&mut samples.to_vec()).unwrap_or(0.0);
-        // Equal samples at an extreme value near the median are no clipping: the force of an impact test rests at its
-        // smallest value. A tachometer has two levels and is not checked at all.
-        let is_clipping =
-            |value: f64| is_extreme(value) && (value - rest).abs() > FAR_FROM_REST * (maximum - minimum);
-        let clipped = if constant || channel.quantity == Quantity::Level {
-            0
-        } else {
-            runs.iter()
-                .filter(|run| is_clipping(samples[run.0]) && run.1 >= CLIPPED_RUN)
-                .map(|run| run.1)
-                .sum()
-        };
+        let levels = levels(channel, &runs, [minimum, maximum]);
+        let clipped = runs
+            .iter()
+            .filter(|run| run.1 >= CLIPPED_RUN && levels.contains(&samples[run.0]))
+            .map(|run| run.1)
+            .sum();
         let changes = runs.len();
         let is_lively = samples.len() as f64 - changes as f64 <= AT_REST * count;
         let time = |sample: usize| start_s + sample as f64 / rate_hz;
@@ -83,6 +76,38 @@ impl ChannelSummary {
             dropouts_s,
         }
     }
+}
+
+/// Values at which a channel is clipped: its largest or smallest one, if some consecutive samples have it and it is far from the median.
+/// Single samples of such a value are clipped too.
+pub fn clipping_levels(channel: &Channel) -> Vec<f64> {
+    let samples = channel.samples.as_slice();
+    let ends = samples
+        .iter()
+        .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], &sample| {
+            [low.min(sample), high.max(sample)]
+        });
+    levels(channel, &runs(samples), ends)
+}
+
+/// Values at which a channel with these `runs` and these smallest and largest values is clipped.
+fn levels(channel: &Channel, runs: &[(usize, usize)], [minimum, maximum]: [f64; 2]) -> Vec<f64> {
+    let samples = channel.samples.as_slice();
+    // A tachometer has two levels and is not checked at all.
+    if minimum == maximum || channel.quantity == Quantity::Level {
+        return Vec::new();
+    }
+    let rest = median(&mut samples.to_vec()).unwrap_or(0.0);
+    // Equal samples at an extreme value near the median are no clipping: the force of an impact test rests at its
+    // smallest value.
+    [minimum, maximum]
+        .into_iter()
+        .filter(|&value| (value - rest).abs() > FAR_FROM_REST * (maximum - minimum))
+        .filter(|&value| {
+            runs.iter()
+                .any(|run| run.1 >= CLIPPED_RUN && samples[run.0] == value)
+        })
+        .collect()
 }
 
 /// Runs of equal consecutive samples: index of the first sample and length of each.
@@ -144,6 +169,15 @@ mod tests {
         assert!((clean.rms - 0.5_f64.sqrt()).abs() < 0.01 && clean.mean.abs() < 0.02);
         let clipped = summary((0..1000).map(|k| sine(k).clamp(-0.8, 0.8)).collect());
         assert!(clipped.clipped > 300, "{}", clipped.clipped);
+        let channel = |samples: Vec<f64>| Channel {
+            name: "ax".into(),
+            quantity: Quantity::Acceleration,
+            samples,
+        };
+        let both = (0..1000).map(|k| sine(k).clamp(-0.8, 0.8)).collect();
+        assert_eq!(clipping_levels(&channel(both)), [-0.8, 0.8]);
+        let above = (0..1000).map(|k| sine(k).min(0.8)).collect();
+        assert_eq!(clipping_levels(&channel(above)), [0.8]);
         let dropped = summary(
             (0..1000)
                 .map(|k| if (200..250).contains(&k) { 0.1 } else { sine(k) })

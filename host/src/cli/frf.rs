@@ -2,6 +2,7 @@
 
 mod answer;
 mod args;
+mod by_level;
 mod compare;
 mod figure;
 mod multisine_answer;
@@ -27,6 +28,9 @@ use args::{FileFormat, OutputFile};
 pub fn run(args: Args) -> Result<(), Error> {
     if let [before, after] = args.compare.as_slice() {
         return compare::run(&args, before, after);
+    }
+    if args.by_level {
+        return by_level::run(&args);
     }
     for target in &args.out {
         let inputs = args.recordings.iter().chain(&args.housing).chain(&args.tip);

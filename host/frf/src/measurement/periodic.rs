@@ -7,7 +7,8 @@ use num_complex::Complex64;
 
 use super::distortion::distortion;
 use super::recording_group::{MeasuredGroup, RecordingGroup, receptances};
-use crate::criteria::{MULTISINE_LINES_MIN, SAME_FORCE, SAME_PHASES};
+use crate::clipping::Clipping;
+use crate::criteria::{MULTISINE_LINES_MIN, SAME_PHASES};
 use crate::error::FrfError;
 use crate::estimate::{Estimator, FrfLine};
 use crate::measurement_settings::{MeasurementSettings, band};
@@ -87,14 +88,18 @@ pub(in crate::measurement) fn periodic(
             )));
         }
         let responses: Vec<&[f64]> = channels.signals().split_off(1);
+        let clipping = Clipping::of(channels);
         let average = period_average(
             &force.samples,
             &responses,
             found,
             band(settings, rate, found),
-            &[],
-        )
-        .ok_or_else(|| {
+            &clipping.is_clipped,
+        );
+        let (clipped, whole) = clipped_periods(&clipping, found, force.samples.len());
+        let warning = clipping.warning(clipped, whole, "periods").map_err(refused)?;
+        warnings.extend(warning);
+        let average = average.ok_or_else(|| {
             refused(format!(
                 "the force changes from period to period; fewer than two periods of {found} samples repeat"
             ))
@@ -125,7 +130,6 @@ pub(in crate::measurement) fn periodic(
         );
     }
     let excited = common_lines(&averages).map_err(refused)?;
-    warnings.extend(levels_differ(&averages));
     let realizations = realizations(&averages);
     if realizations > 1 && realizations < averages.len() {
         // The scatter over recordings of which some share their phases is no variance of the distortion.
@@ -158,6 +162,16 @@ pub(in crate::measurement) fn periodic(
     Ok(receptances(group, &lines, first, warnings))
 }
 
+/// Number of periods with clipped samples, and of all whole periods, counted from the end of a record of `samples` samples.
+fn clipped_periods(clipping: &Clipping, period: usize, samples: usize) -> (usize, usize) {
+    let (whole, first) = (samples / period, samples % period);
+    let clipped = (0..whole).filter(|index| {
+        let start = first + index * period;
+        clipping.holds(start..start + period)
+    });
+    (clipped.count(), whole)
+}
+
 /// Degrees of freedom of the deviations: two for each realization or, with one recording, for each period, less one.
 fn freedoms(averages: &[PeriodAverage]) -> usize {
     match averages {
@@ -181,21 +195,6 @@ fn common_lines(averages: &[PeriodAverage]) -> Result<Vec<usize>, String> {
         ));
     }
     Ok(common)
-}
-
-/// Warning of recordings with different force levels.
-fn levels_differ(averages: &[PeriodAverage]) -> Option<String> {
-    let level = |average: &PeriodAverage| average.force.iter().map(|u| u.norm_sqr()).sum::<f64>().sqrt();
-    let levels: Vec<f64> = averages.iter().map(level).collect();
-    let least = levels.iter().copied().fold(f64::INFINITY, f64::min);
-    let most = levels.iter().copied().fold(0.0, f64::max);
-    (most > SAME_FORCE * least).then(|| {
-        format!(
-            "the forces of the recordings differ by a factor of {:.2}: the best linear approximation of a nonlinear structure is another for \
-             each level",
-            most / least
-        )
-    })
 }
 
 /// Number of different sets of phases among the recordings, whatever their shifts in time.

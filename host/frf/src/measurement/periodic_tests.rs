@@ -366,6 +366,87 @@ fn what_is_no_test_of_whole_periods_is_refused() {
 }
 
 #[test]
+fn periods_with_clipped_samples_are_left_out() {
+    let mut random = random(67);
+    let force = multisine(&tones(40..121, &mut random), 2.0, 8.0);
+    let mut recording = record(TestKind::Shaker, along_y(force), 1e-3, &mut random);
+    let samples = &mut recording.channels[2].samples;
+    let most = 1.5 * samples.iter().fold(0.0_f64, |most, y| most.max(y.abs()));
+    for sample in [
+        5 * PERIOD + 100..5 * PERIOD + 105,
+        6 * PERIOD + 7..6 * PERIOD + 11,
+    ]
+    .into_iter()
+    .flatten()
+    {
+        samples[sample] = most;
+    }
+    let measurement = measure(std::slice::from_ref(&recording), &MeasurementSettings::default()).unwrap();
+    let test = measurement.groups[0].periodic.as_ref().unwrap();
+    assert!(
+        test.used[0] <= 5 && test.used[0] + test.dropped[0] == 8,
+        "{test:?}"
+    );
+    assert!(
+        measurement
+            .warnings
+            .iter()
+            .any(|warning| warning.contains("y is clipped at 9 samples: 2 of 8 periods are left out")),
+        "{:?}",
+        measurement.warnings
+    );
+    let error = super::tests::error(&measurement, "yy");
+    assert!(error < 1e-3, "{error}");
+}
+
+/// The natural frequency of a cubic spring rises with the level as √(1 + 3 k3 σ²/k); that of a linear one does not.
+#[test]
+fn each_force_level_has_its_peak() {
+    let (m, _, k) = OSCILLATOR;
+    let mut random = random(68);
+    let tones = tones(40..121, &mut random);
+    let variance = |record: &Recording| {
+        let settled = &record.channels[1].samples[6 * PERIOD..7 * PERIOD];
+        settled.iter().map(|x| x * x).sum::<f64>() / PERIOD as f64
+    };
+    let linear = [1.0, 2.0].map(|amplitude| oscillator(&tones, amplitude, [0.0; 2]));
+    let k3 = 0.02 * k / 3.0 / variance(&linear[1]);
+    let cubic = [2.0, 1.0].map(|amplitude| oscillator(&tones, amplitude, [0.0, k3]));
+    let rises = |records: &[Recording]| {
+        let levels = crate::measure_levels(records, &MeasurementSettings::default()).unwrap();
+        assert_eq!(levels.len(), 2);
+        // 81 tones of the amplitude a have the root mean square a √(81/2).
+        assert!(
+            (levels[0].force_n / 40.5_f64.sqrt() - 1.0).abs() < 1e-3,
+            "{}",
+            levels[0].force_n
+        );
+        let frequency = |level: &crate::LevelMeasurement| {
+            let table = &level.measurement.table;
+            let peak = crate::fitted_peaks(table, &table.entries()[0])[0];
+            (peak.frequency_hz, peak.ninety_percent() * peak.frequency_std_hz)
+        };
+        let ((low, low_half), (high, high_half)) = (frequency(&levels[0]), frequency(&levels[1]));
+        [high / low - 1.0, low_half.hypot(high_half) / low]
+    };
+    let own = (k / m).sqrt() / TAU;
+    assert!((own - 17.4).abs() < 1e-9);
+    let [none, half] = rises(&linear);
+    println!("linear: {none} ± {half}");
+    assert!(none.abs() < 1e-4, "{none}");
+    let [rise, half] = rises(&cubic);
+    let expected = (1.0 + 3.0 * k3 * variance(&cubic[0]) / k).sqrt()
+        / (1.0 + 3.0 * k3 * variance(&cubic[1]) / k).sqrt()
+        - 1.0;
+    println!("cubic: {rise} ± {half}, expected {expected}");
+    // The distortion of one realization is in the interval of its fit.
+    assert!(
+        rise > half && (rise - expected).abs() < 2.0 * half,
+        "{rise} ± {half}, expected {expected}"
+    );
+}
+
+#[test]
 fn an_unlabelled_random_force_stays_random() {
     let mut random = random(65);
     let white = force_noise(&mut random, 64 * PERIOD, 10.0);

@@ -1,5 +1,6 @@
 //! Spectra of records with continuous excitation: random, cuts and sweeps.
 
+use crate::clipping::Clipping;
 use crate::cross_spectra::{CrossSpectra, Segments, averaged, smoothed};
 use crate::error::FrfError;
 use crate::excitation::Excitation;
@@ -7,12 +8,14 @@ use crate::measurement_settings::{MeasurementSettings, band};
 use crate::test_channels::TestChannels;
 use crate::window::fast_length;
 
-/// Auto- and cross-spectra of a record with continuous excitation, at the frequency lines of the band to evaluate.
+/// Auto- and cross-spectra of a record with continuous excitation, at the frequency lines of the band to evaluate. Segments of random
+/// excitation with clipped samples are left out.
 pub(super) fn steady(
     excitation: Excitation,
     channels: &TestChannels<'_>,
     members: &[TestChannels<'_>],
     settings: &MeasurementSettings,
+    warnings: &mut Vec<String>,
 ) -> Result<CrossSpectra, FrfError> {
     let rate = channels.recording.sample_rate_hz;
     let samples = members
@@ -54,11 +57,19 @@ pub(super) fn steady(
     if length > samples || length < 16 {
         return Err(too_short(length));
     }
-    let segments = Segments::overlapping(
+    let mut segments = Segments::overlapping(
         settings.window.weights(length),
         settings.overlap,
         channels.recording.len(),
     );
+    let clipping = Clipping::of(channels);
+    let count = segments.starts.len();
+    let clipped = segments.leave_out(|samples| clipping.holds(samples));
+    let warning = clipping.warning(clipped, count, "segments");
+    warnings.extend(warning.map_err(|what| FrfError::Content {
+        path: channels.recording.path.clone(),
+        what,
+    })?);
     Ok(averaged(
         &channels.signals(),
         rate,

@@ -36,7 +36,7 @@ pub(super) fn struck(
             .map(|channels| hammer::segments(channels, windows))
             .collect::<Result<Vec<_>, _>>()?;
     }
-    let (mut used, mut double, mut cut_short) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut used, mut double, mut cut_short, mut clipped) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     let mut end_amplitude = 0.0_f64;
     let spectra = cuts
         .into_iter()
@@ -54,6 +54,7 @@ pub(super) fn struck(
             used.extend(cut.used);
             double.extend(cut.double);
             cut_short.extend(cut.cut_short);
+            clipped.extend(cut.clipped);
             end_amplitude = end_amplitude.max(cut.end_amplitude);
             (spectra, tops)
         })
@@ -67,6 +68,12 @@ pub(super) fn struck(
     };
     if !double.is_empty() {
         warnings.push(format!("double impacts are left out: at {} s", times(&double)));
+    }
+    if !clipped.is_empty() {
+        warnings.push(format!(
+            "impacts with clipped samples are left out: at {} s; strike softer, or take a larger range of the sensor",
+            times(&clipped)
+        ));
     }
     if !cut_short.is_empty() {
         warnings.push(format!(

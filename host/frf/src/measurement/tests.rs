@@ -207,6 +207,73 @@ fn welch_finds_the_receptances_of_one_force() {
 }
 
 #[test]
+fn segments_with_clipped_samples_are_left_out() {
+    let mut random = random(4);
+    let force = force_noise(&mut random, (600.0 * RATE) as usize, 10.0);
+    let whole = record(TestKind::Shaker, along_y(force), 0.01, &mut random);
+    let settings = MeasurementSettings {
+        resolution_hz: Some(0.05),
+        ..in_band()
+    };
+    let clipped_at = |share: f64| {
+        let mut recording = whole.clone();
+        let samples = &mut recording.channels[2].samples;
+        let most = share * samples.iter().fold(0.0_f64, |most, y| most.max(y.abs()));
+        samples.iter_mut().for_each(|y| *y = y.clamp(-most, most));
+        measure(&[recording], &settings)
+    };
+    // A response that is 0.9 of its largest for some samples of a period is in few of 59 segments.
+    let measurement = clipped_at(0.9).unwrap();
+    let warning = measurement
+        .warnings
+        .iter()
+        .find(|warning| warning.contains("clipped"))
+        .unwrap();
+    assert!(
+        warning.starts_with("y is clipped at ")
+            && warning.ends_with("of 59 segments are left out; a larger range of the sensor keeps them"),
+        "{warning}"
+    );
+    let averages = measurement.groups[0].averages;
+    assert!((30.0..56.0).contains(&averages), "{averages}");
+    // As without clipping, in `welch_finds_the_receptances_of_one_force`.
+    let error = error(&measurement, "yy");
+    assert!(error < 0.03, "{error}");
+    let refused = clipped_at(0.4).unwrap_err().to_string();
+    assert!(
+        refused.contains("y is clipped") && refused.contains("of 59 segments; what remains"),
+        "{refused}"
+    );
+}
+
+#[test]
+fn clipped_impacts_are_left_out() {
+    let mut random = random(32);
+    let mut force = vec![0.0; (64.0 * RATE) as usize];
+    for (index, at_s) in [1.0, 13.1, 25.3, 37.2, 49.4].into_iter().enumerate() {
+        impact(&mut force, at_s, 200.0 + 30.0 * index as f64);
+    }
+    let mut recording = record(TestKind::Hammer, along_y(force), 0.0, &mut random);
+    let samples = &mut recording.channels[2].samples;
+    // Between the responses to 290 and to 320 N.
+    let most = 0.93 * samples.iter().fold(0.0_f64, |most, y| most.max(y.abs()));
+    samples.iter_mut().for_each(|y| *y = y.clamp(-most, most));
+    let measurement = measure(&[recording], &in_band()).unwrap();
+    let (used, _) = measurement.groups[0].impacts.clone().unwrap();
+    assert_eq!(used.len(), 4);
+    assert!(
+        measurement
+            .warnings
+            .iter()
+            .any(|warning| warning.starts_with("impacts with clipped samples are left out: at 49.4")),
+        "{:?}",
+        measurement.warnings
+    );
+    let error = error(&measurement, "yy");
+    assert!(error < 0.02, "{error}");
+}
+
+#[test]
 fn estimators_differ_by_where_the_noise_is_and_coherence_is_their_ratio() {
     let mut random = random(2);
     let force = force_noise(&mut random, (1200.0 * RATE) as usize, 10.0);

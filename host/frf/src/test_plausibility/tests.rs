@@ -170,8 +170,11 @@ fn clipped_samples_are_named() {
         .iter()
         .map(|sample| sample.clamp(-0.4 * largest, 0.4 * largest))
         .collect();
-    let found = said(force, clipped, Some(TestKind::Hammer)).unwrap();
-    assert!(found.contains("ax is clipped"), "{found}");
+    let found = said(force, clipped, Some(TestKind::Hammer)).unwrap_err();
+    assert!(
+        found.contains("ax is clipped") && found.contains("in all 5 impacts"),
+        "{found}"
+    );
 }
 
 #[test]

@@ -63,6 +63,10 @@ pub struct Args {
     /// Force level in N to use where a step-sine test has several levels.
     #[arg(long, value_name = "F", value_parser = positive, allow_negative_numbers = true)]
     pub(super) force_n: Option<f64>,
+    /// Frequency, damping and size of the peaks at each force level: of a stepped sine at several levels, or of recordings at several. A
+    /// nonlinear structure has another linear model at each.
+    #[arg(long, conflicts_with_all = ["compare", "force_n", "housing"])]
+    pub(super) by_level: bool,
     /// Tool-tip calibration: FRF from the tool tip to the sensor on the housing.
     #[arg(long, value_name = "FILE", requires = "tip")]
     pub(super) housing: Option<PathBuf>,
