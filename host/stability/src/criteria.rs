@@ -113,20 +113,14 @@ pub(crate) const WINDING_ERRORS: [f64; 3] = [0.02, 0.1, 0.4];
 /// each line).
 pub(crate) const CHART_SAMPLES_MIN: usize = 40;
 
-/// Largest number of halvings of an interval of axial depth in which Floquet multipliers cannot be followed. With 40
-/// steps the last interval is 6e-6 of the depth range; in it the number of multipliers outside the unit circle is
-/// bisected. Unfounded.
-pub(crate) const LINE_LEVELS: u32 = 12;
+/// Number of halvings of a depth interval in which multipliers cannot be followed. With 10 intervals the last one is
+/// 6e-6 of the depth range; in it the number of multipliers outside the unit circle is bisected. Unfounded.
+pub(crate) const LINE_LEVELS: u32 = 14;
 
 /// Least |μ| of the multipliers that are followed along the depth. The number outside the unit circle is compared at
 /// every sample, so that a smaller multiplier that crosses the circle between two samples is noticed; the value is
 /// unfounded.
 pub(crate) const LINE_FOLLOWED: f64 = 0.3;
-
-/// Distance of |μ| from 1 beyond which a multiplier only counts as inside or outside the unit circle and is not
-/// followed along the depth. Unfounded; with it the limits of random machines agree with verdicts at single depths
-/// (`tests/multipliers.rs`).
-pub(crate) const LINE_FAR: f64 = 0.5;
 
 /// Distance of |μ| from 1 within which Newton's method corrects a multiplier of the scan over the depth before it
 /// counts as inside or outside the unit circle. It is 1e5 times the error of the scan in each element of its mesh,
@@ -138,19 +132,26 @@ pub(crate) const LINE_POLISHED: f64 = 1e-3;
 /// larger distance is taken as two different multipliers. Unfounded.
 pub(crate) const TANGENT_MISS: f64 = 0.25;
 
-/// Safety factor on |dμ/dw| × (step in depth), the linear estimate of a multiplier's move. A multiplier is followed if
-/// its distance from the unit circle is less than this factor times that move, plus [`REACH_LEAST`], and less than
-/// [`LINE_FAR`]. Unfounded.
+/// As [`TANGENT_MISS`], for the path of ln μ along a line. Newton's method half way confirms each pair. Unfounded;
+/// `tests/scan.rs` checks the switches of random machines.
+pub(crate) const PATH_MISS: f64 = 0.25;
+
+/// Largest error in ln μ, half way between two sampled depths, of the cubic by which a multiplier is followed along the
+/// depth; the error is then subtracted. Unfounded; `tests/scan.rs` checks the switches of random machines.
+pub(crate) const PATH_TOLERANCE: f64 = 5e-3;
+
+/// Safety factor on |d(ln μ)/dw| × (step in depth), the linear estimate of the move of ln μ. A multiplier is followed if
+/// its distance ln|μ| from the unit circle is at most this factor times that move, plus [`REACH_LEAST`]. Unfounded.
 pub(crate) const REACH_FACTOR: f64 = 3.0;
 
-/// Distance of |μ| from 1 within which a multiplier is followed along the depth, however small its derivative dμ/dw.
+/// Distance of ln|μ| from 0 within which a multiplier is followed along the depth, however small its derivative dμ/dw.
 /// Unfounded.
 pub(crate) const REACH_LEAST: f64 = 0.02;
 
-/// Least distance from the unit circle that the cubic interpolant of |μ| between two sampled depths may reach, as a
-/// share of the smaller distance at the two depths. If it comes closer, the multiplier may touch the circle, and the
-/// depth interval is halved. Unfounded.
-pub(crate) const TOUCHING: f64 = 0.3;
+/// Least distance from the unit circle that ln|μ| may reach at an extremum between two sampled depths, as a share of its
+/// second difference there over a sixteenth of the depth interval. If it comes closer, the multiplier may touch the
+/// circle, and the depth interval is halved. A parabola needs an eighth. Unfounded.
+pub(crate) const TOUCHING: f64 = 0.5;
 
 // Charts between the requested speeds.
 

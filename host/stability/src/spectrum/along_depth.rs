@@ -35,6 +35,13 @@ pub(crate) trait Spectrum {
         Some(Root { multiplier, slope })
     }
 
+    /// Floquet multiplier near a guess, to the square of the guess's error; a real guess gives a real multiplier.
+    ///
+    /// `None` if no multiplier is found within 5 % of |guess|.
+    fn corrected(&mut self, guess: Complex64, depth_m: f64) -> Option<Complex64> {
+        self.multiplier_near(guess, depth_m, 0.05 * guess.norm())
+    }
+
     /// Crossing of the unit circle by a multiplier near a guess, at an axial depth between `low_m` and `high_m`.
     fn crossing_near(&mut self, guess: Crossing, low_m: f64, high_m: f64) -> Option<Crossing>;
 

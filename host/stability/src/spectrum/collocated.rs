@@ -66,6 +66,14 @@ impl Spectrum for Collocated<'_> {
         self.characteristic.root_near(guess, depth_m, &mut self.workspace)
     }
 
+    fn corrected(&mut self, guess: Complex64, depth_m: f64) -> Option<Complex64> {
+        let (characteristic, workspace) = (&self.characteristic, &mut self.workspace);
+        let by_one_step = characteristic.root_near(guess, depth_m, workspace);
+        by_one_step
+            .map(|root| root.multiplier)
+            .or_else(|| characteristic.multiplier_near(guess, depth_m, 0.05 * guess.norm(), workspace))
+    }
+
     fn crossing_near(&mut self, guess: Crossing, low_m: f64, high_m: f64) -> Option<Crossing> {
         self.characteristic
             .crossing_near(guess, low_m, high_m, &mut self.workspace)

@@ -14,16 +14,6 @@ pub(crate) struct Root {
 }
 
 impl Root {
-    /// Distance |μ| − 1 of the multiplier from the unit circle, positive outside.
-    pub(crate) fn excess(&self) -> f64 {
-        self.multiplier.norm() - 1.0
-    }
-
-    /// Derivative d|μ|/dw, 1/m.
-    pub(crate) fn excess_slope(&self) -> f64 {
-        (self.multiplier.conj() * self.slope).re / self.multiplier.norm()
-    }
-
     /// Removes from `free`, the multipliers at the depth one step deeper, the one on the same branch as this
     /// multiplier, and returns it: the one whose tangent, half way between the two depths, comes closest to the tangent
     /// of this multiplier. `None` if `free` is empty, if the two are neither both complex nor both real of equal sign,

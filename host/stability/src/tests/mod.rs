@@ -9,6 +9,7 @@ mod line;
 mod multipliers;
 mod properties;
 mod random;
+mod scan;
 mod sensitivity;
 mod taylor;
 mod uncertainty;
