@@ -73,6 +73,8 @@ fn the_page_has_every_key_of_a_case() {
         ("[cut]", "[cut]\n".into()),
         ("[limits]", "[limits]\n".into()),
         ("[posture]", "[posture]\n".into()),
+        ("[uncertainty]", "[uncertainty]\n".into()),
+        ("[provenance]", "[provenance]\n".into()),
     ] {
         let case = format!("{head}{STRANGER} = 1\n");
         let error = Case::parse(Path::new("case.toml"), &case).expect_err("an unknown key");

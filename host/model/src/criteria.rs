@@ -50,3 +50,13 @@ pub(crate) const COEFFICIENT_MAX_MPA: f64 = 1e6;
 
 /// Largest spindle speed in the limits of a case, rev/min. Air-bearing spindles reach 300 000. A choice above them.
 pub(crate) const SPEED_MAX_RPM: f64 = 1e6;
+
+/// Largest error of a correlation in `[uncertainty]` of a case that counts as rounding: of the symmetry of the matrix, and, times the number of
+/// parameters, of an eigenvalue below 0. Covariances with seven digits err by 5e-8 of the product of the standard deviations; the factor of 20
+/// above it is a choice.
+pub(crate) const COVARIANCE_ROUNDING: f64 = 1e-6;
+
+/// Share of a parameter's variance that other parameters leave unexplained up to which the parameter follows from them. What is dropped is a
+/// standard deviation of 1e-4 of that of the parameter, which moves no limit; the rounding of a covariance of 16 digits is some 1e-12. The
+/// value between is a choice.
+pub(crate) const DEPENDENT_PARAMETER: f64 = 1e-8;

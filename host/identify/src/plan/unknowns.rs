@@ -47,7 +47,7 @@ pub(super) struct Unknowns {
     pub(super) standstill: Vec<Variable>,
     /// Names of all unknowns, in the order of a vector of unknowns.
     pub(super) names: Vec<String>,
-    /// True if the case states standard deviations; otherwise those of the prior are assumed.
+    /// True if the case states uncertainties; otherwise those of the prior are assumed.
     pub(super) stated: bool,
 }
 
@@ -65,12 +65,13 @@ struct Named {
 }
 
 impl Unknowns {
-    /// The unknowns whose standard deviations the case states (keys that end in `_std`), or else those of `prior`.
+    /// The unknowns whose standard deviations or covariance the case states (keys that end in `_std`, `[uncertainty]`),
+    /// or else those of `prior`.
     ///
     /// # Errors
     /// There are no unknowns, or the modes of the matrices cannot be computed; the text gives the reason.
     pub(super) fn new(case: &Case, prior: &Prior, means: &Means) -> Result<Self, String> {
-        let stated = !case.deviations.is_empty();
+        let stated = case.is_uncertain();
         let named = if stated {
             of_case(case)
         } else {
@@ -120,10 +121,12 @@ fn percent(share: f64) -> String {
 fn of_case(case: &Case) -> Vec<Named> {
     let named = |variable: Variable| {
         let keys: Vec<String> = variable.parts().iter().map(|part| part.parameter.key()).collect();
-        Named {
-            variable,
-            name: keys.join(" with "),
-        }
+        // A variable of a covariance moves its first parameter and all those correlated with it.
+        let name = match keys.as_slice() {
+            [first, _, _, ..] => format!("{first} with {} correlated parameters", keys.len() - 1),
+            few => few.join(" with "),
+        };
+        Named { variable, name }
     };
     Variable::of_case(case).into_iter().map(named).collect()
 }

@@ -5,6 +5,7 @@ mod job;
 mod joints;
 mod structure;
 mod tool;
+mod uncertainty;
 
 use std::path::Path;
 
@@ -60,7 +61,7 @@ fn case(path: &Path, text: &str) -> Result<Case, CaseError> {
         path.file_stem()
             .map_or_else(String::new, |stem| stem.to_string_lossy().into_owned())
     });
-    Ok(Case {
+    let mut case = Case {
         path: path.into(),
         name,
         structure,
@@ -69,9 +70,18 @@ fn case(path: &Path, text: &str) -> Result<Case, CaseError> {
         cut,
         limits,
         posture,
-        deviations: check.deviations,
+        deviations: std::mem::take(&mut check.deviations),
+        covariance: None,
+        assumed: file
+            .provenance
+            .map_or_else(Vec::new, |provenance| provenance.assumed),
         extensions,
-    })
+    };
+    case.covariance = file
+        .uncertainty
+        .map(|uncertainty| check.uncertainty(&uncertainty, &case))
+        .transpose()?;
+    Ok(case)
 }
 
 fn syntax(path: &Path, text: &str, error: &toml::de::Error) -> CaseError {

@@ -2,8 +2,9 @@
 
 /// The standard deviation of one parameter, in the unit of that parameter: a key `…_std` of the case.
 ///
-/// The errors of parameters are normally distributed and independent, except for entries (i, j) and (j, i) of a matrix
-/// with equal values and equal standard deviations: they vary together.
+/// The errors of these parameters are normally distributed and independent, except for entries (i, j) and (j, i) of a matrix
+/// with equal values and equal standard deviations: they vary together. For other correlations see
+/// [`ParameterCovariance`](super::ParameterCovariance).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Deviation {
     /// The uncertain parameter.

@@ -23,6 +23,8 @@ pub(super) struct CaseFile {
     pub(super) cut: Option<CutFile>,
     pub(super) limits: Option<LimitsFile>,
     pub(super) posture: Option<PostureFile>,
+    pub(super) uncertainty: Option<UncertaintyFile>,
+    pub(super) provenance: Option<ProvenanceFile>,
     #[serde(default)]
     pub(super) extension: ExtensionsFile,
 }
@@ -138,4 +140,18 @@ pub(super) struct LimitsFile {
 pub(super) struct PostureFile {
     pub(super) index: Option<Spanned<i64>>,
     pub(super) joints_deg: Option<Spanned<Vec<f64>>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct UncertaintyFile {
+    pub(super) parameters: Spanned<Vec<Spanned<String>>>,
+    pub(super) covariance: Spanned<Vec<Spanned<Vec<f64>>>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct ProvenanceFile {
+    #[serde(default)]
+    pub(super) assumed: Vec<String>,
 }

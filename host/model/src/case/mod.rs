@@ -10,8 +10,11 @@ mod effects;
 mod error;
 mod file;
 mod limits;
+mod parameter_covariance;
+mod parameter_name;
 mod parameter_value;
 mod posture;
+mod provenance;
 mod sections;
 
 use std::collections::BTreeMap;
@@ -20,6 +23,7 @@ use std::path::PathBuf;
 pub use deviation::{Deviation, Parameter};
 pub use error::CaseError;
 pub use limits::MachineLimits;
+pub use parameter_covariance::ParameterCovariance;
 pub use posture::Posture;
 
 use crate::effects::{EffectName, EffectSpec};
@@ -48,6 +52,11 @@ pub struct Case {
     pub posture: Posture,
     /// Standard deviations of the parameters of the case (keys `…_std`).
     pub deviations: Vec<Deviation>,
+    /// Joint covariance of further parameters (section `[uncertainty]`), none of which is among the [`deviations`](Self::deviations).
+    pub covariance: Option<ParameterCovariance>,
+    /// Assumptions under which the case was identified (section `[provenance]`), one sentence each; see
+    /// [`assumptions`](Self::assumptions).
+    pub assumed: Vec<String>,
     /// Tables `[extension.NAME]` by name. Their names, keys and values agree with the [`EffectSpec`]s; whether the
     /// structure has the direction of an effect is checked when the effect is applied.
     pub extensions: BTreeMap<String, toml::Table>,
@@ -99,6 +108,11 @@ impl Case {
         })
     }
 
+    /// True if the case states how uncertain any of its parameters is: by a standard deviation or by a covariance.
+    pub fn is_uncertain(&self) -> bool {
+        !self.deviations.is_empty() || self.covariance.is_some()
+    }
+
     /// True if the case has this effect as an extension.
     pub fn has(&self, effect: EffectName) -> bool {
         self.extensions.contains_key(effect.name())
@@ -143,3 +157,6 @@ impl Case {
 
 #[cfg(test)]
 pub(crate) mod tests;
+
+#[cfg(test)]
+mod parameter_covariance_tests;

@@ -7,6 +7,36 @@ use super::deviation::Parameter;
 use crate::structure::{Form, Joint, Matrices, Mode};
 
 impl Parameter {
+    /// All parameters of a case that may be uncertain.
+    pub fn of_case(case: &Case) -> Vec<Self> {
+        let structure = case.structure.as_ref();
+        let size = structure.map_or(0, |structure| structure.directions.len());
+        let mut all = match structure.map(|structure| &structure.form) {
+            None => Vec::new(),
+            Some(Form::Matrices(_)) => of_matrices(size),
+            Some(Form::Modes(modes)) => (0..modes.len()).flat_map(|mode| of_mode(mode, size)).collect(),
+            Some(Form::Joints(robot)) => (0..robot.joints.len()).flat_map(of_joint).collect(),
+        };
+        all.extend([
+            Self::EdgeAngle,
+            Self::RunoutOffset,
+            Self::RunoutAngle,
+            Self::Ktc,
+            Self::Krc,
+            Self::Kac,
+            Self::Kte,
+            Self::Kre,
+            Self::Kae,
+            Self::Start,
+            Self::Exit,
+            Self::FeedPerTooth,
+            Self::FeedDirection,
+        ]);
+        let mut slots = case.clone();
+        all.retain(|parameter| parameter.slot(&mut slots).is_some());
+        all
+    }
+
     /// Value of this parameter in a case, in the unit of its key; `None` if the case has no such parameter.
     pub fn value(self, case: &Case) -> Option<f64> {
         // The function `slot` gives mutable access to the value, so reading works on a copy of the case.
@@ -109,6 +139,38 @@ impl Parameter {
             _ => None,
         }
     }
+}
+
+fn of_matrices(size: usize) -> Vec<Parameter> {
+    let entry: [fn(usize, usize) -> Parameter; 5] = [
+        Parameter::Mass,
+        Parameter::Damping,
+        Parameter::Stiffness,
+        Parameter::CubicDamping,
+        Parameter::CubicStiffness,
+    ];
+    let entries = entry
+        .into_iter()
+        .flat_map(|entry| (0..size).flat_map(move |i| (0..size).map(move |j| entry(i, j))));
+    entries.collect()
+}
+
+fn of_mode(mode: usize, size: usize) -> Vec<Parameter> {
+    let parts = || (0..size).flat_map(|entry| [(entry, false), (entry, true)]);
+    let left = parts().map(|(entry, imaginary)| Parameter::Left(mode, entry, imaginary));
+    let right = parts().map(|(entry, imaginary)| Parameter::Right(mode, entry, imaginary));
+    let pole = [Parameter::Frequency(mode), Parameter::DampingRatio(mode)];
+    pole.into_iter().chain(left).chain(right).collect()
+}
+
+fn of_joint(joint: usize) -> [Parameter; 5] {
+    [
+        Parameter::JointStiffness(joint),
+        Parameter::JointDamping(joint),
+        Parameter::JointCubicStiffness(joint),
+        Parameter::JointCubicDamping(joint),
+        Parameter::LinkMass(joint),
+    ]
 }
 
 fn part_of(entry: &mut Complex64, imaginary: bool) -> Option<&mut f64> {

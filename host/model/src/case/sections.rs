@@ -9,7 +9,7 @@ pub(super) struct Section {
 }
 
 /// Sections whose required keys are the same in every case.
-const SECTIONS: [Section; 4] = [
+const SECTIONS: [Section; 5] = [
     Section {
         name: "tool",
         keys: &[
@@ -38,6 +38,17 @@ const SECTIONS: [Section; 4] = [
         keys: &[
             ("rpm_min", "rev/min, slowest speed", "600.0"),
             ("rpm_max", "rev/min, fastest speed", "12000.0"),
+        ],
+    },
+    Section {
+        name: "uncertainty",
+        keys: &[
+            (
+                "parameters",
+                "names of uncertain parameters",
+                "[\"material.ktc_mpa\"]",
+            ),
+            ("covariance", "one row for each parameter", "[[400.0]]"),
         ],
     },
 ];

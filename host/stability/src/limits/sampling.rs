@@ -1,4 +1,4 @@
-//! Random machines of a case with standard deviations: the independent variables, and stratified draws of them.
+//! Random machines of a case with uncertain parameters: the independent variables, and stratified draws of them.
 
 use nalgebra::DVector;
 use quietcut_numerics::statistics::normal_quantile;
@@ -18,7 +18,8 @@ impl Variable {
     /// Independent variables of a case.
     ///
     /// Deviations are independent, except for entries (i, j) and (j, i) of a matrix: with equal values and equal
-    /// deviations they are one number and vary together.
+    /// deviations they are one number and vary together. Parameters with a joint covariance follow from further
+    /// independent variables, each of which moves several of them.
     pub fn of_case(case: &Case) -> Vec<Self> {
         let mut variables: Vec<Self> = Vec::new();
         for &deviation in &case.deviations {
@@ -37,6 +38,8 @@ impl Variable {
                 }),
             }
         }
+        let jointly = case.covariance.iter().flat_map(|known| known.independent_parts());
+        variables.extend(jointly.map(Self::together));
         variables
     }
 
@@ -57,6 +60,25 @@ impl Variable {
         self.parts
             .iter()
             .all(|part| part.parameter.shift(case, part.std * deviations))
+    }
+
+    /// Shifts the parameters of a case to the machine at the values `machine` of the variables; false if a value is then
+    /// not valid.
+    ///
+    /// A parameter that several variables move is shifted once, by their sum: the bounds of its value hold for the sum
+    /// alone.
+    pub fn shift_all(variables: &[Self], machine: &DVector<f64>, case: &mut Case) -> bool {
+        let mut shifts: Vec<Deviation> = Vec::new();
+        for (variable, deviations) in variables.iter().zip(machine.iter()) {
+            for part in &variable.parts {
+                let by = part.std * deviations;
+                match shifts.iter_mut().find(|shift| shift.parameter == part.parameter) {
+                    Some(shift) => shift.std += by,
+                    None => shifts.push(Deviation { std: by, ..*part }),
+                }
+            }
+        }
+        shifts.iter().all(|shift| shift.parameter.shift(case, shift.std))
     }
 }
 

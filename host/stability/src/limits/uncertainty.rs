@@ -45,7 +45,7 @@ const SAMPLES: usize = 40;
 /// Function that builds the stability method for a case; the reason if the case is not a valid machine.
 pub type MethodOfCase<'a> = dyn Fn(&Case) -> Result<Box<dyn Method>, String> + Sync + 'a;
 
-/// Case with standard deviations of its parameters, and the stability method for machines drawn from them.
+/// Case with standard deviations or a covariance of its parameters, and the stability method for machines drawn from them.
 pub struct Uncertainty<'a> {
     case: &'a Case,
     method_of: &'a MethodOfCase<'a>,
@@ -56,7 +56,7 @@ pub struct Uncertainty<'a> {
 }
 
 impl<'a> Uncertainty<'a> {
-    /// Prepares draws of machines from a case; `None` if the case has no standard deviations.
+    /// Prepares draws of machines from a case; `None` if the case states no uncertainty of its parameters.
     pub fn new(case: &'a Case, method_of: &'a MethodOfCase<'a>, seed: u64) -> Option<Self> {
         let variables = Variable::of_case(case);
         (!variables.is_empty()).then(|| Self {
@@ -199,8 +199,7 @@ impl<'a> Uncertainty<'a> {
         whole: bool,
     ) -> Result<Result<SpeedLine, String>, StabilityError> {
         let mut case = self.case.clone();
-        let mut moves = self.variables.iter().zip(machine.iter());
-        if !moves.all(|(variable, deviations)| variable.shift(&mut case, *deviations)) {
+        if !Variable::shift_all(&self.variables, machine, &mut case) {
             return Ok(Err("a parameter lies outside of its bounds".into()));
         }
         let method = match (self.method_of)(&case) {

@@ -50,10 +50,10 @@ impl TableLayer {
         } else {
             (0.0, ANY_FEED_MM)
         };
-        if percentile.is_some() && case.deviations.is_empty() {
+        if percentile.is_some() && !case.is_uncertain() {
             return Err(BuildError::NotPossible {
                 path: case.path,
-                what: "--percentile needs deviations, keys that end in _std, such as ktc_mpa_std = 5.0 beside ktc_mpa",
+                what: "--percentile needs deviations: keys that end in _std, such as ktc_mpa_std = 5.0 beside ktc_mpa, or a section [uncertainty]",
             });
         }
         let pitched = Pitched::new(&case, CubicTerms::Kept)?;

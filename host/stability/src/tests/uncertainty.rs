@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use crate::limits::percentiles::limit_of;
 use crate::*;
-use quietcut_model::case::{Case, Deviation, Parameter};
+use quietcut_model::case::{Case, Deviation, Parameter, ParameterCovariance};
 use quietcut_testkit::case;
 use quietcut_testkit::results::Campaign;
 
@@ -437,4 +437,112 @@ fn deviations_that_make_most_machines_impossible_are_refused() {
     );
     case.deviations.clear();
     assert!(Uncertainty::new(&case, &method_of, 1).is_none());
+}
+
+/// The acetal robot with correlated frequency, damping and shape of its modes and correlated cutting coefficients.
+fn correlated() -> Case {
+    let mut case = acetal();
+    let deviations = std::mem::take(&mut case.deviations);
+    let size = deviations.len();
+    let correlation = |i: usize, j: usize| match (i.min(j), i.max(j)) {
+        (i, j) if i == j => 1.0,
+        (0, 2) => 0.8,
+        (1, 3) => -0.7,
+        (4, 5) => 0.95,
+        (6, 7) => -0.9,
+        (1, 6) => 0.3,
+        _ => 0.0,
+    };
+    let covariance = nalgebra::DMatrix::from_fn(size, size, |i, j| {
+        correlation(i, j) * deviations[i].std * deviations[j].std
+    });
+    let parameters = deviations.iter().map(|deviation| deviation.parameter).collect();
+    case.covariance = Some(ParameterCovariance {
+        parameters,
+        covariance,
+    });
+    case
+}
+
+#[test]
+fn a_diagonal_covariance_is_that_of_independent_deviations() {
+    let independent = acetal();
+    let mut diagonal = independent.clone();
+    let deviations = std::mem::take(&mut diagonal.deviations);
+    let variances = deviations.iter().map(|deviation| deviation.std * deviation.std);
+    diagonal.covariance = Some(ParameterCovariance {
+        parameters: deviations.iter().map(|deviation| deviation.parameter).collect(),
+        covariance: nalgebra::DMatrix::from_diagonal(&nalgebra::DVector::from_iterator(
+            deviations.len(),
+            variances,
+        )),
+    });
+    let spread = |case: &Case| {
+        let uncertainty = Uncertainty::new(case, &method_of, 5).unwrap();
+        uncertainty
+            .spread(&nominal(case, 1480.0, 8.0), 8.0, &[1.0, 2.0])
+            .unwrap()
+    };
+    let (expected, found) = (spread(&independent), spread(&diagonal));
+    assert_eq!(found.stable_share, expected.stable_share);
+    // The square root of a square errs by one rounding.
+    for ((_, a, _), (_, b, _)) in percentiles_of(&expected).into_iter().zip(percentiles_of(&found)) {
+        let (a, b) = (a.unwrap(), b.unwrap());
+        assert!((a - b).abs() < 1e-9 * a, "{a} {b}");
+    }
+}
+
+#[test]
+fn percentiles_of_correlated_parameters_are_those_of_plain_draws_from_their_covariance() {
+    let case = correlated();
+    let (rpm, depth_mm, count) = (1480.0, 8.0, 4000_u64);
+    let uncertainty = Uncertainty::new(&case, &method_of, 7).unwrap();
+    let spread = uncertainty
+        .spread(&nominal(&case, rpm, depth_mm), depth_mm, &[])
+        .unwrap();
+    let known = case.covariance.clone().unwrap();
+    // A symmetric square root instead of the triangular one: another way from the covariance to draws.
+    let eigen = known.covariance.clone().symmetric_eigen();
+    let roots = eigen.eigenvalues.map(|value| value.max(0.0).sqrt());
+    let root =
+        &eigen.eigenvectors * nalgebra::DMatrix::from_diagonal(&roots) * eigen.eigenvectors.transpose();
+    println!("seed {SEED}");
+    let limits: Vec<f64> = (0..count)
+        .into_par_iter()
+        .map(|index| {
+            let mut rng = ChaCha8Rng::seed_from_u64(SEED);
+            rng.set_stream(index);
+            let normal = nalgebra::DVector::from_fn(root.nrows(), |_, _| StandardNormal.sample(&mut rng));
+            let moves = &root * normal;
+            let mut machine = case.clone();
+            for (parameter, by) in known.parameters.iter().zip(moves.iter()) {
+                assert!(parameter.shift(&mut machine, *by));
+            }
+            limit_of(&method_of(&machine).unwrap().line(rpm, depth_mm, 40).unwrap()).unwrap_or(f64::INFINITY)
+        })
+        .collect();
+    let mut drawn = MonteCarlo::new(&case, rpm, depth_mm);
+    drawn.limits = limits;
+    drawn.limits.sort_by(f64::total_cmp);
+    drawn.drawn = count;
+    for (share, found, _) in percentiles_of(&spread) {
+        let found = found.unwrap();
+        let below = drawn.limits.iter().filter(|limit| **limit < found).count();
+        quietcut_testkit::rates::assert_share(
+            &format!("drawn limits below {found:.4} mm"),
+            share,
+            below,
+            count as usize,
+        );
+    }
+    // Without the correlations the same test fails: it can tell the two.
+    let independent = acetal();
+    let uncertainty = Uncertainty::new(&independent, &method_of, 7).unwrap();
+    let other = uncertainty
+        .spread(&nominal(&independent, rpm, depth_mm), depth_mm, &[])
+        .unwrap();
+    let low = other.limit_percentiles_mm.low.unwrap();
+    let below = drawn.limits.iter().filter(|limit| **limit < low).count();
+    println!("5 % percentile without correlation: {low:.4} mm, {below} of {count} below");
+    assert!((below as f64 / count as f64 - 0.05).abs() > 0.02);
 }
