@@ -455,7 +455,7 @@ fn comments_of_a_case_survive_an_identification_into_it() {
     run("frf tap-x.csv tap-y.csv --band-hz 10:30 --out frf.csv");
     run("identify frf.csv --method modes --case case.toml --out case.toml");
     let text = fs::read_to_string(folder.path().join("case.toml")).expect("a case");
-    for words in ["# My machine.", "# Sharp.", "[structure]", "frequency_hz_std"] {
+    for words in ["# My machine.", "# Sharp.", "[structure]", "[uncertainty]"] {
         assert!(text.contains(words), "{words}: {text}");
     }
 }

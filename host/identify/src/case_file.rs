@@ -4,6 +4,7 @@ use nalgebra::{DMatrix, Vector3};
 use num_complex::Complex64;
 use toml::{Table, Value};
 
+use crate::case_uncertainty;
 use crate::modes::{IdentifiedMode, ModalModel};
 use crate::robot::joints::JointParameter;
 use quietcut_model::effects::EffectName;
@@ -49,13 +50,18 @@ pub enum CaseFileError {
 /// # Errors
 /// A value has no form in TOML.
 fn written(case: &Table) -> Result<String, CaseFileError> {
-    toml::to_string(case).map_err(|error| CaseFileError::Toml(error.to_string()))
+    let mut case = case.clone();
+    // A covariance in one line could not be read by a person.
+    let uncertainty = case.remove(case_uncertainty::SECTION);
+    let text = toml::to_string(&case).map_err(|error| CaseFileError::Toml(error.to_string()))?;
+    Ok(text + &uncertainty.map_or_else(String::new, |section| case_uncertainty::text(&section)))
 }
 
 /// Sections of a case file about the tool and the cut, which [`with_sections`] takes from another case.
 const OTHERS: [&str; 4] = ["tool", "material", "cut", "limits"];
 
-/// Case file `text` whose sections tool, material, cut and limits are replaced by those that the case `other` has.
+/// Case file `text` whose sections tool, material, cut and limits are replaced by those that the case `other` has, and
+/// to whose `[uncertainty]` the covariance of their parameters is added.
 ///
 /// # Errors
 /// The text is not valid TOML, or the result cannot be written as TOML.
@@ -68,10 +74,12 @@ pub fn with_sections(text: &str, other: &Table) -> Result<String, CaseFileError>
             case.insert(section.into(), value.clone());
         }
     }
+    case_uncertainty::take_over(&mut case, other, &OTHERS);
     written(&case)
 }
 
-/// Text of a case file with the complex modes of `model`, in the directions that are both excited and measured.
+/// Text of a case file with the complex modes of `model`, in the directions that are both excited and measured, and with
+/// the joint covariance of their parameters.
 ///
 /// # Errors
 /// No direction is both excited and measured, or a value has no form in TOML.
@@ -99,7 +107,47 @@ pub fn text_of_modes(name: &str, model: &ModalModel) -> Result<String, CaseFileE
             }
         })
         .collect();
-    written(&modal(name, &directions, &modes))
+    let mut case = modal(name, &directions, &modes);
+    // The joint covariance replaces the standard deviations.
+    let found = case
+        .get_mut("structure")
+        .and_then(|structure| structure.get_mut("mode"));
+    for mode in found.and_then(Value::as_array_mut).into_iter().flatten() {
+        if let Value::Table(mode) = mode {
+            mode.retain(|key, _| !key.ends_with("_std"));
+        }
+    }
+    let uncertainty = case_uncertainty::of_modes(model, &directions);
+    case.insert(case_uncertainty::SECTION.into(), Value::Table(uncertainty));
+    let mut assumed = left_out(model, &directions);
+    if model.gain_error.is_none() {
+        assumed.push(EXACT_GAINS.into());
+    }
+    if !assumed.is_empty() {
+        let sentences = assumed.into_iter().map(Value::from).collect();
+        let provenance = Table::from_iter([("assumed".to_owned(), Value::Array(sentences))]);
+        case.insert("provenance".into(), Value::Table(provenance));
+    }
+    written(&case)
+}
+
+/// Assumption of a modal identification without errors of the sensors' gains.
+const EXACT_GAINS: &str = "the gains of force and response sensors are taken as exact: limits are off by as many percent as these; \
+    --calibration-percent of identify puts their error into the intervals";
+
+/// A sentence for each of x, y and z that is not among the directions of a case with the modes of `model`.
+fn left_out(model: &ModalModel, directions: &[Direction]) -> Vec<String> {
+    let axes = [Direction::X, Direction::Y, Direction::Z].into_iter();
+    axes.filter(|axis| !directions.contains(axis))
+        .map(|axis| {
+            let reason = match (model.forces.contains(&axis), model.responses.contains(&axis)) {
+                (true, _) => "driven, but not measured",
+                (false, true) => "measured, but not driven",
+                (false, false) => "neither driven nor measured",
+            };
+            format!("{axis} is left out: it was {reason}")
+        })
+        .collect()
 }
 
 /// Table of a case file with complex modes, whose left and right shapes have an entry for each of `directions`.

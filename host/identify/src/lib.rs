@@ -48,6 +48,7 @@
 
 pub mod ambient;
 pub mod case_file;
+mod case_uncertainty;
 mod criteria;
 pub mod cutting;
 pub mod dwells;

@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::lobes_spread::{intervals, percentiles};
 use super::method::MethodChoice;
 use super::varied::{self, Varied};
-use super::{Endings, Error, Output, Range, lobes_cells, lobes_csv, plausible_structure};
+use super::{Endings, Error, Output, Range, assumed, lobes_cells, lobes_csv, plausible_structure};
 use crate::case::Case;
 use crate::file;
 use crate::report::digits::significant;
@@ -73,10 +73,12 @@ pub struct Args {
 }
 
 #[derive(Serialize)]
-struct PointsOutput {
+struct PointsOutput<'a> {
     #[serde(flatten)]
     label: Label,
     points: Vec<CutStability>,
+    #[serde(skip_serializing_if = "<[String]>::is_empty")]
+    assumed: &'a [String],
 }
 
 impl Args {
@@ -123,6 +125,12 @@ pub fn run(args: Args) -> Result<(), Error> {
     let case = Case::read(&args.case).map_err(Error::input)?;
     plausible_structure::warn(&case);
     args.method.announce()?;
+    let assumed = args.method.assumptions(&case)?;
+    if args.cells || args.varied.variation().is_some() {
+        for sentence in &assumed {
+            tracing::warn!("{}: assumed: {sentence}", case.path.display());
+        }
+    }
     if let (Some(variation), Some(rpm), Some(depth_mm)) = (args.varied.variation(), args.rpm, args.depth_mm) {
         return varied::run(&case, &args.method, &variation, rpm, depth_mm, args.output);
     }
@@ -146,6 +154,7 @@ pub fn run(args: Args) -> Result<(), Error> {
                 probability: args.probability,
                 refine: !args.no_refine && !method.takes_seconds(),
                 cuts,
+                assumed,
             };
             run_chart(
                 &case,
@@ -156,11 +165,16 @@ pub fn run(args: Args) -> Result<(), Error> {
                 args.output,
             )
         }
-        _ => run_points(method.as_ref(), &args.at, args.output),
+        _ => run_points(method.as_ref(), &args.at, &assumed, args.output),
     }
 }
 
-fn run_points(method: &dyn Method, at: &[(f64, f64)], output: Output) -> Result<(), Error> {
+fn run_points(
+    method: &dyn Method,
+    at: &[(f64, f64)],
+    assumed: &[String],
+    output: Output,
+) -> Result<(), Error> {
     let points = at
         .iter()
         .map(|&(rpm, depth_mm)| method.point(rpm, depth_mm))
@@ -183,7 +197,13 @@ fn run_points(method: &dyn Method, at: &[(f64, f64)], output: Output) -> Result<
             point.kind.name(),
         );
     }
-    output.answer(&PointsOutput { label, points }, text)
+    text.push_str(&assumed::lines(assumed));
+    let answer = PointsOutput {
+        label,
+        points,
+        assumed,
+    };
+    output.answer(&answer, text)
 }
 
 /// Modulus of a Floquet multiplier as text: six decimals below 1000, seven significant digits from 1000 on.
@@ -202,6 +222,8 @@ struct ChartRequest {
     /// Whether stability limits are also computed at further speeds, where the limits bend.
     refine: bool,
     cuts: Option<Vec<TrialCut>>,
+    /// Assumptions behind the structure, one sentence each.
+    assumed: Vec<String>,
 }
 
 #[derive(Serialize)]
@@ -210,6 +232,8 @@ struct LobesOutput<'a> {
     chart: &'a Chart,
     #[serde(skip_serializing_if = "Option::is_none")]
     cuts: Option<Calls>,
+    #[serde(skip_serializing_if = "<[String]>::is_empty")]
+    assumed: &'a [String],
 }
 
 fn run_chart(
@@ -226,10 +250,11 @@ fn run_chart(
         probability,
         refine,
         cuts,
+        assumed,
     } = request;
     if probability && uncertainty.is_none() {
         return Err(Error::input(format!(
-            "{}: --probability needs standard deviations in the case (keys that end in _std), such as ktc_mpa_std = 5.0 beside ktc_mpa",
+            "{}: --probability needs standard deviations in the case (keys that end in _std), such as ktc_mpa_std = 5.0 beside ktc_mpa, or a section [uncertainty]",
             case.path.display()
         )));
     }
@@ -251,9 +276,15 @@ fn run_chart(
         tracing::warn!("{}: {warning}", case.path.display());
     }
     let calls = cuts.as_deref().map(|cuts| Calls::new(method, cuts)).transpose()?;
+    let shown = ShownChart {
+        case,
+        chart: &chart,
+        depth_mm: deepest_mm,
+        marks: cuts.iter().flatten().map(Mark::from).collect(),
+        assumed: &assumed,
+    };
     for path in out {
-        let marks: Vec<Mark> = cuts.iter().flatten().map(Mark::from).collect();
-        write_chart(case, &chart, deepest_mm, &marks, path)?;
+        shown.write(path)?;
     }
     let mut text = limits_as_text(&chart);
     if let Some(resolution) = &chart.resolution {
@@ -266,12 +297,14 @@ fn run_chart(
             calls.wrong, calls.cuts, calls.missed_chatter, calls.false_alarms, calls.undecided
         );
     }
+    text.push_str(&assumed::lines(&assumed));
     for path in out {
         let _ = write!(text, "\n{}", path.display());
     }
     let answer = LobesOutput {
         chart: &chart,
         cuts: calls,
+        assumed: &assumed,
     };
     output.answer(&answer, text)
 }
@@ -353,52 +386,72 @@ fn resolution_as_text(chart: &Chart, resolution: &Resolution) -> String {
     text
 }
 
-fn write_chart(case: &Case, chart: &Chart, depth_mm: f64, marks: &[Mark], path: &Path) -> Result<(), Error> {
-    let text = match file::ending(path).as_str() {
-        "json" => serde_json::to_string(chart).map_err(Error::other)?,
-        "csv" => lobes_csv::as_csv(chart)?,
-        "svg" => picture(case, chart, depth_mm, marks)?,
-        "html" => as_page(case, chart, depth_mm, marks)?,
-        _ => {
-            return Err(Error::input(format!(
-                "{}: the ending of the file sets its format; .svg, .html, .csv or .json is needed",
-                path.display()
-            )));
-        }
-    };
-    Ok(file::write(path, text.as_bytes())?)
+/// Stability chart of a case with what is shown beside it in a file.
+struct ShownChart<'a> {
+    case: &'a Case,
+    chart: &'a Chart,
+    depth_mm: f64,
+    marks: Vec<Mark>,
+    assumed: &'a [String],
 }
 
-fn picture(case: &Case, chart: &Chart, depth_mm: f64, marks: &[Mark]) -> Result<String, Error> {
-    let columns: Vec<Column> = chart.lines().into_iter().map(Column::from).collect();
-    let title = format!("{}, method: {}", case.name, chart.label);
-    // The chart cannot be drawn if the user gives only one spindle speed: this is an input error.
-    lobe_chart(&title, &columns, depth_mm, marks).map_err(Error::input)
-}
+impl ShownChart<'_> {
+    fn write(&self, path: &Path) -> Result<(), Error> {
+        let text = match file::ending(path).as_str() {
+            "json" => {
+                let answer = LobesOutput {
+                    chart: self.chart,
+                    cuts: None,
+                    assumed: self.assumed,
+                };
+                serde_json::to_string(&answer).map_err(Error::other)?
+            }
+            "csv" => lobes_csv::as_csv(self.chart)?,
+            "svg" => self.picture()?,
+            "html" => self.page()?,
+            _ => {
+                return Err(Error::input(format!(
+                    "{}: the ending of the file sets its format; .svg, .html, .csv or .json is needed",
+                    path.display()
+                )));
+            }
+        };
+        Ok(file::write(path, text.as_bytes())?)
+    }
 
-fn as_page(case: &Case, chart: &Chart, depth_mm: f64, marks: &[Mark]) -> Result<String, Error> {
-    let svg = picture(case, chart, depth_mm, marks)?;
-    let caption = format!(
-        "Stable depths over spindle speed, method: {}. Lines: first loss of stability. Grey areas: undecided within the error \
+    fn picture(&self) -> Result<String, Error> {
+        let columns: Vec<Column> = self.chart.lines().into_iter().map(Column::from).collect();
+        // The chart cannot be drawn if the user gives only one spindle speed: this is an input error.
+        let title = format!("{}, method: {}", self.case.name, self.chart.label);
+        lobe_chart(&title, &columns, self.depth_mm, &self.marks).map_err(Error::input)
+    }
+
+    fn page(&self) -> Result<String, Error> {
+        let (case, chart) = (self.case, self.chart);
+        let svg = self.picture()?;
+        let caption = format!(
+            "Stable depths over spindle speed, method: {}. Lines: first loss of stability. Grey areas: undecided within the error \
          of the method. Grey band with lines: 5 to 95 % percentiles and median of the first limit, from the standard \
          deviations of the case. Circles: stable trial cuts; crosses: trial cuts with chatter; squares: marginal trial cuts.",
-        chart.label
-    );
-    let body = maud::html! {
-        h1 { (case.name) }
-        (figure(&svg, &caption))
-        h2 { "Limits" }
-        table {
-            tr {
-                th { "rev/min" } th { "first limit [mm]" } th { "error [mm]" } th { "kind" } th { "chatter [Hz]" } th { "stable [mm]" }
-                @if chart.speeds.iter().any(|line| line.spread.is_some()) {
-                    th { "5 % percentile of the limit (90 % interval) [mm]" } th { "50 %" } th { "95 %" }
+            chart.label
+        );
+        let body = maud::html! {
+            h1 { (case.name) }
+            (figure(&svg, &caption))
+            (assumed::section(self.assumed))
+            h2 { "Limits" }
+            table {
+                tr {
+                    th { "rev/min" } th { "first limit [mm]" } th { "error [mm]" } th { "kind" } th { "chatter [Hz]" } th { "stable [mm]" }
+                    @if chart.speeds.iter().any(|line| line.spread.is_some()) {
+                        th { "5 % percentile of the limit (90 % interval) [mm]" } th { "50 %" } th { "95 %" }
+                    }
                 }
+                @for line in &chart.speeds { (row(line)) }
             }
-            @for line in &chart.speeds { (row(line)) }
-        }
-    };
-    Ok(page(&case.name, &body))
+        };
+        Ok(page(&case.name, &body))
+    }
 }
 
 fn row(line: &SpeedLine) -> maud::Markup {

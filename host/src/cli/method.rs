@@ -172,6 +172,30 @@ impl MethodChoice {
         Ok(())
     }
 
+    /// Sentences that state the assumptions behind the structure: those of the case, or with `--frf` those of the table.
+    ///
+    /// # Errors
+    /// The table of `--frf` cannot be read.
+    pub(super) fn assumptions(&self, case: &Case) -> Result<Vec<String>, Error> {
+        let Some(path) = &self.frf else {
+            return Ok(case.assumptions());
+        };
+        let missing = self.table(path)?.table.missing();
+        let mut assumptions = Vec::new();
+        if !missing.is_empty() {
+            let names: Vec<String> = missing.iter().map(|name| format!("h{name}")).collect();
+            assumptions.push(format!(
+                "{} are zero, since {} lacks them",
+                names.join(", "),
+                path.display()
+            ));
+        }
+        if missing.iter().any(|name| name == "zz") {
+            assumptions.extend(case.effect_of_rigid_z());
+        }
+        Ok(assumptions)
+    }
+
     fn name(&self) -> MethodName {
         self.method.unwrap_or(if self.frf.is_some() {
             MethodName::MultiFrequency

@@ -4,6 +4,7 @@
 //! input, with one message on stderr. Exit status 130: interrupted by Ctrl-C, which ends `monitor` with success. Exit
 //! status 1: any other failure. An output file is complete or unchanged.
 
+mod assumed;
 mod channels;
 pub mod demo;
 pub mod diagnose;

@@ -4,7 +4,9 @@
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-use super::{Endings, Error, Output, Range, positive, progress};
+use serde::Serialize;
+
+use super::{Endings, Error, Output, Range, assumed, positive, progress};
 use crate::case::Case;
 use crate::file;
 use crate::plan::{Means, Plan, Prior, Request, Step, Test, WithoutDerivative, plan};
@@ -99,6 +101,15 @@ struct Tests {
     standstill_damping_percent: f64,
 }
 
+#[derive(Serialize)]
+struct PlanOutput<'a> {
+    #[serde(flatten)]
+    plan: &'a Plan,
+    /// Assumptions behind the structure of the case, one sentence each.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    assumed: Vec<String>,
+}
+
 /// Runs the verb.
 pub fn run(args: Args) -> Result<(), Error> {
     let case = Case::read(&args.case)?;
@@ -115,11 +126,17 @@ pub fn run(args: Args) -> Result<(), Error> {
     for path in &args.out {
         write(&case, &found, request.depth_mm, path)?;
     }
+    let assumed = case.assumptions();
     let mut output_text = text(&found);
+    output_text.push_str(&assumed::lines(&assumed));
     for path in &args.out {
         let _ = write!(output_text, "\n{}", path.display());
     }
-    args.output.answer(&found, output_text)
+    let answer = PlanOutput {
+        plan: &found,
+        assumed,
+    };
+    args.output.answer(&answer, output_text)
 }
 
 /// Warnings about stability limits without derivatives with respect to the unknown parameters: one about first limits,
@@ -279,6 +296,7 @@ fn write(case: &Case, plan: &Plan, depth_mm: f64, path: &Path) -> Result<(), Err
             let body = maud::html! {
                 h1 { (case.name) ": planned tests" }
                 (figure(&picture()?, caption))
+                (assumed::section(&case.assumptions()))
                 pre { (self::text(plan)) }
             };
             page(&case.name, &body)

@@ -166,7 +166,14 @@ pub fn run(args: Args) -> Result<(), Error> {
             "--rpm {first}: a table needs a range of speeds, first:last:count"
         )));
     }
-    let built = build_table(&cases, &request)?;
+    let mut built = build_table(&cases, &request)?;
+    for case in &cases {
+        for sentence in case.assumptions() {
+            built
+                .warnings
+                .push(format!("{}: assumed: {sentence}", case.path.display()));
+        }
+    }
     file::write(out, &built.bytes)?;
     for warning in &built.warnings {
         tracing::warn!("{warning}");

@@ -10,7 +10,9 @@
 mod covariance;
 mod denominator;
 mod error;
+mod gain_errors;
 mod jacobian;
+mod joint_covariance;
 mod mode;
 mod model;
 mod pole_residue;
@@ -127,10 +129,7 @@ fn model(
     stabilization: Stabilization,
     rejected: Vec<Rejected>,
 ) -> ModalModel {
-    let mut modes: Vec<IdentifiedMode> = (0..refined.fit.modes.len())
-        .map(|index| refined.mode(index))
-        .collect();
-    modes.sort_by(|a, b| a.mode.frequency_hz.total_cmp(&b.mode.frequency_hz));
+    let (modes, covariance) = refined.sorted();
     let outside = data
         .places
         .iter()
@@ -141,6 +140,8 @@ fn model(
         forces: data.forces.clone(),
         responses: data.responses.clone(),
         modes,
+        covariance,
+        gain_error: None,
         outside,
         fit_error: refined.relative_error,
         misfit: data.has_deviation.then_some(refined.misfit),

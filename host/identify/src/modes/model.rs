@@ -1,5 +1,6 @@
 //! The identified modal model.
 
+use nalgebra::DMatrix;
 use num_complex::Complex64;
 
 use super::mode::IdentifiedMode;
@@ -20,6 +21,13 @@ pub struct ModalModel {
     pub responses: Vec<Direction>,
     /// The modes, sorted by frequency.
     pub modes: Vec<IdentifiedMode>,
+    /// Joint covariance of the parameters of all modes. For each mode in turn: natural frequency in Hz, damping ratio,
+    /// entries of the left shape in the order of `forces`, entries of the right shape in the order of `responses`, real
+    /// before imaginary part.
+    pub covariance: DMatrix<f64>,
+    /// Relative standard deviation of the gain of every sensor that the covariance contains; `None` if the gains are taken
+    /// as exact.
+    pub gain_error: Option<f64>,
     /// For each pair of response and force direction: the compliance of the modes above the band, m/N, and the inertia
     /// term of the modes below it, the coefficient of 1/s², in 1/kg.
     pub outside: Vec<(Direction, Direction, [f64; 2])>,

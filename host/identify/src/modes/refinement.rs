@@ -8,6 +8,7 @@ use std::f64::consts::TAU;
 
 use super::covariance::covariance;
 use super::jacobian::{jacobian, normal};
+use super::joint_covariance::pole_derivatives;
 use super::mode::IdentifiedMode;
 use super::pole_residue::{PoleResidue, shared};
 use super::receptances::Receptances;
@@ -168,6 +169,7 @@ impl Refined {
         let pole = shaped.pole;
         let omega = pole.norm();
         let damping_ratio = -pole.re / omega;
+        let (by_frequency, by_damping) = pole_derivatives(pole);
         let by = |gradient: [f64; 2]| -> f64 {
             let covariance = |i: usize, j: usize| self.covariance[(at + i, at + j)];
             let variance = gradient[0] * gradient[0] * covariance(0, 0)
@@ -188,13 +190,8 @@ impl Refined {
                 left: shaped.left.clone(),
                 right: shaped.right.clone(),
             },
-            // Standard deviations of frequency and damping ratio follow from that of the pole λ by ω = |λ|, ζ = −Re
-            // λ/|λ|.
-            frequency_std_hz: by([pole.re / omega / TAU, pole.im / omega / TAU]),
-            damping_ratio_std: by([
-                -pole.im * pole.im / omega.powi(3),
-                pole.re * pole.im / omega.powi(3),
-            ]),
+            frequency_std_hz: by(by_frequency),
+            damping_ratio_std: by(by_damping),
             left_std: deviations(at + 2 + 2 * shaped.right.len(), shaped.left.len()),
             right_std: deviations(at + 2, shaped.right.len()),
         }

@@ -9,6 +9,7 @@ use rand_distr::{Distribution, StandardNormal};
 
 use super::*;
 use quietcut_frf::{Frf, FrfTable};
+use quietcut_model::case::{Case, Parameter};
 use quietcut_model::structure::{Direction, Form, Mode, Structure};
 use quietcut_testkit::case;
 
@@ -154,6 +155,72 @@ fn intervals_cover_the_truth_as_often_as_they_say() {
         missed <= 1 && (0.85..0.95).contains(&share),
         "{share} of {all}, {missed} missed"
     );
+}
+
+/// The residue of a mode follows from entries of two shapes whose errors depend on each other: the interval of the residue
+/// needs their covariance.
+#[test]
+fn a_written_case_states_the_covariance_from_which_residues_follow() {
+    let structure = case("kuka-kr90-acetal").structure.unwrap();
+    let truth = modes_of(&structure);
+    let seeds = 200;
+    let (mut covered, mut independent, mut all) = (0, 0, 0);
+    for seed in 0..seeds {
+        let (table, deviation) = table(&structure, &grid(10.0, 28.0, 145), &AXES, 0.03, 1000 + seed);
+        let data = Receptances::new(&table, Some(&deviation), None).unwrap();
+        let found = identify(&data, &Options::default()).unwrap();
+        if found.modes.len() != truth.len() {
+            continue;
+        }
+        let text = crate::case_file::text_of_modes("found", &found).unwrap();
+        let written = Case::parse(Path::new("found.toml"), &text).unwrap();
+        assert!(written.deviations.is_empty());
+        let known = written.covariance.as_ref().unwrap();
+        assert_eq!(known.parameters.len(), 2 * (2 + 4 * 3));
+        let std = |parameter: Parameter| {
+            let at = known.parameters.iter().position(|known| *known == parameter);
+            known.covariance[(at.unwrap(), at.unwrap())].sqrt()
+        };
+        for (index, mode) in found.modes.iter().enumerate() {
+            for (parameter, stated) in [
+                (Parameter::Frequency(index), mode.frequency_std_hz),
+                (Parameter::DampingRatio(index), mode.damping_ratio_std),
+                (Parameter::Left(index, 2, true), mode.left_std[2][1]),
+                (Parameter::Right(index, 1, false), mode.right_std[1][0]),
+            ] {
+                assert!((std(parameter) / stated - 1.0).abs() < 1e-9, "{parameter:?}");
+            }
+        }
+        // The real part of the residue of y by y of the first mode, and its gradient.
+        let residue = |mode: &Mode| mode.right[1] * mode.left[1];
+        let (r, l) = (found.modes[0].mode.right[1], found.modes[0].mode.left[1]);
+        let gradient = [
+            (Parameter::Right(0, 1, false), l.re),
+            (Parameter::Right(0, 1, true), -l.im),
+            (Parameter::Left(0, 1, false), r.re),
+            (Parameter::Left(0, 1, true), -r.im),
+        ];
+        let (mut variance, mut without) = (0.0, 0.0);
+        for (a, by_a) in gradient {
+            for (b, by_b) in gradient {
+                let place = |parameter| known.parameters.iter().position(|known| *known == parameter);
+                let entry = known.covariance[(place(a).unwrap(), place(b).unwrap())] * by_a * by_b;
+                variance += entry;
+                without += if a == b { entry } else { 0.0 };
+            }
+        }
+        let error = (residue(&found.modes[0].mode) - residue(&truth[0])).re.abs();
+        all += 1;
+        covered += usize::from(error < 1.644_85 * f64::sqrt(variance));
+        independent += usize::from(error < 1.644_85 * f64::sqrt(without));
+    }
+    println!(
+        "seeds 1000 to {}: {covered} of {all}; as if independent {independent}",
+        999 + seeds
+    );
+    assert!(all > 190);
+    quietcut_testkit::rates::assert_share("intervals of a residue", 0.9, covered, all);
+    assert!(independent < covered);
 }
 
 fn mode(hertz: f64, damping: f64, right: [[f64; 2]; 3], left: [[f64; 2]; 3]) -> Mode {

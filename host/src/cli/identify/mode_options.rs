@@ -24,4 +24,8 @@ pub(super) struct ModeOptions {
     /// linearly dependent.
     #[arg(long)]
     pub(super) pseudo_inverse: bool,
+    /// Standard deviation of the gain of every sensor in percent, from its calibration: it widens the intervals of the mode shapes, and those of
+    /// the limits. Default: the gains are taken as exact, and the case says so.
+    #[arg(long, value_name = "P", value_parser = positive, allow_negative_numbers = true)]
+    pub(super) calibration_percent: Option<f64>,
 }

@@ -37,6 +37,9 @@ pub(super) fn modes(args: &Args, understood: &mut Vec<Understood>) -> Result<Ide
     if let Some(records) = &source.records {
         (model, noise) = modes::refine_by_records(&model, records).map_err(refused)?;
     }
+    if let Some(percent) = options.calibration_percent {
+        model.add_gain_errors(0.01 * percent);
+    }
     if let Some(path) = &options.stabilization {
         draw(path, &data, &model)?;
     }

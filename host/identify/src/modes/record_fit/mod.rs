@@ -209,12 +209,7 @@ fn finished(data: &Data<'_>, variances: &[Variances], mut unknowns: Unknowns) ->
 
 fn updated(data: &Data<'_>, model: &ModalModel, refined: &Refined) -> ModalModel {
     let mut updated = model.clone();
-    updated.modes = (0..refined.fit.modes.len())
-        .map(|index| refined.mode(index))
-        .collect();
-    updated
-        .modes
-        .sort_by(|a, b| a.mode.frequency_hz.total_cmp(&b.mode.frequency_hz));
+    (updated.modes, updated.covariance) = refined.sorted();
     for (k, &(p, q)) in data.places.iter().enumerate() {
         updated.outside[k] = (model.responses[p], model.forces[q], refined.fit.outside[k]);
     }
