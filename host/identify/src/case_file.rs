@@ -27,7 +27,7 @@ pub struct Estimate {
 /// Reason why an identified model does not fit into a case file.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum CaseFileError {
-    /// A required parameter was not identified: the matrix of mass, damping or stiffness, or a cutting coefficient.
+    /// A required parameter was not identified: the mass, or a cutting coefficient.
     #[error("a case needs {0}, which this method does not give")]
     Missing(&'static str),
     /// Parameters of the same extension were identified in two directions, but a case holds an extension once.
@@ -286,8 +286,11 @@ fn extension_of(key: &str) -> Option<&'static str> {
 /// Text of a case file with mass, damping, stiffness and cubic terms as matrices, and all other terms as extensions.
 /// With a quintic stiffness, the cubic stiffness is in the same extension.
 ///
+/// A law without a damping or a stiffness term, such as that of a drive that moves freely, has a zero matrix there. Its standard
+/// deviation is zero too: the law states that the term is absent.
+///
 /// # Errors
-/// Mass, damping or stiffness was not identified, one extension is needed in two directions, or a value has no form in
+/// The mass was not identified, one extension is needed in two directions, or a value has no form in
 /// TOML.
 pub fn text(name: &str, directions: &[Direction], estimates: &[Estimate]) -> Result<String, CaseFileError> {
     let mut structure = Table::new();
@@ -303,12 +306,12 @@ pub fn text(name: &str, directions: &[Direction], estimates: &[Estimate]) -> Res
         ("cubic_damping", "c3_ns3_per_m3", false),
         ("cubic_stiffness", "k3_n_per_m3", false),
     ];
-    for (matrix, key, needed) in matrices {
+    for (matrix, key, required) in matrices {
         let of_matrix: Vec<&Estimate> = estimates.iter().filter(|estimate| estimate.key == key).collect();
-        if of_matrix.is_empty() && needed {
+        if of_matrix.is_empty() && matrix == "mass" {
             return Err(CaseFileError::Missing(matrix));
         }
-        if of_matrix.is_empty() || (turned && matrix == "cubic_stiffness") {
+        if (of_matrix.is_empty() && !required) || (turned && matrix == "cubic_stiffness") {
             continue;
         }
         structure.insert(
@@ -457,5 +460,36 @@ mod tests {
         assert_eq!(effects.0.len(), 1);
         let (_, terms) = effects.dynamics(case.structure().unwrap()).unwrap();
         assert_eq!(terms.len(), 1);
+    }
+    #[test]
+    fn a_drive_without_a_spring_is_written_and_read_again() {
+        let estimate = |key, value: f64| Estimate {
+            key,
+            directions: vec![Direction::X],
+            value,
+            deviation: 0.01 * value.abs(),
+        };
+        let estimates = [
+            estimate("mass_kg", 95.1),
+            estimate("damping_ns_per_m", 203.5),
+            estimate("fc_n", 20.4),
+        ];
+        let written = text("drive", &[Direction::X], &estimates).unwrap();
+        let case = Case::parse(std::path::Path::new("drive.toml"), &written).unwrap();
+        let structure = case.structure().unwrap();
+        structure.check().unwrap();
+        let Form::Matrices(m) = &structure.form else {
+            panic!("matrices")
+        };
+        assert_eq!(
+            (m.mass[(0, 0)], m.damping[(0, 0)], m.stiffness[(0, 0)]),
+            (95.1, 203.5, 0.0)
+        );
+        assert_eq!(m.cubic_stiffness, None);
+        // The friction is an extension; mass, damping and friction have deviations, the absent spring has none.
+        assert_eq!(Effects::of_case(&case).unwrap().0.len(), 1);
+        assert_eq!(case.deviations.len(), 3);
+        let only_damping = text("drive", &[Direction::X], &estimates[1..]).unwrap_err();
+        assert_eq!(only_damping, CaseFileError::Missing("mass"));
     }
 }

@@ -1,6 +1,8 @@
 //! Nonlinear restoring forces: linearity tests, and identification of nonlinear terms.
 
+mod block_jackknife;
 pub mod describing;
+mod free_decay;
 pub mod harmonic_balance;
 pub mod hfrf;
 pub mod homogeneity;

@@ -2,7 +2,7 @@
 //!
 //! The force law is fitted by least squares between force and motion *within a band* of frequencies. Force and every
 //! term of the law, nonlinear terms included, pass the same filter: the filtered signals satisfy the same equation, and
-//! noise of derivatives outside the band has no effect. If a force acts and the law has a spring, the error of the
+//! noise of derivatives outside the band has no effect. A free decay is fitted in weak form ([`free_decay`]). If a force acts and the law has a spring, the error of the
 //! force is weighted by the receptance of the law and becomes an error of the *motion*, which carries the noise
 //! (Sanathanan–Koerner weighting). One motion channel is sufficient; displacement, velocity and acceleration follow
 //! from it by differentiation or integration.
@@ -13,6 +13,7 @@ use nalgebra::{DMatrix, DVector};
 use quietcut_numerics::least_squares::{LinearProblem, invert_normal_equations};
 
 use crate::criteria::{BAND_SIGNAL_TO_NOISE, LEAST_SLICE_SAMPLES, SAMPLES_PER_TERM};
+use crate::nonlinear::free_decay;
 use crate::nonlinear::spectrum::{Spectral, band_of, dominant_frequency_hz};
 use quietcut_numerics::statistics::NINETY_PERCENT;
 use quietcut_recording::Quantity;
@@ -98,11 +99,12 @@ pub struct Options {
     pub terms: Vec<ForceTerm>,
     /// Given moving mass, kg; `None` if the fit determines it. Required for a record without force.
     pub mass_kg: Option<f64>,
-    /// Frequency band in which the force law is fitted, Hz; `None` takes the band in which the measured motion exceeds
-    /// its noise. If the motion is integrated, the band starts at a quarter of the dominant frequency at least.
+    /// Frequency band in which the force law is fitted, Hz; `None` takes the band in which the measured motion exceeds its noise. If the
+    /// motion is integrated, the band starts at a quarter of the dominant frequency at least. For a free decay `None` takes a third to
+    /// five thirds of its frequency.
     pub band_hz: Option<[f64; 2]>,
     /// Duration that is left out of the fit at each end of the record, s; at most a quarter of the
-    /// record at each end.
+    /// record at each end. The law of a free decay is fitted to the whole record; only its surface is trimmed.
     pub trim_s: f64,
 }
 
@@ -124,7 +126,8 @@ pub struct Surface {
     pub terms: Vec<ForceTerm>,
     /// Coefficients of the terms, SI.
     pub theta: DVector<f64>,
-    /// Standard deviations of the coefficients of the force law, from the residual and its correlation in time.
+    /// Standard deviations of the coefficients of the force law, from the residual and its correlation in time; for a free decay from the
+    /// scatter between its segments and between bands.
     pub deviations: DVector<f64>,
     /// NRMSE of the force within the band: RMS of the residual over RMS of the force, or of m q̈ in a record without
     /// force.
@@ -155,6 +158,14 @@ pub enum SurfaceError {
         /// Number of samples needed.
         needed: usize,
     },
+    /// The fitted moving mass is not positive.
+    #[error(
+        "the fitted mass is {mass_kg} kg, and no structure has it: force and motion do not belong together; check the signs and units of both channels, whether the sensor sits where the force acts, and --band-hz, which must contain the resonance"
+    )]
+    NoMass {
+        /// The fitted mass, kg.
+        mass_kg: f64,
+    },
     /// The record does not determine the coefficients of all terms.
     #[error("the record does not determine all terms; leave some out, or excite more strongly")]
     Undetermined,
@@ -168,11 +179,7 @@ impl Record<'_> {
     /// Displacement, velocity and acceleration of the record within `band_hz`, from its measured motion.
     pub fn motion(&self, band_hz: [f64; 2]) -> Motion {
         let spectral = Spectral::new(self.motion.len(), self.rate_hz);
-        let measured = match self.quantity {
-            Quantity::Velocity => 1,
-            Quantity::Acceleration => 2,
-            _ => 0,
-        };
+        let measured = self.derivatives();
         let of = |order: i32| spectral.derivative(self.motion, order, band_hz);
         Motion {
             x: of(-measured),
@@ -181,11 +188,24 @@ impl Record<'_> {
         }
     }
 
+    /// Number of time derivatives of the displacement that the record measures.
+    pub(super) fn derivatives(&self) -> i32 {
+        match self.quantity {
+            Quantity::Velocity => 1,
+            Quantity::Acceleration => 2,
+            _ => 0,
+        }
+    }
+
     /// Fits the force law to the record and computes its restoring-force surface.
     ///
     /// # Errors
     /// See [`SurfaceError`].
     pub fn surface(&self, options: &Options) -> Result<Surface, SurfaceError> {
+        if self.force.iter().all(|force| *force == 0.0) {
+            let mass_kg = options.mass_kg.ok_or(SurfaceError::NoForce)?;
+            return free_decay::surface(self, options, mass_kg);
+        }
         let mut band_hz = options
             .band_hz
             .unwrap_or_else(|| band_of(self.motion, self.rate_hz, BAND_SIGNAL_TO_NOISE));
@@ -195,10 +215,6 @@ impl Record<'_> {
         let integrated = matches!(self.quantity, Quantity::Velocity | Quantity::Acceleration);
         let lowest_hz = if integrated { 0.25 * dominant_hz } else { 0.0 };
         band_hz[0] = band_hz[0].max(lowest_hz);
-        let driven = self.force.iter().any(|force| *force != 0.0);
-        if !driven && options.mass_kg.is_none() {
-            return Err(SurfaceError::NoForce);
-        }
         // Nonlinear terms produce harmonics of the motion above the band of the fit; they belong to the restoring-force
         // surface, so the motion keeps them.
         let highest_hz = (1.5 * band_hz[1]).max(3.5 * dominant_hz).min(0.5 * self.rate_hz);
@@ -250,18 +266,13 @@ impl Record<'_> {
             let left = &right - &matrix * &theta;
             Ok((matrix, theta, left, right))
         };
-        let (mut matrix, mut theta, mut left, right) = regress(&|_| 1.0)?;
-        let scale = if driven {
-            let whole = spectral.weighted(self.force, |f| f64::from(u8::from(within(f))));
-            DVector::from_column_slice(&whole[range.clone()]).norm()
-        } else {
-            right.norm()
-        };
+        let (mut matrix, mut theta, mut left, _) = regress(&|_| 1.0)?;
+        let whole = spectral.weighted(self.force, |f| f64::from(u8::from(within(f))));
+        let scale = DVector::from_column_slice(&whole[range.clone()]).norm();
         let mut force_error = left.norm() / scale;
-        // Each frequency is weighted with the receptance of the fitted linear terms, relative to the static compliance;
-        // this needs a stiffness term. A free decay is not weighted: it is a transient, which a filter as narrow as the
-        // resonance would spread over the ends of the record.
-        if driven && terms.contains(&ForceTerm::Stiffness) {
+        // Each frequency is weighted with the receptance of the fitted linear terms, relative to the static compliance; this
+        // needs a stiffness term.
+        if terms.contains(&ForceTerm::Stiffness) {
             for _ in 0..REWEIGHTINGS {
                 let receptance = receptance(&terms, &theta, mass);
                 let weighted = regress(&receptance)?;
@@ -275,6 +286,9 @@ impl Record<'_> {
             .iter()
             .position(|term| *term == ForceTerm::Mass)
             .map_or(mass, |index| theta[index]);
+        if found_mass <= 0.0 && (mass > 0.0 || terms.contains(&ForceTerm::Mass)) {
+            return Err(SurfaceError::NoMass { mass_kg: found_mass });
+        }
         let kept = |samples: &[f64]| samples[range.clone()].to_vec();
         let motion = Motion {
             x: kept(&motion.x),
@@ -318,7 +332,7 @@ impl Record<'_> {
         size(&left) / size(self.force)
     }
 
-    fn kept(&self, trim_s: f64) -> std::ops::Range<usize> {
+    pub(super) fn kept(&self, trim_s: f64) -> std::ops::Range<usize> {
         let trim = (trim_s * self.rate_hz).ceil() as usize;
         let trim = trim.min(self.motion.len() / 4);
         trim..self.motion.len() - trim

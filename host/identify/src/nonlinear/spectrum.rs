@@ -9,6 +9,7 @@ use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use num_complex::Complex64;
+use quietcut_recording::Quantity;
 use rustfft::{Fft, FftPlanner};
 
 /// Discrete Fourier transforms of records of one length.
@@ -131,6 +132,24 @@ impl Spectral {
         })
     }
 
+    /// The record about `centre_hz`, differentiated `order` times over time, or integrated for a negative order, by a filter whose impulse
+    /// response dies within a few periods of the centre frequency: an error at an end of the record stays there. Its gain rises smoothly
+    /// from 0 at a tenth of the centre frequency to 1 at 0.7 of it, and falls from 1 at 3.5 times the frequency, above the third harmonic,
+    /// to 0 at 5 times it.
+    pub(crate) fn near_resonance(&self, samples: &[f64], order: i32, centre_hz: f64) -> Vec<f64> {
+        let nyquist = 0.5 * self.rate_hz;
+        let filter = |frequency: f64| {
+            let ratio = frequency.abs() / centre_hz;
+            let gain = smooth_step((ratio - 0.1) / 0.6) * smooth_step((5.0 - ratio) / 1.5);
+            if gain == 0.0 || frequency.abs() >= nyquist * (1.0 - 1e-12) {
+                Complex64::ZERO
+            } else {
+                Complex64::new(0.0, TAU * frequency).powi(order) * gain
+            }
+        };
+        self.through(samples, Continuation::Mirror, filter, |_, _| [0.0, 0.0])
+    }
+
     /// The record with its spectrum multiplied by a real `weight` of the frequency in Hz, so that no phase shifts.
     pub fn weighted(&self, samples: &[f64], weight: impl Fn(f64) -> f64) -> Vec<f64> {
         let still = weight(0.0);
@@ -141,6 +160,12 @@ impl Spectral {
             |level, slope| [still * level, still * slope],
         )
     }
+}
+
+/// Step from 0 at u = 0 to 1 at u = 1 with two continuous derivatives, u − sin(2πu)/2π.
+fn smooth_step(u: f64) -> f64 {
+    let u = u.clamp(0.0, 1.0);
+    u - (TAU * u).sin() / TAU
 }
 
 /// Gain of a gradual lower band edge: 1 above `low`, 0 below half of it, half a cosine between. A sharp edge would ring
@@ -190,8 +215,35 @@ pub fn dominant_frequency_hz(samples: &[f64], rate_hz: f64) -> f64 {
     (strongest(&smooth) as f64 + 0.5) * width_hz
 }
 
-/// Frequency band in which a record exceeds its noise, Hz: the contiguous intervals around the dominant frequency whose
-/// smoothed power exceeds the noise power by a factor of more than `margin`.
+/// Frequency of the largest line of the spectrum of a free decay, Hz, with the resolution of its duration; of the velocity if a displacement
+/// is measured. The velocity after a release at the static displacement x₀ has lines of x₀/(2ζ) at the resonance, and the drift of a high
+/// pass none above x₀. There is no window, since it would remove the beginning, where the decay is large.
+/// With `band_hz` the largest line within that band.
+pub(super) fn peak_frequency_hz(
+    samples: &[f64],
+    rate_hz: f64,
+    quantity: Quantity,
+    band_hz: Option<[f64; 2]>,
+) -> f64 {
+    let order = i32::from(quantity == Quantity::Displacement);
+    let length = samples.len();
+    let mean = samples.iter().sum::<f64>() / length.max(1) as f64;
+    let mut lines: Vec<Complex64> = samples.iter().map(|x| Complex64::new(x - mean, 0.0)).collect();
+    FftPlanner::new().plan_fft_forward(length).process(&mut lines);
+    let mut largest = (0.0, 1);
+    let hertz = rate_hz / length.max(1) as f64;
+    let [low, high] = band_hz.unwrap_or([0.0, 0.5 * rate_hz]);
+    for (index, line) in lines.iter().enumerate().take(length / 2).skip(1) {
+        let size = line.norm() * (index as f64).powi(order);
+        if size > largest.0 && (low..=high).contains(&(index as f64 * hertz)) {
+            largest = (size, index);
+        }
+    }
+    largest.1 as f64 * hertz
+}
+
+/// Frequency band in which a record exceeds its noise, Hz: the contiguous intervals around the dominant frequency whose smoothed
+/// power exceeds the noise power by a factor of more than `margin`.
 ///
 /// The noise power is the 5 % quantile of the smoothed power spectrum.
 pub fn band_of(samples: &[f64], rate_hz: f64, margin: f64) -> [f64; 2] {

@@ -4,6 +4,7 @@ mod ambient;
 mod coupling;
 mod cubic_joints;
 mod cutting;
+mod decay;
 mod inverse_stability;
 mod joints;
 mod linearity;

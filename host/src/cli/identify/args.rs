@@ -57,7 +57,7 @@ pub struct Args {
     #[arg(long, value_name = "M", value_parser = positive, allow_negative_numbers = true)]
     pub(super) mass_kg: Option<f64>,
     /// Frequency band in Hz of restoring-force, joints, modes and output-only. output-only requires it; the default of
-    /// restoring-force is the band where the motion exceeds its noise.
+    /// restoring-force is the band where the motion exceeds its noise, and for a free decay a third to five thirds of its frequency.
     #[arg(long, value_name = "FIRST:LAST", value_parser = non_negative_ends)]
     pub(super) band_hz: Option<[f64; 2]>,
     /// Width of the slices of the restoring-force surface, as a fraction of the largest velocity or displacement.
