@@ -214,7 +214,7 @@ fn coverage_of_free_decays() {
     check(found, 400);
 }
 
-/// The fault: k3 of one decay was +0.9e11, +3.2e11 or −6.2e11 by where its record began, each with a narrow interval. The record has a
+/// Intervals of k3 from different beginnings of one decay have a common part. The record has a
 /// second mode, which the law does not know.
 #[test]
 fn k3_does_not_depend_on_where_the_record_begins() {
