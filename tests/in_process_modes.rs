@@ -205,7 +205,7 @@ fn speed_sweeps_by_a_table_of_receptances_give_the_modes_of_table_7_1_and_their_
         folder.path(),
         &format!("identify frf.csv --method modes --case {robot} --out found.toml --json"),
     );
-    // The intervals of a table contain the noise of its lines and not their leakage (page of limitations).
+    // That the intervals of a table contain its leakage is tested in `host/identify/src/modes/record_fit/tests.rs`.
     assert_near(&answer, "speed sweep, receptances");
     assert_lobes(folder.path(), "found.toml", "speed sweep, receptances");
 }

@@ -13,6 +13,7 @@ mod error;
 mod gain_errors;
 mod jacobian;
 mod joint_covariance;
+mod leakage;
 mod mode;
 mod model;
 mod pole_residue;

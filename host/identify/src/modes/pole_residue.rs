@@ -97,7 +97,7 @@ impl PoleResidue {
             .sum()
     }
 
-    fn value(&self, place: (usize, usize), k: usize, s: Complex64) -> Complex64 {
+    pub(super) fn value(&self, place: (usize, usize), k: usize, s: Complex64) -> Complex64 {
         let [above, below] = self.outside[k];
         self.of_modes(place, s) + above + below / (s * s)
     }

@@ -28,6 +28,8 @@ pub struct Receptances {
     /// True if standard deviations of the receptances were measured; false if they follow from coherence up to a
     /// factor, or are not known.
     pub has_deviation: bool,
+    /// True if the standard deviations follow from coherence: the receptances are averages over windowed segments, which leak.
+    pub has_coherence: bool,
 }
 
 /// Number of frequency lines on each side over which the variance of a receptance is averaged: a variance from a
@@ -69,6 +71,8 @@ impl Receptances {
             values: Vec::new(),
             deviation: Vec::new(),
             has_deviation: deviation.is_some(),
+            has_coherence: deviation.is_none()
+                && table.entries().iter().all(|entry| entry.coherence.is_some()),
         };
         for entry in table.entries() {
             let place = (

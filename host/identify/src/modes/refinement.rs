@@ -9,6 +9,7 @@ use std::f64::consts::TAU;
 use super::covariance::covariance;
 use super::jacobian::{jacobian, normal};
 use super::joint_covariance::pole_derivatives;
+use super::leakage;
 use super::mode::IdentifiedMode;
 use super::pole_residue::{PoleResidue, shared};
 use super::receptances::Receptances;
@@ -52,7 +53,9 @@ pub(super) fn refine(data: &Receptances, start: PoleResidue) -> Option<Refined> 
     let freedom = values.checked_sub(unknowns).filter(|freedom| *freedom > 0)?;
     let misfit = Weights::of(&data.deviation).squares(&fit, data) / freedom as f64;
     let relative_error = relative_error(data, &fit);
-    let covariance = covariance(data, &fit, &weights)? * (values as f64 / freedom as f64);
+    let leakage = leakage::error(data, &fit, &weights)?;
+    let noise = covariance(data, &fit, &weights)? * (values as f64 / freedom as f64);
+    let covariance = noise + &leakage * leakage.transpose();
     Some(Refined {
         fit,
         covariance,

@@ -12,7 +12,6 @@
 use std::f64::consts::{PI, TAU};
 
 use nalgebra::{DMatrix, DVector};
-use quietcut_recording::Quantity;
 
 use super::block_jackknife;
 use super::restoring_force::{ForceTerm, Motion, Options, Record, Surface, SurfaceError};
