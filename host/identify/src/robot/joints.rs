@@ -18,6 +18,7 @@ use quietcut_numerics::least_squares::{
 use rayon::prelude::*;
 
 pub use super::joint_parameter::JointParameter;
+use super::receptance_model::Model;
 use crate::criteria::{GUESSED_STIFFNESS_RATIO, LEAST_RELATIVE_ERROR, NEARLY_STATIC};
 use crate::least_squares::FitError;
 use quietcut_frf::FrfTable;
@@ -94,6 +95,8 @@ struct Normal {
     /// covariance uses it. The errors of one receptance at different lines count as correlated, those of different
     /// receptances as independent.
     scatter: DMatrix<f64>,
+    /// Gradient by the parameters that a common delay of all receptances causes, one of one radian at the highest frequency of each table.
+    delay: DVector<f64>,
     entries: usize,
     sum: f64,
     left: f64,
@@ -352,72 +355,18 @@ fn finish(robot: Robot, parameters: Vec<JointParameter>, normal: &Normal) -> Res
     let few = student_ninety_percent(normal.entries.saturating_sub(1)) / NINETY_PERCENT;
     let taken = count / (count - parameters.len() as f64).max(1.0);
     let scatter = &inverse * &normal.scatter * &inverse * (taken * few * few);
+    // A delay common to all receptances, from filters, folding and the interpolation between samples, changes the dampings most.
+    let delayed = &inverse * &normal.delay * LEAST_RELATIVE_ERROR;
     Ok(JointFit {
         robot,
         // A calibration error common to all receptances changes all joint parameters by the same factor; its variance
         // is added to every entry.
-        covariance: scatter.add_scalar(LEAST_RELATIVE_ERROR * LEAST_RELATIVE_ERROR),
+        covariance: scatter.add_scalar(LEAST_RELATIVE_ERROR * LEAST_RELATIVE_ERROR)
+            + &delayed * delayed.transpose(),
         parameters,
         misfit,
         relative_error: (normal.left / normal.all.max(f64::MIN_POSITIVE)).sqrt(),
     })
-}
-
-/// A robot at one posture and frequency: joint angles per force on the tool, and receptance of the tool.
-struct Model {
-    omega: f64,
-    /// Joint angles per force on the tool, Z⁻¹Jᵀ, with the dynamic stiffness Z of the joints and the Jacobian J of the
-    /// tool: joints by directions, rad/N.
-    angles: DMatrix<Complex64>,
-    receptance: Matrix3<Complex64>,
-}
-
-impl Model {
-    fn new(robot: &Robot, mass: &DMatrix<f64>, omega: f64) -> Option<Self> {
-        Self::with(robot, &robot.jacobian(), mass, omega)
-    }
-
-    fn with(robot: &Robot, jacobian: &Matrix3xX<f64>, mass: &DMatrix<f64>, omega: f64) -> Option<Self> {
-        let mut dynamic = mass.map(|entry| Complex64::new(-omega * omega * entry, 0.0));
-        for (index, joint) in robot.joints.iter().enumerate() {
-            dynamic[(index, index)] +=
-                Complex64::new(joint.stiffness_nm_per_rad, omega * joint.damping_nms_per_rad);
-        }
-        let jacobian = jacobian.map(Complex64::from);
-        let angles = dynamic.lu().solve(&jacobian.transpose())?;
-        let h = &jacobian * &angles;
-        let angles = DMatrix::from_fn(angles.nrows(), 3, |i, j| angles[(i, j)]);
-        Some(Self {
-            omega,
-            angles,
-            receptance: Matrix3::from_fn(|i, j| h[(i, j)]),
-        })
-    }
-
-    /// Derivative of the receptance by the logarithm of a joint parameter: dH = −(Z⁻¹Jᵀ)ᵀ dZ (Z⁻¹Jᵀ), with the dynamic
-    /// stiffness Z of the joints and the Jacobian J of the tool.
-    fn slope(
-        &self,
-        parameter: JointParameter,
-        robot: &Robot,
-        payload: &Matrix3xX<f64>,
-    ) -> Matrix3<Complex64> {
-        let value = parameter.value(robot);
-        let of_joint = |joint: usize, factor: Complex64| {
-            Matrix3::from_fn(|i, j| factor * self.angles[(joint, i)] * self.angles[(joint, j)])
-        };
-        match parameter {
-            JointParameter::Stiffness(joint) => of_joint(joint, Complex64::from(-value)),
-            JointParameter::Damping(joint) => of_joint(joint, Complex64::new(0.0, -self.omega * value)),
-            // The predicted receptance is that at vanishing force, which cubic terms of the joints do not affect.
-            JointParameter::CubicStiffness(_) | JointParameter::CubicDamping(_) => Matrix3::zeros(),
-            JointParameter::Payload => {
-                let moved = payload.map(Complex64::from) * &self.angles;
-                let product = moved.tr_mul(&moved) * Complex64::from(self.omega * self.omega * value);
-                Matrix3::from_fn(|i, j| product[(i, j)])
-            }
-        }
-    }
 }
 
 fn sums(robot: &Robot, placed: &[PostureMatrices<'_>], parameters: &[JointParameter]) -> Normal {
@@ -430,6 +379,7 @@ fn sums(robot: &Robot, placed: &[PostureMatrices<'_>], parameters: &[JointParame
         all.sums.matrix += part.sums.matrix;
         all.sums.gradient += part.sums.gradient;
         all.scatter += part.scatter;
+        all.delay += part.delay;
         all.entries += part.entries;
         all.sum += part.sum;
         all.left += part.left;
@@ -446,6 +396,7 @@ fn empty(size: usize) -> Normal {
             gradient: DVector::zeros(size),
         },
         scatter: DMatrix::zeros(size, size),
+        delay: DVector::zeros(size),
         entries: 0,
         sum: 0.0,
         left: 0.0,
@@ -461,6 +412,7 @@ fn sums_of(robot: &Robot, posture: &PostureMatrices<'_>, parameters: &[JointPara
     let mass = &posture.mass + posture.payload.tr_mul(&posture.payload) * carried;
     let mut row = DVector::zeros(parameters.len());
     let mut gradients = vec![row.clone(); table.entries().len()];
+    let highest_hz = table.frequency_hz().last().copied().unwrap_or(1.0);
     for (line, frequency) in table.frequency_hz().iter().enumerate() {
         let Some(model) = Model::with(robot, &posture.jacobian, &mass, TAU * frequency) else {
             continue;
@@ -475,6 +427,7 @@ fn sums_of(robot: &Robot, posture: &PostureMatrices<'_>, parameters: &[JointPara
             };
             let measured = entry.receptance[line];
             let left = measured - model.receptance[(i, j)];
+            let delayed = Complex64::new(0.0, frequency / highest_hz) * model.receptance[(i, j)];
             let weight = weights[line];
             normal.left += left.norm_sqr();
             normal.all += measured.norm_sqr();
@@ -486,6 +439,7 @@ fn sums_of(robot: &Robot, posture: &PostureMatrices<'_>, parameters: &[JointPara
                 }
                 normal.sums.matrix.ger(1.0, &row, &row, 1.0);
                 gradient.axpy(weight * part(left), &row, 1.0);
+                normal.delay.axpy(weight * part(delayed), &row, 1.0);
             }
         }
     }

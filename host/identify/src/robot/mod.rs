@@ -4,3 +4,4 @@ pub mod cubic_joints;
 mod cubic_model;
 mod joint_parameter;
 pub mod joints;
+mod receptance_model;

@@ -21,7 +21,7 @@ use quietcut_recording::{Quantity, Recording};
 use quietcut_simulate::rig::{Noise, Rig, Signal};
 use quietcut_stability::{CubicTerms, Problem, line};
 use quietcut_testkit::case;
-use quietcut_testkit::rates::{assert_pooled_share, assert_share};
+use quietcut_testkit::rates::{assert_least_share, assert_pooled_share, assert_share};
 use quietcut_testkit::results::Campaign;
 use quietcut_testkit::robot;
 
@@ -228,8 +228,9 @@ fn held_joints(fit: &JointFit) -> impl Iterator<Item = (String, bool)> {
     })
 }
 
-/// The parameter whose intervals are too narrow, as the page of limitations says: its estimate is 1 to 2 % low.
-const TOO_NARROW: &str = "joint 6 damping_nms_per_rad";
+/// The parameter that a delay of the receptances changes most. Folding of the unfiltered impacts makes its estimate 1 to 2 % low, in each fit
+/// alike: its interval, which contains a delay of this size, holds the truth more often than it claims.
+const OF_DELAY: &str = "joint 6 damping_nms_per_rad";
 
 /// Numbers of fits and of these with the truth in the 90 % interval of each joint parameter and of the peaks at unseen postures.
 #[derive(Default)]
@@ -263,8 +264,12 @@ impl Coverage {
         assert!(self.largest < 0.03, "{}", self.largest);
         let share = self.peaks as f64 / (30 * self.fits) as f64;
         assert_pooled_share("peaks at unseen postures", 0.9, share, 10 * self.fits);
-        for (name, held) in self.joints.iter().filter(|(name, _)| *name != TOO_NARROW) {
-            assert_share(name, 0.9, *held, self.fits);
+        for (name, held) in &self.joints {
+            if name == OF_DELAY {
+                assert_least_share(name, 0.9, *held, self.fits);
+            } else {
+                assert_share(name, 0.9, *held, self.fits);
+            }
         }
     }
 }
@@ -367,8 +372,8 @@ fn coverage_of_joints() {
                 share(joints as u64, 12 * seeds),
             ),
             (
-                format!("of these the intervals of {TOO_NARROW}"),
-                share(coverage.joints[TOO_NARROW] as u64, seeds),
+                format!("of these the intervals of {OF_DELAY}"),
+                share(coverage.joints[OF_DELAY] as u64, seeds),
             ),
         ]);
         found.push(coverage);
