@@ -70,6 +70,11 @@ pub(crate) const NORMAL: f64 = 1e7;
 /// element, so that 4000 elements cover three thousand vibrations; cuts that need more are refused. Unfounded.
 pub(crate) const ELEMENTS_MAX: f64 = 4000.0;
 
+/// Share of the largest depth of a scan for which the first mesh of the period is built. Each further mesh covers at least
+/// twice the depth of the one before, up to the largest depth. The share changes the computing time only, since every mesh
+/// resolves the depths it is built for; its value is unfounded.
+pub(crate) const FIRST_MESH_SHARE: f64 = 0.125;
+
 /// Largest number of instants in a revolution at which the displacement may have a kink: entries and exits of teeth,
 /// and their echoes one or more delays later. A generation of echoes that would exceed it is left out, with all later
 /// ones. The subintervals between these instants are then short, and later echoes are smooth. Unfounded.

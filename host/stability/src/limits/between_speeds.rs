@@ -24,6 +24,7 @@
 //! Lobe tables are refined by another rule, [`Chart::refined`]; the head of its file says why.
 
 use super::chart::{Chart, chart};
+use super::islands::narrowest_island_rpm;
 use super::method::Method;
 use super::resolution::Resolution;
 use super::speed_line::SpeedLine;
@@ -328,70 +329,4 @@ fn bend(largest: &[f64], step: usize, side: f64) -> f64 {
 /// ln|μ|, with |μ| bounded below at a thousandth: smaller multipliers are all far inside the unit circle.
 fn logarithm(size: f64) -> f64 {
     size.max(1e-3).ln()
-}
-
-/// Width in speed of the narrowest region of stability or of chatter that begins and ends between the first and the
-/// last speed of a chart, rev/min; `None` if there is none.
-fn narrowest_island_rpm(lines: &[SpeedLine], depth_mm: f64) -> Option<f64> {
-    let stable = |line: &SpeedLine| line.stable_mm.clone();
-    let unstable = |line: &SpeedLine| complement(&line.stable_mm, depth_mm);
-    let mut widths = Vec::new();
-    widths.extend(island_widths_rpm(lines, &stable));
-    widths.extend(island_widths_rpm(lines, &unstable));
-    widths.into_iter().min_by(f64::total_cmp)
-}
-
-/// Depth intervals between 0 and `depth_mm` that lie outside the given ascending intervals.
-fn complement(intervals: &[[f64; 2]], depth_mm: f64) -> Vec<[f64; 2]> {
-    let starts = std::iter::once(0.0).chain(intervals.iter().map(|interval| interval[1]));
-    let ends = intervals
-        .iter()
-        .map(|interval| interval[0])
-        .chain(std::iter::once(depth_mm));
-    starts
-        .zip(ends)
-        .filter(|(from, to)| to > from)
-        .map(|(from, to)| [from, to])
-        .collect()
-}
-
-/// Widths in speed of all connected regions that touch neither the first nor the last speed of a chart, rev/min. Depth
-/// intervals at neighbouring speeds belong to one region if they overlap in depth. A region extends half way to the
-/// next speeds.
-fn island_widths_rpm(lines: &[SpeedLine], intervals: &dyn Fn(&SpeedLine) -> Vec<[f64; 2]>) -> Vec<f64> {
-    // Regions that reach the latest speed, each with the index of its first speed and its depth intervals at the
-    // latest.
-    let mut open: Vec<(usize, Vec<[f64; 2]>)> = Vec::new();
-    let mut widths = Vec::new();
-    for (index, line) in lines.iter().enumerate() {
-        let mut next: Vec<(usize, Vec<[f64; 2]>)> = Vec::new();
-        let mut continued = vec![false; open.len()];
-        for interval in intervals(line) {
-            let mut first = index;
-            for ((begin, ends), continued) in open.iter().zip(&mut continued) {
-                if ends
-                    .iter()
-                    .any(|end| end[0] < interval[1] && interval[0] < end[1])
-                {
-                    first = first.min(*begin);
-                    *continued = true;
-                }
-            }
-            match next
-                .iter_mut()
-                .find(|(begin, _)| *begin == first && first != index)
-            {
-                Some((_, ends)) => ends.push(interval),
-                None => next.push((first, vec![interval])),
-            }
-        }
-        for ((begin, _), continued) in open.iter().zip(&continued) {
-            if !continued && *begin > 0 {
-                let from_rpm = 0.5 * (lines[begin - 1].rpm + lines[*begin].rpm);
-                widths.push(0.5 * (lines[index - 1].rpm + line.rpm) - from_rpm);
-            }
-        }
-        open = next;
-    }
-    widths
 }

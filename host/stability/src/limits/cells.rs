@@ -10,7 +10,7 @@ use num_complex::Complex64;
 use super::bounds::{check_depth, check_speed};
 use super::cell::Cell;
 use crate::criteria::{
-    CELL_FAR, CELL_FOLLOWED, CELL_TOLERANCE, CELL_TOLERANCE_FAR, LEAST_ERROR, UNCONFIRMED,
+    CELL_FAR, CELL_FOLLOWED, CELL_TOLERANCE, CELL_TOLERANCE_FAR, FIRST_MESH_SHARE, LEAST_ERROR, UNCONFIRMED,
 };
 use crate::error::{NO_SOLUTION, StabilityError};
 use crate::spectrum::along_depth::Spectrum;
@@ -20,10 +20,6 @@ use crate::spectrum::verdict::Verdict;
 /// Largest number of depth intervals of a cell chart at whose ends all multipliers are computed first. If a spindle
 /// speed has no more cells than this, all are computed directly. A choice.
 const INTERVALS: usize = 10;
-
-/// Share of the largest depth of a cell chart for which the first mesh of the period is built. Each further mesh covers
-/// twice the depth of the one before, or more if the next cell lies deeper, but no more than the largest depth.
-const FIRST_SHARE: f64 = 0.125;
 
 /// Implements [`Method::cells`] for a method that gives a [`Spectrum`]. The function `spectrum` gives the multipliers
 /// at this spindle speed, valid up to the axial depth (m) that is its argument.
@@ -42,7 +38,7 @@ pub(crate) fn cells_of<S: Spectrum>(
     let Some(&last_m) = depths_m.last() else {
         return Ok(Vec::new());
     };
-    let mut deepest_m = last_m * FIRST_SHARE;
+    let mut deepest_m = last_m * FIRST_MESH_SHARE;
     let mut column = Column {
         rpm,
         spectrum: spectrum(deepest_m),

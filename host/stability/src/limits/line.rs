@@ -4,6 +4,7 @@
 use super::bounds::{check_depth, check_speed};
 use super::scan::{DirectedCrossing, Scan};
 use super::speed_line::{SpeedLine, Switch};
+use crate::criteria::FIRST_MESH_SHARE;
 use crate::error::StabilityError;
 use crate::problem::linear::Problem;
 use crate::problem::period::check_length;
@@ -11,10 +12,6 @@ use crate::spectrum::along_depth::Spectrum;
 use crate::spectrum::collocated::Collocated;
 use crate::spectrum::crossing::Crossing;
 use crate::spectrum::stability_loss::StabilityLoss;
-
-/// Share of the largest depth of a line for which the first mesh of the period is built. Each further mesh covers twice
-/// the depth of the one before, or more if the next sampled depth lies deeper, but no more than the largest depth.
-const FIRST_SHARE: f64 = 0.125;
 
 /// Number of depth intervals at whose ends all multipliers are computed first. Each is halved until its multipliers can
 /// be followed. A choice: more cost time, fewer are halved at once.
@@ -55,7 +52,7 @@ pub(crate) fn line_of<S: Spectrum>(
     check_depth(depth_mm)?;
     let depth_m = depth_mm * 1e-3;
     let samples = samples.max(1);
-    let mut deepest_m = depth_m * FIRST_SHARE;
+    let mut deepest_m = depth_m * FIRST_MESH_SHARE;
     let mut scan = Scan {
         rpm,
         spectrum: spectrum(deepest_m),

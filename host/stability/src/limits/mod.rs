@@ -7,6 +7,7 @@ pub(crate) mod cell;
 pub(crate) mod cell_chart;
 pub(crate) mod cells;
 pub(crate) mod chart;
+pub(crate) mod islands;
 pub(crate) mod line;
 pub(crate) mod method;
 mod multiplier_path;

@@ -18,7 +18,7 @@ use num_complex::Complex64;
 
 use super::anderson::Anderson;
 use super::follower::size_at;
-use super::forced::ForcedProblem;
+use super::forced::{ForcedProblem, has_unequal_teeth};
 use super::periodic_orbit::{Orbit, PeriodMap, Scale};
 use super::restoring::{Samples, Spring, equivalent, incremental};
 use super::tooth_period::ToothPeriod;
@@ -105,8 +105,8 @@ impl EquivalentProblem {
     /// Builds the stability problem of a case with friction, backlash or hysteresis.
     ///
     /// # Errors
-    /// As [`ForcedProblem::new`], or the structure has no mass at the tool, or the teeth have unequal pitch, or they
-    /// have runout and the structure has smooth nonlinear terms.
+    /// As [`ForcedProblem::new`], or the structure has no mass at the tool, or the teeth have unequal pitch or
+    /// runout: the orbit, and with it the equivalent springs, would repeat once a revolution.
     pub fn new(case: &Case) -> Result<Self, StabilityError> {
         let mut rest = case.clone();
         for spec in ALL
@@ -123,7 +123,7 @@ impl EquivalentProblem {
                        hysteresis have no motion of their own; use mass, damping and stiffness matrices",
             });
         }
-        if smooth.uneven.is_some() {
+        if has_unequal_teeth(&rest)? {
             return Err(StabilityError::NotCovered {
                 path: case.path.clone(),
                 what: "friction, backlash and hysteresis go with teeth that are all alike only: leave out runout, and unequal pitch",

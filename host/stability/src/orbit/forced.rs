@@ -79,6 +79,12 @@ impl Uneven {
     }
 }
 
+/// True if the teeth of the case have unequal pitch or runout.
+pub(super) fn has_unequal_teeth(case: &Case) -> Result<bool, StabilityError> {
+    let pitched = Pitched::new(case, CubicTerms::Kept)?;
+    Ok(Uneven::of(case, &pitched)?.is_some())
+}
+
 /// Smooth restoring forces f_r of the case's extensions, along the machine's axes.
 #[derive(Clone, Debug)]
 struct Smooth {

@@ -1,5 +1,6 @@
 //! Stability of cases with extensions, and extensions that linear stability refuses.
 
+use crate::orbit::EquivalentProblem;
 use crate::*;
 use quietcut_model::case::Case;
 
@@ -60,4 +61,13 @@ fn effects_without_multipliers_are_refused_with_their_reason() {
     }
     // Effects of sensors do not change stability and are accepted.
     assert!(Problem::new(&case("[extension.sensor-gain]\ngain = 1.2\n"), CubicTerms::Refuse).is_ok());
+}
+
+#[test]
+fn friction_with_teeth_that_are_not_alike_is_refused_on_a_linear_structure_too() {
+    let friction = "[extension.coulomb-friction]\nfc_n = 1.0\ndirection = \"x\"\n";
+    assert!(EquivalentProblem::new(&case(friction)).is_ok());
+    let runout = "[extension.runout]\nrunout_um = 20.0\n";
+    let error = EquivalentProblem::new(&case(&format!("{friction}{runout}"))).unwrap_err();
+    assert!(error.to_string().contains("leave out runout"), "{error}");
 }
