@@ -106,9 +106,8 @@ impl Cutter {
 
     /// Sets the radial runout of all teeth from the offset of the tool axis to the spindle axis.
     pub fn set_runout(&mut self, runout: Runout) {
-        let count = self.teeth.len();
-        for (index, tooth) in self.teeth.iter_mut().enumerate() {
-            tooth.radial_m = runout.radial_m(index, count);
+        for tooth in &mut self.teeth {
+            tooth.radial_m = runout.radial_m(tooth.angle_rad);
         }
     }
 

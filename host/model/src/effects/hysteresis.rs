@@ -196,7 +196,8 @@ impl RestoringForce for BoucWen {
         // changed its sign.
         let (of_velocity, of_z) = Self::signs(before);
         let (v, z) = (of_velocity * at.v[self.axis], of_z * own[0]);
-        if v * self.effect.yield_m.recip() < z * self.effect.yield_m.recip() {
+        // One of the two is at zero, the other inside its regime: their units do not matter.
+        if v < z {
             before ^ BACKWARD
         } else {
             before ^ NEGATIVE

@@ -14,12 +14,7 @@ pub(super) fn axis_of(
     let wrong = |what: String| EffectError::Direction {
         name,
         what,
-        directions: structure
-            .directions
-            .iter()
-            .map(ToString::to_string)
-            .collect::<Vec<_>>()
-            .join(", "),
+        directions: directions_in_words(structure),
     };
     match direction {
         Some(direction) if !structure.directions.contains(&direction) => {
@@ -36,6 +31,12 @@ pub(super) fn axis_of(
             }
         }
     }
+}
+
+/// The directions of a structure, separated by commas.
+pub(super) fn directions_in_words(structure: &Structure) -> String {
+    let names: Vec<String> = structure.directions.iter().map(ToString::to_string).collect();
+    names.join(", ")
 }
 
 /// Static stiffness matrix at the tool along x, y and z, N/m: the inverse of the static receptance. For a structure

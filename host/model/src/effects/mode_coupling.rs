@@ -5,7 +5,7 @@
 
 use std::sync::Arc;
 
-use super::location::axis_of;
+use super::location::{axis_of, directions_in_words};
 use super::{Argument, Class, Effect, EffectError, EffectName, EffectSpec, Locations, Parameter, Treatment};
 use crate::structure::{Direction, Structure};
 use crate::{MotionState, Regime, RestoringForce, Slopes};
@@ -84,7 +84,7 @@ impl Effect for ModeCoupling {
                         return Err(EffectError::Direction {
                             name: self.name(),
                             what: "it must say its two directions (directions = [\"x\", \"y\"])".into(),
-                            directions: axes.len().to_string(),
+                            directions: directions_in_words(structure),
                         });
                     }
                 }

@@ -26,7 +26,7 @@ pub(super) const SOFTENING_HARDENING: EffectSpec = EffectSpec {
     shares_term_with: &[EffectName::CubicStiffness],
     summary: "a spring softens at small and hardens at large displacement",
     equation: "f_r += k3·x³ + k5·x⁵, k3 < 0 < k5",
-    shows: "a natural frequency that falls with amplitude and rises again beyond x² = −k3/(2·k5); odd harmonics up to the fifth",
+    shows: "a natural frequency that falls with the amplitude X and rises again beyond X² = −0.6·k3/k5; odd harmonics up to the fifth",
     hidden_by: "levels below the turn, where it is cubic stiffness; two regimes with an edge between them are backlash",
     source: "Nayfeh and Mook, Nonlinear Oscillations (1979), ch. 4",
     example: "k3_n_per_m3 = -5e12\nk5_n_per_m5 = 2e21\ndirection = \"x\"",

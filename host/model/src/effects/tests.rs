@@ -10,6 +10,17 @@ fn a_value_and_its_keys_are_one_effect() {
 }
 
 #[test]
+fn a_switch_is_a_word_or_a_number() {
+    let of = |text| format!("{:?}", Effects::parse([text]).unwrap());
+    assert_eq!(of("axial-depth-modulation=true"), of("axial-depth-modulation=1"));
+    assert_eq!(of("axial-depth-modulation=false"), of("axial-depth-modulation=0"));
+    assert_ne!(
+        of("axial-depth-modulation=true"),
+        of("axial-depth-modulation=false")
+    );
+}
+
+#[test]
 fn a_list_of_directions_is_an_effect_along_each() {
     let of = |text: &str| Effects::of_extension("cubic-stiffness", &text.parse().unwrap());
     let both = of("direction = [\"x\", \"y\"]\nk3_n_per_m3 = [1.0, 2]\n").unwrap();

@@ -20,12 +20,15 @@ pub enum Value {
 }
 
 impl Value {
-    /// Value of a text from the command line: a number if the text is one, a list of numbers or words if it has commas,
-    /// otherwise a word.
+    /// Value of a text from the command line: a number if the text is one, 1 or 0 for `true` or `false`, a list of
+    /// numbers or words if it has commas, otherwise a word.
     pub fn of_text(text: &str) -> Self {
         let text = text.trim();
         if let Ok(number) = text.parse() {
             return Self::Number(number);
+        }
+        if let Ok(on) = text.parse::<bool>() {
+            return Self::Number(f64::from(u8::from(on)));
         }
         if !text.contains(',') {
             return Self::Text(text.into());

@@ -1,7 +1,5 @@
 //! The milling tool.
 
-use std::f64::consts::TAU;
-
 use crate::criteria::VARIABLE_PITCH_DEG;
 
 /// A milling tool without helix: each cutting edge is straight, in a plane with the tool axis, at the edge angle to the
@@ -22,7 +20,8 @@ pub struct Tool {
     pub runout: Option<Runout>,
 }
 
-/// Runout from an axis offset: tooth j, from 0, has the radius R + e·cos(ψ + 2πj/N).
+/// Runout from an axis offset: tooth j, from 0, has the radius R + e·cos(ψ + θ_j), with its angle θ_j from the first
+/// tooth, 2πj/N at equal pitch.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Runout {
     /// Offset e of the tool axis from the spindle axis, µm.
@@ -32,10 +31,10 @@ pub struct Runout {
 }
 
 impl Runout {
-    /// Radial runout of tooth `index`, from 0, of `teeth` teeth: its radius minus the radius without runout, m.
-    pub fn radial_m(self, index: usize, teeth: usize) -> f64 {
-        let angle = self.angle_deg.to_radians() + TAU * index as f64 / teeth as f64;
-        1e-6 * self.offset_um * angle.cos()
+    /// Radial runout of a tooth at the angle `tooth_rad` from the first tooth, rad: its radius minus the radius without
+    /// runout, m.
+    pub fn radial_m(self, tooth_rad: f64) -> f64 {
+        1e-6 * self.offset_um * (self.angle_deg.to_radians() + tooth_rad).cos()
     }
 }
 
