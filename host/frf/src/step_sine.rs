@@ -50,7 +50,7 @@ pub(super) struct ForceLevel {
     /// Median of the force amplitudes of the frequency steps in the first pass at this level, N.
     pub(super) force_n: f64,
     /// Steps by ascending frequency. Of several steps at one frequency the longest is kept; of steps of about equal
-    /// length, that of the highest measured frequency.
+    /// length, the latest.
     pub(super) steps: Vec<FrequencyStep>,
 }
 
@@ -149,19 +149,20 @@ fn median_force(steps: &[FrequencyStep]) -> f64 {
     forces[forces.len() / 2]
 }
 
-fn by_frequency(mut steps: Vec<FrequencyStep>) -> Vec<FrequencyStep> {
-    steps.sort_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz));
+/// The steps of a level, given in the order of time, by ascending frequency and without repeats: see [`ForceLevel::steps`].
+fn by_frequency(steps: Vec<FrequencyStep>) -> Vec<FrequencyStep> {
     let mut kept: Vec<FrequencyStep> = Vec::with_capacity(steps.len());
     for step in steps {
-        match kept.last_mut() {
-            Some(last) if is_same_frequency(last, &step) => {
-                if step.samples as f64 > REPEATED_STEP * last.samples as f64 {
-                    *last = step;
+        match kept.iter_mut().find(|earlier| is_same_frequency(earlier, &step)) {
+            Some(earlier) => {
+                if step.samples as f64 > REPEATED_STEP * earlier.samples as f64 {
+                    *earlier = step;
                 }
             }
-            _ => kept.push(step),
+            None => kept.push(step),
         }
     }
+    kept.sort_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz));
     kept
 }
 
@@ -433,4 +434,33 @@ fn phasor(signal: &[f64], first: usize, length: usize, period: f64) -> Option<Ph
         // the residual variance σ² of n samples.
         variance: 4.0 * residual / (count - 4.0).max(1.0) / count,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn of_equally_long_steps_at_one_frequency_the_latest_is_kept() {
+        let step = |frequency_hz: f64, samples: usize, force_n: f64| FrequencyStep {
+            frequency_hz,
+            samples,
+            force_n,
+            h: Vec::new(),
+            coherence: Vec::new(),
+            deviation: Vec::new(),
+            is_settled: true,
+        };
+        // The force numbers the steps in the order of time. The measured frequency of the second step is above that of the repeat.
+        let kept = by_frequency(vec![
+            step(40.0, 1000, 1.0),
+            step(20.001, 1000, 2.0),
+            step(30.0, 1000, 3.0),
+            step(20.0, 1000, 4.0),
+            // A repeat that is cut short does not replace the earlier step.
+            step(30.001, 300, 5.0),
+        ]);
+        let kept: Vec<f64> = kept.iter().map(|step| step.force_n).collect();
+        assert_eq!(kept, [4.0, 3.0, 1.0]);
+    }
 }

@@ -89,7 +89,8 @@ impl FrfTable {
             }
             let lines = self.frequency_hz.len();
             let coherence = entry.coherence.as_deref().unwrap_or_default();
-            if entry.receptance.len() != lines || !(coherence.is_empty() || coherence.len() == lines) {
+            let is_whole = entry.coherence.is_none() || coherence.len() == lines;
+            if entry.receptance.len() != lines || !is_whole {
                 return Some(format!(
                     "h{name} does not have one value for each of {lines} frequencies"
                 ));

@@ -173,7 +173,11 @@ fn unit_of_level(unit: &str) -> &str {
         .map_or(unit, |rest| &unit[unit.len() - rest.len()..]);
     let rest = rest.trim();
     let rest = rest.strip_prefix("re").map_or(rest, str::trim);
-    let rest = rest.strip_prefix('1').map_or(rest, str::trim);
+    // The 1 of `1 m/N` is a factor, that of `1/kg` the numerator.
+    let rest = match rest.strip_prefix('1') {
+        Some(unit) if !unit.trim_start().starts_with('/') => unit.trim(),
+        _ => rest,
+    };
     rest.trim_start_matches('(')
 }
 

@@ -268,20 +268,23 @@ fn hum(channels: &TestChannels<'_>) -> Vec<String> {
         .collect()
 }
 
+/// Longest part of a record, s, in which hum of the mains is searched: its lines are then at most 0.01 Hz apart, so that
+/// the search within 0.2 Hz takes at most 81 steps. A choice.
+const HUM_S: f64 = 100.0;
+
 /// Largest share of the energy of a signal in one sine within 0.2 Hz of `hertz`. The mains stay within that in normal
 /// operation.
 fn share_near(samples: &[f64], rate: f64, hertz: f64) -> f64 {
-    let samples = &samples[..samples.len().min(LONGEST)];
+    let samples = &samples[..samples.len().min(LONGEST).min((HUM_S * rate).ceil() as usize)];
     let count = samples.len() as f64;
     let mean = samples.iter().sum::<f64>() / count.max(1.0);
     let energy: f64 = samples.iter().map(|sample| (sample - mean).powi(2)).sum();
     if energy <= 0.0 || samples.len() < 16 {
         return 0.0;
     }
-    // Half the distance of independent lines: the amplitude of a sine between two steps is at most 10 % too low, unless
-    // the bound of 40 steps widens them.
+    // Half the distance of independent lines: the amplitude of a sine between two steps is at most 10 % too low.
     let step = 0.5 * rate / count;
-    let steps = (0.2 / step).ceil().clamp(0.0, 40.0) as i32;
+    let steps = (0.2 / step).ceil().max(0.0) as i32;
     (-steps..=steps)
         .map(|index| {
             let turn = TAU * (hertz + f64::from(index) * 0.2 / f64::from(steps.max(1))) / rate;
