@@ -50,7 +50,11 @@ impl Segment {
             )));
         }
         for channel in &recording.channels {
-            let Some(samples) = channel.samples.get(first..end) else {
+            let Some(samples) = channel
+                .samples
+                .get(first..end)
+                .filter(|_| channel.samples.len() == count)
+            else {
                 return Err(content(format!(
                     "channel \"{}\" has {} samples, and the first one {count}; all must have been sampled together",
                     channel.name,
@@ -101,6 +105,21 @@ mod tests {
                 samples,
             }],
             sidecar: Sidecar::default(),
+        }
+    }
+
+    #[test]
+    fn channels_of_unequal_length_are_refused() {
+        for length in [9, 11] {
+            let mut recording = recording();
+            recording.channels[0].samples.fill(1.0);
+            recording.channels.push(Channel {
+                name: "ay".into(),
+                quantity: Quantity::Acceleration,
+                samples: vec![0.0; length],
+            });
+            let said = Segment::default().of(recording).unwrap_err().to_string();
+            assert!(said.contains(&format!("\"ay\" has {length} samples")), "{said}");
         }
     }
 

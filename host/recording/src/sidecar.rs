@@ -128,13 +128,14 @@ fn is_case(text: &str) -> bool {
 }
 
 impl Sidecar {
-    /// Description of the channel with a standard name such as `ax`, also if the file calls it by another name; `None`
-    /// if the sidecar has no description of it. A description that states the name with a sign (`-ax`) is not found.
+    /// Description of the channel with a standard name such as `ax`, also if the file calls it by another name, or if the
+    /// description states the name with a sign (`-ax`); `None` if the sidecar has no description of it.
     pub fn channel(&self, name: &str) -> Option<&RecordedChannel> {
+        let is_named = |stated: &str| stated.strip_prefix('-').unwrap_or(stated) == name;
         let renamed = self
             .channels
             .values()
-            .find(|channel| channel.name.as_deref() == Some(name));
+            .find(|channel| channel.name.as_deref().is_some_and(is_named));
         renamed.or_else(|| self.channels.get(name))
     }
 

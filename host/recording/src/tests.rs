@@ -95,6 +95,17 @@ fn the_sidecar_names_and_scales_channels() {
     assert!((channel.samples[0] - 2.0 * 9.806_65).abs() < 1e-12);
     assert_eq!(recording.sidecar.kind, Some(TestKind::Cutting));
 
+    // An inverted channel is described under its name without the sign.
+    folder.file(
+        "inverted.toml",
+        "sample_rate_hz = 1000.0\n[channels.data]\nname = \"-ay\"\nunit = \"g\"\nanti_aliasing = true\n",
+    );
+    let inverted = Recording::read(folder.file("inverted.csv", "data\n20\n-10\n")).unwrap();
+    let described = inverted.sidecar.channel("ay").unwrap();
+    assert_eq!(described.anti_aliasing, Some(true));
+    assert!(inverted.channel("ay").unwrap().samples[0] < 0.0);
+    assert!(inverted.sidecar.channel("y").is_none());
+
     for (text, words) in [
         ("sample_rate = 3.0\n", vec!["line 1", "sample_rate"]),
         (

@@ -65,9 +65,10 @@ pub(super) fn rate(line: &str, decimal_comma: bool) -> Option<f64> {
             .any(|part| part == word)
     };
     if let Some((value, units)) = after(RATE_WORDS).and_then(|rest| number(&rest)) {
+        // `MS/s` are samples per second; `ms` alone would be the interval in brackets behind a rate.
         let factor = if has(&units, "khz") || has(&units, "ks") {
             1e3
-        } else if has(&units, "mhz") || has(&units, "ms") {
+        } else if has(&units, "mhz") || units.contains("ms/s") {
             1e6
         } else {
             1.0
@@ -96,6 +97,9 @@ mod tests {
             ("Sample Rate: 51.2 kHz", Some(51_200.0)),
             ("Sample rate (Hz),2048", Some(2048.0)),
             ("dt = 0.5 ms", Some(2000.0)),
+            ("Sample rate: 1.2 MS/s", Some(1.2e6)),
+            ("Sample rate: 50 kS/s", Some(50_000.0)),
+            ("Sample rate: 1000 (1 ms)", Some(1000.0)),
             ("Delta_X;0.001", Some(1000.0)),
             ("offset 3", None),
             ("Fs is the rate of the second channel 3", None),
