@@ -78,6 +78,33 @@ pub fn with_sections(text: &str, other: &Table) -> Result<String, CaseFileError>
     written(&case)
 }
 
+/// The case `other` with the name, the tool and the material of `identified`, a case of [`cutting`]. Keys of the tool that
+/// `identified` lacks, and the name of the material, stay those of `other`; coefficients of `other` that were not identified
+/// do not stay.
+pub fn with_coefficients(identified: &Table, other: &Table) -> Table {
+    let mut case = other.clone();
+    for (section, value) in identified {
+        case.insert(section.clone(), value.clone());
+    }
+    let mut keep = |section: &str, is_kept: &dyn Fn(&str) -> bool| {
+        let before = other.get(section).and_then(Value::as_table);
+        let now = case.get_mut(section).and_then(Value::as_table_mut);
+        if let (Some(before), Some(now)) = (before, now) {
+            for (key, value) in before.iter().filter(|(key, _)| is_kept(key)) {
+                now.entry(key.clone()).or_insert_with(|| value.clone());
+            }
+        }
+    };
+    let has_runout = identified
+        .get("tool")
+        .is_some_and(|tool| tool.get("runout_um").is_some());
+    keep("tool", &|key| {
+        !(has_runout && key.starts_with(EffectName::Runout.name()))
+    });
+    keep("material", &|key| key == "name");
+    case
+}
+
 /// Text of a case file with the complex modes of `model`, in the directions that are both excited and measured, and with
 /// the joint covariance of their parameters.
 ///
@@ -402,6 +429,46 @@ mod tests {
     use quietcut_model::case::Case;
     use quietcut_model::structure::Form;
     use quietcut_simulate::Effects;
+
+    #[test]
+    fn identified_coefficients_replace_those_of_a_case_and_all_else_stays() {
+        let path = quietcut_testkit::tests_folder().join("cases/kuka-kr90-acetal.toml");
+        let mut other: Table = std::fs::read_to_string(path).unwrap().parse().unwrap();
+        let tool = other["tool"].as_table_mut().unwrap();
+        tool.insert("runout_um".into(), 7.0.into());
+        tool.insert("runout_um_std".into(), 2.0.into());
+        other["material"]
+            .as_table_mut()
+            .unwrap()
+            .insert("krc_mpa_std".into(), 1.0.into());
+        let estimate = |key, value| Estimate {
+            key,
+            directions: Vec::new(),
+            value,
+            deviation: 0.5,
+        };
+        let estimates = [("ktc_mpa", 101.0), ("krc_mpa", 102.0), ("kac_mpa", 103.0)]
+            .map(|(key, value)| estimate(key, value));
+        let runout = Runout {
+            offset_um: 12.0,
+            angle_deg: 30.0,
+        };
+        let identified = cutting("found", &estimates, 2, 90.0, Some(runout)).unwrap();
+        let written = with_coefficients(&identified, &other);
+        assert_eq!(written["structure"], other["structure"]);
+        assert_eq!(written["cut"], other["cut"]);
+        assert_eq!(written["tool"]["diameter_mm"], other["tool"]["diameter_mm"]);
+        assert_eq!(written["tool"]["runout_um"], 12.0.into());
+        assert!(written["tool"].get("runout_um_std").is_none(), "{written}");
+        let mut material = identified["material"].as_table().unwrap().clone();
+        if let Some(name) = other["material"].get("name") {
+            material.insert("name".into(), name.clone());
+        }
+        assert_eq!(written["material"], Value::Table(material));
+        let text = toml::to_string(&written).unwrap();
+        let case = Case::parse(std::path::Path::new("found.toml"), &text).unwrap();
+        assert_eq!(case.material.unwrap().ktc_mpa, 101.0);
+    }
 
     #[test]
     fn a_robot_that_is_written_is_read_again() {

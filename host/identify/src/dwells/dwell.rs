@@ -187,7 +187,8 @@ fn split(samples: &[f64], from: usize, rate_hz: f64, found: &mut Vec<DwellSegmen
 /// Fractional sample indices of the rising zero crossings of the force, with a hysteresis of at most half its RMS, so
 /// that weaker noise gives no second crossing.
 fn rising_crossings(samples: &[f64], from: usize) -> Vec<f64> {
-    let size = (energy(&samples[from.min(samples.len())..]) / samples.len().max(1) as f64).sqrt();
+    let held = &samples[from.min(samples.len())..];
+    let size = (energy(held) / held.len().max(1) as f64).sqrt();
     let mut crossings = Vec::new();
     let mut armed = false;
     for i in from.max(1)..samples.len() {
@@ -335,5 +336,24 @@ pub fn pool_variances(dwells: &mut [Dwell]) {
                 pick(dwell)[line].variance = sum / count;
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn noise_after_a_long_quiet_start_gives_no_second_crossing() {
+        // 9000 samples of rest, then a sine of 40 samples per period with noise at a quarter of its amplitude.
+        let (rest, period, periods) = (9000, 40, 25);
+        let sine = |i: usize| (std::f64::consts::TAU * (i as f64 + 0.5) / period as f64).sin();
+        let noise = |i: usize| if i % 2 == 0 { 0.25 } else { -0.25 };
+        let samples: Vec<f64> = (0..rest)
+            .map(|_| 0.0)
+            .chain((0..period * periods).map(|i| sine(i) + noise(i)))
+            .collect();
+        let crossings = rising_crossings(&samples, rest);
+        assert_eq!(crossings.len(), periods, "{crossings:?}");
     }
 }

@@ -281,9 +281,14 @@ impl IdentifyOutput {
         }
     }
 
-    /// TOML text of the case file with the identified model, named after `path`. The sections tool, material, cut and
-    /// limits that the case `other` has replace those of the identified model.
+    /// TOML text of the case file with the identified model, named after `path`. Identified cutting coefficients go into
+    /// the case `other`, which keeps all else; for other methods the sections tool, material, cut and limits that
+    /// `other` has replace those of the identified model.
     pub(super) fn case(&self, path: &Path, other: Option<&toml::Table>) -> Result<String, Error> {
+        if let (Some(_), Some(table), Some(other)) = (&self.cutting, &self.table, other) {
+            return toml::to_string(&case_file::with_coefficients(table, other))
+                .map_err(|error| Error::other(format!("--out {}: {error}", path.display())));
+        }
         let text = self.structure(path)?;
         match other {
             Some(other) => case_file::with_sections(&text, other)

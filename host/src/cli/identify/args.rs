@@ -93,7 +93,8 @@ pub struct Args {
     /// For force-coefficients: start and end of full engagement, in s. Default: detected in the measured force.
     #[arg(long, value_name = "FIRST:LAST", value_parser = ends)]
     pub(super) cut_s: Option<[f64; 2]>,
-    /// Case whose tool, material, cut and limits are copied into the written case. Default: the case of --start.
+    /// Case whose tool, material, cut and limits are copied into the written case; for force-coefficients: case that gets the
+    /// identified coefficients and runout, and keeps all else. Default: the case of --start.
     #[arg(long, value_name = "CASE", requires = "out")]
     pub(super) case: Option<PathBuf>,
     #[command(flatten)]

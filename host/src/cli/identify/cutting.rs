@@ -1,10 +1,12 @@
 //! `--method force-coefficients`: cutting and edge coefficients and runout from cuts with measured forces.
 
 use std::collections::BTreeMap;
+use std::path::Path;
 
 use super::Error;
 use super::answer::{Cutting, Figure, IdentifyOutput};
 use super::args::Args;
+use crate::case::Case;
 use crate::identify::case_file::{self, Estimate};
 use crate::identify::force_coefficients::{Fit, KEYS, Value, fit, runout};
 use crate::identify::force_test::{CuttingTest, Setup};
@@ -17,6 +19,9 @@ pub(super) fn force_coefficients(args: &Args, recordings: &[Recording]) -> Resul
             "--edge-angle-deg {}: an angle above 0 and up to 90 is needed",
             args.edge_angle_deg
         )));
+    }
+    if let Some(path) = &args.case {
+        check_edge_angle(args.edge_angle_deg, path)?;
     }
     let setup = Setup {
         edge_angle_deg: args.edge_angle_deg,
@@ -75,6 +80,20 @@ pub(super) fn force_coefficients(args: &Args, recordings: &[Recording]) -> Resul
         table,
         ..IdentifyOutput::of(EffectName::ForceCoefficients.name(), Vec::new(), estimates)
     })
+}
+
+/// Refuses a case whose tool has another edge angle than the one with which the coefficients are identified.
+fn check_edge_angle(edge_angle_deg: f64, path: &Path) -> Result<(), Error> {
+    let case = Case::read(path).map_err(Error::input)?;
+    match case.tool {
+        Some(tool) if tool.edge_angle_deg != edge_angle_deg => Err(Error::input(format!(
+            "--edge-angle-deg {edge_angle_deg}: {} has tool.edge_angle_deg = {of_case}, and coefficients hold for one edge angle; say \
+             --edge-angle-deg {of_case}",
+            path.display(),
+            of_case = tool.edge_angle_deg
+        ))),
+        _ => Ok(()),
+    }
 }
 
 fn figures(values: [Option<Value>; 6]) -> BTreeMap<&'static str, Figure> {
