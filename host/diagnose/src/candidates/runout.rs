@@ -1,4 +1,5 @@
-//! Runout: the edge of tooth j of N teeth lies on the radius R + e·cos(ψ + 2πj/N), with the offset e of the tool axis.
+//! Runout: the edge of tooth j of N teeth lies on the radius R + e·cos(ψ + 2πj/N) at equal pitch, with the offset e of
+//! the tool axis.
 //!
 //! Shows: lines at the spindle frequency and its multiples other than tooth-passing harmonics, from the first engaged
 //! tooth on. Does not show: growth, or lines that are not multiples of the spindle frequency. Flip chatter of constant
@@ -23,8 +24,22 @@ const SHARES_OF_FEED: [f64; 2] = [0.1, 0.25];
 /// cos ψ and e sin ψ, µm.
 const LEAST_UM: f64 = 0.01;
 
+/// Least sine of the angle of a tooth from the first that is no rounding error of π.
+const ASIDE: f64 = 1e-9;
+
 fn teeth(study: &Study<'_>) -> usize {
     cutter(study).map_or(0, |cutter| cutter.teeth.len())
+}
+
+/// True if some tooth lies beside the line through the axis and the first tooth, so that an offset of the tool axis
+/// perpendicular to this line changes a radius. Two teeth at equal pitch have no such tooth.
+fn has_tooth_aside(study: &Study<'_>) -> bool {
+    cutter(study).is_some_and(|cutter| {
+        cutter
+            .teeth
+            .iter()
+            .any(|tooth| tooth.angle_rad.sin().abs() > ASIDE)
+    })
 }
 
 fn offset(along_um: f64, across_um: f64) -> impl Fn(&mut Cutter) {
@@ -60,7 +75,7 @@ impl Cause for RunoutCause {
     /// per tooth in several directions.
     fn nonlinear_grid(&self, study: &Study<'_>, _: &Location) -> Vec<Vec<f64>> {
         let feed_um = cutter(study).map_or(0.0, |cutter| 1e6 * cutter.feed_per_tooth_m);
-        let directions = if teeth(study) > 2 { 6 } else { 2 };
+        let directions = if has_tooth_aside(study) { 6 } else { 2 };
         let about = SHARES_OF_FEED.into_iter().flat_map(|share| {
             (0..directions).map(move |direction| {
                 let angle = TAU * f64::from(direction) / f64::from(directions);
@@ -82,8 +97,7 @@ impl Cause for RunoutCause {
         };
         let (along_step, across_step) = (step(along, LEAST_UM), step(across, LEAST_UM));
         let mut regressors = vec![changed(record, offset(along_step, 0.0), along_step)];
-        // With two teeth, an offset perpendicular to their line changes no radius.
-        if teeth(study) > 2 {
+        if has_tooth_aside(study) {
             regressors.push(added(
                 record,
                 offset(along, 0.0),

@@ -80,22 +80,19 @@ impl SpindleMotion {
     /// adds is proportional to the mean speed, so that the angle at an edge is linear in start angle and mean speed.
     fn fitted(mut self) -> Self {
         let count = self.edges_s.len() as f64;
-        for _ in 0..3 {
-            // At tachometer edge k the spindle angle is 2πk. It is linear in the edge time plus the lead of the speed
-            // modulation, s.
-            let modulation_s = |t: f64| self.modulation_s(t);
-            let times: Vec<f64> = self.edges_s.iter().map(|t| t + modulation_s(*t)).collect();
-            let mean_t = times.iter().sum::<f64>() / count;
-            let mean_k = 0.5 * (count - 1.0);
-            let (mut tt, mut tk) = (0.0, 0.0);
-            for (k, t) in times.iter().enumerate() {
-                tt += (t - mean_t) * (t - mean_t);
-                tk += (t - mean_t) * (k as f64 - mean_k);
-            }
-            let revolutions_per_s = tk / tt;
-            self.rpm = 60.0 * revolutions_per_s;
-            self.start_rad = TAU * (mean_k - revolutions_per_s * mean_t);
+        // At tachometer edge k the spindle angle is 2πk. It is linear in the edge time plus the lead of the speed
+        // modulation, s.
+        let times: Vec<f64> = self.edges_s.iter().map(|t| t + self.modulation_s(*t)).collect();
+        let mean_t = times.iter().sum::<f64>() / count;
+        let mean_k = 0.5 * (count - 1.0);
+        let (mut tt, mut tk) = (0.0, 0.0);
+        for (k, t) in times.iter().enumerate() {
+            tt += (t - mean_t) * (t - mean_t);
+            tk += (t - mean_t) * (k as f64 - mean_k);
         }
+        let revolutions_per_s = tk / tt;
+        self.rpm = 60.0 * revolutions_per_s;
+        self.start_rad = TAU * (mean_k - revolutions_per_s * mean_t);
         let steady = Spindle::new(self.rpm);
         self.spindle = self
             .fluctuation

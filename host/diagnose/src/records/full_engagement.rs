@@ -311,13 +311,16 @@ impl Levels {
     }
 
     /// True if the vibration level of every channel that is below `AIR_LEVEL` in the first revolution grows in the
-    /// second, as it does when a cut begins with the recording.
+    /// second, as it does when a cut begins with the recording; false for a recording of less than two revolutions.
     fn grows_from_rest(&self) -> bool {
         self.of
             .iter()
             .zip(&self.noise)
             .filter(|(of, _)| of[0] < AIR_LEVEL)
-            .all(|(of, noise)| of[1] > GROWTH_FROM_REST * of[0] + noise)
+            .all(|(of, noise)| {
+                of.get(1)
+                    .is_some_and(|next| *next > GROWTH_FROM_REST * of[0] + noise)
+            })
     }
 }
 
@@ -395,6 +398,18 @@ mod tests {
             assert!(from_s >= touches[0] + way_s && from_s < touches[0] + 1.6 * WAY_S);
             assert!(to_s <= touches[1] - way_s && to_s > touches[1] - 2.0 * WAY_S);
         }
+    }
+
+    #[test]
+    fn a_recording_of_one_revolution_does_not_grow_from_rest() {
+        let levels = Levels {
+            count: 1,
+            chatters: false,
+            of: vec![vec![0.5 * AIR_LEVEL]],
+            noise: vec![0.0],
+        };
+        assert!(!levels.grows_from_rest());
+        assert_eq!(levels.smallest(0), 0.5 * AIR_LEVEL);
     }
 
     #[test]
