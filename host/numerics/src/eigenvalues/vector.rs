@@ -11,9 +11,12 @@ const STEPS: usize = 3;
 /// matrix regular.
 const BESIDE: f64 = 1e-8;
 
-/// Right eigenvector of length 1 of a matrix for an approximate eigenvalue. `None` if the matrix is not finite, or
-/// singular after the shift.
+/// Right eigenvector of length 1 of a square matrix for an approximate eigenvalue. `None` if the matrix is not square, not
+/// finite, or singular after the shift.
 pub fn eigenvector(matrix: &DMatrix<Complex64>, eigenvalue: Complex64) -> Option<DVector<Complex64>> {
+    if !matrix.is_square() {
+        return None;
+    }
     let order = matrix.nrows();
     let shift = if eigenvalue.norm() > 0.0 {
         eigenvalue * (1.0 + BESIDE)
@@ -24,8 +27,11 @@ pub fn eigenvector(matrix: &DMatrix<Complex64>, eigenvalue: Complex64) -> Option
 }
 
 /// Vector v of length 1 with A v ≈ 0, of a matrix A that is nearly singular, but not exactly: its eigenvector of the
-/// eigenvalue nearest to zero. `None` if A is exactly singular or not finite.
+/// eigenvalue nearest to zero. `None` if A is not square, exactly singular or not finite.
 pub fn null_vector(matrix: DMatrix<Complex64>) -> Option<DVector<Complex64>> {
+    if !matrix.is_square() {
+        return None;
+    }
     let order = matrix.nrows();
     let lu = matrix.lu();
     let start = DVector::from_fn(order, |i, _| Complex64::new(1.0, 0.3 * i as f64));
@@ -78,5 +84,8 @@ mod tests {
         let vector = eigenvector(&nilpotent, Complex64::ZERO).unwrap();
         assert!(vector[1].norm() < 1e-9);
         assert!(null_vector(DMatrix::repeat(2, 2, Complex64::from(f64::NAN))).is_none());
+        // No square.
+        assert!(null_vector(DMatrix::repeat(2, 3, Complex64::ONE)).is_none());
+        assert!(eigenvector(&DMatrix::repeat(3, 2, Complex64::ONE), Complex64::ONE).is_none());
     }
 }
