@@ -2,7 +2,7 @@
 
 #![allow(clippy::expect_used)]
 
-use quietcut_tests::command::{cases, folder, quietcut, verbs};
+use quietcut_tests::command::{WORKING_POINT, cases, folder, quietcut, verbs, words};
 
 /// The commands under "Example:" in the help of a verb.
 fn examples(verb: &str) -> Vec<Vec<String>> {
@@ -170,31 +170,9 @@ fn json_is_exactly_one_object() {
         &["replay", "a.csv", "--table", "a.qct", "--port", "simulated"],
         &["upload", "simulated", "a.qct"],
         &["info", "simulated"],
-        &[
-            "working-point",
-            "simulated",
-            "--depth-mm",
-            "2",
-            "--start",
-            "90",
-            "--exit",
-            "180",
-            "--feed",
-            "0.15",
-        ],
+        &[&["working-point", "simulated"], &words(WORKING_POINT)[..]].concat(),
         // The former name of the verb.
-        &[
-            "work",
-            "simulated",
-            "--depth-mm",
-            "2",
-            "--start",
-            "90",
-            "--exit",
-            "180",
-            "--feed",
-            "0.15",
-        ],
+        &[&["work", "simulated"], &words(WORKING_POINT)[..]].concat(),
         &["monitor", "simulated", "--seconds", "0.5"],
     ] {
         let answer = quietcut(folder.path(), &[arguments, &["--json"]].concat());

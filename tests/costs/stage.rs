@@ -28,15 +28,19 @@ impl Stage {
 
 fn quietcut(folder: &Path, line: &str) {
     let cases = format!("{}/", cases().display());
-    let status = Command::new(binary())
+    let output = Command::new(binary())
         .args(line.split_whitespace().map(|word| word.replace("CASES/", &cases)))
         .current_dir(folder)
         .env("RAYON_NUM_THREADS", "1")
         .stdout(Stdio::null())
-        .stderr(Stdio::null())
-        .status()
+        .output()
         .unwrap();
-    assert!(status.success(), "{line}: {status}");
+    assert!(
+        output.status.success(),
+        "{line}: {}: {}",
+        output.status,
+        String::from_utf8_lossy(&output.stderr)
+    );
 }
 
 pub(crate) fn stages() -> [Stage; 7] {
@@ -59,9 +63,9 @@ pub(crate) fn stages() -> [Stage; 7] {
         Stage {
             name: "FRF",
             input: &[
-                "simulate CASES/kuka-kr90-acetal.toml --experiment shaker --direction y --force-n 100 --seconds 240 --sample-rate-hz 512 --noise-percent 1 --seed 1 --out shaker.csv",
+                "simulate CASES/kuka-kr90-acetal.toml --experiment sweep --direction y --frequency-hz 5:60:2 --force-n 100 --seconds 240 --sample-rate-hz 512 --noise-percent 1 --seed 1 --out band.csv",
             ],
-            timed: "frf shaker.csv --out frf.csv",
+            timed: "frf band.csv --out frf.csv",
         },
         Stage {
             name: "identify",

@@ -164,6 +164,22 @@ pub fn quietcut<S: AsRef<OsStr>>(folder: &Path, arguments: &[S]) -> Outcome {
     start(folder, arguments).finish()
 }
 
+/// Options of the verb `working-point` for the cut of the virtual tests: 2 mm deep, down-milling at half immersion.
+pub const WORKING_POINT: &str = "--depth-mm 2 --start 90 --exit 180 --feed 0.15";
+
+/// The arguments of the command in `line`, separated by white space.
+pub fn words(line: &str) -> Vec<&str> {
+    line.split_whitespace().collect()
+}
+
+/// Runs the command with the arguments in `line`, separated by white space, in `folder`; it must succeed.
+#[track_caller]
+pub fn done(folder: &Path, line: &str) -> Outcome {
+    let outcome = quietcut(folder, &words(line));
+    assert_eq!(outcome.status, Some(0), "{line}: {outcome:?}");
+    outcome
+}
+
 /// The verbs that the help lists.
 pub fn verbs() -> Vec<String> {
     let help = quietcut(folder().path(), &["help"]);

@@ -6,7 +6,7 @@ use quietcut_core::lobes::{LobeTable, TableError};
 use quietcut_core::protocol::message::MAX_CHUNK;
 use quietcut_core::protocol::{FrameError, Info, Refusal, Reply, Request, Response, Slot};
 
-use crate::command::{cases, folder, quietcut};
+use crate::command::{WORKING_POINT, cases, folder, quietcut, words};
 use crate::raw_host::{RawHost, frame, frame_of_version};
 use crate::small_table::table;
 
@@ -39,16 +39,7 @@ pub fn the_command_uploads_a_table_and_sets_and_reads_the_working_point(port: &s
     std::fs::write(folder.path().join("kuka.qct"), table("kuka", 1.5, 100)).expect("a file");
     let uploaded = run(&["upload", port, "kuka.qct", "--json"]);
     assert_eq!(uploaded["table"]["name"], "kuka", "{uploaded}");
-    let cut = [
-        "--depth-mm",
-        "2",
-        "--start",
-        "90",
-        "--exit",
-        "180",
-        "--feed",
-        "0.15",
-    ];
+    let cut = words(WORKING_POINT);
     let expected = serde_json::json!({"depth_mm": 2.0, "start_deg": 90.0, "exit_deg": 180.0, "feed_per_tooth_mm": 0.15, "posture": 0});
     let told = run(&[&["working-point", port, "--json"], &cut[..]].concat());
     assert_eq!(told["working_point"], expected);
