@@ -22,6 +22,19 @@ pub(crate) const OVERDAMPED: f64 = 0.5;
 /// normal variable exceeds three standard deviations in magnitude with a probability of 0.3 %.
 pub(crate) const LEAST_RESIDUE_SIGNIFICANCE: f64 = 3.0;
 
+/// Residual of a modal fit, as χ² per degree of freedom, below which no further mode is searched. The variance of a
+/// receptance is estimated from at least three impacts and nine lines, which raises χ² by up to 6 %; the rest is margin.
+pub(crate) const FURTHER_MISFIT: f64 = 1.1;
+
+/// NRMSE of the fitted receptances below which no further mode is searched: a mode as small moves no limit by a percent.
+/// Unfounded.
+pub(crate) const FURTHER_ERROR: f64 = 1e-3;
+
+/// Norm of the residue matrix of a further mode, in standard deviations of the norm, from which it is accepted. A pole
+/// that is fitted freely to noise explains some 10 of χ² with its ten parameters, and the best of a thousand places
+/// some 4 ln 1000 = 28 more: six standard deviations. The two above are margin.
+pub(crate) const FURTHER_SIGNIFICANCE: f64 = 8.0;
+
 /// NRMSE of the fitted receptances above which a warning says that the modal model does not fit. Unfounded.
 pub(crate) const LARGEST_FIT_ERROR: f64 = 0.1;
 

@@ -10,6 +10,7 @@
 mod covariance;
 mod denominator;
 mod error;
+mod further_mode;
 mod gain_errors;
 mod jacobian;
 mod joint_covariance;
@@ -38,6 +39,7 @@ pub use stabilization::{Candidate, Stabilization};
 
 use num_complex::Complex64;
 
+use further_mode::with_further_mode;
 use model::warnings;
 use pole_residue::PoleResidue;
 use refinement::Refined;
@@ -93,8 +95,14 @@ pub fn identify(data: &Receptances, options: &Options) -> Result<ModalModel, Mod
             });
         }
         let start = PoleResidue::start(data, &starts)?;
-        let refined = refinement::refine(data, start).ok_or(ModesError::NotConverged(starts.len()))?;
+        let mut refined = refinement::refine(data, start).ok_or(ModesError::NotConverged(starts.len()))?;
         let Some((mode, why)) = spurious(&refined, [from_hz, to_hz]) else {
+            let is_spurious = |fit: &Refined| spurious(fit, [from_hz, to_hz]).is_some();
+            while options.modes.is_none()
+                && let Some(larger) = with_further_mode(data, &refined, &stabilization, is_spurious)
+            {
+                refined = larger;
+            }
             return Ok(model(data, &refined, stabilization, rejected));
         };
         rejected.push(reject(refined.fit.modes[mode].pole, why));

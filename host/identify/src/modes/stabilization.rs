@@ -14,6 +14,9 @@ use crate::criteria::{
 };
 use quietcut_frf::rational_fit::{RationalFitError, residues};
 
+/// Distance of two poles, as a fraction of the decay rate of one, below which both lead a modal fit to the same mode. A choice.
+const SAME_START: f64 = 0.3;
+
 /// A pole of the model of one order in the stabilization diagram.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Candidate {
@@ -64,6 +67,28 @@ pub struct Stabilization {
 }
 
 impl Stabilization {
+    /// Stable poles of the upper half of the model orders that are not among the poles `known`, those with the highest
+    /// peaks first, at most `count`.
+    ///
+    /// Poles count as the same if they are closer than a fraction of the decay rate, [`SAME_START`].
+    pub(super) fn further(&self, known: &[Complex64], count: usize) -> Vec<Complex64> {
+        let mut stable: Vec<&Candidate> = self
+            .candidates
+            .iter()
+            .filter(|candidate| candidate.is_stable && 2 * candidate.order > self.highest_order)
+            .collect();
+        stable.sort_by(|a, b| b.height.total_cmp(&a.height));
+        let mut found: Vec<Complex64> = Vec::new();
+        for candidate in stable {
+            let pole = candidate.pole;
+            let is_known = |other: &&Complex64| (pole - **other).norm() < SAME_START * -pole.re;
+            if found.len() < count && known.iter().chain(&found).find(is_known).is_none() {
+                found.push(pole);
+            }
+        }
+        found
+    }
+
     /// Poles of the stabilization diagram that are rejected as modes, with the reasons.
     pub(super) fn rejected(&self) -> Vec<Rejected> {
         let unstable = self

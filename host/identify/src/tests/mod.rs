@@ -11,4 +11,6 @@ mod linearity;
 mod measured;
 mod steady;
 mod surface;
+mod tap_coverage;
 mod thesis;
+mod virtual_taps;

@@ -1,0 +1,39 @@
+//! Modes that the stabilization diagram misses: poles that stay the same over too few model orders, since noise in small
+//! receptances changes their shapes, although the residual of the fit shows them clearly.
+
+use num_complex::Complex64;
+
+use super::pole_residue::PoleResidue;
+use super::receptances::Receptances;
+use super::refinement::{Refined, refine};
+use super::stabilization::Stabilization;
+use crate::criteria::{FURTHER_ERROR, FURTHER_MISFIT, FURTHER_SIGNIFICANCE};
+
+/// Largest number of poles of the diagram that are tried as a further mode, those with the highest peaks first. A choice.
+const TRIED: usize = 8;
+
+/// The fit with one more mode, if the residual is more than noise and a pole of the diagram explains a part of it
+/// significantly.
+///
+/// `is_spurious` says whether any mode of a fit is none.
+pub(super) fn with_further_mode(
+    data: &Receptances,
+    refined: &Refined,
+    stabilization: &Stabilization,
+    is_spurious: impl Fn(&Refined) -> bool,
+) -> Option<Refined> {
+    let is_noise = data.has_deviation && refined.misfit < FURTHER_MISFIT;
+    if is_noise || refined.relative_error < FURTHER_ERROR {
+        return None;
+    }
+    let known: Vec<Complex64> = refined.fit.modes.iter().map(|mode| mode.pole).collect();
+    stabilization.further(&known, TRIED).into_iter().find_map(|pole| {
+        let mut poles = known.clone();
+        poles.push(pole);
+        let larger = refine(data, PoleResidue::start(data, &poles).ok()?)?;
+        let is_mode = larger.significance(known.len()) >= FURTHER_SIGNIFICANCE
+            && larger.relative_error < refined.relative_error
+            && !is_spurious(&larger);
+        is_mode.then_some(larger)
+    })
+}
