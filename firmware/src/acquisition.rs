@@ -59,8 +59,8 @@ impl<A: Accelerometer> Acquisition<A> {
         &mut self.accelerometer
     }
 
-    /// Starts the sensor, or restarts it after an error. The number of samples lost during the restart is estimated
-    /// from the fitted clock.
+    /// Starts the sensor, or restarts it after an error. The first block after a restart states the number of lost
+    /// samples, estimated from the fitted clock; 0 if there was no time stamp before.
     ///
     /// # Errors
     /// The sensor's driver fails.
@@ -141,8 +141,8 @@ impl<A: Accelerometer> Acquisition<A> {
         if !(queue.overrun || self.uncounted || remainder != 0) {
             return 0;
         }
-        // An overrun of the queue without a gap in the sensor's count gives 0: the overrun came after the preceding
-        // call had read the status, and that call has counted the lost samples.
+        // The overrun may have come after the preceding call had read the status. That call has then counted the lost
+        // samples already, and their number is 0 here.
         let Some(line) = &self.line else {
             return remainder as u32;
         };
@@ -169,8 +169,8 @@ impl<A: Accelerometer> Acquisition<A> {
         };
         match (&self.line, rise) {
             (None, _) => before(now, f32::from(queue.level), self.nominal_period_ns),
-            // The time is computed from the time stamp itself, not from the line fitted to the stamps, because the
-            // signal chain fits the block times again.
+            // The time is counted back from the time stamp itself with the fitted period, not read from the line fitted
+            // to the stamps, because the signal chain fits the block times again.
             (Some(line), Some(rise)) if first <= self.stamped_sample => {
                 before(rise, (self.stamped_sample - first) as f32, line.period_ns())
             }

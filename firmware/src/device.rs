@@ -9,9 +9,9 @@
 //! }
 //! ```
 //!
-//! Only the flash makes the device wait: a request of an upload may take as long as a page erase. A board with a
-//! sensor then first takes all waiting blocks, with only [`flush`](Device::flush) between them, before it
-//! [`poll`](Device::poll)s for the next request. The upload is slower then, but no sample is lost.
+//! Only the flash makes the device wait: a request of an upload may erase a page. A board with a
+//! sensor therefore takes the waiting blocks, with only [`flush`](Device::flush) between them, before it
+//! [`poll`](Device::poll)s for the next request.
 //!
 //! Requests of the host are done one at a time, in order; see [`quietcut_core::protocol`]. While the host feeds
 //! blocks, those of the sensor are ignored.
@@ -35,7 +35,7 @@ use crate::link::{Line, Link};
 use crate::storage::{Storage, TableMemory};
 use outbox::Outbox;
 
-/// The clock that stamps samples and tachometer edges.
+/// The clock that gives the uptime of the device.
 pub trait Clock {
     /// Time since the start of the device, in nanoseconds.
     fn now(&self) -> Nanoseconds;
@@ -44,7 +44,7 @@ pub trait Clock {
 /// Identity of a board.
 #[derive(Clone, Copy, Debug)]
 pub struct Identity {
-    /// Name of the board on which the device runs; at most 24 bytes.
+    /// Name of the board on which the device runs; the host gets an empty name if it has more than 24 bytes.
     pub board: &'static str,
     /// The accelerometer of the board; `None` if the board has none.
     pub sensor: Option<Sensor>,
@@ -63,9 +63,10 @@ pub struct Device<'a, M, C> {
     session: Session,
     outbox: Outbox,
     subscription: Subscription,
-    /// Verdict, reason and advice of the last report sent to a host that subscribes to changes.
+    /// Verdict, reason and advice of the last report while the host subscribes to changes; `None` before the first
+    /// report after a reset of the signal chain or a new subscription.
     last_sent: Option<ReportKey>,
-    /// Tachometer edges received from the host for the next block of samples that it feeds.
+    /// Tachometer edges received from the host for the next block of samples that it feeds, in order of arrival.
     edges: Vec<Edge, MAX_BLOCK_EDGES>,
     is_fed: bool,
     blocks: u32,
@@ -84,8 +85,8 @@ type ReportKey = (Verdict, Reason, Option<Advice>);
 struct Session {
     is_open: bool,
     requests: Sequence,
-    /// Sequence number and reply of the last request, sent again if the host did not receive the reply and repeats the
-    /// request.
+    /// Sequence number and reply of the last answered request. The reply is sent again if the host repeats the
+    /// request. `None` before the first reply.
     last: Option<(u16, Reply)>,
 }
 
@@ -137,8 +138,9 @@ impl<'a, M: TableMemory, C: Clock> Device<'a, M, C> {
         }
     }
 
-    /// Sends as many bytes as the line to the host accepts, and receives until a readable frame of the host is
-    /// processed or no further byte can be. Returns true if it did anything; the caller then calls it again.
+    /// Sends as many bytes as the line to the host accepts, and receives until at least one readable frame of the
+    /// host is processed or no further byte can be. Returns true if any byte was sent or processed; the caller then
+    /// calls it again.
     ///
     /// # Errors
     /// Reading from or writing to the line fails.
@@ -266,7 +268,8 @@ impl<'a, M: TableMemory, C: Clock> Device<'a, M, C> {
         }
     }
 
-    /// Performs a request of the host. Queues its reply, or the reason why it is refused.
+    /// Performs a request of the host and queues the reply. A repeated request is not performed again; it gets the last
+    /// reply. A request with an unexpected sequence number is refused.
     fn answer(&mut self, sequence: u16, request: Request) {
         if request == Request::Hello {
             self.begin_session(sequence);

@@ -163,8 +163,8 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>, const WRITE: usize, const ERASE: usize> NorFl
                 Ok(())
             }
             Fate::Cut(mut noise) => {
-                // An interrupted erase makes the bytes of the page random; in one of four cases they keep the old
-                // content.
+                // An interrupted erase leaves bytes between the old value and 0xFF, or random ones; in one of four
+                // cases all bytes keep the old value.
                 let is_as_before = noise.below(4) == 0;
                 for byte in bytes.iter_mut().filter(|_| !is_as_before) {
                     *byte = match noise.below(2) {

@@ -1,11 +1,12 @@
 //! The device: acquisition of samples, table slots in flash, and the link to the host.
 //!
-//! All code here is generic over embedded-hal, embedded-io and embedded-storage. A board is one folder in `src/bin`.
+//! A board is one folder in `src/bin`. All other code accesses hardware through embedded-hal, embedded-io and
+//! embedded-storage only.
 //!
 //! Main types:
 //! - [`Acquisition`](acquisition::Acquisition): blocks with time stamps from an
 //!   [`Accelerometer`](accelerometer::Accelerometer).
-//! - [`Storage`](storage::Storage): two slots for lobe tables that survive a loss of power at any moment.
+//! - [`Storage`](storage::Storage): two slots for lobe tables in flash.
 //! - [`Device`](device::Device): signal chain, storage and link together. Boards, emulator and the simulated device
 //!   of the host all use it.
 //!

@@ -11,15 +11,14 @@ use quietcut_core::acceleration::Block;
 use quietcut_core::tachometer::Edge;
 use serde::{Deserialize, Serialize};
 
-/// Largest length of a framed stimulus in bytes: 64 samples of three axes at 3 bytes each, the head of the block, and
-/// the frame.
+/// Upper bound of the length of a framed stimulus in bytes: 64 samples of three axes at 3 bytes each, the head of the
+/// block, and the frame.
 pub const MAX_FRAME_BYTES: usize = 640;
 
 /// Answer byte of the emulated board to a stimulus that it has processed.
 pub const TAKEN: u8 = 0x06;
 
-/// Answer byte of the emulated board to a stimulus that is too long, unreadable, exceeds the board's memory, or is
-/// one tachometer edge too many for a block.
+/// Answer byte of the emulated board to a stimulus that it has not processed, or only in part.
 pub const REFUSED: u8 = 0x15;
 
 /// Size in bytes of the emulated flash for lobe tables, at the start of the board's non-volatile memory.

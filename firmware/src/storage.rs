@@ -19,7 +19,7 @@
 //! many bytes are written. After a loss of power the upload continues after the last pages that the journal marks as
 //! written.
 //!
-//! No request erases more than one page, so that the time of a page erase bounds the time of every request.
+//! No request erases more than one page. This limits the time for which a request waits for the flash.
 
 mod contents;
 mod examination;

@@ -1,4 +1,4 @@
-//! Every threshold by which the command decides, each with the source of its number.
+//! Thresholds by which the command decides, each with the source of its number.
 //!
 //! A number without a derivation or a campaign behind it is marked "Unfounded". Sizes of pictures, bounds of options
 //! and waiting times decide nothing about a machine and stay beside the code that uses them.
@@ -6,12 +6,12 @@
 // Frequency response functions
 
 /// Largest relative error of the peak of a measured FRF from folding (aliasing of content above half the sample rate)
-/// up to which `frf` answers; it refuses the record above. The limiting depth is inversely proportional to the
-/// receptance, so that it then errs by ten per cent, more than is of use. Unfounded.
+/// up to which `frf` answers; above, `frf` refuses the recordings. The limiting depth is inversely proportional to the
+/// receptance, so that the depth errs by about ten per cent at this bound. Unfounded.
 pub(crate) const LARGEST_FOLDING: f64 = 0.1;
 
 /// Relative error of the peak of a measured FRF from folding (aliasing of content above half the sample rate) above
-/// which `frf` warns. Sensors of the usual class of 1 % err as much. The stated interval of the FRF contains the error
+/// which `frf` warns. Sensors of the usual class of 1 % err as much. The stated interval of the peak includes the error
 /// from folding, however small.
 pub(crate) const SMALL_FOLDING: f64 = 0.01;
 
@@ -42,7 +42,7 @@ pub(crate) const LARGEST_JOINT_MISFIT: f64 = 4.0;
 
 /// Largest prediction error of a nonlinear model that is fitted to higher-order FRFs: (factor, offset). The user is
 /// warned of a bias if the prediction error (NRMSE) of the steady responses exceeds factor × that of the
-/// harmonic-balance fit to the same responses + offset. Noise alone makes the two errors equal. Unfounded.
+/// harmonic-balance fit to the same responses + offset. Noise alone makes the two errors about equal. Unfounded.
 pub(crate) const BIASED_PREDICTION: (f64, f64) = (2.0, 1e-3);
 
 // Stability
@@ -58,8 +58,8 @@ pub(crate) const UNCHANGED_LIMIT: f64 = 1e-6;
 
 // Reports
 
-/// Relative change of the advised spindle speed up to which the advice counts as unchanged in the output of `replay`
-/// and `monitor`. The tooth-passing rule follows every small change of the estimated chatter frequency. Unfounded.
+/// Relative change of the advised spindle speed up to which the speed counts as unchanged in the output of `replay` and
+/// `monitor`. The tooth-passing rule follows every small change of the estimated chatter frequency. Unfounded.
 pub(crate) const SAME_SPEED: f64 = 0.01;
 
 /// Ratio of the largest to the smallest vibration amplitude in the recordings from which on the report of a diagnosis

@@ -1,9 +1,9 @@
 //! The library behind the `quietcut` command: command line, device client, demonstration and report pages.
 //!
-//! It re-exports the library crates of the workspace (recording, model, frf, simulate, stability, identify, diagnose).
-//! Its own modules are what no library crate knows: [`cli`] parses arguments and prints answers, [`report`] draws
-//! pictures and pages, [`device`] speaks with a monitor over a serial port, [`demo`] shows the monitor without a
-//! machine, [`machine`] keeps the folder of a machine that is set up.
+//! It re-exports library crates of the workspace: recording, frf, simulate, stability, identify, diagnose, and parts of
+//! model. Its own public modules: [`cli`] parses arguments and prints answers, [`report`] draws pictures and pages,
+//! [`device`] speaks with a monitor over a serial port, [`demo`] shows the monitor without a machine, [`machine`] reads
+//! the folder of a machine, writes the text of its case and proposes the next step.
 //!
 //! The stability limit of a case at one spindle speed:
 //!

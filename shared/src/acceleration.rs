@@ -92,7 +92,8 @@ pub struct SampleClockState {
     /// Number of lost samples since the sample clock was started or reset. A gap of unknown length counts with the lost
     /// samples that its following block states.
     lost: u32,
-    /// Number of gaps in the stream of samples since the sample clock was started or reset.
+    /// Number of gaps in the stream of samples, and of restarts of the fit without a gap, since the sample clock was
+    /// started or reset.
     gaps: u32,
 }
 
@@ -210,7 +211,8 @@ impl SampleClockState {
         self.lost
     }
 
-    /// Number of gaps in the stream of samples since the sample clock was started or reset.
+    /// Number of gaps in the stream of samples, and of restarts of the fit without a gap, since the sample clock was
+    /// started or reset.
     pub fn gaps(&self) -> u32 {
         self.gaps
     }

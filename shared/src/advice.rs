@@ -9,7 +9,8 @@
 //! 3. *Tooth-passing rule* ([`tooth_passing_speed`]): used if the table gives no advice: for example, without a
 //!    table, for a cut outside the table, or if the table contradicts the detected chatter.
 //!
-//! [`Advice::source`] names the source, [`Advice::obstacle`] the reason why no better source was used.
+//! [`Advice::source`] names the source, [`Advice::obstacle`] the reason why no better source was used or no
+//! speed is proposed.
 //!
 //! If no working point is set, advice assumes the first layer of the table and the smallest depth at which the table
 //! has chatter of the detected kind at the present speed, else of any kind. If the table is right, the real cut is at

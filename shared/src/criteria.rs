@@ -21,8 +21,8 @@ pub(crate) const SAMPLE_CLOCK_MEMORY_BLOCKS: f32 = 256.0;
 /// Unfounded.
 pub(crate) const STAMP_JITTER_NS: f32 = 10_000.0;
 
-/// Longest gap between two blocks, in samples, whose length is estimated from the sample clock. After a longer gap the
-/// stream of samples starts again. Unfounded.
+/// Longest gap between two blocks, in samples, over which the fit of the sample clock continues. After a longer gap it
+/// starts again. Unfounded.
 pub(crate) const LONGEST_COUNTED_GAP: f32 = 20_000.0;
 
 // Clock of numbered events.
@@ -35,7 +35,8 @@ pub(crate) const OUTLIER_DEVIATIONS: f32 = 4.0;
 /// Unfounded.
 pub(crate) const OUTLIERS_MAX: u8 = 4;
 
-/// Memory of the running variance estimate of the time stamps about their fitted line, in time stamps. Unfounded.
+/// Number of time stamps after which the gain of the running variance of the stamps about their fitted line no longer
+/// decreases. Unfounded.
 pub(crate) const VARIANCE_MEMORY: f32 = 96.0;
 
 /// Gain of the running mean of the deviations of time stamps. The standard deviation of this mean is √(0.25/1.75) =
@@ -170,7 +171,7 @@ pub(crate) const QUIET_SPEED_STEP: f32 = SPEED_BAND / 4.0;
 /// The largest lobe number k (whole vibrations per tooth period) of the tooth-passing rule.
 ///
 /// Pockets k and k + 1 differ in speed by the relative amount 1/k. Beyond k = 20 that is below 5 %, most of it
-/// unstable, so that no pocket is as wide as the ±1 % of [`SPEED_BAND`].
+/// unstable, so that a pocket is rarely as wide as the ±1 % of [`SPEED_BAND`].
 pub const MAX_LOBE: u16 = 20;
 
 // Thresholds for the validity of a layer of the lobe table.

@@ -3,7 +3,7 @@
 //! | band | flat | rate |
 //! |---|---|---|
 //! | tool | to 5 kHz | input rate halved as often as 5 kHz allows; slower inputs are not decimated |
-//! | structure | to 400 Hz | input rate halved to the smallest rate of at least 1 600 Hz |
+//! | structure | to 400 Hz | input rate halved to the smallest rate of at least 1 600 Hz; slower inputs are kept |
 //!
 //! Every stage is a symmetric half-band filter: y\[n\] = Σ h\[i\]·x\[2n − i\], i = 0 … 4m − 2, whose odd taps vanish
 //! except the middle one. The taps are a Kaiser-windowed sinc, computed at compile time. Aliases in the flat band are

@@ -2,7 +2,8 @@
 //!
 //! Samples of the accelerometer and positions of the tachometer wheel are such events: their rate is nearly constant,
 //! their numbers are exact, their time stamps have jitter. The model is `t(n) = a + b·n`. Recursive least squares
-//! with exponential forgetting estimates `a` and `b`: a stamp that is `memory` observations old has the weight 1/e.
+//! with exponential forgetting estimates `a` and `b`: a stamp that is `memory` observations old has a weight
+//! of about 1/e.
 
 use serde::{Deserialize, Serialize};
 
@@ -16,7 +17,7 @@ use crate::units::Nanoseconds;
 /// Settings of the estimator.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct EventClock {
-    /// Number of time stamps after which the weight of a stamp in the fit has decayed to 1/e. At least 2.
+    /// Number of time stamps after which the weight of a stamp in the fit has decayed to about 1/e. At least 2.
     pub memory: f32,
     /// Standard deviation of the initial estimate of the period between events, in units of the standard deviation of
     /// one time stamp.
@@ -42,8 +43,8 @@ pub struct EventClockState {
     /// Deviation of the preceding time stamp from its prediction in ns, scaled so that its standard deviation is that
     /// of one stamp.
     previous_ns: f32,
-    /// Running mean in ns of the scaled deviations of time stamps from their predictions. It differs from zero if the
-    /// rate of the events changes.
+    /// Running mean in ns of the deviations of time stamps from their predictions, each scaled like `previous_ns` and
+    /// bounded.
     bias_ns: f32,
     /// Number of consecutive outliers.
     outliers: u8,
@@ -161,8 +162,8 @@ impl EventClockState {
         } else {
             VARIANCE_MEMORY
         };
-        // After n time stamps the variance is updated with the gain 3/(n + 2), larger than the 1/n of a mean, so that
-        // its initial estimate decays quickly.
+        // After n time stamps, counted up to `VARIANCE_MEMORY`, the variance is updated with the gain 3/(n + 2), larger
+        // than the 1/n of a mean, so that its initial estimate decays quickly.
         self.variance_ns2 += (0.5 * difference_ns * difference_ns - self.variance_ns2) * 3.0 / (memory + 2.0);
         if self.variance_ns2 < STAMP_RESOLUTION_NS * STAMP_RESOLUTION_NS {
             self.variance_ns2 = STAMP_RESOLUTION_NS * STAMP_RESOLUTION_NS;
@@ -205,7 +206,7 @@ impl EventClockState {
 
     /// Fitted time of the event that follows the newest one by `events`; fractions and negative values are allowed.
     ///
-    /// The rounding error is that of one `f32` product: 6e-8 of the distance.
+    /// The rounding error is that of one `f32` product, 6e-8 of the distance, and of rounding to 1 ns.
     pub fn time_at(&self, events: f32) -> Nanoseconds {
         Nanoseconds(offset_ns(self.time_ns, events * self.period_ns))
     }

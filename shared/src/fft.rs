@@ -152,7 +152,7 @@ fn radix4_pass<const Q: usize>(data: &mut [Complex], factors: &[[Complex; 3]; Q]
     }
 }
 
-/// Splits a block of 4·Q values of the transform into its four quarters.
+/// Splits a block of 4·Q values of the transform into its four quarters; `None` if the block has fewer values.
 #[inline(always)]
 fn quarters<const Q: usize>(block: &mut [Complex]) -> Option<[&mut [Complex; Q]; 4]> {
     let (first, rest) = block.split_first_chunk_mut()?;
@@ -270,7 +270,8 @@ const fn q31(value: f64) -> i32 {
     (if scaled < 0.0 { scaled - 0.5 } else { scaled + 0.5 }) as i32
 }
 
-/// Twiddle factors exp(−2πi·j·r/4Q) of a radix-4 pass for j = 0 … Q − 1 and r = 1, 2, 3.
+/// Twiddle factors exp(−iφ) of a radix-4 pass, stored as \[cos φ, sin φ\]: φ = 2π·j·r/4Q for j = 0 … Q − 1 and
+/// r = 1, 2, 3.
 const fn pass_factors<const Q: usize>() -> [[Complex; 3]; Q] {
     let mut table = [[[0; 2]; 3]; Q];
     let mut j = 0;
@@ -286,8 +287,8 @@ const fn pass_factors<const Q: usize>() -> [[Complex; 3]; Q] {
     table
 }
 
-/// Twiddle factors exp(−2πi·k/N) for k = 1 … N/4 − 1 = COUNT, with which the transform of packed values is split into
-/// that of N real values.
+/// Twiddle factors exp(−iφ), stored as \[cos φ, sin φ\], with which the transform of packed values is split into that
+/// of N real values: φ = 2π·k/N for k = 1 … N/4 − 1 = COUNT.
 const fn split_factors<const COUNT: usize>() -> [Complex; COUNT] {
     let mut table = [[0; 2]; COUNT];
     let mut k = 0;

@@ -1,7 +1,7 @@
 //! The lobe table: stability lobes of one machine and tool.
 //!
-//! A table holds, for layers of feed per tooth, immersion and posture and for a grid of spindle speeds, the
-//! depth intervals that are *not* stable. It is a `.qct` file on the host and the same bytes in the device's flash;
+//! A table holds, for layers of feed per tooth, feed direction, immersion and posture and for a grid of spindle speeds,
+//! the depth intervals that are *not* stable. It is a `.qct` file on the host and the same bytes in the device's flash;
 //! [`LobeTable`] reads these bytes in place, without a copy.
 //!
 //! ```text
@@ -13,13 +13,14 @@
 //! ```
 //!
 //! Lookup between the entries:
-//! - *Speed*: the two neighbouring columns are combined. If they have the same sequence of overlapping intervals of the
-//!   same kinds, interval ends and chatter frequencies are interpolated linearly. If they differ (an island begins, the
-//!   kind changes), a depth is unstable if it is unstable in either column.
+//! - *Speed*: the two neighbouring columns are combined, each group of overlapping or touching intervals by itself. If
+//!   the group has the same sequence of kinds in both columns and the intervals overlap pairwise, interval ends and
+//!   chatter frequencies are interpolated linearly. Otherwise (an island begins, the kind changes) a depth is unstable
+//!   if it is unstable in either column.
 //! - *Feed per tooth*: the same rule between the two neighbouring layers. A layer may be valid for a range of feeds.
 //! - *Feed direction*: layers may be valid for one direction only. Between two such directions the same rule applies,
 //!   if they are at most [`FEED_DIRECTION_SPAN`] apart and the feed needs no interpolation. If no direction is set
-//!   and all layers have the same one, that direction is assumed.
+//!   and all layers of the immersion and posture that have a direction have the same one, this direction is assumed.
 //! - *Immersion and posture*: never interpolated. Immersion angles may differ by [`IMMERSION_TOLERANCE`]; the posture
 //!   must be equal.
 //! - *Outside the table*: the result is [`TabulatedStability::NotKnown`] with the reason; nothing is extrapolated.

@@ -70,8 +70,8 @@ impl PowerSpectrum<'_> {
     /// Frequency (in bins) and mean square of a tone of the spectrum whose highest bin is `k`.
     ///
     /// With the amplitudes a, b, c of the bins below, at and above, the Hann window gives the offset δ = 2(c − a)/(a +
-    /// 2b + c) from the middle bin and the amplitude (a + 2b + c)·(1 − δ²)(4 − δ²)/12·πδ/sin πδ, both exact for a
-    /// single tone (Agrež, IEEE Trans. Instrum. Meas. 51, 2002). Noise 20 dB below the peak in its bin gives δ an error
+    /// 2b + c) from the middle bin and the amplitude (a + 2b + c)·(1 − δ²)(4 − δ²)/12·πδ/sin πδ, both for a single
+    /// tone (Agrež, IEEE Trans. Instrum. Meas. 51, 2002). Noise 20 dB below the peak in its bin gives δ an error
     /// of 0.065 rms.
     fn interpolate(&self, k: usize) -> (f32, f32) {
         let [below, middle, above] = [k.wrapping_sub(1), k, k + 1].map(|i| math::sqrt(self.at(i)));
@@ -90,9 +90,10 @@ impl PowerSpectrum<'_> {
         (k as f32 + offset, root * root)
     }
 
-    /// Noise floor of the spectrum at bin `k`: the median power of the bins around the peak there.
+    /// Noise floor of the spectrum at bin `k`: the median power of the bins around the peak there; 0 if there are
+    /// none.
     ///
-    /// Other tones do not change it while they cover less than half of these bins.
+    /// Other tones change it little while they cover much less than half of these bins.
     pub fn noise_floor(&self, k: usize) -> f32 {
         let mut around = [0u32; 2 * FLOOR_HALF_WIDTH];
         let below = k.saturating_sub(FLOOR_HALF_WIDTH)..k.saturating_sub(LOBE_HALF_WIDTH);
@@ -121,7 +122,8 @@ impl PowerSpectrum<'_> {
         }
     }
 
-    /// Bins of the local maxima of the spectrum between two frequencies, strongest first, at most [`MAXIMA_SEARCHED`].
+    /// Bins of the local maxima of the spectrum between two frequencies, or in the next bin outside, strongest first,
+    /// at most [`MAXIMA_SEARCHED`].
     fn maxima(&self, from: Hertz, to: Hertz) -> Vec<usize, MAXIMA_SEARCHED> {
         let mut found: Vec<usize, MAXIMA_SEARCHED> = Vec::new();
         // The rounded mean of the samples was subtracted; its rounding error remains in bins 0 and 1, so these are
@@ -147,16 +149,16 @@ impl PowerSpectrum<'_> {
         found
     }
 
-    /// Sum of the powers of the five bins around a frequency divided by [`HANN_NOISE_BINS`], in (m/s²)². It equals
-    /// the mean square of a tone at this frequency, if no other tone is within the main lobe of the window.
+    /// Sum of the powers of the five bins around a frequency divided by [`HANN_NOISE_BINS`], in (m/s²)². It is
+    /// about the mean square of a tone at this frequency, if no other tone is within the main lobe of the window.
     pub fn mean_square_near(&self, frequency: Hertz) -> f32 {
         let centre = math::round(frequency.0 / self.bin.0).max(0.0) as usize;
         let lobe = centre.saturating_sub(2)..=centre + 2;
         lobe.map(|k| self.at(k)).sum::<f32>() / HANN_NOISE_BINS
     }
 
-    /// The strongest tone of the spectrum between two frequencies, if its power exceeds the noise floor by the factor
-    /// [`MIN_SNR`].
+    /// The strongest tone of the spectrum between two frequencies, if its power is at least [`MIN_SNR`] times the noise
+    /// floor.
     pub fn dominant(&self, from: Hertz, to: Hertz) -> Option<Peak> {
         let strongest = *self.maxima(from, to).first()?;
         Some(self.peak(strongest)).filter(|peak| peak.snr >= MIN_SNR)
@@ -204,7 +206,7 @@ impl PowerSpectrum<'_> {
         Search::Nothing { resolved_to }
     }
 
-    /// True if the Hann side lobes of the stronger maxima in the spectrum amount to at least half of the amplitude in
+    /// True if the leakage of the stronger maxima through the Hann window amounts to at least half of the amplitude in
     /// bin `k`.
     fn is_side_lobe(&self, k: usize, stronger: &[usize]) -> bool {
         let leaked: f32 = stronger

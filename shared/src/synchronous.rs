@@ -65,7 +65,7 @@ pub struct SamplerState {
     filled: u8,
     /// Number of the next slot (fixed spindle angle) to fill, counted from angle 0; `None` before the first.
     next_slot: Option<u64>,
-    /// Number of consecutive slots (fixed spindle angles) filled without a gap.
+    /// Number of consecutive slots (fixed spindle angles) filled without a gap, up to [`SLOTS`] + 1.
     unbroken: u8,
     /// Integral of the signal over time since the angle of the last filled slot, in m/s² times sample periods.
     integral: [f32; 3],
@@ -164,8 +164,9 @@ impl Sampler {
         passed
     }
 
-    /// Fills the slot whose spindle angle lies between the second and third of the last four samples, at the fraction
-    /// `part` of their distance. The integral already covers the distance up to the fraction `done`.
+    /// Handles the angle of a slot, which lies between the second and third of the last four samples, at the fraction
+    /// `part` of their distance: fills this slot, with [`Method::Mean`] the one before. Returns the tooth period that
+    /// is complete then. The integral already covers the distance up to the fraction `done`.
     fn fill(&self, state: &mut SamplerState, slot: u64, done: f32, part: f32) -> Option<Passed> {
         let value = match self.method {
             Method::Mean => {

@@ -106,7 +106,7 @@ impl<S: SpiDevice, D: DelayNs> Iis3dwb<S, D> {
         }
     }
 
-    /// Temperature of the sensor in degrees Celsius, 1/256 °C per count around 25 °C.
+    /// Temperature of the sensor in degrees Celsius, in steps of 1/256 °C.
     pub fn temperature_celsius(&mut self) -> Result<f32, Error<S::Error>> {
         let mut bytes = [0; 2];
         self.read_registers(register::OUT_TEMP_L, &mut bytes)?;
@@ -122,7 +122,7 @@ impl<S: SpiDevice, D: DelayNs> Iis3dwb<S, D> {
         }
     }
 
-    /// Resets all registers of the sensor to their default values.
+    /// Resets the registers of the sensor to their default values.
     fn reset(&mut self) -> Result<(), Error<S::Error>> {
         self.write_register(register::CTRL3_C, bits::IF_INC | bits::SW_RESET)?;
         for _ in 0..RESET_POLLS {

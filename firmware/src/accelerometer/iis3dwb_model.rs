@@ -30,7 +30,7 @@ pub(crate) const UNSETTLED: Counts = [i16::MAX; 3];
 pub(crate) struct Model {
     /// Time since power-on.
     pub(crate) now_ns: u64,
-    /// True sample period of the modelled sensor, which differs from the nominal one by up to a few percent.
+    /// True sample period of the modelled sensor, which may differ from the nominal one.
     pub(crate) period_ns: f64,
     registers: [u8; 128],
     queue: VecDeque<[u8; 7]>,
@@ -41,7 +41,7 @@ pub(crate) struct Model {
     on_since_ns: Option<u64>,
     /// Number of samples taken since the model last started to sample.
     taken: u64,
-    /// Times at which pin INT1 of the modelled sensor rose.
+    /// Times at which pin INT1 of the modelled sensor rose, oldest first.
     pub(crate) rises_ns: Vec<u64>,
     line: bool,
     /// Times of all settled samples that went to the modelled queue. The counts x, y, z of such a sample encode its
@@ -86,7 +86,7 @@ impl Model {
     }
 
     /// The counts x, y, z of the settled sample with this index: `index` modulo 30 000, the negative of that, and
-    /// `index` divided by 30 000.
+    /// the whole part of `index` / 30 000.
     pub(crate) fn counts(index: u64) -> Counts {
         let low = (index % 30_000) as i16;
         [low, -low, (index / 30_000) as i16]
@@ -105,8 +105,8 @@ impl Model {
         self.registers[usize::from(address)]
     }
 
-    /// Sets a fault of the modelled sensor. Resets its registers and empties its queue, which also stops the
-    /// sampling.
+    /// Sets a fault of the modelled sensor. Resets the sensor's registers, which stops the sampling, and empties the
+    /// sensor's queue.
     pub(crate) fn break_with(&mut self, fault: Fault) {
         self.fault = fault;
         self.set_defaults();

@@ -36,10 +36,10 @@ pub trait Accelerometer {
 pub struct Queue {
     /// Level of the sensor's queue at the beginning of the read, in samples.
     pub level: u16,
-    /// True if the sensor's queue has overflowed since the preceding read, so that samples are lost.
+    /// True if the sensor's queue has overflowed since the beginning of the preceding read, so that samples are lost.
     pub overrun: bool,
-    /// Number of samples missing between the preceding read and this one; `None` if the sensor does not number its
-    /// samples, at the first read after a start, and if this read gives no sample.
+    /// Number of samples missing between the sample read last and the first of this read; `None` if the sensor does not
+    /// number its samples, if no sample was read before since the start, and if this read gives no sample.
     pub gap: Option<Gap>,
 }
 

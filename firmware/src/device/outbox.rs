@@ -17,8 +17,7 @@ pub(super) struct Outbox {
     report: Option<Report>,
     strobes: Option<Strobes>,
     spectra: [Option<Spectrum>; BANDS.len()],
-    /// The reply to the request that is being answered, with the sequence number of the request; `None` once it is
-    /// sent.
+    /// The reply that waits to be sent, with the sequence number of its request; `None` if no reply waits.
     reply: Option<(u16, Reply)>,
     /// True if the reply follows all messages that the request caused, false if it precedes them.
     is_reply_last: bool,
@@ -40,12 +39,12 @@ struct Spectrum {
 }
 
 impl Outbox {
-    /// Number of messages to the host that were dropped because the line is too slow.
+    /// Number of reports, sets of stroboscopic points and spectra that were dropped before they were completely sent.
     pub(super) fn dropped(&self) -> u32 {
         self.dropped
     }
 
-    /// True while a reply waits to be sent. The next request is not received until then.
+    /// True while a reply waits to be sent. Until it is sent, no further request is received.
     pub(super) fn has_reply(&self) -> bool {
         self.reply.is_some()
     }
@@ -131,7 +130,8 @@ impl Outbox {
         Some((request, reply))
     }
 
-    /// The next spectrum to send: its band, the field that stores its progress for the next call, and its progress.
+    /// The next spectrum to send: its band, the field that stores its progress for the next call, and its progress,
+    /// which is taken from the field. `None` if no spectrum waits.
     fn next_spectrum(&mut self) -> Option<(Band, &mut Option<Spectrum>, Spectrum)> {
         BANDS.into_iter().zip(&mut self.spectra).find_map(|(band, slot)| {
             let spectrum = slot.take()?;

@@ -24,7 +24,8 @@ impl<M: TableMemory> Storage<M> {
         LobeTable::reopen(table)?.check_entries()
     }
 
-    /// Records the content of a table slot. `check` decides whether its bytes are a valid table.
+    /// Records the content of a table slot. The table is valid if its header is readable, its length fits into the
+    /// slot, and `check` accepts its bytes.
     pub(super) fn record_contents(
         &mut self,
         slot: usize,

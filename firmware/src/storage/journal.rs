@@ -11,8 +11,8 @@
 //! | 64 | U each | marks: mark k is written after section k of the slot |
 //!
 //! A section is one page, or several pages if the marks of single pages would not fit. A mark of U bytes, one or more
-//! flash words, holds the CRC-32 of the file's header and the number k, so that random bytes are no valid mark. The
-//! highest valid mark counts, even if lower marks are damaged.
+//! flash words, holds the CRC-32 of the file's header and the number k, so that random bytes are hardly ever a valid
+//! mark. The highest valid mark counts, even if lower marks are damaged.
 
 use core::marker::PhantomData;
 
@@ -99,8 +99,8 @@ impl<M: NorFlash> Journal<M> {
         (self.start + self.offset_of(number), bytes)
     }
 
-    /// Header of the uploaded file, and number of its bytes (header included) up to the last valid progress mark,
-    /// from the journal; `None` if the journal has no valid record.
+    /// Header of the uploaded file, and number of its bytes up to the last valid progress mark (at least those of the
+    /// header), from the journal; `None` if the journal has no valid record.
     pub(super) fn read(&self, memory: &[u8]) -> Option<(Header, u32)> {
         let page = memory.get(self.start as usize..)?.get(..M::ERASE_SIZE)?;
         let record = page.get(..RECORD_LENGTH)?;

@@ -19,8 +19,8 @@ pub(super) struct Progress {
     pub(super) erased_to: u32,
     /// Received bytes of the table that do not yet fill a flash word.
     pub(super) tail: Vec<u8, MAX_WRITE_SIZE>,
-    /// The header of the uploaded table as it is written to the slot. It has the device's generation number; its CRC is
-    /// set at the end of the upload.
+    /// The header of the uploaded table as it is written to the slot. It has the device's generation number, but
+    /// not yet its own CRC.
     renewed: Header,
     /// Running CRC-32 of the received table with the header of the uploaded file. Computing it only at the end of the
     /// upload would delay the device.

@@ -27,7 +27,7 @@ impl<M: TableMemory> Storage<M> {
 
     /// Discards the upload into a slot by erasing its journal.
     ///
-    /// An error of the erase is ignored: the slot holds no valid table in any case.
+    /// An error of the erase is ignored; the upload may then be resumed at the next start.
     pub(super) fn discard(&mut self, slot: usize) {
         let journal = self.journal(slot).start();
         let _ = self.erase(journal, Self::PAGE);
@@ -77,7 +77,7 @@ impl<M: TableMemory> Storage<M> {
         while upload.erased_to < end {
             let erased = self.erase(start + upload.erased_to, Self::PAGE);
             if upload.erased_to == 0 {
-                // The first page of the slot held the header of the old table, which this erase has removed.
+                // The first page of the slot may have held the header of an old table, which this erase has removed.
                 self.examine(upload.slot);
             }
             erased?;
@@ -88,8 +88,8 @@ impl<M: TableMemory> Storage<M> {
 
     /// Marks the number of written bytes in the journal.
     ///
-    /// A loss of power may have left this mark partly written. It is then not written again, since the next mark also
-    /// covers these bytes.
+    /// A loss of power may have left this mark partly written. It is then not written again; a later mark also covers
+    /// these bytes.
     fn mark(&mut self, journal: &Journal<M>, upload: &Progress) -> Result<(), Refusal> {
         let (offset, mark) = journal.mark(&upload.header, upload.written());
         let range = offset as usize..offset as usize + mark.len();

@@ -74,8 +74,8 @@ impl<M: TableMemory> Storage<M> {
     /// same table is already there.
     ///
     /// # Errors
-    /// [`Refusal::Table`], [`Refusal::TableTooLong`] or [`Refusal::Flash`]: the header is invalid, the table too long,
-    /// or the flash memory fails.
+    /// [`Refusal::Table`]: the schema of the header is unknown, or the stated length leaves no byte after the header.
+    /// [`Refusal::TableTooLong`]: the table does not fit into the slot. [`Refusal::Flash`]: the flash memory fails.
     pub fn begin(&mut self, header: Header) -> Result<Upload, Refusal> {
         if !Header::knows(header.schema) {
             return Err(Refusal::Table(TableError::Schema {
@@ -117,8 +117,9 @@ impl<M: TableMemory> Storage<M> {
     /// Receives a chunk of the uploaded lobe table.
     ///
     /// # Errors
-    /// [`Refusal::NoUpload`], [`Refusal::ChunkOffset`]; [`Refusal::Flash`] ends the upload, and
-    /// [`begin`](Self::begin) then starts it again from the first byte of the table.
+    /// [`Refusal::NoUpload`]. [`Refusal::ChunkOffset`]: the chunk does not begin after the received bytes, or exceeds
+    /// the table. [`Refusal::Flash`] ends the upload, and [`begin`](Self::begin) then starts it again from the first
+    /// byte of the table.
     pub fn chunk(&mut self, offset: u32, data: &[u8]) -> Result<Upload, Refusal> {
         let upload = self.upload.take().ok_or(Refusal::NoUpload)?;
         let (expected, length) = (upload.received, upload.header.length);

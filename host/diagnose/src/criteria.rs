@@ -13,16 +13,16 @@ use std::ops::RangeInclusive;
 /// larger. Unfounded.
 pub(crate) const LEAST_WHITE_SHARE: f64 = 0.05;
 
-/// Least standard deviation assumed for the noise of a channel, as a share of the channel's root mean square: −90 dB,
-/// the level to which the integration of a simulation accumulates errors.
+/// Least standard deviation assumed for the noise of a channel, as a share of the channel's root mean square: about −90
+/// dB, the level to which the integration of a simulation accumulates errors.
 pub(crate) const LEAST_RELATIVE_NOISE: f64 = 3e-5;
 
 // Recorded cuts
 
 /// Largest relative difference between the mean spindle speed from the tachometer and that in the sidecar with which a
 /// recorded cut is accepted. A spindle without speed control may slip by up to 5 % at rated load (NEMA MG 1, induction
-/// motors of design A and B). Counting one pulse too many or too few per revolution changes the speed by more than
-/// that, if there are fewer than 20.
+/// motors of design A and B). Counting one pulse too many or too few per revolution changes the speed by more than 5 %
+/// if there are fewer than 20 pulses per revolution.
 pub(crate) const SPEED_MISMATCH: f64 = 0.05;
 
 /// Fewest tachometer edges, one per revolution, that determine the spindle angle within a fraction of a sample: two for
@@ -89,8 +89,8 @@ pub(crate) const FRICTION_RATIO: f64 = 0.15;
 /// a likely wrong unit. Unfounded.
 pub(crate) const GAIN_UNIT_TOLERANCE: f64 = 0.03;
 
-/// Least energy of a channel's predicted response over that of its response to force-sensor noise, above which its unit
-/// is checked: an amplitude ratio of 5, below which much of the prediction is noise.
+/// Least energy of a channel's predicted response over that of its response to force-sensor noise, above which the
+/// channel's unit is checked: an amplitude ratio of 5, below which much of the prediction is noise.
 pub(crate) const LEAST_ENERGY_OVER_FORCE_NOISE: f64 = 25.0;
 
 /// Smallest squared correlation of measured and predicted samples of a channel at which a wrong unit is reported, if
@@ -105,8 +105,8 @@ pub(crate) const LEAST_CORRELATION_OF_UNKNOWN_UNIT: f64 = 0.8;
 /// counts as moving: three standard deviations.
 pub(crate) const MOVING_OVER_NOISE: f64 = 3.0;
 
-/// Largest standard deviation of a force sensor's noise, as a share of the root mean square of the force. A force with
-/// a white spectrum hides its noise floor, and force sensors are better than this. Unfounded.
+/// Largest standard deviation that is assumed for a force sensor's noise, as a share of the root mean square of the
+/// force. A force with a white spectrum hides its noise floor, and force sensors are better than this. Unfounded.
 pub(crate) const LARGEST_FORCE_NOISE: f64 = 0.02;
 
 /// Standard deviation of the error of a cut's predicted samples, as a share of the root mean square of the channel. The
@@ -130,12 +130,12 @@ pub(crate) const ENGAGED_LEVEL: f64 = 0.8;
 /// `ENGAGED_LEVEL`: (1 − 0.2)/(0.8 − 0.2) = 4/3 for a level that grows linearly from `AIR_LEVEL`, with a margin of 5 %.
 pub(crate) const ENGAGEMENT_AFTER_LEVEL: f64 = 1.4;
 
-/// Factor on the time that the tool's entry takes by its geometry: at the first contact the vibration level is still
-/// below `AIR_LEVEL`, so that the entry is noticed late. Unfounded.
+/// Factor on the time that the tool takes by geometry to enter the workpiece and, in chatter, to leave it: at the first
+/// contact the vibration level is still below `AIR_LEVEL`, so that the entry is noticed late. Unfounded.
 pub(crate) const ENTRY_MARGIN: f64 = 1.1;
 
-/// Share of the time that the tool's exit takes by its geometry which has passed when the vibration level falls to
-/// `AIR_LEVEL`: the chips are thin at the end of the exit. Unfounded.
+/// Share of the time that the tool's exit takes by geometry which has passed, in a stable cut, when the vibration level
+/// falls to `AIR_LEVEL`: the chips are thin at the end of the exit. Unfounded.
 pub(crate) const EXIT_SHARE: f64 = 0.7;
 
 /// Median standard deviation of a channel over the revolutions of a recorded cut, as a multiple of that which the feed
@@ -231,8 +231,9 @@ pub(crate) const HOPELESS_LAG: f64 = 300.0;
 /// may leave; a search whose step leaves more is given up, since it will not catch up. Unfounded.
 pub(crate) const SLOW_CATCHING_UP: f64 = 0.6;
 
-/// Share of the present χ² that the linearized model may predict for the next step of a search that lags behind the
-/// best rival by more than `HOPELESS_LAG`; the search is given up if it predicts more. Unfounded.
+/// Share of the present χ² that the linearized model may predict for the next step of a search, if the prediction
+/// exceeds the χ² of the best rival by more than `HOPELESS_LAG`; the search is given up if a larger share is predicted.
+/// Unfounded.
 pub(crate) const HOPELESS_PREDICTED_SHARE: f64 = 0.5;
 
 /// Smallest decrease of χ² that the linear fit of the extended case must predict for a further prediction of the cuts:
@@ -253,7 +254,7 @@ pub(crate) const FAR_START: f64 = 2.0;
 pub(crate) const FAR_BEHIND: f64 = 4.0;
 
 /// χ² per compared value (1 for noise alone) above which a prediction-error search counts as stuck. A stuck search with
-/// friction is repeated only if its χ² is at most this factor times the χ² of the best rival. Unfounded.
+/// friction is restarted only if its χ² is below this factor times the χ² of the best rival. Unfounded.
 pub(crate) const STUCK: f64 = 1.1;
 
 /// Reduction of χ² by a candidate model, as a share of the reduction by the best one, above which its nonlinear
@@ -285,8 +286,8 @@ pub(crate) const EQUIVALENT: f64 = 16.0;
 /// records nearly as well: it may still be the simpler truth. Unfounded.
 pub(crate) const NEARLY_EXPLAINED: f64 = 1.5;
 
-/// χ² of a candidate model's regression along the measured motion, over the χ² of a rival that explains the records,
-/// above which the candidate model is not simulated. Unfounded.
+/// χ² of a candidate model's regression along the measured motion, over the χ² of a rival that explains the records (at
+/// least the number of compared values), above which the candidate model is not simulated. Unfounded.
 pub(crate) const REGRESSION_FAR_BEHIND: f64 = 6.0;
 
 /// The same ratio as `REGRESSION_FAR_BEHIND` for a candidate model with fewer parameters than the rival. It may be the

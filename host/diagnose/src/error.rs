@@ -12,7 +12,7 @@ pub enum DiagnoseError {
     /// The case file cannot be read or used; for example, an entry is missing or wrong.
     #[error(transparent)]
     Case(#[from] CaseError),
-    /// A recording cannot be read or lacks a required channel.
+    /// A recording cannot be read or used; for example, it lacks a required channel.
     #[error(transparent)]
     Recording(#[from] RecordingError),
     /// The case cannot be simulated.
@@ -28,7 +28,7 @@ pub enum DiagnoseError {
     Record {
         /// File of the recording.
         path: PathBuf,
-        /// The defect of the recording, and what is required instead.
+        /// The reason why the recording cannot be compared.
         what: String,
     },
     /// No recording is given.

@@ -75,7 +75,7 @@
 //! ```
 //!
 //! This crate reads no command line and prints nothing. It identifies no parameter of a case that has no recording
-//! beside it; that is for the crate `identify`.
+//! beside it; that is for the crate `quietcut-identify`.
 
 mod baseline;
 mod candidates;

@@ -16,7 +16,8 @@ use quietcut_model::structure::{Direction, Joint, Mode, Robot};
 pub struct Estimate {
     /// Key of the parameter in a case: `mass_kg`, `k3_n_per_m3` …
     pub key: &'static str,
-    /// Direction of the parameter; two directions for an off-diagonal entry of a matrix and for a coupling.
+    /// Direction of the parameter; two directions for an off-diagonal entry of a matrix and for a coupling, none for a
+    /// coefficient of the cutting force.
     pub directions: Vec<Direction>,
     /// Value, in the unit that ends the key.
     pub value: f64,
@@ -297,8 +298,8 @@ pub fn cutting(
     Ok(case)
 }
 
-/// Name of the extension of a case that contains the parameter `key`; `None` for a parameter of the structure's
-/// matrices, cubic ones included.
+/// Name of the extension of a case that contains the parameter `key`; `None` for every other key, such as those of the
+/// structure's matrices, cubic ones included.
 fn extension_of(key: &str) -> Option<&'static str> {
     let effect = match key {
         "k2_n_per_m2" => EffectName::QuadraticStiffness,

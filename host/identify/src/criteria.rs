@@ -188,7 +188,7 @@ pub(crate) const LEAST_REGION_POINTS: usize = 6;
 pub(crate) const JUMP_DEVIATIONS: f64 = 6.0;
 
 /// Difference between two neighbouring lines of the response amplitude X(F), at the force F where they meet, above
-/// which the response jumps; relative to X there. The curvature of a smooth response gives less between two windows.
+/// which the response jumps; relative to X there. The curvature of a smooth response gives less between two lines.
 /// Unfounded.
 pub(crate) const JUMP_SHARE: f64 = 0.05;
 

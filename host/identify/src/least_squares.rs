@@ -28,12 +28,13 @@ pub enum FitError {
         "the data do not determine all parameters; more force levels, or frequencies on both sides of the resonance, are needed"
     )]
     Undetermined,
-    /// The equation of motion has no periodic solution near the measured motion at some dwells.
+    /// At some dwells no motion was predicted: in general the equation of motion has no periodic solution near the
+    /// measured motion there.
     #[error(
         "the law has no periodic motion near the measured one at {failed} of {all} dwells; another law is needed, or steadier data"
     )]
     NoMotion {
-        /// Number of dwells at which the equation of motion has no periodic solution near the measured motion.
+        /// Number of dwells at which no motion was predicted.
         failed: usize,
         /// Number of all dwells.
         all: usize,
@@ -53,7 +54,7 @@ pub(super) struct Normal {
     /// Σ rᵀr.
     sum: f64,
     rows: usize,
-    /// Number of dwells at which the equation of motion has no periodic solution near the measured motion.
+    /// Number of dwells at which no motion was predicted.
     failed: usize,
     dwells: usize,
 }
@@ -115,7 +116,7 @@ impl Normal {
     /// Covariance of the parameters, and misfit of the fit to the dwells.
     ///
     /// # Errors
-    /// The equation of motion has no periodic solution at a dwell, or the dwells do not determine the parameters.
+    /// No motion was predicted at a dwell, or the dwells do not determine the parameters.
     pub(super) fn spread(&self) -> Result<Spread, FitError> {
         if self.failed > 0 {
             return Err(self.failure());
@@ -175,7 +176,7 @@ impl<F: Fn(&DVector<f64>) -> Normal> Objective for DwellFit<F> {
         length < LAST_STEP && next.failed == now.failed
     }
 
-    /// A periodic solution that is missing at a few dwells may appear once the parameters are better; if it is missing
+    /// A predicted motion that is missing at a few dwells may appear once the parameters are better; if it is missing
     /// at more than half of the dwells, the fit is given up.
     fn gives_up(&self, _: usize, value: &Normal, _: Option<&Normal>) -> bool {
         value.failed * 2 > value.dwells
@@ -205,8 +206,7 @@ pub(super) fn minimum(
 /// need not converge.
 ///
 /// # Errors
-/// The dwells do not determine the parameters, or at more than half of them the equation of motion has no periodic
-/// solution.
+/// The dwells do not determine the parameters, or no motion was predicted at more than half of them.
 pub(super) fn nearer(
     start: DVector<f64>,
     damping: f64,

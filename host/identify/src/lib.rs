@@ -8,7 +8,7 @@
 //! | [`cutting`] | force coefficients, runout; modes from stability limits | cuts with measured force; trial cuts |
 //! | [`robot`] | joint stiffness, damping and cubic terms, payload | receptances or dwells at several postures |
 //! | [`ambient`] | modes from responses alone (stochastic subspace) | idle spindle, background vibration |
-//! | [`plan`] | none: the fewest tests that narrow the limits of a lobe chart | |
+//! | [`plan`] | none: a cheap set of tests that narrows the limits of a lobe chart | |
 //!
 //! [`case_file`] writes what was identified as a case file.
 //!

@@ -15,12 +15,13 @@ use super::{Channel, Quantity, Recording, RecordingError, Sidecar};
 pub struct Imported {
     /// The recording.
     pub recording: Recording,
-    /// Report of how the file was understood: channels, sample rate, notes and warnings.
+    /// Report of how the file was understood.
     pub understood: Understood,
 }
 
 /// Builds a recording from the columns of one record of a file: applies names, units and sensitivities, and determines
-/// the sample rate. `known` are the column names of all records of the file; sidecar and map may name only these.
+/// the sample rate. `known` are the column names of all records of the file; a column that sidecar or map names must be
+/// among them.
 pub(super) fn recording(
     path: &Path,
     raw: Raw,
@@ -153,8 +154,8 @@ pub(super) fn recording(
     })
 }
 
-/// Refuses a file that gives no names for its columns, unless the option `--map` or the sidecar names at least one of
-/// them.
+/// Error unless the option `--map` or the sidecar names at least one of the columns, whose names in the file say
+/// nothing.
 fn require_names(path: &Path, raw: &Raw, sidecar: &Sidecar, import: &Import) -> Result<(), RecordingError> {
     let names: Vec<String> = raw.columns.iter().map(|column| column.name.clone()).collect();
     let is_named = |index: usize| {

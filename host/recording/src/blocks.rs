@@ -10,8 +10,8 @@ use quietcut_core::working_point::{Tool, WorkingPoint};
 use super::criteria::LEAST_SWING;
 use super::{Channel, Quantity, Recording, RecordingError};
 
-/// Acceleration per count, m/s², of the IIS3DWB accelerometer in its ranges ±2, ±4, ±8 and ±16 g (sensitivities of its
-/// data sheet, mg/LSB).
+/// Acceleration per count, m/s², of the IIS3DWB accelerometer in its ranges ±2, ±4, ±8 and ±16 g, in this order
+/// (sensitivities of its data sheet, mg/LSB).
 const COUNT: [f64; 4] = [
     0.061e-3 * 9.806_65,
     0.122e-3 * 9.806_65,
@@ -19,7 +19,8 @@ const COUNT: [f64; 4] = [
     0.488e-3 * 9.806_65,
 ];
 
-/// Largest count that a converted sample takes: one below 32 767, so that the largest sample is not counted as clipped.
+/// Largest absolute count that a converted sample takes: one below 32 767, so that the largest sample is not counted as
+/// clipped.
 const FULL_SCALE: f64 = 32_766.0;
 
 /// Input of the monitor as the device would have acquired it during the recording.
@@ -31,7 +32,7 @@ pub struct Sensed {
     pub working_point: Option<WorkingPoint>,
     /// Blocks of accelerometer counts, in order of time.
     pub blocks: Vec<Block>,
-    /// Rising tachometer edges, in order; empty without a tachometer, or if the user gives the spindle speed.
+    /// Rising tachometer edges, in order of time; empty without a tachometer, or if the user gives the spindle speed.
     pub edges: Vec<Edge>,
     /// False if a channel used as acceleration is recorded in another unit, such as volts, or in an unknown one;
     /// amplitudes are then relative, not in m/s².
@@ -42,8 +43,9 @@ pub struct Sensed {
 #[derive(Clone, Copy, Debug, Default)]
 pub struct SpindleSettings {
     /// Spindle speed that the user gives, rev/min; it replaces a recorded tachometer, whose edges are then ignored.
+    /// `None` if the user gives none.
     pub rpm: Option<f64>,
-    /// Number of teeth that the user gives; it overrides that of the sidecar.
+    /// Number of teeth that the user gives; it overrides that of the sidecar. `None` if the user gives none.
     pub teeth: Option<u8>,
 }
 
@@ -228,7 +230,7 @@ fn blocks(axes: &[Option<&Channel>; 3], count: f64, rate: f64) -> Vec<Block> {
     let sample = |index: usize| -> Counts {
         axes.map(|channel| {
             let value = channel.map_or(0.0, |channel| channel.samples[index]);
-            // The cast to 16 bits saturates at ±full scale, as the sensor does.
+            // The cast to 16 bits saturates at −32 768 and 32 767, as the sensor does.
             (value / count).round() as i16
         })
     };

@@ -4,15 +4,16 @@
 use super::unit::Quantity;
 
 /// Largest deviation of a time stamp from even sampling, in sample intervals. It allows for stamps printed with few
-/// digits, and detects a missing sample (deviation 1). The value between the two is unfounded.
+/// digits, and detects a missing sample (deviation of about 0.5 or more in a long record). The value between the two is
+/// unfounded.
 pub(crate) const UNEVEN: f64 = 0.25;
 
 /// Tolerance when a start or end time selects a sample, in sample intervals. It absorbs the rounding of printed times.
 /// The value lies far below one interval; it is unfounded.
 pub(crate) const SAME_SAMPLE: f64 = 1e-3;
 
-/// Smallest change of the tachometer level that counts as an edge, as a fraction of its range over the recording. It
-/// lies above the noise of usual sensors. Unfounded.
+/// Smallest change of the tachometer level that counts as an edge, as a fraction of the range of the level over the
+/// recording. It lies above the noise of usual sensors. Unfounded.
 pub(crate) const LEAST_SWING: f64 = 0.02;
 
 /// Least number of equal samples in a row at the largest or smallest value of a channel that counts as clipping. Two

@@ -1,9 +1,9 @@
 //! Reader of text tables: a row of names, then rows of numbers. [`super::text_head`] finds separator, decimal mark and
 //! names.
 //!
-//! Files of hundreds of megabytes are read in chunks, without the whole text in memory. Lines that start with `#`, `%`
-//! or `//` are comments. Empty lines are skipped. Numbers may be quoted. Columns without any value are left out, as
-//! are, in a table of several columns, unnamed ones that count the rows.
+//! The file is read in chunks, so that its whole text is never in memory. Lines that start with `#`, `%` or `//` are
+//! comments. Empty lines are skipped. Numbers may be quoted. Columns without any value are left out, as are, in a table
+//! of several columns, unnamed ones that count the rows.
 
 use std::fs::File;
 use std::io::Read;
@@ -48,8 +48,8 @@ pub(super) fn read(path: &Path, finite: bool) -> Result<Raw, RecordingError> {
     Ok(raw)
 }
 
-/// Names of the columns of a text table, with their units in brackets, from the head of the file alone; empty if it has
-/// no row of names or cannot be understood.
+/// Names of the columns of a text table, with their units in brackets, from the head of the file alone; empty if there
+/// is no row of names or the head cannot be understood.
 pub(super) fn titles(path: &Path) -> Result<Vec<String>, RecordingError> {
     let unreadable = |cause| FileError::Read {
         path: path.into(),
@@ -142,12 +142,12 @@ struct Table<'a> {
     /// Number of lines of the text table that are read so far, those of the head included.
     line: u64,
     columns: Vec<RawColumn>,
-    /// Empty fields of each column.
+    /// Empty fields of each column, in the order of `columns`.
     gaps: Vec<Gaps>,
     dialect: Dialect,
     /// Length of the whole file of the text table, bytes.
     bytes: u64,
-    /// True if a NaN or infinite value in the text table is an error.
+    /// True if a NaN or infinite value, or an empty field in a column with values, is an error.
     finite: bool,
 }
 
@@ -155,7 +155,7 @@ struct Table<'a> {
 #[derive(Clone, Copy, Default)]
 struct Gaps {
     count: usize,
-    /// Number of the line with the first empty field of a column, from 1.
+    /// Number of the line with the first empty field of a column, from 1; 0 without empty fields.
     line: u64,
 }
 
@@ -286,8 +286,8 @@ impl<'a> Table<'a> {
         Ok(())
     }
 
-    /// Reserves memory for the samples of the whole file, estimated from the length of the first row, `line` bytes.
-    /// Growth by doubling could take twice the memory.
+    /// After the first row, of `line` bytes, reserves memory for the samples of the whole file; after other rows does
+    /// nothing. Growth by doubling could take twice the memory.
     fn make_room_after_first(&mut self, line: usize) {
         if self
             .columns

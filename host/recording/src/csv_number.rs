@@ -10,8 +10,8 @@ pub(super) enum End {
 }
 
 /// Parses the number at the start of `text`, CSV text from the start of a field on, with optional blanks and quotes.
-/// Returns its value, the number of bytes up to and including the separator, and the separator; `None` if the field is
-/// no number.
+/// Returns its value, the number of bytes up to and including the separator, and the separator; `None` if there is no
+/// number, or anything but a separator after it.
 #[inline]
 pub(super) fn number(text: &[u8]) -> Option<(f64, usize, End)> {
     // Fast path: most numbers have no blanks or quotes around them.

@@ -5,7 +5,7 @@ use std::path::Path;
 use super::{Quantity, Recording, RecordingError};
 use crate::file::Prepared;
 
-/// Number of significant digits of written samples: nine digits represent every 32-bit float exactly.
+/// Number of significant digits of written samples: nine suffice to get every 32-bit float back by rounding to 32 bits.
 const DIGITS: usize = 9;
 
 /// Writes a recording to a temporary CSV file, not yet under its final name: time in seconds, then one column per

@@ -1,8 +1,8 @@
 //! Tables of trial cuts: CSV with spindle speed, axial depth, outcome, and the chatter frequency of cuts where it was
 //! measured.
 //!
-//! Two heads mean the same: `rpm [rev/min],depth [mm],outcome` and `rpm,depth_mm,chatter_hz,verdict`. Columns may stand
-//! in any order and mix both heads. Lines that start with `#` are remarks.
+//! Two heads are usual: `rpm [rev/min],depth [mm],outcome` and `rpm,depth_mm,chatter_hz,verdict`. Columns may stand in
+//! any order and mix both heads. Lines that start with `#` are remarks.
 
 use std::path::{Path, PathBuf};
 
@@ -51,9 +51,9 @@ pub enum CutTableError {
     Line {
         /// The file.
         path: PathBuf,
-        /// The line, from 1.
+        /// Number of the first wrong line, from 1.
         line: u64,
-        /// The faulty text in the line of the table of cuts, and the form that is needed.
+        /// Fault in this line; if several rows are wrong, also the faults in the next ones, up to five in all.
         what: String,
     },
 }
@@ -77,14 +77,15 @@ const TITLES: [[&str; 2]; 4] = [
     ["chatter [Hz]", "chatter_hz"],
 ];
 
-/// Number of wrong rows that a message names. A choice: more fill a terminal.
+/// Largest number of wrong rows that a message names. A choice: more fill a terminal.
 const FAULTS_NAMED: usize = 5;
 
 /// Reads a table of trial cuts; a table without rows gives an empty list.
 ///
 /// # Errors
 /// The file cannot be read, lacks the column of speed, depth or outcome, has a column twice or an unknown one; a row
-/// has more or fewer values than there are columns; or a speed, depth, frequency or outcome is not possible.
+/// has more or fewer values than there are columns; a speed, depth or frequency is no positive finite number; or an
+/// outcome is an unknown word.
 pub fn read(path: &Path) -> Result<Vec<TrialCut>, CutTableError> {
     parse(path, &read_text(path)?)
 }
@@ -112,7 +113,7 @@ pub fn parse(path: &Path, text: &str) -> Result<Vec<TrialCut>, CutTableError> {
         .clone();
     let places = Places::new(&head).map_err(|what| wrong(line_of(&head), what))?;
     let mut cuts = Vec::new();
-    // Every wrong row is named at once: a user mends all of them in one go.
+    // All wrong rows are collected for one message: a user mends them in one go.
     let mut faults: Vec<(u64, String)> = Vec::new();
     for row in reader.into_records() {
         let row =

@@ -9,7 +9,7 @@ use crate::file::FileError;
 /// Error of reading, writing or using a recording; every message names the file.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordingError {
-    /// The file does not exist, or cannot be read or written.
+    /// A file cannot be read or written, or is not UTF-8 text.
     #[error(transparent)]
     File(#[from] FileError),
     /// The file extension belongs to no format that can be read.
@@ -28,20 +28,20 @@ pub enum RecordingError {
         /// The ending.
         found: String,
     },
-    /// The content of the recorded file is malformed or contradictory.
+    /// A fault of the recorded file, of its sidecar or of the options about it that no other variant names.
     #[error("{}: {what}", path.display())]
     Content {
         /// The file.
         path: PathBuf,
-        /// Fault in the content of the file, its location, and the expected content.
+        /// Fault, and in most cases the expected content.
         what: String,
     },
-    /// One line of a text file is malformed.
+    /// A fault of the file or its sidecar that belongs to one line.
     #[error("{}, line {line}: {what}", path.display())]
     Line {
         /// The file.
         path: PathBuf,
-        /// Number of the malformed line, from 1.
+        /// Number of this line, from 1.
         line: u64,
         /// Fault and the expected content.
         what: String,
@@ -56,7 +56,8 @@ pub enum RecordingError {
         /// The unknown unit.
         cause: UnknownUnit,
     },
-    /// The unit of a channel measures another quantity than the name of the channel requires.
+    /// The unit of a channel measures another quantity than the name of the channel, or the words in the head of its
+    /// column, require.
     #[error(
         "{}, column \"{column}\": {found} ({}), but a channel of this name is {expected}; correct the head, or --map \"{column}=NAME:UNIT\" \
          with the name and unit that hold",
@@ -66,11 +67,11 @@ pub enum RecordingError {
     Quantity {
         /// The file.
         path: PathBuf,
-        /// The header of the column.
+        /// Name of the channel or of its column.
         column: String,
         /// Quantity of the stated unit.
         found: Quantity,
-        /// Quantity that a channel of this name must measure.
+        /// Quantity that the name or the words require.
         expected: Quantity,
     },
     /// A sample of a channel is NaN or infinite.
@@ -95,7 +96,8 @@ pub enum RecordingError {
         /// Time of the last NaN or infinite sample of the channel, s.
         last_s: f64,
     },
-    /// The meaning of columns is in doubt: their direction, unit or sensitivity is not stated.
+    /// The meaning of columns is in doubt: their direction, sign, unit or sensitivity is not stated, or several are the
+    /// same channel.
     #[error("{}: {}", path.display(), doubts_text(doubts, *lacks_rate, sidecar))]
     Doubt {
         /// The file.
@@ -129,8 +131,8 @@ pub enum RecordingError {
     },
 }
 
-/// Message for a channel or setting that a recording lacks, with the channels that it has; if the unit of one of them
-/// is unknown, as in `fx [unknown]`, also the option `--map` that would state it.
+/// Message for a channel or setting that a recording lacks, with the channels that it has; if the unit of one with a
+/// standard name is unknown, as in `fx [unknown]`, also the option `--map` that would state it.
 fn no_channel(needed: &str, found: &[String]) -> String {
     let names: Vec<&str> = found
         .iter()
@@ -146,7 +148,7 @@ fn no_channel(needed: &str, found: &[String]) -> String {
     }
 }
 
-/// Message for a sample rate that is not stated; one line of options for all that is missing.
+/// Message for a sample rate that is not stated, with the options or keys that would state it and the missing units.
 fn no_rate(without_unit: &[String], sidecar: &std::path::Path) -> String {
     let names: Vec<&str> = without_unit.iter().map(String::as_str).collect();
     match map_of_units(&names) {

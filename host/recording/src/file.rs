@@ -56,8 +56,7 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
     write_with(path, |writer| writer.write_all(bytes))
 }
 
-/// Paths of the temporary files of writes in progress. The holder of the lock may create, rename and remove temporary
-/// files.
+/// Paths of the temporary files of writes in progress. The lock is held while a temporary file is created or renamed.
 static ASIDE: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
 /// Locks the list of temporary files of writes in progress.
@@ -88,7 +87,7 @@ pub fn write_with(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<(
 #[derive(Debug)]
 pub struct Prepared {
     path: PathBuf,
-    /// The temporary file; `None` after it was renamed to its final name.
+    /// The temporary file; `None` once [`publish`] has taken it.
     aside: Option<NamedTempFile>,
 }
 
@@ -133,8 +132,7 @@ pub fn prepare(
     }
 }
 
-/// Renames prepared files to their final names, one after the other; an interrupt by Ctrl-C waits until all are
-/// renamed.
+/// Renames prepared files to their final names, one after the other; [`abandon_writing`] waits until this is done.
 ///
 /// # Errors
 /// A file cannot be renamed: it and those after it are removed, and the previous files of those names stay.

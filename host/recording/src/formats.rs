@@ -26,8 +26,8 @@ impl Recording {
         Self::read_segment(path, Segment::default())
     }
 
-    /// Reads a segment of a recording and its sidecar. Samples of channels outside the segment may be NaN or infinite,
-    /// except in a LabVIEW measurement file; time stamps may not.
+    /// Reads a segment of the only recording of a file, and its sidecar. Samples of channels outside the segment may be
+    /// NaN or infinite, except in a LabVIEW measurement file; time stamps may not.
     ///
     /// # Errors
     /// An error of [`Recording::read`], or a segment that lies outside the recording.
@@ -43,7 +43,7 @@ impl Recording {
     /// states about the file; also returns a report of how it was understood.
     ///
     /// # Errors
-    /// An error of [`Recording::read`], or a file with several records of which `import` does not choose one.
+    /// An error of [`Recording::import_all`], or a file with several records of which `import` does not choose one.
     pub fn import(path: impl AsRef<Path>, import: &Import) -> Result<Imported, RecordingError> {
         let path = path.as_ref();
         let mut records = Self::import_all(path, import)?;

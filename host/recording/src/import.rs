@@ -9,10 +9,10 @@ use super::unit::{Sensitivity, Unit};
 pub struct Import {
     /// Segment of the recording that is read, by start and end time.
     pub segment: Segment,
-    /// Columns for which the user states name and unit with the option `--map`.
+    /// Facts that the user states about columns with the option `--map`; of several about one column the first counts.
     pub map: Vec<ColumnMap>,
     /// Sample rate, samples per second (`--rate`); it replaces the time column of the file and every rate that file or
-    /// sidecar state.
+    /// sidecar state. `None` if the user states none.
     pub rate_hz: Option<f64>,
     /// Number of the one record to read from a file with several records, from 1 (`--record`); `None` for all.
     pub record: Option<usize>,
@@ -28,7 +28,7 @@ pub struct ColumnMap {
     pub name: String,
     /// True if the channel points against its axis (`acc=-ax`): samples change their sign.
     pub is_negative: bool,
-    /// Unit of the samples in the column, or sensitivity of its sensor; `None` if the user states neither.
+    /// Unit of the samples in the column, or sensitivity of its sensor; `None` if the user states nothing about them.
     pub scale: Option<Scale>,
 }
 
@@ -48,11 +48,12 @@ impl ColumnMap {
     /// `2=fx:N`, `acc=-az`, `ch1=ax:10.2 mV/g`.
     ///
     /// # Errors
-    /// The text has another form, or the unit is unknown; the message states the form that is needed.
+    /// The text has another form, or the unit is unknown; the message states what is needed.
     pub fn parse(text: &str) -> Result<Self, String> {
         let forms =
             "COLUMN=NAME or COLUMN=NAME:UNIT is needed, such as acc=ax:g, 2=fx:N or \"ch1=ax:10.2 mV/g\"";
-        // The name of a column in the file may itself contain an equals sign; the name of a channel contains none.
+        // The name of a column in the file may itself contain an equals sign; the text after the last one is taken as
+        // channel.
         let (column, channel) = text
             .rsplit_once('=')
             .ok_or_else(|| format!("`{text}`: {forms}"))?;
@@ -102,7 +103,7 @@ impl ColumnMap {
     }
 }
 
-/// True if the text is a unit of a frequency response function: a ratio of two units, such as `um/N`, `1/kg` or `dB`.
+/// True if the text is a unit of a frequency response function: a ratio of two units such as `um/N`, or `1/kg` or `dB`.
 fn is_ratio(text: &str) -> bool {
     let of_force = text.rsplit_once('/').is_some_and(|(response, force)| {
         let is_unit = |text: &str| text.parse::<Unit>().is_ok();

@@ -34,7 +34,7 @@
 //! # Ok::<(), quietcut_recording::RecordingError>(())
 //! ```
 //!
-//! This crate knows no structure, tool or cut beyond what the sidecar states, and computes no spectra.
+//! This crate knows no structure, tool or cut beyond what the sidecar or the user states, and computes no spectra.
 
 mod assemble;
 mod blocks;

@@ -1,8 +1,9 @@
-//! Reader of LabVIEW measurement files (`.lvm`): a file header, then blocks of channels with their own header.
+//! Reader of LabVIEW measurement files (`.lvm`): a file header, then blocks of channels, with or without their own
+//! header.
 //!
 //! Format: National Instruments, "Specification for the LabVIEW Measurement File (.lvm)". Separator tab or comma,
-//! decimal point or comma, one X column, one for each channel, or none. Each block is a record of its own. The column
-//! `Comment` is skipped.
+//! decimal point or comma, one X column, one for each channel, or none; of several X columns the first with values is
+//! used. Each block is a record of its own. The column `Comment` is skipped.
 
 use std::path::Path;
 
@@ -14,7 +15,7 @@ use super::text_head::latin;
 /// Line that ends the header of an `.lvm` file and the header of each of its blocks.
 const END: &str = "***End_of_Header***";
 
-/// Text of a line, with the number of the line in the file, from 1.
+/// Number of a line in the file, from 1, and its text.
 type Line<'a> = (u64, &'a str);
 
 /// Reads the blocks of a LabVIEW measurement file, each as a record of its own.
@@ -77,7 +78,7 @@ fn is_blank(line: &str) -> bool {
     line.chars().all(|letter| letter.is_whitespace() || letter == ',')
 }
 
-/// Separator and decimal mark that the header of a LabVIEW measurement file states.
+/// Separator and decimal mark that the header of a LabVIEW measurement file states; tab and point by default.
 fn dialect(lines: &[Line<'_>]) -> Dialect {
     let value = |key: &str| {
         lines
@@ -103,7 +104,7 @@ fn dialect(lines: &[Line<'_>]) -> Dialect {
     }
 }
 
-/// Header of a block of a LabVIEW measurement file: in each row a key and one value for each channel.
+/// Header of a block of a LabVIEW measurement file: rows of a key and values, mostly one for each channel.
 #[derive(Default)]
 struct BlockHeader<'a> {
     rows: Vec<(&'a str, Vec<&'a str>)>,
@@ -202,8 +203,8 @@ fn block<'l, 'a>(lines: &'l [Line<'a>], dialect: Dialect) -> Result<(Raw, &'l [L
     Ok((record(x, columns, &header, dialect), after))
 }
 
-/// Record of a block of samples. The sample rate follows from the interval that the header of the block states if the X
-/// values agree with it or are missing; otherwise the X values are a time column.
+/// Record of a block of samples. X values for all samples become a time column, which takes precedence over a stated
+/// interval, unless they agree with the interval that the header of the block states.
 fn record(
     x: Option<Vec<f64>>,
     mut columns: Vec<RawColumn>,
@@ -233,8 +234,8 @@ fn record(
         .as_ref()
         .filter(|x| x.len() == longest && longest > 1)
         .map(|x| (x[longest - 1] - x[0]) / (longest - 1) as f64);
-    // X values are printed with few digits, the stated interval with all. The two agree if they differ by at most one
-    // sample interval at the end of the block.
+    // X values are printed with few digits, the stated interval with all. They agree if the two durations of the block
+    // differ by at most one sample interval.
     let agrees = match (interval_s, stepped_s) {
         (Some(interval), Some(stepped)) => (interval - stepped).abs() * longest as f64 <= interval,
         _ => true,

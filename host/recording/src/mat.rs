@@ -59,7 +59,7 @@ const DEPTH_MAX: usize = 6;
 /// in a structure array has a few fields.
 const ELEMENTS_MAX: usize = 100_000;
 
-/// Reads the records of a MAT-file: one from its vectors and matrices, or else one from each element of its structures.
+/// Reads the records of a MAT-file; [`records`] states what is a record.
 pub(super) fn read(path: &Path) -> Result<Vec<Raw>, RecordingError> {
     let unreadable = |cause| FileError::Read {
         path: path.into(),
@@ -75,7 +75,7 @@ pub(super) fn read(path: &Path) -> Result<Vec<Raw>, RecordingError> {
     records::records(items).map_err(content)
 }
 
-/// Reads all variables of the supported classes of a MAT-file of `length` bytes.
+/// Reads the variables of a MAT-file of `length` bytes, except those that [`matrix`] skips.
 fn items(reader: &mut dyn BufRead, length: u64) -> Result<Vec<Item>, String> {
     let mut header = Vec::with_capacity(HEADER);
     reader
@@ -193,8 +193,8 @@ fn inflated(source: &mut Source<'_>, length: u64, memory: &mut ValueMemory) -> R
 }
 
 /// Reads the data of a matrix element `depth` levels inside others; `None` unless it has two dimensions and holds a
-/// real numeric matrix, a text of at most [`SMALL_MAX`] bytes, or a structure or cell less than [`DEPTH_MAX`] levels
-/// inside others.
+/// real numeric matrix that is not logical, a text of at most [`SMALL_MAX`] bytes, or a structure or cell less than
+/// [`DEPTH_MAX`] levels inside others.
 fn matrix(source: &mut Source<'_>, memory: &mut ValueMemory, depth: usize) -> Result<Option<Item>, String> {
     // An empty field of a MAT structure is stored as an element without any content.
     if source.available == 0 {
@@ -285,7 +285,8 @@ fn matrix(source: &mut Source<'_>, memory: &mut ValueMemory, depth: usize) -> Re
     }))
 }
 
-/// Reads the elements of a MAT structure array or cell array of `count` elements.
+/// Reads the elements of a MAT structure array or cell array of `count` elements. Index: element, then its fields,
+/// without those that are not read.
 fn elements(
     source: &mut Source<'_>,
     memory: &mut ValueMemory,

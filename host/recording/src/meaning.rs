@@ -14,8 +14,9 @@ pub(super) struct Meaning {
     /// True if the sensor points against its axis, so that the samples change their sign.
     pub(super) is_negative: bool,
     pub(super) from: Basis,
-    /// Unit of the column as the file or the user states it, shown in the report of the import.
+    /// Unit of the column as the file or the user states it, shown in the report of the import; `None` if neither does.
     pub(super) unit: Option<String>,
-    /// Sensitivity of the sensor that the user states, in volts per SI unit, shown in the report of the import.
+    /// Sensitivity of the sensor that the user states, in volts per SI unit, shown in the report of the import; `None`
+    /// if the user states none.
     pub(super) sensitivity: Option<String>,
 }

@@ -24,7 +24,7 @@ pub(super) struct Open {
     pub(super) quantity: Quantity,
     pub(super) axis: Option<char>,
     pub(super) is_negative: bool,
-    /// Quantity of the stated unit.
+    /// Quantity of the stated unit; unknown if none is stated.
     pub(super) stated: Quantity,
     /// True if an earlier column already is the channel that the words of this column name.
     pub(super) is_twice: bool,

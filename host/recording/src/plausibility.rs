@@ -7,7 +7,7 @@ use super::{Channel, Quantity, Recording};
 /// Factors by which the unit of a channel is often wrong: g instead of m/s², milli, micro.
 const FACTORS: [(f64, &str); 3] = [(9.806_65, "9.81 (g and m/s²)"), (1e3, "1000"), (1e6, "a million")];
 
-/// Warnings about channels whose unit is probably wrong; empty if all units are plausible.
+/// Warnings about channels whose unit is probably wrong; empty if there is none.
 pub(super) fn warnings(recording: &Recording) -> Vec<String> {
     let mut warnings: Vec<String> = recording.channels.iter().filter_map(peak).collect();
     for axis in ["x", "y", "z"] {
@@ -32,7 +32,7 @@ pub(super) fn warnings(recording: &Recording) -> Vec<String> {
     warnings
 }
 
-/// Warning for a channel whose peak value lies outside the range that sensors measure.
+/// Warning for a channel whose peak value lies outside the range that sensors measure; `None` for other channels.
 fn peak(channel: &Channel) -> Option<String> {
     let (low, high) = plausible_peak(channel.quantity)?;
     let peak = channel
@@ -53,13 +53,13 @@ fn peak(channel: &Channel) -> Option<String> {
     ))
 }
 
-/// Warning if the time derivative of order `order` of motion `lower` agrees with motion `upper` except for a unit
-/// factor such as 9.81 or 1000.
+/// Warning if the time derivative of order `order` of motion `lower` agrees with motion `upper` except for one of the
+/// unit factors [`FACTORS`]; `None` otherwise.
 ///
-/// Differences of `lower` over a time 2T equal weighted integrals of `upper` exactly, whatever the signal: for order 2,
-/// x(t+T) − 2x(t) + x(t−T) = ∫ (T − |s|) a(t+s) ds from s = −T to T. Sums over the samples approximate the integrals.
-/// The longer T, the less the noise of `lower` is amplified; the T from 1 to 64 sample intervals, in powers of two,
-/// with the best correlation counts.
+/// If `upper` is that derivative, differences of `lower` over a time 2T equal weighted integrals of `upper`: for order
+/// 2, x(t+T) − 2x(t) + x(t−T) = ∫ (T − |s|) a(t+s) ds from s = −T to T. Sums over the samples approximate the
+/// integrals. The longer T, the less the noise of `lower` is amplified; the T from 1 to 64 sample intervals, in powers
+/// of two, with the best correlation counts.
 fn contradiction(lower: &Channel, order: u32, upper: &Channel, rate_hz: f64) -> Option<String> {
     let mut best: Option<(f64, f64)> = None;
     let mut half = 1;
@@ -91,8 +91,9 @@ fn contradiction(lower: &Channel, order: u32, upper: &Channel, rate_hz: f64) -> 
     })
 }
 
-/// Correlation and amplitude ratio between differences of `lower` over 2·`half` samples and the weighted sums of
-/// `upper` that approximate them; `None` for up to 8 differences or a constant signal.
+/// Correlation of differences of `lower` over 2·`half` samples with the weighted sums of `upper` that approximate them,
+/// and ratio of their standard deviations (differences to sums); `None` for up to 8 differences, or if the differences
+/// or the sums are all equal.
 fn compared(lower: &[f64], order: u32, upper: &[f64], half: usize, rate_hz: f64) -> Option<(f64, f64)> {
     let count = lower.len().min(upper.len());
     let step = 1.0 / rate_hz;

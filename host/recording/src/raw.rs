@@ -9,7 +9,7 @@ pub(super) struct Raw {
     /// Sample rate that the format of the file states, samples per second; `None` if it states none.
     pub(super) sample_rate_hz: Option<f64>,
     /// Sample rate, samples per second, that a text or a variable of the file states, such as `Fs = 25600`; the sidecar
-    /// takes precedence.
+    /// takes precedence. `None` if none is stated so.
     pub(super) worded_rate_hz: Option<f64>,
     /// Time of the first sample of the record, s; a time column replaces it unless the option `--rate` replaces that
     /// column.
@@ -17,8 +17,8 @@ pub(super) struct Raw {
     /// Name of the group (TDMS), structure element (MAT) or block (LabVIEW) that holds the record; `None` for the only
     /// record of a TDMS or LabVIEW file, for variables of a MAT-file outside structures, and in other formats.
     pub(super) label: Option<String>,
-    /// Number of the first line with numbers in a text file without a row of names; `None` if there are names. Columns
-    /// without names are called by their numbers.
+    /// Number of the first line with numbers in a text file without a row of names, whose columns are called by their
+    /// numbers; `None` if there is a row of names, and in other formats.
     pub(super) unnamed_line: Option<u64>,
     /// True if there are several columns and all come from one matrix of a MAT-file, which has no names for them, so
     /// that the user must give them.

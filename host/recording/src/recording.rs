@@ -30,9 +30,9 @@ pub struct Recording {
 pub struct Channel {
     /// Name of the channel: `fx`, `x`, `vx`, `ax`, `tacho` …
     pub name: String,
-    /// Measured quantity; samples are in its SI unit.
+    /// Measured quantity; it sets the unit of `samples`.
     pub quantity: Quantity,
-    /// Samples, in the SI unit of `quantity`.
+    /// Samples, in the SI unit of `quantity`; as recorded if the quantity is unknown.
     pub samples: Vec<f64>,
 }
 
@@ -57,10 +57,11 @@ impl Recording {
         self.start_s + sample as f64 / self.sample_rate_hz
     }
 
-    /// The segment of the recording with the samples whose indices are in `range`, with its own start times.
+    /// The segment of the recording with the samples whose indices are in `range`, with the times of its own first
+    /// sample in `start_s` and `since_s`.
     ///
     /// # Panics
-    /// The recording has fewer samples than `range` requires, or `range` starts after its end.
+    /// A channel has fewer samples than `range` requires, or the start of `range` is after the end of `range`.
     #[must_use]
     pub fn part(&self, range: Range<usize>) -> Self {
         let channels = self.channels.iter().map(|channel| Channel {

@@ -3,7 +3,7 @@
 use super::criteria::SAME_SAMPLE;
 use super::{Recording, RecordingError};
 
-/// A segment of a recording: all samples with `from_s` ≤ t < `until_s`.
+/// A segment of a recording: all samples with `from_s` ≤ t < `until_s`, apart from a tolerance for rounded times.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Segment {
     /// Start time of the segment, s, on the time axis of the file; `None` for the start of the recording.
@@ -13,7 +13,7 @@ pub struct Segment {
 }
 
 impl Segment {
-    /// True if the segment is the whole recording.
+    /// True if neither start nor end is given.
     pub fn is_whole(self) -> bool {
         self.from_s.is_none() && self.until_s.is_none()
     }
@@ -21,8 +21,8 @@ impl Segment {
     /// Cuts the segment out of `recording`.
     ///
     /// # Errors
-    /// A given start or end leaves fewer than two samples; a channel ends before the segment, or before the first
-    /// channel if the segment has no given end; or the segment has a NaN or infinite sample.
+    /// A given start or end leaves fewer than two samples; a channel has fewer samples than the end of the segment, or
+    /// without a given end the first channel, requires; or the segment has a NaN or infinite sample.
     pub(super) fn of(self, recording: Recording) -> Result<Recording, RecordingError> {
         let (count, rate) = (recording.len(), recording.sample_rate_hz);
         let content = |what: String| RecordingError::Content {

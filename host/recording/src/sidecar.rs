@@ -29,7 +29,7 @@ pub enum TestKind {
     Idle,
 }
 
-/// The sidecar file of a recording.
+/// The sidecar file of a recording; a part that is not given is `None` or empty.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Sidecar {
@@ -89,7 +89,7 @@ pub struct RecordedCut {
     pub teeth: Option<u32>,
 }
 
-/// Description of one channel in the sidecar.
+/// Description of one channel in the sidecar; a fact that is not given is `None`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RecordedChannel {

@@ -1,4 +1,4 @@
-//! Spindle angle at every sample, interpolated between the tachometer edges.
+//! Spindle angle at the samples from the first to the last tachometer edge, interpolated between the edges.
 
 use super::{Recording, RecordingError, TachometerEdges};
 

@@ -25,13 +25,14 @@ pub struct ChannelSummary {
     pub rms: f64,
     /// Mean (DC component).
     pub mean: f64,
-    /// Number of clipped samples of the channel: those in runs of equal samples at its largest or smallest value, if
-    /// this is far from the median; 0 for a constant channel or a tachometer.
+    /// Number of clipped samples of the channel: those in runs of at least three equal samples at its largest or
+    /// smallest value, if this is far from the median; 0 for a constant channel or one without dimension, such as a
+    /// tachometer.
     pub clipped: usize,
     /// True if all samples of the channel are equal.
     pub constant: bool,
-    /// Dropouts of the channel: long runs of equal samples between its extremes although it changes otherwise, each
-    /// with start and excluded end in s.
+    /// Dropouts of the channel: long runs of equal samples at a value between its extremes although it changes
+    /// otherwise, each with start and excluded end in s. In order of time.
     pub dropouts_s: Vec<[f64; 2]>,
 }
 
@@ -123,7 +124,8 @@ fn runs(samples: &[f64]) -> Vec<(usize, usize)> {
 }
 
 /// Envelope for a small picture of a channel: largest absolute deviation from the mean of the channel in each of
-/// `width` equal runs of samples (one per sample if there are fewer samples), divided by the largest of all runs.
+/// `width` nearly equal runs of samples (one per sample if there are fewer samples), divided by the largest of all runs
+/// unless that is 0.
 pub fn envelope(samples: &[f64], width: usize) -> Vec<f64> {
     let mean = samples.iter().sum::<f64>() / samples.len().max(1) as f64;
     let width = width.min(samples.len());

@@ -36,8 +36,8 @@ impl Dialect {
         let mut fields = Vec::new();
         let mut start = 0;
         let mut is_quoted = false;
-        // In a line with an odd number of quotes each quote is an ordinary character, so that an open quote does not
-        // swallow the rest of the line.
+        // In a line with an odd number of quotes, separators between quotes separate too, so that an open quote does
+        // not swallow the rest of the line.
         let is_closed = line.matches('"').count().is_multiple_of(2);
         for (at, letter) in line.char_indices() {
             if letter == '"' && is_closed {
@@ -51,7 +51,7 @@ impl Dialect {
         fields
     }
 
-    /// Number in a field of a text table; `None` if the field is no number.
+    /// Number in a field of a text table; `None` if the field is no number in this notation.
     pub(super) fn number(self, field: &str) -> Option<f64> {
         if self.decimal_comma && field.contains(',') {
             if field.contains('.') {

@@ -91,8 +91,8 @@ pub(super) fn head(bytes: &[u8]) -> Result<Head, (u64, String)> {
         notes.push("encoding Latin-1".into());
     }
     let Some((index, dialect, width)) = found else {
-        // In a file without any line of numbers the first line counts as the head; the reader of the rows then reports
-        // the fault in the next lines.
+        // In a file without any line of numbers the first line that is no comment counts as the head; the reader of the
+        // rows then reports the fault in the next lines.
         let first = data.first();
         let columns = first.map(|line| head_columns(&Dialect::PLAIN.fields(line.text), None));
         let after = data.get(1).or(data.first());
@@ -130,8 +130,8 @@ pub(super) fn head(bytes: &[u8]) -> Result<Head, (u64, String)> {
     })
 }
 
-/// Names and units of the columns from the lines before the first line of numbers; the line numbers of the rows that
-/// give them are added to `used`.
+/// Names and units of the columns from the lines before the first line of numbers; `None` if no row gives them. The
+/// line numbers of the rows that give them are added to `used`.
 fn columns_before(
     dialect: Dialect,
     width: usize,
@@ -204,7 +204,7 @@ fn columns_before(
 }
 
 /// Fault of a table with commas between the columns and commas in its numbers: its rows have more fields than the row
-/// of names.
+/// of names. `None` if there is no such fault.
 ///
 /// A decimal comma splits a number in two, so that a row has at most twice as many fields as names.
 fn ambiguous_commas(dialect: Dialect, width: usize, before: &[&Line], first: &Line) -> Option<(u64, String)> {
@@ -237,7 +237,8 @@ fn ambiguous_commas(dialect: Dialect, width: usize, before: &[&Line], first: &Li
     })
 }
 
-/// Decodes UTF-8, or Latin-1 if the bytes are no UTF-8; an incomplete UTF-8 character at the end of `bytes` is dropped.
+/// Decodes UTF-8, or Latin-1 if the bytes are no UTF-8, and tells whether it was Latin-1; an incomplete UTF-8 character
+/// at the end of `bytes` is dropped.
 fn decoded(bytes: &[u8]) -> (String, bool) {
     match std::str::from_utf8(bytes) {
         Ok(text) => (text.into(), false),

@@ -31,7 +31,8 @@ const INTERVAL_WORDS: &[&str] = &[
     "dt",
 ];
 
-/// Sample rate, samples per second, that a line such as `Fs = 25600 Hz` or `dt: 0.1 ms` states.
+/// Sample rate, samples per second, that a line such as `Fs = 25600 Hz` or `dt: 0.1 ms` states; `None` if it states
+/// none.
 pub(super) fn rate(line: &str, decimal_comma: bool) -> Option<f64> {
     let lower = line.to_lowercase();
     let after = |words: &[&str]| {
@@ -46,8 +47,8 @@ pub(super) fn rate(line: &str, decimal_comma: bool) -> Option<f64> {
     };
     let number = |rest: &str| {
         let at = rest.find(|letter: char| letter.is_ascii_digit())?;
-        // Between the word for the rate and its number at most four letters may stand (a unit such as `Hz`), so that no
-        // other sentence is read as a rate.
+        // Between the word and its number at most four letters may stand (a unit such as `Hz`), so that no other
+        // sentence is read as a rate or an interval.
         if rest[..at].chars().filter(|letter| letter.is_alphabetic()).count() > 4 {
             return None;
         }

@@ -1,4 +1,4 @@
-//! Text tables as other programs write them: columns of numbers with name and unit, in any separator and decimal mark.
+//! Text tables as other programs write them: columns of numbers with name and unit.
 
 use std::path::Path;
 
@@ -17,7 +17,7 @@ pub struct TextTable {
 /// One column of a text table.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TextColumn {
-    /// Name of the column; its number if the file gives no names.
+    /// Name of the column; its number if the file gives it none.
     pub name: String,
     /// Unit of the column as the file states it; `None` if it states none.
     pub unit: Option<String>,
@@ -26,11 +26,11 @@ pub struct TextColumn {
 }
 
 impl TextTable {
-    /// Reads a text table, with any separator and decimal mark.
+    /// Reads a text table with comma, semicolon, tab or blanks between the columns, and decimal point or comma.
     ///
     /// # Errors
-    /// The file cannot be read; a line has text among its numbers, or another number of values than the head; a value
-    /// is NaN or infinite.
+    /// The file cannot be read, has no values, or is in UTF-16; a line has text among its numbers, or another number of
+    /// values than the head; commas are both separator and decimal mark; a value is NaN, infinite or missing.
     pub fn read(path: &Path) -> Result<Self, RecordingError> {
         let raw = csv::read(path, true)?;
         let columns = raw.columns.into_iter().map(|column| TextColumn {
@@ -47,7 +47,8 @@ impl TextTable {
         })
     }
 
-    /// Names of the columns of a text file, from its head alone; empty if it has none or its head cannot be understood.
+    /// Names of the columns of a text file, with their units in brackets, from its head alone; empty if there are none
+    /// or the head cannot be understood.
     ///
     /// # Errors
     /// The file cannot be read.

@@ -1,9 +1,11 @@
 //! Understanding of columns: which column is which channel, from the option `--map`, the sidecar, or the words and unit
 //! of its head.
 //!
-//! A column with the name of a channel (`t`, `fx`, `x`, `vx`, `ax`, `tacho`) is that channel. A column whose words or
-//! unit say that it is a force or a motion must also state its direction and its unit; otherwise it is a doubt, and the
-//! file is refused with the option that answers it. All other columns are auxiliary channels.
+//! A column that the option or the sidecar names is the channel of that name. A column with the name of a channel (`t`,
+//! `fx`, `x`, `vx`, `ax`, `tacho`) is that channel; an axis alone, such as `X [g]`, is the channel of its unit. Words
+//! may name time and tachometer. A column whose words or unit say that it is a force or a motion must also state its
+//! direction and its unit; otherwise it is a doubt, and the file is refused with the option that answers it. All other
+//! columns are auxiliary channels.
 
 use std::path::Path;
 
@@ -30,9 +32,9 @@ struct Stated {
 /// Meaning of every column of a file, that is the channel that it becomes, in the order of `columns`.
 ///
 /// # Errors
-/// A unit is unknown or contradicts the name or the words of its channel; a sensitivity is unknown or given for a
-/// column that is no voltage; the sidecar or the map names a column that does not exist; the map states a unit of
-/// frequency response functions; a meaning is in doubt.
+/// A unit is unknown (unless the file states it for an auxiliary channel) or contradicts the name or the words of its
+/// channel; a sensitivity is unknown or given for a column that is no voltage; the sidecar or the map names a column
+/// that does not exist; the map states a unit of frequency response functions; a meaning is in doubt.
 pub(super) fn understand(
     path: &Path,
     columns: &[RawColumn],
@@ -274,8 +276,9 @@ fn motion_of_axis(name: &str, quantity: Quantity) -> Option<String> {
     is_axis.then(|| format!("{prefix}{name}"))
 }
 
-/// Refuses a column with a standard channel name if the text of its unit is unknown, or if the unit measures another
-/// quantity than the name requires. A name with a number, such as `ax_2`, is checked for an unknown unit only.
+/// Refuses a column with a standard channel name if the text of its unit is unknown, or if the unit, unless of voltage,
+/// measures another quantity than the name requires. A name with a number, such as `ax_2`, is checked for an unknown
+/// unit only.
 fn checked(path: &Path, column: &RawColumn, found: Meaning) -> Result<Meaning, RecordingError> {
     let stem = found.name.split('_').next().unwrap_or_default();
     let expected = Quantity::of_name(&found.name).or_else(|| Quantity::of_name(stem));

@@ -25,7 +25,7 @@ pub struct Understood {
     /// Other facts about the reading of the record: separator, encoding, omitted columns.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub notes: Vec<String>,
-    /// Units that are probably wrong.
+    /// Warnings, such as that a unit is probably wrong.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub warnings: Vec<String>,
 }
@@ -57,7 +57,7 @@ pub struct UnderstoodColumn {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Basis {
-    /// The head of the column is a channel name, such as `ax`.
+    /// The head of the column is a channel name, such as `ax`, or `time`.
     Head,
     /// Words in the head of the column, such as `Hammer` or `Acc X`, name the channel.
     Words,
@@ -71,8 +71,8 @@ pub enum Basis {
 }
 
 impl Understood {
-    /// True if the file did not state all meanings in the standard form, so that the user should see how it was read:
-    /// from words, from options, or with notes and warnings.
+    /// True if the user should see how the file was read: a meaning comes from words or the option, the sample rate
+    /// from the option, or there are notes or warnings.
     pub fn is_interpreted(&self) -> bool {
         !self.notes.is_empty()
             || !self.warnings.is_empty()

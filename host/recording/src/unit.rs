@@ -6,7 +6,7 @@ use std::str::FromStr;
 /// Standard gravity, m/s² (ISO 80000-3); converts `g` and kilogram-force.
 const G: f64 = 9.806_65;
 
-/// Physical quantity that a channel measures. The samples of the channel are in its SI unit.
+/// Physical quantity that a channel measures. The samples of the channel are in its SI unit, unless it is unknown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Quantity {
     /// Time, s.
@@ -32,7 +32,7 @@ pub enum Quantity {
 }
 
 impl Quantity {
-    /// Text of the SI unit of a quantity, as it stands in column headers.
+    /// Text of the SI unit of a quantity, as it stands in column headers; `unknown` for an unknown quantity.
     pub fn unit(self) -> &'static str {
         match self {
             Self::Time => "s",
@@ -88,7 +88,8 @@ pub struct Unit {
     pub factor: f64,
 }
 
-/// Table of all units that can be read: name, quantity, factor to SI. The first unit of each quantity is the SI unit.
+/// Standard spellings of all units that can be read: name, quantity, factor to SI. The first unit of each quantity is
+/// the SI unit.
 const UNITS: &[(&str, Quantity, f64)] = &[
     ("s", Quantity::Time, 1.0),
     ("ms", Quantity::Time, 1e-3),
@@ -133,7 +134,7 @@ const UNITS: &[(&str, Quantity, f64)] = &[
     ("", Quantity::Level, 1.0),
 ];
 
-/// Error for a unit that is not in the table of units; the message lists the known ones.
+/// Error for a text that is no known unit; the message lists the known ones.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("the unit \"{found}\" is not known{}; known are {}", meant(found), known())]
 pub struct UnknownUnit {
@@ -189,7 +190,7 @@ impl FromStr for Unit {
     }
 }
 
-/// Parses a unit without a number before it, by its usual spellings.
+/// Parses a unit without a number before it, by its usual spellings; `None` for other texts.
 fn plain(text: &str) -> Option<Unit> {
     let plain = text
         .trim()

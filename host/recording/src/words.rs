@@ -5,15 +5,15 @@ use super::unit::{Quantity, Unit};
 /// Meaning of the words in the name of a column.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct NameMeaning {
-    /// Quantity that a word in the column name states, such as force for `Hammer`.
+    /// Quantity that a word in the column name states, such as force for `Hammer`; `None` if none does.
     pub(super) quantity: Option<Quantity>,
     /// True if a word in the column name states the signal of a tachometer.
     pub(super) is_tacho: bool,
-    /// Direction that a word in the column name states: `x`, `y` or `z`.
+    /// Direction that a word in the column name states: `x`, `y` or `z`; `None` if none does.
     pub(super) axis: Option<char>,
     /// True if the direction in the column name has a minus sign, as in `Acc -Z`.
     pub(super) is_negative: bool,
-    /// Unit at the end of the column name, as in `force_N`.
+    /// Unit of this quantity at the end of the column name, as in `force_N`; `None` if there is none.
     pub(super) unit: Option<Unit>,
 }
 
@@ -78,8 +78,8 @@ const TACHO: &[&str] = &["tacho", "tachometer", "drehzahlsensor", "keyphasor"];
 /// choice: `kraft` begins `Kraftsensor`, `acc` must not begin `accuracy`.
 const STEM: usize = 5;
 
-/// Words whose presence in a column name means that its other words state no quantity or direction: `cutting speed`,
-/// `force error`, and settings that are no signal of a sensor.
+/// Words whose presence in a column name means that its other words state nothing: `cutting speed`, `force error`, and
+/// settings that are no signal of a sensor.
 const OTHER: &[&str] = &[
     "speed",
     "rpm",
@@ -174,7 +174,7 @@ impl NameMeaning {
     }
 }
 
-/// Direction that a word states if it is x, y or z alone.
+/// Direction that a word states if it is x, y or z alone; `None` for other words.
 fn axis(word: &str) -> Option<char> {
     match word {
         "x" => Some('x'),
@@ -219,7 +219,8 @@ fn tokens(name: &str) -> Vec<String> {
     tokens
 }
 
-/// Unit of the given quantity in the last words of a column name: `force_N`, `acc_g`, `ax_m_s2`.
+/// Unit of the given quantity in the last words of a column name: `force_N`, `acc_g`, `ax_m_s2`; `None` if there is
+/// none.
 fn unit_at_end(tokens: &[String], quantity: Quantity) -> Option<Unit> {
     let [first, rest @ ..] = tokens else {
         return None;
@@ -242,7 +243,8 @@ fn unit_at_end(tokens: &[String], quantity: Quantity) -> Option<Unit> {
 /// Splits a column title into name and unit: `name [unit]`, `name (unit)`, `name {unit}`, `name / unit`, `name in
 /// unit`, `name, unit`.
 ///
-/// Square brackets at the end always hold a unit. Other forms count only if the text is a known unit.
+/// Square brackets at the end always hold a unit. Other forms count only if the text is a known unit. Without a unit
+/// the whole title is the name.
 pub(super) fn name_and_unit(title: &str) -> (&str, Option<&str>) {
     let title = title.trim();
     if let Some((name, unit)) = title.strip_suffix(']').and_then(|inner| inner.rsplit_once('[')) {

@@ -62,7 +62,8 @@ struct TrialAnswer {
     depth_mm: f64,
     /// First report in which the device detects chatter during one cut of the demonstration; `null` if it detects none.
     alarm: Option<VerdictAnswer>,
-    /// Last verdict of the device on one cut of the demonstration, before the tool begins to leave the workpiece.
+    /// Last verdict of the device on one cut of the demonstration, before the tool begins to leave the workpiece;
+    /// `null` if there is none.
     verdict: Option<&'static str>,
     /// Standard deviation of the acceleration in one cut of the demonstration along x, y and z over the last quarter
     /// of full engagement, m/s².
@@ -145,7 +146,8 @@ fn switch_on(cell: &VirtualCell, table: &LobeTable<'_>, output: Output) -> Resul
     Ok(bench)
 }
 
-/// Sentence about the lowest stability limit of a lobe table: depth, spindle speed and kind of stability loss.
+/// Sentence about the lowest stability limit in the first layer of a lobe table: depth, spindle speed and kind of
+/// stability loss.
 fn lowest_limit(table: &LobeTable<'_>) -> String {
     let limits = table.speeds().enumerate().filter_map(|(index, speed)| {
         let limit = *table.entry(0, index)?.first_limit()?;

@@ -110,8 +110,8 @@ fn add_limits(case: &Case, recordings: &[Recording], cuts: &[TrialCut], diagnosi
     }
 }
 
-/// Length of the progress bar of `quietcut diagnose`: at least the eight stages of a diagnosis that searches causes
-/// once, including the stability limits. A second search, in the whole of long recordings, has more stages.
+/// Length of the progress bar of `quietcut diagnose`. A diagnosis that searches causes once has at most eight stages,
+/// the stability limits included. A second search, in the whole of long recordings, has more.
 const STAGES: u64 = 9;
 
 fn stage_message(stage: Stage) -> &'static str {

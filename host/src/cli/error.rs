@@ -16,7 +16,7 @@ type Cause = Box<dyn StdError + Send + Sync>;
 
 /// The error with which a verb (subcommand) of `quietcut` ends.
 ///
-/// The `From` conversions decide for each error of the library whether it is an input error.
+/// The `From` conversions decide whether an error of the library is an input error.
 #[derive(Debug)]
 pub enum Error {
     /// Wrong usage or wrong input, which the user can correct: exit status 2.
@@ -74,7 +74,7 @@ impl StdError for Error {}
 impl From<FileError> for Error {
     fn from(error: FileError) -> Self {
         match error {
-            // The user gave the path that cannot be read or is no text, so this is an input error.
+            // The user gave the path of the file that cannot be read or is no text, so this is an input error.
             FileError::Read { .. } | FileError::NotText { .. } => Self::input(error),
             FileError::Write { ref cause, .. } => match cause.kind() {
                 io::ErrorKind::NotFound

@@ -119,7 +119,7 @@ struct ExperimentOutput {
     branch_changes: u64,
 }
 
-/// Simulates a vibration test on the structure of the case and writes its recording.
+/// Simulates a vibration test on the structure of the case and writes the recording of the test.
 pub(super) fn run(
     case: &Case,
     kind: ExperimentKind,
@@ -205,8 +205,8 @@ const PERIODS: f64 = 8.0;
 
 /// Default sampling rate of a simulated vibration test in Hz: the smallest power of two of at least 20 times the
 /// highest excited frequency, so that the eighth harmonic of this frequency lies below the Nyquist frequency. The
-/// highest excited frequency is that of `--frequency-hz`, 30 Hz without this option; an impact of duration T excites up
-/// to about 1/T.
+/// highest excited frequency is 1/T for hammer impacts of duration T; for other excitation the larger end of
+/// `--frequency-hz`, or 30 Hz without this option.
 fn default_rate_hz(kind: ExperimentKind, options: &Experiment) -> f64 {
     let highest_hz = match kind {
         ExperimentKind::Hammer => 1e3 / options.pulse_ms,

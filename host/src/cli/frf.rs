@@ -61,12 +61,12 @@ pub fn run(args: Args) -> Result<(), Error> {
     args.output.answer_with(&understood, &answer, text)
 }
 
-/// Adds a warning if aliasing (content above half the sample rate, folded into the record) may change the peak of a
-/// receptance by a relative error above [`SMALL_FOLDING`]. A relative error above [`LARGEST_FOLDING`] is an error.
+/// Adds a warning about the receptance whose peak aliasing (content above half the sample rate, folded into the record)
+/// may change most, if this relative change is above [`SMALL_FOLDING`]. A change above [`LARGEST_FOLDING`] is an error.
 fn check_folding(measurement: &mut Measurement) -> Result<(), Error> {
-    // The error by aliasing at a frequency line is a sum of two terms: one is inversely proportional to the force
-    // spectrum there, the other to the response spectrum. So |H| divided by this error is largest at the resonance that
-    // the impacts excite, and small where the force spectrum vanishes.
+    // The peak is taken at the line with the largest |H| divided by the relative error by aliasing. |H| alone may be
+    // largest where the force spectrum almost vanishes; one term of the error is inversely proportional to that
+    // spectrum, so that the quotient is small there.
     let at_peak = |(entry, folding): (&Frf, &Vec<f64>)| {
         let excited = |line: usize| entry.receptance[line].norm() / folding[line].max(f64::MIN_POSITIVE);
         let peak = (0..folding.len()).max_by(|&a, &b| excited(a).total_cmp(&excited(b)));

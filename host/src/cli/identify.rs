@@ -76,8 +76,7 @@ fn sections(path: &Path) -> Result<toml::Table, Error> {
         .map_err(|error| Error::input(format!("{}: {error}", path.display())))
 }
 
-/// Number of significant digits of the identified parameters in the text output; JSON and case files keep all digits. A
-/// choice.
+/// Number of significant digits of the parameters of [`IdentifyOutput::models`] in the text output: a choice.
 const DIGITS: usize = 6;
 
 fn text(answer: &IdentifyOutput) -> String {

@@ -82,8 +82,8 @@ struct PointsOutput<'a> {
 }
 
 impl Args {
-    /// Refuses options of a chart, such as `--cells` or `--out`, and single ranges if `--rpm` or `--depth-mm` is
-    /// missing, and a command without ranges and points; one message names all that is missing.
+    /// Refuses a command without `--rpm` or without `--depth-mm`, unless it has `--at`, neither of these ranges and no
+    /// option of a chart, such as `--cells` or `--out`. The message names each missing range.
     fn check(&self) -> Result<(), Error> {
         let has_range = self.rpm.is_some() || self.depth_mm.is_some();
         let missing: Vec<&str> = [
@@ -365,7 +365,8 @@ fn limits_as_text(chart: &Chart) -> String {
 }
 
 /// Text about the resolution of a stability chart: the number of added spindle speeds, the error of straight lines
-/// between neighbouring speeds, the narrowest island, and the gaps between speeds where the verdict stays open.
+/// between neighbouring speeds, the width of the narrowest island, and the number of gaps between speeds in which the
+/// verdict may be open.
 fn resolution_as_text(chart: &Chart, resolution: &Resolution) -> String {
     let mut text = format!(
         "\n{} further speeds; straight lines between all speeds are right to {} % in depth or {} % in speed",

@@ -10,8 +10,8 @@ use crate::report::cell_map::cell_map;
 use crate::report::page::{figure, page};
 use crate::stability::{CellChart, Method, Verdict, cell_chart};
 
-/// Computes the dominant Floquet multiplier at each speed and depth of the grid, writes them to each file of `--out`,
-/// and prints the counts of stable, unstable and undecided points.
+/// Computes the dominant Floquet multiplier at each speed and depth of the grid, writes the multipliers to each file of
+/// `--out`, and prints the counts of stable, unstable and undecided points, or with `--json` the multipliers.
 pub(super) fn run(
     case: &Case,
     method: &dyn Method,
@@ -80,8 +80,8 @@ fn picture(case: &Case, chart: &CellChart) -> Result<String, Error> {
     cell_map(&title, &sorted).map_err(Error::input)
 }
 
-/// Stability map as CSV with one row per grid point: speed, depth, modulus of the dominant Floquet multiplier, its
-/// error and the verdict.
+/// Stability map as CSV with one row per grid point: speed, depth, modulus of the dominant Floquet multiplier, error of
+/// the modulus, and verdict.
 fn as_csv(chart: &CellChart) -> Result<String, Error> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     writer

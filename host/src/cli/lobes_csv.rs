@@ -4,8 +4,9 @@ use super::Error;
 use super::lobes_spread::{intervals, percentiles};
 use crate::stability::Chart;
 
-/// Stability limits as CSV with one row for each change of stability over the axial depth at each spindle speed; a
-/// speed without any change has one row with its speed and, if computed, the percentiles of its first limit.
+/// Stability limits as CSV with one row for each crossing of the unit circle by a Floquet multiplier over the axial
+/// depth at each spindle speed. A speed without any crossing has one row with the speed and, if computed, the
+/// percentiles of the first limit.
 pub(super) fn as_csv(chart: &Chart) -> Result<String, Error> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     let mut header = vec![
@@ -51,7 +52,7 @@ pub(super) fn as_csv(chart: &Chart) -> Result<String, Error> {
             let first = line
                 .first_limit
                 .is_some_and(|limit| limit.depth_mm == switch.depth_mm);
-            // The interval of axial depths around this change of stability in which the method cannot decide.
+            // The interval of axial depths around this crossing in which the method cannot decide.
             let undecided = line
                 .undecided_mm
                 .iter()

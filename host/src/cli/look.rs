@@ -124,7 +124,7 @@ pub fn run(args: Args) -> Result<(), Error> {
 }
 
 /// Refuses lobe tables (`.qct`), cases and sidecars (`.toml`), which are neither recordings nor tables of frequency
-/// response functions; the error names the command that shows them.
+/// response functions; the error names commands that show or check them.
 fn refuse_other_kinds(path: &Path) -> Result<(), Error> {
     let what = match crate::file::ending(path).as_str() {
         "qct" => format!("a lobe table; quietcut table --show {} shows it", path.display()),
@@ -295,7 +295,7 @@ impl RecordOutput {
 /// A number with its unit and four significant digits; some units get a prefix for a nonzero size below 0.1 or of 10⁴
 /// and more.
 fn shown(value: f64, unit: &str) -> String {
-    // Only units that are written with prefixes in practice get one.
+    // Values in these units may get a prefix; values in other units, such as g, get none.
     let takes_prefix = matches!(unit, "m" | "N" | "V" | "m/s" | "m/s^2" | "Pa");
     let (factor, prefix) = match value.abs() {
         _ if !takes_prefix => (1.0, ""),
@@ -310,8 +310,8 @@ fn shown(value: f64, unit: &str) -> String {
         .into()
 }
 
-/// Picture of a channel over time, drawn with block characters in one line: the largest deviation from the mean in each
-/// part of the record, relative to the largest of all.
+/// Picture of a channel over time, drawn with block characters in one line: the largest deviation from the mean of the
+/// channel in each part of the record, relative to the largest in any part.
 fn picture(samples: &[f64]) -> String {
     const BLOCKS: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
     envelope(samples, WIDTH)

@@ -31,7 +31,7 @@ const HARMONICS_MAX: usize = 400;
 /// Copy of the case with the values that its wear and drift give the parameters after `after_s` seconds of operation.
 ///
 /// # Errors
-/// The case has neither wear nor drift, so that the time would change nothing; or these give impossible values.
+/// The case has neither wear nor drift, so that the time would change nothing; else as [`after`].
 pub(super) fn case_after(case: &Case, after_s: f64) -> Result<Case, Error> {
     if !case.has(EffectName::Wear) && !case.has(EffectName::Drift) {
         return Err(Error::input(format!(
@@ -267,8 +267,8 @@ fn warn_of_table(table: &FrfTable) -> Result<(), Error> {
         .iter()
         .filter(|entry| entry.response == entry.force)
     {
-        // A direct receptance far below all modes is nearly its positive static compliance. A phase beyond ±45° at the
-        // first frequency line indicates a mode below this line.
+        // A direct receptance far below all modes is nearly its positive static compliance. With a phase beyond ±45° at
+        // the first frequency line, a mode may lie below this line.
         if let (Some(first), Some(hz)) = (entry.receptance.first(), table.frequency_hz().first())
             && first.im.abs() > first.re
         {

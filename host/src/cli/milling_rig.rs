@@ -1,4 +1,5 @@
-//! `quietcut simulate --experiment porous|speed-sweep`: simulated cuts that identify the structure from cutting forces.
+//! `quietcut simulate --experiment porous|speed-sweep`: simulated cuts whose forces excite the structure for its
+//! identification.
 
 use serde::Serialize;
 use std::path::PathBuf;
@@ -40,7 +41,7 @@ struct MillingRigOutput {
     sample_rate_hz: f64,
     samples: usize,
     largest_displacement_mm: f64,
-    /// Standard deviation over time of each measured cutting force, N.
+    /// Standard deviation over time of each recorded force with its noise, N, in the order of the channels.
     force_rms_n: Vec<f64>,
     steps: u64,
     contact_changes: u64,
@@ -50,7 +51,7 @@ struct MillingRigOutput {
 /// frequencies of a milling robot (tens of Hz).
 const SAMPLE_RATE_HZ: f64 = 2048.0;
 
-/// Simulates the cut of porous or speed-sweep and writes the recording of its sensors.
+/// Simulates the cut of porous or speed-sweep and writes the recording of the cut.
 pub(super) fn run(
     case: &Case,
     kind: ExperimentKind,
@@ -144,7 +145,7 @@ fn fastest_hz(cut: &VirtualCut, case: &Case) -> f64 {
 }
 
 /// Copy of the case with the immersion angles of `--start-deg` and `--exit-deg`; an option that is not given leaves the
-/// angle of the case.
+/// angle of the case. A case without a cut stays unchanged.
 pub(super) fn immersed(case: &Case, rig: &MillingRig) -> Result<Case, Error> {
     let mut case = case.clone();
     if let Some(cut) = &mut case.cut {

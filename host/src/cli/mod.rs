@@ -1,4 +1,4 @@
-//! The command line: one file per verb, each with its arguments and a `run`.
+//! The command line: one module per verb, with its arguments and a function `run`.
 //!
 //! Exit status 0: success, or the reader of standard output has closed the pipe. Exit status 2: wrong usage or wrong
 //! input, with one message on stderr. Exit status 130: interrupted by Ctrl-C, which ends `monitor` with success. Exit
@@ -119,8 +119,8 @@ pub fn main() -> ExitCode {
     }
 }
 
-/// Message for the first value of an option that begins with a dash and a digit or point, such as `--rpm -900:1200:7`:
-/// the parser takes such a value for an option.
+/// Message for the first option that is followed by a text beginning with a dash and a digit or point, such as `--rpm
+/// -900:1200:7`; `None` if there is none. The parser may take such a text for an option.
 fn dashed_value(given: &[String]) -> Option<String> {
     let is_value = |text: &str| {
         let mut letters = text.chars();

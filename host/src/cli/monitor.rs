@@ -43,7 +43,7 @@ pub fn run(args: Args) -> Result<(), Error> {
         reports: Reports::All,
         ..Subscription::default()
     })?;
-    // With a `--seconds` beyond the range of the clock, `monitor` runs without end.
+    // With a `--seconds` beyond the range of the clock, `monitor` runs until Ctrl-C.
     let end = args
         .seconds
         .and_then(|seconds| Instant::now().checked_add(Duration::try_from_secs_f64(seconds).ok()?));
@@ -60,8 +60,8 @@ pub fn run(args: Args) -> Result<(), Error> {
     args.output.end(&[], &log, &log.summary)
 }
 
-/// Prints each report of the device whose verdict or advice differs from the previous one, and the unchanged state
-/// once [`UNCHANGED_LINE_PERIOD`] has passed since the last line, until `is_over` returns true.
+/// Until `is_over` returns true, prints each report of the device that [`VerdictLog::take`] finds changed, and the
+/// state of an unchanged report if [`UNCHANGED_LINE_PERIOD`] has passed since the last line.
 fn listen(
     client: &mut Client,
     output: StreamedOutput,

@@ -1,4 +1,4 @@
-//! Parsers of numbers on the command line; an error states the allowed range.
+//! Parsers of numbers on the command line.
 
 use std::num::NonZeroU8;
 

@@ -28,7 +28,7 @@ pub(super) fn keep_inputs<'a>(inputs: impl IntoIterator<Item = &'a Path>, out: &
     }
 }
 
-/// Endings that an output file may have; they set its format.
+/// Endings that an output file may have; the ending sets the format of the file.
 #[derive(Clone, Copy, Debug)]
 pub struct Endings(pub &'static [&'static str]);
 

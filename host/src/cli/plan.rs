@@ -1,4 +1,4 @@
-//! `quietcut plan`: a search for the smallest set of tests that reduces the uncertainty of the stability limits to a
+//! `quietcut plan`: a search for the cheapest set of tests that reduces the uncertainty of the stability limits to a
 //! given width.
 
 use std::fmt::Write;
@@ -140,7 +140,7 @@ pub fn run(args: Args) -> Result<(), Error> {
 }
 
 /// Warnings about stability limits without derivatives with respect to the unknown parameters: one about first limits,
-/// whose spindle speeds the plan leaves out, and one about lobes at larger depths.
+/// whose spindle speeds the plan leaves out, and one about lobes at larger depths; each only if there are such limits.
 fn derivative_warnings(without_derivative: &[WithoutDerivative]) -> Vec<String> {
     let listed = |is_first: bool| -> Vec<String> {
         without_derivative
@@ -203,7 +203,7 @@ fn request(args: &Args) -> Request {
     }
 }
 
-/// Sentence that tells the machinist how to carry out one planned test.
+/// Instruction for the machinist: how to carry out one planned test.
 fn instruction(step: &Step) -> String {
     match &step.test {
         Test::Hammer { direction, impacts } => {

@@ -15,8 +15,8 @@ pub(super) fn warn(case: &Case) {
     }
 }
 
-/// Warnings, at most one for each direction, about directions of the tool that are statically softer or stiffer than
-/// any machine, or softer at a resonance; none if the case has no structure or the structure has no receptance.
+/// The warnings of [`warn()`], at most one for each direction; none if the case has no structure, or if the first-order
+/// form of the structure cannot be computed.
 fn warnings(case: &Case) -> Vec<String> {
     let Some(first_order) = case
         .structure

@@ -10,15 +10,15 @@ use super::Error;
 /// Smallest writable unit of the flash memory, bytes.
 const WORD: usize = 8;
 
-/// Postures of the lobe table in the bytes of the file at `path`.
+/// Postures of the lobe table in `bytes`, ascending; an error names the file `path`.
 pub(super) fn of_table(path: &Path, bytes: &[u8]) -> Result<Vec<u8>, Error> {
     let table = LobeTable::parse(bytes)
         .map_err(|error| Error::input(format!("{}: this is no lobe table: {error}", path.display())))?;
     Ok(postures(&table))
 }
 
-/// Postures of the newest lobe table in the memory file of the simulated device; `None` if the file cannot be read or
-/// holds no lobe table.
+/// Postures, ascending, of the lobe table with the highest generation number in the memory file of the simulated
+/// device; `None` if the file cannot be read or holds no valid lobe table.
 pub(super) fn of_state(path: &Path) -> Option<Vec<u8>> {
     let bytes = crate::file::read(path).ok()?;
     // The firmware begins a lobe table at a multiple of a word of the flash memory.

@@ -127,8 +127,8 @@ fn on_host(args: &Args, sensed: &Sensed, table: Option<&[u8]>) -> Result<Verdict
     Ok(log)
 }
 
-/// Runs the signal chain of a device on a recording. Afterwards it restores the settings, the working point and a
-/// replaced feed direction of the device, and returns it to its own sensor; an uploaded lobe table stays.
+/// Runs the signal chain of a device on a recording. Afterwards the device gets back its settings, its working point,
+/// the feed direction that `--feed-direction-deg` replaced, and its own sensor; an uploaded lobe table stays.
 fn on_device(args: &Args, port: &str, sensed: &Sensed, table: Option<&[u8]>) -> Result<VerdictLog, Error> {
     let (mut client, _) = Client::connect(device::open(port, None)?)?;
     if let (Some(bytes), Some(path)) = (table, &args.table) {
@@ -154,7 +154,8 @@ fn on_device(args: &Args, port: &str, sensed: &Sensed, table: Option<&[u8]>) -> 
     Ok(log)
 }
 
-/// Configures the device for the recording, sends it the recorded samples, and collects its reports.
+/// Configures the device for the recording, sends the recorded samples to the device, and logs the reports of the
+/// device on them.
 fn feed_recording(args: &Args, client: &mut Client, sensed: &Sensed) -> Result<VerdictLog, Error> {
     client.set_settings(sensed.settings)?;
     client.set_working_point(sensed.working_point)?;
@@ -169,7 +170,7 @@ fn feed_recording(args: &Args, client: &mut Client, sensed: &Sensed) -> Result<V
     for (block, edges) in sensed.steps() {
         client.feed(block, edges)?;
         // The last report before the reply to a fed block is the report on this block. Earlier reports belong to the
-        // device's own sensor, which it evaluates until the first block is fed.
+        // sensor of the device, whose samples the device evaluates until the first block is fed.
         let mut last = None;
         while let Some(event) = client.next_event(Duration::ZERO)? {
             if let Event::Report(report) = event {

@@ -36,7 +36,7 @@ pub(super) struct StatedColumns {
     record: Option<u32>,
 }
 
-/// Recordings that a verb has read, and how their files were understood where they had to be interpreted.
+/// Recordings that a verb has read, and how each record that had to be interpreted was understood.
 #[derive(Default)]
 pub(super) struct Recorded {
     pub(super) recordings: Vec<Recording>,

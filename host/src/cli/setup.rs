@@ -253,8 +253,8 @@ impl Given {
         }
     }
 
-    /// Answers of the user with nothing missing. A missing answer is asked for on the terminal if `ask`; otherwise the
-    /// error names the option that gives it.
+    /// Answers of the user with nothing missing. A missing answer without a default is asked for on the terminal if
+    /// `ask`; otherwise the error names the options for the missing answers.
     fn complete(mut self, default_name: &str, ask: bool) -> Result<Answers, Error> {
         let missing = self.missing();
         if !missing.is_empty() && !ask {

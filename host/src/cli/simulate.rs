@@ -270,7 +270,8 @@ fn tachometer(args: &Args) -> Result<TachometerModel, Error> {
     })
 }
 
-/// Builds the cut from the options; without `--entry` it chooses feed if the case and the duration allow it, else ramp.
+/// Builds the cut from the options. Without `--entry` the entry is feed, or ramp if the tool diameter is not given or
+/// the duration is too short for feed.
 fn cut(args: &Args, case: &Case, effects: Effects) -> Result<VirtualCut, Error> {
     let (Some(rpm), Some(depth_mm), Some(seconds)) = (args.rpm, args.depth_mm, args.seconds) else {
         return Err(Error::input(

@@ -104,7 +104,8 @@ struct ModeOutput {
     damping_ratio: f32,
 }
 
-/// Derivatives of both ends of an unstable depth interval of the lobe table, mm per relative change of the parameter.
+/// Derivatives of both ends of an unstable depth interval of the lobe table, the lower end first, mm per relative
+/// change of the parameter. Inner lists are in the order of the modes of the layer.
 #[derive(Serialize)]
 struct DerivativesOutput {
     by_frequency_mm: [Vec<f32>; 2],

@@ -48,7 +48,8 @@ pub struct Args {
 struct WorkingPointOutput<'a> {
     port: &'a str,
     working_point: WorkingPointAnswer,
-    /// Feed direction that the device uses, in degrees from the machine's x towards its y; `null` if none is set.
+    /// Feed direction that the device uses, in degrees from the machine's x towards its y; `null` if none is set, or if
+    /// older firmware has none.
     feed_direction_deg: Option<f64>,
 }
 
@@ -93,8 +94,8 @@ pub fn run(args: Args) -> Result<(), Error> {
             args.port.name()
         ))
     })?;
-    // The requests for the feed direction come last, because older firmware rejects them. The device's earlier
-    // feed direction is replaced or removed.
+    // The requests for the feed direction come last, because older firmware rejects them. The earlier feed direction of
+    // the device is replaced by that of the option, or removed without the option.
     let direction = args.feed_direction_deg.map(|degrees| Degrees(degrees as f32));
     if direction.is_some() || client.feed_direction()?.is_some() {
         client.set_feed_direction(direction)?;

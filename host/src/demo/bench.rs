@@ -17,7 +17,7 @@ use crate::simulate::{SensedCut, VirtualCutError};
 /// Failure of a cut on the test bench.
 #[derive(Debug, thiserror::Error)]
 pub enum BenchError {
-    /// The device failed or does not answer.
+    /// Starting the device, or a request to it, failed.
     #[error(transparent)]
     Device(#[from] DeviceError),
     /// The cut cannot be simulated.
@@ -28,7 +28,7 @@ pub enum BenchError {
     Silent,
 }
 
-/// Longest wait for a report during a cut: a choice far above the computing time of a block.
+/// Longest wait for the next event of the device during a cut: a choice far above the computing time of a block.
 const REPORT_TIMEOUT: Duration = Duration::from_secs(20);
 
 /// Duration of each cut, s: a choice, long enough for detection and for the stationary vibration after it.
@@ -110,7 +110,7 @@ impl Bench {
             strobes: true,
         };
         self.client.subscribe(all)?;
-        // Sending cannot fail: the bench owns the device, which receives cuts until it is dropped.
+        // A failure to send is not handled here: no report of the last block then arrives, which is an error below.
         let _ = self.cuts.send(recorded);
         let last = self.next_sequence.wrapping_add(blocks).wrapping_sub(1);
         self.collect(&mut trial, last)?;

@@ -19,19 +19,20 @@ use crate::report::{PictureError, words};
 pub struct Story {
     /// First cut, before any advice.
     pub first: Trial,
-    /// Cut with the advised speed and depth; `None` without advice.
+    /// Cut with the advised speed and depth; `None` if no other speed or depth was advised.
     pub advised: Option<Trial>,
 }
 
 /// Spindle speeds of the lobe chart, rev/min: a choice that contains all cuts of the demonstration.
 const CHART_RPM: RangeInclusive<f64> = 850.0..=1200.0;
-/// Largest axial depth of the lobe chart, mm: a choice, twice the depth of the cuts.
+/// Largest axial depth of the lobe chart, mm: a choice, twice the depth of the first cuts.
 const CHART_DEPTH_MM: f64 = 4.0;
 /// Highest frequency of the spectra, Hz: a choice that shows the modes of the robot and the first tooth-passing
 /// harmonics.
 const SPECTRUM_HZ: f64 = 120.0;
 
-/// Renders the page: the lobe chart of the table with all cuts, then the texts and pictures of each story.
+/// Renders the page: the lobe chart of the first layer of the table with all cuts, then the texts and pictures of each
+/// story.
 ///
 /// # Errors
 /// A picture cannot be drawn.
@@ -94,7 +95,8 @@ fn kind(trial: &Trial) -> String {
 fn chapter(story: &Story) -> Result<Markup, PictureError> {
     let trials: Vec<&Trial> = std::iter::once(&story.first).chain(&story.advised).collect();
     let axis = dominant_axis(&story.first);
-    // The first and the advised cut share one scale, so that their vibrations can be compared.
+    // The time signals of the first and the advised cut share one scale, as do their stroboscopic samples, so that the
+    // vibrations can be compared.
     let scale = CommonScale {
         axis,
         signal: around_zero(

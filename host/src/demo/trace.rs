@@ -14,7 +14,8 @@ pub struct Trace {
 
 impl Trace {
     /// Filters the blocks into the structure band as the device does, and removes the delay of the filter. The sampling
-    /// rate follows from the time stamps of the first and the last block.
+    /// rate follows from the time stamps of the first and the last block. The trace is empty if no sample precedes the
+    /// last block, or if the filter does not support the nominal rate of the sensor.
     pub fn of(blocks: &[Block], sensor: &Sensor) -> Self {
         let mut trace = Self::default();
         let (Ok(decimation), Some(first), Some(last)) = (
@@ -37,7 +38,7 @@ impl Trace {
                 continue;
             };
             let t_s = (index as f64 - delay) * period_s;
-            // Negative times are the transient of the filter at the first sample.
+            // Values at negative times are left out: they belong to the transient of the filter.
             if t_s < 0.0 {
                 continue;
             }

@@ -46,7 +46,7 @@ impl Trial {
             .find(|report| report.judgement.verdict.is_chatter())
     }
 
-    /// Last report of the device before the tool begins to leave the workpiece.
+    /// Last report of the device before the end of full engagement; `None` if there is none.
     pub fn last_in_cut(&self) -> Option<&Report> {
         let end = self
             .reports
@@ -64,7 +64,8 @@ impl Trial {
         self.rpm / 60.0 * f64::from(self.teeth)
     }
 
-    /// Number of tooth passings between the start of full engagement and the time `t_s`.
+    /// Number of tooth passings, not rounded, from the start of full engagement to the time `t_s`; negative if `t_s` is
+    /// earlier.
     pub fn teeth_since_entry(&self, t_s: f64) -> f64 {
         (t_s - self.full_cut_s[0]) * self.tooth_passing_hz()
     }
@@ -88,7 +89,7 @@ impl Trial {
             .collect()
     }
 
-    /// Latest power spectrum that the device completed before the end of full engagement.
+    /// Latest power spectrum that the device completed before the end of full engagement; `None` if there is none.
     pub fn spectrum_in_cut(&self) -> Option<&Spectrum> {
         let last = self.last_in_cut()?.sequence;
         self.spectra
@@ -97,8 +98,8 @@ impl Trial {
             .find(|spectrum| spectrum.sequence <= last)
     }
 
-    /// Appends a chunk of a power spectrum of the structure band; chunks arrive in order, and one after a gap is
-    /// ignored.
+    /// Appends a chunk of a power spectrum of the structure band; chunks of another band, and chunks of a spectrum
+    /// after a gap, are ignored.
     pub(super) fn take_spectrum(&mut self, chunk: &SpectrumChunk) {
         if chunk.band != Band::Structure {
             return;

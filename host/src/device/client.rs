@@ -28,7 +28,7 @@ pub(super) const REPLY_AFTER_ERASE: Duration = Duration::from_secs(3);
 /// Longest wait for the reply to a request after an unreadable frame: a choice.
 const AFTER_NOISE: Duration = Duration::from_millis(if cfg!(test) { 10 } else { 150 });
 
-/// Longest time to send one frame: a choice above the 0.6 s of the largest frame at 9600 bit/s.
+/// Longest time to send one frame: a choice above the 0.55 s of the largest frame at 9600 bit/s.
 const SEND: Duration = Duration::from_secs(2);
 
 /// Message that the device sends without a request.
@@ -85,7 +85,8 @@ impl Client {
         self.port.name()
     }
 
-    /// Number of frames of the device that did not arrive, from the gaps in their sequence numbers.
+    /// Number of frames of the device that did not arrive since the connection, from the gaps in their sequence
+    /// numbers.
     pub fn lost_frames(&self) -> u32 {
         self.lost_frames
     }
@@ -135,8 +136,8 @@ impl Client {
 
     /// Requests the feed direction; `None` if none is set.
     ///
-    /// Older firmware does not support this request and is treated as having none. It must be the last request to such
-    /// a device.
+    /// Older firmware does not support this request and is treated as having none. This request must be the last one to
+    /// such a device.
     pub fn feed_direction(&mut self) -> Result<Option<Degrees>, DeviceError> {
         match self.exchange(&Request::FeedDirection, "feed direction", REPLY) {
             Ok(Reply::FeedDirection(direction)) => Ok(direction),
@@ -242,7 +243,7 @@ impl Client {
         })
     }
 
-    /// Waits for the reply to a sent request; `None` if it must be sent again.
+    /// Waits for the reply to request `number`; `None` if no usable reply came, so that the request must be sent again.
     fn await_reply(
         &mut self,
         number: u16,
@@ -300,8 +301,8 @@ impl Client {
         Ok(answer)
     }
 
-    /// Queues an event of the device; returns a response that concerns the request with this number, and otherwise
-    /// `None`.
+    /// Queues an event of the device. Returns a reply to the request with this number, or the refusal of a frame;
+    /// otherwise `None`.
     fn sort(&mut self, sequence: u16, response: Response, number: Option<u16>) -> Option<ReplyFrame> {
         let order = self.responses.check(sequence);
         if let Err(FrameError::OutOfOrder { expected, found }) = order {
@@ -318,7 +319,7 @@ impl Client {
                 return Some(ReplyFrame::Version(theirs));
             }
             Response::FrameRefused(error) => return Some(ReplyFrame::Again(error)),
-            // Drops a second reply to a request that was repeated.
+            // Drops a reply to another request, such as a second reply to an earlier request that was repeated.
             Response::Reply { request, .. } if Some(request) != number => {}
             Response::Reply { reply, .. } => {
                 return Some(match order {

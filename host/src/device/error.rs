@@ -73,8 +73,8 @@ pub enum DeviceError {
         /// Number of times that the host sent the request.
         attempts: u32,
     },
-    /// Frames from or to the device are damaged, unknown to the receiver or out of order, also after the request was
-    /// repeated.
+    /// No usable reply arrived after all attempts, and at least one frame from or to the device was damaged, unknown to
+    /// the receiver or out of order.
     #[error(
         "{port}: no usable answer to {request}, asked {attempts} times: {error}; check the cable and that nothing else uses the port"
     )]
@@ -110,7 +110,7 @@ pub enum DeviceError {
         /// Reason of the refusal.
         refusal: Refusal,
     },
-    /// The reply of the device does not belong to the request of the host.
+    /// The reply of the device is not of the kind that belongs to the request.
     #[error("{port}: the device answers `{reply}` to {request}: it does not keep to the protocol")]
     Unexpected {
         /// Name of the port.

@@ -10,11 +10,11 @@ use super::DeviceError;
 use super::client::Client;
 
 impl Client {
-    /// Feeds one block and the tachometer edges up to its end; returns after the signal chain has processed it.
-    /// Subscribed events of the block are then available from [`next_event`](Self::next_event).
+    /// Feeds one block and the tachometer edges up to the end of the block; returns after the signal chain has
+    /// processed the block. Its subscribed events are then available from [`next_event`](Self::next_event).
     ///
     /// # Errors
-    /// The device does not answer or refuses the block.
+    /// The port fails, or the device does not answer or refuses the block or the edges.
     pub fn feed(&mut self, block: &Block, edges: &[Edge]) -> Result<(), DeviceError> {
         let (before, with) = edges.split_at(edges.len().saturating_sub(MAX_FEED_EDGES));
         for some in before.chunks(MAX_EDGES) {

@@ -38,8 +38,8 @@ pub enum FlashFileError {
     },
 }
 
-/// Flash memory with the write and erase rules of the board. Every change is written to the file at once, so that an
-/// aborted command leaves the same state as a power failure.
+/// Flash memory with the write and erase rules of the board. Every change is written at once to the state file, if
+/// there is one, so that an aborted command loses no earlier change.
 pub(super) struct FlashFile {
     flash: FlashModel<Vec<u8>, WORD, PAGE>,
     file: Option<File>,

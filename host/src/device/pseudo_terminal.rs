@@ -21,7 +21,7 @@ impl PseudoTerminal {
     /// Creates a pseudo-terminal.
     ///
     /// # Errors
-    /// The operating system has no free pseudo-terminal.
+    /// The operating system has no free pseudo-terminal or no free handles.
     pub fn new() -> Result<Self, DeviceError> {
         let failed = |cause| DeviceError::PseudoTerminal { cause };
         let (device_end, host_end) = TTYPort::pair().map_err(failed)?;
@@ -67,7 +67,8 @@ impl PseudoTerminal {
         }
     }
 
-    /// Sends as many bytes as the line accepts within `timeout` and returns their number.
+    /// Sends as many bytes as the line accepts, waiting at most `timeout` until it accepts any; returns their number, 0
+    /// if it accepts none.
     pub fn send(&mut self, bytes: &[u8], timeout: Duration) -> io::Result<usize> {
         self.device_end.set_timeout(timeout)?;
         match self.device_end.write(bytes) {

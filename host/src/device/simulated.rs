@@ -150,8 +150,8 @@ struct Machine {
     stop: Arc<AtomicBool>,
 }
 
-/// Clock of the simulated device: the time of its newest sample block at [`Pace::AsFastAsPossible`], else the time
-/// since the start of the device.
+/// Clock of the simulated device: the time of its newest sample block. At [`Pace::RealTime`] the time since the start
+/// of the device, read before each wait for the serial line, advances it too.
 #[derive(Clone)]
 struct SharedClock(Arc<AtomicU64>);
 
@@ -161,7 +161,7 @@ impl Clock for SharedClock {
     }
 }
 
-/// Longest wait of the simulated device for the serial line while no block of samples is due: a choice.
+/// Longest wait of the simulated device for the serial line at a time: a choice.
 const IDLE: Duration = Duration::from_millis(5);
 
 impl Machine {
@@ -206,8 +206,8 @@ impl Machine {
         }
     }
 
-    /// True if the virtual spindle has a further block of samples that is due: in real time once the time of its
-    /// samples has passed, else at once.
+    /// True if the virtual spindle has a further block of samples that is due: in real time once the time stamp of the
+    /// block has passed, else at once.
     fn step_due(&mut self, clock: &SharedClock, began: Instant) -> bool {
         let now = clock.now();
         let Some((block, _)) = self.spindle.peek(now) else {

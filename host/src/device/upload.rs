@@ -16,7 +16,7 @@ const RESTARTS: u32 = 3;
 pub struct Uploaded {
     /// Identity and memory slots of the device after the upload of the table.
     pub info: Info,
-    /// Offset of the first byte of the lobe table that was sent; greater than 0 if an interrupted upload was resumed.
+    /// Offset in the lobe table at which an interrupted upload was resumed, bytes; 0 if no upload was resumed.
     pub resumed_at: u32,
 }
 

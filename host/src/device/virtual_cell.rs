@@ -83,8 +83,8 @@ impl VirtualCell {
         virtual_cut(spindle_rpm, depth_mm, seconds).full_cut_s(&self.case)
     }
 
-    /// Endless sequence of three cuts: period doubling, stable, Hopf. Each cut is computed while the previous one is
-    /// played.
+    /// Sequence that repeats three cuts without end: period doubling, stable, Hopf. Cuts are computed while earlier
+    /// ones are played. The sequence ends if a cut cannot be simulated.
     pub fn endless_cuts(self) -> Receiver<SensedCut> {
         const CUTS: [(f64, f64); 3] = [(1045.0, 2.0), (1045.0, 1.0), (900.0, 2.0)];
         const SECONDS: f64 = 12.0;

@@ -41,7 +41,7 @@ impl VirtualSpindle {
         self.steps.front()
     }
 
-    /// Removes and returns the block of [`peek`](Self::peek).
+    /// Removes and returns the block that [`peek`](Self::peek) shows; `None` if it has found none.
     pub(super) fn take(&mut self) -> Option<Step> {
         self.steps.pop_front()
     }

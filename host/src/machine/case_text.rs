@@ -50,10 +50,9 @@ fn engaged_deg(radial_depth_mm: f64, diameter_mm: f64) -> f64 {
 pub enum MaterialAnswer {
     /// Class of materials, whose coefficients are only known to lie in a range.
     Range(&'static MaterialRange),
-    /// Specific cutting coefficients that the user gives: tangential, radial and axial, MPa, with the standard
-    /// deviation of the tangential one if it is known.
+    /// Specific cutting coefficients that the user gives; the radial one may be assumed.
     Given {
-        /// Cutting coefficients, MPa.
+        /// Tangential, radial and axial specific cutting coefficient, MPa.
         cutting_mpa: [f64; 3],
         /// Standard deviation of the tangential specific cutting coefficient, MPa; `None` if unknown.
         ktc_std_mpa: Option<f64>,
@@ -83,12 +82,12 @@ pub struct Answers {
     pub feed_per_tooth_mm: f64,
     /// Lowest and highest speed of the spindle, rev/min.
     pub rpm: (f64, f64),
-    /// Power of the spindle, W.
+    /// Power of the spindle, W; `None` if not given.
     pub power_w: Option<f64>,
 }
 
-/// Text of a case file from the answers of the user, with comments. It has no structure: `identify`
-/// adds that from tap tests.
+/// Text of a case file from the answers of the user, with comments. The case has no structure: `identify` adds the
+/// structure from tap tests.
 pub fn case_text(answers: &Answers) -> String {
     let mut text = String::new();
     // Writing to a String cannot fail.
@@ -182,7 +181,7 @@ fn write_material(text: &mut String, answers: &Answers) -> std::fmt::Result {
     Ok(())
 }
 
-/// A number as text of a TOML file, rounded to 13 significant digits so that no rounding error shows.
+/// A number as text of a TOML file, rounded to 13 significant digits to hide small rounding errors.
 fn float(value: f64) -> String {
     let rounded: f64 = format!("{value:.12e}").parse().unwrap_or(value);
     format!("{rounded:?}")

@@ -12,12 +12,12 @@ use crate::case::{Case, CaseError};
 use crate::frf::FrfTable;
 use crate::recording::{Import, Recording, cut_table};
 
-/// File name extensions of recordings.
+/// File name extensions of the recordings in the folders `taps` and `cuts`.
 const RECORDINGS: [&str; 10] = [
     "csv", "mat", "uff", "unv", "wav", "txt", "dat", "lvm", "tdms", "uf",
 ];
 
-/// File name extensions of the tables of receptances that `identify` reads.
+/// File name extensions of the tables of receptances in the folder `frf`.
 const RECEPTANCES: [&str; 4] = ["csv", "uff", "unv", "uf"];
 
 /// Reason why the folder of a machine cannot be used.
@@ -35,7 +35,7 @@ pub enum FolderError {
         /// The file.
         path: PathBuf,
     },
-    /// The folder cannot be read.
+    /// The folder `taps`, `frf` or `cuts` cannot be read.
     #[error("{}: the folder cannot be read", path.display())]
     Unreadable {
         /// The folder.
@@ -43,7 +43,7 @@ pub enum FolderError {
         /// Reason of the system.
         source: io::Error,
     },
-    /// `case.toml` is wrong.
+    /// `case.toml` cannot be read or is not a valid case.
     #[error(transparent)]
     Case(#[from] CaseError),
 }
@@ -57,7 +57,7 @@ pub struct DatedFile {
     pub changed: SystemTime,
 }
 
-/// Files in the folder of one machine.
+/// Files in the folder of one machine. A field of a single file is `None` if there is no such file.
 #[derive(Clone, Debug)]
 pub struct MachineFolder {
     /// Path of the machine's folder as the user gave it.
@@ -141,8 +141,7 @@ impl MachineFolder {
     /// Lists the files in the folder of a machine, reads its case, and tries to read its recordings and tables.
     ///
     /// # Errors
-    /// The folder cannot be read, or `case.toml` is wrong. A recording or table that cannot be read is no error: see
-    /// [`MachineFolder::broken`].
+    /// See [`FolderError`]. A recording or table that cannot be read is no error: see [`MachineFolder::broken`].
     pub fn read(path: &Path) -> Result<Self, FolderError> {
         if path.is_file() {
             return Err(FolderError::File { path: path.into() });
@@ -211,7 +210,8 @@ fn files_in(folder: &Path, endings: &[&str]) -> io::Result<Vec<DatedFile>> {
     Ok(files)
 }
 
-/// The file at a path, with the time of its last change; `None` if there is no regular file.
+/// The file at a path, with the time of its last change; `None` if there is no regular file, or if this time cannot be
+/// read.
 fn dated(path: PathBuf) -> Option<DatedFile> {
     let about = fs::metadata(&path).ok()?;
     let changed = about.is_file().then(|| about.modified().ok()).flatten()?;

@@ -10,7 +10,7 @@ use super::folder::{BrokenFile, DatedFile, FileKind, MachineFolder};
 /// Next useful command for a machine, with its reason.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct NextStep {
-    /// State of the machine's folder: one statement for each kind of file, and one for each file that cannot be read.
+    /// State of the machine's folder: statements about its files, then one for each file that cannot be read.
     pub state: Vec<String>,
     /// The command to run next.
     pub command: String,

@@ -13,7 +13,7 @@ use super::words;
 /// Verdict of the chatter detector after one block of samples.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct VerdictAnswer {
-    /// Time of the end of the block of samples to which the verdict belongs, s, on the clock of the samples.
+    /// Time of the last sample of the block to which the verdict belongs, s, on the clock of the samples.
     pub t_s: f64,
     /// Key of the verdict, see [`words::verdict_key`].
     pub verdict: &'static str,
@@ -40,7 +40,7 @@ pub struct AdviceAnswer {
     pub source: &'static str,
     /// Whether the advice assumes a working point because none is set.
     pub assumed_working_point: bool,
-    /// Reason for the advice, as a sentence.
+    /// Reason for the advice, as text for the user.
     pub why: String,
 }
 
@@ -80,7 +80,8 @@ impl AdviceAnswer {
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct VerdictLog {
     /// The first verdict of the sequence, and every later one that differs from the entry before it in verdict or
-    /// advice. A change of the advised speed by at most 1 % does not count.
+    /// advice. A change of the advised speed by at most 1 % does not count, nor any change of speed or depth while the
+    /// advice is to keep cutting.
     pub verdicts: Vec<VerdictAnswer>,
     /// Summary over all reports.
     pub summary: Summary,
@@ -99,7 +100,7 @@ pub struct Summary {
     pub blocks: u64,
     /// Number of clipped acceleration samples since the signal chain was started or reset.
     pub clipped: u32,
-    /// Number of gaps in the sequence of samples, where samples are missing.
+    /// Number of gaps in the sequence of samples: reports that count more lost samples than the report before.
     pub gaps: u32,
     #[serde(skip)]
     lost: u32,
@@ -122,7 +123,7 @@ impl fmt::Display for Summary {
 }
 
 impl VerdictLog {
-    /// Adds the next report to the log; returns its verdict if verdict or advice differs from the last entry.
+    /// Adds the next report to the log; returns its entry in [`VerdictLog::verdicts`], or `None` if it gets none.
     pub fn take(&mut self, report: &Report) -> Option<&VerdictAnswer> {
         let next = VerdictAnswer::new(report);
         let summary = &mut self.summary;
@@ -151,8 +152,8 @@ fn is_same_advice(a: Option<&AdviceAnswer>, b: Option<&AdviceAnswer>) -> bool {
         (None, None) => true,
         (Some(a), Some(b)) => {
             let near = (a.rpm - b.rpm).abs() <= SAME_SPEED * a.rpm;
-            // Two answers that advise to keep cutting are equal whatever speed is measured; others are equal if their
-            // advised speeds are near each other and their depths are equal.
+            // With the same action and source, two pieces of advice are equal if both are to keep cutting, or if their
+            // speeds are near each other and their depths are equal.
             let same_target = a.action == "keep" || (near && a.depth_mm == b.depth_mm);
             a.action == b.action && a.source == b.source && same_target
         }

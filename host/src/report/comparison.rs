@@ -16,11 +16,11 @@ pub struct Line {
     pub name: String,
     /// Points (x, y).
     pub points: Vec<(f64, f64)>,
-    /// Meaning of the line in the chart, which sets its colour and shape.
+    /// Meaning of the line in the chart, which sets colour and shape of the line.
     pub role: LineRole,
 }
 
-/// Meaning of a line, which sets its colour and shape.
+/// Meaning of a line, which sets colour and shape of the line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LineRole {
     /// Measured signal.
@@ -50,8 +50,8 @@ impl LineRole {
     }
 }
 
-/// Draws lines over a common axis as SVG of `size` pixels; `y_range` is the range of the vertical axis, by default that
-/// of all points.
+/// Draws lines over a common axis as SVG of `size` pixels, with the `y_range` of the vertical axis; `None` chooses a
+/// range that contains all points.
 ///
 /// # Errors
 /// There are fewer than two points, or the drawing library fails.

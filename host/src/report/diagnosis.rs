@@ -14,7 +14,8 @@ use crate::diagnose::{Diagnosis, ResidualView};
 /// of residual to noise: a choice.
 const PICTURED: usize = 3;
 
-/// Renders the page of `diagnosis`; `case_name` names the baseline model, `extended` is the text of the extended case.
+/// Renders the page of `diagnosis`; `case_name` names the baseline model. `extended` is the text of the extended case,
+/// or `None` to leave it out.
 ///
 /// # Errors
 /// A picture cannot be drawn.
@@ -121,8 +122,8 @@ fn prediction_error_table(diagnosis: &Diagnosis) -> Markup {
     }
 }
 
-/// Pictures of the residual of the case in the [`PICTURED`] recorded channels with the largest ratio of residual to
-/// noise.
+/// Pictures of the residual of the case in at most [`PICTURED`] recorded channels, those with the largest ratio of
+/// residual to noise.
 fn all_pictures(diagnosis: &Diagnosis) -> Result<Markup, PictureError> {
     let mut views: Vec<&ResidualView> = diagnosis.views.iter().collect();
     let residual_to_noise = |view: &ResidualView| view.sizes()[1] / view.deviation.max(f64::MIN_POSITIVE);

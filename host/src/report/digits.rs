@@ -1,7 +1,7 @@
-//! Numbers for a reader: a fixed number of significant digits, never an exponent such as `6.86495e2`.
+//! Numbers as text for a reader, without an exponent such as in `6.86495e2`.
 
-/// A number with this many significant digits: decimals from 0.0001 to below 10⁶, else a power of ten, as in
-/// `6.86·10¹²`.
+/// A number with this many significant digits: as a decimal number from 0.0001 to below 10⁶, where all digits before
+/// the point are shown; otherwise with a power of ten, as in `6.86·10¹²`. Zero is `0`.
 pub fn significant(value: f64, digits: usize) -> String {
     if value == 0.0 {
         return "0".into();

@@ -1,5 +1,5 @@
-//! Stability lobe diagram: stable axial depths over spindle speed, kind of each limit, trial cuts. A limit is a depth
-//! at which the dominant Floquet multiplier (characteristic multiplier) has the modulus 1.
+//! Stability lobe diagram: stable axial depths over spindle speed, first limits with their kind, trial cuts. A limit is
+//! a depth at which the dominant Floquet multiplier (characteristic multiplier) has the modulus 1.
 
 use plotters::chart::SeriesLabelPosition;
 use plotters::prelude::{Circle, LineSeries, PathElement, Polygon, Rectangle, WHITE};
@@ -35,9 +35,9 @@ pub struct Column {
     /// First stability limit at this speed; `None` if none was found up to the largest computed depth, or if the lowest
     /// interval of a lobe table that is not stable is undecided.
     pub first_limit: Option<FirstLimit>,
-    /// 5, 50 and 95 % percentiles of the first stability limit at this speed, mm; for an extended case the ends of its
-    /// 90 % interval with the limit between them. An entry is `None` if it is deeper than the largest computed depth.
-    /// `None` in all if no spread of the limit is computed.
+    /// 5, 50 and 95 % percentiles of the first stability limit at this speed, mm; for an extended case the lower end of
+    /// the 90 % interval of the limit, the limit, and the upper end. An entry is `None` if it is deeper than the
+    /// largest computed depth. The field is `None` if no spread or interval of the limit is known.
     pub percentiles_mm: Option<[Option<f64>; 3]>,
 }
 
@@ -174,7 +174,8 @@ fn draw_undecided(
     Ok(())
 }
 
-/// Draws the band between the 5 and 95 % percentiles of the first stability limit, and its median.
+/// Draws the band between the 5 and 95 % percentiles of the first stability limit, and lines along the 5, 50 and 95 %
+/// percentiles; nothing if fewer than two speeds have percentiles.
 fn draw_percentiles(
     chart: &mut Axes<'_, '_>,
     columns: &[Column],
@@ -243,7 +244,7 @@ fn draw_limits(
 ) -> Result<(), PictureError> {
     let (color, name) = limit_look(kind);
     for (index, run) in limit_runs(columns, depth_max_mm, kind).into_iter().enumerate() {
-        // A kind of stability loss that occurs at a single speed has no line to draw; a circle marks it.
+        // A run of a single speed has no line to draw; the circle at each point of a run marks it.
         chart.draw_series(run.iter().map(|&at| Circle::new(at, 1, color.filled())))?;
         let line = chart.draw_series(LineSeries::new(run, color.stroke_width(3)))?;
         if index == 0 {

@@ -27,9 +27,10 @@ pub struct Mark {
     pub depth_mm: f64,
     /// Outcome of the marked cut, which sets the symbol.
     pub kind: MarkKind,
-    /// Label beside the symbol of the cut; empty for none.
+    /// Label drawn near the symbol of the cut; empty for none.
     pub label: String,
-    /// Spindle speed in rev/min and axial depth in mm that the device advised after the cut, shown by an arrow.
+    /// Spindle speed in rev/min and axial depth in mm that the device advised after the cut, shown by an arrow; `None`
+    /// without advice.
     pub advice: Option<(f64, f64)>,
     /// True if the stability chart predicts the opposite outcome of the cut, which a ring shows.
     pub wrong: bool,
@@ -117,7 +118,7 @@ fn draw_label(
     let (w, h) = canvas.estimate_text_size(label, &style)?;
     let (w, h) = (w as i32 + 12, h as i32 + 6);
     let width = canvas.dim_in_pixel().0 as i32;
-    // The label is shifted sideways so that it stays within the picture.
+    // The label is shifted sideways so that it starts within the picture and, if it is no wider than that, ends there.
     let left = (at.0 - w / 2).clamp(0, (width - w).max(0));
     let tops = [
         at.1 - h - 11,

@@ -20,7 +20,7 @@ th, td { text-align: left; padding: 0.3em 1.1em 0.3em 0; border-bottom: 1px soli
 footer { color: #5a626e; font-size: 0.9em; margin-top: 3em; }
 ";
 
-/// Renders a complete HTML page around `body`; it needs no other file and no network.
+/// Renders a complete HTML page around `body`; it needs no other file and no network if `body` needs none.
 pub fn page(title: &str, body: &Markup) -> String {
     html! {
         (DOCTYPE)

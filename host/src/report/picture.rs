@@ -133,8 +133,8 @@ pub(super) fn label(
     Ok(())
 }
 
-/// Formats a number at a tick of an axis: rounded to four decimals, or with an exponent and two digits below 0.001 and
-/// from a million on.
+/// Formats a number at a tick of an axis: rounded to four decimals; with an exponent and two significant digits below
+/// 0.001 and from a million on; as 0 below 1e-12. The bounds are those of its absolute value.
 fn tick(value: &f64) -> String {
     let size = value.abs();
     if size < 1e-12 {

@@ -83,8 +83,7 @@ pub fn plan_chart(title: &str, plan: &Plan, depth_max_mm: f64) -> Result<String,
     })
 }
 
-/// Shaded area of the chart between a lower and an upper axial depth at each spindle speed, with its colour, opacity
-/// and name in the legend.
+/// Shaded area of the chart between a lower and an upper axial depth at each spindle speed.
 struct Band {
     interval: fn(&Speed) -> [f64; 2],
     color: RGBColor,

@@ -1,5 +1,5 @@
-//! Pictures of the residual of a channel, measured samples minus those of the baseline model: over time, frequency,
-//! spindle order, tooth passing, vibration amplitude and displacement.
+//! Pictures of one channel: of its residual, measured samples minus those of the model, over time, frequency, spindle
+//! order and tooth passing; of the missing force over vibration amplitude and displacement.
 
 use maud::{Markup, html};
 
@@ -18,15 +18,15 @@ const POINTS: usize = 3000;
 /// Width and height in pixels of residual pictures that stand side by side.
 const HALF_WIDTH_SIZE: (u32, u32) = (470, 330);
 
-/// Highest spindle order in the picture divided by the number of teeth: a choice that shows four harmonics of the tooth
-/// passing.
+/// Highest spindle order in the picture divided by the number of teeth, unless half the sample rate is lower: a choice
+/// that shows four harmonics of the tooth passing.
 const ORDERS_PER_TOOTH: f64 = 4.5;
 
-/// Number of tooth passings in the stroboscopic picture, the last ones of the record: a choice.
+/// Largest number of tooth passings in the stroboscopic picture, the last ones of the record: a choice.
 const PASSINGS: usize = 400;
 
-/// All residual pictures of one channel of one record; `channel_views` are the views of the channels of this name in
-/// all records, for the picture over the vibration amplitude.
+/// Residual pictures of one channel of one record, those for which there are data; `channel_views` are the views of the
+/// channels of this name in all records, for the picture over the vibration amplitude.
 ///
 /// # Errors
 /// A picture cannot be drawn.
@@ -84,7 +84,7 @@ pub(super) fn pictures(
     })
 }
 
-/// File name without its folders.
+/// Part of the path after its last slash.
 pub(super) fn file_name(path: &str) -> &str {
     path.rsplit('/').next().unwrap_or(path)
 }
@@ -124,9 +124,9 @@ fn over_time(view: &ResidualView, what: &str) -> Result<String, PictureError> {
     comparison((960, 300), [what, "time [s]", &unit], &lines, None)
 }
 
-/// Amplitude spectra, as logarithms to base 10, of the measured signal, the residuals and the noise of a channel up to
-/// `last_hz`, each with at most `points` frequency lines up to half the sample rate; `scale` converts Hz to the unit of
-/// the horizontal axis.
+/// Amplitude spectra, as logarithms to base 10, of the measured signal and the residuals of a channel, and its noise
+/// level if that is above 0. Each spectrum reaches up to `last_hz` and would have at most `points` points up to half
+/// the sample rate; `scale` converts Hz to the unit of the horizontal axis.
 fn spectra(view: &ResidualView, points: usize, last_hz: f64, scale: f64) -> Vec<Line> {
     let mut lines: Vec<Line> = signals(view)
         .into_iter()
@@ -166,8 +166,8 @@ fn over_orders(view: &ResidualView, spindle: &SpindleMotionView) -> Result<Strin
     let unit = format!("log10 of {} [{}]", view.channel, view.unit);
     let revolutions_hz = spindle.rpm / 60.0;
     let last_hz = (ORDERS_PER_TOOTH * spindle.teeth as f64 * revolutions_hz).min(0.5 * view.rate_hz);
-    // With this number of points up to half the sample rate the spectrum has ten frequency lines per spindle order, or
-    // fewer in a record shorter than ten revolutions.
+    // With this number of points up to half the sample rate the spectrum has ten points per spindle order, or fewer in
+    // a record shorter than ten revolutions.
     let points = (5.0 * view.rate_hz / revolutions_hz) as usize;
     let lines = spectra(view, points, last_hz, revolutions_hz.recip());
     comparison(HALF_WIDTH_SIZE, ["", "spindle order", &unit], &lines, None)
@@ -180,12 +180,12 @@ fn stroboscopic_map(samples: &[(u32, f64)], what: &str, view: &ResidualView) -> 
 }
 
 /// Picture of the stiffness and damping that the baseline model lacks, over the displacement amplitude; `None` with
-/// fewer than three amplitudes, or if the largest is less than [`AMPLITUDE_RATIO`] times the smallest.
+/// fewer than three points, or if the largest amplitude is less than [`AMPLITUDE_RATIO`] times the smallest.
 fn over_amplitude(records: &[&MissingForce]) -> Result<Option<String>, PictureError> {
     let rms = |a: &[f64]| (a.iter().map(|x| x * x).sum::<f64>() / a.len().max(1) as f64).sqrt();
-    // One point for each segment of a record: displacement amplitude in µm; missing stiffness k divided by the static
-    // stiffness; ω·c divided by the static stiffness, with the missing damping c and ω as the ratio of the
-    // root-mean-square values of velocity and displacement over the record.
+    // One point for each segment of each record whose static stiffness is positive: displacement amplitude in µm;
+    // missing stiffness k divided by the static stiffness; ω·c divided by the static stiffness, with the missing
+    // damping c and ω as the ratio of the root-mean-square values of velocity and displacement over the record.
     let mut all: Vec<[f64; 3]> = Vec::new();
     for missing in records.iter().filter(|missing| missing.stiffness > 0.0) {
         let omega = rms(&missing.v) / rms(&missing.x).max(f64::MIN_POSITIVE);

@@ -11,9 +11,9 @@ const SIZE: (u32, u32) = (470, 330);
 /// Frequencies that are marked in the picture of a spectrum, Hz.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SpectrumMarks {
-    /// Tooth-passing frequency, Hz; thin lines mark its harmonics.
+    /// Tooth-passing frequency, Hz; thin lines mark it and its harmonics. `None` for no lines.
     pub tooth_passing_hz: Option<f64>,
-    /// Chatter frequency, Hz.
+    /// Chatter frequency, Hz; `None` for no mark.
     pub chatter_hz: Option<f64>,
 }
 

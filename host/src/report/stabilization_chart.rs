@@ -1,4 +1,5 @@
-//! Stabilization diagram: poles over the model order; below it the measured receptances and their modal fit.
+//! Stabilization diagram: poles over the model order; below it the magnitudes of the measured receptances and of the
+//! modal fit.
 
 use plotters::prelude::{Circle, LineSeries, PathElement, RGBColor};
 use plotters::style::Color;

@@ -2,7 +2,7 @@
 
 use quietcut_core::monitor::Report;
 
-/// Converts the time stamp of a report from ns to s; an `f64` holds whole nanoseconds exactly for 104 days.
+/// Converts the time stamp of a report from ns to s.
 pub fn seconds(report: &Report) -> f64 {
     report.time.0 as f64 / 1e9
 }

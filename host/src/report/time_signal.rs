@@ -18,8 +18,8 @@ pub struct TimeMark {
 
 /// Width and height in pixels of the chart of a signal over time.
 const SIZE: (u32, u32) = (960, 280);
-/// Largest number of subintervals of the time axis, in each of which the minimum and maximum of the signal are drawn: a
-/// choice above the width of the picture, 960 pixels.
+/// Largest number of runs of samples of which the minimum and maximum are drawn: a choice above the width of the
+/// picture, 960 pixels.
 const SUBINTERVALS: usize = 1200;
 
 /// Draws `values` at the ascending times `t_s` (equally many, s) as SVG; `range` is that of the vertical axis, by
@@ -51,7 +51,7 @@ pub fn time_signal(
             let line = [(moment.t_s, y.start), (moment.t_s, y.end)];
             chart.draw_series([PathElement::new(line, CHATTER.stroke_width(2))])?;
             let (x, top) = chart.backend_coord(&(moment.t_s, y.end));
-            // The labels of three events in a row get different heights, so that they do not overlap.
+            // The labels of three events in a row get different heights, so that these labels do not overlap.
             let row = 16 * (index as i32 % 3);
             label(canvas, (x + 6, top + 4 + row), &moment.label, INK)?;
         }
@@ -59,8 +59,8 @@ pub fn time_signal(
     })
 }
 
-/// Reduces a signal over time to its minimum and maximum in each of at most 1200 runs of equally many samples, in the
-/// order in which they occur; a signal of up to 2400 samples stays as it is.
+/// Reduces a signal over time to its minimum and maximum in each of at most 1200 runs of equally many samples (the last
+/// may be shorter), in the order in which they occur; a signal of up to 2400 samples stays as it is.
 pub(super) fn thinned(t_s: &[f64], values: &[f64]) -> Vec<(f64, f64)> {
     let points: Vec<(f64, f64)> = t_s.iter().copied().zip(values.iter().copied()).collect();
     let length = points.len().div_ceil(SUBINTERVALS).max(1);

@@ -1,4 +1,4 @@
-//! Texts of verdicts and advice for machinists, and their keys for JSON and CSV.
+//! Texts of verdicts and advice for machinists, and the short texts that stand for them in JSON and CSV.
 
 use quietcut_core::advice::{Action, Advice, Obstacle, Source};
 use quietcut_core::detector::{Judgement, Reason, Verdict};
@@ -9,7 +9,7 @@ use quietcut_core::working_point::WorkingPoint;
 
 use super::time::seconds;
 
-/// Text of a verdict that JSON and CSV outputs use as its key.
+/// Text that stands for a verdict in JSON and CSV outputs.
 pub fn verdict_key(verdict: Verdict) -> &'static str {
     match verdict {
         Verdict::AirCut => "air-cut",
@@ -22,7 +22,7 @@ pub fn verdict_key(verdict: Verdict) -> &'static str {
     }
 }
 
-/// Text of an advised action that JSON and CSV outputs use as its key.
+/// Text that stands for an advised action in JSON and CSV outputs.
 pub fn action_key(action: Action) -> &'static str {
     match action {
         Action::Keep => "keep",
@@ -32,7 +32,7 @@ pub fn action_key(action: Action) -> &'static str {
     }
 }
 
-/// Text of the source of advice that JSON and CSV outputs use as its key.
+/// Text that stands for the source of advice in JSON and CSV outputs.
 pub fn source_key(source: Source) -> &'static str {
     match source {
         Source::Table => "table",
@@ -76,7 +76,8 @@ pub fn reason(reason: Reason) -> &'static str {
     }
 }
 
-/// One line of text for a report: time, spindle speed, verdict, and the advice unless it is to keep cutting.
+/// One line of text for a report: time, spindle speed, verdict; also the advice with its reason, unless there is none
+/// or it is to keep cutting.
 pub fn line(report: &Report) -> String {
     match &report.advice {
         Some(advice) if advice.action != Action::Keep => format!(
@@ -115,8 +116,8 @@ pub fn action(advice: &Advice) -> String {
     }
 }
 
-/// Reason for the advice: its source and, where there are such, the obstacle to a better source and the assumed working
-/// point; for the advice to keep cutting only that no chatter is detected. `speed` is the spindle speed of the report.
+/// Reason for the advice: its source, then the obstacle and the assumed working point that it states, if any; for the
+/// advice to keep cutting only that no chatter is detected. `speed` is the spindle speed of the report.
 pub fn why(advice: &Advice, judgement: &Judgement, speed: Option<Rpm>) -> String {
     let mut parts = vec![source_reason(advice, judgement, speed)];
     if advice.action != Action::Keep {

@@ -12,8 +12,8 @@
 pub const LEAST_ERROR: f64 = 1e-7;
 
 /// Least stated error of a Floquet multiplier from the collocated map over a tooth period that Newton's method on the
-/// characteristic matrix did not confirm, relative to max(1, |μ|). It is ten times the residual 1e-7 at which Krylov
-/// spaces settle.
+/// characteristic matrix did not confirm, relative to max(1, |μ|). It is ten times the residual up to which block
+/// Arnoldi accepts an eigenvalue as a starting value of Newton's method, 1e-7.
 pub(crate) const UNCONFIRMED: f64 = 1e-6;
 
 /// Factor in the stated error of a Floquet multiplier on its change from the working to the finer mesh of the period.
@@ -56,8 +56,8 @@ pub(crate) const KRYLOV_ANY: f64 = 0.25;
 pub(crate) const CROWD: usize = 24;
 
 /// Least |μ| of the largest Floquet multiplier at which multipliers are taken from the transition matrix Φ(w) alone,
-/// which omits the surface of the preceding tooth. That surface acts with the factor 1/μ, so that the eigenvalue of
-/// Φ(w) has a relative error of 1e-6, from which Newton's method starts.
+/// which omits the surface of the preceding tooth. That surface acts with the factor 1/μ, so that the relative error of
+/// the eigenvalue of Φ(w) is about 1e-6. Newton's method starts from that eigenvalue.
 pub(crate) const GROWN: f64 = 1e6;
 
 /// Largest entry of a period map, or of its projection on a Krylov space, relative to max(1, |μ|) of its largest
@@ -133,8 +133,8 @@ pub(crate) const LINE_FOLLOWED: f64 = 0.3;
 pub(crate) const LINE_POLISHED: f64 = 1e-3;
 
 /// Largest distance, half way between two sampled depths, between the tangents to a Floquet multiplier's path in the
-/// complex plane from both depths, as a share of the distance that the multiplier travels between them. A pair with a
-/// larger distance is taken as two different multipliers. Unfounded.
+/// complex plane from both depths, as a share of the distance that the multiplier travels between them; 1e-6 is added.
+/// A pair with a larger distance is taken as two different multipliers. Unfounded.
 pub(crate) const TANGENT_MISS: f64 = 0.25;
 
 /// As [`TANGENT_MISS`], for the path of ln μ along a line. Newton's method half way confirms each pair. Unfounded;
@@ -174,9 +174,9 @@ pub(crate) const CHART_SPEED: f64 = 1e-3;
 /// `tests/between_speeds.rs` checks nearly three thousand random points of random machines.
 pub(crate) const LINES_OF_LOBE: f64 = 12.0;
 
-/// Largest gap between two speeds of a chart, relative to the speed. A region of stability or of chatter that is wider
-/// appears in some line; a narrower one may not. Unfounded: a region of 2 % in speed and 5 % in depth is a thousandth
-/// of a chart over a factor of 2.7 in speed, hence contains one of a thousand random points.
+/// Largest gap between two speeds of a refined chart, relative to the speed. A region of stability or of chatter that
+/// is wider appears in some line; a narrower one may not. Unfounded: a region of 2 % in speed and 5 % in depth is a
+/// thousandth of a chart over a factor of 2.7 in speed, hence contains one of a thousand random points.
 pub(crate) const CHART_GAP: f64 = 0.02;
 
 /// Relative gap between two speeds down to which it is halved next to a line that shows a tongue of instability: half
@@ -339,9 +339,9 @@ pub(crate) const VELOCITY_JUMP: f64 = 1e-6;
 /// down takes about a hundred steps.
 pub(crate) const BRANCH_STEP_MAX: f64 = 1.0 / 30.0;
 
-/// Shortest step along a branch of forced orbits, in the units of [`BRANCH_STEP_MAX`]. In steps up to twice this length
-/// each multiplier is paired with the nearest one of the next orbit, at any distance, since two real multipliers that
-/// meet move infinitely fast. Unfounded.
+/// Length up to which a step along a branch of forced orbits is not halved further, in the units of
+/// [`BRANCH_STEP_MAX`]. In steps up to twice this length each multiplier is paired with the nearest one of the next
+/// orbit, at any distance, since two real multipliers that meet move infinitely fast. Unfounded.
 pub(crate) const BRANCH_STEP_MIN: f64 = 1e-5;
 
 /// Factor in the stated error on the change of an orbit's multiplier and depth from the working to the finer mesh. Nine

@@ -39,7 +39,7 @@ pub enum StabilityError {
         /// Feature of the case that the method does not cover, and what to do instead.
         what: &'static str,
     },
-    /// A mode has no damping, so that its receptance is infinite, or negative damping.
+    /// A mode has zero, almost zero or negative damping, so that its receptance is infinite or meaningless.
     #[error(
         "a mode of {frequency_hz:.4} Hz has no damping: its receptance is infinite there; damping is needed, or a method \
          that does not go through receptances"
@@ -73,7 +73,7 @@ pub enum StabilityError {
         /// Last frequency of the table of receptances, Hz.
         last_hz: f64,
     },
-    /// The result depends on receptances outside the frequency range of the table.
+    /// The cut vibrates at a frequency outside the range of the table of receptances.
     #[error(
         "at {rpm} rev/min and {depth_mm:.4} mm the cut vibrates at {frequency_hz:.3} Hz, but the frequency response \
          functions were measured from {first_hz} to {last_hz} Hz only; measure there too, or ask for less depth"
@@ -90,7 +90,7 @@ pub enum StabilityError {
         /// Last frequency of the table of receptances, Hz.
         last_hz: f64,
     },
-    /// The standard deviations of the case are so large that many drawn machines are not physical.
+    /// More than a fifth of the machines drawn from the standard deviations of the case are not physical.
     #[error(
         "{}: with its deviations (keys that end in _std) {percent:.0} % of the machines are impossible: a damping ratio \
          or a frequency below 0, or indefinite matrices; smaller deviations are needed (the first one: {reason})",
@@ -104,7 +104,7 @@ pub enum StabilityError {
         /// Reason why the first of the machines that are not physical is impossible.
         reason: String,
     },
-    /// A speed or depth that is out of range.
+    /// An argument out of range, such as a speed or a depth.
     #[error("{quantity} {value}: {expected} is needed")]
     Argument {
         /// Name of the quantity.
@@ -151,7 +151,7 @@ pub(crate) const NO_DOMINANT: &str = "motions grow beyond the range of numbers, 
 /// Reason why Floquet multipliers, or roots of a loop, cannot be computed at one speed and depth.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Breakdown {
-    /// A linear system is singular, or a result is not finite.
+    /// A linear system is singular, a result is not finite, or no solution is found.
     NoSolution,
     /// Block Arnoldi does not converge on a map too large for all eigenvalues.
     TooManyMultipliers,
@@ -170,8 +170,8 @@ impl From<EigenvalueError> for Breakdown {
 }
 
 impl Breakdown {
-    /// Error at a spindle speed (rev/min) and an axial depth (mm); `no_solution` is its text if a system of equations
-    /// has no finite solution.
+    /// Error at a spindle speed (rev/min) and an axial depth (mm); `no_solution` is its text for
+    /// [`NoSolution`](Self::NoSolution).
     pub(crate) fn at(self, rpm: f64, depth_mm: f64, no_solution: &'static str) -> StabilityError {
         let what = match self {
             Self::NoSolution => no_solution,

@@ -13,8 +13,8 @@
 //! revolution for unequal pitch. All methods share the interface [`Method`].
 //!
 //! Main types: [`Problem`] is the linear delay equation of a case. A [`Method`] computes from it the stability of one
-//! cut ([`CutStability`]) or all limits at one spindle speed ([`SpeedLine`]). [`chart()`] does so at many speeds, and
-//! [`lobe_table::build_table`] writes the table of the device.
+//! cut ([`CutStability`]) or all limits at one spindle speed ([`SpeedLine`]). [`chart()`] computes the limits at many
+//! speeds, and [`lobe_table::build_table`] writes the table of the device.
 //!
 //! ```
 //! use quietcut_model::case::Case;

@@ -9,8 +9,8 @@ use crate::limits::speed_line::SpeedLine;
 
 pub use quietcut_recording::cut_table::{Outcome, TrialCut, read};
 
-/// Number of equal steps in axial depth, up to the deepest trial cut at a speed, at which Floquet multipliers are
-/// computed; methods refine them where needed. A choice: half more than the least number of a chart, 40.
+/// Number of equal steps in axial depth from 0 to the deepest trial cut at a speed, as [`Method::line`] takes it. A
+/// choice: half more than the least number of a chart, 40.
 const SAMPLES: usize = 60;
 
 /// Numbers of trial cuts whose outcome a stability method predicts wrongly, and of those that decide nothing about the
@@ -30,7 +30,7 @@ pub struct Calls {
     pub undecided: usize,
 }
 
-/// Names of the columns in the first line of a CSV file of trial cuts.
+/// Names of the columns in the first line of the [`text`] of trial cuts.
 const HEADER: [&str; 3] = ["rpm [rev/min]", "depth [mm]", "outcome"];
 
 /// Text of a CSV file of trial cuts, without chatter frequencies; [`read`] reads it.
@@ -116,7 +116,7 @@ pub fn calls<M: Method + ?Sized>(method: &M, cuts: &[TrialCut]) -> Result<Vec<Ca
 }
 
 /// Compares the prediction for one trial cut with its outcome. One of the `lines` must have the spindle speed of the
-/// cut and reach its depth; otherwise the cut is taken as predicted unstable.
+/// cut and reach its depth; otherwise the cut counts as predicted unstable.
 pub fn call(lines: &[SpeedLine], cut: &TrialCut) -> Call {
     let line = lines.iter().find(|line| line.rpm == cut.rpm);
     let within = |of: fn(&SpeedLine) -> &Vec<[f64; 2]>| {

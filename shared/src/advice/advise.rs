@@ -84,15 +84,14 @@ pub fn advise(
     }
 }
 
-/// A lobe table with the working point of the cut for which advice is given. The table has a layer for this working
-/// point.
+/// A lobe table with the working point of the cut for which advice is given. The table covers this working point.
 struct Cut<'t> {
     table: &'t LobeTable<'t>,
     at: WorkingPoint,
 }
 
-/// Pairs the lobe table with the working point as set or assumed; an error without a usable table for this tool and
-/// working point.
+/// Pairs the lobe table with the working point as set or assumed. An error if there is no table, if it is not usable
+/// for this tool and working point, or if it has no chatter from which to assume a depth.
 fn cut_in_table<'t>(
     judgement: &Judgement,
     speed: Rpm,

@@ -23,8 +23,8 @@ pub(super) enum Cell {
 /// around it, in all layers of the table from which the cut is interpolated.
 #[derive(Clone, Copy)]
 pub(super) struct Node {
-    /// True if all depths within the margin around the depth of the cut lie within the table and are stable in all
-    /// layers.
+    /// True if no depth within the margin around the depth of the cut exceeds the largest depth of the table, and all
+    /// are stable in all layers.
     is_stable: bool,
     /// Whether the depths `(1 − DEPTH_MARGIN)·d`, `d` and `(1 + DEPTH_MARGIN)·d`, with the depth d of the cut, are
     /// unstable or undecided in every layer.
@@ -35,8 +35,7 @@ impl Node {
     /// Stability of the cut at the speed of the table with index `speed_index` and the depth `depth_mm`.
     /// `depth_to_mm` is the largest depth of the table.
     ///
-    /// `None` if the entries of the table alone do not decide the stability between this speed and the next one of the
-    /// table.
+    /// `None` if an entry of the table at this speed cannot be read, or has more than [`FEW`] unstable intervals.
     pub(super) fn at(
         cut: &CutLobes<'_>,
         speed_index: usize,

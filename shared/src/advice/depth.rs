@@ -21,9 +21,9 @@ struct Candidate {
 }
 
 impl QuietSpeedSearch<'_> {
-    /// The largest quiet depth (stable with margin) up to the depth of the cut, and the spindle speed for it. That is
-    /// the present speed, unless no depth is quiet there or the quiet depth of another speed is larger by the factor
-    /// [`BETTER`].
+    /// The largest quiet depth (stable with margin) found up to the depth of the cut, and the spindle speed for it;
+    /// `None` if none is found. The speed is the present one, unless no depth is quiet there or the quiet depth of
+    /// another speed is larger by the factor [`BETTER`].
     ///
     /// The entries at the grid speeds give an upper bound of the quiet depth at every speed. For the speeds with the
     /// largest bounds the quiet depth is computed from interpolated entries, until no bound exceeds the depth to beat.
@@ -95,7 +95,8 @@ impl QuietSpeedSearch<'_> {
     }
 
     /// The largest quiet depth (stable with margin) in mm at a spindle speed, if it exceeds `at_least_mm`. The speed
-    /// band around the speed, within the machine's limits, is checked in steps; `None` if it leaves the lobe table.
+    /// band around the speed, within the machine's limits, is checked in steps. `None` also if the band leaves the
+    /// lobe table, or a column of the table cannot be read.
     fn largest_depth_mm(&self, rpm: f32, at_least_mm: f32) -> Option<f32> {
         let (low_rpm, high_rpm) = self.known_rpm;
         let from_rpm = f32::max(rpm * (1.0 - SPEED_BAND), self.machine_rpm.0);
@@ -120,7 +121,7 @@ impl QuietSpeedSearch<'_> {
     }
 
     /// The depth ranges, up to the depth of the cut, that are stable with the depth margin at exactly this spindle
-    /// speed.
+    /// speed; `None` if the lobe table gives no column for it.
     fn quiet_depths(&self, rpm: f32) -> Option<Ranges> {
         let column = self.cut.column(Rpm(rpm)).ok()?;
         let mut ranges = Ranges::new();

@@ -40,17 +40,17 @@ pub enum Obstacle {
     /// The lobe table cannot be used for the present cut: for example, it has no entry for it, or is damaged.
     Table(NotKnown),
     /// The lobe table says that the present cut is stable, but it chatters: the table is wrong here. Stable means with
-    /// margin at the set depth; without a working point, at every depth.
+    /// margin at the set depth; without a working point, unstable at no depth.
     Contradicted,
-    /// The present spindle speed is not a positive number.
+    /// The present spindle speed is not a positive finite number.
     Speed,
     /// The search found no depth, up to that of the cut, that the lobe table calls stable with margin at a speed within
     /// the limits of the machine.
     NothingStable,
-    /// The chatter frequency is unknown; the tooth-passing rule requires it.
+    /// The chatter frequency, which the tooth-passing rule requires, is unknown or not a positive finite number.
     ChatterFrequency,
-    /// Every speed that the tooth-passing rule proposes is outside the limits of the machine or unstable in the lobe
-    /// table.
+    /// The tooth-passing rule proposes no speed that lies within the limits of the machine and is not unstable in the
+    /// lobe table.
     NoSpeedWithinLimits,
 }
 
@@ -65,7 +65,7 @@ pub struct Advice {
     /// Advised axial depth; the set depth if no other is advised. `None` if the tooth-passing rule, which has no
     /// depths, says to reduce the depth. Without a working point `None`, unless the lobe table proposes a depth.
     pub depth: Option<Millimeters>,
-    /// Source of the advice.
+    /// Source of the advice; without chatter [`Source::Table`] if there is a lobe table.
     pub source: Source,
     /// The working point that the advice assumes because none is set; `None` if one is set or none was assumed.
     pub assumed: Option<WorkingPoint>,

@@ -50,7 +50,7 @@ impl<'t> QuietSpeedSearch<'t> {
     /// Prepares the search for quiet speeds of a cut within the speed range `machine_rpm` of the machine.
     ///
     /// # Errors
-    /// The table has no layer for this cut, or is damaged.
+    /// The table does not cover this cut, or is damaged.
     pub(super) fn new(
         table: &'t LobeTable<'t>,
         at: &WorkingPoint,
@@ -77,7 +77,8 @@ impl<'t> QuietSpeedSearch<'t> {
         })
     }
 
-    /// The quiet speed (stable with margin) with the smallest relative change from `speed`; it may be `speed` itself.
+    /// The quiet speed (stable with margin) with the smallest relative change from `speed`, which may be `speed`
+    /// itself; `None` if none is found.
     pub(super) fn nearest_speed(&self, speed: Rpm) -> Option<Rpm> {
         let faster = self.walk(Direction::Faster, speed, f32::INFINITY);
         let limit = faster.map_or(f32::INFINITY, |faster| ratio(faster, speed));

@@ -37,7 +37,7 @@ pub struct Additions<'a> {
     /// most [`MODES_MAX`]. An empty slice means no derivatives.
     pub modes: &'a [&'a [LayerMode]],
     /// Derivatives of the limits of every unstable depth interval, in the order of layers, speeds and intervals of the
-    /// table.
+    /// table; empty without modes.
     pub slopes: &'a [IntervalSlopes],
 }
 
@@ -54,7 +54,8 @@ impl Additions<'_> {
             && self.feed_directions.iter().all(Option::is_none)
     }
 
-    /// Checks the optional parts of a lobe table against its numbers of layers and of unstable depth intervals.
+    /// Checks the lengths of the optional parts of a lobe table against its numbers of layers and of unstable depth
+    /// intervals, and the values of feed directions and derivatives.
     pub(super) fn check(&self, layers: usize, intervals: usize) -> Result<(), TableError> {
         let count = self.mode_count();
         let wrong = TableError::Slopes {

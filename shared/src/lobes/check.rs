@@ -30,7 +30,7 @@ impl<'a> LobeTable<'a> {
     }
 }
 
-/// Checks every spindle speed, layer, column and unstable depth interval of a lobe table.
+/// Checks every spindle speed, layer, column and unstable depth interval of a lobe table, and its optional parts.
 fn check_entries(table: &LobeTable<'_>) -> Result<(), TableError> {
     check_speeds(table.speeds())?;
     check_layers(
@@ -104,8 +104,8 @@ pub(super) fn check_speeds(speeds: impl Iterator<Item = Rpm>) -> Result<(), Tabl
     Ok(())
 }
 
-/// Checks that every layer of a lobe table has a non-empty range of feed and immersion and that no two layers are valid
-/// for the same cut. Each layer comes with its feed direction, `None` for any.
+/// Checks the layers of a lobe table; [`TableError::Layer`] states what is refused. Each layer comes with its feed
+/// direction, `None` for any.
 pub(super) fn check_layers(
     layers: impl Iterator<Item = (Validity, Option<Degrees>)> + Clone,
 ) -> Result<(), TableError> {
@@ -122,7 +122,7 @@ pub(super) fn check_layers(
         let clashes = |(other, other_direction): (Validity, Option<Degrees>)| match other.is_family_of(&layer)
         {
             // Two table layers of equal immersion and posture that are valid for different feed directions do not
-            // overlap. A layer valid for any feed direction may overlap a layer for one direction.
+            // clash. A layer for any feed direction clashes with a layer for one if their feed ranges overlap.
             true if direction.zip(other_direction).is_some_and(|(a, b)| a != b) => false,
             true => other.feed_from <= layer.feed_to && layer.feed_from <= other.feed_to,
             // Table layers of equal immersion and posture form a family. The immersion ranges of two families,
@@ -150,8 +150,8 @@ fn is_near(a: &Validity, b: &Validity) -> bool {
     (a.start.0 - b.start.0).abs() <= tolerance && (a.exit.0 - b.exit.0).abs() <= tolerance
 }
 
-/// Checks the optional parts of schema 2 in a lobe table: all numbers finite, interpolation error and modes within
-/// their ranges.
+/// Checks the optional parts of schema 2 in a lobe table: codes of feed directions valid, all numbers finite,
+/// interpolation error and modes within their ranges.
 fn check_additions(table: &LobeTable<'_>) -> Result<(), TableError> {
     let LobeTable { bytes, shape, .. } = table;
     for layer in 0..shape.layers {

@@ -125,7 +125,7 @@ impl Column {
         let below = self.intervals.iter().rev().find(|i| i.to.0 <= depth_mm);
         let above = self.intervals.iter().find(|i| i.from.0 > depth_mm);
         // With no unstable interval below the depth, the distance to the smallest depth of the table bounds the margin,
-        // unless that is 0: no cut has a depth below 0.
+        // unless the smallest depth is 0: no cut has a depth below 0.
         let from_mm = match below {
             Some(interval) => interval.to.0,
             None if self.depth_from_mm > 0.0 => self.depth_from_mm,
@@ -135,7 +135,7 @@ impl Column {
         f32::min(depth_mm - from_mm, to_mm - depth_mm)
     }
 
-    /// The depth range in mm of an unstable interval and of all intervals of any kind that touch it.
+    /// The depth range in mm of an unstable interval and of all intervals of any kind joined to it without a gap.
     fn unstable_range_mm(&self, index: usize, interval: &Interval) -> (f32, f32) {
         let (mut from_mm, mut to_mm) = (interval.from.0, interval.to.0);
         for before in self.intervals.iter().take(index).rev() {

@@ -29,10 +29,11 @@ impl LobeTable<'_> {
     }
 
     /// The unstable depth intervals of one layer at one speed of the table, corrected for changed modal parameters and
-    /// cutting force. In a table without derivatives they equal those of [`entry`](Self::entry).
+    /// cutting force. In a table without derivatives they equal those of [`entry`](Self::entry). `None` if the entry
+    /// does not exist or cannot be read.
     ///
     /// Interval ends at the smallest or largest depth of the table are not shifted. An interval is removed if its ends
-    /// meet. An interval that would overlap the preceding one begins where the preceding one ends.
+    /// meet or cross. An interval that would overlap the preceding one begins where the preceding one ends.
     pub fn corrected_entry(&self, layer: usize, speed_index: usize, learned: &Learned) -> Option<Column> {
         let mut column = self.empty_column();
         let depths = self.depths();

@@ -145,7 +145,7 @@ impl<'a> LobeTable<'a> {
 }
 
 /// The two table layers that enclose the working point in feed or in feed direction, and the interpolation weight of
-/// the second.
+/// the second; one layer twice if nothing is to be interpolated.
 // `inline(never)` on this function and those below: one copy of the code saves flash, and the time of a call is
 // negligible.
 #[inline(never)]

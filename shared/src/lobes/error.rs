@@ -9,7 +9,7 @@ use crate::units::{Hertz, Millimeters, Rpm};
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum TableError {
-    /// The bytes are fewer than the header and the description of a lobe table need.
+    /// The bytes, or the table length that the header states, are fewer than a lobe table needs.
     TooShort {
         /// Bytes needed at least.
         needed: u32,
@@ -28,21 +28,21 @@ pub enum TableError {
         /// The latest schema of lobe tables that this code knows.
         known: u16,
     },
-    /// The table length that the header states differs from the number of bytes.
+    /// The table length that the header states does not fit the number of bytes.
     Length {
         /// Length of the lobe table that its header states, in bytes.
         header: u32,
         /// Bytes found.
         found: u32,
     },
-    /// The CRC-32 does not match: bytes of the table have changed since it was computed.
+    /// The CRC-32 does not match: bytes of the table have changed since the CRC was computed.
     Crc {
         /// CRC-32 in the header.
         header: u32,
         /// CRC-32 computed from the bytes.
         computed: u32,
     },
-    /// The counts in the description of the table (layers, speeds, intervals) do not match the length of the table.
+    /// The counts in the description of the table (layers, speeds, intervals) do not match its length or its columns.
     Arrays {
         /// The length in bytes that the counts in the description of the table imply.
         needed: u64,
@@ -63,7 +63,7 @@ pub enum TableError {
         /// Fastest.
         to: Rpm,
     },
-    /// The depth range of the table is not ascending, or begins below 0.
+    /// The depth range of the table is not an ascending, finite range of depths of at least 0.
     Depths {
         /// Smallest.
         from: Millimeters,
@@ -82,16 +82,17 @@ pub enum TableError {
         /// Layers; 1 to 65 535.
         layers: u32,
     },
-    /// The spindle speeds of the table are not positive and strictly ascending.
+    /// A spindle speed of the table is not positive and finite, or not above the preceding one.
     SpeedOrder {
         /// Index of the wrong speed.
         index: u32,
         /// Its value.
         found: Rpm,
     },
-    /// A layer of the table has an empty range of feed or immersion; or its feed range overlaps that of a layer of
-    /// equal immersion and posture whose feed direction is not another one; or its immersion differs by at most twice
-    /// the tolerance from that of a layer of the same posture, without being equal.
+    /// The feed range or the immersion of a layer of the table is empty or not finite, or its feed range begins below
+    /// 0; or the feed range overlaps that of a layer of equal immersion and posture whose feed direction is not
+    /// another one; or the immersion differs by at most twice the tolerance from that of a layer of the same posture,
+    /// without being equal.
     Layer {
         /// Index of the layer.
         layer: u32,
@@ -115,8 +116,8 @@ pub enum TableError {
         /// Number of unstable depth intervals: in the column, or from the first column of the layer up to this one.
         found: u32,
     },
-    /// A column of the table whose unstable depth intervals are not stored directly after those of the preceding
-    /// column.
+    /// A column of the table that cannot be read, or whose unstable depth intervals are not stored directly after
+    /// those of the preceding column.
     ColumnOrder {
         /// Index of the layer.
         layer: u32,
@@ -145,12 +146,14 @@ pub enum TableError {
         /// The flags of the description.
         found: u16,
     },
-    /// A feed direction of a table layer is no angle, or the number of directions differs from the number of layers.
+    /// A feed direction of a table layer is not finite, beyond ±1000 revolutions, or stored as an invalid code; or the
+    /// number of directions differs from the number of layers.
     FeedDirection {
         /// Index of the table layer with an invalid feed direction, or the number of feed directions.
         layer: u32,
     },
-    /// A mode of a table layer has a frequency that is not positive, or a damping ratio that is not in [0, 1).
+    /// A mode of a table layer has a frequency that is not positive and finite, or a damping ratio that is not in
+    /// [0, 1).
     Mode {
         /// Index of the layer.
         layer: u32,
@@ -162,11 +165,11 @@ pub enum TableError {
     InterpolationError {
         /// Stated error in depth.
         depth: Millimeters,
-        /// Stated interpolation error in spindle speed, relative to the speed; it must be below 1.
+        /// Stated interpolation error in spindle speed, relative to the speed; it must be in [0, 1).
         speed: f32,
     },
-    /// A derivative of a limit is not finite, the number of sets of derivatives differs from the number of unstable
-    /// intervals, or the layers have different numbers of modes or more than [`MODES_MAX`](super::MODES_MAX).
+    /// A derivative of a limit is not finite; the number of sets of derivatives differs from the number of unstable
+    /// intervals; or not all layers have the same number of modes, at most [`MODES_MAX`](super::MODES_MAX).
     Slopes {
         /// Index in the table of the unstable interval with the faulty derivative, or the number of sets of
         /// derivatives.

@@ -27,8 +27,8 @@ impl Header {
         schema == SCHEMA_PLAIN || schema == SCHEMA
     }
 
-    /// Reads the header of a lobe table at the beginning of `bytes`. Refuses a wrong magic number, an unknown schema
-    /// and an impossible length.
+    /// Reads the header of a lobe table at the beginning of `bytes`. Refuses too few bytes, a wrong magic number, an
+    /// unknown schema, and a length that is too small for a table.
     ///
     /// `bytes` may be longer than the table. The CRC is not checked here, but by [`check`](Self::check).
     pub fn read(bytes: &[u8]) -> Result<Self, TableError> {

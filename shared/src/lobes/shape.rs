@@ -176,7 +176,8 @@ impl Shape {
         f32_at(bytes, self.speeds_offset() + 4 * index)
     }
 
-    /// Range of the indices, in the whole table, of the unstable depth intervals of one column.
+    /// Range of the indices, in the whole table, of the unstable depth intervals of one column; `None` if there is no
+    /// such column.
     pub(super) fn column_range(&self, bytes: &[u8], layer: usize, speed: usize) -> Option<Range<usize>> {
         if layer >= self.layers || speed >= self.speeds {
             return None;
@@ -188,7 +189,8 @@ impl Shape {
         Some(from..to)
     }
 
-    /// The unstable depth intervals of a layer at one speed; an item is `None` if its kind is unknown.
+    /// The unstable depth intervals of a layer at one speed; `None` if there is no such column or it exceeds the bytes.
+    /// An item is `None` if its kind is unknown.
     pub(super) fn column<'a>(
         &self,
         bytes: &'a [u8],
@@ -273,7 +275,8 @@ impl Shape {
         })
     }
 
-    /// Derivatives of the unstable interval with this index, counted over the whole table.
+    /// Derivatives of the unstable interval with this index, counted over the whole table; `None` if the table has none
+    /// for it.
     pub(super) fn interval_slopes(&self, bytes: &[u8], index: usize) -> Option<IntervalSlopes> {
         if self.modes == 0 || index >= self.intervals {
             return None;

@@ -24,11 +24,11 @@ pub struct LayerMode {
 /// Derivatives of one end of an unstable depth interval, in mm per relative change of a parameter.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Slopes {
-    /// Derivatives of the limit by the natural frequency of each mode, mm per relative change; 0 for modes that the
-    /// table does not contain.
+    /// Derivatives of the limit by the natural frequency of each mode of the layer, in the order of the modes, mm per
+    /// relative change; 0 beyond the last mode.
     pub by_frequency: [f32; MODES_MAX],
-    /// Derivatives of the limit by the damping ratio of each mode, mm per relative change; 0 for modes that the table
-    /// does not contain.
+    /// Derivatives of the limit by the damping ratio of each mode of the layer, in the order of the modes, mm per
+    /// relative change; 0 beyond the last mode.
     pub by_damping_ratio: [f32; MODES_MAX],
     /// Derivative of the limit by the cutting force coefficient K_tc, mm per relative change.
     pub by_cutting_force: f32,
@@ -48,9 +48,11 @@ pub struct IntervalSlopes {
 /// increase by 1 %.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Learned {
-    /// Relative change of the natural frequency of each mode since the lobe table was computed.
+    /// Relative change of the natural frequency of each mode, in the order of the modes of the layer, since the lobe
+    /// table was computed.
     pub frequency: [f32; MODES_MAX],
-    /// Relative change of the damping ratio of each mode since the lobe table was computed.
+    /// Relative change of the damping ratio of each mode, in the order of the modes of the layer, since the lobe table
+    /// was computed.
     pub damping_ratio: [f32; MODES_MAX],
     /// Relative change of the cutting force coefficient K_tc since the lobe table was computed.
     pub cutting_force: f32,
@@ -98,7 +100,8 @@ impl Slopes {
             .chain(core::iter::once(self.by_cutting_force))
     }
 
-    /// Reads the derivatives of a limit from numbers in the order of [`numbers`](Self::numbers).
+    /// Reads the derivatives of a limit from numbers in the order of [`numbers`](Self::numbers); `None` if they are too
+    /// few.
     pub(super) fn of_numbers(mut numbers: impl Iterator<Item = f32>, modes: usize) -> Option<Self> {
         let mut slopes = Self::default();
         for slot in slopes.by_frequency.iter_mut().take(modes) {

@@ -7,7 +7,8 @@ use super::{Column, InterpolationError, Interval, NotKnown, TableError, Validity
 use crate::units::{Degrees, Hertz, Millimeters, Rpm};
 use crate::working_point::Limits;
 
-/// A lobe table whose bytes were checked. It is read in place, without a copy.
+/// A lobe table, read in place without a copy. [`parse`](Self::parse) checks its bytes, [`reopen`](Self::reopen) trusts
+/// them.
 #[derive(Clone, Copy, Debug)]
 pub struct LobeTable<'a> {
     pub(super) bytes: &'a [u8],
@@ -50,7 +51,7 @@ impl<'a> LobeTable<'a> {
         self.shape.teeth
     }
 
-    /// Speed limits of the machine that the table states; `None` if the case has none.
+    /// Speed limits of the machine that the table states; `None` if it states none.
     pub fn limits(&self) -> Option<Limits> {
         self.shape.limits
     }
@@ -70,7 +71,8 @@ impl<'a> LobeTable<'a> {
         Millimeters(self.shape.depth_step_mm())
     }
 
-    /// Largest rounding error of a chatter frequency in the table: half a step of its 16-bit scale.
+    /// Largest rounding error of a chatter frequency in the table: half a step of its 16-bit scale. Only a frequency
+    /// below half a step errs by more, as it is not rounded to 0.
     pub fn chatter_error(&self) -> Hertz {
         Hertz(0.5 * self.shape.chatter_step_hz())
     }
@@ -122,7 +124,7 @@ impl<'a> LobeTable<'a> {
         }
     }
 
-    /// The feed direction of the cut that is looked up, as set by [`towards`](Self::towards).
+    /// The feed direction of the cut that is looked up, as set by [`towards`](Self::towards); `None` if none is set.
     pub fn cut_direction(&self) -> Option<Degrees> {
         self.feed_direction
     }
@@ -171,7 +173,7 @@ impl LobeTable<'_> {
     }
 
     /// The feed direction for which a layer of the table is valid, from the machine's x axis towards its y axis; `None`
-    /// for any direction.
+    /// for any direction, and for a layer that cannot be read.
     pub fn feed_direction(&self, layer: usize) -> Option<Degrees> {
         self.shape.feed_direction(self.bytes, layer).ok().flatten()
     }

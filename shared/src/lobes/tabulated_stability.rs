@@ -27,16 +27,16 @@ pub enum NotKnown {
         /// The largest axial depth of the lobe table.
         to: Millimeters,
     },
-    /// The feed per tooth lies outside all table layers for this immersion and posture.
+    /// The feed per tooth lies outside the range of the table layers for this immersion, posture and feed direction.
     Feed {
         /// The requested feed per tooth.
         asked: Millimeters,
-        /// The smallest feed per tooth of the table layers for this immersion and posture.
+        /// The smallest feed per tooth of these table layers.
         from: Millimeters,
-        /// The largest feed per tooth of the table layers for this immersion and posture.
+        /// The largest feed per tooth of these table layers.
         to: Millimeters,
     },
-    /// The lobe table has no layer for the immersion angles of the cut.
+    /// The lobe table has no layer for the immersion angles of the cut at its posture.
     Immersion {
         /// The requested entry angle.
         start: Degrees,
@@ -65,7 +65,8 @@ pub enum NotKnown {
         /// The requested feed direction.
         asked: Degrees,
     },
-    /// The lobe table has layers for several feed directions, and the feed direction of the cut is not set.
+    /// The lobe table has layers for several feed directions at this immersion and posture, and the feed direction of
+    /// the cut is not set.
     FeedDirectionNotTold,
 }
 
@@ -75,7 +76,8 @@ pub enum NotKnown {
 pub enum TabulatedStability {
     /// The cut is stable: a perturbation of the forced vibration decays.
     Stable {
-        /// Distance of the cut's depth to the nearest depth that is not stable, or to the end of the lobe table.
+        /// Distance of the cut's depth to the nearest depth that is not stable, or to an end of the lobe table other
+        /// than depth 0, whichever is nearer.
         margin: Millimeters,
     },
     /// The cut is unstable.
@@ -84,7 +86,8 @@ pub enum TabulatedStability {
         kind: IntervalKind,
         /// Chatter frequency; 0 if unknown.
         chatter: Hertz,
-        /// Distance of the cut's depth to the nearest stable depth, or to the end of the lobe table.
+        /// Distance of the cut's depth to the nearest stable depth, or to an end of the lobe table, whichever is
+        /// nearer.
         margin: Millimeters,
     },
     /// The stability of the cut is not known, for the given reason.

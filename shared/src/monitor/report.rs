@@ -13,7 +13,8 @@ pub struct Report {
     pub sequence: u32,
     /// Time of the last sample of the block, on the device's clock.
     pub time: Nanoseconds,
-    /// Spindle speed: measured by the tachometer, else estimated from the spectrum, else assumed.
+    /// Spindle speed: measured by the tachometer, else estimated from the spectrum, else assumed; `None` if none of
+    /// these is available.
     pub speed: Option<Rpm>,
     /// The verdict on the cut with its reason and estimates.
     pub judgement: Judgement,

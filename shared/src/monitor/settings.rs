@@ -19,7 +19,7 @@ pub struct Settings {
     pub wheel: Option<Wheel>,
     /// Spindle speed that is assumed if no tachometer measures it; `None` if unknown.
     pub assumed_speed: Option<Rpm>,
-    /// Speed limits of the spindle.
+    /// Speed limits of the spindle; `None` without limits.
     pub limits: Option<Limits>,
 }
 
@@ -36,13 +36,13 @@ pub enum SettingsError {
     Wheel(Wheel),
     /// The sample rate of the sensor is outside the range of the decimation filters.
     SampleRate(Hertz),
-    /// The acceleration of one sensor count is not a positive number.
+    /// The acceleration of one sensor count is not a positive finite number.
     CountScale(f32),
-    /// The noise density of the sensor is negative or not a number.
+    /// The noise density of the sensor is not a finite number of at least 0.
     Noise(f32),
-    /// The assumed spindle speed is not a positive number.
+    /// The assumed spindle speed is not a positive finite number.
     AssumedSpeed(Rpm),
-    /// The slowest spindle speed is not a positive number, or not below the fastest.
+    /// The slowest and the fastest spindle speed are not an ascending range of positive finite numbers.
     Limits(Limits),
 }
 
@@ -78,7 +78,8 @@ impl core::fmt::Display for SettingsError {
 
 impl core::error::Error for SettingsError {}
 
-/// Checks the settings of the signal chain. Each condition states what must hold, because NaN fails every comparison.
+/// Checks the settings of the signal chain, except wheel and sample rate. Each condition states what must hold, because
+/// NaN fails every comparison.
 pub(super) fn check(settings: &Settings) -> Result<(), SettingsError> {
     let Settings {
         sensor,

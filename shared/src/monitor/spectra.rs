@@ -19,8 +19,8 @@ const STRUCTURE_TONES: (Hertz, Hertz) = (Hertz(5.0), STRUCTURE_BAND);
 const TOOL_TONES: (Hertz, Hertz) = (Hertz(150.0), TOOL_BAND);
 
 impl Monitor {
-    /// Computes the spectra of the bands that have a complete block, and updates the background spectrum and the
-    /// tracked tone of each band.
+    /// Computes the spectra of the bands that have a complete block of samples. Updates tracked tone and background
+    /// spectrum of these bands, and the spindle speed estimated from the tool band.
     pub(super) fn take_spectra(&self, state: &mut State, measured: Option<Hertz>) {
         let rate = state
             .sample_clock
@@ -86,7 +86,8 @@ impl Monitor {
             .then_some(Hertz(peak.frequency.0 / f32::from(self.settings.tool.teeth)))
     }
 
-    /// Spindle speed with its uncertainty: measured by the tachometer, else from the spectrum, else assumed.
+    /// Spindle speed with its uncertainty: measured by the tachometer, else from the spectrum, else assumed; `None` if
+    /// none of these is available.
     fn rotation(&self, state: &State, measured: Option<Hertz>) -> Option<Rotation> {
         let with = |frequency: Hertz, uncertainty: f32| Rotation {
             frequency,

@@ -30,7 +30,7 @@ pub struct State {
     /// Running mean over the blocks of the share of samples that are clipped or lost.
     pub(super) damage: f32,
     /// Spindle speed estimated from the newest spectrum of the tool band, in revolutions per second; `None` if the
-    /// tachometer measures the speed or the spectrum has no tooth-passing tone.
+    /// tachometer measures the speed, or if no tooth-passing tone was found.
     pub(super) tone_speed: Option<Hertz>,
     pub(super) detector: Detector,
     pub(super) advice: Option<Advised>,

@@ -39,8 +39,8 @@ impl Monitor {
         state.detector.step(&evidence)
     }
 
-    /// Returns the previous advice, or computes it again if the verdict, the speed or another of its inputs has
-    /// changed.
+    /// Returns the previous advice, or computes new advice if an input has changed: speed and chatter frequency by more
+    /// than [`ADVICE_SPEED_STEP`] and [`ADVICE_FREQUENCY_STEP`].
     pub(super) fn advise(
         &self,
         state: &mut State,

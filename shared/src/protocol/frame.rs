@@ -266,7 +266,8 @@ impl Decoder {
         }
     }
 
-    /// Takes a byte from the line. At the end of a frame it returns the frame, or the reason why the frame is refused.
+    /// Takes a byte from the line. Returns the frame that it completes, or the reason why a frame is refused; `None` if
+    /// neither.
     pub fn push(&mut self, byte: u8) -> Option<Result<Frame<'_>, FrameError>> {
         if self.is_skipping {
             self.is_skipping = byte != 0;
@@ -340,14 +341,15 @@ impl Sequence {
         Self { due: Some(next) }
     }
 
-    /// Returns the sequence number of the next frame to send; 0 for the first.
+    /// Returns the sequence number of the next frame to send. It is 0 for the first, unless another number
+    /// was set.
     pub fn take(&mut self) -> u16 {
         let number = self.due.unwrap_or_default();
         self.due = Some(number.wrapping_add(1));
         number
     }
 
-    /// Checks the sequence number of a received frame. The first frame may have any number.
+    /// Checks the sequence number of a received frame. If no number is expected yet, any is accepted.
     ///
     /// # Errors
     /// [`FrameError::OutOfOrder`] if `found` is not the expected number, which then stays the same.

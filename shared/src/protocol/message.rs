@@ -33,7 +33,7 @@ pub const SLOTS: usize = 2;
 // The buffers of the link have the size of the largest request anyway, and boxing its fields would need an allocator.
 #[allow(clippy::large_enum_variant)]
 pub enum Request {
-    /// Begins a session and restarts the sequence numbers. Reply: [`Reply::Info`].
+    /// Begins a session and restarts the sequence numbers of the requests. Reply: [`Reply::Info`].
     Hello,
     /// Requests the identity of the device. Reply: [`Reply::Info`].
     Info,
@@ -236,9 +236,9 @@ pub struct Info {
     pub sensor: Option<Sensor>,
     /// Largest length of a lobe table that fits into a slot, in bytes.
     pub slot_capacity: u32,
-    /// State of the flash slots for lobe tables.
+    /// Contents of the flash slots for lobe tables, in the order of their addresses.
     pub slots: [Slot; SLOTS],
-    /// The table in use.
+    /// The table in use; `None` if there is none.
     pub table: Option<TableSummary>,
 }
 
@@ -319,8 +319,8 @@ pub struct Status {
     pub frames: u32,
     /// Numbers of refused frames from the host.
     pub frame_errors: FrameErrors,
-    /// Number of messages that were dropped because the line is too slow: reports, spectra, and sets of the
-    /// stroboscopic points of one block.
+    /// Number of reports, spectra and sets of the stroboscopic points of one block that were dropped, as a whole or in
+    /// part, because the line is too slow.
     pub dropped: u32,
 }
 
@@ -366,8 +366,8 @@ pub struct Feed {
     time: Nanoseconds,
     lost: u32,
     clipped: u16,
-    /// Counts of x, y and z as six bytes per sample, little-endian. With the variable-length integers of postcard, a
-    /// block of large counts would exceed the frame.
+    /// Counts of x, y and z as six bytes per sample, little-endian, oldest sample first. With the variable-length
+    /// integers of postcard, a block of large counts would exceed the frame.
     counts: Vec<[u8; 6], MAX_BLOCK_SAMPLES>,
     /// Tachometer edges from the host up to the end of the block, in order of time. They follow those of
     /// [`Request::FeedEdges`].
@@ -426,7 +426,7 @@ pub struct SpectrumChunk {
     pub bins: u16,
     /// Index of the first spectrum bin in this chunk.
     pub first: u16,
-    /// Power per bin, in (m/s²)².
+    /// Power per bin from bin `first` on, in (m/s²)².
     pub power: Vec<f32, MAX_CHUNK_BINS>,
 }
 

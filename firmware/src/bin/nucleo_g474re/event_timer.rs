@@ -1,6 +1,6 @@
 //! The device's clock: timer TIM2, which captures tachometer edges and the sensor's watermark line in hardware.
 //!
-//! Both inputs pass the same filter, so that both have the same delay. The timer wraps every 53 s. Events and calls
+//! Both inputs pass the same filter, so that both have the same delay. The timer wraps every 54 s. Events and calls
 //! of [`now`] extend its count beyond 32 bits.
 
 use core::cell::{Cell, RefCell};
@@ -31,7 +31,7 @@ const MAX_EDGES: usize = 256;
 /// Edges of the tachometer, in order of time. If the queue is full, the newest edges are dropped.
 pub(crate) static EDGES: Queue<CriticalSectionRawMutex, Edge, MAX_EDGES> = Queue::new();
 
-/// Time of the last rise of the sensor's watermark line.
+/// Time of the last rise of the sensor's watermark line, until it is taken or discarded.
 pub(crate) static RISE: Signal<CriticalSectionRawMutex, Nanoseconds> = Signal::new();
 
 static TIMER: Mutex<RefCell<Option<Timer<'static, TIM2>>>> = Mutex::new(RefCell::new(None));
@@ -46,7 +46,7 @@ pub(crate) fn start(
     watermark: Peri<'static, PA1>,
 ) {
     use embassy_stm32::gpio::Pull;
-    // The pull-down resistor only defines the level of an input without a tachometer. The output of a tachometer is
+    // The pull-down resistors only define the level of an unconnected input. The outputs of tachometer and sensor are
     // push-pull.
     core::mem::forget(CapturePin::<TIM2, Ch1>::new(tachometer, Pull::Down));
     core::mem::forget(CapturePin::<TIM2, Ch2>::new(watermark, Pull::Down));
@@ -56,7 +56,7 @@ pub(crate) fn start(
     timer.set_max_compare_value(u32::MAX);
     for channel in [TACHOMETER, WATERMARK] {
         timer.set_input_ti_selection(channel, InputTISelection::Normal);
-        // Input filter: eight equal samples at a quarter of 160 MHz. Pulses shorter than 0.2 µs are suppressed.
+        // Input filter: eight equal samples at a quarter of 160 MHz. Pulses shorter than 0.175 µs are suppressed.
         timer.set_input_capture_filter(channel, FilterValue::FDTS_DIV4_N8);
         timer.set_input_capture_mode(channel, InputCaptureMode::Rising);
         timer.set_input_capture_prescaler(channel, 0);
@@ -81,7 +81,8 @@ pub(crate) fn now() -> Nanoseconds {
     })
 }
 
-/// The time that belongs to a timer count, which is at most half a period of the timer from the newest count.
+/// The time that belongs to a timer count, which is at most half a period of the timer from the newest count. Updates
+/// the newest count.
 fn carry_on(token: CriticalSection<'_>, count: u32) -> Nanoseconds {
     let newest = TICKS.borrow(token).get();
     // The captures of both inputs, served in one interrupt, may be out of order, so the difference is signed.

@@ -11,9 +11,9 @@ use embedded_io::{ErrorType, Read, ReadReady, Write, WriteReady};
 
 use crate::work::WORK;
 
-/// Capacity in bytes of the queue from host to device: 22 ms of bytes at 921 600 baud, the time of a page erase.
+/// Queue of bytes from host to device: 22 ms of bytes at 921 600 baud, the time of a page erase.
 static RECEIVED: Pipe<CriticalSectionRawMutex, 2048> = Pipe::new();
-/// Capacity in bytes of the queue from device to host.
+/// Queue of bytes from device to host.
 static SENT: Pipe<CriticalSectionRawMutex, 2048> = Pipe::new();
 
 /// Task that passes the bytes received from the host to the device.
@@ -26,7 +26,7 @@ pub(crate) async fn receive(mut port: RingBufferedUartRx<'static>) {
                 RECEIVED.write_all(bytes.get(..count).unwrap_or_default()).await;
                 WORK.signal(());
             }
-            // Lost bytes need no other handling: a frame with missing bytes fails its CRC.
+            // Lost bytes need no other handling: a frame with missing bytes is refused.
             Err(error) => defmt::warn!("link: {}", error),
         }
     }
@@ -59,7 +59,7 @@ impl ReadReady for LinkLine {
 }
 
 impl Read for LinkLine {
-    /// Reads the bytes of the host that have arrived; returns 0 if there are none.
+    /// Reads bytes of the host that have arrived; returns 0 if there are none.
     fn read(&mut self, bytes: &mut [u8]) -> Result<usize, Infallible> {
         Ok(RECEIVED.try_read(bytes).unwrap_or(0))
     }
@@ -72,7 +72,7 @@ impl WriteReady for LinkLine {
 }
 
 impl Write for LinkLine {
-    /// Accepts as many bytes as the queue to the host has room for.
+    /// Moves bytes to the queue to the host without waiting; returns 0 if the queue is full.
     fn write(&mut self, bytes: &[u8]) -> Result<usize, Infallible> {
         Ok(SENT.try_write(bytes).unwrap_or(0))
     }

@@ -137,7 +137,7 @@ async fn main(_spawner: Spawner) {
     defmt::info!("quietcut on NUCLEO-G474RE");
     let mut edges = BlockEdges::default();
     loop {
-        // All waiting blocks of samples are processed before a request of the host, which may erase a flash page. Their
+        // Waiting blocks of samples are processed before a request of the host, which may erase a flash page. Their
         // number is limited, so that requests are done even if the signal chain is too slow for the samples.
         for _ in 0..2 * MAX_BLOCKS {
             let Ok(block) = BLOCKS.try_receive() else { break };
@@ -147,7 +147,7 @@ async fn main(_spawner: Spawner) {
         }
         let Ok(is_busy) = device.poll(&mut LinkLine);
         watchdog.pet();
-        // Reads the timer at least once per wrap, so that its count can be extended beyond 32 bits.
+        // Reads the timer at least once per half of its period, so that its count can be extended beyond 32 bits.
         event_timer::now();
         if !is_busy {
             // That no event came is no error: the main loop then runs once without one.
@@ -156,7 +156,7 @@ async fn main(_spawner: Spawner) {
     }
 }
 
-/// Returns the first instance of a task; a second instance of the same task stops the program.
+/// Returns the first instance of a task; panics if the task has an instance already.
 fn first<S>(task: Result<SpawnToken<S>, SpawnError>) -> SpawnToken<S> {
     match task {
         Ok(task) => task,
@@ -168,13 +168,14 @@ fn first<S>(task: Result<SpawnToken<S>, SpawnError>) -> SpawnToken<S> {
 #[derive(Default)]
 struct BlockEdges {
     edges: Vec<Edge, MAX_BLOCK_EDGES>,
-    /// A tachometer edge that lies after the end of the newest block and belongs to a later one.
+    /// A tachometer edge that lies after the end of the newest block and belongs to a later one; `None` if there is
+    /// none.
     ahead: Option<Edge>,
 }
 
 impl BlockEdges {
-    /// The tachometer edges since the end of the preceding block, up to the end of `block` at the nominal sample
-    /// rate; at most [`MAX_BLOCK_EDGES`], the others go to later blocks.
+    /// The tachometer edges not yet given to a block, up to the end of `block` at the nominal sample rate, oldest
+    /// first; at most [`MAX_BLOCK_EDGES`], the others go to later blocks.
     fn until_the_end_of(&mut self, block: &Block) -> &[Edge] {
         let period_ns = (1e9 / Sensor::IIS3DWB_16G.nominal_rate.0) as u64;
         let end = Nanoseconds(block.time.0 + block.counts.len() as u64 * period_ns);
@@ -225,7 +226,7 @@ fn clocks() -> Config {
 }
 
 /// Handler of the interrupt that reading a lobe table raises if a loss of power has damaged it: returns and lets the
-/// read continue. Any other cause of the interrupt stops the program.
+/// read continue. Panics if the interrupt has another cause.
 // SAFETY: the handler touches a flag of the flash memory only.
 #[exception]
 unsafe fn NonMaskableInt() {

@@ -1,4 +1,4 @@
-//! The task that reads the accelerometer at each rise of the watermark line and queues blocks for the device.
+//! The task that reads the accelerometer and queues blocks of samples for the device.
 
 use core::convert::Infallible;
 
@@ -27,7 +27,7 @@ pub(crate) type Sensor =
 pub(crate) const MAX_BLOCKS: usize = 16;
 
 /// Longest wait for the watermark line, which rises every 2.4 ms. If the line is not connected, the sensor's queue is
-/// read at this interval; it is full after 19 ms.
+/// read after this wait; the queue is full after 19 ms.
 const LINE_TIMEOUT: Duration = Duration::from_millis(10);
 const RETRY: Duration = Duration::from_secs(1);
 
@@ -86,7 +86,7 @@ async fn read_blocks(acquisition: &mut Acquisition<Sensor>) -> Result<Infallible
     }
 }
 
-/// True while the sensor's queue holds at least as many samples as the watermark.
+/// True while the watermark line is high: the sensor's queue holds at least as many samples as the watermark.
 fn watermark_is_reached() -> bool {
     pac::GPIOA.idr().read().idr(1) == pac::gpio::vals::Idr::HIGH
 }

@@ -53,7 +53,7 @@ impl TableFlash {
 }
 
 /// Handles the non-maskable interrupt on reading a double word with a two-bit error, which a loss of power during a
-/// write leaves behind.
+/// write can leave behind.
 ///
 /// The bytes are used as read, and the CRC of the table detects them. Returns false if the interrupt has another cause.
 pub(crate) fn pass_over_damage() -> bool {
@@ -67,8 +67,8 @@ pub(crate) fn pass_over_damage() -> bool {
 
 impl TableMemory for TableFlash {
     fn mapped(&self) -> &[u8] {
-        // SAFETY: `memory.x` reserves these addresses for the table slots. Any byte value is valid, and they are
-        // written through `self` only.
+        // SAFETY: `memory.x` reserves these addresses for the table slots. Any byte value is valid, and the
+        // bytes are written through `self` only.
         unsafe { core::slice::from_raw_parts(&raw const __table_slots_start, self.bytes as usize) }
     }
 }

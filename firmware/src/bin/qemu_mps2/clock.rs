@@ -23,7 +23,7 @@ pub(crate) fn start() {
     }
 }
 
-/// Handles the interrupt of timer 0, which counts the wraps of the timer.
+/// Handles the interrupt of timer 0: counts a wrap of the timer.
 pub(crate) fn wrap() {
     // SAFETY: clears the interrupt flag of timer 0.
     unsafe { (INTERRUPT as *mut u32).write_volatile(1) };

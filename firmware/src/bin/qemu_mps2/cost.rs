@@ -29,8 +29,8 @@ pub(crate) struct Cost {
 }
 
 impl Cost {
-    /// Starts the measurement of stack depth and times. The stack frame of the caller does not count: it is the main
-    /// function, which holds the device. The real board holds the device in static memory.
+    /// Starts the measurement of stack depth and times. The stack frame of the caller does not count: the caller is the
+    /// main function, which holds the device. The real board holds the device in static memory.
     ///
     /// # Safety
     /// Interrupts must be disabled, and the stack at most some kilobytes deep.

@@ -2,8 +2,7 @@
 //! real board's flash.
 //!
 //! A page has 2 KB, and an erase sets all its bits. A double word of 8 bytes is written once after each erase; only
-//! zeros may overwrite it. The times are those of the STM32G474, so that a loss of power interrupts the same
-//! operations as on the real board.
+//! zeros may overwrite it. An erase and a write take as long as on the STM32G474.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 

@@ -16,7 +16,7 @@ pub(crate) struct Spindle {
     frame: Vec<u8, MAX_FRAME_BYTES>,
     /// True while the rest of a stimulus frame that is too long is skipped.
     is_skipping: bool,
-    /// Tachometer edges that arrived for the next block of samples.
+    /// Tachometer edges that arrived for the next block of samples, in order of arrival.
     edges: Vec<Edge, MAX_BLOCK_EDGES>,
     /// Measured costs of the device.
     pub(crate) cost: Cost,
@@ -60,7 +60,7 @@ impl Spindle {
     }
 
     /// Passes the stimuli that the first `bytes` bytes of the store in the board's memory contain to the device;
-    /// `None` as soon as one is unreadable or refused.
+    /// `None` if the store is shorter, and as soon as one stimulus is unreadable or refused.
     fn play(&mut self, bytes: usize, device: &mut BoardDevice, line: &mut Uart) -> Option<()> {
         if bytes > MEMORY_BYTES - STORE_OFFSET {
             return None;

@@ -33,7 +33,7 @@ pub(crate) struct Baseline<'a> {
     /// True if a step of the force makes the velocity of the tool jump, so that accelerations are averages over a
     /// sampling interval: see [`quietcut_simulate::Dynamics::velocity_jumps`].
     pub velocity_jumps: bool,
-    /// The machine's axes (0, 1, 2) in which the structure moves.
+    /// The machine's axes (0, 1, 2) along which the structure moves, in the order of its directions.
     pub axes: Vec<usize>,
 }
 
@@ -41,7 +41,7 @@ impl<'a> Baseline<'a> {
     /// The baseline model of a case.
     ///
     /// # Errors
-    /// A missing or indefinite structure, or an extension that does not apply to it.
+    /// The case has no structure, or an extension or the structure with it is refused.
     pub(crate) fn new(case: &'a Case) -> Result<Self, DiagnoseError> {
         let structure = case.structure()?;
         let wrong = |error| DiagnoseError::simulate(&case.path, error);
@@ -75,7 +75,8 @@ impl<'a> Baseline<'a> {
         Ok(dynamics.first_order())
     }
 
-    /// True if the baseline structure has a rigid-body mode: a pole at zero.
+    /// True if the baseline structure has a rigid-body mode: a pole within 1e-9 times the largest |pole| (taken as at
+    /// least 1e-9 rad/s) of zero.
     pub(crate) fn is_free(&self) -> bool {
         let poles = self.first_order.poles();
         let largest = poles.iter().map(|pole| pole.norm()).fold(0.0, f64::max);
@@ -92,7 +93,8 @@ impl<'a> Baseline<'a> {
             .fold(0.0, f64::max)
     }
 
-    /// The lowest natural frequency of the baseline structure, Hz; `None` without oscillating modes.
+    /// The lowest natural frequency |λ|/2π of the oscillating modes of the baseline structure, Hz; `None` without such
+    /// modes.
     pub(crate) fn lowest_hz(&self) -> Option<f64> {
         self.first_order
             .poles()
@@ -109,7 +111,7 @@ impl<'a> Baseline<'a> {
     }
 }
 
-/// The machine's axes (0, 1, 2) along which a structure moves. Rotations have none.
+/// The machine's axes (0, 1, 2) along which a structure moves, in the order of its directions. Rotations have none.
 pub(crate) fn axes_of(structure: &Structure) -> Vec<usize> {
     structure
         .directions
@@ -123,7 +125,7 @@ pub(crate) fn direction_of(axis: usize) -> Direction {
     [Direction::X, Direction::Y, Direction::Z][axis.min(2)]
 }
 
-/// The ideal sensor of a channel name: fx, x, vx, ax and so on.
+/// The ideal sensor of a channel name such as fx, x, vx or ax; `None` for a name that is not of this form.
 fn pickup_of(name: &str) -> Option<Pickup> {
     use quietcut_recording::Quantity;
     let (quantity, axis) = match name.as_bytes() {

@@ -8,8 +8,7 @@ use crate::criteria::LEAST_INVERSE_MASS_SHARE;
 use crate::signal::grid::Grid;
 use quietcut_model::structure::FirstOrder;
 
-/// Largest relative difference |λ₁ − λ₂|/|λ| of two poles of the structure that count as one pole: the rounding error
-/// of eigenvalues.
+/// Largest relative difference |λ₁ − λ₂|/|λ₂| of two poles of the structure that count as one pole.
 const SAME: f64 = 1e-9;
 
 /// Receptance H(s) = Σ_r R_r/(s − λ_r) of a structure in first-order form, m/N, along x, y and z; rows displacement,
@@ -17,15 +16,15 @@ const SAME: f64 = 1e-9;
 #[derive(Clone, Debug)]
 pub(crate) struct Receptance {
     terms: Vec<(Complex64, Matrix3<Complex64>)>,
-    /// The first-order form of the structure, if no sum over poles represents the receptance because the state matrix
-    /// is defective; otherwise `None`.
+    /// The first-order form of the structure, if the sum over poles misses the receptance: see [`new()`](Self::new);
+    /// otherwise `None`.
     whole: Option<FirstOrder>,
 }
 
 impl Receptance {
     /// Computes the residues with the projectors P_r = Π_{j≠r} (A − λ_j)/(λ_r − λ_j) (Lagrange–Sylvester). Poles that
-    /// coincide count once. If the sum misses the receptance by more than a relative 1e-8 at one of three test
-    /// frequencies, the first-order form is kept instead.
+    /// coincide within `SAME` count once. If the sum misses the receptance by more than a relative 1e-8 at one of three
+    /// test frequencies, the first-order form is kept instead.
     pub(crate) fn new(first_order: &FirstOrder) -> Self {
         let mut poles: Vec<Complex64> = Vec::new();
         for pole in first_order.poles() {
@@ -84,8 +83,8 @@ impl Receptance {
         sum
     }
 
-    /// Poles λ in the upper half plane that a force along `axis` excites, each with the inverse modal mass 2·Im(λ)·|R|
-    /// along that axis, 1/kg. Empty if the receptance has no sum over poles.
+    /// Poles λ in the upper half plane, each with the inverse modal mass 2·Im(λ)·|R| along `axis`, 1/kg, if that
+    /// exceeds `LEAST_INVERSE_MASS_SHARE` times the largest one. Empty if the receptance has no sum over poles.
     pub(crate) fn modes_along(&self, axis: usize) -> impl Iterator<Item = (Complex64, f64)> {
         let per_mass = move |(pole, residue): &(Complex64, Matrix3<Complex64>)| {
             2.0 * pole.im * residue[(axis, axis)].norm()
@@ -97,8 +96,8 @@ impl Receptance {
             .filter(move |(pole, per_mass)| pole.im > 0.0 && *per_mass > LEAST_INVERSE_MASS_SHARE * largest)
     }
 
-    /// √(Σ |R_r/(iω − λ_r)|²) over the poles, with the residues' diagonal entries of `axis`, m/N: the size that the
-    /// receptance |H| along `axis` would have if modes did not cancel each other. 0 if the receptance has no sum over
+    /// √(Σ |R_r/(iω − λ_r)|²) over the poles, with the residues' diagonal entries of `axis`, m/N: the root sum of
+    /// squares of the contributions of the poles to the receptance along `axis`. 0 if the receptance has no sum over
     /// poles.
     pub(crate) fn size_at(&self, omega: f64, axis: usize) -> f64 {
         let s = Complex64::new(0.0, omega);

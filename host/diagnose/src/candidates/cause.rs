@@ -1,6 +1,6 @@
 //! A cause: a physical term with few parameters that the baseline may lack.
 //!
-//! To add one: write its file and name it in [`all`](super::all), whose match asks for it.
+//! To add one: write its file and name it in the match of `candidates::of`.
 
 use std::fmt;
 
@@ -18,7 +18,8 @@ use quietcut_recording::Quantity;
 /// Where a cause acts.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub(crate) enum Location {
-    /// Location of a cause that acts on the whole machine, or of a sensor error in all channels of motion.
+    /// Location of a cause that acts on the whole machine or along all its axes, or of a sensor error in all channels
+    /// of motion.
     Everywhere,
     /// Location of a cause that acts along one of the machine's axes (0, 1, 2).
     Axis(usize),
@@ -35,7 +36,8 @@ pub(crate) enum Location {
 }
 
 impl Location {
-    /// Direction x, y or z of a cause's location, if the location has exactly one axis; otherwise `None`.
+    /// Direction x, y or z of a cause's location, if that is [`Axis`](Self::Axis) or
+    /// [`ChannelFrom`](Self::ChannelFrom); otherwise `None`.
     pub(crate) fn direction(&self) -> Option<Direction> {
         match self {
             Self::Axis(axis) | Self::ChannelFrom(_, axis) => Some(direction_of(*axis)),
@@ -43,7 +45,8 @@ impl Location {
         }
     }
 
-    /// Channel name of a cause's location, if the location is exactly one channel; otherwise `None`.
+    /// Channel name of a cause's location, if that is [`Channel`](Self::Channel) or [`ChannelFrom`](Self::ChannelFrom);
+    /// otherwise `None`.
     pub(crate) fn channel(&self) -> Option<&str> {
         match self {
             Self::Channel(name) | Self::ChannelFrom(name, _) => Some(name),
@@ -93,8 +96,8 @@ pub(crate) struct Regressor {
     /// along an axis without force. A record in the response domain compares −H·f_r with the residual, a record in the
     /// force domain f_r itself.
     pub restoring_n: [Vec<f64>; 3],
-    /// Contribution of the cause to the reading of each channel, at the samples of the record, for causes such as
-    /// sensor errors that act on readings; empty for channels without one.
+    /// Contribution of the cause to the readings, by channel and sample of the record, for causes such as sensor errors
+    /// that act on readings; empty for a channel without contribution, and as a whole for other causes.
     pub observed: Vec<Vec<f64>>,
     /// Contribution of the cause to the cutting force per unit of its coefficient, in a record of a cut; `None` if
     /// there is none.
@@ -221,7 +224,8 @@ pub(crate) trait Cause: Send + Sync {
         self.effect().name()
     }
 
-    /// All effect names of the cause in an answer. Most causes have one; friction behind a backlash has two.
+    /// All effect names of the cause in an answer. Most causes have one; friction behind a backlash, for example, has
+    /// two.
     fn names(&self) -> Vec<&'static str> {
         vec![self.name()]
     }
@@ -229,13 +233,14 @@ pub(crate) trait Cause: Send + Sync {
     /// Locations at which the cause can act and be measured in this study; empty if there is none.
     fn locations(&self, study: &Study<'_>) -> Vec<Location>;
 
-    /// Start values of the nonlinear parameters, as a grid. A cause that is linear in all parameters has one empty set.
+    /// Sets of start values of the nonlinear parameters. A cause that is linear in all parameters has one empty set;
+    /// without any set the cause is no candidate at this location.
     fn nonlinear_grid(&self, _study: &Study<'_>, _location: &Location) -> Vec<Vec<f64>> {
         vec![Vec::new()]
     }
 
-    /// Further start values of the nonlinear parameters, from the residual `_residual` that other causes leave: samples
-    /// by record and channel.
+    /// Further sets of start values of the nonlinear parameters, from the residual `_residual` that other causes leave:
+    /// samples by record and channel.
     fn nonlinear_grid_beside(
         &self,
         _study: &Study<'_>,
@@ -245,7 +250,8 @@ pub(crate) trait Cause: Send + Sync {
         Vec::new()
     }
 
-    /// Bounds of the nonlinear parameters: lowest and highest value of each.
+    /// Bounds of the nonlinear parameters: lowest and highest value of each, in their order; empty for a cause without
+    /// bounds.
     fn bounds(&self, _study: &Study<'_>, _location: &Location) -> Vec<[f64; 2]> {
         Vec::new()
     }
@@ -260,7 +266,7 @@ pub(crate) trait Cause: Send + Sync {
     ) -> Regressors;
 
     /// Parameters by key from the fitted coefficients and the nonlinear parameters; `None` if they are not physical, as
-    /// a negative friction force.
+    /// a negative friction force, or cannot be computed.
     fn parameters(
         &self,
         study: &Study<'_>,
@@ -270,7 +276,8 @@ pub(crate) trait Cause: Send + Sync {
     ) -> Option<Vec<Parameter>>;
 
     /// Nonlinear parameters computed from the fitted coefficients, for a cause whose regressors are exact at those
-    /// values: they are found by fixed-point iteration, not by a search. `None` for other causes.
+    /// values: they are found by fixed-point iteration, not by a search. `None` for other causes, or if the
+    /// coefficients give no such values.
     fn settled(&self, _nonlinear_parameters: &[f64], _coefficients: &[f64]) -> Option<Vec<f64>> {
         None
     }

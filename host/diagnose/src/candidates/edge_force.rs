@@ -1,9 +1,8 @@
 //! The edge coefficients K_te, K_re, K_ae of the material differ from those of the case.
 //!
 //! Shows: forces that do not depend on the chip thickness while a tooth is engaged. Does not show: any change with the
-//! feed per tooth, whereas the part of the force by cutting coefficients is proportional to it. In a short record wear
-//! is equivalent. Fit: linear in each coefficient. Source: Altintas, Manufacturing Automation (2012), ch. 2; Budak,
-//! Altintas and Armarego (1996).
+//! feed per tooth, whereas the part of the force by cutting coefficients is proportional to it. Fit: linear in each
+//! coefficient. Source: Altintas, Manufacturing Automation (2012), ch. 2; Budak, Altintas and Armarego (1996).
 
 use super::coefficients::Coefficients;
 use quietcut_model::effects::EffectName;
@@ -18,8 +17,8 @@ pub(super) const EDGE_FORCE: Coefficients = Coefficients {
             &mut material.kae_n_per_mm,
         ]
     },
-    // Step of a finite difference with respect to an edge coefficient, N/mm: the tangential force per mm of axial depth
-    // at a chip thickness equal to the feed per tooth, but at least 1e-3 N/mm.
+    // Step of a finite difference with respect to an edge coefficient, N/mm: the magnitude of the cutting coefficient
+    // K_tc times the feed per tooth, but at least 1e-3 N/mm.
     step: |cutter| {
         (1e3 * cutter.feed_per_tooth_m * cutter.force.material().ktc_mpa)
             .abs()

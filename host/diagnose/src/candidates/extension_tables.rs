@@ -2,9 +2,8 @@
 
 use toml::{Table, Value};
 
-/// Joins the tables `[extension.NAME]` that have the same name, in the order of their first occurrence. A cause that
-/// acts along several directions gets one table with a list of directions and, for each parameter, a list of equal
-/// length.
+/// Joins the tables `[extension.NAME]` of the same name, in the order of their first occurrence. A key that several of
+/// them have gets the list of its values, in the order of the tables.
 pub(crate) fn joined<'a>(parts: impl IntoIterator<Item = (&'a str, &'a Table)>) -> Vec<(String, Table)> {
     let mut all: Vec<(String, Table)> = Vec::new();
     for (name, table) in parts {

@@ -1,8 +1,7 @@
 //! All cutting and edge coefficients of the material change by one factor, and the cutting force F with them: F·(1 +
 //! change).
 //!
-//! In the steady state of a stable linear cut without measured force, one gain of all channels of motion is exactly
-//! equivalent.
+//! In the steady state of a stable linear cut without measured force, one gain of all channels of motion is equivalent.
 
 use super::process::{changed, cutter, everywhere};
 use crate::candidates::cause::{Cause, LocatedEffect, Location, Parameter, Regressors};

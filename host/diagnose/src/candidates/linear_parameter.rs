@@ -29,8 +29,8 @@ use quietcut_recording::Quantity;
 use quietcut_simulate::Effects;
 
 /// Relative change θ of mass, damping or stiffness in the central differences that give the derivative of the
-/// receptance with respect to θ (of the dynamic stiffness if forces are compared). Their relative error is about its
-/// square, 1e-8; rounding contributes 1e-12/`STEP`.
+/// receptance with respect to θ (of the dynamic stiffness if forces are compared). Their relative truncation error is
+/// about `STEP`², 1e-8.
 const STEP: f64 = 1e-4;
 /// Size of the receptance |H| at which it counts as nearly vanishing, over the root sum of squares of its modal
 /// contributions. The regularization ε of the effective force F + H* (x − H F)/(|H|² + ε²) is this number times that
@@ -56,7 +56,7 @@ impl LinearChange {
     }
 
     /// Diagonal entry of the case's mass, stiffness or damping matrix for the direction of `location`; `None` if the
-    /// structure is not given by matrices, or if `location` has no single direction.
+    /// structure is not given by matrices, or if `location` has no single direction in which the structure moves.
     fn entry(&self, study: &Study<'_>, location: &Location) -> Option<f64> {
         let Form::Matrices(matrices) = &study.baseline.structure.form else {
             return None;
@@ -253,7 +253,9 @@ fn of_folded_forces(record: &Record) -> Option<[Option<Vec<Complex64>>; 3]> {
 
 /// The force F_eff = F + H*(x − H F)/(|H|² + ε²) that explains the estimated displacement x of the tool, N: by axis and
 /// frequency bin. F is the force that excites the structure (measured, or predicted in a cut; 0 along an axis without
-/// force), H the receptance of the baseline, and ε keeps the division regular where H nearly vanishes.
+/// force), H the receptance of the baseline, and ε keeps the division regular where H nearly vanishes. With several
+/// axes H is a matrix, and H*(…)/(|H|² + ε²) stands for H*(H H* + ε²)⁻¹(…). F_eff is 0 in a bin where that inverse does
+/// not exist.
 fn effective_force(study: &Study<'_>, record: &Record) -> [Vec<Complex64>; 3] {
     let baseline = &study.baseline;
     let (axes, grid) = (&baseline.axes, &record.grid);

@@ -26,7 +26,7 @@ use quietcut_model::effects::EffectName;
 
 pub(super) struct MissingMode;
 
-/// Damping ratios of a missing mode at which the search for its frequency starts.
+/// Damping ratios of a missing mode with which its frequency is searched.
 const DAMPING: [f64; 3] = [0.008, 0.025, 0.08];
 /// Number of candidate modes (frequency, damping ratio) that are kept as start values of a missing mode: those at the
 /// largest peaks, over frequency, of the reduction of the residual energy.
@@ -63,8 +63,8 @@ impl Cause for MissingMode {
         self.nonlinear_grid_beside(study, location, &residual)
     }
 
-    /// Frequencies, Hz, and damping ratios at which one further mode would reduce the energy of the residual `left`
-    /// most.
+    /// Pairs of frequency, Hz, and damping ratio of one further mode at the `KEPT` largest peaks, over frequency, of
+    /// its reduction of the energy of the residual `left`, the largest first.
     fn nonlinear_grid_beside(
         &self,
         study: &Study<'_>,
@@ -172,9 +172,9 @@ impl Cause for MissingMode {
         Ok(vec![Regressor::of_channels(observed)])
     }
 
-    /// Frequency, damping ratio and modal mass of the missing mode. `None` if the modal mass is not positive, or if the
-    /// baseline has a mode of smaller modal mass along the axis whose half-power bandwidth overlaps with that of the
-    /// missing mode: the fit then describes a change of the baseline's mode.
+    /// Frequency, damping ratio and modal mass of the missing mode. `None` if the modal mass is not positive, if
+    /// `location` is no axis, or if the baseline has a mode of smaller modal mass along the axis whose half-power
+    /// bandwidth overlaps with that of the missing mode: the fit then describes a change of the baseline's mode.
     fn parameters(
         &self,
         study: &Study<'_>,

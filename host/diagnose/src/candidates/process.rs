@@ -22,7 +22,7 @@ pub(super) fn everywhere(study: &Study<'_>, name: &str) -> Vec<Location> {
     }
 }
 
-/// The cutter (teeth, geometry and force law) of the first cut of the study.
+/// The cutter (teeth, geometry and force law) of the first cut of the study; `None` without a cut.
 pub(super) fn cutter<'a>(study: &'a Study<'_>) -> Option<&'a Cutter> {
     study
         .records

@@ -9,7 +9,7 @@ use quietcut_simulate::Effects;
 use quietcut_simulate::path::restoring_along;
 
 /// A cause that is a restoring force f_r = Σ coefficient · f(x, v, t; nonlinear parameters) of displacement x and
-/// velocity v of the tool.
+/// velocity v of the tool and of time t.
 pub(super) struct Restoring {
     pub(super) effect: EffectName,
     /// Parameter keys of the coefficients in which the restoring force is linear.
@@ -28,8 +28,8 @@ pub(super) struct Restoring {
     /// as in joints of one kind. A driven axis is one along which some record has a force or a motion above the noise.
     /// A force that is tried like this has no nonlinear parameters.
     pub(super) each: bool,
-    /// Start values of the restoring force's nonlinear parameters for one axis, from the records of the study: for
-    /// example from the displacement amplitudes along this axis.
+    /// Sets of start values of the restoring force's nonlinear parameters for one axis, from the records of the study:
+    /// for example from the displacement amplitudes along this axis.
     pub(super) nonlinear_grid: fn(&Study<'_>, usize) -> Vec<Vec<f64>>,
     /// Lowest and highest value of each nonlinear parameter for one axis.
     pub(super) bounds: fn(&Study<'_>, usize) -> Vec<[f64; 2]>,

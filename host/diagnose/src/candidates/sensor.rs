@@ -64,8 +64,8 @@ pub(super) fn is_at(location: &Location, channel: &Observed) -> bool {
 /// its spectrum multiplied by `change`(ω).
 ///
 /// The acceleration of a cut jumps when teeth enter and leave, and sampling folds much of it into the band. In a cut,
-/// if a channel of the same quantity, delay and filters reads an axis alone, its reading of the estimated motion, which
-/// contains this aliasing, is used for the axis instead of the estimated displacement.
+/// if a channel of the same quantity, delay and filters reads an axis alone, the reading that this channel has of the
+/// estimated motion, which contains the aliasing, is used for the axis instead of the estimated displacement.
 pub(super) fn read(
     record: &Record,
     channel: &Observed,
@@ -108,8 +108,8 @@ pub(super) fn read(
     grid.samples(&sum)
 }
 
-/// Regressor of a sensor error: the readings that the channels at `location` have of the estimated motion, each with
-/// its spectrum multiplied by `change`(ω); empty for all other channels.
+/// Regressor of a sensor error: the readings that the channels at `location`, with the axis weights `weights`, have of
+/// the estimated motion, each with its spectrum multiplied by `change`(ω); empty for all other channels.
 pub(super) fn readings_at(
     record: &Record,
     location: &Location,

@@ -6,8 +6,7 @@
 //!
 //! Fit: δ, f_m and ψ are fitted to the tachometer edges, with f_m up to 0.45 times the lowest spindle frequency. The
 //! regressor is the difference between the cutting force with this modulation and the force at constant speed. Its
-//! coefficient is 1 if the records confirm the modulation; the reported amplitude is that of the tachometer, which is
-//! more accurate.
+//! coefficient is 1 if the records confirm the modulation; the reported amplitude is that of the tachometer.
 
 use super::process::everywhere;
 use crate::candidates::cause::{Cause, Location, Parameter, Regressor, Regressors, WRONG_PARAMETERS};
@@ -77,7 +76,7 @@ impl Cause for SpeedFluctuationCause {
         Ok(vec![Regressor::of_cut(force.difference(&cut.force, 1.0))])
     }
 
-    /// The nonlinear parameters of the speed modulation (amplitude, frequency, phase) come from the tachometer, not
+    /// The nonlinear parameters of the speed modulation (frequency, amplitude, phase) come from the tachometer, not
     /// from the fit.
     fn settled(&self, nonlinear_parameters: &[f64], _: &[f64]) -> Option<Vec<f64>> {
         Some(nonlinear_parameters.to_vec())

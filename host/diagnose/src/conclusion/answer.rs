@@ -43,10 +43,10 @@ pub struct EstimatedCause {
     /// there is no single one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub direction: Option<&'static str>,
-    /// The two directions that the cause couples, if it couples two.
+    /// The two directions that the cause couples; `None` for a cause that couples none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub directions: Option<[&'static str; 2]>,
-    /// Name of the channel in which the cause acts, if it is an error of one sensor.
+    /// Name of the channel in which the cause acts, if it is an error of one sensor; otherwise `None`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub channel: Option<String>,
     /// Parameters by key.
@@ -58,8 +58,8 @@ pub struct EstimatedCause {
     /// they have the same index.
     #[serde(skip)]
     pub choice: usize,
-    /// The table `[extension.NAME]` with parameters at both ends of the 90 % interval along each principal direction of
-    /// the correlation of the fitted parameters.
+    /// The table `[extension.NAME]` with the parameters at both ends of a 90 % interval: one pair for each principal
+    /// direction of the correlation of the fitted parameters.
     #[serde(skip)]
     pub moved: Vec<[toml::Table; 2]>,
 }
@@ -98,23 +98,24 @@ pub(crate) fn label(causes: &[EstimatedCause]) -> String {
 /// square root of the ratio of their χ², unless a long record is validated on its rest.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Quality {
-    /// NRMSE on the held-out segments: root mean square of the residual of a channel in a segment over that of the
-    /// measured channel in its whole record. The squares are averaged over all channels and segments with equal weight.
+    /// NRMSE on the held-out segments: the ratio of the RMS residual of a channel in a segment to the RMS of the
+    /// measured channel in its whole record, as root mean square over all channels and segments with equal weight.
     pub nrmse_heldout: f64,
     /// NRMSE on the whole records, each one segment; otherwise as `nrmse_heldout`.
     pub nrmse_whole: f64,
 }
 
-/// Reduction of the residual energy on the held-out segments by the extension.
+/// Reduction of the residual energy on the held-out segments by the extension; for a long record that is validated on
+/// its rest, of the energy in the rest.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Gain {
-    /// Share of the held-out residual energy above the noise that the extension explains: 1 − (E_after − n)/(E_before −
-    /// n), with the residual energies E before and after the extension in units of the noise variance, and n compared
-    /// values; limited to −1 to 1.
+    /// Share of this residual energy above the noise that the extension explains: 1 − (E_after − n)/(E_before − n),
+    /// with the residual energies E before and after the extension in units of the noise variance, and the number n of
+    /// compared values; limited to −1 to 1.
     pub residual_energy_removed: f64,
     /// 90 % interval of `residual_energy_removed`, from the variance of both residual energies by the noise. It is
     /// limited to −1, where the extension doubles the residual energy above the noise, and to 1. It is wide if the
-    /// held-out residual of the baseline is close to the noise.
+    /// residual of the baseline is close to the noise.
     pub ci90: [f64; 2],
 }
 
@@ -146,44 +147,48 @@ pub struct Unexplained {
     /// only noise is left.
     pub fraction: f64,
     /// Channel with the largest unexplained residual relative to its noise, in words, with the frequency and time at
-    /// which that is largest; `none above noise` if only noise is left.
+    /// which the residual is largest; `none above noise` if only noise is left.
     #[serde(rename = "where")]
     pub location: String,
-    /// A formula that may describe the unexplained restoring force: a guess.
+    /// A formula that may describe the unexplained restoring force: a guess; `None` unless the outcome is `Unexplained`
+    /// and a formula explains enough.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub guess: Option<String>,
 }
 
-/// The experiment that separates confounded candidate models.
+/// The experiment that separates confounded candidate models, or comes nearest to it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct NextTest {
     /// Kind of the proposed test, in the words of a recording's sidecar.
     pub kind: &'static str,
-    /// Direction of the exciting force of the proposed test, if it is a test of the structure.
+    /// Direction of the exciting force of the proposed test, if it is a test of the structure; `None` for a cut.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub direction: Option<&'static str>,
-    /// Force amplitudes of the proposed test, applied one after the other, N; for an impact the peak force.
+    /// Force amplitudes of the proposed test, applied one after the other, N; for an impact the peak force; empty for a
+    /// cut.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub force_n: Vec<f64>,
-    /// First and last frequency of the proposed sweep, Hz; for a step sine both are the same.
+    /// First and last frequency of the proposed sweep, Hz; for a step sine both are the same; `None` for an impact or a
+    /// cut.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub band_hz: Option<[f64; 2]>,
-    /// Spindle speed of the proposed cut, rev/min.
+    /// Spindle speed of the proposed cut, rev/min; `None` for a test of the structure.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub spindle_rpm: Option<f64>,
-    /// Axial depth of the proposed cut, mm.
+    /// Axial depth of the proposed cut, mm; `None` for a test of the structure.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub axial_depth_mm: Option<f64>,
-    /// Feed per tooth of the proposed cut, mm.
+    /// Feed per tooth of the proposed cut, mm; `None` for a test of the structure.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub feed_per_tooth_mm: Option<f64>,
     /// Duration of the proposed test, s.
     pub seconds: f64,
-    /// Quantities that the proposed test measures in addition to the channels of the present records.
+    /// Quantities that the proposed test measures in addition to the channels of the present records; `None` if there
+    /// are none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub measure: Option<&'static str>,
     /// Distance between the predictions of those two candidate models that the proposed test separates least, in
-    /// standard deviations of the noise. A distance of about 8 separates two models nearly always.
+    /// standard deviations of the noise.
     pub distance: f64,
     /// In words: the two candidate models that the proposed test separates least, and the channel in which they differ
     /// most; if no test separates them reliably, the distance instead of the channel.
@@ -191,7 +196,7 @@ pub struct NextTest {
 }
 
 impl NextTest {
-    /// The proposed test in words, as a sentence without full stop.
+    /// The proposed test in words, as a phrase.
     pub fn what(&self) -> String {
         let list = |values: &[f64]| {
             let values: Vec<String> = values.iter().map(|value| format!("{value:.3}")).collect();
@@ -239,31 +244,33 @@ pub struct Diagnosis {
     /// Prediction error of the extended case; `None` without an extension.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub extended: Option<Quality>,
-    /// Reduction of the held-out residual by the extension, if there is one.
+    /// Reduction of the residual energy by the extension; `None` without an extension.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gain: Option<Gain>,
     /// The unexplained residual.
     pub unexplained: Unexplained,
-    /// Effect of the extension on the stability limits; `None` without an extension, or if limits cannot be computed.
+    /// Effect of the extension on the stability limits, as [`lobes`](crate::lobes::lobes) computes it;
+    /// [`diagnose`](crate::diagnose) leaves it `None`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lobes: Option<Lobes>,
-    /// Stability lobes of the case without extension, with the trial cuts and recorded cuts; `None` with an extension,
-    /// without such cuts, or if limits cannot be computed.
+    /// Stability lobes of the case without extension, with the trial cuts and recorded cuts, as
+    /// [`baseline_lobes`](crate::lobes::baseline_lobes) computes them; [`diagnose`](crate::diagnose) leaves it `None`.
     #[serde(skip)]
     pub baseline_lobes: Option<Chart>,
-    /// The experiment that separates confounded candidate models.
+    /// The experiment that separates the candidate models of `explanations`, or comes nearest to it; `None` if there
+    /// are fewer than two, or if no experiment can be simulated with all of them.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub next_test: Option<NextTest>,
-    /// Remarks, for example on the records or on results that cannot be computed.
+    /// Remarks in words, for example on the records or on results that cannot be computed.
     pub warnings: Vec<String>,
     /// The best candidate model and those equivalent to it, each with the causes that act together: more than one if
-    /// the outcome is `Confounded`.
+    /// the outcome is `Confounded`, none if no candidate model is accepted.
     #[serde(skip_serializing_if = "is_single")]
     pub explanations: Vec<Vec<EstimatedCause>>,
     /// Number of entries of `causes`, from the first, that act together in the extended case; 0 without an extension.
     #[serde(skip)]
     pub acting: usize,
-    /// Measured samples and residuals of each channel of each record.
+    /// Measured samples and residuals, one view for each channel of each record: by record, then by channel.
     #[serde(skip)]
     pub views: Vec<ResidualView>,
 }
@@ -304,7 +311,7 @@ impl Diagnosis {
         labels.join("; or ")
     }
 
-    /// The names of the causes, each once. A cause along several directions has an entry for each.
+    /// The names of the `causes`, each once, in their order.
     pub fn names(&self) -> Vec<&'static str> {
         let mut names = Vec::new();
         for cause in &self.causes {

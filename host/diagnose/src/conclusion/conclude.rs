@@ -84,7 +84,7 @@ fn answer(
     };
     let confidence = doubt * confidence(selection.ahead, of_excess / allowed);
     // Errors of the computation are proportional to the signal. If they resemble the contribution of a cause, they bias
-    // its parameters, so the variances are raised.
+    // the parameters of the cause, so the variances are raised.
     let uncertain = inflation + criteria.coherent;
     let spread = |model: &CandidateModel| {
         let closed = criteria.closed.as_ref();
@@ -116,8 +116,8 @@ fn answer(
     diagnosis
 }
 
-/// The answer if the baseline is right, with a warning if the prediction error is much larger on the whole records than
-/// on the held-out segments.
+/// The answer if the baseline is right, with the warnings of the library, and one more if the prediction error is much
+/// larger on the whole records than on the held-out segments.
 fn of_baseline(
     study: &Study<'_>,
     library: &Library,
@@ -198,8 +198,8 @@ fn shared_names(library: &Library, selection: &Selection, best: &[&'static str])
 }
 
 /// Sets the outcome to confounded. The group of equivalent names holds those that not all equivalent candidate models
-/// share, and the confidence in them is bounded by one over the number of names or of models, whichever is larger. If
-/// all models share all names, the group holds the names that occur at different locations.
+/// share, and the confidence in them is bounded by one over the number of names in the group or of models, whichever is
+/// larger. If all models share all names, the group holds the names of the causes that equivalent models add.
 fn confound(diagnosis: &mut Diagnosis, shared: &[&'static str]) {
     diagnosis.outcome = Outcome::Confounded;
     let mut group = diagnosis.names();

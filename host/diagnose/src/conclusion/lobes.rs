@@ -31,35 +31,37 @@ const SHALLOWEST_MM: f64 = 0.01;
 /// found.
 const DEEPEST_MM: f64 = 200.0;
 
-/// Largest axial depth of a stability chart without trial cuts, as a multiple of the lowest stability limit found in
-/// the speed range. The chart is deeper if [`BELOW_CUTS`] requires it.
+/// Largest axial depth of a stability chart without trial cuts, as a multiple of the lowest stability limit that
+/// [`depth_mm`] finds. The chart is deeper if [`BELOW_CUTS`] requires it.
 const DEPTH: f64 = 4.0;
 
 /// Largest axial depth of a stability chart with trial cuts, as a multiple of the axial depth of the deepest trial or
 /// recorded cut in it. Without trial cuts a chart is at least as deep as this.
 const BELOW_CUTS: f64 = 1.2;
 
-/// Stability limit at one spindle speed before and after the extension, each with its kind and chatter frequency; a
-/// limit is `None` if it is above the largest depth of the search.
+/// Stability limit at one spindle speed before and after the extension, each with its kind and chatter frequency.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Change {
-    /// Stability limit of axial depth of the case without the extension, mm.
+    /// Stability limit of axial depth of the case without the extension, mm; `None` if none lies within the depth of
+    /// the search.
     pub limit_before_mm: Option<f64>,
-    /// Stability limit of axial depth of the extended case, mm.
+    /// Stability limit of axial depth of the extended case, mm; `None` if none lies within the depth of the search.
     pub limit_after_mm: Option<f64>,
     /// 90 % interval of `limit_after_mm`, from the intervals of the causes' parameters; `None` if it was not computed.
-    /// An upper end of `None` is above the largest depth of the search.
+    /// An upper end of `None` is not below the largest depth of the search.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub limit_after_ci90_mm: Option<[Option<f64>; 2]>,
     /// Spindle speed, rev/min.
     pub at_rpm: f64,
-    /// Type of the stability loss at the limit of the case without the extension.
+    /// Type of the stability loss at the limit of the case without the extension; `None` without this limit.
     pub kind_before: Option<StabilityLoss>,
-    /// Type of the stability loss at the limit of the extended case.
+    /// Type of the stability loss at the limit of the extended case; `None` without this limit.
     pub kind_after: Option<StabilityLoss>,
-    /// Chatter frequency at the limit of the case without the extension, Hz.
+    /// Chatter frequency at the limit of the case without the extension, Hz; `None` without this limit, or if the
+    /// frequency cannot be computed.
     pub chatter_before_hz: Option<f64>,
-    /// Chatter frequency at the limit of the extended case, Hz.
+    /// Chatter frequency at the limit of the extended case, Hz; `None` without this limit, or if the frequency cannot
+    /// be computed.
     pub chatter_after_hz: Option<f64>,
 }
 
@@ -79,9 +81,9 @@ pub struct Chart {
     pub method: &'static str,
     /// Largest axial depth up to which stability limits were searched, mm.
     pub searched_mm: f64,
-    /// The stability limits of axial depth, one entry for each spindle speed.
+    /// The stability limits of axial depth, one entry for each spindle speed, by ascending speed.
     pub lines: Vec<SpeedLine>,
-    /// Trial cuts and recorded cuts, each with the comparison of its outcome with the prediction.
+    /// Trial cuts, then recorded cuts, each with the comparison of its outcome with the prediction.
     pub cuts: Vec<(TrialCut, Call)>,
     /// One sentence for each recorded cut whose outcome cannot be determined.
     pub warnings: Vec<String>,
@@ -97,12 +99,12 @@ pub struct Lobes {
     /// Largest axial depth up to which stability limits were searched, mm.
     pub searched_mm: f64,
     /// Time since the start of the recording for which stability limits with drift or wear hold: the end of the longest
-    /// recording, s.
+    /// recording, s; `None` if neither case has drift or wear.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub after_s: Option<f64>,
     /// Name of the stability method of the extended case.
     pub method_after: &'static str,
-    /// Stability limits before and after the extension, at every speed of the chart.
+    /// Stability limits before and after the extension, one entry for each speed of the chart, by ascending speed.
     pub speeds: Vec<Change>,
     /// Right and wrong predictions for trial and recorded cuts before and after the extension; `None` without such
     /// cuts.
@@ -241,7 +243,8 @@ struct Cuts<'a> {
     recorded: Vec<TrialCut>,
     /// One sentence for each recorded cut whose outcome cannot be determined.
     warnings: Vec<String>,
-    /// Speeds of all recorded cuts, rev/min, including cuts whose immersion or feed belongs to another chart.
+    /// Spindle speeds that the sidecars of recorded cuts give, rev/min, including cuts whose immersion or feed belongs
+    /// to another chart.
     recorded_rpm: Vec<f64>,
 }
 
@@ -397,8 +400,8 @@ fn speeds(
     Ok(speeds)
 }
 
-/// Largest axial depth of a stability chart, mm: [`DEPTH`] times the lowest stability limit over some of the speeds,
-/// which is searched by doubling the depth; [`DEEPEST_MM`] if no limit is found.
+/// Largest axial depth of a stability chart, mm: [`DEPTH`] times the lowest stability limit over at most [`COARSE`] of
+/// the speeds, which is searched by doubling the depth; [`DEEPEST_MM`] if no limit is found.
 fn depth_mm(method: &dyn Method, speeds_rpm: &[f64]) -> Result<f64, StabilityError> {
     let every = speeds_rpm.len().div_ceil(COARSE).max(1);
     let coarse: Vec<f64> = speeds_rpm.iter().copied().step_by(every).collect();

@@ -5,7 +5,7 @@
 //! one speed contain nearly the information of a minute, except on changes over the minute. Therefore the extended case
 //! (the case itself if no cause was found) is accepted only if its residual energy in the rest is near that of the
 //! noise, or exceeds it by a small share of the baseline's excess. The gain is computed from the rest alone, to which
-//! nothing was fitted.
+//! no parameter of a cause was fitted.
 
 use crate::baseline::Baseline;
 use crate::conclusion::answer::{Diagnosis, Gain, Outcome, Quality};
@@ -18,14 +18,14 @@ use crate::records::study::Study;
 use quietcut_model::case::Case;
 use quietcut_recording::{Recording, TestKind};
 
-/// Number of samples of all records together in whose first parts causes are searched; `PERIODS` and `REVOLUTIONS` may
-/// require more.
+/// Number of samples in the first parts of all records together, in which causes are searched; `PERIODS` and
+/// `REVOLUTIONS` may require more.
 const SEARCHED: usize = 32_768;
 /// Smallest length of the first part of a record, in which causes are searched, in periods of the lowest natural
 /// frequency of the baseline.
 const PERIODS: f64 = 60.0;
 /// Smallest length of the first part of a recorded cut, in which causes are searched, in revolutions of the spindle. As
-/// many revolutions are left out before it.
+/// many revolutions are left out before it if the record is long enough.
 const REVOLUTIONS: f64 = 24.0;
 
 /// The first part and the rest of each record, if all records are of random forces, of impacts or of cuts at one speed;
@@ -113,7 +113,7 @@ fn validated(
         searched_s.fold(0.0, f64::max)
     ));
     let extended = match diagnosis.outcome {
-        // The rest of the records is not evaluated: more samples would not make a known cause explain the residual.
+        // The answer is not validated: more samples would not make a known cause explain the residual.
         Outcome::Unexplained => return Ok(Some(diagnosis)),
         Outcome::None => case.clone(),
         _ => match diagnosis.extended(case) {
@@ -145,13 +145,13 @@ fn validated(
     Ok(Some(diagnosis))
 }
 
-/// Residual of a case in whole records to which no cause is fitted.
+/// Residual of a case in records to which no cause is fitted.
 struct Residual {
     /// Residual energy χ² of all records, in units of the noise variance.
     energy: f64,
     /// Number of compared values of all records.
     count: f64,
-    /// Prediction error (NRMSE) of the case on the whole records.
+    /// Prediction error (NRMSE) of the case on these records.
     nrmse: f64,
 }
 

@@ -32,7 +32,7 @@ pub struct MissingForce {
     pub force_n: Vec<f64>,
     /// Static stiffness of the baseline along the axis, N/m: one over the static compliance; 0 if that is not positive.
     pub stiffness: f64,
-    /// Number of samples in each segment over which stiffness and damping of the missing force are fitted.
+    /// Number of samples in each segment over which stiffness and damping of the missing force are fitted, at least 16.
     segment: usize,
 }
 
@@ -42,17 +42,17 @@ pub struct MissingForce {
 pub struct AtAmplitude {
     /// Displacement amplitude of the segment: largest distance of the displacement from its mean over the segment, m.
     pub amplitude_m: f64,
-    /// Stiffness that the missing force adds: the least-squares slope of its force over the displacement in the
+    /// Stiffness that the missing force adds: the least-squares slope of the force over the displacement in the
     /// segment, N/m.
     pub stiffness: f64,
-    /// Damping that the missing force adds: the least-squares slope of its force over the velocity in the segment, N
+    /// Damping that the missing force adds: the least-squares slope of the force over the velocity in the segment, N
     /// s/m.
     pub damping: f64,
 }
 
 impl MissingForce {
-    /// The missing force that the residual of a channel implies; `None` for a channel of cutting force in the
-    /// response domain, or for an axis without motion.
+    /// The missing force that the residual of a channel implies; `None` for a channel of force in the response domain,
+    /// for a channel that reads no axis, or for an axis without motion.
     pub(crate) fn of(
         baseline: &Baseline<'_>,
         record: &Record,
@@ -72,7 +72,7 @@ impl MissingForce {
             Domain::Response => response_over(record, channel, axis, residual),
         };
         let at_rest = baseline.receptance.at(0.0)[(axis, axis)].re;
-        // For a structure without oscillating modes, the record is divided into twenty segments.
+        // For a structure without oscillating modes, a segment is a twentieth of the record.
         let duration_s = residual.len() as f64 / record.grid.rate_hz();
         let segment_s = baseline.lowest_hz().map_or(0.05 * duration_s, |hz| PERIODS / hz);
         Some(Self {
@@ -84,8 +84,8 @@ impl MissingForce {
         })
     }
 
-    /// Stiffness and damping of the missing force in each segment of the record, without segments whose amplitude is
-    /// small against the largest.
+    /// Stiffness and damping of the missing force in each whole segment of the record, in order of time, without
+    /// segments whose amplitude is at most `LEAST_AMPLITUDE` of the largest.
     pub fn at_amplitudes(&self) -> Vec<AtAmplitude> {
         let all: Vec<AtAmplitude> = self
             .x

@@ -15,7 +15,8 @@ use crate::records::study::Study;
 use quietcut_model::effects::EffectName;
 
 /// The causes of a candidate model with their estimated parameters and 90 % intervals. `inflation` is the factor on the
-/// variances for unit-variance noise, `confidence` the confidence in every cause.
+/// variances for unit-variance noise, `confidence` the confidence in every cause. A cause whose parameters are not
+/// physical is left out.
 pub(crate) fn parameter_estimates(
     study: &Study<'_>,
     library: &Library,

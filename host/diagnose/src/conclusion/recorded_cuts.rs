@@ -9,9 +9,9 @@ use quietcut_recording::{RecordedCut, Recording, Sensed, SpindleSettings, TestKi
 use quietcut_stability::trial_cuts::{Outcome, TrialCut};
 
 /// The recorded cuts that belong to the stability chart of a case, as trial cuts: those whose sidecar gives one spindle
-/// speed and an axial depth, and whose immersion and feed, if the sidecar gives them, are those of the case. The second
-/// value holds one warning, with the reason, for each cut whose outcome cannot be determined and which therefore counts
-/// as marginal.
+/// speed and an axial depth, and whose immersion and feed, if the sidecar gives them, agree with those of the case. The
+/// second value holds one warning, with the reason, for each cut whose outcome cannot be determined and which therefore
+/// counts as marginal.
 pub fn recorded_cuts(case: &Case, recordings: &[Recording]) -> (Vec<TrialCut>, Vec<String>) {
     let mut warnings = Vec::new();
     let cuts = recordings

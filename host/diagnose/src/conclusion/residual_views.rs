@@ -34,11 +34,11 @@ pub struct ResidualView {
     /// Measured samples minus those that the baseline (the case file with its extensions) predicts along the measured
     /// motion, free decay included, in the unit of the channel.
     pub residual: Vec<f64>,
-    /// Measured samples minus those that the extended case predicts, in the unit of the channel; empty without an
-    /// extension.
+    /// `residual` minus the contribution of the extension along the measured motion, with the free decay fitted again
+    /// unless forces are compared; empty without an extension.
     pub left: Vec<f64>,
     /// The restoring force that would explain the residual of the baseline in this channel; `None` for a channel of
-    /// force if motion is compared, or if the channel's axis has no motion.
+    /// force if motion is compared, if the channel reads no axis, or if its axis has no motion.
     pub missing: Option<MissingForce>,
     /// The channel and its baseline residual, interpolated at the tooth passings of a cut; `None` for other tests.
     pub spindle_motion: Option<SpindleMotionView>,
@@ -87,7 +87,8 @@ impl ResidualView {
     }
 }
 
-/// Views of every channel of every record, with the residual of the candidate model `best` if there is one.
+/// Views of every channel of every record, by record and then by channel, with the residual of the candidate model
+/// `best` if there is one.
 pub(crate) fn residual_views(
     study: &Study<'_>,
     library: &Library,

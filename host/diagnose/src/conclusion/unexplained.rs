@@ -12,9 +12,9 @@ const SEGMENTS: usize = 40;
 /// Number of spectral lines on each side of the residual's largest line whose energy is counted with that of the line.
 const NEAR: usize = 8;
 
-/// Words for the channel whose residual is largest relative to its noise: RMS of the residual, its largest spectral
-/// line with the spindle order, and the time of its largest energy. The residual is that of the extended case, or of
-/// the baseline if there is no extension.
+/// Words for the channel whose residual is largest relative to its noise: RMS of the residual, largest spectral line
+/// (in a cut with its spindle order), time of the largest energy, and share of the energy at large amplitudes. Empty
+/// without views. The residual is that of the extended case, or of the baseline if there is no extension.
 pub(crate) fn describe(views: &[ResidualView]) -> String {
     let worst = views.iter().max_by(|a, b| {
         let beside_noise =
@@ -92,8 +92,9 @@ fn segment_energies(samples: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-/// Share of the residual energy in those segments of a record (a quarter of them) that have the largest measured
-/// energy: about a quarter if the residual does not depend on the amplitude, more if it grows with the amplitude.
+/// Share of the residual energy in those segments of a record (a quarter of them, rounded up) that have the largest
+/// measured energy: about a quarter if the residual does not depend on the amplitude, more if it grows with the
+/// amplitude.
 fn share_at_large_amplitude(energy: &[f64], measured: &[f64]) -> f64 {
     let mut order: Vec<usize> = (0..measured.len().min(energy.len())).collect();
     order.sort_by(|a, b| measured[*b].total_cmp(&measured[*a]));

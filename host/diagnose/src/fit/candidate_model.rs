@@ -22,13 +22,14 @@ pub(crate) struct Choice {
 pub(crate) struct CandidateModel {
     /// The causes of this candidate model, each at its location and with one set of nonlinear parameters.
     pub choices: Vec<Choice>,
-    /// The linear fit of all coefficients to the residual of the baseline, in the order of `choices`. A
-    /// prediction-error fit overwrites its coefficients and its χ².
+    /// The linear fit of all coefficients to the residual of the baseline, cause after cause in the order of `choices`.
+    /// A prediction-error fit overwrites its coefficients and its χ².
     pub fit: Fit,
-    /// Number of fitted parameters of the candidate model, nonlinear ones included.
+    /// Number of fitted parameters of the candidate model: see
+    /// [`Library::parameter_count`](crate::fit::library::Library::parameter_count).
     pub parameter_count: usize,
-    /// Result of the prediction-error fit, if one was made. Coefficients, nonlinear parameters and χ² of the model are
-    /// then those of this fit.
+    /// Result of the prediction-error fit; `None` if none was made. With such a result, coefficients, nonlinear
+    /// parameters and χ² of the model are those of this fit.
     pub simulated: Option<Simulated>,
 }
 
@@ -41,7 +42,7 @@ pub(crate) struct Simulated {
     /// For each record: the fitted initial state of the simulation; empty for a start from rest. No entries in a study
     /// with a cut.
     pub starts: Vec<Vec<f64>>,
-    /// Prediction of the records by the extended case, if a later stage needs it.
+    /// Prediction of the records by the extended case in a study with a cut; otherwise `None`.
     pub reading: Option<Arc<ExtendedPrediction>>,
 }
 

@@ -8,12 +8,12 @@ use crate::fit::regression::{Regression, Subset};
 use crate::records::domain::Domain;
 use crate::records::study::Study;
 
-/// For each cause of the candidate model: covariance of its coefficients and, after them, of its nonlinear parameters,
-/// for unit-variance noise.
+/// For each cause of the candidate model: covariance of its coefficients and, after them, of its nonlinear parameters
+/// (none if [`Library::slopes_of`] gives no derivatives for them), for unit-variance noise.
 ///
-/// In the force domain the residual contains errors of the equations and of the differentiated motion besides noise.
-/// The covariance is then estimated from the residual and divided by `inflation`, because the caller multiplies it by
-/// that factor.
+/// If all records are compared in force, the residual contains errors of the equations and of the differentiated motion
+/// besides noise. The covariance is then estimated from the residual and divided by `inflation`, because the caller
+/// multiplies it by that factor.
 pub(crate) fn covariance(
     study: &Study<'_>,
     library: &Library,

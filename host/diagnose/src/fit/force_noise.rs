@@ -5,10 +5,10 @@
 //! resonance, or with dry friction, that linear S is wrong: whether the machine jumps or slips depends on n as much as
 //! on the parameters, and the covariance of the fit is far too small. Let J be the Jacobian in units of the noise and N
 //! = JᵀJ: a residual e that n causes shifts the parameters by δ = N⁻¹ Jᵀ e. This file draws noise n_k, computes e_k =
-//! y(f + n_k) − y(f), and subtracts the linear part e'_k = H n_k that N already contains: C = D N⁻¹ D, D_i² = max(1,
-//! 1 + ν/(ν − 2) · mean_k(δ_ki² − δ'_ki²) / (N⁻¹)_ii) with ν ≥ 3 the number of draws that do not diverge. This is a
-//! parametric bootstrap with one Gauss–Newton step (Efron and Tibshirani, An Introduction to the Bootstrap, 1993,
-//! ch. 6) and the linear machine as control variate. Intervals only become wider.
+//! y(f + n_k) − y(f), and subtracts the linear part e'_k = H n_k that N already contains: C = D N⁻¹ D with the diagonal
+//! matrix D, D_i² = max(1, 1 + ν/(ν − 2) · mean_k(δ_ki² − δ'_ki²) / (N⁻¹)_ii), where ν (at least 3) is the number of
+//! draws that do not diverge. This is a parametric bootstrap with one Gauss–Newton step (Efron and Tibshirani, An
+//! Introduction to the Bootstrap, 1993, ch. 6) and the linear machine as control variate. Intervals only become wider.
 
 use std::ops::Range;
 
@@ -28,7 +28,7 @@ use crate::fit::segment::{Segment, Subset};
 use crate::fit::unknowns::{FreeParameter, at_bounds, covariance};
 
 /// Least and largest number of draws of force noise. The relative error of a standard deviation from n draws is
-/// 1/√(2n): a third for 4 draws, a fifth for 16.
+/// 1/√(2n): about a third for 4 draws, a fifth for 16.
 const DRAWS: [usize; 2] = [4, 16];
 /// Largest total number of samples simulated in all draws of force noise, as long as the smallest number of draws is
 /// kept.
@@ -45,8 +45,9 @@ type Forces = [Vec<f64>; 3];
 
 impl OutputError<'_> {
     /// The candidate model with its parameters' covariance widened by the noise of the force sensors; `None` if no
-    /// prediction-error fit was made, if no force has noise, if the extended case is linear, if its simulation fails,
-    /// or if no parameter's variance grows by more than the share `LEAST_FORCE_NOISE_VARIANCE`.
+    /// prediction-error fit was made, if no force has noise, if the extended case is linear, if it cannot be simulated,
+    /// if the normal equations cannot be solved, or if no parameter's variance grows by more than the share
+    /// `LEAST_FORCE_NOISE_VARIANCE`.
     pub(crate) fn spread(&self, library: &Library, model: &CandidateModel) -> Option<CandidateModel> {
         let simulated = model.simulated.as_ref()?;
         let mut deviations = self

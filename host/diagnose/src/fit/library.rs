@@ -16,7 +16,8 @@ pub(crate) struct Candidate {
     pub cause: usize,
     /// Location of the candidate's cause, for example an axis or a channel.
     pub location: Location,
-    /// Each set of the cause's nonlinear parameters, with the indices of its regression columns.
+    /// Each set of the cause's nonlinear parameters, with the indices of its regression columns, one for each
+    /// coefficient.
     pub variants: Vec<(Vec<f64>, Vec<usize>)>,
 }
 
@@ -30,8 +31,8 @@ pub(crate) struct Library {
     pub unexamined: Vec<String>,
 }
 
-/// The effects that change mass, stiffness and damping of the structure. One factor on all three is a factor on its
-/// dynamic stiffness.
+/// The effects that change mass, stiffness and damping of the structure. One factor on all three matrices is a factor
+/// on the dynamic stiffness of the structure.
 pub(crate) const OF_DYNAMIC_STIFFNESS: [EffectName; 3] =
     [EffectName::Mass, EffectName::Stiffness, EffectName::Damping];
 
@@ -210,7 +211,7 @@ impl Library {
             .collect()
     }
 
-    /// Fitted coefficients of the cause at index `position` of a candidate model.
+    /// Fitted coefficients of the cause at index `position` in `choices` of a candidate model.
     pub(crate) fn coefficients(&self, model: &CandidateModel, position: usize) -> Vec<f64> {
         let from: usize = model.choices[..position]
             .iter()
@@ -255,7 +256,8 @@ impl Library {
         }
     }
 
-    /// Parameters by key of every cause of a candidate model; `None` if the parameters of one cause are not physical.
+    /// Parameters by key of every cause of a candidate model; `None` if those of one cause are not physical or cannot
+    /// be computed.
     pub(crate) fn parameters(
         &self,
         study: &Study<'_>,
@@ -280,7 +282,8 @@ impl Library {
             .collect()
     }
 
-    /// Names and tables of the extensions that add a candidate model to a case; `None` if a parameter is not physical.
+    /// Names and tables of the extensions that add a candidate model to a case; `None` as for
+    /// [`parameters()`](Self::parameters).
     pub(crate) fn extensions(
         &self,
         study: &Study<'_>,

@@ -1,5 +1,5 @@
-//! Fits the parameters of one candidate model: by linear regression along the measured motion first, then by prediction
-//! error.
+//! Fits the parameters of one candidate model: by linear regression along the measured motion first and then, where
+//! possible, by prediction error.
 
 pub(crate) mod candidate_model;
 pub(crate) mod closed_fit;

@@ -2,8 +2,7 @@
 
 use nalgebra::DMatrix;
 
-/// Values of each column in one block of a matrix product: 8 KiB per column, so that the block of some hundred columns
-/// stays in the cache.
+/// Values of each column in one block of a matrix product: 8 KiB per column.
 const BLOCK: usize = 1024;
 
 /// Inner products of the whitened regression columns, over one subset of the records' segments.
@@ -55,8 +54,8 @@ impl Products {
 
 /// Inner products of the regression columns from index `first` on with all `columns`, one row for each.
 ///
-/// The cost is 2·(new columns)·(columns)·(samples) flops. Products of blocks stay in the cache, whereas single inner
-/// products would be limited by memory.
+/// The cost is 2·(new columns)·(columns)·(samples) flops. It is spent block by block (`BLOCK` values of every column),
+/// because single inner products would be limited by the memory's speed.
 pub(crate) fn products(columns: &[&[f64]], first: usize) -> DMatrix<f64> {
     let (size, length) = (columns.len(), columns.first().map_or(0, |column| column.len()));
     let mut sum = DMatrix::zeros(size - first, size);

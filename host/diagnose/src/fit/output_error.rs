@@ -25,7 +25,8 @@ use quietcut_simulate::Effects;
 const HORIZONS: [f64; 2] = [0.12, 0.35];
 
 /// Smallest step of the finite difference by which a simulated response is differentiated by a parameter or an initial
-/// state, relative to its value. Smaller steps drown in the rounding errors of the integration.
+/// state, relative to the value of that parameter or state. Smaller steps drown in the rounding errors of the
+/// integration.
 pub(crate) const LEAST_STEP: f64 = 1e-7;
 
 /// Smallest step of the finite difference by which a simulated response with dry friction is differentiated by a
@@ -48,7 +49,7 @@ pub(crate) struct OutputError<'a> {
 /// derivatives of the whitened samples.
 pub(crate) type Column = (usize, usize, Vec<f64>);
 
-/// Jᵀ r, the product of the Jacobian's columns with the residuals, for `size` free parameters.
+/// Jᵀ r, the product of the Jacobian's columns with the residuals, for `size` free parameters; `residuals` by record.
 pub(crate) fn projected(columns: &[Column], size: usize, residuals: &[Vec<f64>]) -> DVector<f64> {
     let mut sum = DVector::zeros(size);
     for (record, slot, column) in columns {
@@ -152,7 +153,8 @@ impl<'a> OutputError<'a> {
     }
 
     /// Columns of the Jacobian J = ∂y_simulated/∂θ of the simulated samples by finite differences, record after record.
-    /// `left` is the residual at the parameter values `point`.
+    /// `left` is the residual at the parameter values `point`. `None` if a simulation fails, or if both a step of a
+    /// parameter and its opposite lead to values that are not physical.
     pub(crate) fn columns(
         &self,
         problem: &FitProblem<'_>,

@@ -6,7 +6,7 @@ use crate::fit::library::Library;
 use crate::fit::regression::{Regression, Subset};
 use crate::records::study::Study;
 
-/// Largest number of candidate models whose nonlinear parameters are refined.
+/// Largest number of candidate models whose nonlinear parameters one call of [`refine`] refines.
 const REFINED: usize = 3;
 
 /// Refines the nonlinear parameters of the best candidate models: the first `REFINED` of `found` that reduce χ² by more
@@ -59,11 +59,11 @@ fn one(
 }
 
 /// Largest number of fixed-point iterations of those nonlinear parameters of a cause that follow from the fitted
-/// coefficients. The iteration converges slowly if teeth lose contact.
+/// coefficients.
 const FIXED_POINT_ITERATIONS: usize = 12;
 
-/// Iterates to their fixed point those nonlinear parameters that follow from the fitted coefficients. If the whole step
-/// to the new values does not decrease χ², half a step is tried.
+/// Iterates towards their fixed point those nonlinear parameters that follow from the fitted coefficients. If the whole
+/// step to the new values does not decrease χ², half a step is tried.
 fn settle(
     study: &Study<'_>,
     library: &mut Library,

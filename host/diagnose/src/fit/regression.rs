@@ -1,6 +1,6 @@
 //! Linear least squares of regressors in units of the noise, with free decays and sensor offsets projected out.
 //!
-//! Every record is one segment as a whole, and is also divided into fitted and held-out segments. Residual and
+//! Every record is one segment as a whole, and besides fitted or held-out segments: see [`split`]. Residual and
 //! regressors of each segment are whitened. Their inner products (Gram matrices) then give the fit of any set of
 //! regressors.
 
@@ -20,7 +20,7 @@ use crate::signal::dot::dot;
 const SOFTENED: f64 = 1e-9;
 
 /// Ridge added to the unit diagonal of the scaled normal equations of a fit of few regression columns: the rounding
-/// error. In a study with a cut, whose columns are less accurate, the square of their relative error replaces it.
+/// error. In a study with a cut, `RELATIVE_ERROR_OF_CUTS`² replaces it.
 const ROUNDING: f64 = 1e-13;
 
 /// Result of a linear fit of some regression columns to the residual of the baseline.
@@ -38,7 +38,7 @@ pub(crate) struct Fit {
 /// Result of a linear fit of some regression columns to the residual of a candidate model.
 #[derive(Clone, Debug)]
 pub(crate) struct Refit {
-    /// Change of the coefficients of the regression columns.
+    /// Change of the coefficient of each regression column, in the order of the columns.
     pub change: Vec<f64>,
     /// χ² of the candidate model before the change of its coefficients.
     pub before: f64,
@@ -53,11 +53,11 @@ pub(crate) struct Regression {
     columns: Vec<Vec<Vec<f64>>>,
     residuals: Vec<Vec<f64>>,
     /// Inner products of the regression columns over the fitted segments, over the held-out segments and over the whole
-    /// records.
+    /// records, in this order: that of [`Subset`].
     products: [Products; 3],
     /// Number of regression columns, from the first, whose inner products with each other are computed.
     complete: usize,
-    /// Ridge added to the unit diagonal of the scaled normal equations of every fit of this study.
+    /// Ridge added to the unit diagonal of the scaled normal equations of fits of few regression columns.
     ridge: f64,
 }
 
@@ -168,8 +168,8 @@ impl Regression {
         }
     }
 
-    /// Energy Σ (y/σ)² of the measured samples y of all records, σ being the standard deviation of their noise; free
-    /// decays and sensor offsets are projected out.
+    /// Energy of the whitened measured samples of all records, in units of the noise variance; free decays and sensor
+    /// offsets are projected out.
     pub(crate) fn signal(&self, study: &Study<'_>) -> f64 {
         let of_segment = |segment: &Segment| {
             let channels = study.records[segment.record].channels.iter();

@@ -19,7 +19,8 @@ pub(crate) struct Segment {
     pub(crate) range: Range<usize>,
     pub(crate) subset: Subset,
     /// Weight of the segment's values: one over the factor by which
-    /// [`Regression::level_records`](crate::fit::regression::Regression::level_records) raises the noise of its record.
+    /// [`Regression::level_records`](crate::fit::regression::Regression::level_records) raises the standard deviation
+    /// of the noise of the record; 1 without that.
     pub(crate) weight: f64,
     bins: usize,
     transform: SegmentTransform,

@@ -47,7 +47,7 @@ pub(crate) struct SearchResult {
     pub(crate) point: ParameterPoint,
     pub(crate) left: f64,
     /// Normal matrix Jᵀ J of the free parameters from the last linearization, at the end of the search or one step
-    /// before.
+    /// before; rows and columns of parameters that [`at_bounds`] fixes are zero.
     pub(crate) normal: DMatrix<f64>,
 }
 
@@ -76,7 +76,8 @@ impl FitProblem<'_> {
         slots.filter(|slot| matches!(slot, FreeParameter::Inner { .. }))
     }
 
-    /// The effects of the candidate model with the parameters of `point`; `None` if they are not physical.
+    /// The effects of the candidate model with the parameters of `point`; `None` if they are not physical, or not
+    /// possible as effects.
     pub(crate) fn effects(&self, study: &Study<'_>, point: &ParameterPoint) -> Option<Effects> {
         let Self { library, choices, .. } = self;
         let mut tables = Vec::new();
@@ -120,17 +121,16 @@ pub(crate) fn stepped(
     next
 }
 
-/// Ridge added to the unit diagonal of the scaled normal equations of a prediction-error search: about the square of
-/// the simulation's accuracy.
+/// Ridge added to the unit diagonal of the scaled normal equations of a prediction-error search.
 pub(crate) const RIDGE: f64 = 1e-12;
 
-/// Decrease of χ² by a whole Gauss–Newton step, predicted by the linearized model.
+/// Decrease of χ² by a whole Gauss–Newton step, predicted by the linearized model; 0 if its equations cannot be solved.
 pub(crate) fn predicted(normal: &DMatrix<f64>, gradient: &DVector<f64>) -> f64 {
     NormalEquations::new(normal, 1e-9, Idle::Hold).map_or(0.0, |equations| equations.explained(gradient))
 }
 
-/// Fixes every free parameter that lies at one of its bounds and whose next step would leave it: its gradient, row and
-/// column become zero.
+/// Fixes every parameter of a cause that lies at one of its bounds and whose gradient leads out of the bounds: its
+/// entry in `gradient` and its row and column in `normal` become zero.
 pub(crate) fn at_bounds(
     problem: &FitProblem<'_>,
     point: &ParameterPoint,
@@ -153,7 +153,8 @@ pub(crate) fn at_bounds(
     }
 }
 
-/// (Jᵀ J)⁻¹: covariance of the free parameters for unit-variance noise; zero for a fixed parameter.
+/// (Jᵀ J)⁻¹: covariance of the free parameters for unit-variance noise; zero for a fixed parameter. `None` if the
+/// matrix cannot be inverted.
 pub(crate) fn covariance(normal: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     Some(NormalEquations::new(normal, RIDGE, Idle::Hold)?.inverse())
 }

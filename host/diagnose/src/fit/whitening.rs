@@ -9,7 +9,7 @@ use crate::records::domain::Domain;
 use crate::records::record::Record;
 
 /// Whitening by L⁻¹, with the covariance of the channels at each bin S = diag(σ²) + Σ σ_f² h hᴴ = L Lᴴ. The first part
-/// is the noise of the motion sensors. The second is the response h to noise of the force sensors and to aliased
+/// is the noise of the channels' own sensors. The second is the response h to noise of the force sensors and to aliased
 /// forces, both contained in the noise floor σ_f of each force; it is correlated between channels and absent in the
 /// force domain. In a cut near or in chatter, the noise covariance of its closed loop ([`LoopNoise`]) replaces S.
 #[derive(Default)]
@@ -18,11 +18,11 @@ pub(crate) struct Whitening {
     /// For each frequency bin: number of real values per channel, 1 for a real bin (zero and half the sample rate) and
     /// 2 for a complex one.
     numbers: Vec<usize>,
-    /// For each frequency bin and channel: one over the diagonal element of L, the Cholesky factor of the noise
-    /// covariance between channels.
+    /// Bin after bin, for each channel: one over the diagonal element of L, the Cholesky factor of the noise covariance
+    /// between channels.
     weights: Vec<f64>,
-    /// For each frequency bin: elements left of the diagonal of L, the Cholesky factor of the noise covariance between
-    /// channels; empty if the channels' noise is independent.
+    /// Bin after bin, row by row: elements left of the diagonal of L, the Cholesky factor of the noise covariance
+    /// between channels; empty if the channels' noise is independent.
     common: Vec<Complex64>,
 }
 
@@ -106,8 +106,8 @@ impl Whitening {
     }
 }
 
-/// Writes into `read` each channel's response at ω (rad/s) to one standard deviation σ_f of the noise of each force.
-/// `forces` holds the axis and σ_f of each force.
+/// Writes into `read`, with one row per channel and one column per force, the channel's response at ω (rad/s) to one
+/// standard deviation σ_f of the force's noise. `forces` holds the axis and σ_f of each force.
 fn read_of_noise(record: &Record, omega: f64, forces: &[(usize, f64)], read: &mut [Complex64]) {
     let nearest = (omega / record.grid.omega(1)).round() as usize;
     let of_channels = read.chunks_exact_mut(forces.len().max(1));

@@ -5,7 +5,7 @@
 //! direction of the chip thickness, τ the time between passes, r the runout of a tooth, f the feed per tooth, φ the
 //! immersion angle and γ the edge angle. The cutting force is linear in most parameters of the process. It jumps
 //! between samples when teeth enter and leave. Its mean over each interval of the upsampled grid drives the structure,
-//! with entry, exit and loss of contact at their exact instants.
+//! with entry, exit and loss of contact within the interval.
 
 use crate::criteria::{SPEED_MISMATCH, UNCERTAIN_SAMPLES};
 use crate::error::DiagnoseError;

@@ -138,8 +138,8 @@ impl SpindleMotion {
     }
 }
 
-/// Step of the grid of tried frequencies of a speed modulation, in modulation periods per duration of the longest
-/// record.
+/// Step of the grid of tried frequencies of a speed modulation, in modulation periods over the longest record, from its
+/// first to its last tachometer edge.
 const STEP: f64 = 0.2;
 
 /// A speed modulation estimated from tachometer edges.
@@ -153,8 +153,8 @@ pub(crate) struct SpeedModulation {
 }
 
 /// The speed modulation that fits the tachometer edges of all records best; `None` if the edges are too few, or if the
-/// modulation is not significant or its amplitude too large. Frequencies from 0.7 periods per longest record to 0.45
-/// times the lowest spindle frequency are tried.
+/// modulation is not significant or its amplitude too large. Frequencies from 0.7 periods over the longest record (from
+/// its first to its last edge) to 0.45 times the lowest spindle frequency are tried.
 ///
 /// Edge k is at the time t with k T₀ = t + δ cos ψ·(1 − cos ωt)/ω + δ sin ψ·sin ωt/ω + constant. The equation is linear
 /// in all unknowns except the frequency ω. T₀, the mean duration of a revolution, and the constant differ between

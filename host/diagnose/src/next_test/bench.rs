@@ -24,7 +24,7 @@ const PERIODS: [f64; 2] = [20.0, 60.0];
 /// Samples of a simulated test per period of the highest natural frequency of the baseline.
 const SAMPLES_PER_PERIOD: f64 = 24.0;
 /// Duration of the transient that is simulated before a proposed cut is compared, in multiples of the longest time
-/// constant of the structure.
+/// constant of the structure, unless [`WAITED`] shortens it.
 const SETTLED: f64 = 12.0;
 /// Largest duration of the simulated transient of a proposed cut, as a multiple of the standard duration of a test.
 const WAITED: f64 = 4.0;
@@ -56,7 +56,8 @@ pub(super) struct Bench<'a> {
     /// True if a recorded cut has a channel of force.
     pub(super) has_force: bool,
     /// Force of level 1 in proposed tests of the structure, N: the largest force in records other than cuts. Without
-    /// such a force, the one that causes the displacement `largest_m` at the lowest natural frequency.
+    /// such a force, the one that causes the displacement `largest_m` at the lowest natural frequency along the axis
+    /// with the largest receptance there.
     pub(super) force_n: f64,
     /// Largest displacement of the tool in the records, m. Peaks of velocity and acceleration are converted to
     /// displacement at the lowest natural frequency.

@@ -41,7 +41,8 @@ pub(super) struct Experiment {
     pub(super) effort: f64,
 }
 
-/// All tests that can be proposed: of the structure along each of its directions, and cuts if a cut was recorded.
+/// All tests that can be proposed: of the structure along each of its directions, and cuts if one was recorded whose
+/// sidecar gives speed and depth.
 pub(super) fn experiments(bench: &Bench<'_>) -> Vec<Experiment> {
     let mut all = Vec::new();
     for direction in &bench.baseline.structure.directions {
@@ -148,7 +149,8 @@ impl Experiment {
     /// Simulated readings of all sensors in this test if `case` is the true machine; of a cut without its transient.
     ///
     /// # Errors
-    /// The experiment cannot be simulated, or the tool moves too far in a cut; the error is a sentence.
+    /// The experiment cannot be simulated, the simulation diverges, or the tool moves too far in a cut; the error is a
+    /// sentence.
     pub(super) fn readings(&self, bench: &Bench<'_>, case: &Case) -> Result<Vec<SimulatedReading>, String> {
         let mounted = self.recording(bench, case)?;
         // A second sensor next to a mounted one is taken as free of errors, so the sensor extensions of the case are

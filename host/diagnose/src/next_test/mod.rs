@@ -2,10 +2,10 @@
 //!
 //! Every equivalent candidate model is simulated in all experiments ([`experiment`]). The readings of two models are
 //! compared in units of the noise, after the parameters of one are fitted to the readings of the other
-//! ([`separation`]). The proposal is the experiment with the least effort that separates all models from each other or,
-//! if there is none, the one in which the smallest distance between two models is largest. The distance follows A. C.
-//! Atkinson and V. V. Fedorov, The design of experiments for discriminating between two rival models, Biometrika 62
-//! (1975), T-optimality.
+//! ([`separation`]). The proposal is the experiment with the least effort (that of additional sensors included) that
+//! separates all models from each other or, if there is none, the one in which the smallest distance between two models
+//! is largest. The distance follows A. C. Atkinson and V. V. Fedorov, The design of experiments for discriminating
+//! between two rival models, Biometrika 62 (1975), T-optimality.
 
 mod bench;
 mod experiment;

@@ -11,7 +11,7 @@ use crate::conclusion::answer::{EstimatedCause, Figure, NINETY_PERCENT};
 use quietcut_model::case::Case;
 
 /// Smallest step of the finite difference by which simulated readings are differentiated by a parameter, relative to
-/// the parameter. The simulation is accurate to 1e-9, so that the derivative is accurate to 1e-5.
+/// the parameter.
 const LEAST_STEP: f64 = 1e-4;
 
 /// A candidate model in a comparison: the causes that act together.
@@ -61,8 +61,8 @@ impl Rival<'_> {
         Ok(Predicted { readings, moved })
     }
 
-    /// Steps for the uncertain parameters of a candidate model: index of the cause, key of the parameter, step in its
-    /// unit, and step in its standard deviations.
+    /// Steps for the uncertain parameters of a candidate model: index of the cause, key of the parameter, step in the
+    /// parameter's unit, and step in the parameter's standard deviations.
     fn steps(&self) -> Vec<(usize, &'static str, f64, f64)> {
         let of = |(index, cause): (usize, &EstimatedCause)| {
             let figures: Vec<(&'static str, Figure)> = cause
@@ -188,7 +188,7 @@ fn difference(bench: &Bench<'_>, truth: &Predicted, model: &Predicted, sensors: 
 }
 
 /// Difference `apart` − Jδ at the δ that minimizes ‖apart − Jδ‖² + Σ (step·δ)², and that minimum. `columns` are the
-/// columns of J.
+/// columns of J. If the fit fails, δ is 0.
 pub(super) fn least(apart: &DVector<f64>, columns: &[DVector<f64>], steps: &[f64]) -> (DVector<f64>, f64) {
     if columns.is_empty() {
         return (apart.clone(), apart.norm_squared());

@@ -49,7 +49,7 @@ impl Observed {
     }
 }
 
-/// The axis with the largest weight in a channel; `None` if all weights are zero.
+/// The axis with the largest |weight| in a channel; `None` if all weights are zero.
 pub(crate) fn main_axis(channel: &Observed) -> Option<usize> {
     (0..3)
         .filter(|axis| channel.pickup.weights[*axis] != 0.0)

@@ -83,7 +83,7 @@ const UNITS: [(f64, f64, &str); 6] = [
 ///
 /// `response` is the response to the forces alone that the baseline predicts, `measured` the samples of the channel,
 /// `by_noise` the energy of the channel's response to force-sensor noise. The ratio is the absolute least-squares
-/// factor from the first to the second; unless impossible, it is evaluated only if they correlate.
+/// factor from `response` to `measured`. Nothing is refused if the energy of `response` is not well above `by_noise`.
 pub(crate) fn unit(
     path: &std::path::Path,
     name: &str,
@@ -126,7 +126,7 @@ pub(crate) fn unit(
 
 /// Result of the unit checks of a cut: success if one channel passes or none is checked, otherwise the first refusal.
 /// If one unit is right, a ratio of another channel within the limits of [`far_off`] is not a wrong unit: a wrong edge
-/// coefficient alone changes a small axial force by a factor of ten.
+/// coefficient alone may change a small axial force by a factor of ten.
 pub(crate) fn unless_one_is_right(
     checked: impl IntoIterator<Item = Result<(), DiagnoseError>>,
 ) -> Result<(), DiagnoseError> {
@@ -193,8 +193,8 @@ fn said(likely: Option<&str>) -> String {
 }
 
 /// The level at which a channel is clipped: at one end of its range, unless that is zero, it has at least two flat tops
-/// of at least three equal samples with more than the share `CLIPPED_SHARE` of all samples, or one as short as an
-/// impact with steep flanks. `None` without clipping.
+/// of at least three equal samples with more than the share `CLIPPED_SHARE` of all samples, or one as short as that of
+/// an impact, with steep flanks. `None` without clipping.
 fn clipped(samples: &[f64]) -> Option<f64> {
     let (low, high) = samples
         .iter()

@@ -9,7 +9,7 @@ use quietcut_recording::{Quantity, Recording, TestKind};
 pub(crate) enum Domain {
     /// The force F is the input, and the motion y is compared: y − H·(F − f_r), with the receptance H and the nonlinear
     /// restoring forces f_r of the baseline model. In a cut the baseline model predicts F, and a measured force is
-    /// compared too. A free decay has no F.
+    /// compared too. A free decay needs no F.
     Response,
     /// The motion x is the input, and the force F is compared: F − (M ẍ + C ẋ + K x + f_r). So it is if the sidecar
     /// names a motion, as `input = ["x"]`, or, except in free decays, if the structure has a rigid-body mode; never in

@@ -2,10 +2,11 @@
 //!
 //! A case describes a cut with its whole radial engagement and axial depth. Recordings of real cuts begin and end in
 //! air, and during entry and exit the tool crosses a face of the workpiece, where the case does not define the chips.
-//! Therefore only the segment with full engagement is compared. A revolution is in air if the vibration of one channel
-//! is small both against the other revolutions of the recording and against the response of the baseline to the feed
-//! alone. The second condition is needed because chatter exceeds the response to the feed by far: before chatter has
-//! grown, the vibration of a revolution is small against that of later ones, although the tool is not in air.
+//! Therefore only the segment with full engagement is compared. A revolution counts as air only if the vibration of one
+//! channel is small both against the median over the revolutions of the recording and against the response of the
+//! baseline to the feed alone. The second condition is needed because chatter exceeds the response to the feed by far:
+//! before chatter has grown, the vibration of a revolution is small against that of later ones, although the tool is
+//! not in air.
 
 use quietcut_numerics::statistics::median;
 use std::borrow::Cow;
@@ -33,8 +34,8 @@ use quietcut_simulate::{Cutter, Spindle, WorkpieceTraverse};
 const ANGLES: usize = 512;
 
 /// The recordings, each shortened to its segment of full engagement, and warnings: one for each shortened recording,
-/// and one more if its tool has no diameter. Recordings of other tests stay as they are, and so do cuts in which no
-/// segment is found: without air, without a required value, or without a revolution of full vibration level.
+/// and one more if its tool has no diameter. Recordings of other tests stay as they are, and so do cuts for which
+/// [`engaged`] gives none.
 ///
 /// # Errors
 /// The case cannot be simulated, or a recording has too few revolutions of full engagement.
@@ -92,8 +93,8 @@ struct Engaged {
 }
 
 /// The samples of a recorded cut with full engagement; `None` if the recording is not of a cut, lacks a usable
-/// tachometer or another value, shows no air, has no channel with vibration above its noise, or has no revolution in
-/// which all channels reach `ENGAGED_LEVEL`.
+/// tachometer or another value, shows no air, has no channel with vibration above its noise (see [`Levels::of()`]), or
+/// if the longest range of revolutions not in air contains none in which all these channels reach `ENGAGED_LEVEL`.
 fn engaged(baseline: &Baseline<'_>, recording: &Recording) -> Option<Engaged> {
     if !is_of_a_cut(recording) {
         return None;
@@ -118,9 +119,9 @@ fn engaged(baseline: &Baseline<'_>, recording: &Recording) -> Option<Engaged> {
         0 => 0.0,
         start => start as f64 + (ENTRY_MARGIN * way).max(engaged_after) + 1.0,
     };
-    // The recording may end with the cut, before the vibration has decayed; then its end is kept. Otherwise the
-    // duration of the exit is subtracted: with the factor `ENTRY_MARGIN` in chatter, which stays large until the tool
-    // has left the workpiece, with `EXIT_SHARE` in a stable cut.
+    // The recording may end with the cut, before the vibration has decayed; then its end is kept. Otherwise at least
+    // the duration of the exit is cut off, times `ENTRY_MARGIN` in chatter, which stays large until the tool has left
+    // the workpiece, and times `EXIT_SHARE` in a stable cut.
     let to = if cut.end == levels.count && cut.end - last <= LEAST_AIR_AT_ENDS {
         f64::INFINITY
     } else {
@@ -219,24 +220,24 @@ fn force_n(cutter: &Cutter, angle_rad: f64) -> Vector3<f64> {
         .sum()
 }
 
-/// Vibration level of each channel in each revolution of a recorded cut: the standard deviation of the channel, without
-/// its noise, over a reference. The reference is the median of the standard deviation over the revolutions, or the
-/// standard deviation that the feed alone causes if that is smaller, as in chatter.
+/// Vibration level of each channel that exceeds its noise enough, in each revolution of a recorded cut: the standard
+/// deviation of the channel, without its noise, over a reference. The reference is the median of the standard deviation
+/// over the revolutions, or the standard deviation that the feed alone causes if that is smaller, as in chatter.
 struct Levels {
     count: usize,
-    /// True if the median standard deviation of some channel over the revolutions exceeds the one that the feed alone
-    /// causes by more than the factor `CHATTER_LEVEL`.
+    /// True if the median standard deviation of some channel of `of` over the revolutions is more than `CHATTER_LEVEL`
+    /// times the one that the feed alone causes.
     chatters: bool,
-    /// Vibration levels by channel and revolution.
+    /// Vibration levels by channel (those that exceed their noise enough) and revolution.
     of: Vec<Vec<f64>>,
-    /// Standard deviation of each channel's noise, divided by the same reference as the vibration levels of the
-    /// channel.
+    /// Standard deviation of the noise of each channel of `of`, divided by the same reference as the vibration levels
+    /// of the channel.
     noise: Vec<f64>,
 }
 
 impl Levels {
-    /// Computes the vibration levels in each revolution of a recording, of the channels that exceed their noise enough
-    /// to distinguish air from cutting; `None` if no channel does.
+    /// Computes the vibration levels of a recording. Of the channels that the baseline knows, those count whose
+    /// reference exceeds `AIR_OVER_NOISE` times their noise; `None` if there is none.
     fn of(
         baseline: &Baseline<'_>,
         recording: &Recording,

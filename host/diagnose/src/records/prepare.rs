@@ -111,7 +111,7 @@ fn opened(baseline: &Baseline<'_>, recording: &Recording, known: Known) -> Resul
         closed: None,
         highest_hz,
         lowest_hz: baseline.lowest_hz().unwrap_or(0.0),
-        // The forces of a cut have harmonics up to half the sample rate.
+        // The harmonics of a cutting force reach up to half the sample rate and beyond.
         band_hz: if is_cut {
             0.5 * rate_hz
         } else {
@@ -134,9 +134,9 @@ fn opened(baseline: &Baseline<'_>, recording: &Recording, known: Known) -> Resul
     Ok(record)
 }
 
-/// Returns the record unless the amplitude of a channel shows a wrong unit; a cut is returned if one checked channel
-/// passes. In a cut only channels of motion are checked here; its forces were checked when its channels were first
-/// predicted.
+/// Returns the record unless the amplitude of a checked channel shows a wrong unit; a cut is returned if one checked
+/// channel passes, or if none is checked. In a cut only channels of motion are checked here; its forces were checked
+/// when its channels were first predicted.
 fn checked(record: Record) -> Result<Record, DiagnoseError> {
     let is_cut = record.kind == Some(TestKind::Cutting);
     let checked = |(index, channel): (usize, &Observed)| {
@@ -244,8 +244,8 @@ fn channels(baseline: &Baseline<'_>, recording: &Recording, domain: Domain) -> V
         .collect()
 }
 
-/// Frequency below which the share [`MOTION_BAND_SHARE`] of the power of every channel of motion lies, Hz; at least
-/// three times the frequency resolution 1/duration of the recording.
+/// Frequency up to which at least the share [`MOTION_BAND_SHARE`] of the power of every channel of motion about its
+/// mean lies, Hz; at least three times the frequency resolution 1/duration of the recording.
 fn highest_hz(recording: &Recording) -> f64 {
     let grid = Grid::new(recording.len(), recording.sample_rate_hz, 0.0, 1);
     let of_motion = recording.channels.iter().filter(|channel| {

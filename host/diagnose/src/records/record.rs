@@ -19,8 +19,8 @@ use crate::signal::noise::{BANDS, floor_between_lines, rms, white_floor_beside};
 use quietcut_recording::{Quantity, TestKind};
 use quietcut_simulate::path::{SampledMotion, restoring_along};
 
-/// For each axis of the force: frequency response of one channel, in its unit per newton, at the bins of the upsampled
-/// spectrum. Empty along an axis in which the structure does not move, and for a channel of force.
+/// For each axis of the force: frequency response of one channel, in the channel's unit per newton, at the bins of the
+/// upsampled spectrum. Empty along an axis in which the structure does not move, and for a channel of force.
 pub(crate) type Responses = [Vec<Complex64>; 3];
 
 /// Noise-free samples of a record's channels, as an extended case predicts them.
@@ -28,7 +28,7 @@ pub(crate) type Responses = [Vec<Complex64>; 3];
 pub(crate) struct Clean {
     /// Noise-free samples, by channel.
     readings: Vec<Vec<f64>>,
-    /// Standard deviation of each channel's measurement noise, in the SI unit of the channel.
+    /// Standard deviation of the measurement noise, by channel, in the SI unit of the channel.
     deviations: Vec<f64>,
 }
 
@@ -36,7 +36,7 @@ pub(crate) struct Clean {
 pub(crate) struct Record {
     /// File of the recording.
     pub path: PathBuf,
-    /// Kind of the test, from the sidecar.
+    /// Kind of the test, from the sidecar; `None` if the sidecar does not state it.
     pub kind: Option<TestKind>,
     /// Domain in which the record is compared: motion, in a cut with the force, or force alone.
     pub domain: Domain,
@@ -47,23 +47,24 @@ pub(crate) struct Record {
     /// Channels that are compared.
     pub channels: Vec<Observed>,
     /// Forces on the structure along the machine's axes at the samples of the record, N: the measured ones, or in a cut
-    /// the cutting force that the baseline predicts. Empty for an axis without force.
+    /// the cutting force that the baseline predicts. Empty along an axis without force, or along which the structure
+    /// does not move.
     pub force_n: [Vec<f64>; 3],
     /// Noise floor of each measured force as a standard deviation of white noise, N: sensor noise and aliased force.
-    /// Zero in a cut.
+    /// Zero in a cut, and along an axis without force.
     pub force_deviation_n: [f64; 3],
     /// Estimated displacement and velocity of the tool, upsampled: the predicted displacement, corrected at each
     /// frequency towards the measured one by a weight from 0 to 1 (Wiener), with its derivative. In the force domain:
     /// the measured motion within its band.
     pub motion: SampledMotion,
-    /// Spectra of the estimated displacement at the samples of the record, m; beyond both ends of the record the
-    /// displacement is continued by reflection and fades out.
+    /// Spectra of the estimated displacement at the samples of the record, by axis, m; beyond both ends of the record
+    /// the displacement is continued by reflection and fades out.
     pub displacement: [Vec<Complex64>; 3],
     /// For each channel, in a cut: the estimated motion as this channel reads it, in the unit of the channel; for a
-    /// channel of force, its predicted samples.
+    /// channel of force, its predicted samples. Empty in other tests.
     pub readings: Vec<Vec<f64>>,
-    /// Frequency below which 99.5 % of the power of each channel of motion lies, Hz; at least three times the frequency
-    /// resolution 1/duration of the record.
+    /// Frequency up to which at least 99.5 % of the power of each channel of motion about its mean lies, Hz; at least
+    /// three times the frequency resolution 1/duration of the record.
     pub highest_hz: f64,
     /// Lowest natural frequency of the baseline, Hz; 0 without oscillating modes.
     pub lowest_hz: f64,
@@ -75,20 +76,21 @@ pub(crate) struct Record {
     /// For each channel: its frequency response per newton of force, at the bins of the upsampled spectrum. Empty in
     /// the force domain.
     pub(super) responses: Vec<Responses>,
-    /// Range of the samples of the record that are compared with the prediction: all, except near the ends of a cut.
-    /// The samples at its beginning only determine later chips. Near its end the motion is less certain if its sensors
-    /// measure velocity or acceleration.
+    /// Range of the samples of the record that are compared with the prediction: all samples of other tests. A cut is
+    /// compared without its first revolutions, which only determine later chips, and, unless it is short, without as
+    /// many samples at its end, where the motion is less certain if the sensors measure velocity or acceleration.
     pub compared: Range<usize>,
     /// For each channel: indices of samples that are not compared, such as those beside a jump of the cutting force.
     pub skipped: Vec<Vec<usize>>,
     /// Free decays of the baseline in each channel, and the fitted initial state of the record.
     pub decays: Decays,
-    /// The cut with its force, if the record is of a cut.
+    /// The cut with its force; `None` in other tests.
     pub cut: Option<Cutting>,
     /// By channel, in a cut: prediction of the baseline in closed loop, in which the predicted motion determines the
-    /// chips.
+    /// chips. `None` in other tests and in a cut near or in chatter.
     pub(super) closed: Option<Vec<Vec<f64>>>,
-    /// Noise-free samples that determine the motion instead of the measured ones, if an extended case supplies them.
+    /// Noise-free samples that determine the motion instead of the measured ones; `None` unless an extended case
+    /// supplies them.
     pub clean: Option<Clean>,
     /// True for a cut near or in chatter, whose motion is taken as measured (see `amplification`).
     pub(crate) amplifies: bool,
@@ -100,7 +102,7 @@ pub(crate) struct Record {
 /// Results of an earlier prediction of the same record that a new prediction starts from.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Known {
-    /// Noise-free samples of the channels.
+    /// Noise-free samples of the channels; `None` if none are known.
     pub(crate) clean: Option<Clean>,
     /// True if the cut is known to be near or in chatter, false if it is known not to be; `None` if the record itself
     /// decides.
@@ -212,8 +214,8 @@ impl Record {
         })
     }
 
-    /// Receptance at a channel's sensor at the bins of the upsampled spectrum, m/N: that at the tool tip, unless the
-    /// baseline has mode shapes at the sensor.
+    /// In the response domain: receptance at a channel's sensor at the bins of the upsampled spectrum, m/N. It is that
+    /// at the tool tip, unless the baseline has mode shapes at the sensor.
     pub(crate) fn seen_by<'a>(&'a self, channel: &'a Observed) -> &'a [Matrix3<Complex64>] {
         channel.seen.as_deref().unwrap_or(&self.transfer)
     }
@@ -228,8 +230,8 @@ impl Record {
         }
     }
 
-    /// Adds −f_r to the force spectra `force`: f_r are the restoring forces along the motion that the linear structure
-    /// of the baseline does not contain.
+    /// Adds −f_r to the force spectra `force`, with the restoring forces f_r of the baseline's terms
+    /// ([`Baseline::terms`]) along the estimated motion.
     pub(crate) fn add_terms(&self, baseline: &Baseline<'_>, force: &mut [Option<Vec<Complex64>>; 3]) {
         for term in &baseline.terms {
             let restoring = restoring_along(&**term, &self.motion);
@@ -253,9 +255,9 @@ impl Record {
         self.decays = Decays::of(baseline, &self.grid, pickups, &self.skipped);
     }
 
-    /// Accepts the samples `predicted`, which contain no free decay, as prediction of the record: sets samples that are
-    /// not compared to the measured value, adds the best-fitting free decay, and estimates the noise from the residual
-    /// unless an extended case supplies it.
+    /// Accepts the samples `predicted`, which contain no free decay, as prediction of the record: sets the samples in
+    /// `skipped` to the measured value, adds the best-fitting free decay to the others, and estimates the noise from
+    /// the residual unless an extended case supplies it.
     pub(crate) fn accept(&mut self, predicted: Vec<Vec<f64>>) {
         for ((channel, mut predicted), skipped) in self.channels.iter_mut().zip(predicted).zip(&self.skipped)
         {
@@ -287,9 +289,9 @@ impl Record {
         }
     }
 
-    /// Stores the closed-loop prediction, in which the predicted motion determines the chips. Samples that are not
-    /// compared take the value of the prediction along the estimated motion. If an extended case supplied noise-free
-    /// samples, the closed-loop prediction replaces them.
+    /// Stores the closed-loop prediction, in which the predicted motion determines the chips. The samples in `skipped`
+    /// take the value of the prediction along the estimated motion. If an extended case supplied noise-free samples,
+    /// the closed-loop prediction replaces them.
     pub(crate) fn close(&mut self, mut closed: Vec<Vec<f64>>) {
         for ((closed, channel), skipped) in closed.iter_mut().zip(&self.channels).zip(&self.skipped) {
             for &sample in skipped {
@@ -304,7 +306,7 @@ impl Record {
 
     /// Largest root mean square, over the channels of motion, of the measured minus the predicted samples in the
     /// compared range, in standard deviations of the channel's noise. If an extended case supplies noise-free samples,
-    /// they replace the measured ones: it is then the distance of their motion from the prediction along it.
+    /// they replace the measured ones.
     pub(crate) fn distance_from_closed_loop(&self) -> f64 {
         (0..self.channels.len())
             .filter(|index| self.channels[*index].pickup.quantity != Quantity::Force)

@@ -54,7 +54,8 @@ impl Library {
     }
 
     /// True for two causes that share a term at a common location, and are therefore not identifiable together. For
-    /// example, softening-hardening contains a cubic spring, and a ratio for each mode of a channel contains its gain.
+    /// example, softening-hardening contains a cubic spring, and a ratio for each mode of a channel contains the gain
+    /// of the channel.
     fn share_a_term(&self, one: Choice, other: Choice) -> bool {
         let effect = |choice: Choice| self.cause(choice.candidate).effect();
         if !effect(one).spec().shares_term_with.contains(&effect(other)) {

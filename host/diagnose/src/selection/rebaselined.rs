@@ -18,8 +18,8 @@ use quietcut_recording::Recording;
 
 /// Candidate models that consist of `base` and one further cause, found with the extended case of `base` as the
 /// baseline, best first: by ascending χ² plus the price of the parameters. Empty if `base` does not change the state
-/// matrix of the linear structure, if one of its parameters is not physical, or if the recordings cannot be compared
-/// with the extended case.
+/// matrix of the linear structure, if one of its parameters is not physical or cannot be computed, or if the recordings
+/// cannot be compared with the extended case.
 pub(crate) fn extended_rebaselined(
     study: &Study<'_>,
     recordings: &[Recording],

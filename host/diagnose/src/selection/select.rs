@@ -21,19 +21,19 @@ use quietcut_recording::Recording;
 
 /// Largest number of causes in a candidate model.
 const CAUSES: usize = 3;
-/// Number of candidate models with the largest gain in the regression that are simulated: among models of one, of two
-/// and of three causes.
+/// Number of candidate models with the largest gain in the regression that are simulated, among models of one, of two
+/// and of three causes; those that extend simulated models of fewer causes come in addition.
 const SIMULATED: [usize; CAUSES] = [9, 5, 3];
 
 /// The selected candidate model, and those that are equivalent to it.
 pub(crate) struct Selection {
     pub(crate) best: Option<CandidateModel>,
     pub(crate) others: Vec<CandidateModel>,
-    /// Lead of the selected candidate model: its gain (decrease of χ² minus the price of its parameters) minus that of
-    /// its best rival; infinite without a rival.
+    /// Lead of the selected candidate model: its gain (decrease of χ² minus the price of its parameters) minus the gain
+    /// of its best rival; infinite without a rival, and if no model is selected.
     pub(crate) ahead: f64,
-    /// Gain of the selected candidate model (decrease of χ² minus the price of its parameters) minus that of the model
-    /// selected before it with fewer causes, or 0 for the baseline.
+    /// Gain of the selected candidate model (decrease of χ² minus the price of its parameters) minus the gain of the
+    /// model with fewer causes selected before it, if there is one; 0 if no model is selected.
     pub(crate) gained: f64,
 }
 
@@ -49,9 +49,9 @@ pub(crate) struct SelectionCriteria<'a> {
     /// χ² of the baseline, with which the χ² of simulated candidate models is compared: from a simulation of the
     /// baseline if one is possible, otherwise along the measured motion.
     pub(crate) reference: f64,
-    /// χ² by errors of the computation of a cut, which are proportional to the signal: the square of
-    /// `RELATIVE_ERROR_OF_CUTS` times the signal energy. A wrong cause can gain this much. Zero for tests of the
-    /// structure.
+    /// χ² by errors of the computation of a cut, which are proportional to the signal: `RELATIVE_ERROR_OF_CUTS`
+    /// squared, times the signal energy in units of the noise variance. A wrong cause can gain this much. Zero for
+    /// tests of the structure.
     pub(crate) coherent: f64,
 }
 
@@ -86,8 +86,8 @@ impl<'a> SelectionCriteria<'a> {
         }
     }
 
-    /// χ² per degree of freedom of the simulated candidate model `best`, at least 0.5; without a simulated one, that of
-    /// a fit of the whole library.
+    /// χ² per degree of freedom of the simulated candidate model `best`, at least 0.5; the field `inflation` if there
+    /// is no `best` or if it is not simulated.
     pub(crate) fn inflation(&self, regression: &Regression, best: Option<&CandidateModel>) -> f64 {
         match best {
             Some(best) if best.simulated.is_some() => {
@@ -102,7 +102,8 @@ impl<'a> SelectionCriteria<'a> {
     }
 
     /// Smallest increase of the gain (decrease of χ² minus the price of the parameters) that a further cause must
-    /// bring, including what errors of the computation may gain.
+    /// bring, including what errors of the computation may gain. In a cut it is larger if fewer causes are already
+    /// sufficient.
     pub(crate) fn least_gain(&self, regression: &Regression, fewer_are_enough: bool) -> f64 {
         let noise = regression.count(Subset::Whole) as f64;
         let share = if self.coherent > 0.0 && fewer_are_enough {
@@ -158,8 +159,9 @@ impl<'a> SelectionCriteria<'a> {
             || (best.is_some() && of_excess < sampling)
     }
 
-    /// True if the residual of a simulated model resembles a further cause, although the residual of `best` is close to
-    /// noise. The simulated model is `best` or, if that is not simulated, the first simulated one of `found`.
+    /// True if a further cause, fitted to the residual of a simulated model, lowers χ² plus the price of the parameters
+    /// by more than [`Self::least_gain`] from that of `best`. The simulated model is `best` or, if that is not
+    /// simulated, the first simulated one of `found`.
     fn resembles_further_cause(
         &self,
         library: &mut Library,

@@ -10,8 +10,9 @@ use crate::fit::library::Library;
 use crate::fit::regression::{Fit, Regression, Subset};
 use crate::records::study::Study;
 
-/// Candidate models that consist of `base` and one further cause, one for each candidate, best first: by ascending χ²
-/// plus the price of the parameters. `left` is the residual of the simulation of `base`, by record and channel.
+/// Candidate models that consist of `base` and one further cause, at most one for each candidate, best first: by
+/// ascending χ², divided by that of `base` per sample if that is above 1, plus the price of the parameters. `left` is
+/// the residual of the simulation of `base`, by record and channel.
 pub(crate) fn extended(
     study: &Study<'_>,
     library: &mut Library,
@@ -128,8 +129,8 @@ pub(crate) fn nested(
         {
             return None;
         }
-        // A simpler cause can replace this one only if its coefficients are reported parameters, with values that the
-        // replaced cause has too.
+        // A simpler cause can replace this one only if the parameters that it reports are among those of the replaced
+        // cause, with equal values.
         let cause = library.cause(choice.candidate);
         let own: Vec<f64> = values
             .iter()

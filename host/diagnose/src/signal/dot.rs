@@ -1,6 +1,6 @@
 //! Inner products of long signals.
 
-/// Inner product Σ a·b, accumulated in eight partial sums, so that the processor adds them in parallel.
+/// Inner product Σ a·b, accumulated in eight partial sums, so that the processor can add them in parallel.
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     let mut sums = [0.0; 8];
     let (a_chunks, b_chunks) = (a.chunks_exact(8), b.chunks_exact(8));

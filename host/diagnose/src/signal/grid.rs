@@ -8,9 +8,9 @@ use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
 
 /// Fourier transforms of one record of `count` samples, padded with zeros while the response of the structure decays.
 ///
-/// Spectra hold bins 0 … length/2 of the unnormalized transform X_k = Σ x_n e^(−2πikn/length). Signals that are not
-/// upsampled are taken as band-limited to half the sample rate, so that the spectrum defines them between samples. An
-/// upsampled signal has `finer` samples per sample of the record.
+/// Spectra of signals that are not upsampled hold bins 0 … length/2 of the unnormalized transform X_k = Σ x_n
+/// e^(−2πikn/length). Signals that are not upsampled are taken as band-limited to half the sample rate, so that the
+/// spectrum defines them between samples. An upsampled signal has `finer` samples per sample of the record.
 #[derive(Clone)]
 pub(crate) struct Grid {
     count: usize,
@@ -48,7 +48,7 @@ impl Grid {
         self.count
     }
 
-    /// Number of samples of a transform: those of the record and its zero padding.
+    /// Number of samples of a transform without upsampling: those of the record and its zero padding.
     pub(crate) fn length(&self) -> usize {
         self.length
     }
@@ -83,7 +83,8 @@ impl Grid {
     /// Spectrum of a signal that is continued smoothly beyond both ends of the record: reflected at its end points, and
     /// faded out.
     ///
-    /// With this continuation, derivatives (iω)·X are accurate to a few percent up to the ends of the record.
+    /// The continuation has no step at the ends of the record, which keeps the errors of derivatives (iω)·X small
+    /// there.
     pub(crate) fn continued_spectrum(&self, samples: &[f64]) -> Vec<Complex64> {
         let mut padded = vec![0.0; self.length];
         let count = samples.len();

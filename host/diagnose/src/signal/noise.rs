@@ -14,8 +14,8 @@ pub(crate) const BANDS: usize = 32;
 ///
 /// The variance is first the lower quartile, over 32 frequency bands, of the mean of the periodogram in a band. It is
 /// then repeatedly the mean over all bands within three standard deviations of it, which are nearly all bands if the
-/// residual is noise alone. The standard deviation is at least `LEAST_RELATIVE_NOISE` times `size`. For fewer than 128
-/// samples it is the root mean square of the residual.
+/// residual is noise alone. For fewer than 128 samples the standard deviation is the root mean square of the residual.
+/// It is always at least `LEAST_RELATIVE_NOISE` times `size`.
 pub(crate) fn white_floor(residual: &[f64], size: f64) -> f64 {
     white_floor_beside(residual, size, &[0.0; BANDS])
 }

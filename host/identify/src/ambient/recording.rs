@@ -19,7 +19,7 @@ pub struct Ambient {
     /// Mean spindle frequency, whose harmonics were removed unless `harmonics_remain`, Hz; `None` if no speed is known.
     pub turn_hz: Option<f64>,
     /// Reason why a recorded tachometer does not give the spindle angle; the stated speed is used instead, if there is
-    /// one.
+    /// one. `None` if no tachometer was recorded, or if it gives the angle.
     pub tachometer_fault: Option<String>,
     /// True if the spindle harmonics are still in the samples, because the record is too short to separate them from
     /// each other.
@@ -30,7 +30,7 @@ pub struct Ambient {
 struct Removal {
     /// Spindle frequency, Hz; `None` if no speed is known.
     turn_hz: Option<f64>,
-    /// Reason why a recorded tachometer does not give the spindle angle.
+    /// Reason why a recorded tachometer does not give the spindle angle; `None` as in [`Ambient`].
     tachometer_fault: Option<String>,
     /// True if the record is too short to separate the spindle harmonics, so that they are still in the samples.
     harmonics_remain: bool,
@@ -80,8 +80,8 @@ impl Ambient {
 }
 
 /// Removes the mean and all spindle harmonics up to 1.2 `high_hz` from `samples` by least squares over the record,
-/// after trimming the samples to the range in which the spindle angle is known. Nothing is removed if the record is too
-/// short to separate the harmonics.
+/// after trimming the samples to the range in which the spindle angle is known. Nothing is removed, not even the mean,
+/// if the record is too short to separate the harmonics.
 fn without_harmonics(recording: &Recording, samples: &mut [Vec<f64>], high_hz: f64) -> Removal {
     let cut = recording.sidecar.cut.unwrap_or_default();
     let rate_hz = recording.sample_rate_hz;
@@ -145,7 +145,8 @@ fn without_harmonics(recording: &Recording, samples: &mut [Vec<f64>], high_hz: f
 }
 
 /// Decimates samples by the factor `every`, after a low-pass filter (windowed sinc, Hann) that passes frequencies up to
-/// a third of the new sample rate and blocks those from two thirds on. Aliases fall above a third of the new rate.
+/// a third of the new sample rate and blocks those from two thirds on. Aliases fall above a third of the new rate. The
+/// first and last 10·`every` samples are lost. With `every` 1 the samples stay as they are.
 fn thinned(samples: &[f64], every: usize) -> Vec<f64> {
     if every == 1 {
         return samples.to_vec();

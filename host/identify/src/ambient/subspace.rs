@@ -61,7 +61,8 @@ pub enum AmbientError {
         /// Duration needed, s.
         needed_s: f64,
     },
-    /// No mode in the band exceeds the noise and keeps its frequency at a higher model order.
+    /// No mode in the band with an admissible damping ratio exceeds the noise and keeps its frequency at a higher model
+    /// order.
     #[error("no mode between {0} and {1} Hz exceeds the noise; record longer, or excite the structure more")]
     NoMode(f64, f64),
     /// The singular values of the covariances cannot be computed.
@@ -177,8 +178,8 @@ impl Record {
     /// limited by the size of the matrix. It is rounded up to an even number, since poles come in conjugate pairs.
     fn order(&self) -> Result<usize, AmbientError> {
         let values = singular_values(self.mean.clone())?;
-        // Half the difference between the mean Hankel matrices of the even and of the odd blocks: pure noise, as large
-        // as the noise of the mean of all blocks.
+        // Half the difference between the mean Hankel matrices of the even and of the odd blocks: pure noise, about as
+        // large as the noise of the mean of all blocks.
         let count = self.of_blocks.len() as f64;
         let mut noise = DMatrix::zeros(self.mean.nrows(), self.mean.ncols());
         for (index, block) in self.of_blocks.iter().enumerate() {
@@ -217,8 +218,9 @@ impl Record {
         ))
     }
 
-    /// Modes of the mean Hankel matrix within the band; their standard deviations come from the deviations of the
-    /// Hankel matrices of the blocks from the mean.
+    /// Modes of the mean Hankel matrix within the band, with a damping ratio between 0 and `LARGEST_AMBIENT_DAMPING`,
+    /// by ascending frequency. Their standard deviations come from the deviations of the Hankel matrices of the blocks
+    /// from the mean.
     fn modes(&self, order: usize) -> Result<Vec<AmbientMode>, AmbientError> {
         let [low_hz, high_hz] = self.band_hz;
         let is_mode = |pole: &Complex64| {

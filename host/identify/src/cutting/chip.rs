@@ -29,9 +29,9 @@ struct SurfacePoint {
 /// The chips cut at every sample of a cutting test, by sample; `runout_m` is the radial offset r of each tooth, m.
 ///
 /// In tooth passing k the tooth (−k mod N) moves over the arc of engagement. Without feed, and with the tool displaced
-/// by u, its edge stands at p(φ) = (sin φ, cos φ, 0)·u sin γ − z cos γ + r sin γ, with the edge angle γ (thesis eq.
-/// 3.1). With the feed per tooth f, the surface is S_k = max(p_k, S_(k−1) − f sin φ sin γ), and the chip thickness p_k
-/// − S_(k−1) + f sin φ sin γ where that is positive.
+/// by u, its edge stands at p(φ) = (sin φ, cos φ, 0)·u sin γ − z cos γ + r sin γ, with the edge angle γ and z the axial
+/// component of u (thesis eq. 3.1). With the feed per tooth f, the surface is S_k = max(p_k, S_(k−1) − f sin φ sin γ),
+/// and the chip thickness p_k − S_(k−1) + f sin φ sin γ where that is positive.
 pub fn chips(test: &CuttingTest, runout_m: &[f64]) -> Vec<Vec<Chip>> {
     let mut chips = vec![Vec::new(); test.angle.len()];
     let (Some(&first), Some(&last)) = (test.angle.first(), test.angle.last()) else {
@@ -87,8 +87,8 @@ pub fn chips(test: &CuttingTest, runout_m: &[f64]) -> Vec<Vec<Chip>> {
 }
 
 /// The machined surface at the immersion angle `phi`: on the cubic through four neighbouring points that one tooth
-/// left, else on the straight line through two, else at the height of one point. `place` is the index of the last point
-/// up to `phi` and only grows. `None` without points.
+/// left, else on the straight line through two, else at the height of one point. `place` is advanced to the index of
+/// the last point up to `phi` and never moves back. `None` without points.
 fn surface_at(surface: &[SurfacePoint], phi: f64, place: &mut usize) -> Option<SurfacePoint> {
     while *place + 1 < surface.len() && surface[*place + 1].phi <= phi {
         *place += 1;

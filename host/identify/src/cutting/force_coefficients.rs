@@ -2,12 +2,12 @@
 //!
 //! At every instant F = Σ a {(K_tc e_t + K_rc e_r + K_ac e_a)(φ) h + (K_te e_t + K_re e_r + K_ae e_a)(φ)/sin γ}, summed
 //! over the engaged teeth, with the axial depth a and the edge angle γ (thesis eqs 3.2 to 3.4). The chip thickness h
-//! comes from [`chips`] and contains the runout of each tooth. The coefficients minimize the squared residual of the
-//! force over the revolutions of full engagement, without the samples beside tooth entries and exits; each channel is
-//! weighted with the inverse of its residual variance. The mean-force method (Altintas) serves for comparison: forces
-//! averaged over a revolution are regressed on those that each unit coefficient would cause at the feed of the test.
-//! Runout and stable vibration do not affect it as long as every tooth stays in contact. Intervals come from the
-//! scatter between revolutions.
+//! comes from [`chips`] and contains the runout of each tooth. The coefficients minimize the weighted squared residual
+//! of the force over the revolutions of full engagement, without the samples beside tooth entries and exits; each
+//! channel is weighted with the inverse of its residual variance. The mean-force method (Altintas) serves for
+//! comparison: forces averaged over a revolution are regressed on those that each unit coefficient would cause at the
+//! feed of the test. Runout and stable vibration do not affect it as long as every tooth stays in contact. Intervals
+//! come from the scatter between revolutions.
 
 use std::f64::consts::TAU;
 
@@ -43,20 +43,19 @@ pub struct Value {
     pub deviation: f64,
 }
 
-/// Length of a Gauss–Newton step below which a force-coefficient fit stops, in standard deviations of its parameters. A
-/// choice.
+/// Length of a Gauss–Newton step below which a fit of force coefficients stops, in standard deviations. A choice.
 const SETTLED: f64 = 1e-2;
 
 /// Result of the fit: force coefficients from a set of cutting tests.
 #[derive(Clone, Debug)]
 pub struct Fit {
-    /// Force coefficients from instantaneous forces, in the order of [`KEYS`]; `None` for the axial ones if no axial
-    /// force was measured.
+    /// Force coefficients from instantaneous forces, in the order of [`KEYS`]; `None` for the axial ones unless the
+    /// axial force was measured in every test.
     pub coefficients: [Option<Value>; 6],
-    /// Force coefficients from mean forces of revolutions, in the order of [`KEYS`]; `None` if all feeds are equal, or
-    /// if mean forces do not determine the coefficients.
+    /// Force coefficients from mean forces of revolutions, in the order of [`KEYS`], each `None` as in `coefficients`.
+    /// `None` altogether if all feeds are equal within 2 %, or if mean forces do not determine the coefficients.
     pub averaged: Option<[Option<Value>; 6]>,
-    /// Radial offset of the edge of each tooth from the mean of all teeth, m.
+    /// Radial offset of the edge of each tooth from the mean of all teeth, m, by tooth.
     pub runout_m: Vec<Value>,
     /// NRMSE of the fitted force at the samples of the fit.
     pub relative_error: f64,
@@ -74,12 +73,13 @@ pub enum ForceCoefficientError {
     /// The tests have different numbers of teeth.
     #[error("the tests have tools with {0} and {1} teeth; tests of one tool are needed")]
     Teeth(usize, usize),
-    /// Radial and axial force coefficients are not separately identifiable.
+    /// Some test lacks fz, and at this edge angle the coefficients of radial and axial force are then not separately
+    /// identifiable.
     #[error(
         "no fz was measured, and with an edge angle of {0:.1} degrees radial and axial forces act in one direction in the plane of the tool; fz, or a square end mill (90 degrees), is needed"
     )]
     NoAxialForce(f64),
-    /// There are no cutting tests, or they do not determine the force coefficients.
+    /// There are no cutting tests, or they do not determine force coefficients and runout.
     #[error(
         "the tests do not determine the coefficients; cuts at two or more feeds, in which teeth cut air now and then, are needed"
     )]
@@ -177,7 +177,8 @@ struct Fitter<'a> {
 }
 
 impl Fitter<'_> {
-    /// Indices in [`KEYS`] of the fitted force coefficients: all, or without an axial force all but the axial ones.
+    /// Indices in [`KEYS`] of the fitted force coefficients: all, or all but the axial ones if some test lacks the
+    /// axial force.
     fn active(&self) -> Vec<usize> {
         (0..6).filter(|index| self.has_axial || index % 3 != 2).collect()
     }
@@ -294,8 +295,7 @@ impl Fitter<'_> {
         Ok((next, step.dot(&(matrix * &step)).max(0.0).sqrt()))
     }
 
-    /// Gauss–Newton iteration without damping: the forces are linear in the force coefficients, and bilinear in
-    /// coefficients and runout.
+    /// Gauss–Newton iteration without damping: the forces are bilinear in force coefficients and runout.
     fn settle(&self, mut state: State) -> Result<State, ForceCoefficientError> {
         let mut length = f64::INFINITY;
         for _ in 0..30 {
@@ -311,8 +311,8 @@ impl Fitter<'_> {
         }
     }
 
-    /// Sets the weight of each force direction of each test to the inverse of its residual variance, and the axial
-    /// weight to 0 if the axial coefficients are not fitted.
+    /// Sets the weight of each force direction of each test to the inverse of the residual variance in that direction,
+    /// and the axial weight to 0 if the axial coefficients are not fitted.
     fn weigh(&mut self, state: &State) {
         let variances: Vec<Vector3<f64>> = self
             .tests
@@ -393,8 +393,7 @@ impl Fitter<'_> {
         feeds.len()
     }
 
-    /// Force coefficients from mean forces, by least squares on two or three equations per revolution; `None` if the
-    /// tests do not determine them.
+    /// Force coefficients from mean forces, by least squares; `None` if the tests do not determine them.
     fn averaged(&self) -> Option<[Option<Value>; 6]> {
         let active = self.active();
         let directions = if self.has_axial { 3 } else { 2 };
@@ -448,8 +447,7 @@ impl Fit {
             sizes.fold(0.0, f64::max)
         };
         let cutting = largest(&self.coefficients[..3]);
-        // Base for differences of edge coefficients, N per mm of axial depth: the largest edge coefficient, or if
-        // larger the largest cutting coefficient times the mean feed per tooth; MPa times m gives 10³ N/mm.
+        // MPa times m gives 10³ N/mm.
         let edge = largest(&self.coefficients[3..]).max(1e3 * self.feed_per_tooth_m * cutting);
         let differs = |&(index, _): &(usize, &'static str)| {
             let (Some(one), Some(other)) = (self.coefficients[index], averaged[index]) else {

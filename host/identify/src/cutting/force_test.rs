@@ -32,7 +32,7 @@ pub struct CuttingTest {
     /// False if the axial force was not measured; the axial entries of `force` are then 0.
     pub has_axial_force: bool,
     /// Displacement of the tool at each sample in feed, normal and axial direction, m, from the measured axes; `None`
-    /// if none was measured.
+    /// if no displacement was measured.
     pub displacement: Option<Vec<Vector3<f64>>>,
     /// First sample of full engagement, and the sample after its last one. They bound whole revolutions unless their
     /// times were set.
@@ -54,8 +54,8 @@ impl CuttingTest {
     /// The cutting test in a recording with forces and a tachometer.
     ///
     /// # Errors
-    /// No tachometer, no fx or fy, a cut that the sidecar does not describe completely, or too few revolutions of full
-    /// engagement.
+    /// No usable tachometer, no fx or no fy, a cut that the sidecar does not describe completely, or too few
+    /// revolutions of full engagement.
     pub fn new(recording: &Recording, setup: Setup) -> Result<Self, RecordingError> {
         let cut = recording.sidecar.cut.unwrap_or_default();
         let said = |value: Option<f64>, key: &str| {

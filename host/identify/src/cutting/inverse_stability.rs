@@ -4,9 +4,8 @@
 //! every cut the structure has a dominant Floquet multiplier μ (characteristic multiplier): the cut chatters if |μ| >
 //! 1, at the frequency given by μ. With the errors of the set depth and the measured chatter frequency, every structure
 //! has a likelihood of the observed outcomes. The posterior distribution, with a log-uniform prior within
-//! [`PriorFactors`], is sampled by sequential Monte Carlo (Del Moral, Doucet and Jasra 2006). With few cuts the
-//! intervals are wide. If structures in several separate regions of the parameters explain the cuts, the sample
-//! can contain all of these regions.
+//! [`PriorFactors`], is sampled by sequential Monte Carlo (Del Moral, Doucet and Jasra 2006). If structures in several
+//! separate regions of the parameters explain the cuts, the sample can contain all of these regions.
 
 use std::f64::consts::TAU;
 
@@ -30,8 +29,7 @@ use quietcut_model::structure::{Direction, FirstOrder, Mode};
 use quietcut_numerics::statistics::NINETY_PERCENT;
 use quietcut_stability::{Problem, StabilityError, point};
 
-/// Width of the prior distribution of the modal parameters: for each kind, the largest factor, up or down, from the
-/// first guess.
+/// Width of the prior of the modal parameters: for each kind, the largest factor, up or down, from the first guess.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PriorFactors {
     /// Largest factor of natural frequencies.
@@ -103,7 +101,7 @@ pub struct InverseMode {
 /// Reason why the trial cuts give no result.
 #[derive(Debug, thiserror::Error)]
 pub enum InverseError {
-    /// The first guess has no oscillating mode.
+    /// The first guess has no oscillating mode with a full set of mode shapes.
     #[error("the first guess has no oscillating mode with a mode shape")]
     NoModes,
     /// Every sampled structure misjudges more than one in twenty of the trial cuts.
@@ -127,8 +125,8 @@ const EFFECTIVE: f64 = 0.5;
 /// the last, and after the last. A choice.
 const MOVES: [usize; 2] = [2, 4];
 
-/// Family of structures with the parameters θ: logarithms of the factors by which frequency, damping and stiffness of
-/// each mode differ from the first guess.
+/// Family of structures with the parameters θ: logarithms of the factors by which frequency, damping ratio and
+/// stiffness differ from the first guess, mode by mode.
 struct Family<'a> {
     start: &'a Problem,
     /// For each mode of the first guess, its pole λ, rad/s, and its projector P in the first-order form.
@@ -261,8 +259,8 @@ impl Family<'_> {
         problem
     }
 
-    /// Log-likelihood of the observed outcomes for the structure θ, and the number of trial cuts that the structure
-    /// misjudges.
+    /// Log-likelihood of the observed outcomes and chatter frequencies for the structure θ, and the number of trial
+    /// cuts that the structure misjudges.
     ///
     /// Every cut lowers the log-likelihood. If it has fallen to `least` before the last cut, the evaluation stops and
     /// returns −∞. It also returns −∞ if the stability of a cut cannot be computed. In both cases all cuts count as
@@ -452,8 +450,8 @@ fn weights(sums: &[f64], step: f64) -> Vec<f64> {
     raw.iter().map(|weight| weight / total).collect()
 }
 
-/// Next increment of the likelihood exponent of the tempering: the largest one that keeps the effective sample size at
-/// least at the share [`EFFECTIVE`] of the number of particles.
+/// Next increment of the likelihood exponent of the tempering: the largest one, up to the exponent 1, that keeps the
+/// effective sample size at least at the share [`EFFECTIVE`] of the number of particles; at least 1e-6.
 fn next_step(sums: &[f64], share: f64) -> f64 {
     let effective = |step: f64| 1.0 / weights(sums, step).iter().map(|w| w * w).sum::<f64>();
     let enough = EFFECTIVE * sums.len() as f64;
@@ -468,7 +466,7 @@ fn next_step(sums: &[f64], share: f64) -> f64 {
 }
 
 /// Index of the old particle that each new particle copies, by systematic resampling with the particle weights
-/// `weights`.
+/// `weights`; `first` is a random number from 0 to 1.
 fn systematic(weights: &[f64], first: f64) -> Vec<usize> {
     let count = weights.len();
     let (mut index, mut below) = (0, weights[0]);

@@ -11,9 +11,9 @@ use quietcut_model::milling::{Immersion, Material, RotatingVector, ToothForce};
 /// A cutting test with the quantities that the steps of the fit of its force coefficients share.
 pub(super) struct Prepared<'a> {
     pub(super) test: &'a CuttingTest,
-    /// Derivatives of the tooth force by the force coefficients at the axial depth of the test, as vectors over the
-    /// immersion angle. `cutting`: N per unit of each cutting coefficient and per meter of chip thickness. `edge`: N
-    /// per unit of each edge coefficient.
+    /// Derivatives of the tooth force by the tangential, radial and axial coefficient at the axial depth of the test,
+    /// as vectors over the immersion angle. `cutting`: N per unit of each cutting coefficient and per meter of chip
+    /// thickness. `edge`: N per unit of each edge coefficient.
     pub(super) cutting: [RotatingVector; 3],
     pub(super) edge: [RotatingVector; 3],
     /// Indices of the samples next to a tooth entry or exit. Part of their sampling interval has another number of
@@ -64,10 +64,11 @@ pub(super) fn prepared(test: &CuttingTest) -> Prepared<'_> {
 }
 
 impl Prepared<'_> {
-    /// Mean over a revolution of the force that each force coefficient causes without runout and vibration, N per unit
-    /// of the coefficient; and the measured mean force, N.
+    /// Mean over a revolution of the force that each force coefficient, in the order of
+    /// [`KEYS`](super::force_coefficients::KEYS), causes without runout and vibration, N per unit of the coefficient;
+    /// and the measured mean force, N.
     ///
-    /// Both means are over the same samples, so that the sampling of tooth entry and exit biases neither.
+    /// Both means are over the same samples: those of the revolution that are not in `switching`.
     pub(super) fn mean_forces(&self, [from, to]: [usize; 2]) -> ([Vector3<f64>; 6], Vector3<f64>) {
         let test = self.test;
         let mut sums = [Vector3::zeros(); 6];

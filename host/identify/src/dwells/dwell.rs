@@ -34,9 +34,9 @@ pub struct Dwell {
     /// (AᵀA)⁻¹ of the harmonic regression with design matrix A. Multiplied by the noise variance of a channel it is the
     /// covariance of the coefficients of that channel.
     pub gram_inverse: DMatrix<f64>,
-    /// Fourier series of each force channel.
+    /// Fourier series of each force channel, in the order of the recording.
     pub forces: Vec<FourierSeries>,
-    /// Fourier series of each motion channel that is not zero throughout.
+    /// Fourier series of each motion channel that is not zero throughout the recording, in the order of the recording.
     pub motions: Vec<FourierSeries>,
 }
 
@@ -274,7 +274,7 @@ impl Dwell {
         (!dwell.forces.is_empty()).then_some(dwell)
     }
 
-    /// Fourier series of the force channel with the largest fundamental.
+    /// Fourier series of the force channel with the largest fundamental; `None` without a force channel.
     pub fn force(&self) -> Option<&FourierSeries> {
         self.forces
             .iter()
@@ -316,6 +316,7 @@ fn slope_by_omega(coefficients: &DVector<f64>, design: &DMatrix<f64>, rate_hz: f
 }
 
 /// Replaces the noise variance of each channel by its mean over the given dwells, weighted by their numbers of samples.
+/// All dwells must have the same channels.
 pub fn pool_variances(dwells: &mut [Dwell]) {
     type Pick = fn(&mut Dwell) -> &mut Vec<FourierSeries>;
     let picks: [Pick; 2] = [|dwell| &mut dwell.forces, |dwell| &mut dwell.motions];

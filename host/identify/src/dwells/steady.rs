@@ -19,7 +19,7 @@ pub enum Settling {
     /// The transient is the first half of the dwell.
     Half,
     /// The transient ends when a decay e^{−σt}, initially as large as the steady motion, has fallen below a fifth of
-    /// the standard deviation of its Fourier coefficients; σ is the given decay rate, 1/s.
+    /// the standard deviation of the motion's Fourier coefficients; σ is the given decay rate, 1/s.
     Decay(f64),
 }
 
@@ -99,9 +99,9 @@ struct Settled {
     still: bool,
 }
 
-/// The part of a dwell after its transient; `None` if it is too short. While the motion still changes in this part, its
-/// last half replaces it, as long as that contains at least [`LEAST_DWELL_PERIODS`] excitation periods. A length of the
-/// transient that the user set is kept.
+/// The part of a dwell after its transient; `None` if it is too short or cannot be fitted. While the motion still
+/// changes in this part, its last half replaces it, as long as that contains at least [`LEAST_DWELL_PERIODS`]
+/// excitation periods and can be fitted. A length of the transient that the user set is kept.
 fn settled(
     recording: &Recording,
     stretch: DwellSegment,
@@ -173,7 +173,8 @@ fn is_still(recording: &Recording, part: DwellSegment, dwell: &Dwell) -> bool {
 }
 
 /// Complex amplitude X of the least-squares fit Re X e^{iφk} + constant to the samples in `range`; k counts from the
-/// first sample of the channel, φ is `radians_per_sample`.
+/// first sample of the channel, φ is `radians_per_sample`. `None` if `range` exceeds the samples or the normal
+/// equations are singular.
 fn phasor(samples: &[f64], range: std::ops::Range<usize>, radians_per_sample: f64) -> Option<Complex64> {
     let mut normal = Matrix3::<f64>::zeros();
     let mut right = Vector3::<f64>::zeros();
@@ -190,7 +191,8 @@ fn phasor(samples: &[f64], range: std::ops::Range<usize>, radians_per_sample: f6
     Some(Complex64::new(solution[0], solution[1]))
 }
 
-/// The part of a dwell after its transient, and [`Settled::whole`]; `None` if the part is too short.
+/// The part of a dwell after its transient, and [`Settled::whole`]; `None` if the part is too short or cannot be
+/// fitted.
 fn first_settled(
     recording: &Recording,
     stretch: DwellSegment,
@@ -231,7 +233,8 @@ fn first_settled(
 }
 
 /// Dwells of a record with constant excitation frequency and slowly changing force amplitude: consecutive windows of
-/// `periods` excitation periods each. An incomplete window at the end of a segment of constant frequency is left out.
+/// `periods` excitation periods each. An incomplete window at the end of a segment of constant frequency is left out,
+/// and so is a window that cannot be fitted.
 pub fn windows(recording: &Recording, harmonics: usize, periods: f64) -> Vec<Dwell> {
     let mut dwells = Vec::new();
     for stretch in dwell_segments(recording) {

@@ -16,7 +16,8 @@ use super::weights::Weights;
 /// window couples two.
 const LAGS: usize = 2;
 
-/// Covariance of the parameters of a modal fit under the constraints of [`shape::normalize`] on the mode shapes.
+/// Covariance of the parameters of a modal fit under the constraints of [`shape::normalize`] on the mode shapes; `None`
+/// as for [`constrained_inverse`].
 pub(super) fn covariance(data: &Receptances, fit: &PoleResidue, weights: &Weights) -> Option<DMatrix<f64>> {
     let jacobian = jacobian(data, fit, weights);
     let normal = normal(&jacobian);
@@ -24,8 +25,8 @@ pub(super) fn covariance(data: &Receptances, fit: &PoleResidue, weights: &Weight
     let left = weights.left(fit, data);
     let same_line = &bread * meat(&jacobian, &left, 0) * &bread;
     let all = &bread * meat(&jacobian, &left, LAGS) * &bread;
-    // Correlations between lines, estimated from few lines, may make the variance of a parameter too small; it is kept
-    // at least as large as without correlation between lines.
+    // Correlations between lines, estimated from few lines, may make the variance of a parameter too small; the
+    // variance is kept at least as large as without correlation between lines.
     let is_more = |i: usize| all[(i, i)] >= same_line[(i, i)];
     let scale = DVector::from_fn(all.nrows(), |i, _| {
         if is_more(i) || all[(i, i)] <= 0.0 {
@@ -79,7 +80,8 @@ fn meat(jacobian: &[DMatrix<Complex64>], left: &[DVector<Complex64>], lags: usiz
 
 /// Covariance block of a modal fit: the upper left block of [N Gᵀ; G 0]⁻¹, with the normal matrix N and the gradients G
 /// of the constraints on the mode shapes. The right shape of a mode can be multiplied by any complex factor if the left
-/// one is divided by it. The data do not determine this factor; the constraints fix it.
+/// one is divided by it. The data do not determine this factor; the constraints fix it. `None` if the matrix is
+/// singular.
 pub(super) fn constrained_inverse(
     fit: &PoleResidue,
     shared: &[(usize, usize)],

@@ -29,7 +29,8 @@ pub enum ModesError {
         /// Number of requested modes.
         wanted: usize,
     },
-    /// The modal fit with this number of modes does not converge, or the data do not determine its parameters.
+    /// The modal fit with this number of modes does not converge, the data do not determine its parameters, or a
+    /// decomposition in it fails.
     #[error("the fit of {0} modes does not converge; fewer modes or another band are needed")]
     NotConverged(usize),
     /// The poles of the LSCF model with a common denominator cannot be computed.

@@ -145,8 +145,8 @@ impl PoleResidue {
             .collect()
     }
 
-    /// Writes the derivatives of the fitted receptance H_k by all parameters at one line, divided by its standard
-    /// deviation there, into `row`.
+    /// Writes the derivatives of the fitted receptance H_k by all parameters at one line, divided by the standard
+    /// deviation `deviation` of the measured value, into `row`.
     pub(super) fn derivatives(
         &self,
         data: &Receptances,

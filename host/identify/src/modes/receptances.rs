@@ -18,12 +18,12 @@ pub struct Receptances {
     pub forces: Vec<Direction>,
     /// For each receptance, the index of its response direction and the index of its force direction.
     pub places: Vec<(usize, usize)>,
-    /// The receptances, m/N.
+    /// The receptances, m/N, in the order of `places`, each at the frequencies of `frequency_hz`.
     pub values: Vec<Vec<Complex64>>,
     /// Standard deviation of the real part, equal to that of the imaginary part, of every receptance at every
-    /// frequency, m/N. The variance is averaged over neighbouring lines. If only coherence is measured, the standard
-    /// deviation is correct up to a common factor; if neither is known, it is a fixed fraction of the RMS of the
-    /// receptance.
+    /// frequency, as `values`, m/N. The variance is averaged over neighbouring lines, and the standard deviation is at
+    /// least a fixed fraction of the RMS of the receptance. If only coherence is measured, the standard deviation is
+    /// correct up to a common factor; if neither is known, it is that fraction.
     pub deviation: Vec<Vec<f64>>,
     /// True if standard deviations of the receptances were measured; false if they follow from coherence up to a
     /// factor, or are not known.

@@ -9,7 +9,7 @@ pub(super) fn pair(residue: Complex64, s: Complex64, pole: Complex64) -> Complex
 }
 
 /// The nearest rank-one matrix right·leftᵀ to a matrix of residues (responses by forces), and the norm of the
-/// difference relative to that of the matrix.
+/// difference relative to that of the matrix. `None` if the singular value decomposition fails.
 pub(crate) fn rank_one(residues: &DMatrix<Complex64>) -> Option<(Vec<Complex64>, Vec<Complex64>, f64)> {
     let all = residues.norm();
     let svd = residues.clone().try_svd(true, true, f64::EPSILON, 0)?;
@@ -28,10 +28,11 @@ pub(crate) fn rank_one(residues: &DMatrix<Complex64>) -> Option<(Vec<Complex64>,
     Some((right, left, if all > 0.0 { rest.sqrt() / all } else { 0.0 }))
 }
 
-/// Scales the right shape of a mode by a complex factor c and the left one by 1/c. Then both have equal norm over the
-/// `shared` entries (index in right, index in left) and differ as little as possible: the shapes of a reciprocal
-/// structure become equal. Without a shared entry the norms of the whole shapes become equal. The largest entry of the
-/// right shape gets a positive real part.
+/// Scales the right shape of a mode by a complex factor c and the left one by 1/c, unless one of them is zero. Then
+/// both have equal norm over the `shared` entries (index in right, index in left) and differ as little as possible: the
+/// shapes of a reciprocal structure become equal. Without a shared entry, or if one shape is zero in all of them, the
+/// norms of the whole shapes become equal. The real part of the largest entry of the right shape does not become
+/// negative.
 pub(crate) fn normalize(right: &mut [Complex64], left: &mut [Complex64], shared: &[(usize, usize)]) {
     let norm = |shape: &[Complex64]| shape.iter().map(|entry| entry.norm_sqr()).sum::<f64>().sqrt();
     let pick = |shape: &[Complex64], of: &dyn Fn(&(usize, usize)) -> usize| -> Vec<Complex64> {

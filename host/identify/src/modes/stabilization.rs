@@ -27,12 +27,13 @@ pub struct Candidate {
     /// Height of the pole's resonance peak: norm of its residues, with each receptance normalized by its RMS, divided
     /// by the decay rate −Re λ; dimensionless.
     pub height: f64,
-    /// True if frequency, damping and shape agree with those of a pole of the previous model order.
+    /// True if the pole continues a pole of the previous model order, with which it agrees in frequency, damping and
+    /// shape. No two poles continue the same one.
     pub is_stable: bool,
     /// Index of the chain of stable poles over the model orders that the pole continues or starts.
     line: usize,
     /// Distance to the pole of the previous order in the chain, the larger one of the relative changes of frequency and
-    /// damping, in multiples of `SAME_FREQUENCY` and `SAME_DAMPING`.
+    /// damping, in multiples of `SAME_FREQUENCY` and `SAME_DAMPING`; infinite for the first pole of the chain.
     change: f64,
     /// Residues of the pole in all receptances, each receptance normalized by its RMS, as a vector of norm 1.
     shape: Vec<Complex64>,
@@ -53,7 +54,7 @@ impl Candidate {
 /// Stabilization diagram: poles of all model orders, and the poles that are modes.
 #[derive(Clone, Debug)]
 pub struct Stabilization {
-    /// Poles in the band with a damping ratio above 0 and below 0.5, by model order.
+    /// Poles in the band with a damping ratio above 0 and below 0.5, in ascending model order.
     pub candidates: Vec<Candidate>,
     /// Highest model order.
     pub highest_order: usize,
@@ -186,7 +187,7 @@ fn candidates(
 }
 
 /// Distance of two poles: the larger one of the relative differences of frequency and damping ratio, in multiples of
-/// `SAME_FREQUENCY` and `SAME_DAMPING`. Up to 1 the poles count as the same.
+/// `SAME_FREQUENCY` and `SAME_DAMPING`. Up to 1 the poles agree in both.
 fn distance(a: &Candidate, b: &Candidate) -> f64 {
     let frequency = (a.frequency_hz() / b.frequency_hz() - 1.0).abs() / SAME_FREQUENCY;
     let damping = (a.damping_ratio() / b.damping_ratio() - 1.0).abs() / SAME_DAMPING;

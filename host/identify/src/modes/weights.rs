@@ -21,7 +21,7 @@ const LEAST_LEFT: f64 = 1e-6;
 /// Weights of the residual between measured and fitted receptances.
 #[derive(Clone)]
 pub(super) struct Weights {
-    /// Standard deviation of every receptance at every line, m/N.
+    /// Standard deviations of the real part, equal to those of the imaginary part, by receptance and line, m/N.
     pub(super) deviation: Vec<Vec<f64>>,
     /// Whitening matrix between the residuals of the receptances of one line; `None` if they are taken as uncorrelated.
     whitening: Option<DMatrix<Complex64>>,
@@ -99,7 +99,8 @@ fn mean(values: &[f64]) -> f64 {
 }
 
 /// Whitening matrix L⁻¹ from the Cholesky factor of the correlation L Lᴴ between the residuals of the receptances, with
-/// unit variance of real and of imaginary part; `None` with too few lines.
+/// unit variance of real and of imaginary part; `None` with too few lines, or if the correlation matrix is not positive
+/// definite.
 fn whitening(left: &[DVector<Complex64>]) -> Option<DMatrix<Complex64>> {
     let (count, lines) = (left.len(), left.first().map_or(0, |left| left.len()));
     if lines < LINES_PER_RECEPTANCE * count {

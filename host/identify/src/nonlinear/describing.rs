@@ -27,7 +27,7 @@ pub enum Nonlinearity {
 }
 
 impl Nonlinearity {
-    /// The effect, with its describing function.
+    /// The effect of a case file that has this force.
     pub fn effect(self) -> EffectName {
         match self {
             Self::CubicStiffness => EffectName::CubicStiffness,

@@ -49,7 +49,7 @@ pub struct Solution {
     by_omega: DVector<f64>,
 }
 
-/// Newton's method for the harmonic balance did not converge from the start.
+/// Newton's method for the harmonic balance did not converge from the start, or its Jacobian is singular.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error("harmonic balance at {frequency_hz:.4} Hz does not converge")]
 pub struct NotConverged {
@@ -231,7 +231,8 @@ impl Grid {
 
 impl Solution {
     /// Derivatives of the Fourier coefficients of the motion by the parameters θ of the equation of motion, by the
-    /// Fourier coefficients of the force with the indices `of_force`, and by the frequency ω.
+    /// Fourier coefficients of the force with the indices `of_force`, and by the frequency ω. `None` if the Jacobian is
+    /// singular.
     pub fn sensitivities(
         &self,
         of_force: std::ops::Range<usize>,

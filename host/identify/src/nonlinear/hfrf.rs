@@ -40,19 +40,19 @@ pub struct HfrfFit {
     /// Standard deviations of the parameters from the scatter over frequency. They do not include the bias of the
     /// method.
     pub deviations: DVector<f64>,
-    /// The higher-order FRFs at each frequency with three or more force levels.
+    /// The higher-order FRFs, one for each frequency at which [`higher_order`] gives them.
     pub estimates: Vec<HigherOrder>,
 }
 
 /// Reason why the method of higher-order FRF gives no result.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum HfrfError {
-    /// Fewer than two frequencies have three or more force levels.
+    /// Higher-order FRFs are determined at fewer than two frequencies.
     #[error(
         "{frequencies} frequencies were measured at three or more force levels; higher-order FRF need at least 2 of them"
     )]
     Levels {
-        /// Number of frequencies with three or more force levels.
+        /// Number of frequencies at which higher-order FRFs are determined.
         frequencies: usize,
     },
     /// The regression for m, c and k or that for k3 and c3 is singular.
@@ -60,8 +60,8 @@ pub enum HfrfError {
     Undetermined,
 }
 
-/// Groups dwells by excitation frequency: dwells within the relative difference `tolerance` belong to one step of a
-/// step-sine test. Dwells without motion in the direction of the force are left out.
+/// Groups dwells by excitation frequency: dwells up to the factor 1 + `tolerance` above the lowest frequency of a group
+/// belong to it. Dwells without motion in the direction of the largest force are left out.
 pub fn responses(dwells: &[Dwell], tolerance: f64) -> Vec<Response> {
     let mut points: Vec<(f64, f64, Complex64)> = dwells
         .iter()
@@ -91,7 +91,8 @@ pub fn responses(dwells: &[Dwell], tolerance: f64) -> Vec<Response> {
     groups
 }
 
-/// Higher-order FRF at one frequency: thesis eq. 5.15 by least squares; `None` with fewer than three force levels.
+/// Higher-order FRF at one frequency: thesis eq. 5.15 by least squares; `None` with fewer than three force levels, or
+/// if they do not determine H₁, H₃ and H₅.
 pub fn higher_order(response: &Response) -> Option<HigherOrder> {
     if response.levels.len() < LEAST_LEVELS {
         return None;
@@ -116,7 +117,7 @@ pub fn higher_order(response: &Response) -> Option<HigherOrder> {
 /// 5.16 and 5.17).
 ///
 /// # Errors
-/// Fewer than two frequencies have three or more force levels; or a regression is singular.
+/// Higher-order FRFs are determined at fewer than two frequencies, or a regression is singular.
 pub fn fit(responses: &[Response]) -> Result<HfrfFit, HfrfError> {
     let estimates: Vec<HigherOrder> = responses.iter().filter_map(higher_order).collect();
     if estimates.len() < 2 {

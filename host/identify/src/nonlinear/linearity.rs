@@ -27,7 +27,8 @@ pub struct Verdict {
     /// True if the data are consistent with a linear structure.
     pub linear: bool,
     /// The kinds of nonlinearity that explain the dependence of the stiffness F/X on the force level, followed by a
-    /// quadratic spring if the second harmonic is significant. Empty if there is none.
+    /// quadratic spring if the second harmonic is significant. If a quadratic spring explains the dependence, other
+    /// springs are left out. Empty if there is none.
     pub kinds: Vec<Nonlinearity>,
     /// χ² per degree of freedom of a linear structure's fit to the stiffnesses F/X of all dwells: near 1 if the
     /// structure is linear.
@@ -37,7 +38,8 @@ pub struct Verdict {
     pub explained_misfit: f64,
     /// Largest relative change of the stiffness |F/X| between two dwells of one frequency.
     pub level_dependence: f64,
-    /// Second and third harmonics of the measured motion in each dwell, as in figures 5.4 (b) and (c) of the thesis.
+    /// Second and third harmonics of the measured motion in each dwell with force and motion in one direction, as in
+    /// figures 5.4 (b) and (c) of the thesis.
     pub harmonics: Vec<Harmonics>,
 }
 
@@ -198,7 +200,7 @@ impl<'a> LinearModel<'a> {
     }
 
     /// χ² of the measured stiffnesses F/X after a fit of the describing functions `features` and a free complex
-    /// stiffness per frequency.
+    /// stiffness per frequency; without `features` if they are linearly dependent.
     fn sum_of_squares(&self, features: &[Vec<Complex64>]) -> f64 {
         let rows = 2 * self.points.len();
         let mut matrix = DMatrix::zeros(rows, features.len().max(1));
@@ -433,7 +435,7 @@ fn level_dependence(points: &[DwellStiffness]) -> f64 {
 }
 
 /// Amplitude of harmonic h of a force or motion channel in a dwell, and the standard deviation of its noise, in the
-/// unit of the channel.
+/// unit of the channel; `None` if the Fourier series does not reach harmonic h.
 fn at_harmonic(line: &FourierSeries, dwell: &Dwell, h: usize) -> Option<(f64, f64)> {
     let place = 2 * h - 1;
     if line.coefficients.len() <= place + 1 {
@@ -443,8 +445,8 @@ fn at_harmonic(line: &FourierSeries, dwell: &Dwell, h: usize) -> Option<(f64, f6
     Some((line.amplitude(h), variance.sqrt()))
 }
 
-/// True if harmonic h of the motion, over all dwells, exceeds both the noise and the response to harmonic h of the
-/// force.
+/// True if harmonic h of the motion exceeds the response to harmonic h of the force by more than noise, over all dwells
+/// together.
 fn harmonic(dwells: &[Dwell], h: usize) -> bool {
     let (mut sum, mut count) = (0.0, 0.0);
     for dwell in dwells {

@@ -108,7 +108,7 @@ impl Curve {
     /// with |H| from the fraction `share` to 98 % of the peak.
     ///
     /// Each measured point on one side is paired with an interpolated point on the other. Between points, real and
-    /// imaginary part of H are cubics through four of them.
+    /// imaginary part of H are cubics through four of them. Empty if the peak is at an end of the curve.
     pub fn linearized(&self, share: f64) -> Vec<Linearized> {
         let Some(peak) = self.peak() else {
             return Vec::new();
@@ -153,7 +153,7 @@ impl Curve {
     }
 
     /// First crossing of |H| with `level` in the frequency intervals that begin at the points `starts`: its ω, rad/s,
-    /// and H.
+    /// and H; `None` if there is none.
     fn crossing(&self, level: f64, starts: Vec<usize>) -> Option<(f64, Complex64)> {
         let start = starts.into_iter().find(|&i| {
             let (a, b) = (
@@ -170,8 +170,8 @@ impl Curve {
         Some((low, self.between(start, low)))
     }
 
-    /// Receptance at `omega`, rad/s, from the cubic through the four points around the interval that begins at the
-    /// point `start`.
+    /// Receptance at `omega`, rad/s, from the cubic through four points at the interval that begins at the point
+    /// `start`, or through all points if there are fewer.
     fn between(&self, start: usize, omega: f64) -> Complex64 {
         let first = start.saturating_sub(1).min(self.points.len().saturating_sub(4));
         let around = &self.points[first..(first + 4).min(self.points.len())];

@@ -47,7 +47,7 @@ pub enum PeriodicError {
         "{0} is not smooth: harmonic balance of a multisine takes springs and dampers; use restoring-force"
     )]
     NotSmooth(&'static str),
-    /// The signals differ in their number of samples, or the periods are too short.
+    /// There is no period, the signals differ in their number of samples, or the periods are too short.
     #[error("periods of one length, at least 16 samples, are needed")]
     Length,
     /// The terms lack mass, damping or stiffness; all three are required.
@@ -69,7 +69,7 @@ struct Balance {
     rate_hz: f64,
     forward: Arc<dyn Fft<f64>>,
     inverse: Arc<dyn Fft<f64>>,
-    /// Angular frequencies of the lines of the transform, rad/s.
+    /// Angular frequencies of the lines of the transform, rad/s; negative in the upper half of the lines.
     omega: Vec<f64>,
 }
 
@@ -148,8 +148,8 @@ impl Balance {
         place.map_or(0.0, |index| theta[index])
     }
 
-    /// Derivatives of the nonlinear terms of the equation of motion by displacement x and velocity v at every sample of
-    /// a period.
+    /// Derivatives of the nonlinear terms of the equation of motion at every sample of a period: by the displacement x,
+    /// then by the velocity v.
     fn slopes(&self, theta: &DVector<f64>, x: &[f64]) -> [Vec<f64>; 2] {
         let v = self.derivative(x, 1);
         let (k2, k3) = (
@@ -177,7 +177,7 @@ impl Balance {
     }
 
     /// Solves J δ = `right` for the change δ of the displacement, with J the derivative of the harmonic balance by the
-    /// displacement.
+    /// displacement; `None` as for [`gmres`].
     fn solve_linear(&self, theta: &DVector<f64>, slopes: &[Vec<f64>; 2], right: &[f64]) -> Option<Vec<f64>> {
         let mean = |values: &Vec<f64>| values.iter().sum::<f64>() / values.len() as f64;
         let near = self.linear(theta, [mean(&slopes[0]), mean(&slopes[1])]);
@@ -222,7 +222,8 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-/// Solves A y = b by GMRES without restart; `None` if a hundred iterations do not reduce the residual to 1e-9 of b.
+/// Solves A y = b by GMRES without restart; `None` if a hundred iterations do not reduce the residual to 1e-9 of b, or
+/// if the least-squares problem of one is singular.
 fn gmres(apply: impl Fn(&[f64]) -> Vec<f64>, right: &[f64]) -> Option<Vec<f64>> {
     let size = norm(right);
     if size == 0.0 {
@@ -321,7 +322,7 @@ pub fn fit(periods: &[Period<'_>], rate_hz: f64, terms: &[ForceTerm]) -> Result<
 }
 
 /// First guess of the coefficients, by linear least squares on the balance Σ θ φ(x) = F of the measured motion, within
-/// the frequency band of the force.
+/// the frequency band of the force. `None` if the equations are singular.
 fn first_guess(balance: &Balance, forces: &[Vec<f64>], motions: &[Vec<f64>]) -> Option<DVector<f64>> {
     // Above the frequency band of the force the derivatives of the measured motion consist of noise.
     let limit = force_band(balance, forces);
@@ -344,7 +345,7 @@ fn first_guess(balance: &Balance, forces: &[Vec<f64>], motions: &[Vec<f64>]) -> 
     Some(fit.parameters)
 }
 
-/// Angular frequency below which the share [`FORCE_BAND_SHARE`] of the force power lies, rad/s.
+/// Angular frequency up to which at least the share [`FORCE_BAND_SHARE`] of the force power lies, rad/s.
 fn force_band(balance: &Balance, forces: &[Vec<f64>]) -> f64 {
     let mut power = vec![0.0; balance.omega.len() / 2];
     for force in forces {

@@ -22,7 +22,8 @@ pub struct Reciprocity {
 }
 
 /// Receptance in direction `to` under a force in direction `from` in one dwell, m/N, its variance, and the force
-/// amplitude, N.
+/// amplitude, N. `None` if the largest force is not in direction `from`, or if no motion in direction `to` was
+/// measured.
 fn receptance(dwell: &Dwell, from: Direction, to: Direction) -> Option<(Complex64, f64, f64)> {
     let force = dwell.force().filter(|line| line.direction == from)?;
     let motion = dwell.motions.iter().find(|line| line.direction == to)?;

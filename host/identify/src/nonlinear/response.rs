@@ -32,7 +32,7 @@ pub enum ResponseError {
 /// anti-aliasing filter. The classical Runge–Kutta method takes four steps per sample.
 ///
 /// # Errors
-/// The law has no mass, or the predicted motion grows without bound.
+/// The law has no mass, or one that is not finite; or the predicted motion grows without bound.
 pub fn displacement(
     law: &[(ForceTerm, f64)],
     force: &[f64],

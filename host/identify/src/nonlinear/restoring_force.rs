@@ -124,7 +124,7 @@ pub struct Motion {
 pub struct Surface {
     /// The fitted terms.
     pub terms: Vec<ForceTerm>,
-    /// Coefficients of the terms, SI.
+    /// Coefficients of the terms, in the order of `terms`, SI units.
     pub theta: DVector<f64>,
     /// Standard deviations of the coefficients of the force law, from the residual and its correlation in time; for a free decay from the
     /// scatter between its segments and between bands.
@@ -136,7 +136,7 @@ pub struct Surface {
     pub band_hz: [f64; 2],
     /// Motion at the samples of the record that the fit uses.
     pub motion: Motion,
-    /// Restoring force f_r = f − m q̈ at the samples of the surface, N.
+    /// Restoring force f_r = f − m q̈ at the samples of `motion`, N.
     pub restoring_n: Vec<f64>,
 }
 
@@ -312,7 +312,7 @@ impl Record<'_> {
     }
 
     /// Residual force of a law that was fitted elsewhere, relative to the force within `band_hz`: ‖f − Σ θ·term‖/‖f‖,
-    /// as [`Surface::force_error`].
+    /// as [`Surface::force_error`] for a record with force.
     pub fn force_error(&self, law: &[(ForceTerm, f64)], band_hz: [f64; 2], trim_s: f64) -> f64 {
         let motion = self.motion([0.0, 0.5 * self.rate_hz]);
         let left: Vec<f64> = (0..self.motion.len())
@@ -359,7 +359,7 @@ fn receptance(terms: &[ForceTerm], theta: &DVector<f64>, mass: f64) -> impl Fn(f
 }
 
 /// Standard deviations of a least-squares solution whose residual is correlated in time: sandwich covariance from sums
-/// over blocks of samples (the block form of Newey and West).
+/// over blocks of samples (the block form of Newey and West). `None` if the normal equations are singular.
 pub(crate) fn deviations(matrix: &DMatrix<f64>, left: &DVector<f64>) -> Option<DVector<f64>> {
     let inverse = invert_normal_equations(&matrix.tr_mul(matrix))?;
     let blocks = 40.min(matrix.nrows() / (2 * matrix.ncols()).max(1)).max(1);
@@ -387,14 +387,16 @@ pub struct Slice {
 }
 
 impl Surface {
-    /// Stiffness slice of the surface: restoring force f_r over displacement x at the samples with |v| below the
-    /// fraction `share` of its maximum. A linear term in v accounts for the remaining velocity.
+    /// Stiffness slice of the surface: restoring force f_r over displacement x at the samples with |v| up to the
+    /// fraction `share` of the largest |v|. A linear term in v accounts for the remaining velocity. `None` with too few
+    /// such samples, or if they do not determine the polynomial.
     pub fn stiffness_slice(&self, share: f64) -> Option<Slice> {
         slice(&self.motion.x, &self.motion.v, &self.restoring_n, share)
     }
 
-    /// Damping slice of the surface: restoring force f_r over velocity v at the samples with |x| below the fraction
-    /// `share` of its maximum. A linear term in x accounts for the remaining displacement.
+    /// Damping slice of the surface: restoring force f_r over velocity v at the samples with |x| up to the fraction
+    /// `share` of the largest |x|. A linear term in x accounts for the remaining displacement. `None` as for
+    /// [`Self::stiffness_slice`].
     pub fn damping_slice(&self, share: f64) -> Option<Slice> {
         slice(&self.motion.v, &self.motion.x, &self.restoring_n, share)
     }

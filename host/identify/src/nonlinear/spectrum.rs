@@ -1,9 +1,9 @@
 //! Derivatives, integrals and filters of whole records by the discrete Fourier transform.
 //!
-//! A record is not periodic. For a band from 0 Hz the straight line through its ends is subtracted, and the remaining
-//! signal is continued by point reflection about its end, so that value and slope are continuous. For a higher band the
-//! record is mirrored at its ends. At both ends of the filtered record an error remains, over about one period of the
-//! lowest frequency of the band; callers leave these ends out.
+//! A record is not periodic. For a band from 0 Hz, and for a weighted spectrum, the straight line through its ends is
+//! subtracted, and the remaining signal is continued by point reflection about its end, so that value and slope are
+//! continuous. For a higher band the record is mirrored at its ends. At both ends of the filtered record an error
+//! remains, over about one period of the lowest frequency of the band; callers leave these ends out.
 
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -179,8 +179,8 @@ fn above(frequency: f64, low: f64) -> f64 {
     }
 }
 
-/// Power spectrum of a record averaged over frequency intervals of 1/400 of the sample rate, at least three lines, and
-/// the width of these intervals, Hz.
+/// Power spectrum of a record averaged over successive frequency intervals of about 1/400 of the sample rate, at least
+/// three lines, and the width of these intervals, Hz.
 fn smooth_power(samples: &[f64], rate_hz: f64) -> (Vec<f64>, f64) {
     let length = samples.len();
     // A Hann window reduces the leakage from the ends of the record.
@@ -209,7 +209,8 @@ fn strongest(smooth: &[f64]) -> usize {
     strongest
 }
 
-/// Frequency at which a record has the largest smoothed power, Hz, with a resolution of 1/400 of the sample rate.
+/// Frequency at which a record has the largest smoothed power, Hz, with a resolution of 1/400 of the sample rate, or of
+/// three lines if those are wider.
 pub fn dominant_frequency_hz(samples: &[f64], rate_hz: f64) -> f64 {
     let (smooth, width_hz) = smooth_power(samples, rate_hz);
     (strongest(&smooth) as f64 + 0.5) * width_hz

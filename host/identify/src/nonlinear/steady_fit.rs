@@ -27,7 +27,7 @@ pub struct Fit {
     pub covariance: DMatrix<f64>,
     /// χ² per degree of freedom: near 1 if the equation of motion explains the dwells within their noise.
     pub misfit: f64,
-    /// NRMSE of the fundamental of the predicted motion over all dwells.
+    /// NRMSE of the fundamental of the predicted motion over the dwells: see [`Data::relative_error`].
     pub relative_error: f64,
     /// True if the covariance of the parameters is the sandwich covariance, from the scatter between dwells.
     pub robust: bool,
@@ -39,7 +39,7 @@ pub struct Fit {
 pub struct Data<'a> {
     /// The equation of motion whose parameters are fitted.
     pub law: &'a Law,
-    /// Direction of the displacement that is each degree of freedom.
+    /// For each degree of freedom, the direction of the displacement that it is.
     pub directions: &'a [Direction],
     /// The dwells of steady motion; the Fourier series of every channel has as many harmonics as the grid.
     pub dwells: &'a [Dwell],
@@ -148,13 +148,15 @@ impl Data<'_> {
     }
 
     /// Fourier coefficients of the displacement that the equation of motion predicts near the measured motion of a
-    /// dwell, one degree of freedom after the other.
+    /// dwell, one degree of freedom after the other. `None` if a displacement is not measured, or if no periodic
+    /// solution is found there.
     pub fn predicted(&self, dwell: &Dwell, theta: &DVector<f64>) -> Option<DVector<f64>> {
         let start = self.displacement(dwell)?;
         Some(self.solve(dwell, theta, &start)?.x)
     }
 
-    /// NRMSE of the fundamental of the predicted motion over all dwells.
+    /// NRMSE of the fundamental of the predicted motion over all dwells whose displacements are measured; a missing
+    /// prediction counts as zero.
     pub fn relative_error(&self, theta: &DVector<f64>) -> f64 {
         let (mut left, mut all) = (0.0, 0.0);
         for dwell in self.dwells {

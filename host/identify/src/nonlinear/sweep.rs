@@ -67,7 +67,7 @@ impl Spectra {
     }
 
     /// Band of the sweep, Hz: from the upper end of the first to the lower end of the last interval of 2R + 1 lines
-    /// whose force power exceeds the share [`SWEPT_POWER_SHARE`] of the largest one.
+    /// whose force power exceeds the share [`SWEPT_POWER_SHARE`] of the largest one. `None` without force.
     fn band_hz(&self) -> Option<[f64; 2]> {
         let width = (2 * R + 1) as usize;
         let power: Vec<f64> = self
@@ -119,8 +119,8 @@ impl Spectra {
     }
 }
 
-/// Compares the receptances of two records with the same direction of force and the same motion; `None` if their common
-/// band has too few independent estimates.
+/// Compares the receptances of two records with the same direction of force and the same motion; `None` if one has no
+/// force, or if their common band has too few independent estimates.
 pub fn compare(a: &Spectra, b: &Spectra) -> Option<Comparison> {
     let (of_a, of_b) = (a.band_hz()?, b.band_hz()?);
     let (low, high) = (of_a[0].max(of_b[0]), of_a[1].min(of_b[1]));

@@ -58,7 +58,8 @@ impl OutputMap<'_> {
     /// respect to θ.
     ///
     /// The covariance comprises the noise of the motion, and the noise of force and frequency propagated through the
-    /// derivatives of the predicted motion. `None` if the harmonic balance or the covariance is singular.
+    /// derivatives of the predicted motion. `None` if the Jacobian of the harmonic balance is singular, or the
+    /// covariance is not positive definite.
     pub(crate) fn whitened(
         &self,
         dwell: &Dwell,

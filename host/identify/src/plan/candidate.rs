@@ -20,8 +20,8 @@ use quietcut_stability::{CubicTerms, Problem, Variable};
 /// parameter. A choice.
 const STEP: f64 = 0.05;
 
-/// Number of angles at which the cutting force is evaluated in each subinterval of the tooth-passing period with the
-/// same number of engaged teeth. A choice.
+/// Number of angles at which the cutting force is evaluated in each subinterval of the tooth-passing period in which
+/// the number of engaged teeth is constant and not zero. A choice.
 const PHASES: usize = 90;
 
 /// Largest number of spindle speeds at which candidate tests of a plan bracket the stability limit by trial cuts. A
@@ -32,7 +32,8 @@ const BRACKETS: usize = 40;
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(tag = "kind", rename_all = "kebab-case")]
 pub enum Test {
-    /// Hammer impacts at the tool tip at standstill, with the acceleration measured there in every direction.
+    /// Hammer impacts at the tool tip at standstill, with the acceleration measured there in every direction of the
+    /// structure.
     Hammer {
         /// Direction of the impact.
         direction: String,
@@ -78,7 +79,8 @@ pub(super) enum CandidateError {
     /// The nominal structure has no equation of motion.
     #[error("{0}")]
     Structure(#[from] StructureError),
-    /// The case is invalid after a change of an unknown parameter by one step of the central differences.
+    /// After a change of an unknown parameter by one step of the central differences the case is invalid, or a quantity
+    /// of it cannot be computed.
     #[error("a change of an unknown ({unknown}) by a twentieth of its standard deviation gives {what}")]
     Invalid {
         /// Name of the unknown.
@@ -136,8 +138,8 @@ fn cuts(index: usize, limit: &KnownLimit, means: &Means) -> Candidate {
     }
 }
 
-/// A quantity `of` the case after a change of each of `variables` by one step downwards and upwards; `names` are those
-/// of the unknowns.
+/// A quantity `of` the case after a change of each of `variables` by one step downwards and upwards, in the order of
+/// `variables`; `names` are their names.
 ///
 /// # Errors
 /// One of the changed cases is invalid, or has no such quantity.
@@ -167,7 +169,7 @@ fn shifted<'a, T, E: Display>(
         .collect()
 }
 
-/// Candidate hammer tests, one for each direction of the machine.
+/// Candidate hammer tests, one for each direction of the structure; none without a structure or an oscillating mode.
 ///
 /// An acceleration a = −ω²H(ω)F(ω), measured in white noise of one-sided density S, holds the Fisher information J_ij =
 /// 4/S ∫₀^∞ Re(∂_i a* ∂_j a) dω/2π per impact, with F the transform of a half-sine force.
@@ -296,7 +298,7 @@ fn half_sine(peak_n: f64, pulse_s: f64, hz: f64) -> f64 {
 }
 
 /// Candidate cut on a dynamometer at half the lowest stability limit of the chart: it is stable, so that the feed alone
-/// sets the chip thickness.
+/// sets the chip thickness. `None` if the chart has no limits.
 ///
 /// The force F measured over the time T in noise of one-sided density S holds the Fisher information J_ij = 2T/S · mean
 /// over the tooth-passing period of ∂_i F · ∂_j F.

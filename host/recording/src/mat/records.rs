@@ -1,9 +1,9 @@
-//! Records in the variables of a MAT-file: vectors beside each other, matrices with a rate, structures, and arrays of
-//! structures.
+//! Records in the variables of a MAT-file.
 //!
-//! The variables of the file are one record if vectors or matrices are among them. Otherwise each element of each
-//! structure with vectors is a record of its own: an array of impacts gives as many records. Two or more structures
-//! side by side that hold one signal each are channels of one record.
+//! Of the vectors and matrices of the file, those with the most samples are one record. If none has more than one
+//! sample, each element of each structure is read in the same way, as a record of its own: an array of impacts gives as
+//! many records. Two or more structures side by side that hold one signal each count as vectors: their signals are
+//! channels of one record.
 
 use super::value::{Item, Value, Variable};
 use crate::raw::{FoundUnit, Raw, RawColumn};
@@ -140,7 +140,7 @@ fn record(
 }
 
 /// Sample rate, samples per second, from a scalar variable whose name says that it is a sample rate or a sample
-/// interval.
+/// interval; `None` without such a variable with a positive finite value.
 fn rate(items: &[Item]) -> Option<f64> {
     let scalar = |names: &[&str]| {
         items.iter().find_map(|item| match &item.value {
@@ -186,7 +186,7 @@ fn units(items: &[Item]) -> Vec<(String, String)> {
 }
 
 /// If at least two of `structures` hold one channel each, removes these and returns their channels: one vector, and the
-/// text of its unit if there is one.
+/// text of its unit if there is one. Otherwise returns nothing.
 fn channels(structures: &mut Vec<(String, Vec<Vec<Item>>)>) -> Vec<(Variable, Option<String>)> {
     // If only one structure holds a single channel, it is left as a record of its own, with the names of its fields.
     let is_channel = |(_, elements): &(String, Vec<Vec<Item>>)| match elements.as_slice() {

@@ -62,13 +62,14 @@ pub(super) fn word(bytes: &[u8], big_endian: bool) -> u32 {
     }
 }
 
-/// Tag of a data element in a MAT-file: data type and length.
+/// Tag of a data element in a MAT-file.
 pub(super) struct Tag {
     /// Code of the data type of the element, for example 1 (miINT8) or 16 (miUTF8).
     pub(super) kind: u32,
     /// Length of the data, bytes.
     pub(super) length: u64,
-    /// Data of a small element, stored inside its tag instead of after it (up to four bytes).
+    /// Data of a small element (up to four bytes), stored inside its tag instead of after it; `None` for other
+    /// elements.
     inside: Option<[u8; 4]>,
 }
 
@@ -202,7 +203,7 @@ impl Source<'_> {
     }
 
     /// Lets `read` read the data of one element, limits it to that element, and skips the data that `read` leaves
-    /// unread.
+    /// unread and the padding.
     pub(super) fn within<T>(
         &mut self,
         tag: &Tag,

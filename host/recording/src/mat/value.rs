@@ -23,7 +23,7 @@ pub(super) enum Value {
 #[derive(Debug)]
 pub(super) struct Variable {
     pub(super) name: String,
-    /// Samples of each channel of the variable; all channels have the same length.
+    /// Samples of the variable, all channels equally long. Index: channel, then sample.
     pub(super) values: Vec<Vec<f64>>,
 }
 

@@ -1,8 +1,8 @@
 //! Reader of TDMS files of National Instruments: groups of channels with properties, in segments.
 //!
-//! Format: National Instruments, "TDMS File Format Internal Structure". Each group is a record. `wf_increment` states
-//! the sample interval, `unit_string` the unit. Raw data of DAQmx (unscaled, with a format of its own) is refused; one
-//! linear scale per channel is applied, any other scale is refused.
+//! Format: National Instruments, "TDMS File Format Internal Structure". Each group with numeric samples is a record.
+//! `wf_increment` states the sample interval, `unit_string` the unit. Raw data of DAQmx (unscaled, with a format of its
+//! own) is refused; one linear scale per channel is applied, any other scale is refused.
 //!
 //! Every size is checked against the length of the file before memory is taken.
 
@@ -15,7 +15,7 @@ use super::RecordingError;
 use super::raw::{FoundUnit, Raw, RawColumn};
 use segments::{Object, Property};
 
-/// Reads the groups of a TDMS file, each as a record of its own.
+/// Reads the groups of a TDMS file that have numeric samples, each as a record of its own.
 pub(super) fn read(path: &Path) -> Result<Vec<Raw>, RecordingError> {
     let data = crate::file::read(path)?;
     let wrong = |what: String| RecordingError::Content {
@@ -49,7 +49,8 @@ pub(super) fn read(path: &Path) -> Result<Vec<Raw>, RecordingError> {
         .collect()
 }
 
-/// Group and channel name in a TDMS path such as `/'group'/'channel'`; a quote in a name is doubled.
+/// Names in a TDMS path: group and channel of `/'group'/'channel'`, the group alone of `/'group'`. A quote in a name is
+/// doubled in the path.
 fn names(path: &str) -> Vec<String> {
     let mut names = Vec::new();
     let mut rest = path;
@@ -73,7 +74,8 @@ fn names(path: &str) -> Vec<String> {
     names
 }
 
-/// One record from the channels of a TDMS group.
+/// One record from the channels of a TDMS group; a note names each channel with fewer samples than the longest, which
+/// is not used.
 fn record(channels: Vec<Object>, label: Option<String>) -> Result<Raw, String> {
     let longest = channels
         .iter()

@@ -7,7 +7,7 @@ use super::bytes::{Bytes, size_of_kind};
 /// Length of the lead-in, the fixed first part of each segment of a TDMS file, bytes.
 const LEAD_IN: usize = 28;
 
-/// Bits of the table of contents in the lead-in of a TDMS segment: what the segment contains.
+/// Bits of the table of contents in the lead-in of a TDMS segment: what the segment contains, and in which form.
 const HAS_METADATA: u32 = 1 << 1;
 const HAS_NEW_OBJECTS: u32 = 1 << 2;
 const HAS_SAMPLES: u32 = 1 << 3;
@@ -18,7 +18,7 @@ const IS_DAQMX: u32 = 1 << 7;
 /// Type of a text.
 const TEXT: u32 = 0x20;
 
-/// An object of a TDMS file, that is a channel, a group or the root, with its properties and all its samples.
+/// An object of a TDMS file, that is a channel, a group or the root, with its properties and all its numeric samples.
 pub(super) struct Object {
     pub(super) path: String,
     pub(super) properties: BTreeMap<String, Property>,
@@ -66,8 +66,8 @@ pub(super) fn objects(data: &[u8]) -> Result<Vec<Object>, String> {
         let (next, samples) = (lead.u64()?, lead.u64()?);
         let start = at + LEAD_IN;
         let rest = (data.len() - start) as u64;
-        // A TDMS segment that was not closed has an offset of all ones to the next segment; it reaches to the end of
-        // the file.
+        // A TDMS segment that was not closed has an offset of all ones to the next segment; such a segment reaches to
+        // the end of the file.
         let end = start + usize::try_from(next.min(rest)).unwrap_or(0);
         let first = start + usize::try_from(samples.min(rest)).unwrap_or(0);
         if contents & HAS_METADATA != 0 {
@@ -98,7 +98,7 @@ pub(super) fn objects(data: &[u8]) -> Result<Vec<Object>, String> {
     Ok(objects)
 }
 
-/// Reads the metadata of a TDMS segment: for each object its properties and the layout of its samples.
+/// Reads the metadata of a TDMS segment: for each object its properties and, if it has samples, their layout.
 fn metadata(bytes: &mut Bytes<'_>, objects: &mut Vec<Object>, active: &mut Vec<usize>) -> Result<(), String> {
     let count = bytes.u32()?;
     for _ in 0..count {
@@ -180,8 +180,8 @@ fn metadata(bytes: &mut Bytes<'_>, objects: &mut Vec<Object>, active: &mut Vec<u
     Ok(())
 }
 
-/// Reads the samples of a TDMS segment chunk by chunk. In each chunk the values stand channel after channel, or
-/// interleaved.
+/// Reads the numeric samples of a TDMS segment chunk by chunk; an incomplete last chunk is left out. In each chunk the
+/// values stand channel after channel, or interleaved.
 fn read_samples(
     bytes: &mut Bytes<'_>,
     objects: &mut [Object],

@@ -9,7 +9,7 @@ use super::header::{Binary, Header};
 use super::number;
 use super::source::{Source, SourceError};
 
-/// Number of values of a UFF data set for which memory is reserved before they are read, at most. A choice; it bounds
+/// Largest number of values of a UFF data set for which memory is reserved before they are read. A choice; it bounds
 /// the cost of a false count in the header.
 const TRUSTED: usize = 1 << 16;
 
@@ -171,8 +171,8 @@ fn ends_here<R: BufRead>(source: &mut Source<R>, is_last: bool) -> Result<bool, 
     }
     Ok(match source.peek_filled(1)? {
         None => !is_last,
-        // The number of a UFF data set ends in column six; values rarely have a digit in this column, so it tells the
-        // two apart.
+        // The number of a UFF data set ends in column six. A value rarely has a digit in this column, so that the
+        // column tells a number of a data set from a value.
         Some(second) => {
             second.bytes.get(5).is_some_and(u8::is_ascii_digit) && second.number_of_set().is_some()
         }

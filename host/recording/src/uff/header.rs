@@ -51,7 +51,8 @@ impl Function {
 /// Degree of freedom of the response or the reference of a UFF function (record 6): node and direction.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct DegreeOfFreedom {
-    /// Name of the measured entity at this degree of freedom, up to ten characters; empty if there is none.
+    /// Name of the measured entity at this degree of freedom, ten characters at most by the standard; empty if there is
+    /// none.
     pub entity: String,
     /// Node number.
     pub node: i64,
@@ -238,7 +239,7 @@ fn parse_data_form([kind, count, spacing, first, step]: [&str; 5]) -> Result<Dat
     ))
 }
 
-/// Parses one of the records 8 to 11 of a UFF header, Fortran format `I10, 3I5, 2(1X,A20)`: quantity and unit of an
+/// Parses one of the records 8 to 10 of a UFF header, Fortran format `I10, 3I5, 2(1X,A20)`: quantity and unit of an
 /// axis.
 fn axis(record: &str) -> Result<Axis, String> {
     Ok(Axis {
@@ -294,7 +295,8 @@ impl Binary {
     }
 }
 
-/// Text in the columns `from .. from + length` of a UFF record, trimmed; empty if the record is shorter.
+/// Text in the columns `from .. from + length` of a UFF record, counted from 0, trimmed; empty if the record ends
+/// before them.
 fn field(record: &str, from: usize, length: usize) -> &str {
     let at = |index: usize| {
         record

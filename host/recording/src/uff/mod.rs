@@ -311,7 +311,8 @@ impl DataSet {
     }
 
     /// Name of the channel from the header of its data set: a standard name, such as `az` for an acceleration along ±z;
-    /// else the entity name, else the first line of text, else `channel`.
+    /// else the entity name; the first line of text if there is no entity name or it may be truncated; `channel` if
+    /// that line is empty.
     fn name(&self) -> String {
         let header = &self.header;
         let axis = match header.response.direction.abs() {

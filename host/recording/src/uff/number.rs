@@ -33,7 +33,8 @@ pub(super) fn append(line: &[u8], values: &mut Vec<f64>) -> Result<(), String> {
     }
 }
 
-/// Parses the number at the start of `text`, in Fortran notation. Returns its value and its length in bytes.
+/// Parses the number at the start of `text`, in Fortran notation. Returns its value and its length in bytes; `None` if
+/// there is no number, or other text directly after it.
 fn number(text: &[u8]) -> Option<(f64, usize)> {
     let (value, length) = fast_float2::parse_partial::<f64, _>(text).ok()?;
     let rest = &text[length..];

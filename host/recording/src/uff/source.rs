@@ -1,4 +1,4 @@
-//! Sequential reader of text lines and binary data from one UFF file; a long record is in memory only once.
+//! Sequential reader of text lines and binary data from one UFF file.
 
 use std::collections::VecDeque;
 use std::io::BufRead;
@@ -74,7 +74,7 @@ impl<R: BufRead> Source<R> {
         }
     }
 
-    /// Number of the last line that the reader returned, from 1.
+    /// Number of the last line that the reader returned, from 1; 0 before the first.
     pub(super) fn line(&self) -> u64 {
         self.ahead.front().map_or(self.line, |line| line.number - 1)
     }
@@ -87,7 +87,8 @@ impl<R: BufRead> Source<R> {
         }
     }
 
-    /// Looks ahead at the next non-blank line after `before` other non-blank lines, without consuming any line.
+    /// Looks ahead at the next non-blank line after `before` other non-blank lines, without consuming any line; `None`
+    /// if the file ends before it.
     pub(super) fn peek_filled(&mut self, before: usize) -> Result<Option<&Line>, SourceError> {
         let mut filled = self.ahead.iter().filter(|line| !line.is_blank()).count();
         while filled <= before {

@@ -30,9 +30,8 @@ struct ColumnsAnswer {
     excitation: &'static str,
     recordings: usize,
     averages: f64,
-    /// Smallest singular value of the force spectra over the frequencies that are not left out, with each force divided
-    /// by its root mean square at the frequency: 1 for uncorrelated forces or a single force, 0 for linearly dependent
-    /// forces.
+    /// Smallest singular value of the force spectra over the frequencies that are not left out: see
+    /// [`RecordingGroup::least_singular`].
     least_singular_value: f64,
     left_out_hz: Vec<f64>,
     #[serde(rename = "blows", skip_serializing_if = "Option::is_none")]
@@ -185,8 +184,8 @@ impl ColumnsAnswer {
 }
 
 impl ReceptanceAnswer {
-    /// Peak magnitude of one receptance with its 90 % interval from the random error of the estimate and from aliasing,
-    /// and the coherence at the peak and its median over all frequency lines.
+    /// Peak magnitude of entry `index` of `table` with the 90 % interval from the random error of the estimate and from
+    /// aliasing, the coherence at the peak, and the median of the coherence over all frequency lines.
     fn new(measurement: &Measurement, table: &FrfTable, index: usize) -> Self {
         let entry = &table.entries()[index];
         let size = |line: usize| entry.receptance[line].norm();
@@ -194,8 +193,8 @@ impl ReceptanceAnswer {
             .max_by(|&a, &b| size(a).total_cmp(&size(b)))
             .unwrap_or(0);
         // The standard deviation is known for the receptance before the tool-tip calibration, and is divided by this
-        // receptance. The calibration multiplies the contribution of each mode by one factor, so that the ratio also
-        // holds after it where one mode dominates, as at a peak.
+        // receptance. The calibration multiplies the contribution of each mode by one factor, so that the quotient also
+        // holds after the calibration where one mode dominates.
         let before = measurement.table.entries()[index].receptance[at].norm();
         let relative = if before > 0.0 {
             measurement.deviation[index][at] / before

@@ -26,23 +26,26 @@ pub(super) struct IdentifyOutput {
     /// Poles of the fitted receptance matrix that were rejected as structural modes, with the reason.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub(super) rejected: Vec<Rejected>,
-    /// Median over the identified frequency band of the coherence of each response.
+    /// By direction of the response: median of its coherence over the identified frequency band. A response without
+    /// coherence is missing.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub(super) coherence: BTreeMap<&'static str, f64>,
-    /// Measurement noise of each recorded channel, if the modes were fitted to the spectra of whole recordings.
+    /// Estimated noise of each force and response channel of each recording; empty unless the modes were fitted to the
+    /// spectra of whole recordings.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub(super) noise: Vec<ChannelNoise>,
     /// Identified parameters, grouped by direction or pair of directions; cutting coefficients have no direction.
     pub(super) models: Vec<Model>,
-    /// Root mean square of the residual of the identified model divided by the root mean square of the measured data.
+    /// Root mean square of the residual divided by that of the data; the method determines which data. `None` for a
+    /// method without a fit.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) fit_error: Option<f64>,
     /// Reduced χ² of the identified model: weighted sum of squared residuals divided by (number of residuals − number
-    /// of parameters).
+    /// of parameters). `None` for a method that does not compute it, and for receptances of unknown variance.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) misfit: Option<f64>,
     /// Number of steady sine responses (dwells) taken from the recordings; for `linearity` plus the windows of sines
-    /// with increasing force.
+    /// with increasing force. `None` for a method that uses no dwells.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) dwells: Option<usize>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -73,7 +76,7 @@ pub(super) struct IdentifyOutput {
     pub(super) estimates: Vec<Estimate>,
     #[serde(skip)]
     pub(super) directions: Vec<Direction>,
-    /// Sentences of the text output.
+    /// Lines of the text output after those of `models`.
     #[serde(skip)]
     pub(super) messages: Vec<String>,
 }
@@ -118,8 +121,8 @@ pub(super) struct ComplexFigure {
 pub(super) struct Linearity {
     /// Whether all linearity checks agree with a linear structure.
     pub(super) linear: bool,
-    /// Linearity checks of steady sine responses and of sines with increasing force, one entry for each direction of
-    /// the force that has enough force levels.
+    /// Linearity checks of steady sine responses and of sines with increasing force: one entry for each direction of
+    /// the force in which a frequency was measured at two levels.
     pub(super) tones: Vec<TonesLinearity>,
     /// Comparisons of two sine sweeps.
     pub(super) sweeps: Vec<SweepPair>,
@@ -139,7 +142,7 @@ pub(super) struct TonesLinearity {
     pub(super) jumps_n: Vec<f64>,
 }
 
-/// Comparison of two sine sweeps of the same direction and quantity.
+/// Comparison of two sine sweeps with the same direction of the force and the same quantity of the motion.
 #[derive(Debug, Serialize)]
 pub(super) struct SweepPair {
     pub(super) recordings: [PathBuf; 2],
@@ -186,8 +189,8 @@ pub(super) struct EstimatedJoint {
 /// Results of cutting tests besides the fitted force coefficients: coefficients from mean forces, and runout.
 #[derive(Debug, Serialize)]
 pub(super) struct Cutting {
-    /// Force coefficients from the regression of mean forces on the feed (Altintas); `null` if all feeds are equal, or
-    /// if mean forces do not determine the coefficients.
+    /// Force coefficients from the regression of mean forces on the feed (Altintas); `null` if `feeds` is 1, or if mean
+    /// forces do not determine the coefficients.
     pub(super) averaged: Option<BTreeMap<&'static str, Figure>>,
     /// Radial runout of each tooth relative to the mean of all teeth, µm.
     pub(super) runout_um: Vec<Figure>,
@@ -231,8 +234,8 @@ impl Coefficients {
 }
 
 impl Model {
-    /// Text that precedes each parameter in the text output: its direction or pair of directions; empty without a
-    /// direction.
+    /// Text before each parameter of the model in the text output: the direction, or the pair of directions; empty
+    /// without a direction.
     pub(super) fn label(&self) -> String {
         match (&self.direction, &self.directions) {
             (Some(direction), _) => format!("{direction} "),

@@ -1,4 +1,4 @@
-//! Comments of a case file that is written anew: the comments of sections and keys that the new case also has are kept.
+//! Comments of a case file that is written anew: [`kept`] states which of them stay.
 
 use toml_edit::{DocumentMut, Item, Table};
 
@@ -6,8 +6,8 @@ use toml_edit::{DocumentMut, Item, Table};
 /// the text that it replaces.
 ///
 /// Sections and keys that `after` lacks are removed with their comments; comments within arrays and within the tables
-/// of an array (`[[structure.mode]]`) are lost. The result is `after` itself if `before` has no comment, or if one of
-/// the texts is not TOML.
+/// of an array (`[[structure.mode]]`) are lost. The result is `after` itself if `before` has no `#`, if one of the
+/// texts is not TOML, or if the keys and values of the merged text would differ from those of `after`.
 pub(super) fn kept(before: &str, after: &str) -> String {
     let has_comment = before.lines().any(|line| line.contains('#'));
     let (Ok(mut case), Ok(values)) = (before.parse::<DocumentMut>(), after.parse::<DocumentMut>()) else {
@@ -27,7 +27,7 @@ pub(super) fn kept(before: &str, after: &str) -> String {
     }
 }
 
-/// Gives `table` the keys and values of `values`. The comments of keys that stay are kept, except within arrays.
+/// Gives `table` the keys and values of `values`. Comments of keys that stay are kept, with the exceptions in [`kept`].
 fn merge(table: &mut Table, values: &Table) {
     let gone: Vec<String> = table
         .iter()

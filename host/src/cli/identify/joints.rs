@@ -21,7 +21,7 @@ use crate::recording::{Recording, TestKind};
 use crate::structure::{Direction, Form, Robot, Structure};
 use quietcut_numerics::statistics::NINETY_PERCENT;
 
-/// Joint angles of one posture of the robot, with the recordings made there.
+/// Joint angles of one posture of the robot, from its first recording, with all recordings made there.
 struct AtPosture {
     joints_deg: Vec<f64>,
     recordings: Vec<Recording>,
@@ -85,7 +85,7 @@ fn postures(recordings: &[Recording]) -> Result<Vec<AtPosture>, Error> {
     Ok(postures)
 }
 
-/// Steady sine responses at every posture of the robot, with warnings, such as of recordings or dwells that are left
+/// For each of `postures`, in their order: the steady sine responses, and warnings, such as of dwells that are left
 /// out.
 fn dwells(args: &Args, postures: &[AtPosture], settling: Settling) -> Vec<(PostureDwells, Vec<String>)> {
     postures
@@ -115,7 +115,8 @@ fn has_levels(dwells: &[Dwell]) -> bool {
     })
 }
 
-/// Identifies stiffness, damping and cubic terms of robot joints from steady sine responses at several force levels.
+/// Identifies stiffness, damping and the cubic terms of `--terms` of robot joints from steady sine responses at several
+/// force levels.
 fn from_tones(
     args: &Args,
     start: &Robot,

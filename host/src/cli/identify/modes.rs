@@ -61,13 +61,15 @@ pub(super) fn modes(args: &Args, understood: &mut Vec<Understood>) -> Result<Ide
     })
 }
 
-/// Receptances from which the modes are identified, with their standard deviations (`None` if unknown) and coherence.
+/// Receptances from which the modes are identified, with their standard deviations by entry of the table and frequency
+/// line. The standard deviations are `None` for a table from a file, and if a hammer test has fewer than three single
+/// impacts.
 struct Source {
     table: FrfTable,
     deviation: Option<Vec<Vec<f64>>>,
     warnings: Vec<String>,
-    /// Spectra of the recorded forces and responses; `None` for a table of receptances, or if a recording is a hammer
-    /// or step-sine test.
+    /// Spectra of the recorded forces and responses, by recording; `None` for a table of receptances, or if a recording
+    /// is a hammer or step-sine test.
     records: Option<Vec<RecordSpectra>>,
 }
 
@@ -126,7 +128,7 @@ fn source(args: &Args, understood: &mut Vec<Understood>) -> Result<Source, Error
 /// reason why no table was read, and `None` for another file that does not have the head of a table of receptances.
 ///
 /// # Errors
-/// A file that is not UFF cannot be read, or has the head of a table of receptances but wrong content.
+/// A text file cannot be read, or has the head of a table of receptances but wrong content.
 fn table(path: &Path, import: &Import) -> Result<Result<ImportedTable, Option<FrfError>>, Error> {
     match crate::file::ending(path).as_str() {
         "uff" | "unv" | "bunv" => Ok(FrfTable::import(path, import).map_err(Some)),
@@ -135,8 +137,8 @@ fn table(path: &Path, import: &Import) -> Result<Result<ImportedTable, Option<Fr
     }
 }
 
-/// Median over a frequency band of the coherence of each response; the last receptance of the response in the table
-/// counts.
+/// Median over a frequency band of the coherence of each response, by direction of the response. The last receptance of
+/// a response in the table that has coherence in the band counts; a response without one is missing.
 fn coherence(table: &FrfTable, [from_hz, to_hz]: [f64; 2]) -> BTreeMap<&'static str, f64> {
     let mut medians = BTreeMap::new();
     for entry in table.entries() {
@@ -179,7 +181,8 @@ fn of_mode(model: &ModalModel, found: &IdentifiedMode) -> ComplexMode {
 }
 
 /// Warning about directions of forces or responses that the written case file does not contain, since a case needs
-/// directions that are both excited and measured; `None` if it contains all, or if no case file is written.
+/// directions that are both excited and measured. `None` if the case file contains all or none of the directions, or if
+/// no case file is written.
 fn not_in_case(args: &Args, model: &ModalModel) -> Option<String> {
     args.out.as_ref()?;
     let directions = model.directions();

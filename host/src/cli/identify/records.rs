@@ -10,8 +10,8 @@ use crate::identify::restoring_force::{ForceTerm, Options, Record, Slice, Surfac
 use crate::recording::{Quantity, Recording};
 use crate::structure::Direction;
 
-/// Identifies parameters by harmonic balance from the last `samples` samples of each multisine recording, which are one
-/// period of the multisine.
+/// Identifies parameters by harmonic balance from the last `samples` samples of each multisine recording, which are
+/// taken as one period of the multisine.
 pub(super) fn multisine(
     args: &Args,
     recordings: &[Recording],

@@ -24,7 +24,8 @@ pub(crate) struct AveragedLoop<'a> {
     /// Axial (z) column of β₀, the averaged coefficients of edge and feed forces, N/m; zero without axial-depth
     /// modulation.
     forced: Vector3<f64>,
-    /// Indices of the directions (0 feed, 1 normal, 2 axial) in which the tool moves and changes the chip thickness.
+    /// Indices of the directions (0 feed, 1 normal, 2 axial) in which the tool moves and changes the chip thickness,
+    /// ascending.
     axes: Vec<usize>,
 }
 
@@ -89,7 +90,8 @@ impl<'a> AveragedLoop<'a> {
         Complex64::ONE + (h.row(2) * self.forced.map(Complex64::from))[0]
     }
 
-    /// Loop matrix H̃ α₀ at a complex exponent s, with H̃ = (I + H β₀)⁻¹ H from the Sherman–Morrison formula.
+    /// Loop matrix H̃ α₀ at a complex exponent s, with H̃ = (I + H β₀)⁻¹ H from the Sherman–Morrison formula; `None` if
+    /// s is a pole of the modelled structure.
     fn matrix(&self, s: Complex64) -> Option<Matrix3<Complex64>> {
         let h = self.problem.transfer(s)?;
         let change = h * self.forced.map(Complex64::from) * h.row(2);

@@ -27,10 +27,11 @@ pub(crate) struct HarmonicLoop<'a> {
     passing: f64,
     /// Highest harmonic K.
     harmonics: usize,
-    /// Fourier coefficients of the directional coefficients α and β over a tooth period, of order −(2K + 1) to 2K + 1.
+    /// Fourier coefficients of the directional coefficients α and β over a tooth period, of order −(2K + 1) to 2K + 1
+    /// in ascending order.
     coefficients: Vec<Harmonic>,
     /// Indices of the directions (0 feed, 1 normal, 2 axial) in which the tool moves and thereby changes the chip
-    /// thickness or the axial depth.
+    /// thickness or the axial depth, ascending.
     axes: Vec<usize>,
 }
 
@@ -97,7 +98,8 @@ impl<'a> HarmonicLoop<'a> {
         2 * self.harmonics + 2
     }
 
-    /// Receptance matrices H at all frequencies s + ipΩ of the vibration, lowest first.
+    /// Receptance matrices H at all frequencies s + ipΩ of the vibration, lowest first; `None` if one of these is a
+    /// pole of the modelled structure.
     fn transfers(&self, s: Complex64) -> Option<Vec<Matrix3<Complex64>>> {
         (0..self.count())
             .map(|index| {
@@ -117,7 +119,7 @@ impl<'a> HarmonicLoop<'a> {
     }
 
     /// Block matrices H_p α_{p−q} and H_p β_{p−q} over all frequencies p and q of the vibration, both restricted to
-    /// `axes`.
+    /// `axes`; the second only with axial-depth modulation. `None` where [`transfers`](Self::transfers) is.
     fn matrices(&self, s: Complex64) -> Option<(DMatrix<Complex64>, Option<DMatrix<Complex64>>)> {
         let transfers = self.transfers(s)?;
         let (count, axes) = (self.count(), &self.axes);
@@ -148,7 +150,8 @@ impl<'a> HarmonicLoop<'a> {
         Some((cut, forced))
     }
 
-    /// Matrix (I + Hβ)⁻¹ Hα of the loop at s; its eigenvalues are the λ of [`OpenLoop`].
+    /// Matrix (I + Hβ)⁻¹ Hα of the loop at s; its eigenvalues are the λ of [`OpenLoop`]. `None` if H is infinite or I +
+    /// Hβ singular.
     fn matrix(&self, s: Complex64) -> Option<DMatrix<Complex64>> {
         let (cut, forced) = self.matrices(s)?;
         match forced {
@@ -171,7 +174,8 @@ impl<'a> HarmonicLoop<'a> {
         Ok(real.map(|value| value.re).collect())
     }
 
-    /// Frequency, Hz, of the harmonic with the largest displacement in the motion of a root s at a depth, m.
+    /// Frequency, Hz, of the harmonic with the largest displacement in the motion of a root s at a depth, m; `None` if
+    /// that motion cannot be computed.
     pub(crate) fn vibration_hz(&self, s: Complex64, depth_m: f64) -> Option<f64> {
         let kappa = self.regeneration(s) * depth_m;
         let (cut, forced) = self.matrices(s)?;
@@ -213,15 +217,16 @@ impl<'a> HarmonicLoop<'a> {
 }
 
 impl HarmonicLoop<'_> {
-    /// Frequency, Hz, of the harmonic with the largest displacement in the vibration at a limit.
+    /// Frequency, Hz, of the harmonic with the largest displacement in the vibration at a limit; `None` if that
+    /// vibration cannot be computed.
     pub(crate) fn chatter_hz(&self, limit: &AxisCrossing) -> Option<f64> {
         let s = Complex64::new(0.0, limit.omega);
         self.vibration_hz(s, limit.depth_m)
     }
 }
 
-/// Loop matrix at s = iΩ/2 transformed to real form, from complex harmonics to cosines and sines. There its entry for
-/// the frequencies (p, q) is the conjugate of that for (−p−1, −q−1).
+/// Loop matrix at s = iΩ/2 transformed to real form, from complex harmonics to cosines and sines. At this s the entry
+/// of the loop matrix for the frequencies (p, q) is the conjugate of that for (−p−1, −q−1).
 fn real_form(matrix: &DMatrix<Complex64>, count: usize, axes: usize) -> DMatrix<f64> {
     let mirrored = |index: usize| (count - 1 - index / axes) * axes + index % axes;
     let half = std::f64::consts::FRAC_1_SQRT_2;

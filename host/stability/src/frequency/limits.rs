@@ -25,7 +25,8 @@ pub(crate) struct AxisCrossing {
     pub(crate) outward: bool,
 }
 
-/// All crossings of the imaginary axis by roots of a loop up to an axial depth (m), by depth.
+/// All crossings of the imaginary axis, at ω ≥ 0 in the frequency range of the loop, by roots of the loop up to an
+/// axial depth (m), by depth.
 ///
 /// # Errors
 /// Receptances are infinite, a result is not finite, an eigenvalue iteration fails, or a crossing is not found in an
@@ -97,7 +98,8 @@ pub(crate) fn unstable_roots(open_loop: &impl OpenLoop, depth_m: f64, sigma: f64
     };
     let mut increase = argument_increase(&determinant, &grid)?;
     if open_loop.real_end().ok()?.is_none_or(|end| end.omega == 0.0) {
-        // Beyond the grid the loop gain is below one, so that the determinant goes straight to 1 and its argument to 0.
+        // Beyond the grid the loop gain is below one, so that the determinant goes to 1 and its argument to 0 without a
+        // further revolution.
         increase -= determinant(*grid.last()?)?.arg();
     }
     let half_turns = increase / PI;
@@ -121,8 +123,8 @@ fn error_m(limit: &AxisCrossing, others: &[Vec<AxisCrossing>]) -> Option<f64> {
     })
 }
 
-/// Stability at one spindle speed from the limits of a loop. `others` are the limits of the computations from whose
-/// difference the error is estimated; `chatter_hz` returns the vibration frequency at a limit.
+/// Stability at one spindle speed from the limits of a loop. `others` are the limits of the other computations from
+/// whose difference the error is estimated, one list each; `chatter_hz` returns the vibration frequency at a limit.
 ///
 /// # Errors
 /// The roots at depth 0 cannot be counted, or a vibration lies outside the measured frequencies.
@@ -159,7 +161,7 @@ pub(crate) fn speed_line(
 }
 
 /// Number of unstable roots of a loop at depth 0: edge and feed forces that depend on the axial vibration may cause
-/// some.
+/// some. `None` as by [`unstable_roots`].
 pub(crate) fn outside_at_no_depth(open_loop: &impl OpenLoop) -> Option<i32> {
     if open_loop.problem().process.axial_depth_modulation {
         unstable_roots(open_loop, 0.0, 0.0)

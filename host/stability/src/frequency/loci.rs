@@ -21,7 +21,7 @@ pub(crate) struct Sample {
 pub(crate) struct Crossing {
     /// Frequency, rad/s.
     pub(crate) omega: f64,
-    /// Value of the characteristic locus where it crosses the real axis.
+    /// Value of the characteristic locus where it crosses the real axis, 1/m.
     pub(crate) value: f64,
     /// True if the imaginary part of the locus rises with the frequency where it crosses the real axis.
     pub(crate) rises: bool,
@@ -33,8 +33,9 @@ pub(crate) trait Loci: Fn(f64) -> Result<Vec<Complex64>, Breakdown> {}
 impl<F: Fn(f64) -> Result<Vec<Complex64>, Breakdown>> Loci for F {}
 
 /// Samples characteristic loci on a frequency grid, so densely that every locus of at least `floor` is nearly straight
-/// between two samples and can be told from the others where that matters. Its middle deviates from the straight line
-/// by at most `bend` × [`LOCUS_BEND`] of its size. An interval is halved at most [`LOCUS_LEVELS`] times.
+/// between two samples and can be told from the others where that matters: its middle deviates from the straight line
+/// by at most `bend` × [`LOCUS_BEND`] of the larger of its values at both ends. An interval is halved at most
+/// [`LOCUS_LEVELS`] times, even if that does not suffice.
 ///
 /// # Errors
 /// Those of the function `loci`.
@@ -61,7 +62,7 @@ pub(crate) fn trace(loci: &impl Loci, grid: &[f64], floor: f64, bend: f64) -> Re
 }
 
 /// Adds frequency samples between two samples until every characteristic locus is straight and told apart from the
-/// others, or until the halvings are used up.
+/// others, or below half the floor, or until the halvings are used up.
 fn divide(
     sample: &impl Fn(f64) -> Result<Sample, Breakdown>,
     low: &Sample,
@@ -129,7 +130,8 @@ fn is_alone(sample: &Sample, index: usize, travel: f64) -> bool {
     others.all(|(_, other)| (other - value).norm() > travel || !is_near_axis(value) || !is_near_axis(*other))
 }
 
-/// Pairs the eigenvalues at two frequencies, nearest first. `None` if an eigenvalue of at least `floor` has no partner.
+/// Pairs the eigenvalues at two frequencies, nearest first, as indices in `a` and in `b`. `None` if an eigenvalue of at
+/// least `floor` has no partner.
 fn pairs(a: &Sample, b: &Sample, floor: f64) -> Option<Vec<(usize, usize)>> {
     let mut near: Vec<(f64, usize, usize)> = Vec::with_capacity(a.values.len() * b.values.len());
     for (i, p) in a.values.iter().enumerate() {
@@ -153,10 +155,9 @@ fn pairs(a: &Sample, b: &Sample, floor: f64) -> Option<Vec<(usize, usize)>> {
 /// Part of a characteristic locus between two frequency samples: frequency (rad/s) and value at both ends.
 pub(crate) type Step = [(f64, Complex64); 2];
 
-/// Steps between two frequency samples, one for each characteristic locus.
+/// Steps between two frequency samples, one for each characteristic locus with a value in both.
 fn steps_between(low: &Sample, high: &Sample) -> Vec<Step> {
-    // With an infinite floor no eigenvalue needs a partner, so that pairing cannot fail. Eigenvalues without a partner
-    // lie below every floor that callers use.
+    // With an infinite floor no eigenvalue needs a partner, so that pairing cannot fail.
     let pairs = pairs(low, high, f64::INFINITY).unwrap_or_default();
     pairs
         .into_iter()
@@ -173,7 +174,8 @@ pub(crate) fn steps(samples: &[Sample]) -> impl Iterator<Item = Step> {
 
 /// Solutions that `solve` finds on every step of every characteristic locus between neighbouring frequency samples.
 ///
-/// If `solve` fails on a step because two close loci were exchanged, the interval is halved and solved again.
+/// If `solve` gives `None` on a step, for example because two close loci were exchanged, the interval is halved and
+/// solved again.
 ///
 /// # Errors
 /// Those of the function `loci`, or `solve` still fails after 2 × [`LOCUS_LEVELS`] halvings.
@@ -214,7 +216,8 @@ fn solve_between<T>(
 }
 
 /// Crossings of the positive real axis by characteristic loci of at least `floor`, largest value first. The imaginary
-/// part at a crossing is at most 1e-12 of the size of the locus, or 1e-9 where rounding of the frequency forbids more.
+/// part at a crossing is at most 1e-12 of the larger |value| of the locus at both ends of the step, or 1e-9 where
+/// rounding of the frequency forbids more.
 ///
 /// # Errors
 /// As [`solve_steps`].
@@ -253,8 +256,8 @@ pub(crate) fn crossings(
     Ok(found)
 }
 
-/// Point of a characteristic locus with the residual of the equation that is solved along the locus; it vanishes at the
-/// solution.
+/// Point of a characteristic locus with the residual of the equation that is solved along the locus; the residual
+/// vanishes at the solution.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LocusPoint {
     pub(crate) omega: f64,

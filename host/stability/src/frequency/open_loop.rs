@@ -40,8 +40,8 @@ pub(crate) trait OpenLoop: Sync {
     /// H is infinite, a result is not finite, or the eigenvalue iteration fails.
     fn eigenvalues(&self, s: Complex64, floor: f64) -> Result<Vec<Complex64>, Breakdown>;
 
-    /// Determinant det(I − (κα − β)H): its zeros are the roots, its poles the poles of the structure. `None` if it is
-    /// not finite.
+    /// Determinant det(I − (κα − β)H): its zeros are the roots, its poles the poles of the structure. `None` if it or H
+    /// is not finite.
     fn determinant(&self, s: Complex64, kappa: Complex64) -> Option<Complex64>;
 
     /// End of the frequency range at which characteristic loci other than 0 are real; `None` if there is none.
@@ -102,7 +102,7 @@ pub(crate) fn around(resonances: &[Resonance], end: f64) -> Vec<f64> {
     ascending(grid)
 }
 
-/// Sorts a frequency grid and merges points that differ by rounding only.
+/// Sorts a frequency grid and merges points that differ by less than 1e-10 of the last.
 pub(crate) fn ascending(mut grid: Vec<f64>) -> Vec<f64> {
     grid.sort_by(f64::total_cmp);
     let end = grid.last().copied().unwrap_or(0.0);

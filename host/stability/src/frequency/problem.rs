@@ -166,7 +166,7 @@ impl FrequencyProblem {
         })
     }
 
-    /// Resonances: poles of a modelled structure, or peaks of a table of receptances.
+    /// Resonances: poles of a modelled structure with Im ≥ 0, or peaks of a table of receptances.
     pub(crate) fn resonances(&self) -> Vec<Resonance> {
         match &self.receptance {
             Receptance::Model(_, poles) => poles

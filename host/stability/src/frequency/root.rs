@@ -81,7 +81,7 @@ fn from_poles(open_loop: &impl OpenLoop, depth_m: f64) -> Option<Complex64> {
 }
 
 /// Rightmost of the loop's roots that are predicted from characteristic loci along a line Re s = `sigma`; `None` if
-/// there is none.
+/// there is none, or at depth 0.
 fn from_line(
     open_loop: &impl OpenLoop,
     depth_m: f64,
@@ -118,8 +118,8 @@ fn from_line(
     Ok(best)
 }
 
-/// True if the loop has no root to the right of the given one, that is with a larger real part. With a table of
-/// receptances: true if unstable roots exist only if the given one is unstable, and it is so only if they exist.
+/// True if counting shows that the loop has no root to the right of the given one, that is with a larger real part.
+/// With a table of receptances: true if it shows that unstable roots exist exactly when the given one is unstable.
 fn is_rightmost(open_loop: &impl OpenLoop, depth_m: f64, root: Complex64, decay: f64) -> bool {
     // The roots are counted to the right of a line Re s = const that lies slightly right of the given root.
     let sigma = root.re + 1e-3 * (root.re.abs() + 1e-3 * decay);
@@ -146,11 +146,12 @@ fn loci_at(open_loop: &impl OpenLoop, s: Complex64, floor: f64) -> Result<Vec<Co
     Ok(loci)
 }
 
-/// Root s of a loop near a guess, by secant steps on w − 1/λ with the axial depth w and the characteristic locus λ(s)
-/// for which the difference is smallest. `None` if the steps do not converge.
+/// Root s of a loop near a guess, by secant steps on w − 1/ℓ with the axial depth w and the characteristic locus ℓ(s) =
+/// κλ/w for which the difference is smallest. `None` if the steps do not converge, leave the neighbourhood of the
+/// guess, or end where the difference is not small.
 pub(crate) fn polish(open_loop: &impl OpenLoop, depth_m: f64, guess: Complex64) -> Option<Complex64> {
-    // Axial depth, m, that sets the floor of loci in place of depth 0, where the roots are poles and a locus is
-    // infinite.
+    // Least axial depth, m, that sets the floor of loci and the tolerance. At depth 0 the roots are poles, where a
+    // locus is infinite.
     const SHALLOW_M: f64 = 1e-3;
     let floor = 0.3 / depth_m.max(SHALLOW_M);
     let miss = |s: Complex64| {
@@ -195,8 +196,8 @@ pub(crate) fn polish(open_loop: &impl OpenLoop, depth_m: f64, guess: Complex64) 
 /// Dominant Floquet multiplier of a loop with averaged coefficients.
 ///
 /// With a table of receptances the stated error contains the change of the multiplier when every second line is
-/// omitted, infinite if no root is found then. Cubic interpolation through all lines errs by a sixteenth of that where
-/// lines are dense, and by no more elsewhere.
+/// omitted, infinite if no root is found then. Cubic interpolation through all lines errs by about a sixteenth of that
+/// change where lines are dense.
 ///
 /// # Errors
 /// The root cannot be found or verified, or lies outside the measured frequencies.

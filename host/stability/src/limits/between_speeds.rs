@@ -10,7 +10,7 @@
 //!   e_r e_l/(e_r + e_l)
 //!
 //! off the straight line, wherever in the gap it is; a parabola over equal gaps lies off by a quarter of that. If the
-//! stable intervals of two neighbouring speeds differ in number, the gap is halved down to the least width.
+//! stable intervals of two neighbouring speeds differ in number, the gap is halved, down to the width [`CHART_SPEED`].
 //!
 //! A region of stability or of chatter that lies within one gap changes no limit at either end. It is found from the
 //! largest Floquet multiplier (characteristic multiplier) |μ|: at each step in depth, the same extrapolations of ln|μ|
@@ -149,8 +149,8 @@ fn contains(intervals: &[[f64; 2]], depth_mm: f64) -> bool {
         .any(|[from, to]| (*from..=*to).contains(&depth_mm))
 }
 
-/// Spindle speeds at which a gap between two speeds of a chart is to be divided, rev/min; none if straight lines draw
-/// the limits in it and it is narrow enough for its lobes, or if its relative width is at most [`CHART_SPEED`].
+/// Spindle speeds at which the gap below the speed with index `right` is to be divided, rev/min, ascending; none if
+/// [`is_drawn`] holds and the gap is no wider than [`coarsest`], or if its relative width is at most [`CHART_SPEED`].
 fn speeds_within(lines: &[SpeedLine], right: usize, teeth: usize) -> Vec<f64> {
     let (left, right_line) = (&lines[right - 1], &lines[right]);
     let width = right_line.rpm / left.rpm - 1.0;
@@ -186,8 +186,8 @@ fn coarsest(left: &SpeedLine, right: &SpeedLine, teeth: usize) -> f64 {
     (1.0 / (LINES_OF_LOBE * vibrations(left).max(vibrations(right)))).min(CHART_GAP)
 }
 
-/// True if straight lines over the gap between two neighbouring speeds draw every stable depth interval, and if no sign
-/// shows of a region of stability or of chatter within the gap.
+/// True if straight lines over the gap below the speed with index `right` draw every stable depth interval, and if no
+/// sign shows of a region of stability or of chatter within the gap.
 fn is_drawn(lines: &[SpeedLine], right: usize) -> bool {
     let gap = Gap {
         before: right.checked_sub(2).map(|index| &lines[index]),
@@ -198,7 +198,8 @@ fn is_drawn(lines: &[SpeedLine], right: usize) -> bool {
     gap.is_straight() && !gap.may_hide_a_region() && !gap.may_hide_a_tongue()
 }
 
-/// Gap between two neighbouring speeds of a chart: the limits at both of them, and at the next speeds on either side.
+/// Gap between two neighbouring speeds of a chart: the limits at both of them, and at the next speeds on either side,
+/// `None` at the ends of the chart.
 struct Gap<'a> {
     before: Option<&'a SpeedLine>,
     left: &'a SpeedLine,
@@ -208,7 +209,8 @@ struct Gap<'a> {
 
 impl Gap<'_> {
     /// True if both speeds have the same number of stable depth intervals, and if the straight line over the gap
-    /// between the ends of each interval is right to [`CHART_DEPTH`] of the depth or to [`CHART_SPEED`] of the speed.
+    /// between the ends of each interval is right to [`CHART_DEPTH`] of the depth or to [`CHART_SPEED`] of the speed by
+    /// the estimated error. Without an estimate both ends must be equal.
     fn is_straight(&self) -> bool {
         let count = self.left.stable_mm.len();
         if self.right.stable_mm.len() != count {
@@ -232,7 +234,7 @@ impl Gap<'_> {
 
     /// Prediction errors of linear extrapolation at both ends of the gap: (right end, left end). Each is the value of a
     /// limit, or of ln|μ|, at that end less the value of the straight line through the other end and the next speed
-    /// beyond that other end.
+    /// beyond that other end; `None` without a value at that next speed.
     fn misses(&self, before: Option<f64>, left: f64, right: f64, after: Option<f64>) -> [Option<f64>; 2] {
         let width = self.right.rpm - self.left.rpm;
         let at_right = self.before.zip(before).map(|(line, value)| {
@@ -275,7 +277,7 @@ impl Gap<'_> {
 
 impl Gap<'_> {
     /// True if a tongue of instability may lie between two speeds: their gap is wider than [`TONGUE_GAP`], and at one
-    /// of them the largest |μ| has a maximum over the depth closely below 1.
+    /// of them or both [`shows_a_tongue`] holds.
     fn may_hide_a_tongue(&self) -> bool {
         self.right.rpm > self.left.rpm * (1.0 + TONGUE_GAP)
             && [self.left, self.right]
@@ -314,8 +316,9 @@ fn kink_between(misses: [Option<f64>; 2]) -> Option<f64> {
     }
 }
 
-/// Distance by which ln|μ| comes closer to the unit circle within a step in depth beside a sample than at both ends of
-/// the step: that of the parabola through three samples, (second difference)/8, or 0 if it bends away.
+/// Distance by which the parabola of ln|μ| through a sample and both its neighbours in depth lies closer to 0 at the
+/// middle of a step than the chord over the step: (second difference)/8. It is 0 if the parabola bends away from 0 or a
+/// sample is missing.
 fn bend(largest: &[f64], step: usize, side: f64) -> f64 {
     let at = |index: usize| largest.get(index).map(|size| side * logarithm(*size));
     let three = step

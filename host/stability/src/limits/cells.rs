@@ -1,9 +1,9 @@
 //! Cells at one speed: the dominant Floquet multiplier (characteristic multiplier) at many depths from samples at few.
 //!
-//! All multipliers are computed at a few depths only. Between two of these depths each multiplier that may be dominant
-//! is interpolated by a cubic in depth through both ends with their derivatives. One or two Newton steps on the
-//! characteristic matrix at the middle cell give the error of the cubic there. If the error is too large, or if
-//! multipliers cannot be told apart, the depth interval is halved, down to single cells.
+//! All multipliers that may be dominant are first computed at a few depths. Between two of these depths each multiplier
+//! that may be dominant is interpolated by a cubic in depth through both ends with their derivatives. One or two Newton
+//! steps on the characteristic matrix at the middle cell give the error of the cubic there. If the error is too large,
+//! or if a multiplier cannot be followed, the depth interval is halved, down to single cells.
 
 use num_complex::Complex64;
 
@@ -82,7 +82,7 @@ struct Sample {
 }
 
 impl Sample {
-    /// Absolute value of the largest Floquet multiplier at this depth.
+    /// Absolute value of the largest of `roots`; 0 without roots.
     fn largest(&self) -> f64 {
         let sizes = self.roots.iter().flatten().map(|root| root.multiplier.norm());
         sizes.fold(0.0, f64::max)
@@ -111,7 +111,7 @@ impl Curve {
     }
 
     /// Sets the quartic from the error of the cubic interpolant at the fraction `share` of the depth interval; returns
-    /// the error of the cubic at the middle of the interval.
+    /// the absolute value of the quartic at the middle of the interval.
     fn correct(&mut self, share: f64, error: Complex64) -> f64 {
         let product = share * (1.0 - share);
         self.correction = error / (product * product);
@@ -128,7 +128,8 @@ struct Column<S> {
 }
 
 impl<S: Spectrum> Column<S> {
-    /// Computes all Floquet multipliers at the depth of a cell, and stores the largest in the cell.
+    /// Computes all Floquet multipliers that may be dominant at the depth of a cell, and stores the largest |μ| and the
+    /// largest error in the cell.
     fn sample(&mut self, index: usize) -> Result<Sample, StabilityError> {
         let depth_m = self.depths_m[index];
         let all = self
@@ -212,8 +213,9 @@ impl<S: Spectrum> Column<S> {
             roots: Some(roots),
         };
         self.cells[index] = Cell::exact(middle.largest());
-        // Stated error of interpolated cells: twice the error of the cubic in depth, although the quartic corrects it.
-        // Far outside the unit circle, where depth intervals are wide, four times the error of the cubic.
+        // Error of interpolated cells, to which `fill` adds [`LEAST_ERROR`]: twice the largest error of the cubics in
+        // depth, although the quartics correct it; far outside the unit circle, where depth intervals are wide, four
+        // times.
         let error = if least > CELL_FAR {
             4.0 * worst
         } else {
@@ -226,7 +228,8 @@ impl<S: Spectrum> Column<S> {
         }
     }
 
-    /// Floquet multiplier near a guess, from one Newton step, or two if the first is 1e-5 of the guess or longer.
+    /// Floquet multiplier near a guess, from one Newton step, or two if the first is 1e-5 of the guess or longer;
+    /// `None` if one of them fails.
     fn polished(&mut self, guess: Complex64, depth_m: f64) -> Option<Root> {
         let root = self.spectrum.root_near(guess, depth_m)?;
         // After a relative Newton step below 1e-5 the remaining relative error is about its square: 1e-10.
@@ -236,8 +239,8 @@ impl<S: Spectrum> Column<S> {
         self.spectrum.root_near(root.multiplier, depth_m)
     }
 
-    /// Fills the cells between two sampled depths from interpolants of the multipliers with a given error; `None` if a
-    /// cell is undecided and its multiplier cannot be computed directly.
+    /// Fills the cells between two sampled depths from interpolants of the multipliers with a given error; `None` if
+    /// there is no interpolant, or if a cell is undecided and its multiplier cannot be computed directly.
     fn fill(&mut self, low: &Sample, high: &Sample, curves: &[Curve], error: f64) -> Option<()> {
         for index in low.index + 1..high.index {
             if index == middle_of(low, high) {
@@ -265,11 +268,11 @@ impl<S: Spectrum> Column<S> {
 enum Followed {
     /// All multipliers were followed between the two depths, and the cells there are filled.
     Filled,
-    /// The interpolants of the multipliers err too much, or an undecided cell could not be computed directly; the
-    /// multipliers at the middle cell are known.
+    /// The interpolants of the multipliers err too much, or `fill` failed; the multipliers at the middle cell are
+    /// known.
     Bent(Sample),
-    /// Multipliers at the two depths could not be paired, Newton's method failed at the middle cell, or two
-    /// interpolants led to one multiplier.
+    /// There are no interpolants (see [`curves`]), Newton's method failed at the middle cell, or two interpolants led
+    /// to one multiplier.
     Lost,
 }
 
@@ -286,7 +289,7 @@ fn middle_of(low: &Sample, high: &Sample) -> usize {
 }
 
 /// Interpolants of all multipliers that may be dominant between two sampled depths; `None` if a multiplier without a
-/// partner may be dominant, or if one lacks a derivative.
+/// partner may be dominant, or if a sample has no roots.
 fn curves(low: &Sample, high: &Sample) -> Option<Vec<Curve>> {
     let step_m = high.depth_m - low.depth_m;
     let mut free = high.roots.clone()?;

@@ -2,12 +2,12 @@
 //!
 //! Two refinements in speed exist, since a lobe table and a drawn chart need different speeds. [`Chart::refined`]
 //! serves lobe tables: the device interpolates between the stored speeds, so that each gap is tested at its middle,
-//! against one tolerance in depth, until all gaps pass or the table has its size. [`Chart::with_lines_between`] serves
-//! charts that are drawn: its tolerance is relative to the limit, a steep limit may be off in speed instead, and
-//! regions within a gap must be found although no limit at its ends shows them. It predicts the errors from
-//! neighbouring gaps and from |μ| at every speed, so that a straight gap costs no further speed. For a table, a
-//! tolerance relative to the limit would let the smallest limit set the number of speeds; a chart tested only at the
-//! middles of gaps would miss regions within a gap.
+//! against one tolerance in depth, until all gaps pass or are too narrow, or the table has its size.
+//! [`Chart::with_lines_between`] serves charts that are drawn: its tolerance is relative to the limit, a steep limit
+//! may be off in speed instead, and regions within a gap must be found although no limit at its ends shows them. The
+//! errors are predicted from neighbouring gaps and from |μ| at every speed, so that a straight gap costs no further
+//! speed. For a table, a tolerance relative to the limit would let the smallest limit set the number of speeds; a chart
+//! tested only at the middles of gaps would miss regions within a gap.
 
 use rayon::prelude::*;
 use serde::Serialize;
@@ -26,14 +26,14 @@ pub struct Chart {
     /// Label of the method that computed the stability chart.
     #[serde(flatten)]
     pub label: Label,
-    /// Limits at each spindle speed of the chart, in the requested order.
+    /// Limits at the requested spindle speeds, in the requested order, and at those that [`Chart::refined`] has
+    /// inserted.
     pub speeds: Vec<SpeedLine>,
-    /// Limits at spindle speeds between the requested ones, ascending, so that straight lines between neighbouring
-    /// speeds draw the limits; empty if not requested or not needed.
+    /// Limits at spindle speeds between the requested ones, ascending, added by [`Chart::with_lines_between`]; empty if
+    /// it added none or was not called.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub refined: Vec<SpeedLine>,
-    /// Accuracy of the limits between the speeds of the chart; `None` if no speeds between the requested ones were
-    /// asked for.
+    /// Accuracy of the limits between the speeds of the chart; `None` without a call of [`Chart::with_lines_between`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub resolution: Option<Resolution>,
     /// Depths of cells, mm, at which the share of stable machines among those drawn is stated for every requested
@@ -70,8 +70,8 @@ pub struct Refinement {
     /// Largest difference between a limit at the middle of a gap between two speeds and the straight line between the
     /// limits at both, as a share of the largest depth, up to which the halves of the gap are not divided.
     pub tolerance: f64,
-    /// Least distance of an added speed from its neighbours in the chart, relative to the speed: a gap no wider than
-    /// twice this gets no further speed.
+    /// Least distance of an added speed from its neighbours in the chart, relative to the lower one: a gap no wider
+    /// than twice this gets no further speed.
     pub least_step: f64,
     /// Number of speeds of the chart from which no further round of refinement begins.
     pub most_speeds: usize,

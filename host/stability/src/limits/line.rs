@@ -108,11 +108,11 @@ impl<S: Spectrum> Scan<S> {
         }
     }
 
-    /// Error of the depth of a crossing, m: a distance at which |μ| of its branch differs from 1 by at least the error
-    /// of the multiplier, on both sides in depth.
+    /// Error of the depth of a crossing, m: a distance in depth at which the multiplier that crosses is inside the unit
+    /// circle on one side and outside on the other, by at least its own error; a side below depth 0 is not tested.
     ///
-    /// The first try is slightly more than that error divided by d|μ|/dw; the distance doubles until |μ| confirms it.
-    /// `deepest_m` if no smaller distance does.
+    /// The first try is slightly more than the error of the multiplier divided by d|μ|/dw; the distance doubles until
+    /// |μ| confirms it. `deepest_m` if no smaller distance does.
     ///
     /// # Errors
     /// The error of the multiplier, or its derivative over the depth, cannot be computed.

@@ -15,7 +15,7 @@ pub trait Method: Sync {
     /// Name in results and captions.
     fn name(&self) -> &'static str;
 
-    /// Effects that the method neglects, as text after "blind to"; `None` if it covers all of linear stability.
+    /// Effects that the method neglects, as text after "blind to"; `None` if the method covers all of linear stability.
     fn blind_to(&self) -> Option<&'static str> {
         None
     }
@@ -40,8 +40,8 @@ pub trait Method: Sync {
     /// of the orbit has. Effects that the method neglects are not included.
     ///
     /// # Errors
-    /// Speed not positive, depth negative, or a computation that breaks down, for example because it leaves the range
-    /// of numbers or of measured frequencies.
+    /// Speed not positive, depth negative, one of them not finite, or a computation that breaks down, for example
+    /// because it leaves the range of numbers or of measured frequencies.
     fn point(&self, rpm: f64, depth_mm: f64) -> Result<CutStability, StabilityError>;
 
     /// All crossings of the unit circle by Floquet multipliers at a spindle speed (rev/min), from axial depth 0 to

@@ -5,7 +5,7 @@ use quietcut_numerics::statistics::{sample_quantile, student_ninety_percent};
 use super::speed_line::SpeedLine;
 use crate::criteria::PERCENTILE_SETTLED;
 
-/// First stability limits of all drawn machines, in all and by batch.
+/// First stability limits of all drawn machines that are valid: together, and by batch in the order of drawing.
 pub(super) struct Limits {
     pub(super) all: Sorted,
     pub(super) by_batch: Vec<Sorted>,
@@ -30,7 +30,7 @@ impl Limits {
     }
 
     /// Half the width of the 90 % confidence interval of a percentile of the limiting depth, relative to the
-    /// percentile; an end beyond the last depth counts as the last depth.
+    /// percentile; an end or a percentile beyond the last depth counts as the last depth.
     pub(super) fn relative_width(&self, share: f64, depth_mm: f64) -> f64 {
         let [low, high] = self.interval(share).map(|end| end.unwrap_or(depth_mm));
         let percentile_mm = self.all.quantile(share).unwrap_or(depth_mm);

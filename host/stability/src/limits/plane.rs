@@ -34,10 +34,11 @@ pub struct Linearized {
 pub struct Plane {
     /// Axial depth of the crossing on the nominal machine, mm.
     pub depth_mm: f64,
-    /// Gradient of the depth of the crossing over the uncertain variables, mm per standard deviation.
+    /// Gradient of the depth of the crossing, mm per standard deviation, with one entry per uncertain variable in their
+    /// order.
     pub gradient: DVector<f64>,
     /// Chatter frequency, Hz, with its gradient, Hz per standard deviation; `None` at a flip, whose frequency follows
-    /// from the spindle speed alone.
+    /// from the spindle speed alone, or if no variable changes the angle of the multiplier.
     pub chatter_hz: Option<(f64, DVector<f64>)>,
 }
 

@@ -74,8 +74,8 @@ fn as_pair<S: serde::Serializer>(value: &Complex64, serializer: S) -> Result<S::
 /// Dominant multiplier of a cut at a spindle speed (rev/min) and an axial depth (mm).
 ///
 /// # Errors
-/// Speed not positive, depth negative, too many vibrations in a tooth period, or a computation that breaks down, for
-/// example because it leaves the range of numbers.
+/// Speed not positive, depth negative, one of them not finite, too many vibrations in a tooth period, or a computation
+/// that breaks down, for example because it leaves the range of numbers.
 pub fn point(problem: &Problem, rpm: f64, depth_mm: f64) -> Result<CutStability, StabilityError> {
     check_speed(rpm)?;
     check_depth(depth_mm)?;
@@ -153,8 +153,8 @@ impl ScannedMultipliers {
     }
 }
 
-/// Dominant Floquet multiplier of a cut on the working and a finer mesh by Newton's method; `None` if it does not
-/// converge.
+/// Dominant Floquet multiplier of a cut on the working and a finer mesh by Newton's method; `None` if [`dominant_of`]
+/// fails on one of them.
 fn confirmed(problem: &Problem, rpm: f64, depth_m: f64, rough: &ScannedMultipliers) -> Option<Solution> {
     let dominant = |resolution, guesses: &[Complex64]| {
         let period = Period::new(problem, rpm, rough.kappa_m, resolution);
@@ -172,7 +172,8 @@ fn confirmed(problem: &Problem, rpm: f64, depth_m: f64, rough: &ScannedMultiplie
 }
 
 /// Dominant Floquet multiplier of a cut from the period maps on the working and a finer mesh, for multipliers too small
-/// for Newton's method, and if all else fails.
+/// for Newton's method, and if all else fails; `None` if one of the maps fails or its largest multipliers are not
+/// certain.
 fn of_maps(problem: &Problem, rpm: f64, depth_m: f64, rough: &ScannedMultipliers) -> Option<Solution> {
     let kappa_m = rough.kappa_m.min(KAPPA_MAX * depth_m);
     let largest = |resolution, share| {
@@ -196,8 +197,9 @@ fn of_maps(problem: &Problem, rpm: f64, depth_m: f64, rough: &ScannedMultipliers
     })
 }
 
-/// Dominant Floquet multiplier of a cut if period maps are not reliable: the largest one found. Its error reaches to a
-/// radius beyond which a winding number counts no multiplier. `None` if there is no such radius.
+/// Dominant Floquet multiplier of a cut if period maps are not reliable: the largest one found. Its error reaches at
+/// least to a radius beyond which a winding number counts no multiplier. `None` if there is no such radius, if no
+/// candidate lies within it, or if the multiplier is lost on the finer mesh.
 fn searched(problem: &Problem, rpm: f64, depth_m: f64, candidates: &[Complex64]) -> Option<Solution> {
     let kappa_m = (1.0 + WOUND.recip()) * depth_m;
     let working = Period::new(problem, rpm, kappa_m, Resolution::WORKING);
@@ -230,8 +232,8 @@ fn searched(problem: &Problem, rpm: f64, depth_m: f64, candidates: &[Complex64])
     })
 }
 
-/// Largest of the Floquet multipliers to which Newton's method converges from the guesses; `None` if it fails from one
-/// of them, or moves by more than 5 % of it.
+/// Largest of the Floquet multipliers to which Newton's method converges from the guesses; `None` if there is no guess,
+/// or if the method fails from one or moves by more than 5 % of it.
 fn dominant_of(period: &Period, kappa_m: f64, depth_m: f64, guesses: &[Complex64]) -> Option<Complex64> {
     let characteristic = Characteristic::new(period, kappa_m);
     let mut work = characteristic.workspace();

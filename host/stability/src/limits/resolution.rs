@@ -5,11 +5,11 @@ use serde::Serialize;
 /// Accuracy of stability limits between the speeds of a chart, and where it is not reached.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Resolution {
-    /// Largest estimated error in depth of a limit on the straight line between two neighbouring speeds of the chart,
-    /// relative to the depth of the limit; outside the gaps `unresolved_rpm`.
+    /// Bound of the estimated error in depth of a limit on the straight line between two neighbouring speeds of the
+    /// chart, relative to the depth of the limit; outside the gaps `unresolved_rpm`.
     pub depth_share: f64,
-    /// Largest estimated error in spindle speed, relative to the speed, of a limit that is too steep over the speed for
-    /// the error in depth; outside the gaps `unresolved_rpm`.
+    /// Bound of the estimated error in spindle speed, relative to the speed, of a limit that is too steep over the
+    /// speed for `depth_share`; outside the gaps `unresolved_rpm`.
     pub speed_share: f64,
     /// Width of the narrowest region of stability or of chatter in the chart that ends within the chart on both sides,
     /// rev/min; `None` if there is no such region.

@@ -95,8 +95,7 @@ fn mirrored(parameter: Parameter) -> Option<Parameter> {
     }
 }
 
-/// Orthonormal basis of the uncertain variables whose first vectors span the directions of largest influence on the
-/// limits.
+/// Orthonormal basis of the uncertain variables whose first vectors span given leading directions.
 #[derive(Clone, Debug)]
 pub struct Basis {
     vectors: Vec<DVector<f64>>,
@@ -104,7 +103,8 @@ pub struct Basis {
 
 impl Basis {
     /// Orthonormal basis that starts with the directions of the vectors `leading`, the most important first. Vectors
-    /// that vanish or depend on earlier ones are skipped; unit vectors complete the basis.
+    /// that vanish, or depend on earlier ones to a thousandth of their length, are skipped; unit vectors complete the
+    /// basis.
     pub fn new(size: usize, leading: &[DVector<f64>]) -> Self {
         let unit = |index: usize| DVector::from_fn(size, |i, _| if i == index { 1.0 } else { 0.0 });
         let mut vectors: Vec<DVector<f64>> = Vec::with_capacity(size);

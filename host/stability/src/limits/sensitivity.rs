@@ -1,5 +1,4 @@
-//! Exact derivatives of a limit with respect to all parameters of the delay problem, from one Floquet mode and its
-//! adjoint.
+//! Derivatives of a limit with respect to parameters of the delay problem, from one Floquet mode and its adjoint.
 //!
 //! At a crossing of the unit circle by a Floquet multiplier, F = lᵀ(Φ(κ; p) − μ)r = 0 with the transition matrix Φ over
 //! the tooth period, its left and right eigenvectors l and r, the complex depth κ = w (1 − 1/μ), and μ = e^{iθ}. Along
@@ -24,10 +23,10 @@ use quietcut_model::structure::{FirstOrder, ModalPart};
 /// Derivative of the linear delay problem along one parameter, per unit of the parameter.
 #[derive(Clone, Debug)]
 pub struct Tangent {
-    /// Derivative of the structure's matrices A, B and C, in feed, normal and axial direction.
+    /// Derivative of the structure's matrices A, B and C, in feed, normal and axial direction; `None` stands for zero.
     structure: Option<FirstOrder>,
-    /// Derivative of a tooth's force direction (`cutting`), chip normal (`normal`) and edge force (`edge`); `None` if
-    /// they do not depend on the parameter.
+    /// Derivative of a tooth's force direction (`cutting`), chip normal (`normal`) and edge force (`edge`); `None`
+    /// stands for zero.
     force: Option<ToothForce>,
     feed_per_tooth_m: f64,
     start: f64,
@@ -142,8 +141,8 @@ impl<'a> Sensitivity<'a> {
     /// Prepares the derivatives of one of the stability switches found by [`line`](crate::line()).
     ///
     /// # Errors
-    /// The switch is a fold, has no chatter frequency, or does not belong to this problem: there is no Floquet mode for
-    /// it.
+    /// The switch is a fold, or a Hopf switch without a chatter frequency, or its Floquet mode cannot be computed. A
+    /// switch of another problem is not detected.
     pub fn new(problem: &'a Problem, rpm: f64, switch: &Switch) -> Result<Self, StabilityError> {
         let broke_down = StabilityError::BrokeDown {
             rpm,

@@ -11,7 +11,8 @@ pub struct Switch {
     /// Axial depth, mm.
     pub depth_mm: f64,
     /// Error estimate of the depth, mm: a distance in depth at which |μ| differs from 1 by at least the error of the
-    /// multiplier, or the change of the depth between two computations. `None` if the method has no estimate.
+    /// multiplier, or the change of the depth between two computations; the last depth if it cannot be computed. `None`
+    /// if the method has no estimate.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error_mm: Option<f64>,
     /// Kind of crossing.
@@ -34,7 +35,7 @@ pub struct Limit {
     pub error_mm: Option<f64>,
     /// Kind of stability loss.
     pub kind: StabilityLoss,
-    /// Chatter frequency, Hz.
+    /// Chatter frequency, Hz; `None` if there is none or if it cannot be computed.
     pub chatter_hz: Option<f64>,
 }
 
@@ -53,8 +54,8 @@ pub struct SpeedLine {
     /// them.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub bistable_mm: Vec<[f64; 2]>,
-    /// Limit at which stability is first lost at this spindle speed; `None` if no stable interval ends before the last
-    /// depth.
+    /// Limit at which stability is first lost at this spindle speed; `None` if it is never lost up to the last depth,
+    /// or on a branch of forced orbits that begins unstable.
     pub first_limit: Option<Limit>,
     /// Every crossing of the unit circle by a multiplier, including those while another multiplier is outside: by
     /// depth, or, for a branch of forced orbits, in the order of the branch.
@@ -126,7 +127,7 @@ impl From<&Switch> for Limit {
     }
 }
 
-/// Union of depth intervals: overlapping ones are joined, in ascending order.
+/// Union of depth intervals: those that overlap or touch are joined; in ascending order.
 pub(crate) fn union(mut intervals: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
     intervals.sort_by(|a, b| a[0].total_cmp(&b[0]));
     let mut joined: Vec<[f64; 2]> = Vec::with_capacity(intervals.len());

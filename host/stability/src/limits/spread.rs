@@ -2,17 +2,19 @@
 
 use serde::Serialize;
 
-/// The 5, 50 and 95 % percentiles of the first stability limit over all drawn machines, mm; `None` beyond the last
-/// depth.
+/// The 5, 50 and 95 % percentiles of the first stability limit over the drawn machines that are physical, mm; `None`
+/// beyond the last depth.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Percentiles {
-    /// The 5 % percentile of the first limit, mm: nineteen machines of twenty are stable up to this depth.
+    /// The 5 % percentile of the first limit, mm: nineteen machines of twenty are stable up to this depth; `None`
+    /// beyond the last depth.
     #[serde(rename = "5")]
     pub low: Option<f64>,
     /// The median.
     #[serde(rename = "50")]
     pub median: Option<f64>,
-    /// The 95 % percentile of the first limit, mm: one machine of twenty is stable up to this depth.
+    /// The 95 % percentile of the first limit, mm: one machine of twenty is stable up to this depth; `None` beyond the
+    /// last depth.
     #[serde(rename = "95")]
     pub high: Option<f64>,
 }

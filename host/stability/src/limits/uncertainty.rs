@@ -50,7 +50,8 @@ pub struct Uncertainty<'a> {
     case: &'a Case,
     method_of: &'a MethodOfCase<'a>,
     variables: Vec<Variable>,
-    /// Derivatives of the limits along the uncertain variables, which give the directions of stratification.
+    /// Delay problem with its derivatives along the uncertain variables, for the directions of stratification; `None`
+    /// if it cannot be built.
     linear: Option<Linearized>,
     seed: u64,
 }
@@ -109,8 +110,8 @@ impl<'a> Uncertainty<'a> {
         })
     }
 
-    /// Percentile of the first limit at one spindle speed: the depth below which the given share of all drawn machines
-    /// loses stability.
+    /// Percentile of the first limit at one spindle speed: the depth below which the given share of the drawn machines
+    /// that are physical loses stability.
     ///
     /// # Errors
     /// As [`spread`](Self::spread).

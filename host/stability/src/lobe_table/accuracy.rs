@@ -35,7 +35,7 @@ pub(super) struct Disagreement {
 
 impl Disagreement {
     /// Disagreement between the stable depths of the method (`truth`) and of the table, up to `depth_mm`; depth 0
-    /// counts as a limit if the method finds nothing stable.
+    /// counts as a limit if the method finds nothing stable. A distance is infinite if the method has no limit.
     pub(super) fn between(truth: &[[f64; 2]], tabulated: &[[f64; 2]], depth_mm: f64) -> Self {
         let ends = |set: &[[f64; 2]]| -> Vec<f64> { set.iter().flatten().copied().collect() };
         let mut limits: Vec<f64> = ends(truth)
@@ -143,8 +143,8 @@ impl<'a> Checks<'a> {
     }
 
     /// Checks suspect gaps of the table at more speeds, until the largest disagreement between table and method in a
-    /// gap grows by no more than the factor [`CHECK_GROWTH`], at most [`ROUNDS`] times. A gap is suspect if they
-    /// disagree by more than [`SUSPECT`] of the tolerance.
+    /// gap grows by no more than the factor [`CHECK_GROWTH`], at most [`ROUNDS`] times. A gap is suspect if table and
+    /// method disagree by more than [`SUSPECT`] of the tolerance.
     ///
     /// # Errors
     /// The method cannot compute the limits at a checked speed.
@@ -209,12 +209,12 @@ impl<'a> Checks<'a> {
     }
 
     /// Corrects gaps in which `table` calls depths stable that are unstable, by more than `tolerance_mm`. The entries
-    /// at both ends of such a gap become unstable at every depth at which one of them is, or the method at a checked
-    /// speed in the gap: this covers steep flanks and islands between entries.
+    /// at both ends of such a gap, in all layers that are checked together, become unstable at every depth at which one
+    /// of them is, or the method at a checked speed in the gap: this covers steep flanks and islands between entries.
     ///
-    /// Lookups in such a gap, and in its neighbours, then err on the safe side. `entries` are by layer and speed.
-    /// Returns the corrected gaps by checked layers: the limits at their checked speeds have shaped entries and are no
-    /// independent check, so that [`check_again`](Self::check_again) adds other speeds.
+    /// Lookups in such a gap, and in its neighbours, become more cautious. `entries` are by layer and speed. Returns,
+    /// by checked layers and gap, whether the gap is corrected: the limits at the checked speeds of corrected gaps have
+    /// shaped entries and are no independent check, so that [`check_again`](Self::check_again) adds other speeds.
     pub(super) fn guard(
         &self,
         table: &LobeTable<'_>,
@@ -294,8 +294,8 @@ impl<'a> Checks<'a> {
         }
         InterpolationError {
             depth: Millimeters((TABLE_ROOM * depth + f64::from(table.depth_step().0)) as f32),
-            // A stated relative error in speed of 1 would be no bound, so that a smaller one is stated. Only a table of
-            // few speeds over a wide range has such gaps.
+            // A relative error in speed of 1 or more would be no bound: at most 0.999 is stated. Only a table of few
+            // speeds over a wide range has such gaps.
             speed: speed.min(0.999) as f32,
         }
     }

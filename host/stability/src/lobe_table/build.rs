@@ -15,8 +15,8 @@ use crate::limits::speeds::{default_speeds, spaced};
 use quietcut_model::case::Case;
 
 /// Target size of a table, bytes: a quarter of a slot of the board, so that refinement, which stops only after
-/// exceeding it, stays within the slot. A speed takes 4 bytes, plus 2 in each layer, plus 8, and its derivatives, for
-/// each of one or two unstable intervals.
+/// exceeding it, stays within the slot. A speed takes 4 bytes, plus 2 in each layer, plus 8, and the derivatives, for
+/// each unstable interval, of which 1.5 per layer are assumed.
 const BYTES: usize = 32 * 1024;
 
 /// Default number of speeds of a lobe table before refinement. A choice.
@@ -31,7 +31,8 @@ const GUARDED: usize = 3;
 pub struct BuiltTable {
     /// Bytes of the lobe table, header and CRC included.
     pub bytes: Vec<u8>,
-    /// Limits without derivatives, one warning per layer; empty if derivatives were not requested or all exist.
+    /// Warnings about limits without derivatives, one for each layer with such limits; empty if derivatives were not
+    /// requested or all exist.
     pub warnings: Vec<String>,
 }
 
@@ -39,11 +40,11 @@ pub struct BuiltTable {
 ///
 /// Speeds are added until every limit half way between two speeds differs from the straight line between them by at
 /// most 0.3 % of the largest depth, until they lie too close for more, or until the table has its target size of 32
-/// KiB. Feeds and directions are added likewise, up to a number of layers. Then every gap between speeds is checked
-/// against the method at two more speeds or more, and at further ones if these disagree with the table, in every layer
-/// and half way between layers. If the table is too deep there, on flanks too steep for its speeds, the surrounding
-/// entries become as shallow as the gap; see [`InterpolationError`] for the stated error. Depths with two stable
-/// orbits, which only nonlinear cases have, count as unstable.
+/// KiB. Feeds and directions are added between the requested ones likewise, up to a number of layers. Then every gap
+/// between speeds is checked against the method at two more speeds or more, and at further ones if these disagree with
+/// the table, in every layer and half way between layers. If the table is too deep there, on flanks too steep for its
+/// speeds, the surrounding entries become as shallow as the gap; see [`InterpolationError`] for the stated error.
+/// Depths with two stable orbits, which only nonlinear cases have, count as unstable.
 ///
 /// # Errors
 /// No case, different numbers of teeth, a request that does not fit a case, two layers for the same cut, or a case

@@ -28,7 +28,7 @@ pub enum BuildError {
     NotPossible {
         /// The case file.
         path: std::path::PathBuf,
-        /// Feature of the request that does not fit the case, and what to do instead.
+        /// Reason why the request does not fit the case.
         what: &'static str,
     },
     /// The format of lobe tables refuses the content, such as two layers for the same cut.

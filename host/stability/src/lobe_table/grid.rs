@@ -35,7 +35,7 @@ pub(super) fn default_depth(
     Ok(DEEPEST_MM)
 }
 
-/// Union of the refined spindle speeds of all layers, ascending, with the limits of every layer at all of these speeds.
+/// Union of the refined spindle speeds of all layers, ascending, with the limits by layer and speed.
 pub(super) fn lines_of_all(
     table_layers: &[TableLayer],
     coarse: &[f64],

@@ -98,16 +98,17 @@ impl TableLayer {
         (a.posture, a.start, a.exit) == (b.posture, b.start, b.exit)
     }
 
-    /// Difference of the feeds per tooth, mm, if this layer has the larger feed and is for the same immersion, posture
-    /// and feed direction; otherwise `None`.
+    /// Difference of the feeds per tooth, mm, if this layer has the larger feed, its limits depend on the feed, and
+    /// both are for the same immersion, posture and feed direction; otherwise `None`.
     fn feeds_beyond(&self, other: &Self) -> Option<f64> {
         let more_mm = self.feed_mm() - other.feed_mm();
         let is_same = self.is_of_cut(other) && self.direction_deg == other.direction_deg;
         (is_same && depends_on_feed(&self.case) && more_mm > 0.0).then_some(more_mm)
     }
 
-    /// Angle from the feed direction of the other layer to that of this one, degrees, if the layers are equal in all
-    /// else; `None` if lookups of the device do not interpolate over it.
+    /// Angle from the feed direction of the other layer to that of this one, degrees, if immersion, posture and feed
+    /// are equal; otherwise `None`, as for an angle over which lookups of the device do not interpolate, or a direction
+    /// that is not stated.
     fn turned_from(&self, other: &Self) -> Option<f64> {
         let turn = (self.direction_deg? - other.direction_deg?).rem_euclid(360.0);
         let is_same = self.is_of_cut(other) && self.feed_mm() == other.feed_mm();
@@ -278,7 +279,7 @@ fn division(case: &Case, request: &TableRequest) -> Result<Division, BuildError>
     feeds_mm.dedup();
     let mut directions: Vec<f64> = request.feed_directions_deg.clone();
     directions.sort_by(f64::total_cmp);
-    // Feed directions of 0 and 360 degrees are one direction.
+    // Feed directions of 0 and 360 degrees, next to each other in this order, are one direction.
     directions.dedup_by_key(|degrees| (degrees.rem_euclid(360.0) * 100.0).round() as i64);
     let directions_deg = if directions.is_empty() {
         vec![None]

@@ -35,8 +35,8 @@ pub struct Discretized<D> {
     pub pitched: Pitched,
     /// Scheme of one time step.
     pub discretization: D,
-    /// Number of time steps per tooth period, at least 1; in every interval between entries and exits of teeth it is
-    /// rounded up.
+    /// Number of time steps per tooth period; 0 counts as 1. Entries and exits of teeth, and a delay shorter than a
+    /// step, make steps shorter.
     pub steps: usize,
 }
 
@@ -62,8 +62,8 @@ pub(crate) fn with_dominant<D: Discretization, T>(
 
 #[expect(private_bounds, reason = "sealed: discretizations are those of this module")]
 impl<D: Discretization> Discretized<D> {
-    /// Dominant Floquet multiplier with the configured number of steps, without an error estimate; costs a seventh of
-    /// [`point()`](Method::point).
+    /// Dominant Floquet multiplier with the configured number of steps, without an error estimate; costs about a
+    /// seventh of [`point()`](Method::point).
     ///
     /// # Errors
     /// As [`Method::point`].

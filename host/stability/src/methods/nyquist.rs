@@ -35,8 +35,8 @@ impl Nyquist {
     /// Number of unstable roots at a spindle speed (rev/min) and an axial depth (mm); a complex pair counts as 2.
     ///
     /// # Errors
-    /// Speed not positive, depth negative, a table of receptances that ends too early for this depth, or roots that
-    /// cannot be counted, for example at a limit.
+    /// Speed not positive, depth negative, one of them not finite, a table of receptances that ends too early for this
+    /// depth, or roots that cannot be counted, for example at a limit.
     pub fn unstable_roots(&self, rpm: f64, depth_mm: f64) -> Result<i32, StabilityError> {
         check_speed(rpm)?;
         check_depth(depth_mm)?;
@@ -64,7 +64,7 @@ impl Nyquist {
 }
 
 /// Stability limits up to an axial depth, mm. Between every two of them, and behind the last, a count of unstable roots
-/// must agree with the crossings of the real axis by the characteristic loci.
+/// must agree with the crossings of the real axis by the characteristic loci, unless the depth interval is too short.
 fn confirmed(
     open_loop: &impl OpenLoop,
     rpm: f64,

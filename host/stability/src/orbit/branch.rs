@@ -27,18 +27,19 @@ pub struct Event {
     /// Axial depth, mm.
     pub depth_mm: f64,
     /// Error estimate of the depth of the bifurcation, mm: the change of depth along the branch over which the
-    /// multiplier moves by its error, plus a multiple of the change of the depth on a finer mesh; the largest depth of
-    /// the branch if this cannot be computed.
+    /// multiplier moves by its error, plus a multiple of the change of the depth on a finer mesh; the requested depth
+    /// if this cannot be computed.
     pub error_mm: f64,
     /// Kind of bifurcation; at a fold the branch turns back in depth. With unequal teeth the kind is that of the
     /// multiplier over the revolution.
     pub kind: StabilityLoss,
-    /// True if the number of the orbit's multipliers outside the unit circle falls along the branch.
+    /// True if the multiplier moves into the unit circle along the branch.
     pub gain: bool,
     /// Multiplier at the crossing.
     #[serde(skip)]
     pub multiplier: Complex64,
-    /// Frequency of the vibration that begins or ends at the bifurcation, Hz; `None` at a fold.
+    /// Frequency of the vibration that begins or ends at the bifurcation, Hz; `None` at a fold, or if it cannot be
+    /// computed.
     pub chatter_hz: Option<f64>,
 }
 
@@ -56,7 +57,8 @@ pub struct Branch {
 /// Extent to which a branch of forced orbits is followed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Extent {
-    /// To the first loss of stability along the branch, which suffices for a limit.
+    /// To the end of the first step along the branch in which a multiplier leaves the unit circle, which suffices for a
+    /// limit.
     FirstLoss,
     /// To the last requested depth, through folds of the branch, or back to depth 0.
     Whole,
@@ -101,7 +103,8 @@ impl Branch {
         union(around.collect())
     }
 
-    /// Depth intervals in which two stable forced orbits exist, mm.
+    /// Depth intervals in which two stable forced orbits exist, mm: the overlap of every two intervals of
+    /// [`stable_mm`](Self::stable_mm), in their order.
     pub fn bistable_mm(&self) -> Vec<[f64; 2]> {
         let stable = self.stable_mm();
         let mut both = Vec::new();

@@ -63,7 +63,7 @@ pub struct EquivalentProblem {
     displacement: DMatrix<f64>,
     /// Matrix from the states of the structure to the velocity of the tool along the machine's axes, 3 × n.
     velocity: DMatrix<f64>,
-    /// Static stiffness of the structure along each axis, N/m; 0 for a rigid axis.
+    /// Static stiffness of the structure along each axis, N/m; 0 for an axis without positive static flexibility.
     stiffness: [f64; 3],
     /// Damping constant along each axis that stands for sticking friction, N s/m: see [`STICKING_DAMPER`].
     most_damping: [f64; 3],
@@ -316,7 +316,8 @@ impl<'a> Follower<'a> {
         while low.outside() != top.outside() {
             high.clone_from(&top);
             // If no multiplier is outside the unit circle at one end of the depth interval, the largest one crosses and
-            // |μ| − 1 is interpolated. Otherwise one of several crosses, and the interval is bisected.
+            // |μ| − 1 is interpolated, with a bisection after every three steps. Otherwise one of several crosses, and
+            // the interval is bisected.
             let is_largest = |low: &Sample, high: &Sample| (low.outside() == 0) != (high.outside() == 0);
             let mut halves = 0;
             while high.depth_m() - low.depth_m() > CROSSING * last_m {

@@ -17,12 +17,12 @@ use super::tooth_period::ToothPeriod;
 use crate::criteria::{BRANCH_STEP_MAX, BRANCH_STEP_MIN, LEAST_ERROR, ORBIT_ROOM};
 use crate::spectrum::stability_loss::StabilityLoss;
 
-/// Largest number of steps of a branch: ten times the hundred that a branch up and down takes with the longest step. A
-/// choice.
+/// Largest number of steps of a branch, failed ones included: ten times the hundred that a branch up and down takes
+/// with the longest step. A choice.
 const STEPS_MAX: usize = 1000;
 
 /// Follows the forced orbits at one spindle speed from depth 0 until the depth reaches `depth_mm` or returns to 0; with
-/// [`Extent::FirstLoss`] at most until stability is lost.
+/// [`Extent::FirstLoss`] at most until a multiplier leaves the unit circle.
 ///
 /// # Errors
 /// The branch cannot be followed further with the shortest step, or takes too many steps; or no preceding tooth cuts
@@ -48,7 +48,7 @@ pub fn follow_depth(
 pub(super) struct Dominant {
     /// Dominant multiplier of the orbit; of a conjugate pair the one above the real axis.
     pub(super) multiplier: Complex64,
-    /// Vibration frequency of the Floquet mode that belongs to the multiplier, Hz.
+    /// Vibration frequency of the Floquet mode that belongs to the multiplier, Hz; `None` if it cannot be computed.
     pub(super) chatter_hz: Option<f64>,
 }
 
@@ -101,8 +101,8 @@ fn dominant_of<M: PeriodMap>(map: M, rpm: f64, depth_mm: f64) -> Result<[Dominan
     Ok([at(map)?, at(finer)?])
 }
 
-/// Norm of the orbit's state at the start of the period at a depth, from the equation linearized about rest at depth 0:
-/// the unit of the state along a branch.
+/// Norm of the orbit's state at the start of the period at a depth, from the equation linearized about rest at depth 0,
+/// or 1 if that gives none above 0: the unit of the state along a branch.
 pub(super) fn size_at(map: &impl PeriodMap, depth_m: f64) -> f64 {
     let rest = Orbit::rest(map);
     let linear = map
@@ -271,7 +271,7 @@ impl<M: PeriodMap> Follower<M> {
 
     /// Crossing of the unit circle by the multiplier that moves from one value to another over a step, with the length
     /// of the step along the branch to it. Regula falsi with the weights of Anderson and Björck keeps the crossing
-    /// enclosed.
+    /// enclosed. `None` if an orbit in between fails or has no followed multiplier.
     fn refine(&self, here: &Sample, step: f64, from: Complex64, to: Complex64) -> Option<(f64, Event)> {
         let outward = to.norm() > 1.0;
         let mut bracket = SignChange::new([0.0, from.norm() - 1.0], [step, to.norm() - 1.0]);

@@ -24,9 +24,10 @@ use quietcut_model::{ChipLaw, MotionState, ProcessDamping, RestoringForce};
 /// cubic terms M⁻¹(C₃ q̇∘³ + K₃ q∘³)/s in the lower half. On an orbit of the tooth period F = (w − z)·Σ_teeth
 /// (cutting·n_x f_t + edge), with z the axial displacement under axial-depth modulation, otherwise 0.
 ///
-/// With unequal pitch, or runout on a nonlinear structure, an orbit has the period of the revolution. Its chip is n_x
-/// f_j + n(u − u(t − τ_j)) + (r_j − r_{j−1}) sin γ, with the feed f_j during the delay τ_j. The force is linear in the
-/// chip thickness through zero: a tooth that would leave the surface pulls, as in the linear problem.
+/// With unequal pitch, or runout on a nonlinear structure, an orbit has the period of the revolution. The chip of tooth
+/// j on such an orbit is n_x f_j + n(u − u(t − τ_j)) + (r_j − r_{j−1}) sin γ, with the feed f_j during the delay τ_j.
+/// The force is linear in the chip thickness through zero: a tooth that would leave the surface pulls, as in the linear
+/// problem.
 ///
 /// Extensions of the case add smooth restoring forces −B f_r(u, u̇), a chip law in place of n_x f_t, and process
 /// damping −w D(φ) u̇.
@@ -38,9 +39,10 @@ pub struct ForcedProblem {
     pub(super) uneven: Option<Uneven>,
     /// Cubic stiffness and damping terms; `None` for a linear structure.
     pub(super) cubic: Option<CubicForce>,
-    /// Smooth restoring forces of the case's extensions, with the structure in the machine's axes.
+    /// Smooth restoring forces of the case's extensions, with the structure in the machine's axes; `None` without such
+    /// forces.
     smooth: Option<Smooth>,
-    /// Chip law of the cutting force; `None` if the force is proportional to the chip thickness.
+    /// Chip law of the cutting force; `None` if the cutting force is proportional to the chip thickness.
     chip: Option<ChipLaw>,
     /// Process damping; `None` if absent.
     flank: Option<Flank>,
@@ -156,9 +158,9 @@ impl ForcedProblem {
     /// Builds the forced problem of a case, whose solutions are forced periodic orbits.
     ///
     /// # Errors
-    /// As [`Problem::new`], except that cubic terms are accepted. Process damping and smooth restoring forces are
-    /// refused without a mass at the tool, a chip law for teeth with unequal pitch or runout, and unequal pitch on a
-    /// linear structure. Friction, backlash and hysteresis are refused too;
+    /// As [`Pitched::new`]; cubic terms are accepted. Process damping and smooth restoring forces are refused without a
+    /// mass at the tool, a chip law for teeth with unequal pitch or runout, and unequal pitch without cubic terms and
+    /// smooth restoring forces. Friction, backlash and hysteresis are refused too;
     /// [`EquivalentProblem`](super::EquivalentProblem) treats them.
     pub fn new(case: &Case) -> Result<Self, StabilityError> {
         if is_not_smooth(case) {
@@ -358,7 +360,7 @@ impl ForcedProblem {
     }
 
     /// Jacobian of the equation of a forced orbit at a state, A − ∂N/∂x − B ∂f_r/∂x − B·(force per depth)·∂z/∂x,
-    /// without process damping.
+    /// without process damping and without the influence of the vibration on the chip thickness.
     pub(super) fn jacobian(&self, state: &[f64], force_per_depth: &Vector3<f64>) -> DMatrix<f64> {
         let structure = &self.linear.structure;
         let mut jacobian = structure.a.clone();

@@ -32,8 +32,8 @@ impl Method for ForcedProblem {
         let fail = |cause| broke_down(rpm, depth_mm, cause);
         let [coarse, fine] = multiplier_at(self, rpm, depth_mm).map_err(fail)?;
         let multiplier = fine.multiplier;
-        // The coarse mesh errs by far more than the fine one, so that their difference bounds the error of the fine
-        // one.
+        // The coarse mesh errs by far more than the fine one, so that the change from one to the other bounds the error
+        // of the fine one.
         let error = (ORBIT_ROOM * (coarse.multiplier - multiplier).norm())
             .max(LEAST_ERROR * multiplier.norm().max(1.0));
         Ok(CutStability::new(

@@ -13,8 +13,8 @@ pub(super) const FOLLOWED: f64 = 1.0 - 2.5 * MULTIPLIER_MOVE_MAX;
 /// Pairs the multipliers of two neighbouring orbits of a branch; `None` if a multiplier near the unit circle cannot be
 /// identified.
 ///
-/// With `anyhow` each multiplier is paired with the nearest one of the other orbit, at any distance. Two real
-/// multipliers that meet and leave the real axis move infinitely fast there, so that no step is short enough.
+/// With `anyhow` each multiplier is paired with the nearest one that is left of the other orbit, at any distance. Two
+/// real multipliers that meet and leave the real axis move infinitely fast there, so that no step is short enough.
 pub(super) fn pair(
     from: &[Complex64],
     to: &[Complex64],
@@ -49,8 +49,8 @@ pub(super) fn pair(
     (anyhow || free.iter().all(|&root| is_far(root))).then_some(pairs)
 }
 
-/// Removes conjugate pairs of one orbit that are two real multipliers of the neighbouring orbit, on the same side of
-/// the unit circle: they met on the real axis, and neither has crossed the circle.
+/// Removes conjugate pairs of one orbit, and the two real multipliers that each has become in the neighbouring orbit,
+/// on the same side of the unit circle: they met on the real axis, and neither has crossed the circle.
 fn remove_met_pairs(conjugate: &mut Vec<Complex64>, real: &mut Vec<Complex64>) {
     conjugate.retain(|&root| {
         let reach = MULTIPLIER_MOVE_MAX * root.norm().max(1.0);
@@ -69,12 +69,12 @@ fn remove_met_pairs(conjugate: &mut Vec<Complex64>, real: &mut Vec<Complex64>) {
     });
 }
 
-/// True if a multiplier cannot reach the unit circle within a step along the branch.
+/// True if a multiplier lies farther than [`MULTIPLIER_MOVE_MAX`] from the unit circle.
 fn is_far(multiplier: Complex64) -> bool {
     (multiplier.norm() - 1.0).abs() > MULTIPLIER_MOVE_MAX
 }
 
-/// Multiplier of a list that lies nearest to an expected value.
+/// Multiplier of a list that lies nearest to an expected value; `None` if the list is empty.
 pub(super) fn nearest(roots: &[Complex64], expected: Complex64) -> Option<Complex64> {
     roots
         .iter()

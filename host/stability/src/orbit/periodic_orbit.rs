@@ -9,10 +9,10 @@ use crate::error::Breakdown;
 use quietcut_numerics::eigenvalues::EigenvalueError;
 use quietcut_numerics::quadrature::Gauss;
 
-/// Reason why no forced periodic orbit was found.
+/// Reason why a forced periodic orbit or its Floquet multipliers were not found.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum OrbitError {
-    /// Newton's method did not converge, or the branch of orbits cannot be followed further.
+    /// Newton's method did not converge or failed in a subinterval, or the branch of orbits cannot be followed further.
     #[error("no periodic orbit was found near the guess at {depth_mm} mm: the iteration does not settle")]
     NoConvergence {
         /// Axial depth, mm.
@@ -25,7 +25,7 @@ pub enum OrbitError {
         depth_mm: f64,
     },
     /// The equations of the periodic orbit, or those linearized about it, cannot be solved, for example at a fold or a
-    /// branch point.
+    /// branch point; or no preceding tooth cuts the surface in front of some tooth.
     #[error("the equations of the periodic orbit are singular at {depth_mm} mm")]
     Singular {
         /// Axial depth, mm.
@@ -149,7 +149,7 @@ pub(super) trait PeriodMap: Sized {
     fn subinterval_nodes(&self) -> Vec<SubintervalNodes<'_>>;
 
     /// Applies the map over the period, with derivatives, linearized about the states `guess` at the nodes. The result
-    /// is exact if `guess` contains the states of the motion from `start`. `None` if a subinterval is singular.
+    /// is exact if `guess` contains the states of the motion from `start`. `None` if a subinterval fails.
     fn integrate(
         &self,
         start: &DVector<f64>,
@@ -167,7 +167,7 @@ pub(super) trait PeriodMap: Sized {
     /// The linearized equations are singular, or the eigenvalues cannot be computed.
     fn multipliers(&self, orbit: &Orbit) -> Result<Vec<Complex64>, Breakdown>;
 
-    /// Vibration frequency of a Floquet multiplier about a forced orbit, Hz.
+    /// Vibration frequency of a Floquet multiplier about a forced orbit, Hz; `None` if it cannot be computed.
     fn chatter_hz(&self, orbit: &Orbit, multiplier: Complex64) -> Option<f64>;
 
     /// The same map over the period on a finer mesh, for error estimates; `None` if there is no such mesh.

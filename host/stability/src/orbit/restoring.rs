@@ -9,8 +9,8 @@ use crate::criteria::{DISTURBANCE, DISTURBANCE_PERIODS};
 use quietcut_model::RestoringForce;
 use quietcut_model::path::{SampledMotion, restoring_along, restoring_from};
 
-/// Mean number of samples of the orbit in a subinterval of the mesh, for forces of friction, backlash and hysteresis.
-/// Over a subinterval the fastest motion rotates by a few radians. A choice.
+/// Mean number of samples of the orbit in a subinterval of the mesh, for forces of friction, backlash and hysteresis,
+/// unless [`LEAST`] requires more. Over a subinterval the fastest motion rotates by a few radians. A choice.
 const PER_SUBINTERVAL: usize = 128;
 
 /// Least number of samples of the orbit in a period for the forces of friction, backlash and hysteresis. A choice.
@@ -145,8 +145,8 @@ impl Samples {
             });
             before = Some((from, to));
             start = own;
-            // Secant step to the fixed point of the map over a period. It is taken only where the slope of the map lies
-            // between 0 and 1, as for a term with fading memory.
+            // Secant step to the fixed point of the map over a period. It is taken only where the slope of the map is
+            // at least 0 and below 0.999, as for a term with fading memory.
             if term.states() == 1 && (0.0..0.999).contains(&slope) {
                 start[0] = from + (to - from) / (1.0 - slope);
             }

@@ -86,7 +86,8 @@ impl<'a> RevolutionPeriod<'a> {
     }
 
     /// Delayed displacement at every port (cutting tooth at a node) of a subinterval, ports × 1, with its derivatives
-    /// with respect to the map's state at the start of the revolution and the depth, ports × (size + 1).
+    /// with respect to the map's state at the start of the revolution and the depth, ports × (size + 1); `None` if a
+    /// delayed time lies in this subinterval.
     fn past(
         &self,
         subinterval: &Subinterval,

@@ -1,4 +1,4 @@
-//! Forced orbit of equal teeth over one tooth period: Gauss collocation with an exact Jacobian.
+//! Forced orbit of equal teeth over one tooth period: Gauss collocation with an analytic Jacobian.
 //!
 //! On a subinterval with Gauss nodes c_i, integrals a_ij, weights b_j and duration h
 //!
@@ -6,8 +6,8 @@
 //!
 //! which has order 2m at the ends. Linearized about values Y, a subinterval gives the Newton step of these values, and
 //! of x₁ as a function of x₀ and depth. Composition of all subintervals gives the map x(0) → x(T) over the period with
-//! its exact derivatives. A periodic orbit is its fixed point: on it u = u_τ, and the previously cut surface does not
-//! act. Subintervals end where teeth enter and leave the cut.
+//! its derivatives. A periodic orbit is its fixed point: on it u = u_τ, and the previously cut surface does not act.
+//! Subintervals end where teeth enter and leave the cut.
 
 use nalgebra::{DMatrix, DVector, Vector3};
 

@@ -13,7 +13,7 @@ const RADIUS: f64 = 0.5;
 #[derive(Clone, Debug)]
 pub(crate) struct Exponential {
     matrix: DMatrix<f64>,
-    /// Norm ‖A‖ of the matrix: its largest column sum.
+    /// Norm ‖A‖ of the matrix: the largest sum of absolute values in a column.
     norm: f64,
 }
 
@@ -41,8 +41,8 @@ impl Exponential {
         multiply(&square, &x, &mut cube);
         multiply(&square, &square, &mut fourth);
         let powers = [DMatrix::identity(n, n), x, square, cube];
-        // Sums the Taylor series Σ x^k/k! in blocks of four powers (Paterson & Stockmeyer), highest block first;
-        // x¹⁶/16! is the fourth power alone.
+        // Sums the Taylor series Σ x^k/k! in blocks of four powers (Paterson & Stockmeyer), highest block first; the
+        // sum begins with 1/16!, which four products with x⁴ turn into x¹⁶/16!.
         let mut inverse_factorials = [1.0; 17];
         for k in 1..inverse_factorials.len() {
             inverse_factorials[k] = inverse_factorials[k - 1] / k as f64;

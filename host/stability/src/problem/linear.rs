@@ -51,9 +51,9 @@ impl Problem {
     /// Builds the linear problem of a case.
     ///
     /// # Errors
-    /// A section is missing, the structure is indefinite, or the case has a feature that the equation does not cover:
-    /// variable pitch, nonlinear terms that `cubic` refuses, runout together with axial-depth modulation, or an
-    /// extension that cannot be treated.
+    /// A section is missing, the structure has no first-order form, or the case has a feature that the equation does
+    /// not cover: variable pitch, nonlinear terms that `cubic` refuses, runout together with axial-depth modulation, or
+    /// an extension that cannot be treated.
     pub fn new(case: &Case, cubic: CubicTerms) -> Result<Self, StabilityError> {
         Self::of(case, cubic, cutting(case, cubic.treated())?)
     }

@@ -35,8 +35,8 @@ pub(crate) struct Resolution {
 }
 
 impl Resolution {
-    /// Coarse mesh, on which all Floquet multipliers are computed at many depths. Its elements are long and have few
-    /// nodes in all, since the eigenvalues of the whole map are computed.
+    /// Coarse mesh, on which many Floquet multipliers are computed together at many depths. Its elements are long and
+    /// have few nodes in all, since the eigenvalues of the whole map are computed.
     pub(crate) const SCAN: Self = Self {
         angle: 20.0,
         tolerance: 1e-8,

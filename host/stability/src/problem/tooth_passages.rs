@@ -118,7 +118,7 @@ impl ToothPassages {
         distinct(ends.chain([0.0, self.period_s]).collect(), self.period_s)
     }
 
-    /// Passages of the teeth that cut at a time, s; the time must not be an entry or exit.
+    /// Passages of the teeth that cut at a time, s, without those that enter or leave just then.
     pub(crate) fn cutting_at(&self, time_s: f64) -> impl Iterator<Item = &ToothPassage> {
         self.list
             .iter()

@@ -88,7 +88,7 @@ fn cutter(
     cutter.map_err(|cause| wrong(case, cause))
 }
 
-/// Radial runout of each tooth: its radius minus the mean radius, m, in the order of the teeth.
+/// Radial runout of each tooth: its radius minus the radius without runout, m, in the order of the teeth.
 ///
 /// # Errors
 /// A section is missing, or an extension cannot be applied to the case.

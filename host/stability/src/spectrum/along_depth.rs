@@ -8,8 +8,8 @@ use crate::error::{Breakdown, StabilityError};
 
 /// Floquet multipliers of one method at one spindle speed, as functions of the axial depth.
 pub(crate) trait Spectrum {
-    /// All multipliers at an axial depth (m) that may come close to the unit circle, largest first; complex ones in
-    /// exact conjugate pairs.
+    /// All multipliers at an axial depth (m) above a size that the method sets, and possibly smaller ones, largest
+    /// first; complex ones in exact conjugate pairs.
     ///
     /// # Errors
     /// The equations have no finite solution, or the eigenvalues cannot be computed.
@@ -21,7 +21,8 @@ pub(crate) trait Spectrum {
     /// `None` if no multiplier is found within the distance `reach` of the guess.
     fn multiplier_near(&mut self, guess: Complex64, depth_m: f64, reach: f64) -> Option<Complex64>;
 
-    /// Derivative dμ/dw of a Floquet multiplier μ over the axial depth w, 1/m, along its branch through (μ, w).
+    /// Derivative dμ/dw of a Floquet multiplier μ over the axial depth w, 1/m, along its branch through (μ, w); `None`
+    /// if it cannot be computed.
     fn sensitivity(&mut self, multiplier: Complex64, depth_m: f64) -> Option<Complex64>;
 
     /// Floquet multiplier near a guess, with its derivative dμ/dw; a real guess gives a real multiplier.
@@ -45,7 +46,7 @@ pub(crate) trait Spectrum {
     /// Crossing of the unit circle by a multiplier near a guess, at an axial depth between `low_m` and `high_m`.
     fn crossing_near(&mut self, guess: Crossing, low_m: f64, high_m: f64) -> Option<Crossing>;
 
-    /// Chatter frequency at a crossing of the unit circle by a multiplier, Hz.
+    /// Chatter frequency at a crossing of the unit circle by a multiplier, Hz; `None` if it cannot be computed.
     fn chatter_hz(&self, crossing: &Crossing) -> Option<f64>;
 
     /// Error estimate of the multiplier at a crossing, as an absolute value.

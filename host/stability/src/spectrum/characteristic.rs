@@ -1,4 +1,4 @@
-//! The characteristic matrix: single Floquet multipliers and limits, to rounding.
+//! The characteristic matrix: single Floquet multipliers and limits by Newton's method.
 //!
 //! On a motion that one period multiplies by μ, u_τ = u/μ. The delay equation becomes ẋ = (A + B[κ K α(t) − β(t)] C) x
 //! with the complex depth κ = w (1 − 1/μ). Its transition matrix Φ over the period depends on κ alone and is an entire
@@ -35,7 +35,7 @@ pub(crate) struct Characteristic {
     order: usize,
     /// Axial depth, m, by which the complex depth κ is divided before its powers are taken.
     scale: f64,
-    /// For each element the coefficients of its polynomial in κ/scale, n × n row by row.
+    /// For each element the coefficients of its polynomial in κ/scale, by ascending power, each n × n row by row.
     elements: Vec<Vec<f64>>,
     /// Transition matrix of the structure over the free flight, in which no tooth cuts, n × n row by row.
     flight: Vec<f64>,
@@ -190,7 +190,7 @@ impl Characteristic {
     /// multiplier.
     ///
     /// Its error is about the square of that of the guess. `None` if the relative step is 0.01 or more, if κ is too
-    /// large for the polynomials, or if a result is not finite.
+    /// large for the polynomials, if Φ − μI is singular, or if a result is not finite.
     pub(crate) fn root_near(&self, guess: Complex64, depth_m: f64, work: &mut Workspace) -> Option<Root> {
         // Both logarithmic derivatives of the characteristic function F are infinite at a root of F. Close to it their
         // ratio is smooth, so that they are evaluated at a relative distance of 1e-7.
@@ -204,13 +204,14 @@ impl Characteristic {
         if guess.im == 0.0 {
             (multiplier.im, slope.im) = (0.0, 0.0);
         }
-        // One Newton step is not enough if the guess is more than 1 % off. Near a second root, whose term is also in
-        // the logarithmic derivative, the step is too short as well.
+        // One Newton step is not enough if the guess is more than 1 % off. A second root nearby, whose term is also in
+        // the logarithmic derivative, makes the step too short, which is not detected here.
         let step = (multiplier - guess).norm();
         (step < 0.01 * guess.norm() && slope.is_finite()).then_some(Root { multiplier, slope })
     }
 
-    /// Derivative dμ/dw of a Floquet multiplier μ over the axial depth w, 1/m, along its branch through (μ, w).
+    /// Derivative dμ/dw of a Floquet multiplier μ over the axial depth w, 1/m, along its branch through (μ, w); `None`
+    /// if a result is not finite.
     pub(crate) fn sensitivity(
         &self,
         multiplier: Complex64,

@@ -18,7 +18,8 @@ const GROWTH: f64 = 1e3;
 /// parts: a limit on computing time. A choice.
 const CYCLIC_MAX: usize = 256;
 
-/// Vibration frequency, Hz, of the motion u(t) = e^{st} v(t), with v periodic in the tooth period τ and e^{sτ} = μ.
+/// Vibration frequency, Hz, of the motion u(t) = e^{st} v(t), with v periodic in the tooth period τ and e^{sτ} = μ;
+/// `None` if it cannot be computed.
 ///
 /// The motion contains the frequencies |Im ln μ + 2πk|/(2πτ). The result is the one whose harmonic of the tool
 /// displacement, û_k = 1/τ ∫₀^τ u(t) e^{−s_k t} dt, has the largest norm. With F̂_k the k-th harmonic of all forces
@@ -54,7 +55,8 @@ pub(crate) fn chatter_hz(
     })
 }
 
-/// Frequency, Hz, of the structural mode that a period of free vibration multiplies by about μ.
+/// Frequency, Hz, of the structural mode that a period of free vibration multiplies by the factor nearest to μ; `None`
+/// if the structure has no pole.
 fn free_hz(problem: &Problem, period_s: f64, multiplier: Complex64) -> Option<f64> {
     let miss = |pole: &Complex64| ((pole * period_s).exp() - multiplier).norm();
     let poles = problem.structure.poles();
@@ -63,7 +65,8 @@ fn free_hz(problem: &Problem, period_s: f64, multiplier: Complex64) -> Option<f6
 }
 
 /// Frequency, Hz, among |Im ln μ + 2πk|/(2πT) at which the motion is largest. `size` gives the norm of the harmonic at
-/// an exponent s with e^{sT} = μ; it is called for ascending Im s in steps of 2π/T. `None` if `size` gives no value.
+/// an exponent s with e^{sT} = μ; it is called for ascending Im s in steps of 2π/T. `None` if `size` gives a value for
+/// no exponent.
 pub(crate) fn dominant_frequency_hz(
     problem: &Problem,
     depth_m: f64,
@@ -86,7 +89,7 @@ pub(crate) fn dominant_frequency_hz(
 }
 
 /// Forces along the Floquet mode times quadrature weight, each with the time of its node. The forces of teeth that cut
-/// at the same node are added.
+/// at the same node are added. `None` if an element is singular, or if [`cyclic_vector`] finds no states.
 fn eigenfunction_forces(
     period: &Period,
     multiplier: Complex64,
@@ -143,7 +146,8 @@ fn eigenfunction_forces(
 }
 
 /// Solves for the states x_g of a Floquet mode at the start of each part of the period: T_g x_g = x_{g+1}, and μ x_0
-/// after the last part, with the transition matrices T_g of the parts.
+/// after the last part, with the transition matrices T_g of the parts. `None` if there are more unknowns than
+/// [`CYCLIC_MAX`], or if the matrix is not finite or singular after the shift.
 ///
 /// All states are solved for at once. Integration from a start that is exact to rounding would fail if the parts
 /// together grow by far more than μ.

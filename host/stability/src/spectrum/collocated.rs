@@ -13,18 +13,19 @@ use crate::error::{Breakdown, NO_FINER, StabilityError};
 use crate::problem::linear::Problem;
 use crate::problem::period::{Period, Resolution};
 
-/// Floquet multipliers at one speed: all of them from the collocated map, single ones from the characteristic matrix.
+/// Floquet multipliers at one speed: the larger ones together from the collocated map, single ones from the
+/// characteristic matrix.
 pub(crate) struct Collocated<'a> {
     problem: &'a Problem,
     rpm: f64,
     deepest_m: f64,
-    /// Coarse mesh of the tooth period, on which all multipliers are computed at once.
+    /// Coarse mesh of the tooth period, on which the larger multipliers are computed together.
     coarse: Period,
     /// Working mesh, for limits.
     period: Period,
     characteristic: Characteristic,
     workspace: Workspace,
-    /// Characteristic matrix on the finer mesh, for error estimates of limits; built on first use.
+    /// Characteristic matrix on the finer mesh, for error estimates of limits; `None` before the first use.
     finer: Option<Characteristic>,
 }
 

@@ -24,7 +24,8 @@ use quietcut_numerics::quadrature::Gauss;
 const ANGLE: f64 = 3.0;
 
 /// Target for the relative collocation error at the end of a subinterval. At the inner nodes collocation has half the
-/// order, so that mode and adjoint, and integrals of yᵀ dG x, are accurate to about its square root, 1e-8.
+/// order, so that mode and adjoint, and integrals of yᵀ dG x, are accurate to about 1e-8, the square root of this
+/// target.
 const TOLERANCE: f64 = 1e-16;
 
 type Matrix = DMatrix<Complex64>;

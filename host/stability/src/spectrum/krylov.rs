@@ -119,7 +119,7 @@ impl Dominant {
         })
     }
 
-    /// Right eigenvector, of length 1, that belongs to one of the eigenvalues.
+    /// Right eigenvector, of length 1, that belongs to one of the eigenvalues; `None` if it cannot be computed.
     pub(crate) fn vector(&self, eigenvalue: Complex64) -> Option<DVector<Complex64>> {
         let within = eigenvector(&self.projected.map(Complex64::from), eigenvalue)?;
         Some(match &self.basis {

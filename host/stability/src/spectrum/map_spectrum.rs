@@ -12,13 +12,13 @@ use crate::criteria::MAPPED;
 use crate::error::{Breakdown, StabilityError};
 
 /// Step in axial depth w of the difference quotient dμ/dw of a Floquet multiplier μ, as a share of the largest depth to
-/// be computed. Its truncation error, and the rounding of multipliers divided by the step, are then both near 1e-6. The
-/// derivatives only predict multipliers and the steps of Newton's method.
+/// be computed, taken as at least 1e-9 m.
 const DIFFERENCE: f64 = 1e-6;
 
 /// Map over one period at one axial depth; its eigenvalues are the Floquet multipliers.
 pub(crate) trait PeriodMap: LinearMap {
-    /// Vibration frequency of a Floquet multiplier, Hz, from its eigenvector of the map.
+    /// Vibration frequency of a Floquet multiplier, Hz, from its eigenvector `vector` of the map; `None` if it cannot
+    /// be computed.
     fn chatter_hz(&self, multiplier: Complex64, vector: &nalgebra::DVector<Complex64>) -> Option<f64>;
 }
 
@@ -27,7 +27,7 @@ struct MultipliersAtDepth {
     depth_m: f64,
     dominant: Dominant,
     /// Floquet multipliers at the depth `depth_m` plus `MapSpectrum::step_m`, for the difference quotient dμ/dw; `None`
-    /// until it is requested.
+    /// until they have been computed.
     deeper: Option<Vec<Complex64>>,
 }
 
@@ -65,8 +65,8 @@ impl<M: PeriodMap, F: Fn(f64) -> Option<M>, E: Fn(Complex64, f64) -> Result<f64,
         self.known.as_mut().ok_or(Breakdown::NoSolution)
     }
 
-    /// Floquet multiplier nearest to a guess at an axial depth: a real one for a real guess, a complex one for a
-    /// complex guess; `None` if there is none of that kind.
+    /// Of the Floquet multipliers at an axial depth with |μ| > `MAPPED`, the one [`nearest`] to a guess; `None` if
+    /// there is none of its kind, or if they cannot be computed.
     fn nearest(&mut self, guess: Complex64, depth_m: f64) -> Option<Complex64> {
         nearest(&self.at(depth_m).ok()?.dominant.eigenvalues, guess)
     }
@@ -109,8 +109,8 @@ impl<M: PeriodMap, F: Fn(f64) -> Option<M>, E: Fn(Complex64, f64) -> Result<f64,
         Some((nearest(deeper, own)? - own) / step_m)
     }
 
-    /// Newton's method in the axial depth for |μ| = 1 of one Floquet multiplier μ. Its derivative is a difference
-    /// quotient, so that the last step is not applied: the crossing lies at the depth at which the multiplier was last
+    /// Newton's method in the axial depth for |μ| = 1 of one Floquet multiplier μ. The last step is not applied,
+    /// because dμ/dw is a difference quotient: the crossing lies at the depth at which the multiplier was last
     /// computed.
     fn crossing_near(&mut self, guess: Crossing, low_m: f64, high_m: f64) -> Option<Crossing> {
         let margin_m = 0.5 * (high_m - low_m);

@@ -11,8 +11,7 @@ use crate::error::Breakdown;
 use crate::problem::period::Period;
 use quietcut_numerics::eigenvalues;
 
-/// Largest size (number of rows) of a period map for which all eigenvalues are computed from its matrix without trying
-/// block Arnoldi, which is not faster there.
+/// Largest size (number of rows) of a period map for which block Arnoldi is not tried, because it is not faster there.
 const WHOLE: usize = 110;
 
 /// Largest size (number of rows) of a period map for which [`largest`] computes all eigenvalues if block Arnoldi does
@@ -23,7 +22,7 @@ const UNSETTLED_WHOLE_MAX: usize = 400;
 ///
 /// x is the state of the structure at the start of the period, x⁺ that at its end. p are the displacements along the
 /// chip normals at the collocation nodes while teeth cut, p_τ those one tooth period earlier. `None` if the collocation
-/// equations are singular, which happens at large depths only.
+/// equations are singular.
 pub(crate) fn monodromy(period: &Period, depth_m: f64) -> Option<DMatrix<f64>> {
     let order = period.order();
     let size = order + period.ports();
@@ -58,8 +57,7 @@ pub(crate) fn monodromy(period: &Period, depth_m: f64) -> Option<DMatrix<f64>> {
     Some(map)
 }
 
-/// All Floquet multipliers of the collocated map over a tooth period, largest first. Those that only represent the
-/// discretized history are near zero.
+/// All Floquet multipliers of the collocated map over a tooth period, largest first.
 ///
 /// # Errors
 /// The collocation equations are singular, or the eigenvalues cannot be computed.
@@ -82,15 +80,15 @@ pub(crate) fn of_matrix(map: DMatrix<f64>) -> Result<Vec<Complex64>, Breakdown> 
 pub(crate) struct Candidates {
     /// Multipliers, largest first.
     pub(crate) multipliers: Vec<Complex64>,
-    /// False if larger multipliers may be missing: block Arnoldi did not converge, or the map is so non-normal that
-    /// rounding moves its eigenvalues.
+    /// False if larger multipliers may be missing: block Arnoldi did not converge, or an entry of the map (or of its
+    /// projection on a Krylov space) is so large that rounding may move the eigenvalues.
     pub(crate) is_certain: bool,
 }
 
-/// Floquet multipliers of the collocated map of at least `share` times the size of the largest.
+/// Floquet multipliers of the collocated map of at least `share` times the size of the largest, largest first.
 ///
-/// Large maps are treated by block Arnoldi, which limits the number of multipliers. If the largest exceeds [`GROWN`],
-/// the transition matrix Φ(w) gives all, unless rounding moves its eigenvalues.
+/// They are eigenvalues of the transition matrix Φ(w) if the largest of these exceeds [`GROWN`] and rounding does not
+/// move them. Otherwise block Arnoldi computes those of a large map, at most [`CROWD`](crate::criteria::CROWD).
 ///
 /// # Errors
 /// The collocation equations are singular, or the eigenvalues cannot be computed.
@@ -105,7 +103,8 @@ pub(crate) fn largest(period: &Period, depth_m: f64, share: f64) -> Result<Candi
         }
     };
     // Multipliers from the transition matrix Φ(w), which is the map without the surface of the preceding tooth (κ = w);
-    // `None` unless the largest exceeds `GROWN`, so that this surface does not act, and rounding does not move them.
+    // `None` unless the largest exceeds `GROWN`, so that this surface hardly acts, and no entry of Φ(w) is so large
+    // that rounding may move its eigenvalues.
     let grown = |transition: DMatrix<f64>| {
         let norm = transition.amax();
         let multipliers = of_matrix(transition).ok()?;
@@ -133,13 +132,14 @@ pub(crate) fn largest(period: &Period, depth_m: f64, share: f64) -> Result<Candi
 }
 
 /// Floquet multipliers of the collocated map larger than `least`, or larger than `share` times the largest if that is
-/// less, largest first. If the map is small, or block Arnoldi does not converge, smaller multipliers are included too.
+/// less, largest first. If the map is small, or block Arnoldi fails or does not converge, all smaller multipliers
+/// follow.
 ///
 /// Large maps are treated by block Arnoldi, accurate enough to start Newton's method.
 ///
 /// # Errors
-/// The collocation equations are singular, the eigenvalues cannot be computed, or block Arnoldi does not converge and
-/// the map is too large for all eigenvalues.
+/// The collocation equations are singular, the eigenvalues cannot be computed, or block Arnoldi fails or does not
+/// converge and the map is too large for all eigenvalues.
 pub(crate) fn larger_than(
     period: &Period,
     depth_m: f64,
@@ -164,8 +164,8 @@ pub(crate) fn larger_than(
 struct Map<'a> {
     period: &'a Period,
     depth_m: f64,
-    /// LU factors of I − w Q for each element of the tooth-passing period, with the axial depth w and the kernel Q,
-    /// which is the response of the displacements along the chip normals to the regenerative chips, 1/m.
+    /// LU factors of I − w Q, one for each element of the tooth period in its order, with the axial depth w and the
+    /// kernel Q, the response of the displacements along the chip normals to the regenerative chips, 1/m.
     implicit: Vec<LU<f64, Dyn, Dyn>>,
 }
 

@@ -17,8 +17,8 @@ use crate::problem::revolution_mesh::{Series, Source};
 pub(crate) struct RevolutionMap<'a> {
     revolution: Rc<Revolution<'a>>,
     depth_m: f64,
-    /// LU factors of I − w Q for each subinterval of the revolution, with the axial depth w and the kernel Q,
-    /// which is the response of the displacements along the chip normals to the regenerative chips, 1/m.
+    /// LU factors of I − w Q, one for each subinterval of the revolution in its order, with the axial depth w and the
+    /// kernel Q, the response of the displacements along the chip normals to the regenerative chips, 1/m.
     factors: Vec<LU<f64, Dyn, Dyn>>,
 }
 
@@ -26,9 +26,10 @@ pub(crate) struct RevolutionMap<'a> {
 struct Trace {
     /// State x of the structure at the end of the revolution, n × columns.
     state: DMatrix<f64>,
-    /// Displacements p along the chip normals in each element of the revolution, columns × ports.
+    /// Displacements p along the chip normals, one matrix (columns × ports) for each element of the revolution in its
+    /// order.
     seen: Vec<DMatrix<f64>>,
-    /// Regenerative chips p − p_τ in each element of the revolution, ports × columns.
+    /// Regenerative chips p − p_τ, one matrix (ports × columns) for each element of the revolution in its order.
     chips: Vec<DMatrix<f64>>,
 }
 

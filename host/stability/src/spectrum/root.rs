@@ -17,8 +17,8 @@ impl Root {
     /// Removes from `free`, the multipliers at the depth one step deeper, the one on the same branch as this
     /// multiplier, and returns it: the one whose tangent, half way between the two depths, comes closest to the tangent
     /// of this multiplier. `None` if `free` is empty, if the two are neither both complex nor both real of equal sign,
-    /// or if the two tangents miss each other half way by more than 1e-6 plus a quarter of the distance that the
-    /// multiplier travels.
+    /// or if the two tangents miss each other half way by more than 1e-6 plus [`TANGENT_MISS`] times the distance that
+    /// the multiplier travels at the mean of the two |slopes|. With `None` nothing is removed.
     pub(crate) fn take_next(&self, free: &mut Vec<Self>, step_m: f64) -> Option<Self> {
         let middle = self.multiplier + self.slope * (0.5 * step_m);
         let miss = |to: &Self| (middle - (to.multiplier - to.slope * (0.5 * step_m))).norm();

@@ -17,14 +17,15 @@ use quietcut_numerics::newton::Newton;
 use super::characteristic::{Characteristic, Workspace};
 use crate::criteria::{FINE_MARGINS, MARGINS, WINDING_ERRORS, WOUND};
 
-/// Largest number of floating-point operations of all evaluations of the characteristic function in one search: a few
-/// seconds. A choice.
+/// Largest estimated number of floating-point operations of all evaluations of the characteristic function in one
+/// search: a few seconds. A choice.
 const OPERATIONS_MAX: f64 = 3e9;
 
-/// Largest number of points on half of a circle from which a winding number is taken: a limit on computing time.
+/// Largest number of equal steps along half of a circle from whose points a winding number is taken: a limit on
+/// computing time.
 const POINTS_MAX: usize = 8192;
 
-/// Largest number of candidate multipliers from which Newton's method starts: a limit on computing time.
+/// Largest number of given candidate multipliers from which Newton's method starts: a limit on computing time.
 const CANDIDATES_MAX: usize = 6;
 
 /// Largest number of known multipliers that a search by winding number deflates to find a larger one: a limit on
@@ -52,7 +53,7 @@ pub(crate) struct Search<'a> {
 
 impl<'a> Search<'a> {
     /// Search for the largest multiplier at an axial depth, m; the characteristic matrix must be valid for complex
-    /// depths of up to five times that depth.
+    /// depths with absolute values of up to five times that depth.
     pub(crate) fn new(characteristic: &'a Characteristic, depth_m: f64) -> Self {
         Self {
             characteristic,
@@ -75,9 +76,9 @@ impl<'a> Search<'a> {
         slope.is_finite().then_some(slope)
     }
 
-    /// Number of Floquet multipliers with |μ| larger than `radius`; `None` if one lies so close to the circle |μ| =
-    /// `radius` that the largest number of points does not resolve it, if evaluations run out, or if a result is not
-    /// finite.
+    /// Number of Floquet multipliers with |μ| larger than `radius`; `None` if the winding number does not converge (a
+    /// multiplier lies too close to the circle |μ| = `radius`) or is negative, or if [`slope()`](Self::slope) has no
+    /// value at one of the points.
     pub(crate) fn count_beyond(&mut self, radius: f64) -> Option<usize> {
         use std::f64::consts::PI;
         let at = |angle: f64| Complex64::from_polar(radius.recip(), angle);
@@ -131,7 +132,7 @@ impl<'a> Search<'a> {
     /// Floquet multiplier μ = 1/z to which Newton's method converges from z = `start`, with the `known` multipliers
     /// deflated; of a conjugate pair the upper one. `None` without convergence, or if |μ| is below [`WOUND`].
     fn newton(&mut self, start: Complex64, known: &[Complex64]) -> Option<Complex64> {
-        // The polynomials of the elements in the complex depth w (1 − z) are not valid for |z| larger than 1/`WOUND`.
+        // The polynomials of the elements in the complex depth w (1 − z) are made for |z| up to 1/`WOUND`.
         let is_valid = |z: Complex64| z.is_finite() && z.norm() <= WOUND.recip();
         let found = Newton::new(15, 1e-9).solve(start, |&z: &Complex64| {
             if z != start && !is_valid(z) {
@@ -154,8 +155,8 @@ impl<'a> Search<'a> {
     }
 
     /// Largest Floquet multiplier found, and the radius beyond which the winding number counts none. `candidates` are
-    /// approximate multipliers from which Newton's method starts: the first `CANDIDATES_MAX` of those that exceed
-    /// [`WOUND`] and lie on the real axis or above it.
+    /// approximate multipliers from which Newton's method starts: the first `CANDIDATES_MAX` of those with |μ| above
+    /// [`WOUND`] that lie on the real axis or above it.
     pub(crate) fn largest(&mut self, candidates: &[Complex64]) -> LargestMultiplier {
         let mut known: Vec<Complex64> = Vec::new();
         let mut best: Option<Complex64> = None;

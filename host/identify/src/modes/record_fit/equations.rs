@@ -100,7 +100,7 @@ fn eliminated(gram: &DMatrix<f64>, structure: usize, transient: usize) -> Option
 }
 
 /// Contribution of the uncertainty of the estimated forces to the normal matrix Re(Jᴴ J), for forces with the
-/// covariance P = V_f − V_f Gᴴ C⁻¹ G V_f, where G = sⁿ H.
+/// covariance P = V_f − V_f Gᴴ C⁻¹ G V_f, where G = sⁿ H. `None` if a covariance is not positive definite.
 pub(super) fn of_force_noise(
     data: &Data<'_>,
     record: usize,

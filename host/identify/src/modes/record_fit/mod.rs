@@ -149,7 +149,8 @@ impl Objective for RecordFit<'_> {
     }
 }
 
-/// Levenberg–Marquardt iteration for modes and transients with given noise variances; `None` if it does not converge.
+/// Levenberg–Marquardt iteration for modes and transients with given noise variances; `None` if it does not end within
+/// `STEPS_MAX` steps, or if it cannot be evaluated at the start or linearized.
 fn least_squares(data: &Data<'_>, variances: &[Variances], unknowns: Unknowns) -> Option<Unknowns> {
     let mut fit = RecordFit {
         data,
@@ -162,7 +163,8 @@ fn least_squares(data: &Data<'_>, variances: &[Variances], unknowns: Unknowns) -
 }
 
 /// Result of the fit with its covariance B⁻¹ M B⁻¹. M is the covariance of the gradient of half the cost Σ eᴴ C⁻¹ e,
-/// and B is the curvature of half the cost; the uncertainty of the estimated forces makes M larger than B/2.
+/// and B is the curvature of half the cost; the uncertainty of the estimated forces makes M larger than B/2. `None` if
+/// a covariance is not positive definite or normal equations are singular.
 fn finished(data: &Data<'_>, variances: &[Variances], mut unknowns: Unknowns) -> Option<Refined> {
     let directions = unknowns
         .structure

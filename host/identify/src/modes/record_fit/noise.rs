@@ -32,8 +32,8 @@ const BAND: usize = 64;
 /// variance; below the expected 0.61.
 const EIGENVALUE: f64 = 0.5;
 
-/// Ridge on the diagonal of the Fisher scoring matrix for the noise variances, relative to its trace. A choice, near
-/// the rounding error.
+/// Ridge on the diagonal of the Fisher scoring matrix, scaled by the current noise variances, relative to the trace of
+/// the scaled matrix. A choice, near the rounding error.
 const RIDGE: f64 = 1e-12;
 
 /// Smallest start value of the noise variance of a force channel, relative to the mean square of its transform in the
@@ -41,7 +41,7 @@ const RIDGE: f64 = 1e-12;
 const FORCE_START: f64 = 1e-6;
 
 /// Start values of the noise variances of a record: the whole residual is attributed to noise of the responses, and the
-/// variances of the forces start at their lower bounds.
+/// variances of the forces start at their lower bounds, or at `FORCE_START` times the mean square if that is larger.
 pub(super) fn start(data: &Data<'_>, record: usize, unknowns: &Unknowns) -> Variances {
     let spectra = &data.records[record];
     let mut variances = Variances {
@@ -145,7 +145,8 @@ pub(super) fn update(data: &Data<'_>, record: usize, unknowns: &Unknowns, varian
 }
 
 /// Solution of the scoring equations A v = b for the noise variances v with lower bounds: variances at a bound are
-/// fixed there and the others are solved again.
+/// fixed there and the others are solved again. No variance falls below `SHRINK` times its current value. `None` if the
+/// equations are singular.
 fn scored(normal: &DMatrix<f64>, right: &DVector<f64>, current: &[f64], bounds: &[f64]) -> Option<Vec<f64>> {
     let mut next = current.to_vec();
     let mut free: Vec<usize> = (0..current.len()).collect();
@@ -181,8 +182,8 @@ fn scored(normal: &DMatrix<f64>, right: &DVector<f64>, current: &[f64], bounds: 
 
 /// Divides the apparent noise of each force into measurement noise and unmeasured forces. The variance V_f of the
 /// measurement noise is at most the apparent noise. It is the noise plateau of the force spectrum, if there is one;
-/// else it is the fraction of the apparent noise, common to all forces, that the smallest eigenvalue of the spectral
-/// matrix of the forces allows in every band. The rest is unmeasured force that acts on the structure.
+/// else it is the fraction of the apparent noise, common to all forces without a plateau, that the smallest eigenvalue
+/// of the spectral matrix of the forces allows in every band. The rest is unmeasured force that acts on the structure.
 fn divide(data: &Data<'_>, record: usize, unknowns: &Unknowns, variances: &mut Variances) {
     let spectra = &data.records[record];
     let count = spectra.frequency_hz.len();
@@ -215,7 +216,7 @@ fn divide(data: &Data<'_>, record: usize, unknowns: &Unknowns, variances: &mut V
 }
 
 /// Fisher scoring matrix A_cd = Σ tr(C⁻¹B_cC⁻¹B_d) and right-hand side b_c = Σ eᴴC⁻¹B_cC⁻¹e for the noise variances of
-/// the channels c.
+/// the channels c: first the responses, then the forces. `None` if C is not positive definite at some line.
 fn scores(
     data: &Data<'_>,
     record: usize,

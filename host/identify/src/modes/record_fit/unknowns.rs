@@ -21,7 +21,7 @@ pub(super) struct Unknowns {
 pub(super) struct Transient {
     /// Residues c_pr of the transient, by response and mode.
     pub(super) residues: Vec<Vec<Complex64>>,
-    /// Polynomial coefficients a_pj, by response.
+    /// Polynomial coefficients a_pj, by response and power j.
     pub(super) smooth: Vec<[f64; SMOOTH]>,
 }
 

@@ -21,9 +21,10 @@ pub struct ChannelNoise {
 /// Noise variances of the channels of one record, in each frequency line of their transforms.
 #[derive(Clone, Debug)]
 pub(super) struct Variances {
-    /// Noise variances of the responses.
+    /// Noise variances of the responses, by response channel of the record.
     pub(super) responses: Vec<f64>,
-    /// Apparent noise variances of the forces, V_f + V_d: V_f of measurement noise and V_d of unmeasured forces.
+    /// Apparent noise variances of the forces, V_f + V_d, by force channel of the record: V_f of measurement noise and
+    /// V_d of unmeasured forces.
     pub(super) forces: Vec<f64>,
     /// Variances V_f of the measurement noise of the forces; the rest of the apparent noise is V_d of unmeasured
     /// forces.
