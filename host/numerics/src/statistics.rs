@@ -214,8 +214,8 @@ fn incomplete_beta(a: f64, b: f64, x: f64) -> f64 {
 
 /// ln B(a, b) = ln Γ(a) + ln Γ(b) − ln Γ(a + b).
 ///
-/// For large arguments the logarithms of Γ cancel. Stirling's series of their difference does not (Abramowitz & Stegun
-/// 6.1.41).
+/// If the larger argument l is large, ln Γ(l) and ln Γ(a + b) cancel. Their difference is then computed from Stirling's
+/// series, which does not cancel (Abramowitz & Stegun 6.1.41).
 fn log_beta(a: f64, b: f64) -> f64 {
     let (small, large) = (a.min(b), a.max(b));
     // For arguments from 20 on, four terms of Stirling's series are accurate to 1e-14.

@@ -14,8 +14,7 @@ use quietcut_stability::{
     default_speeds, needs_orbit, spaced,
 };
 
-/// Number of spindle speeds at equal ratios in a stability chart, to which those of recorded cuts are added;
-/// [`FEW_SPEEDS`] if each limit takes seconds to compute.
+/// Number of spindle speeds at equal ratios in a stability chart, to which those of recorded cuts are added.
 const SPEEDS: usize = 41;
 
 /// Number of spindle speeds at equal ratios in a stability chart whose limits take seconds each, as limits about forced
@@ -106,8 +105,7 @@ pub struct Lobes {
     pub method_after: &'static str,
     /// Stability limits before and after the extension, one entry for each speed of the chart, by ascending speed.
     pub speeds: Vec<Change>,
-    /// Right and wrong predictions for trial and recorded cuts before and after the extension; `None` without such
-    /// cuts.
+    /// Right and wrong predictions for trial and recorded cuts, before and after; `None` without such cuts.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub calls: Option<CallsChange>,
     /// Stability charts of the case without the extension and of the extended case, in this order.

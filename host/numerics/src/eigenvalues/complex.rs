@@ -194,7 +194,9 @@ fn of_hessenberg(mut m: DMatrix<Complex64>) -> Result<Vec<Complex64>, Eigenvalue
     Ok(found)
 }
 
-/// One QR step with a shift on rows and columns `first..=last`: M − shift = Q R is replaced by R Q + shift.
+/// One QR step with a shift on the diagonal block of rows and columns `first..=last` of a Hessenberg matrix: this block
+/// minus the shift, = Q R, is replaced by R Q + shift. Entries outside the block stay as they are, since only
+/// eigenvalues are wanted.
 fn sweep(m: &mut DMatrix<Complex64>, first: usize, last: usize, shift: Complex64) {
     for i in first..=last {
         m[(i, i)] -= shift;

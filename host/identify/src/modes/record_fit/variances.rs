@@ -26,8 +26,8 @@ pub(super) struct Variances {
     /// Apparent noise variances of the forces, V_f + V_d, by force channel of the record: V_f of measurement noise and
     /// V_d of unmeasured forces.
     pub(super) forces: Vec<f64>,
-    /// Variances V_f of the measurement noise of the forces; the rest of the apparent noise is V_d of unmeasured
-    /// forces.
+    /// Variances V_f of the measurement noise of the forces, by force channel of the record; the rest of the apparent
+    /// noise `forces` is V_d of unmeasured forces.
     pub(super) measured: Vec<f64>,
     /// Covariance sⁿ H V_d Hᴴ s̄ⁿ of the responses to unmeasured forces at each line, with the structure's FRF H of the
     /// previous round.
