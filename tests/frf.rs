@@ -324,3 +324,90 @@ fn the_interval_of_an_unfiltered_record_holds_what_a_fast_record_shows() {
         assert!(to - from < 0.1 * truth, "{from} {to}");
     }
 }
+
+/// Multisines of the virtual rig, a linear and a cubic structure, through the command; then a mass on the tool, and two levels.
+#[test]
+fn a_multisine_tells_noise_from_distortion_and_levels_from_changes() {
+    let folder = folder();
+    let here: &Path = folder.path();
+    let case = |name: &str, mass: f64, cubic: &str| {
+        let text = format!(
+            "[structure]\nkind = \"matrices\"\ndirections = [\"y\"]\nmass = [[{mass}]]\ndamping = [[305.0]]\nstiffness = [[2.26e6]]\n{cubic}"
+        );
+        std::fs::write(here.join(name), text).expect("written");
+    };
+    case("linear.toml", 188.0, "");
+    case("heavier.toml", 192.0, "");
+    case("cubic.toml", 188.0, "cubic_stiffness = [[-5e12]]\n");
+    let simulated = |case: &str, more: &str, out: &str| {
+        let words = format!(
+            "simulate {case} --experiment multisine --frequency-hz 14:21 --period-s 16 --sample-rate-hz 256 --noise-percent 1 {more} --out {out}"
+        );
+        let words: Vec<&str> = words.split_whitespace().collect();
+        assert_eq!(quietcut(here, &words).status, Some(0), "{words:?}");
+    };
+    let answer = |words: &str| {
+        let words: Vec<&str> = words.split_whitespace().collect();
+        quietcut(here, &words).json()
+    };
+    for (case, level) in [("linear", 5.0), ("heavier", 5.0), ("cubic", 5.0)] {
+        for seed in [1, 2] {
+            simulated(
+                &format!("{case}.toml"),
+                &format!("--force-n {level} --seed {seed}"),
+                &format!("{case}-{seed}.csv"),
+            );
+        }
+        let found = answer(&format!(
+            "frf {case}-1.csv {case}-2.csv --out {case}-frf.csv --json"
+        ));
+        let part = &found["parts"][0];
+        assert_eq!(part["excitation"], "multisine");
+        assert_eq!(part["period_s"], 16.0);
+        assert_eq!(part["realizations"], 2);
+        let distortion = &part["distortion"][0];
+        assert_eq!(
+            distortion["distortion_db"].is_null(),
+            case != "cubic",
+            "{distortion}"
+        );
+        assert!(
+            distortion["noise_db"].as_f64().expect("a number") < -30.0,
+            "{distortion}"
+        );
+    }
+    let changed = answer("frf --compare linear-frf.csv heavier-frf.csv --json");
+    assert_eq!(changed["has_changed"], true);
+    let number = |value: &Value| value.as_f64().expect("a number");
+    let change = &changed["peaks"][0]["frequency_hz"]["change"];
+    // √(188/192) of 17.45 Hz.
+    let expected = (2.26e6_f64 / 188.0).sqrt() / TAU * ((188.0_f64 / 192.0).sqrt() - 1.0);
+    assert!(
+        (number(&change["value"]) - expected).abs() < 0.02 && number(&change["ci90"][1]) < 0.0,
+        "{change} {expected}"
+    );
+    let same = answer("frf --compare linear-frf.csv linear-frf.csv --json");
+    assert_eq!(same["has_changed"], false);
+    quietcut(
+        here,
+        &[
+            "frf",
+            "--compare",
+            "linear-frf.csv",
+            "heavier-frf.csv",
+            "--out",
+            "change.svg",
+        ],
+    );
+    let svg = std::fs::read_to_string(here.join("change.svg")).expect("a picture");
+    assert!(svg.contains("before") && svg.contains("after"));
+
+    simulated("cubic.toml", "--force-n 1 --seed 3", "low.csv");
+    let levels = answer("frf cubic-1.csv low.csv --by-level --json");
+    let found = &levels["dependences"][0];
+    assert!(
+        found["is_nonlinear"] == true && number(&found["frequency"]["value"]) < 0.0,
+        "{levels}"
+    );
+    quietcut(here, &["frf", "low.csv", "--by-level"]).refused(&["one force level", "--by-level"]);
+}

@@ -73,6 +73,13 @@ pub(super) fn run(args: &Args) -> Result<(), Error> {
         )));
     }
     let peaks: Vec<Vec<(String, FittedPeak)>> = levels.iter().map(largest_peaks).collect();
+    if peaks.iter().all(Vec::is_empty) {
+        return Err(Error::input(format!(
+            "{}: at no force level does a receptance have a peak with eight settled lines that falls to half its power on both sides; take finer \
+             steps over a wider band and longer dwells, or test a stepped sine by identify --method linearity",
+            args.recordings[0].display()
+        )));
+    }
     let mut warnings: Vec<String> = Vec::new();
     for (level, peaks) in levels.iter().zip(&peaks) {
         for warning in &level.measurement.warnings {
