@@ -349,7 +349,7 @@ mod tests {
         // 9000 samples of rest, then a sine of 40 samples per period with noise at a quarter of its amplitude.
         let (rest, period, periods) = (9000, 40, 25);
         let sine = |i: usize| (std::f64::consts::TAU * (i as f64 + 0.5) / period as f64).sin();
-        let noise = |i: usize| if i % 2 == 0 { 0.25 } else { -0.25 };
+        let noise = |i: usize| if i.is_multiple_of(2) { 0.25 } else { -0.25 };
         let samples: Vec<f64> = (0..rest)
             .map(|_| 0.0)
             .chain((0..period * periods).map(|i| sine(i) + noise(i)))

@@ -2,7 +2,7 @@
 //!
 //! The force law is fitted by least squares between force and motion *within a band* of frequencies. Force and every
 //! term of the law, nonlinear terms included, pass the same filter: the filtered signals satisfy the same equation, and
-//! noise of derivatives outside the band has no effect. A free decay is fitted in weak form ([`free_decay`]). If a force acts and the law has a spring, the error of the
+//! noise of derivatives outside the band has no effect. A free decay is fitted in weak form. If a force acts and the law has a spring, the error of the
 //! force is weighted by the receptance of the law and becomes an error of the *motion*, which carries the noise
 //! (Sanathanan–Koerner weighting). One motion channel is sufficient; displacement, velocity and acceleration follow
 //! from it by differentiation or integration.
