@@ -118,7 +118,7 @@ fn ten_commands_lead_from_an_empty_folder_to_a_chart_and_a_table() {
     };
     let (found, truth) = (limit("mill/case.toml"), limit(&virtual_machine()));
     assert!((found / truth - 1.0).abs() < 0.1, "{found} for {truth}");
-    // A cut that was recorded later is diagnosed next.
+    // The outcome of a cut that was recorded later is added to the table of tried cuts, and then compared with the chart.
     age(folder);
     done(
         folder,
@@ -128,8 +128,13 @@ fn ten_commands_lead_from_an_empty_folder_to_a_chart_and_a_table() {
         ),
     );
     let command = next(folder)["command"].as_str().expect("a command").to_string();
+    let replay = "replay mill/cuts/first.csv --table mill/table.qct --tried mill/tried.csv";
+    assert_eq!(command, format!("quietcut {replay}"));
+    age(folder);
+    done(folder, replay);
+    let command = next(folder)["command"].to_string();
     assert!(
-        command.starts_with("quietcut diagnose mill/case.toml mill/cuts/first.csv"),
+        command.contains("lobes mill/case.toml") && command.contains("--cuts mill/tried.csv"),
         "{command}"
     );
 }
@@ -191,6 +196,55 @@ fn what_is_missing_is_named_with_the_option_that_gives_it() {
         "line 2",
         "diametre-mm",
     ]);
+}
+
+#[test]
+fn a_case_without_limits_is_completed_once() {
+    let folder = folder();
+    let folder = folder.path();
+    fs::create_dir(folder.join("mill")).expect("a folder");
+    let before = fs::read_to_string(virtual_machine()).expect("a case");
+    let path = folder.join("mill/case.toml");
+    fs::write(&path, &before).expect("written");
+    let step = next(folder);
+    assert_eq!(step["command"], "quietcut setup mill --rpm FIRST:LAST", "{step}");
+    quietcut(folder, &["setup", "mill"]).refused(&["setup needs --rpm;"]);
+    quietcut(folder, &["setup", "mill", "--rpm", "600:2400", "--teeth", "3"]).refused(&["--teeth", "[tool]"]);
+    done(folder, "setup mill --rpm 600:2400");
+    let after = fs::read_to_string(&path).expect("the case");
+    assert!(after.starts_with(before.trim_end()), "{after}");
+    assert!(
+        after.contains("rpm_min = 600.0") && after.contains("rpm_max = 2400.0"),
+        "{after}"
+    );
+    // It is asked once: the chart is next, within the limits.
+    let command = next(folder)["command"].to_string();
+    assert!(
+        command.contains("lobes mill/case.toml --rpm 600:2400:"),
+        "{command}"
+    );
+    quietcut(folder, &["setup", "mill", "--rpm", "600:2400"]).refused(&["complete", "--replace"]);
+    // Any section that is missing is asked for and added.
+    let without_cut = before.replace("[cut]", "[limits]\nrpm_min = 600.0\nrpm_max = 2400.0\n#");
+    let without_cut: Vec<&str> = without_cut
+        .lines()
+        .filter(|line| {
+            !["start_deg", "exit_deg", "feed_per"]
+                .iter()
+                .any(|key| line.starts_with(key))
+        })
+        .collect();
+    fs::write(&path, without_cut.join("\n")).expect("written");
+    quietcut(folder, &["setup", "mill"]).refused(&["--down-milling-mm", "--feed-per-tooth-mm"]);
+    done(
+        folder,
+        "setup mill --down-milling-mm 6.35 --feed-per-tooth-mm 0.15",
+    );
+    let after = fs::read_to_string(&path).expect("the case");
+    assert!(
+        after.contains("start_deg = 90.0") && after.contains("feed_per_tooth_mm = 0.15"),
+        "{after}"
+    );
 }
 
 #[test]

@@ -56,6 +56,15 @@ pub(crate) const COARSE_TABLE: f64 = 0.01;
 /// as ln of the depth, so that limits are accurate to about 1e-7; the threshold is ten times that.
 pub(crate) const UNCHANGED_LIMIT: f64 = 1e-6;
 
+/// Share of its axial depth by which a tried cut must lie beyond the interval of the stability limit to contradict it.
+/// Intervals of limits contain the errors of the identification, but not the scatter of cutting coefficients between
+/// batches of a material. Unfounded.
+pub(crate) const CONTRADICTED_BEYOND: f64 = 0.1;
+
+/// Probability below which so many contradicting cuts are no chance: the usual level of significance of a test. Of five
+/// cuts two must contradict the limits, of ten three.
+pub(crate) const CONTRADICTION_BY_CHANCE: f64 = 0.05;
+
 // Reports
 
 /// Relative change of the advised spindle speed up to which the speed counts as unchanged in the output of `replay` and

@@ -161,6 +161,14 @@ pub(crate) const LARGEST_DAMPING_RATIO: f64 = 0.3;
 
 // Plausibility of a test
 
+/// Largest share of a record in which the force of a hammer acts. A tooth of a milling cutter cuts over more of its
+/// revolution than 7°, which is this share. A choice.
+pub(crate) const STRUCK_SHARE: f64 = 0.02;
+
+/// Smallest share of the energy of a force that lies in its pulses if it is that of a hammer. Between impacts there is
+/// only the noise of the sensor; a random force has nearly all of its energy outside of such pulses. A choice.
+pub(crate) const STRUCK_ENERGY: f64 = 0.9;
+
 /// Smallest ratio of the effective number of samples of the force to that of the response above which the two may be
 /// swapped. In a test with a hammer the response rings longer than the force acts, which is a ratio below 1. The
 /// distance from 1 is a choice.

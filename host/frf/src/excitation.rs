@@ -1,6 +1,8 @@
 //! Kinds of excitation of a structure.
 
-use quietcut_recording::{Sidecar, TestKind};
+use quietcut_recording::{Quantity, RecordedCut, Recording, Sidecar, TestKind};
+
+use super::hammer::is_struck;
 
 /// Kind of excitation; it selects how a record is divided into segments.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -20,7 +22,7 @@ pub enum Excitation {
 impl Excitation {
     /// Kind of excitation of a recording, from the kind of test and the speed ramp in its sidecar; random for every
     /// other kind, and if the sidecar names none.
-    pub(super) fn of(sidecar: &Sidecar) -> Self {
+    fn of(sidecar: &Sidecar) -> Self {
         let glides = sidecar.cut.is_some_and(|cut| cut.last_rpm.is_some());
         match sidecar.kind {
             Some(TestKind::Cutting) if glides => Self::Sweep,
@@ -30,6 +32,23 @@ impl Excitation {
             Some(TestKind::Shaker | TestKind::Cutting | TestKind::Idle | TestKind::FreeDecay) | None => {
                 Self::Random
             }
+        }
+    }
+
+    /// Kind of excitation of a recording: that of its sidecar; if this names neither a kind nor a cut, a hammer test if the
+    /// only force of the recording is that of a hammer.
+    pub(super) fn of_recording(recording: &Recording) -> Self {
+        let sidecar = &recording.sidecar;
+        let mut forces = recording
+            .channels
+            .iter()
+            .filter(|channel| channel.quantity == Quantity::Force);
+        let is_free = sidecar.kind.is_none() && sidecar.cut.is_none_or(|cut| cut == RecordedCut::default());
+        match (forces.next(), forces.next()) {
+            (Some(force), None) if is_free && is_struck(&force.samples, recording.sample_rate_hz) => {
+                Self::Hammer
+            }
+            _ => Self::of(sidecar),
         }
     }
 

@@ -36,7 +36,7 @@ pub fn measure_levels(
         let channels = TestChannels::of(recording, &settings.channels)?;
         let excitation = settings
             .excitation
-            .unwrap_or_else(|| Excitation::of(&recording.sidecar));
+            .unwrap_or_else(|| Excitation::of_recording(recording));
         if excitation != Excitation::StepSine {
             others.push((force_level(&channels, excitation), recording));
             continue;

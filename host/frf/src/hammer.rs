@@ -5,7 +5,8 @@ use quietcut_numerics::statistics::median;
 use super::FrfError;
 use super::clipping::Clipping;
 use super::criteria::{
-    BOUNCE_S, LEAST_IMPACT, PULSE_ABOVE_NOISE, PULSE_END, PULSE_END_ABOVE_NOISE, SECOND_PULSE,
+    BOUNCE_S, LEAST_IMPACT, PULSE_ABOVE_NOISE, PULSE_END, PULSE_END_ABOVE_NOISE, SECOND_PULSE, STRUCK_ENERGY,
+    STRUCK_SHARE,
 };
 use super::test_channels::TestChannels;
 
@@ -168,6 +169,25 @@ pub(super) fn segments(
         cut.used.push(impact);
     }
     Ok(cut)
+}
+
+/// True if a force is that of a hammer: its energy lies in few short pulses of one sign.
+pub(super) fn is_struck(force: &[f64], rate: f64) -> bool {
+    let impacts = impacts(force, rate);
+    let middle = median(&mut force.to_vec()).unwrap_or(0.0);
+    let energy = |samples: &[f64]| -> f64 { samples.iter().map(|f| (f - middle).powi(2)).sum() };
+    let samples: usize = impacts.iter().map(|impact| impact.last - impact.first + 1).sum();
+    let struck: f64 = impacts
+        .iter()
+        .map(|impact| energy(&force[impact.first..=impact.last]))
+        .sum();
+    let has_one_sign = impacts
+        .windows(2)
+        .all(|pair| pair[0].peak_n * pair[1].peak_n > 0.0);
+    !impacts.is_empty()
+        && has_one_sign
+        && samples as f64 <= STRUCK_SHARE * force.len() as f64
+        && struck >= STRUCK_ENERGY * energy(force)
 }
 
 /// Amplitude (√2 · RMS) of the last twentieth of a segment of a response, as a fraction of the peak of the segment.

@@ -166,7 +166,7 @@ fn grouped<'a>(
     for channels in channels {
         let stated = settings
             .excitation
-            .unwrap_or_else(|| Excitation::of(&channels.recording.sidecar));
+            .unwrap_or_else(|| Excitation::of_recording(channels.recording));
         if matches!(stated, Excitation::Random | Excitation::Hammer)
             && let Some(what) = test_plausibility::swapped(&channels)
         {

@@ -63,7 +63,7 @@ pub fn record_spectra(
     let is_continuous = |recording: &Recording| {
         let excitation = settings
             .excitation
-            .unwrap_or_else(|| Excitation::of(&recording.sidecar));
+            .unwrap_or_else(|| Excitation::of_recording(recording));
         matches!(excitation, Excitation::Random | Excitation::Sweep)
     };
     if !recordings.iter().all(is_continuous) {

@@ -6,6 +6,7 @@ use nalgebra::Matrix3;
 use num_complex::Complex64;
 
 use super::FrfError;
+use super::criteria::UNRELATED;
 use quietcut_model::structure::Direction;
 
 /// One receptance H_ij(f): displacement in direction i per force in direction j, m/N.
@@ -36,6 +37,26 @@ impl Frf {
     /// Name of the receptance from its directions, as in a column header: `xy` is displacement in x due to force in y.
     pub fn name(&self) -> String {
         format!("{}{}", self.response, self.force)
+    }
+
+    /// Index of the line with the largest |H|. Where the coherence is known, only lines count at which at least half of
+    /// the response comes from the force, if there are any: divided by ω², the noise of an accelerometer is larger at the
+    /// first lines than a resonance.
+    pub fn peak_line(&self) -> usize {
+        let largest = |of: &dyn Fn(usize) -> bool| {
+            (0..self.receptance.len())
+                .filter(|line| of(*line))
+                .max_by(|&a, &b| self.receptance[a].norm().total_cmp(&self.receptance[b].norm()))
+        };
+        largest(&|line| self.is_related(line))
+            .or_else(|| largest(&|_| true))
+            .unwrap_or(0)
+    }
+
+    /// True if at least half of the response at a line comes from the force, or if the coherence is not known.
+    pub(crate) fn is_related(&self, line: usize) -> bool {
+        let coherence = self.coherence.as_ref().and_then(|coherence| coherence.get(line));
+        coherence.is_none_or(|coherence| *coherence >= UNRELATED)
     }
 }
 
@@ -171,6 +192,22 @@ mod tests {
             receptance: values.iter().map(|&value| Complex64::from(value)).collect(),
             coherence: None,
         }
+    }
+
+    #[test]
+    fn the_peak_is_a_line_that_the_force_excites() {
+        let value = |size: f64| Complex64::new(0.0, -size);
+        let mut entry = Frf {
+            response: Direction::X,
+            force: Direction::X,
+            receptance: vec![value(9.0), value(1.0), value(3.0), value(2.0)],
+            coherence: Some(vec![0.2, 0.9, 0.98, 0.9]),
+        };
+        assert_eq!(entry.peak_line(), 2);
+        entry.coherence = Some(vec![0.2; 4]);
+        assert_eq!(entry.peak_line(), 0);
+        entry.coherence = None;
+        assert_eq!(entry.peak_line(), 0);
     }
 
     #[test]

@@ -330,11 +330,12 @@ pub(super) fn of_table(table: &FrfTable, has_periodic_force: bool) -> Vec<String
     for entry in table.entries() {
         let name = entry.name();
         let size = |line: usize| entry.receptance[line].norm();
-        let Some(peak) = (0..entry.receptance.len()).max_by(|&a, &b| size(a).total_cmp(&size(b))) else {
-            continue;
-        };
-        // The mean of the sine of the phase, weighted with |H|²: −1 at the resonances of a passive drive point.
-        let (imaginary, power) = entry.receptance.iter().fold((0.0, 0.0), |(sum, all), h| {
+        let peak = entry.peak_line();
+        // The mean of the sine of the phase, weighted with |H|²: −1 at the resonances of a passive drive point. Lines whose
+        // response is mostly noise have any phase, and as accelerations divided by ω² the largest |H| of all.
+        let related = (0..entry.receptance.len()).filter(|line| entry.is_related(*line));
+        let (imaginary, power) = related.fold((0.0, 0.0), |(sum, all), line| {
+            let h = entry.receptance[line];
             (sum + h.im * h.norm(), all + h.norm_sqr())
         });
         let phase = if power > 0.0 { imaginary / power } else { 0.0 };

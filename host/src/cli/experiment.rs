@@ -1,11 +1,12 @@
 //! `quietcut simulate --experiment`: a simulated vibration test of the structure.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::ValueEnum;
 use serde::Serialize;
 
 use super::channels::Channels;
+use super::output_recordings::OutputRecordings;
 use super::{Error, Output, Range, non_negative, positive};
 use crate::case::Case;
 use crate::recording::Quantity;
@@ -101,7 +102,7 @@ pub(super) struct Common<'a> {
     pub(super) seconds: Option<f64>,
     pub(super) sample_rate_hz: Option<f64>,
     pub(super) seed: u64,
-    pub(super) out: &'a Path,
+    pub(super) out: &'a OutputRecordings,
     pub(super) effects: &'a [String],
     pub(super) channels: &'a Channels,
 }
@@ -109,6 +110,8 @@ pub(super) struct Common<'a> {
 #[derive(Debug, Serialize)]
 struct ExperimentOutput {
     recording: PathBuf,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    copies: Vec<PathBuf>,
     kind: crate::recording::TestKind,
     direction: &'static str,
     sample_rate_hz: f64,
@@ -150,10 +153,12 @@ pub(super) fn run(
                 .unwrap_or_else(|| default_rate_hz(kind, options)),
         )
     };
-    let (mut recording, statistics) = rig.record(structure, common.out).map_err(|error| input(&error))?;
+    let (mut recording, statistics) = rig
+        .record(structure, &common.out.first)
+        .map_err(|error| input(&error))?;
     recording.sidecar.posture = case.posture.recorded();
     common.channels.add_noise(&mut recording, common.seed)?;
-    recording.write(common.out)?;
+    common.out.write(&recording)?;
     let largest = recording
         .channels
         .iter()
@@ -161,7 +166,8 @@ pub(super) fn run(
         .flat_map(|channel| &channel.samples)
         .fold(0.0_f64, |a, b| a.max(b.abs()));
     let answer = ExperimentOutput {
-        recording: common.out.into(),
+        recording: common.out.first.clone(),
+        copies: common.out.copies.clone(),
         kind: rig.signal.kind(),
         direction: direction.name(),
         sample_rate_hz: recording.sample_rate_hz,

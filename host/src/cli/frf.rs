@@ -70,14 +70,25 @@ fn check_folding(measurement: &mut Measurement) -> Result<(), Error> {
     let at_peak = |(entry, folding): (&Frf, &Vec<f64>)| {
         let excited = |line: usize| entry.receptance[line].norm() / folding[line].max(f64::MIN_POSITIVE);
         let peak = (0..folding.len()).max_by(|&a, &b| excited(a).total_cmp(&excited(b)));
-        (entry.name(), peak.map_or(0.0, |peak| folding[peak]))
+        let size = peak.map_or(0.0, |peak| entry.receptance[peak].norm());
+        (entry.name(), peak.map_or(0.0, |peak| folding[peak]), size)
     };
-    let worst = measurement
+    let peaks: Vec<(String, f64, f64)> = measurement
         .table
         .entries()
         .iter()
         .zip(&measurement.folding)
         .map(at_peak)
+        .collect();
+    // Limits follow from all receptances together: the error of a small cross receptance counts as a part of the largest
+    // receptance.
+    let largest = peaks
+        .iter()
+        .map(|(.., size)| *size)
+        .fold(f64::MIN_POSITIVE, f64::max);
+    let worst = peaks
+        .into_iter()
+        .map(|(name, error, size)| (name, error * size / largest))
         .max_by(|a, b| a.1.total_cmp(&b.1));
     let Some((name, error)) = worst.filter(|(_, error)| *error > 0.0) else {
         return Ok(());
@@ -86,7 +97,7 @@ fn check_folding(measurement: &mut Measurement) -> Result<(), Error> {
                   anti_aliasing = true under [channels.fx] and under the channel of the response in the sidecar";
     if error > LARGEST_FOLDING {
         return Err(Error::input(format!(
-            "{}: content above half the sample rate folds into the record and may change the peak of H{name} by {:.0} %, more than {:.0} %: {remedy}",
+            "{}: content above half the sample rate folds into the record and may change the peak of H{name} by {:.0} % of the largest peak, more than {:.0} %: {remedy}",
             measurement.table.path().display(),
             100.0 * error,
             100.0 * LARGEST_FOLDING
@@ -94,7 +105,7 @@ fn check_folding(measurement: &mut Measurement) -> Result<(), Error> {
     }
     if error > SMALL_FOLDING {
         measurement.warnings.push(format!(
-            "content above half the sample rate folds into the record: it may change the peak of H{name} by {:.1} %, which is in its interval; {remedy}",
+            "content above half the sample rate folds into the record: it may change the peak of H{name} by {:.1} % of the largest peak, which is in its interval; {remedy}",
             100.0 * error
         ));
     }

@@ -38,6 +38,8 @@ pub(super) struct MillingRig {
 #[derive(Debug, Serialize)]
 struct MillingRigOutput {
     recording: PathBuf,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    copies: Vec<PathBuf>,
     sample_rate_hz: f64,
     samples: usize,
     largest_displacement_mm: f64,
@@ -91,7 +93,7 @@ pub(super) fn run(
     };
     let tachometer = TachometerModel::ONE_MARK;
     let (mut recording, statistics) = cut
-        .record(case, recorder, tachometer, common.out)
+        .record(case, recorder, tachometer, &common.out.first)
         .map_err(|error| input(&error))?;
     let largest = recording
         .channels
@@ -100,13 +102,14 @@ pub(super) fn run(
         .flat_map(|channel| &channel.samples)
         .fold(0.0_f64, |a, b| a.max(b.abs()));
     common.channels.add_noise(&mut recording, common.seed)?;
-    recording.write(common.out)?;
+    common.out.write(&recording)?;
     let forces = recording
         .channels
         .iter()
         .filter(|channel| channel.quantity == Quantity::Force);
     let answer = MillingRigOutput {
-        recording: common.out.into(),
+        recording: common.out.first.clone(),
+        copies: common.out.copies.clone(),
         sample_rate_hz: recording.sample_rate_hz,
         samples: recording.len(),
         largest_displacement_mm: 1e3 * largest,

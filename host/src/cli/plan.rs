@@ -101,6 +101,7 @@ struct Tests {
     standstill_damping_percent: f64,
 }
 
+/// A plan, and what the speed limits of the spindle mean for it.
 #[derive(Serialize)]
 struct PlanOutput<'a> {
     #[serde(flatten)]
@@ -108,12 +109,19 @@ struct PlanOutput<'a> {
     /// Assumptions behind the structure of the case, one sentence each.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     assumed: Vec<String>,
+    /// Speeds of --rpm outside the limits of the spindle, rev/min: no test is proposed there.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    outside_limits_rpm: Vec<f64>,
+    /// True if the case has no section `[limits]`: every speed of --rpm is then taken as possible.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    assumes_every_speed: bool,
 }
 
 /// Runs the verb.
 pub fn run(args: Args) -> Result<(), Error> {
     let case = Case::read(&args.case)?;
-    let request = request(&args);
+    let mut request = request(&args);
+    let outside_limits_rpm = leave_out_impossible(&case, &mut request)?;
     let bar = progress::bar(
         Some(request.speeds_rpm.len() as u64),
         "{spinner} limits {bar:40} {pos}/{len} {elapsed}",
@@ -129,14 +137,58 @@ pub fn run(args: Args) -> Result<(), Error> {
     let assumed = case.assumptions();
     let mut output_text = text(&found);
     output_text.push_str(&assumed::lines(&assumed));
+    output_text.push_str(&about_speeds(&case, &outside_limits_rpm));
     for path in &args.out {
         let _ = write!(output_text, "\n{}", path.display());
     }
     let answer = PlanOutput {
         plan: &found,
         assumed,
+        outside_limits_rpm,
+        assumes_every_speed: case.limits.is_none(),
     };
     args.output.answer(&answer, output_text)
+}
+
+/// Removes the speeds outside the limits of the spindle from the request, and returns them, rev/min.
+///
+/// # Errors
+/// No speed lies within the limits.
+fn leave_out_impossible(case: &Case, request: &mut Request) -> Result<Vec<f64>, Error> {
+    let Some(limits) = case.limits else {
+        return Ok(Vec::new());
+    };
+    let (possible, impossible) = request
+        .speeds_rpm
+        .iter()
+        .partition::<Vec<f64>, _>(|rpm| limits.allows(**rpm));
+    if possible.is_empty() {
+        return Err(Error::input(format!(
+            "--rpm: no speed lies within the limits of the spindle in {}, {} to {} rev/min",
+            case.path.display(),
+            limits.rpm_min,
+            limits.rpm_max
+        )));
+    }
+    request.speeds_rpm = possible;
+    Ok(impossible)
+}
+
+/// Text about the speeds that the spindle cannot run at, and about limits that the case does not state.
+fn about_speeds(case: &Case, outside_limits_rpm: &[f64]) -> String {
+    match case.limits {
+        None => {
+            "\nthe case has no section [limits]: every speed is taken as possible; add rpm_min and rpm_max"
+                .into()
+        }
+        Some(limits) if !outside_limits_rpm.is_empty() => format!(
+            "\n{} speeds outside the limits of the spindle, {} to {} rev/min, are not considered",
+            outside_limits_rpm.len(),
+            limits.rpm_min,
+            limits.rpm_max
+        ),
+        Some(_) => String::new(),
+    }
 }
 
 /// Warnings about stability limits without derivatives with respect to the unknown parameters: one about first limits,

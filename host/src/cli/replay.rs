@@ -10,7 +10,7 @@ use quietcut_core::protocol::{Reports, Subscription};
 use quietcut_core::units::Degrees;
 
 use super::segment::RecordedSegment;
-use super::{Error, StreamedOutput, angle, count, positive};
+use super::{Endings, Error, StreamedOutput, angle, count, positive, tried};
 use crate::device::{self, Client, Event};
 use crate::recording::{RecordingError, Sensed, Sidecar, SpindleSettings};
 use crate::report::answer::VerdictLog;
@@ -40,6 +40,10 @@ pub struct Args {
     /// Feed direction in degrees from the machine's x towards its y, for lobe tables with layers of several directions.
     #[arg(long, value_name = "D", value_parser = angle, allow_negative_numbers = true)]
     feed_direction_deg: Option<f64>,
+    /// Add the outcome of the cut to this table of tried cuts, which lobes --cuts reads; it is made if there is none. The
+    /// sidecar must state spindle speed and axial depth.
+    #[arg(long, value_name = "FILE.csv", value_parser = Endings(&["csv"]).parser())]
+    tried: Option<PathBuf>,
     #[command(flatten)]
     segment: RecordedSegment,
     #[command(flatten)]
@@ -91,11 +95,23 @@ pub fn run(args: Args) -> Result<(), Error> {
         );
     }
     let table = args.table.as_deref().map(crate::file::read).transpose()?;
-    let log = match &args.port {
+    let mut log = match &args.port {
         Some(port) => on_device(&args, port, &sensed, table.as_deref())?,
         None => on_host(&args, &sensed, table.as_deref())?,
     };
+    if args.port.is_none() && !has_speed_limits(&sensed, table.as_deref()) {
+        log.assume_every_speed();
+    }
+    if let Some(table) = &args.tried {
+        tried::add(table, &args.recording, &recording.sidecar, &log)?;
+    }
     args.output.end(&recorded.understood, &log, &log.summary)
+}
+
+/// True if the settings or the lobe table state the speed limits of the spindle, within which advice stays.
+fn has_speed_limits(sensed: &Sensed, table: Option<&[u8]>) -> bool {
+    let of_table = |bytes| LobeTable::parse(bytes).is_ok_and(|table: LobeTable<'_>| table.limits().is_some());
+    sensed.settings.limits.is_some() || table.is_some_and(of_table)
 }
 
 /// Runs the signal chain of the device on a recording, on this computer.

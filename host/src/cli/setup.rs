@@ -1,5 +1,7 @@
 //! `quietcut setup`: a folder and a commented case file for one's own machine, by options, by a file, or by questions.
 
+mod known_case;
+
 use std::fs;
 use std::io::{self, BufRead, IsTerminal, Write};
 use std::num::NonZeroU8;
@@ -12,10 +14,13 @@ use super::{Error, Output, angle, count, finite, positive};
 use crate::case::Case;
 use crate::file;
 use crate::machine::{
-    Answers, Immersion, MachineFolder, MaterialAnswer, MaterialRange, NextStep, RANGES, case_text, next_step,
+    Answers, Immersion, MachineFolder, MaterialAnswer, MaterialRange, NextStep, RANGES, Section, case_text,
+    next_step, section_text,
 };
+use known_case::missing_sections;
 
-/// Makes the folder of a machine with a commented case file, and says which taps to make.
+/// Makes the folder of a machine with a commented case file, or adds the missing sections to its case, and says which taps
+/// to make.
 ///
 /// Answers come from the options, else from the file of --answers, else from questions on the terminal.
 #[derive(Debug, clap::Args)]
@@ -32,7 +37,8 @@ pub struct Args {
     /// TOML file with answers.
     #[arg(long, value_name = "FILE")]
     answers: Option<PathBuf>,
-    /// Replace the case file in the folder of the machine if there is one.
+    /// Replace the case file in the folder of the machine if there is one. Without this option the sections that the case
+    /// lacks are added to it.
     #[arg(long)]
     replace: bool,
     #[command(flatten)]
@@ -128,23 +134,41 @@ pub fn run(args: Args) -> Result<(), Error> {
         return list_materials(args.output);
     };
     let path = folder.join("case.toml");
-    if path.exists() && !args.replace {
+    let known = if path.exists() && !args.replace {
+        Some(Case::read(&path)?)
+    } else {
+        None
+    };
+    let missing = known.as_ref().map_or(Section::ALL.to_vec(), missing_sections);
+    if missing.is_empty() {
         return Err(Error::input(format!(
-            "{}: the case exists; --replace writes it anew, quietcut next {} says what to do with it",
+            "{}: the case exists and is complete; --replace writes it anew, quietcut next {} says what to do with it",
             path.display(),
             folder.display()
         )));
     }
+    if let Some(known) = &known {
+        args.given.check_missing(known)?;
+    }
     let given = match &args.answers {
         Some(file) => args.given.or(answers_of(file)?),
         None => args.given,
+    };
+    let given = match &known {
+        Some(known) => given.known_from(known),
+        None => given,
     };
     let ask = io::stdin().is_terminal() && io::stderr().is_terminal();
     let default_name = folder
         .file_name()
         .map_or_else(|| "machine".into(), |name| name.to_string_lossy().into_owned());
     let answers = given.complete(&default_name, ask)?;
-    let text = case_text(&answers);
+    let text = if known.is_some() {
+        let before = file::read_text(&path)?;
+        format!("{}\n\n{}", before.trim_end(), section_text(&answers, &missing))
+    } else {
+        case_text(&answers)
+    };
     // Parsing the text of the new case refuses impossible values before any file is written.
     Case::parse(&path, &text)?;
     for name in ["taps", "frf", "cuts"] {

@@ -9,6 +9,7 @@ use serde::Serialize;
 use super::channels::Channels;
 use super::experiment::{self, Experiment};
 use super::milling_rig::{self, MillingRig};
+use super::output_recordings::OutputRecordings;
 use super::{Error, Output, finite, non_negative, positive};
 use crate::case::Case;
 use crate::file;
@@ -88,9 +89,9 @@ pub struct Args {
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
     /// Recording to write; the ending sets the format: csv, uff (UFF 58, text) or bunv (UFF 58, binary). Metadata go to
-    /// a sidecar file with the ending .toml.
-    #[arg(long, value_name = "REC.csv", value_parser = recording_to_write)]
-    out: PathBuf,
+    /// a sidecar file with the ending .toml. May be repeated.
+    #[arg(long, value_name = "REC.csv", value_parser = recording_to_write, required = true)]
+    out: Vec<PathBuf>,
     #[command(flatten)]
     output: Output,
 }
@@ -112,6 +113,8 @@ enum EntryKind {
 #[derive(Debug, Serialize)]
 struct CutOutput {
     recording: PathBuf,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    copies: Vec<PathBuf>,
     sample_rate_hz: f64,
     samples: usize,
     entry: &'static str,
@@ -137,22 +140,25 @@ fn recording_to_write(text: &str) -> Result<PathBuf, String> {
 /// Runs the verb.
 pub fn run(args: Args) -> Result<(), Error> {
     let case = Case::read(&args.case)?;
-    let sidecar = Sidecar::path_of(&args.out);
-    if let (Ok(sidecar), Ok(case)) = (sidecar.canonicalize(), args.case.canonicalize())
-        && sidecar == case
-    {
-        return Err(Error::input(format!(
-            "--out {}: the sidecar file of the recording would overwrite the case {}; choose another name",
-            args.out.display(),
-            sidecar.display()
-        )));
+    for out in &args.out {
+        let sidecar = Sidecar::path_of(out);
+        if let (Ok(sidecar), Ok(case)) = (sidecar.canonicalize(), args.case.canonicalize())
+            && sidecar == case
+        {
+            return Err(Error::input(format!(
+                "--out {}: the sidecar file of the recording would overwrite the case {}; choose another name",
+                out.display(),
+                sidecar.display()
+            )));
+        }
     }
+    let files = OutputRecordings::new(&args.out);
     if let Some(kind) = args.experiment.experiment {
         let common = experiment::Common {
             seconds: args.seconds,
             sample_rate_hz: args.sample_rate_hz,
             seed: args.seed,
-            out: &args.out,
+            out: &files,
             effects: &args.effect,
             channels: &args.channels,
         };
@@ -209,17 +215,18 @@ pub fn run(args: Args) -> Result<(), Error> {
             ..
         },
     ) = cut
-        .record(&case, recorder, tachometer, &args.out)
+        .record(&case, recorder, tachometer, &files.first)
         .map_err(named)?;
     args.channels.add_noise(&mut recording, args.seed)?;
-    recording.write(&args.out)?;
+    files.write(&recording)?;
     let displacements = recording
         .channels
         .iter()
         .filter(|channel| ["x", "y", "z"].contains(&channel.name.as_str()))
         .flat_map(|channel| &channel.samples);
     let answer = CutOutput {
-        recording: args.out.clone(),
+        recording: files.first,
+        copies: files.copies,
         sample_rate_hz: recording.sample_rate_hz,
         samples: recording.len(),
         entry: match cut.entry {

@@ -21,9 +21,9 @@ pub struct Args {
     /// The case files; each becomes one layer of the table.
     #[arg(value_name = "CASE", required_unless_present = "show", requires = "out")]
     cases: Vec<PathBuf>,
-    /// Lobe table to write.
-    #[arg(long, value_name = "FILE.qct", value_parser = Endings(&["qct"]).parser(), requires = "cases")]
-    out: Option<PathBuf>,
+    /// Lobe table to write; the ending sets the format: qct for the device, json for a program. May be repeated.
+    #[arg(long, value_name = "FILE.qct", value_parser = Endings(&["qct", "json"]).parser(), requires = "cases")]
+    out: Vec<PathBuf>,
     /// Spindle speeds in rev/min, first:last or first:last:count. Only the ends are used; the speeds between them are
     /// chosen adaptively. Default: the speed limits of the machine, else the range of the lobes.
     #[arg(long, value_name = "R", value_parser = Range::positive, requires = "cases")]
@@ -133,9 +133,10 @@ struct UnstableOutput {
 pub fn run(args: Args) -> Result<(), Error> {
     if let Some(path) = &args.show {
         let bytes = file::read(path)?;
-        return show(path, &bytes, Vec::new(), args.output);
+        let shown = shown(path, &bytes, Vec::new())?;
+        return args.output.answer(&shown, as_text(path, &shown));
     }
-    let Some(out) = &args.out else {
+    let Some(first) = args.out.first() else {
         return Err(Error::input("--out FILE.qct is needed: the lobe table to write"));
     };
     let mut cases = args
@@ -175,14 +176,24 @@ pub fn run(args: Args) -> Result<(), Error> {
                 .push(format!("{}: assumed: {sentence}", case.path.display()));
         }
     }
-    file::write(out, &built.bytes)?;
     for warning in &built.warnings {
         tracing::warn!("{warning}");
     }
-    show(out, &built.bytes, built.warnings, args.output)
+    let shown = shown(first, &built.bytes, built.warnings)?;
+    for path in &args.out {
+        match file::ending(path).as_str() {
+            "json" => file::write(
+                path,
+                serde_json::to_string(&shown).map_err(Error::other)?.as_bytes(),
+            )?,
+            _ => file::write(path, &built.bytes)?,
+        }
+    }
+    args.output.answer(&shown, as_text(first, &shown))
 }
 
-fn show(path: &Path, bytes: &[u8], warnings: Vec<String>, output: Output) -> Result<(), Error> {
+/// Content of the lobe table in `bytes`; `path` names it in messages.
+fn shown(path: &Path, bytes: &[u8], warnings: Vec<String>) -> Result<TableOutput, Error> {
     let wrong = |error| Error::input(format!("{}: this is no lobe table: {error}", path.display()));
     let table = LobeTable::parse(bytes).map_err(wrong)?;
     let header = table.header().map_err(wrong)?;
@@ -206,7 +217,7 @@ fn show(path: &Path, bytes: &[u8], warnings: Vec<String>, output: Output) -> Res
             speeds: columns(&table, index),
         })
         .collect();
-    let shown = TableOutput {
+    Ok(TableOutput {
         name: table.name().into(),
         teeth: table.teeth(),
         bytes: bytes.len(),
@@ -220,9 +231,7 @@ fn show(path: &Path, bytes: &[u8], warnings: Vec<String>, output: Output) -> Res
         }),
         layers,
         warnings,
-    };
-    let text = as_text(path, &shown);
-    output.answer(&shown, text)
+    })
 }
 
 fn columns(table: &LobeTable<'_>, layer: usize) -> Vec<SpeedOutput> {
@@ -293,6 +302,8 @@ fn as_text(path: &Path, shown: &TableOutput) -> String {
     );
     if let Some([slowest, fastest]) = shown.rpm_limits {
         let _ = write!(text, ", machine {slowest} to {fastest} rev/min");
+    } else {
+        text.push_str(", no speed limits of the machine: advice assumes that every speed is possible");
     }
     if let Some(error) = &shown.interpolation_error {
         let _ = write!(

@@ -104,32 +104,85 @@ fn write_case(text: &mut String, answers: &Answers) -> std::fmt::Result {
         writeln!(text, "# {what}: {}", said.replace(['\n', '\r'], " "))?;
     }
     writeln!(text, "name = {}\n", toml::Value::String(answers.name.clone()))?;
-    writeln!(text, "[tool]\nteeth = {}", answers.teeth)?;
-    writeln!(
-        text,
-        "# 90 is a square end mill.\nedge_angle_deg = {}",
-        float(answers.edge_angle_deg)
-    )?;
-    writeln!(text, "diameter_mm = {}\n", float(answers.diameter_mm))?;
-    write_material(text, answers)?;
-    writeln!(
-        text,
-        "\n[cut]\n# Immersion angles count from the normal to the feed, in the sense in which the tool rotates."
-    )?;
-    writeln!(text, "start_deg = {}", float(answers.immersion.start_deg))?;
-    writeln!(text, "exit_deg = {}", float(answers.immersion.exit_deg))?;
-    writeln!(text, "feed_per_tooth_mm = {}\n", float(answers.feed_per_tooth_mm))?;
-    writeln!(text, "[limits]\n# Speeds outside are never proposed.")?;
-    writeln!(
-        text,
-        "rpm_min = {}\nrpm_max = {}",
-        float(answers.rpm.0),
-        float(answers.rpm.1)
-    )?;
-    if let Some(power_w) = answers.power_w {
-        writeln!(text, "power_w = {}", float(power_w))?;
+    for section in Section::ALL {
+        write_section(text, answers, section)?;
     }
     Ok(())
+}
+
+/// Section of a case file that the answers of a user give.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Section {
+    /// `[tool]`.
+    Tool,
+    /// `[material]`.
+    Material,
+    /// `[cut]`.
+    Cut,
+    /// `[limits]`.
+    Limits,
+}
+
+impl Section {
+    /// All sections, in the order in which a case file has them.
+    pub const ALL: [Self; 4] = [Self::Tool, Self::Material, Self::Cut, Self::Limits];
+
+    /// Name of the section in a case file.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Tool => "tool",
+            Self::Material => "material",
+            Self::Cut => "cut",
+            Self::Limits => "limits",
+        }
+    }
+}
+
+/// Text of some sections of a case file from the answers of the user, to be appended to a case that lacks them.
+pub fn section_text(answers: &Answers, sections: &[Section]) -> String {
+    let mut text = String::new();
+    for section in sections {
+        // Writing to a String cannot fail.
+        let _ = write_section(&mut text, answers, *section);
+    }
+    text
+}
+
+fn write_section(text: &mut String, answers: &Answers, section: Section) -> std::fmt::Result {
+    match section {
+        Section::Tool => {
+            writeln!(text, "[tool]\nteeth = {}", answers.teeth)?;
+            writeln!(
+                text,
+                "# 90 is a square end mill.\nedge_angle_deg = {}",
+                float(answers.edge_angle_deg)
+            )?;
+            writeln!(text, "diameter_mm = {}\n", float(answers.diameter_mm))
+        }
+        Section::Material => write_material(text, answers),
+        Section::Cut => {
+            writeln!(
+                text,
+                "[cut]\n# Immersion angles count from the normal to the feed, in the sense in which the tool rotates."
+            )?;
+            writeln!(text, "start_deg = {}", float(answers.immersion.start_deg))?;
+            writeln!(text, "exit_deg = {}", float(answers.immersion.exit_deg))?;
+            writeln!(text, "feed_per_tooth_mm = {}\n", float(answers.feed_per_tooth_mm))
+        }
+        Section::Limits => {
+            writeln!(text, "[limits]\n# Speeds outside are never proposed.")?;
+            writeln!(
+                text,
+                "rpm_min = {}\nrpm_max = {}",
+                float(answers.rpm.0),
+                float(answers.rpm.1)
+            )?;
+            if let Some(power_w) = answers.power_w {
+                writeln!(text, "power_w = {}", float(power_w))?;
+            }
+            Ok(())
+        }
+    }
 }
 
 fn write_material(text: &mut String, answers: &Answers) -> std::fmt::Result {
@@ -178,7 +231,7 @@ fn write_material(text: &mut String, answers: &Answers) -> std::fmt::Result {
             writeln!(text, "{key} = {}", float(value))?;
         }
     }
-    Ok(())
+    writeln!(text)
 }
 
 /// A number as text of a TOML file, rounded to 13 significant digits to hide small rounding errors.

@@ -5,7 +5,9 @@ use std::time::SystemTime;
 
 use serde::Serialize;
 
+use super::contradiction::contradiction;
 use super::folder::{BrokenFile, DatedFile, FileKind, MachineFolder};
+use crate::recording::{Sidecar, cut_table};
 
 /// Next useful command for a machine, with its reason.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -78,9 +80,9 @@ pub fn next_step(folder: &MachineFolder) -> NextStep {
             Some(_) => step(
                 format!(
                     "quietcut identify {} --method modes --case {case} --out {case}",
-                    list(&folder.receptances)
+                    list(measured(folder))
                 ),
-                "the case has no structure; the command fits modes to the frequency response functions and writes them into the case",
+                "the case has no structure; the command fits modes to the frequency response functions of the taps, or to those in frf/, and writes them into the case",
             ),
             None => step(
                 format!(
@@ -96,7 +98,7 @@ pub fn next_step(folder: &MachineFolder) -> NextStep {
         return step(
             format!(
                 "quietcut identify {} --method modes --case {case} --out {case}",
-                list(&folder.receptances)
+                list(measured(folder))
             ),
             "the frequency response functions are newer than the case; the command fits its modes again",
         );
@@ -110,6 +112,13 @@ pub fn next_step(folder: &MachineFolder) -> NextStep {
         return step(
             format!("quietcut setup {}", quoted(&folder.path)),
             &format!("the case has no section [{section}], which limits need; the command asks for it"),
+        );
+    }
+    if content.limits.is_none() {
+        return step(
+            format!("quietcut setup {} --rpm FIRST:LAST", quoted(&folder.path)),
+            "the case has no section [limits]: without the lowest and highest speed of the spindle in rev/min, FIRST and LAST, charts and \
+             advice assume that every speed is possible; the command keeps them in the case",
         );
     }
     let newer_than_case = |file: &Option<DatedFile>| is_newer(file, case_file.changed);
@@ -130,21 +139,29 @@ pub fn next_step(folder: &MachineFolder) -> NextStep {
             "the case is newer than the lobe table of the device; the command builds the table",
         );
     }
-    let cuts = newest(&folder.cuts);
+    after_the_chart(folder, &step)
+}
+
+/// The next step of a machine whose chart and lobe table are newer than its case: cuts, and what they say.
+fn after_the_chart(folder: &MachineFolder, step: &dyn Fn(String, &str) -> NextStep) -> NextStep {
+    let at = |name: &str| quoted(&folder.path.join(name));
+    let (case, ranges) = (at("case.toml"), ranges(folder));
+    let cuts = folder.cuts.iter().map(|file| file.changed).max();
     if cuts.is_none() && folder.tried.is_none() {
         return step(
             format!("quietcut plan {case} {ranges} --width-percent 20"),
-            "no cut was made yet; the command proposes the cuts that tell most about the limits. Save their recordings in cuts/, and their outcome in tried.csv",
+            "no cut was made yet; the command proposes the cuts that tell most about the limits. Save their recordings in cuts/, or their outcome in tried.csv",
         );
     }
-    if cuts > folder.diagnosis.as_ref().map(|file| file.changed) {
+    if let Some(cut) = untried(folder) {
         return step(
             format!(
-                "quietcut diagnose {case} {} --out {}",
-                list(&folder.cuts),
-                at("diagnosis")
+                "quietcut replay {} --table {} --tried {}",
+                quoted(&cut.path),
+                at("table.qct"),
+                at("tried.csv")
             ),
-            "recorded cuts are newer than the diagnosis; the command compares them with the simulation and names what it lacks",
+            "the outcome of this cut does not stand in tried.csv; the command looks for chatter in the recording and adds the outcome",
         );
     }
     if let (Some(tried), Some(chart)) = (&folder.tried, &folder.chart)
@@ -157,6 +174,27 @@ pub fn next_step(folder: &MachineFolder) -> NextStep {
                 at("lobes.html")
             ),
             "tried cuts are newer than the chart; the command counts those that are predicted wrong",
+        );
+    }
+    if let Some(why) = contradicted(folder) {
+        return step(
+            format!(
+                "quietcut frf {} --out {} --out {}",
+                list(&folder.taps),
+                at("frf/tool-tip.csv"),
+                at("frf/tool-tip.svg")
+            ),
+            &why,
+        );
+    }
+    if cuts > folder.diagnosis.as_ref().map(|file| file.changed) {
+        return step(
+            format!(
+                "quietcut diagnose {case} {} --out {}",
+                list(&folder.cuts),
+                at("diagnosis")
+            ),
+            "recorded cuts are newer than the diagnosis; the command compares them with the simulation and names what it lacks",
         );
     }
     if let (Some(extended), Some(table)) = (&folder.extended, &folder.table)
@@ -175,6 +213,49 @@ pub fn next_step(folder: &MachineFolder) -> NextStep {
         format!("quietcut upload PORT {}", at("table.qct")),
         "everything is up to date; the command sends the table to the device, PORT is its serial port",
     )
+}
+
+/// Files from which modes are identified: the taps, whose recordings also tell the errors of sampling and the noise, or
+/// without taps the tables of receptances.
+fn measured(folder: &MachineFolder) -> &[DatedFile] {
+    if folder.taps.is_empty() {
+        &folder.receptances
+    } else {
+        &folder.taps
+    }
+}
+
+/// The first recorded cut whose speed and depth, as its sidecar states them, stand in no row of the table of tried cuts.
+fn untried(folder: &MachineFolder) -> Option<&DatedFile> {
+    let tried = tried_cuts(folder);
+    folder.cuts.iter().find(|file| {
+        let cut = Sidecar::beside(&file.path).ok().and_then(|sidecar| sidecar.cut);
+        let point = cut.and_then(|cut| Some((cut.spindle_rpm?, cut.axial_depth_mm?)));
+        point.is_some_and(|point| !tried.iter().any(|cut| (cut.rpm, cut.depth_mm) == point))
+    })
+}
+
+fn tried_cuts(folder: &MachineFolder) -> Vec<cut_table::TrialCut> {
+    let file = folder.tried.as_ref();
+    file.and_then(|file| cut_table::read(&file.path).ok())
+        .unwrap_or_default()
+}
+
+/// Reason to tap again: the tried cuts contradict the limits of the case. `None` if they do not, or if there are no taps.
+fn contradicted(folder: &MachineFolder) -> Option<String> {
+    let (_, case) = folder.case.as_ref()?;
+    if folder.taps.is_empty() {
+        return None;
+    }
+    let found = contradiction(case, &tried_cuts(folder))?;
+    Some(format!(
+        "{} of {} tried cuts contradict the limits beyond their intervals ({}): the taps may be those of another tool, holder or overhang, \
+         or of a tool that sat differently. Tap this tool again and replace the recordings in taps/; then run this command. If the taps are \
+         right, the cutting coefficients are wrong: quietcut identify --method force-coefficients",
+        found.contradicted.len(),
+        found.cuts,
+        found.contradicted.join("; ")
+    ))
 }
 
 /// True if the file exists and was last changed at the time `than` or later.

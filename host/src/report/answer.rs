@@ -102,6 +102,10 @@ pub struct Summary {
     pub clipped: u32,
     /// Number of gaps in the sequence of samples: reports that count more lost samples than the report before.
     pub gaps: u32,
+    /// True if a speed was advised and the speed limits of the spindle are not known: the advice then assumes that every
+    /// speed is possible.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub assumes_every_speed: bool,
     #[serde(skip)]
     lost: u32,
     #[serde(skip)]
@@ -118,11 +122,28 @@ impl fmt::Display for Summary {
             f,
             "; {} blocks, {} clipped samples, {} gaps",
             self.blocks, self.clipped, self.gaps
-        )
+        )?;
+        if self.assumes_every_speed {
+            write!(
+                f,
+                "; the speed limits of the spindle are not known, and the advice assumes that every speed is possible: the table of a \
+                 case with [limits] keeps it within them"
+            )?;
+        }
+        Ok(())
     }
 }
 
 impl VerdictLog {
+    /// Notes that the speed limits of the spindle are not known; the summary says so if a speed was advised.
+    pub fn assume_every_speed(&mut self) {
+        self.summary.assumes_every_speed = self
+            .verdicts
+            .iter()
+            .filter_map(|verdict| verdict.advice.as_ref())
+            .any(|advice| advice.action == "speed");
+    }
+
     /// Adds the next report to the log; returns its entry in [`VerdictLog::verdicts`], or `None` if it gets none.
     pub fn take(&mut self, report: &Report) -> Option<&VerdictAnswer> {
         let next = VerdictAnswer::new(report);

@@ -122,8 +122,11 @@ fn of_cuts(bench: &Bench<'_>) -> Vec<Experiment> {
         (1.0, 1.0, 2.0, 1.0),
         (1.0, 1.0, 1.0, 4.0),
     ];
+    // Speeds outside the limits of the spindle are never proposed.
+    let is_possible = |rpm: f64| bench.case.limits.is_none_or(|limits| limits.allows(rpm));
     factors
         .into_iter()
+        .filter(|(by_rpm, ..)| is_possible(by_rpm * so_far.rpm))
         .map(|(by_rpm, by_depth, by_feed, longer)| Experiment {
             excitation: Excitation::Cut {
                 rpm: by_rpm * so_far.rpm,
@@ -138,6 +141,12 @@ fn of_cuts(bench: &Bench<'_>) -> Vec<Experiment> {
 }
 
 impl Experiment {
+    /// True if the test is a cut at another spindle speed than that of the recorded cut.
+    pub(super) fn changes_speed(&self, bench: &Bench<'_>) -> bool {
+        let recorded_rpm = bench.cut.as_ref().map(|so_far| so_far.rpm);
+        matches!(self.excitation, Excitation::Cut { rpm, .. } if Some(rpm) != recorded_rpm)
+    }
+
     /// The sets of sensors with which this test can be made.
     pub(super) fn sensors(&self) -> Vec<Sensors> {
         match self.excitation {

@@ -78,7 +78,10 @@ pub(super) fn next_test(
         return Err(reason.unwrap_or_else(|| "there is no experiment for this machine".into()));
     };
     let [one, other] = best.between.map(|index| label(&explanations[index]));
-    let why = best.why(&one, &other);
+    let mut why = best.why(&one, &other);
+    if case.limits.is_none() && best.experiment.changes_speed(&bench) {
+        why.push_str("; the case has no section [limits], and the spindle is assumed to reach this speed");
+    }
     Ok(Some(best.experiment.described(
         best.sensors,
         best.least.squared.sqrt(),

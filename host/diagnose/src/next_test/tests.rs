@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use super::bench::Bench;
+use super::experiment::{Excitation, experiments};
 use super::separation::least;
 use crate::conclusion::answer::{Diagnosis, Outcome};
 use crate::{Options, diagnose};
@@ -55,6 +57,32 @@ fn cuts(case: &Case, effects: &Effects) -> Vec<Recording> {
 
 fn names(diagnosis: &Diagnosis) -> Vec<&'static str> {
     diagnosis.names()
+}
+
+#[test]
+fn cuts_are_proposed_within_the_speed_limits_of_the_spindle_only() {
+    let mut case = case("kuka-kr90-half");
+    let records = cuts(&case, &Effects::default());
+    let speeds_rpm = |case: &Case| -> Vec<f64> {
+        let bench = Bench::new(case, &records, &[]).unwrap();
+        let of_cut = |excitation: &Excitation| match excitation {
+            Excitation::Cut { rpm, .. } => Some(*rpm),
+            Excitation::Rig { .. } => None,
+        };
+        let all = experiments(&bench);
+        all.iter().filter_map(|test| of_cut(&test.excitation)).collect()
+    };
+    // Without limits the recorded cut at 900 rev/min is also proposed a fifth slower and a quarter faster.
+    let free = speeds_rpm(&case);
+    assert!(free.contains(&720.0) && free.contains(&1125.0), "{free:?}");
+    case.limits = Some(quietcut_model::case::MachineLimits {
+        rpm_min: 800.0,
+        rpm_max: 1000.0,
+        power_w: None,
+    });
+    let limited = speeds_rpm(&case);
+    assert_eq!(limited.len(), free.len() - 2);
+    assert!(limited.iter().all(|rpm| *rpm == 900.0), "{limited:?}");
 }
 
 #[test]

@@ -10,3 +10,10 @@ pub struct MachineLimits {
     /// Spindle power, W; `None` if the case does not give it.
     pub power_w: Option<f64>,
 }
+
+impl MachineLimits {
+    /// True if the spindle may run at the speed `rpm`, rev/min: both ends of its range are allowed.
+    pub fn allows(&self, rpm: f64) -> bool {
+        (self.rpm_min..=self.rpm_max).contains(&rpm)
+    }
+}

@@ -189,9 +189,7 @@ impl ReceptanceAnswer {
     fn new(measurement: &Measurement, table: &FrfTable, index: usize) -> Self {
         let entry = &table.entries()[index];
         let size = |line: usize| entry.receptance[line].norm();
-        let at = (0..entry.receptance.len())
-            .max_by(|&a, &b| size(a).total_cmp(&size(b)))
-            .unwrap_or(0);
+        let at = entry.peak_line();
         // The standard deviation is known for the receptance before the tool-tip calibration, and is divided by this
         // receptance. The calibration multiplies the contribution of each mode by one factor, so that the quotient also
         // holds after the calibration where one mode dominates.

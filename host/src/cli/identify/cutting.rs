@@ -11,6 +11,7 @@ use crate::identify::case_file::{self, Estimate};
 use crate::identify::force_coefficients::{Fit, KEYS, Value, fit, runout};
 use crate::identify::force_test::{CuttingTest, Setup};
 use crate::recording::Recording;
+use crate::report::digits::significant;
 use crate::simulate::effect::EffectName;
 
 pub(super) fn force_coefficients(args: &Args, recordings: &[Recording]) -> Result<IdentifyOutput, Error> {
@@ -133,8 +134,10 @@ fn sentences(fit: &Fit) -> Vec<String> {
         messages.extend(figures(averaged).into_iter().map(|(key, figure)| {
             let [low, high] = figure.ci90;
             format!(
-                "from mean forces {key} = {:.5e}, 90 % interval {low:.5e} to {high:.5e}",
-                figure.value
+                "from mean forces {key} = {}, 90 % interval {} to {}",
+                significant(figure.value, 6),
+                significant(low, 6),
+                significant(high, 6)
             )
         }));
     }

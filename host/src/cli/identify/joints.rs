@@ -18,6 +18,7 @@ use crate::identify::joints::{self, JointParameter, PostureFrf};
 use crate::identify::law::NonlinearTerm;
 use crate::identify::steady::{Settling, steady};
 use crate::recording::{Recording, TestKind};
+use crate::report::digits::significant;
 use crate::structure::{Direction, Form, Robot, Structure};
 use quietcut_numerics::statistics::NINETY_PERCENT;
 
@@ -268,12 +269,12 @@ fn answer(args: &Args, found: &JointFit, postures: usize) -> IdentifyOutput {
         let joint = parameter.joint(count);
         of_joints[joint].parameters.insert(parameter.key(), *figure);
         messages.push(format!(
-            "joint {} {} = {:.5e}, 90 % interval {:.5e} to {:.5e}",
+            "joint {} {} = {}, 90 % interval {} to {}",
             joint + 1,
             parameter.key(),
-            figure.value,
-            figure.ci90[0],
-            figure.ci90[1]
+            significant(figure.value, 6),
+            significant(figure.ci90[0], 6),
+            significant(figure.ci90[1], 6)
         ));
     }
     let deviations: Vec<(JointParameter, f64)> = found

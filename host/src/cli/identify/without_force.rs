@@ -11,6 +11,7 @@ use crate::identify::inverse_stability::{
 use crate::identify::observed_cut::ObservedCut;
 use crate::identify::{case_file, subspace};
 use crate::recording::{Recording, TestKind, cut_table};
+use crate::report::digits::significant;
 use crate::stability::{CubicTerms, Problem};
 
 /// Identifies modes from a recording of motion under unmeasured excitation (operational modal analysis).
@@ -191,9 +192,11 @@ fn sentences(modes: &[EstimatedMode]) -> Vec<String> {
     let line = |index: usize, key: &str, figure: &Figure, vague: bool| {
         let [low, high] = figure.ci90;
         format!(
-            "mode {} {key} = {:.5e}, 90 % interval {low:.5e} to {high:.5e}{}",
+            "mode {} {key} = {}, 90 % interval {} to {}{}",
             index + 1,
-            figure.value,
+            significant(figure.value, 6),
+            significant(low, 6),
+            significant(high, 6),
             if vague {
                 ": not identifiable from the data"
             } else {
