@@ -154,8 +154,8 @@ fn cause_table(cause: &EstimatedCause) -> Markup {
             @for (key, Figure { value, ci90: [low, high] }) in &cause.parameters {
                 tr {
                     td { (key) }
-                    td { (significant(value, 6)) }
-                    td { (significant(low, 6)) " to " (significant(high, 6)) }
+                    td { (significant(*value, 6)) }
+                    td { (significant(*low, 6)) " to " (significant(*high, 6)) }
                 }
             }
         }
