@@ -14,11 +14,11 @@ const SAMPLES: usize = 60;
 
 /// Tried cuts whose outcomes the limits of a case do not allow, although they have an interval.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Contradiction {
+pub(super) struct Contradiction {
     /// Number of tried cuts that were stable or chattered.
-    pub cuts: usize,
+    pub(super) cuts: usize,
     /// Tried cuts that contradict the limit, each with the limit: `9000 rev/min, 3.2 mm: stable, limit 2.44 mm`.
-    pub contradicted: Vec<String>,
+    pub(super) contradicted: Vec<String>,
 }
 
 /// Compares the outcomes of tried cuts with the limits of a case. `None` if no more cuts contradict them than chance
@@ -28,7 +28,7 @@ pub struct Contradiction {
 /// was stable above the 95 % percentile, by more than [`CONTRADICTED_BEYOND`] of the depth. If the case is right, this
 /// happens to a cut with at most the probability p = 5 %, and to k or more of n cuts with the tail probability of the
 /// binomial distribution, which must be below [`CONTRADICTION_BY_CHANCE`].
-pub fn contradiction(case: &Case, cuts: &[TrialCut]) -> Option<Contradiction> {
+pub(super) fn contradiction(case: &Case, cuts: &[TrialCut]) -> Option<Contradiction> {
     let method_of = |case: &Case| collocation_of(case).map_err(|error| error.to_string());
     let method = method_of(case).ok()?;
     let uncertainty = Uncertainty::new(case, &method_of, 1);
