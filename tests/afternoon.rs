@@ -314,7 +314,7 @@ fn a_clipped_impact_is_left_out_with_the_reason() {
     afternoon.tap(2, Style::Tabs, Some(range_n));
     let frf = afternoon.follow("frf");
     assert!(
-        frf.stderr.contains("clipped impacts are left out") && frf.stderr.contains("fx stays"),
+        frf.stderr.contains("impacts with clipped samples are left out"),
         "{frf:?}"
     );
     afternoon.follow("identify");

@@ -104,7 +104,7 @@ fn terminals_show_no_exponents() {
 fn no_speed_outside_the_limits_of_the_spindle_is_proposed() {
     let folder = folder();
     let text = std::fs::read_to_string(cases().join("kuka-kr90-acetal.toml")).expect("a case");
-    let limited = format!("{text}\n[limits]\nrpm_min = 950.0\nrpm_max = 1250.0\n");
+    let limited = format!("{text}\n[limits]\nrpm_min = 1030.0\nrpm_max = 1250.0\n");
     std::fs::write(folder.path().join("free.toml"), text).expect("written");
     std::fs::write(folder.path().join("limited.toml"), limited).expect("written");
     let run = |line: &str| {
@@ -116,19 +116,19 @@ fn no_speed_outside_the_limits_of_the_spindle_is_proposed() {
     let answer = run(&format!("plan limited.toml {plan} --json")).json();
     for test in answer["tests"].as_array().expect("tests") {
         if let Some(rpm) = test["rpm"].as_f64() {
-            assert!((950.0..=1250.0).contains(&rpm), "{answer}");
+            assert!((1030.0..=1250.0).contains(&rpm), "{answer}");
         }
     }
     assert_eq!(
         answer["outside_limits_rpm"].as_array().map(Vec::len),
-        Some(11),
+        Some(12),
         "{answer}"
     );
     let answer = run(&format!("plan free.toml {plan} --json")).json();
     assert_eq!(answer["assumes_every_speed"], true);
     run("plan limited.toml --rpm 700:900:3 --depth-mm 0:6 --width-percent 15")
-        .refused(&["--rpm", "950 to 1250"]);
-    // replay: a cut at 1045 rev/min and 2 mm chatters; the stable speed, 1380 rev/min, is outside the limits.
+        .refused(&["--rpm", "1030 to 1250"]);
+    // replay: a cut at 1045 rev/min and 2 mm chatters; the nearest stable speed, 1024 rev/min, is outside the limits.
     run("simulate free.toml --rpm 1045 --depth-mm 2 --seconds 6 --out cut.csv");
     for case in ["free", "limited"] {
         let answer = run(&format!("table {case}.toml --rpm 700:2000 --out {case}.qct"));
@@ -154,10 +154,10 @@ fn no_speed_outside_the_limits_of_the_spindle_is_proposed() {
             .filter_map(|verdict| verdict["advice"]["rpm"].as_f64())
             .collect()
     };
-    assert!(speeds(&free).iter().any(|rpm| *rpm > 1250.0), "{free}");
+    assert!(speeds(&free).iter().any(|rpm| *rpm < 1030.0), "{free}");
     assert!(!speeds(&limited).is_empty());
     assert!(
-        speeds(&limited).iter().all(|rpm| (950.0..=1250.0).contains(rpm)),
+        speeds(&limited).iter().all(|rpm| (1030.0..=1250.0).contains(rpm)),
         "{limited}"
     );
     // The outcome of the cut was added to a table that lobes reads.

@@ -7,6 +7,7 @@ use serde::Serialize;
 
 use super::args::{Args, Method};
 use super::multisine_answer::MultisineAnswer;
+use super::related_lines::largest;
 use crate::frf::{FrfTable, Measurement, ModeRatio, RecordingGroup};
 use crate::report::digits::significant;
 
@@ -189,7 +190,7 @@ impl ReceptanceAnswer {
     fn new(measurement: &Measurement, table: &FrfTable, index: usize) -> Self {
         let entry = &table.entries()[index];
         let size = |line: usize| entry.receptance[line].norm();
-        let at = entry.peak_line();
+        let at = largest(entry, size);
         // The standard deviation is known for the receptance before the tool-tip calibration, and is divided by this
         // receptance. The calibration multiplies the contribution of each mode by one factor, so that the quotient also
         // holds after the calibration where one mode dominates.

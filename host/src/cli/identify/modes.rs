@@ -234,7 +234,7 @@ fn sentences(model: &ModalModel, noise: &[ChannelNoise]) -> Vec<String> {
                 })
                 .collect();
             lines.push(format!(
-                "  {name} shape, 1e-3 (one standard deviation): {}",
+                "  {name} shape, 10⁻³ (one standard deviation): {}",
                 entries.join(", ")
             ));
         }
