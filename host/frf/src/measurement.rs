@@ -41,7 +41,7 @@ use recording_group::{MeasuredEntry, MeasuredGroup, receptances};
 use sensor_mass::{accelerated, roving, sensor_mass};
 use steady::steady;
 use stepped::stepped;
-use struck::struck;
+use struck::{common_segment_s, struck};
 use usable_lines::{independent, keep_excited};
 
 /// Measured receptances with their statistics.
@@ -97,6 +97,11 @@ pub fn measure(recordings: &[Recording], settings: &MeasurementSettings) -> Resu
     for recording in recordings {
         check_band(recording, settings)?;
     }
+    let mut settings = settings.clone();
+    if settings.hammer.segment_s.is_none() && settings.resolution_hz.is_none() {
+        settings.hammer.segment_s = common_segment_s(&groups)?;
+    }
+    let settings = &settings;
     let exponential_s = settings.hammer.exponential_s;
     if let (Some(_), Some((other, _))) = (
         exponential_s,

@@ -5,9 +5,35 @@ use super::recording_group::RecordingGroup;
 use crate::criteria::{END_AMPLITUDE, IMPACTS_MIN};
 use crate::cross_spectra::{CrossSpectra, Segments, averaged};
 use crate::error::FrfError;
-use crate::hammer::{self, MeasuredImpact};
+use crate::excitation::Excitation;
+use crate::hammer::{self, HammerWindows, MeasuredImpact};
 use crate::measurement_settings::{MeasurementSettings, band};
 use crate::test_channels::TestChannels;
+
+/// Length of the segments of all hammer tests, s, if their groups differ in force or response: the shortest one. With
+/// segments of different lengths, taps in x and in y would have no frequency line in common. `None` with fewer than two
+/// groups of hammer tests.
+///
+/// # Errors
+/// A hammer test has no usable impact.
+pub(super) fn common_segment_s(
+    groups: &[(Excitation, Vec<TestChannels<'_>>)],
+) -> Result<Option<f64>, FrfError> {
+    let tests: Vec<&Vec<TestChannels<'_>>> = groups
+        .iter()
+        .filter(|(excitation, _)| *excitation == Excitation::Hammer)
+        .map(|(_, members)| members)
+        .collect();
+    if tests.len() < 2 {
+        return Ok(None);
+    }
+    let mut shortest_s = f64::INFINITY;
+    for channels in tests.into_iter().flatten() {
+        let cut = hammer::segments(channels, HammerWindows::default())?;
+        shortest_s = shortest_s.min(cut.length as f64 / channels.recording.sample_rate_hz);
+    }
+    Ok(Some(shortest_s))
+}
 
 /// Auto- and cross-spectra of hammer tests with one segment for each single impact, and the largest powers of the
 /// channels near half the sample rate; one result for each recording.
