@@ -21,6 +21,10 @@ const SIZE_MAX: usize = 80;
 /// Distance of |μ| from 1 within which the eigenvalues of the map leave a count open: they err by far less.
 const OPEN: f64 = 1e-7;
 
+/// Distance of |μ| from 1 within which counting by Taylor series is not asked. It counts a pair with |μ| = 1 − 5.5e-4 of
+/// machine 896 as outside, where eigenvalues on four meshes and semi-discretization agree that it lies inside.
+const OPEN_BY_SERIES: f64 = 1e-2;
+
 /// Counts the multipliers of a machine outside the unit circle at any depth.
 struct Counter {
     period: Period,
@@ -43,10 +47,15 @@ impl Counter {
 
     /// Number of multipliers outside the unit circle; `None` if one lies on it to the error of the map.
     fn outside(&self, depth_mm: f64) -> Option<i32> {
+        self.outside_unless(depth_mm, OPEN)
+    }
+
+    /// Number of multipliers outside the unit circle; `None` if one lies closer to it than the distance `open`.
+    fn outside_unless(&self, depth_mm: f64, open: f64) -> Option<i32> {
         let all = period_map::multipliers(&self.period, depth_mm * 1e-3).ok()?;
         let is_open = all
             .iter()
-            .any(|multiplier| (multiplier.norm() - 1.0).abs() < OPEN);
+            .any(|multiplier| (multiplier.norm() - 1.0).abs() < open);
         let outside = all.iter().filter(|multiplier| multiplier.norm() > 1.0).count();
         (!is_open).then_some(outside as i32)
     }
@@ -138,7 +147,9 @@ fn outcome(seed: u64, index: usize) -> Option<Outcome> {
     // One depth by a method that shares no code with the line.
     if index.is_multiple_of(4) && counter.size() < 60 {
         let depth_mm = rng.random_range(0.0..DEPTH_MM);
-        if let Some(counted) = taylor::count_beyond(&problem, rpm, depth_mm * 1e-3, 1.0) {
+        if counter.outside_unless(depth_mm, OPEN_BY_SERIES).is_some()
+            && let Some(counted) = taylor::count_beyond(&problem, rpm, depth_mm * 1e-3, 1.0)
+        {
             outcome.by_series += 1;
             if counted as i32 != expected(depth_mm) {
                 report(depth_mm, counted as i32, "by Taylor series");
@@ -168,7 +179,7 @@ fn check(seed: u64, first: usize, count: usize) {
         println!("{wrong}");
     }
     assert!(wrong.is_empty());
-    // Nine of ten machines have maps small enough, and most of these a limit.
+    // Nine of ten machines have maps small enough. A count of zero switches would test nothing.
     assert!(4 * outcomes.len() > 3 * count && 2 * sum(|outcome| outcome.switches) > count);
 }
 
