@@ -27,14 +27,13 @@ pub(crate) const PULSE_END: f64 = 0.05;
 pub(crate) const PULSE_END_ABOVE_NOISE: f64 = 2.0;
 
 /// Smallest second force pulse of a hammer that makes an impact a double impact, as a fraction of the first peak; the
-/// pulse must also exceed [`PULSE_ABOVE_NOISE`]. The
-/// force window removes the second pulse but not its response, so that a smaller one causes an error of the FRF of up
-/// to this fraction. That 3 % are tolerable is unfounded.
+/// pulse must also exceed [`PULSE_ABOVE_NOISE`]. The force window removes the second pulse but not the response to
+/// it, so that a smaller pulse causes an error of the FRF of up to this fraction. That 3 % are tolerable is unfounded.
 pub(crate) const SECOND_PULSE: f64 = 0.03;
 
 /// Largest contribution of an exponential window to the measured decay rate of a mode, as a fraction of that rate. The
-/// difference of both is the decay rate of the mode itself. At the limit its relative error is twenty times that of the
-/// measured rate: 20 % where that is known to 1 %. Unfounded.
+/// difference of both is the decay rate of the mode itself. At the limit the relative error of the difference is twenty
+/// times that of the measured rate: 20 % where the measured rate is known to 1 %. Unfounded.
 pub(crate) const LARGEST_WINDOW_SHARE: f64 = 0.95;
 
 /// Smallest number of single impacts of a hammer test; with fewer, a warning replaces coherence and standard deviation.
@@ -55,13 +54,13 @@ pub(crate) const END_AMPLITUDE: f64 = 0.02;
 pub(crate) const DEPENDENT: f64 = 1e-2;
 
 /// Smallest excess of the number of independent averages of the spectra over the number of forces; with less, an FRF
-/// measurement is refused unless it is a hammer test. With as many averages as forces, the coherence is 1 whatever the
-/// noise. The half average is unfounded.
+/// measurement with random or swept excitation is refused. With as many averages as forces, the coherence is 1 whatever
+/// the noise. The half average is unfounded.
 pub(crate) const SPARE_AVERAGES: f64 = 0.5;
 
-/// Smallest force power of a frequency line that lies within the swept range of a swept sine, as a fraction of the
-/// largest force power of all lines. At resonances the force of a shaker drops to about 1e-2 of the largest power; the
-/// tenth of that is unfounded.
+/// Smallest force power of a frequency line that lies within the swept range of a swept sine, or that a periodic force
+/// excites, as a fraction of the largest force power of all lines. At resonances the force of a shaker drops to about
+/// 1e-2 of the largest power; the tenth of that is unfounded.
 pub(crate) const EXCITED: f64 = 1e-3;
 
 // Step-sine tests
@@ -70,8 +69,9 @@ pub(crate) const EXCITED: f64 = 1e-3;
 /// the periods needs several. Unfounded.
 pub(crate) const PERIODS_MIN: usize = 8;
 
-/// Smallest relative change of the excitation period that begins a new frequency step of a step-sine test. Usual
-/// increments between steps near a resonance are four times as large. Unfounded.
+/// Smallest relative change of the excitation period that begins a new frequency step of a step-sine test, and smallest
+/// relative difference of the frequencies of two steps with which they are no repetitions. Usual increments between
+/// steps near a resonance are four times as large. Unfounded.
 pub(crate) const FREQUENCY_STEP: f64 = 1.5e-3;
 
 /// Smallest deviation of an excitation period from the mean period of its frequency step that begins a new step, in
@@ -99,7 +99,7 @@ pub(crate) const SUBSEGMENT_SAMPLES_MIN: usize = 5;
 
 /// Largest deviation of the phasor ratio response/force of a subsegment from its mean over the second half of the
 /// frequency step with which the response counts as settled, as a fraction of that mean. The response may also differ
-/// by noise, see [`SETTLED_NOISE`]. Unfounded.
+/// by noise, see [`SETTLED_NOISE`]. The same fraction holds for the periods of periodic excitation. Unfounded.
 pub(crate) const SETTLED: f64 = 2e-3;
 
 /// Largest deviation of the phasor ratio response/force of a subsegment from its mean over the second half of the
@@ -111,8 +111,9 @@ pub(crate) const SETTLED_NOISE: f64 = 3.0;
 /// count as one force level. The amplitude of a controlled shaker varies by some percent. Unfounded.
 pub(crate) const SAME_LEVEL: f64 = 1.05;
 
-/// Largest ratio of force amplitudes in a step-sine test: between the force level that the user selects and the level
-/// that is evaluated, and between the frequency steps of a level without a warning of a varying force. Unfounded.
+/// Largest ratio of force amplitudes that count as equal: of the force level that the user selects and the evaluated
+/// level of a step-sine test, and, without a warning, of the frequency steps of such a level and of averaged shaker
+/// recordings. Unfounded.
 pub(crate) const SAME_FORCE: f64 = 1.2;
 
 /// Smallest length of a repeated frequency step with which it replaces the other step of about the same frequency,
@@ -174,8 +175,8 @@ pub(crate) const STRUCK_ENERGY: f64 = 0.9;
 /// distance from 1 is a choice.
 pub(crate) const PULSE_SHORTER: f64 = 3.0;
 
-/// Smallest share of the energy of a hammer's force pulses that lies in samples of one sign: a hammer pushes and does
-/// not pull. Filters ring by some percent, a choice.
+/// Smallest share of the energy of the samples above a fifth of a hammer's peak that lies in samples of one sign: a
+/// hammer pushes and does not pull. Filters ring by some percent, a choice.
 pub(crate) const ONE_SIGN: f64 = 0.95;
 
 /// Smallest ratio of the mean power of a signal just after a pulse of another channel to that just before it, from
@@ -194,8 +195,8 @@ pub(crate) const SPIKE_ABOVE: f64 = 3.0;
 /// with fewer than three samples are larger. A choice.
 pub(crate) const SPIKE_NEIGHBOURS: f64 = 0.05;
 
-/// Largest share of clipped segments, periods or impacts of a record of which the others are evaluated. With more than one half the median part
-/// is clipped: those that remain are the weakest, and their level is not that of the test.
+/// Largest share of clipped segments or periods of a record of which the others are evaluated. With more than
+/// one half the median part is clipped: those that remain are the weakest, and their level is not that of the test.
 pub(crate) const CLIPPED_PARTS: f64 = 0.5;
 
 /// Coherence below which noise has more energy than the response to the force: γ² = S/(S + N) with S = N.
@@ -206,9 +207,9 @@ pub(crate) const UNRELATED: f64 = 0.5;
 /// line.
 pub(crate) const UNRELATED_PEAK: f64 = 0.8;
 
-/// Mean of the sine of the phase of a drive-point receptance, weighted with |H|², above which it has the sign of an
-/// inverted sensor. A passive drive point has none above 0, −1 at a resonance and 0 at frequencies without damping. A
-/// choice.
+/// Mean of the sine of the phase of a drive-point receptance, weighted with |H|², above which the receptance has the
+/// sign of an inverted sensor. A passive drive point has none above 0, −1 at a resonance and 0 at frequencies without
+/// damping. A choice.
 pub(crate) const INVERTED_PHASE: f64 = 0.2;
 
 /// Range of plausible peaks of receptances, m/N. The most compliant structures that are tapped, thin walls, reach 10⁻³
@@ -219,72 +220,76 @@ pub(crate) const PLAUSIBLE_RECEPTANCE: [f64; 2] = [1e-12, 1e-2];
 /// largest of 64 independent exponential powers of a random force exceeds 50 medians with a probability of 64·2⁻⁵⁰.
 pub(crate) const LINE_ABOVE_NEIGHBOURS: f64 = 50.0;
 
-/// Smallest share of the energy of a force in single lines that makes it periodic. A random force has none, the force
-/// of a steady cut all but its noise. A choice.
+/// Smallest share of the energy of a force in single lines, or repeated after a period, that makes it periodic. A
+/// random force has none, the force of a steady cut all but its noise. A choice.
 pub(crate) const SHARE_OF_LINES: f64 = 0.9;
 
 // Periodic excitation
 
-/// Smallest number of whole periods in a record of periodic excitation: two that may hold the transient, and two whose difference is the
-/// noise that the transient is compared with.
+/// Smallest number of whole periods in a record of periodic excitation: two that may hold the transient, and two whose
+/// difference is the noise that the transient is compared with.
 pub(crate) const PERIODS_RECORDED_MIN: usize = 4;
 
-/// Largest distance of a line of a periodic force from its line of the transform, in line spacings. A line leaks the same fraction into its
-/// neighbours, and that fraction of the FRF is the error.
+/// Largest distance of the highest strong line of a periodic force from its line of the transform, in line spacings. A
+/// line leaks the same fraction into its neighbours, and that fraction of the FRF is the error.
 pub(crate) const PERIOD_SHIFT: f64 = 1e-3;
 
-/// Standard deviations by which the period of a force must differ from a whole number of samples to be refused: Gaussian noise
-/// reaches it in one of 16 000 records.
+/// Standard deviations by which the period of a force must differ from a whole number of samples to be refused:
+/// Gaussian noise reaches it in one of 16 000 records.
 pub(crate) const PERIOD_SHIFT_ERRORS: f64 = 4.0;
 
-/// Smallest number of lines in the band with which a periodic force is taken for a multisine without being told. A sine has one, the force
-/// of a cut in a band of some tooth-passing frequencies a few. Unfounded.
+/// Smallest number of lines in the band with which a periodic force is taken for a multisine without being told. A sine
+/// has one, the force of a cut in a band of some tooth-passing frequencies a few. Unfounded.
 pub(crate) const MULTISINE_LINES_MIN: usize = 10;
 
-/// Energy of the difference between two consecutive periods of a force, as a multiple of its median over all pairs, from which the force
-/// changes there, as at its start and its end. The ratio of the noise energies of two periods of a hundred samples exceeds 2 in one of 1e4.
-/// Unfounded above that.
+/// Energy of the difference between two consecutive periods of a force, as a multiple of its median over all pairs,
+/// from which the force changes there, as at its start and its end. The ratio of the noise energies of two periods of a
+/// hundred samples exceeds 2 in one of 1e4. Unfounded above that.
 pub(crate) const FORCE_CHANGE: f64 = 10.0;
 
 /// Smallest power of an excited line of a periodic force over the variance of its mean over the periods. Noise alone
 /// exceeds it with the probability e⁻¹⁶ per line.
 pub(crate) const LINE_ABOVE_NOISE: f64 = 16.0;
 
-/// Probability with which noise alone is taken for a transient, a distortion or a difference of realizations: once in a thousand tests, as
-/// in the bands of the project's rates.
+/// Probability with which noise alone is taken for a transient, a distortion or a difference of realizations: once in a
+/// thousand tests. A choice.
 pub(crate) const FALSE_ALARM: f64 = 1e-3;
 
 /// Smallest distortion that is reported, relative to the response. Rounding in a file of five digits is as large.
 pub(crate) const LEAST_DISTORTION: f64 = 1e-5;
 
-/// Largest correlation of the spectra of two periodic forces that have different phases. The correlation of n lines of random phases exceeds
-/// c at one of the n independent shifts with the probability n·exp(−n c²): 1e-3 with 10 lines, 5e-11 with 30.
+/// Largest correlation of the spectra of two periodic forces that have different phases. The correlation of n lines of
+/// random phases exceeds c at one of the n independent shifts with the probability n·exp(−n c²): 1e-3 with 10 lines,
+/// 5e-11 with 30.
 pub(crate) const SAME_PHASES: f64 = 0.95;
 
 // Mass of the accelerometer
 
-/// Smallest number of lines between the half-power points of a peak from which its modal mass is estimated: one more than the two
-/// unknowns of a straight line.
+/// Smallest number of lines between the half-power points of a peak from which its modal mass is estimated: one more
+/// than the two unknowns of a straight line.
 pub(crate) const PEAK_LINES_MIN: usize = 3;
 
-/// Mass of an accelerometer that is assumed for its effect if none is given, kg. Sensors for taps of tools weigh 0.5 to 10 g; a choice between.
+/// Mass of an accelerometer that is assumed for its effect if none is given, kg. Sensors for taps of tools weigh 0.5 to
+/// 10 g; a choice between.
 pub(crate) const ASSUMED_ACCELEROMETER_KG: f64 = 5e-3;
 
-/// Smallest relative shift of a peak by that mass that is warned of. Charts resolve the speed to 0.1 %, and lobes move with the frequency.
+/// Smallest relative shift of a peak by an accelerometer that is warned of. Charts resolve the speed to 0.1 %, and
+/// lobes move with the frequency.
 pub(crate) const LEAST_PEAK_SHIFT: f64 = 1e-3;
 
 // Peaks of a receptance
 
-/// Smallest peak that is fitted in a comparison, as a fraction of the largest of the receptance. The limit from a peak is inversely
-/// proportional to it: lower peaks limit at ten times the depth.
+/// Smallest peak that is fitted in a comparison, as a fraction of the largest of the receptance. The limit from a peak
+/// is inversely proportional to it: lower peaks limit at more than ten times the depth.
 pub(crate) const LEAST_COMPARED_PEAK: f64 = 0.1;
 
-/// Standard deviations that the damping ratio and the size of a fitted peak must exceed. Gaussian noise exceeds both together in far fewer than
-/// one of 30 000 maxima.
+/// Standard deviations that the damping ratio and the size of a fitted peak must exceed. Gaussian noise exceeds both
+/// together in far fewer than one of 30 000 maxima.
 pub(crate) const PEAK_ABOVE_NOISE: f64 = 4.0;
 
-/// Smallest |H| of the lines of a fit of one peak, as a fraction of the peak. At the half the residual of other modes is still a straight line
-/// over the band, 1.7 half-power bandwidths. Unfounded.
+/// Smallest |H| of the lines of a fit of one peak, as a fraction of the peak, unless these are fewer than
+/// [`FITTED_LINES_MIN`]. At one half the contribution of other modes is still a straight line over the band, 1.7
+/// half-power bandwidths. Unfounded.
 pub(crate) const FITTED_PART: f64 = 0.5;
 
 /// Smallest number of lines of a fit of one peak: its four complex unknowns, and as many for the scatter.

@@ -77,7 +77,8 @@ impl Segments {
         }
     }
 
-    /// Leaves out the segments for which `is_left_out` holds, and returns their number. The averages are reduced in proportion.
+    /// Leaves out the segments for which `is_left_out` holds, and returns their number. The averages are reduced in
+    /// proportion.
     pub(super) fn leave_out(&mut self, is_left_out: impl Fn(Range<usize>) -> bool) -> usize {
         let (before, length) = (self.starts.len(), self.weights.len());
         self.starts.retain(|&start| !is_left_out(start..start + length));
@@ -127,8 +128,9 @@ pub(super) fn averaged(
     spectra
 }
 
-/// Cross-spectra of whole `signals` without their means, each summed over successive groups of `width` lines of `band`;
-/// a last group of fewer lines is left out. The fraction `taper` of each signal is tapered at each end.
+/// Cross-spectra of whole `signals` without their means, each summed over successive groups of `width` lines of `band`
+/// (without 0 Hz and half the sample rate); a last group of fewer lines is left out. The fraction `taper` of each
+/// signal is tapered at each end.
 pub(super) fn smoothed(
     signals: &[&[f64]],
     sample_rate_hz: f64,

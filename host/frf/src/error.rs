@@ -5,13 +5,13 @@ use std::path::PathBuf;
 use quietcut_recording::RecordingError;
 use quietcut_recording::file::FileError;
 
-/// Error of reading an FRF table or of measuring FRFs; every message names the file.
+/// Error of reading or writing an FRF table, or of measuring FRFs; every message names the file or the origin.
 #[derive(Debug, thiserror::Error)]
 pub enum FrfError {
     /// The file of an FRF table or a recording does not exist, or cannot be read or written.
     #[error(transparent)]
     File(#[from] FileError),
-    /// A recording that cannot be read or lacks a required channel.
+    /// A recording does not have the channels that the measurement needs.
     #[error(transparent)]
     Recording(RecordingError),
     /// A line of a text file, or a data set of a UFF file, is malformed.

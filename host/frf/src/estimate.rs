@@ -135,7 +135,7 @@ fn line(
         Estimator::H2 => h2(&xf, &xx, counts)?,
         Estimator::Mean => scaled(&sum(&h1, &h2(&xf, &xx, counts)?), 0.5),
     };
-    // Power of the residual X − H1 F of the responses: S_xx − 2 Re(S_xf Hᴴ) + H S_ff Hᴴ.
+    // Power of the residual X − H F of the responses with H = `h1`: S_xx − 2 Re(S_xf Hᴴ) + H S_ff Hᴴ.
     let explained = product_adjoint(&xf, &h1);
     let modelled = product_adjoint(&product(&h1, &ff), &h1);
     let unbiased = averages / (averages - counts.forces as f64).max(1.0);
@@ -170,7 +170,8 @@ fn line(
     Some(line)
 }
 
-/// Estimate H2 = S_xx S_fx⁻¹. With one force, H2 is computed separately for each response.
+/// Estimate H2 = S_xx S_fx⁻¹. With one force, H2 is computed separately for each response; with several, `None` if S_fx
+/// is singular.
 fn h2(xf: &Matrix, xx: &Matrix, counts: ChannelCounts) -> Option<Matrix> {
     if counts.forces == 1 {
         let mut h = ZERO;
@@ -187,7 +188,7 @@ fn h2(xf: &Matrix, xx: &Matrix, counts: ChannelCounts) -> Option<Matrix> {
 /// Blocks W_i of the pseudo-inverse of the force spectra S = [S_ff,1 S_ff,2 …] of all tests i, and the smallest and
 /// largest singular value of S with rows of unit norm.
 ///
-/// For full row rank, S⁺ = Sᴴ (S Sᴴ)⁻¹.
+/// For full row rank, S⁺ = Sᴴ (S Sᴴ)⁻¹. `None` if S Sᴴ is singular.
 fn stacked(powers: &[Powers], forces: usize) -> Option<(Vec<Matrix>, (f64, f64))> {
     let gram = powers.iter().fold(ZERO, |gram, test| {
         sum(&gram, &product_adjoint(&test.ff, &test.ff))

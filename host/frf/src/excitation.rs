@@ -4,7 +4,7 @@ use quietcut_recording::{Quantity, RecordedCut, Recording, Sidecar, TestKind};
 
 use super::hammer::is_struck;
 
-/// Kind of excitation; it selects how a record is divided into segments.
+/// Kind of excitation; it selects how a record is evaluated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Excitation {
     /// Random excitation, or a cut at constant spindle speed: overlapping windowed segments (Welch's method).
@@ -20,8 +20,8 @@ pub enum Excitation {
 }
 
 impl Excitation {
-    /// Kind of excitation of a recording, from the kind of test and the speed ramp in its sidecar; random for every
-    /// other kind, and if the sidecar names none.
+    /// Kind of excitation of a recording, from the kind of test and the speed ramp in its sidecar. Random for shaker
+    /// tests, cuts without a speed ramp, idle runs and free decays, and if the sidecar names no kind.
     fn of(sidecar: &Sidecar) -> Self {
         let glides = sidecar.cut.is_some_and(|cut| cut.last_rpm.is_some());
         match sidecar.kind {
@@ -35,8 +35,8 @@ impl Excitation {
         }
     }
 
-    /// Kind of excitation of a recording: that of its sidecar; if this names neither a kind nor a cut, a hammer test if the
-    /// only force of the recording is that of a hammer.
+    /// Kind of excitation of a recording: that of its sidecar; if this names neither a kind nor a cut, a hammer test if
+    /// the only force of the recording is that of a hammer.
     pub(super) fn of_recording(recording: &Recording) -> Self {
         let sidecar = &recording.sidecar;
         let mut forces = recording

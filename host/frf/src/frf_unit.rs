@@ -18,7 +18,7 @@ pub(super) struct FrfUnit {
     pub(super) derivatives: i32,
 }
 
-/// Parses directions such as `xy`: displacement in x, force in y.
+/// Parses directions such as `xy`: displacement in x, force in y. `None` for any other text.
 pub(super) fn pair_of(text: &str) -> Option<DirectionPair> {
     let axis = |text: &str| {
         let direction: Direction = text.parse().ok()?;

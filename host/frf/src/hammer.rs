@@ -10,8 +10,8 @@ use super::criteria::{
 };
 use super::test_channels::TestChannels;
 
-/// Length of the part of a hammer segment before the impact, as a fraction of the segment length. The mean of this part
-/// is subtracted from the segment as the offset of the sensor. A choice.
+/// Length of the part of a hammer segment before the force pulse, as a fraction of the segment length. The mean of this
+/// part is subtracted from the segment as the offset of the sensor. A choice.
 const BEFORE: f64 = 0.01;
 
 /// One impact of the hammer.
@@ -34,11 +34,12 @@ pub struct MeasuredImpact {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct HammerWindows {
     /// Length of the segment of each impact, s. `None` for the inverse of the frequency resolution or, if none is set,
-    /// for the greatest length with which segments neither overlap nor exceed the record.
+    /// for the greatest length with which segments neither overlap nor exceed their record in any hammer test that is
+    /// measured together.
     pub segment_s: Option<f64>,
     /// Time constant τ of the exponential window on force and response, s; `None` for no window.
     ///
-    /// With e^{−t/τ} on both signals the FRF is exactly H(iω + 1/τ): every pole λ moves to λ − 1/τ.
+    /// With e^{−t/τ} on both signals the FRF is H(iω + 1/τ): every pole λ moves to λ − 1/τ.
     /// [`measure`](crate::measure) removes the damping that the window adds.
     pub exponential_s: Option<f64>,
 }
@@ -171,7 +172,7 @@ pub(super) fn segments(
     Ok(cut)
 }
 
-/// True if a force is that of a hammer: its energy lies in few short pulses of one sign.
+/// True if a force is that of a hammer: its energy lies in short pulses whose peaks have one sign.
 pub(super) fn is_struck(force: &[f64], rate: f64) -> bool {
     let impacts = impacts(force, rate);
     let middle = median(&mut force.to_vec()).unwrap_or(0.0);

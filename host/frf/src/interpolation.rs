@@ -48,7 +48,7 @@ impl Interpolation {
     }
 
     /// Interpolation through every second line of this table and its last line; `None` if fewer than four lines remain.
-    /// Its difference from the full table shows the effect of the line spacing.
+    /// The difference between both interpolations shows the effect of the line spacing.
     pub fn thinned(&self) -> Option<Self> {
         let last = self.lines.len() - 1;
         let kept = || (0..last).step_by(2).chain([last]);

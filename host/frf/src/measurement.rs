@@ -50,15 +50,16 @@ pub struct Measurement {
     /// Measured receptances with the coherence of each response, or without it for fewer than three impacts of a
     /// hammer. With several forces it is the multiple coherence.
     pub table: FrfTable,
-    /// Standard deviation of |H| of each entry of the table at each of its frequencies, m/N.
+    /// Standard deviation of |H|, by entry of the table, then by frequency, m/N.
     pub deviation: Vec<Vec<f64>>,
     /// One value per entry of the table. False if its standard deviation is meaningless, since it comes from fewer than
     /// three impacts of a hammer.
     pub has_deviation: Vec<bool>,
-    /// Degrees of freedom of the standard deviations of each entry of the table, if these are few.
+    /// One value per entry of the table: degrees of freedom of its standard deviations from periodic excitation; `None`
+    /// for other excitation, with normal quantiles.
     pub freedoms: Vec<Option<usize>>,
-    /// Largest relative error of each entry of the table at each frequency by aliasing of content above half the sample
-    /// rate. It is estimated for hammer tests only, and 0 for all other excitation.
+    /// Largest relative error by aliasing of content above half the sample rate, by entry of the table, then by
+    /// frequency. It is estimated for hammer tests only, and 0 for all other excitation.
     pub folding: Vec<Vec<f64>>,
     /// Groups of recordings that were evaluated together.
     pub groups: Vec<RecordingGroup>,
@@ -67,8 +68,8 @@ pub struct Measurement {
 }
 
 impl Measurement {
-    /// Half the width of the 90 % interval of an entry of the table, in its standard deviations: 1.645, or more where few degrees of freedom
-    /// determine these.
+    /// Half the width of the 90 % interval of an entry of the table, in its standard deviations: 1.645, or more where
+    /// few degrees of freedom determine these.
     pub fn ninety_percent(&self, entry: usize) -> f64 {
         self.freedoms
             .get(entry)
@@ -85,8 +86,8 @@ impl Measurement {
 /// left out. The damping that an exponential window adds is removed.
 ///
 /// # Errors
-/// For example: a recording has no force or no response, or is too short for the resolution; the forces are dependent;
-/// the recordings have fewer than half of their frequencies in common.
+/// For example: a recording has no force or no response, or is too short for the resolution; the forces are dependent
+/// at more than half of the frequencies; the recordings have fewer than half of their frequencies in common.
 pub fn measure(recordings: &[Recording], settings: &MeasurementSettings) -> Result<Measurement, FrfError> {
     let channels = recordings
         .iter()
@@ -159,10 +160,11 @@ pub fn measure(recordings: &[Recording], settings: &MeasurementSettings) -> Resu
 
 /// Groups recordings with the same force directions, the same measured responses and the same kind of excitation.
 ///
-/// The excitation is that of the settings or of the sidecar, or a multisine if the force of a shaker is periodic with several lines.
+/// The excitation is that of the settings. If they state none, it is [`Excitation::of_recording`], or a multisine
+/// instead of a random one if the force is [`recognized`].
 ///
 /// # Errors
-/// The force and a response of a recording are swapped.
+/// The force and a response of a recording with random or hammer excitation seem to be swapped.
 fn grouped<'a>(
     channels: Vec<TestChannels<'a>>,
     settings: &MeasurementSettings,

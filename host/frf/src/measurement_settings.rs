@@ -10,13 +10,13 @@ use super::window::Window;
 /// Settings of an FRF measurement from recordings.
 #[derive(Clone, Debug)]
 pub struct MeasurementSettings {
-    /// Kind of excitation of all recordings; `None` takes that of the test in the sidecar of each recording.
+    /// Kind of excitation of all recordings; `None` determines it for each recording from its sidecar and its force.
     pub excitation: Option<Excitation>,
     /// FRF estimator.
     pub estimator: Estimator,
-    /// Frequency resolution (line spacing), Hz. `None` selects eight half-overlapping segments for each force in random
-    /// excitation, and averages over eight lines for each force in a sweep. In a hammer test it sets the segment length
-    /// if [`HammerWindows`] does not.
+    /// Frequency resolution (line spacing), Hz. `None` selects about eight half-overlapping segments for each force in
+    /// random excitation, and averages over eight lines for each force in a sweep. In a hammer test it sets the segment
+    /// length if [`HammerWindows`] does not.
     pub resolution_hz: Option<f64>,
     /// Overlap of the segments of random excitation, as a fraction of their length.
     pub overlap: f64,
@@ -29,7 +29,7 @@ pub struct MeasurementSettings {
     pub channels: Vec<String>,
     /// Segment length and exponential window of hammer tests.
     pub hammer: HammerWindows,
-    /// Mass of the accelerometer at the drive point, kg, whose effect is removed; `None` if it is not known.
+    /// Mass of the accelerometer at the drive point, kg, whose effect is removed; `None` removes nothing.
     pub accelerometer_mass_kg: Option<f64>,
     /// Period of periodic excitation, s; `None` finds it from the force.
     pub period_s: Option<f64>,
@@ -56,7 +56,7 @@ impl Default for MeasurementSettings {
 }
 
 /// Indices of the lines within the band to evaluate, of a transform of `length` samples at the sampling rate `rate`,
-/// Hz; 0 Hz is excluded.
+/// Hz; 0 Hz is excluded. Without a band, all lines between 0 Hz and half the sampling rate, both excluded.
 pub(super) fn band(settings: &MeasurementSettings, rate: f64, length: usize) -> Range<usize> {
     let line = |hertz: f64| hertz * length as f64 / rate;
     match settings.band_hz {

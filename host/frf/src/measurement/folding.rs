@@ -27,7 +27,8 @@ const TOP: f64 = 0.25;
 const FOLDED: f64 = std::f64::consts::PI * std::f64::consts::PI / 24.0;
 
 /// Largest power of every channel of a hammer test near half the sample rate, scaled to half the sample rate by 1/f⁴,
-/// at the scale of the cross-spectra; 0 for a channel with an anti-aliasing filter. Forces come first.
+/// at the scale of the cross-spectra; 0 for a channel for which the sidecar states an anti-aliasing filter. Forces come
+/// first.
 pub(super) fn top_powers(
     channels: &TestChannels<'_>,
     signals: &[&[f64]],

@@ -21,16 +21,19 @@ pub struct RecordingGroup {
     pub forces: Vec<Direction>,
     /// Kind of excitation.
     pub excitation: Excitation,
-    /// Effective number of independent averages of the spectra of the group; 1 for a step-sine test.
+    /// Effective number of independent averages of the spectra of the group: for periodic excitation the number of
+    /// periods, for a step-sine test 1.
     pub averages: f64,
-    /// Frequencies left out because the forces of the group are linearly dependent there, Hz.
+    /// Frequencies left out because the forces of the group are linearly dependent there, Hz; without those at which no
+    /// FRF can be computed at all.
     pub left_out_hz: Vec<f64>,
     /// Smallest singular value of the force spectra over the frequencies of the group that are not left out, each force
     /// normalized at each frequency; 1 for a single force.
     pub least_singular: f64,
     /// Single impacts (used) and double impacts (left out) of a hammer test; `None` for other excitation.
     pub impacts: Option<(Vec<MeasuredImpact>, Vec<MeasuredImpact>)>,
-    /// Degrees of freedom of the standard deviations, if these are few; `None` for normal quantiles.
+    /// Degrees of freedom of the standard deviations of a test with periodic excitation; `None` for other excitation,
+    /// with normal quantiles.
     pub freedoms: Option<usize>,
     /// Periods, realizations and distortion of a test with periodic excitation; `None` for other excitation.
     pub periodic: Option<PeriodicTest>,

@@ -8,8 +8,8 @@ use crate::measurement_settings::{MeasurementSettings, band};
 use crate::test_channels::TestChannels;
 use crate::window::fast_length;
 
-/// Auto- and cross-spectra of a record with continuous excitation, at the frequency lines of the band to evaluate. Segments of random
-/// excitation with clipped samples are left out.
+/// Auto- and cross-spectra of a record with continuous excitation, at the frequency lines of the band to evaluate.
+/// Segments of random excitation with clipped samples are left out.
 pub(super) fn steady(
     excitation: Excitation,
     channels: &TestChannels<'_>,

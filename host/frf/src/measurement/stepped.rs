@@ -8,7 +8,8 @@ use crate::measurement_settings::MeasurementSettings;
 use crate::step_sine::{ForceLevel, step_sine};
 use crate::test_channels::TestChannels;
 
-/// Measures the receptances of a step-sine test, one frequency line per step.
+/// Measures the receptances of one force level of a step-sine test, one frequency line per step within the band to
+/// evaluate.
 pub(super) fn stepped(
     mut group: RecordingGroup,
     members: &[TestChannels<'_>],
@@ -83,7 +84,7 @@ pub(super) fn stepped(
 }
 
 /// Force level of a step-sine test to evaluate: without `force_n` (N) the only level of the test, otherwise the level
-/// nearest to `force_n` and within the factor [`SAME_FORCE`] of it; an error if there is none.
+/// nearest to `force_n` and within the factor [`SAME_FORCE`] of it; an error if there is no such level.
 fn level(
     channels: &TestChannels<'_>,
     mut levels: Vec<ForceLevel>,

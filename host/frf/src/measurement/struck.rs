@@ -10,12 +10,12 @@ use crate::hammer::{self, HammerWindows, MeasuredImpact};
 use crate::measurement_settings::{MeasurementSettings, band};
 use crate::test_channels::TestChannels;
 
-/// Length of the segments of all hammer tests, s, if their groups differ in force or response: the shortest one. With
-/// segments of different lengths, taps in x and in y would have no frequency line in common. `None` with fewer than two
-/// groups of hammer tests.
+/// Length of the segments of all hammer tests, s, if their groups differ in force or response: the shortest of the
+/// lengths that [`hammer::segments`] selects for the recordings. With segments of different lengths, taps in x and in y
+/// would have no frequency line in common. `None` with fewer than two groups of hammer tests.
 ///
 /// # Errors
-/// A hammer test has no usable impact.
+/// As [`hammer::segments`].
 pub(super) fn common_segment_s(
     groups: &[(Excitation, Vec<TestChannels<'_>>)],
 ) -> Result<Option<f64>, FrfError> {

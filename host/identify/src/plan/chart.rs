@@ -8,21 +8,22 @@ use quietcut_numerics::statistics::NINETY_PERCENT;
 use quietcut_stability::Basis;
 use quietcut_stability::{Linearized, Plane, SpeedLine, StabilityError};
 
-/// Largest number of stability lobes that are considered at each spindle speed of a chart, from the first stability
-/// limit upwards.
+/// Largest number of stability lobes with derivatives that count at each spindle speed of a chart, from the first
+/// stability limit to greater depths.
 const LOBES: usize = 4;
 
 /// Number of quasi-random points that represent the distribution of the depth of the lowest of several lobes: a power
 /// of 2.
 const POINTS: u32 = 256;
 
-/// The first stability limit at a spindle speed as the lowest of several lobes, each linearized in the unknown
+/// Stability lobes at a spindle speed, from the first stability limit to greater depths, each linearized in the unknown
 /// parameters.
 #[derive(Clone, Debug)]
 pub(super) struct KnownLimit {
     /// Spindle speed, rev/min.
     pub(super) rpm: f64,
-    /// Depth of each lobe at this speed, linearized in the unknown parameters; lowest first, at least one.
+    /// The linearized lobes at this speed, lowest first: the first stability limit, and deeper lobes with derivatives,
+    /// up to [`LOBES`] together.
     pub(super) planes: Vec<Plane>,
 }
 
@@ -31,7 +32,7 @@ pub(super) struct KnownLimit {
 pub struct WithoutDerivative {
     /// Spindle speed, rev/min.
     pub rpm: f64,
-    /// Axial depth at which stability is lost, mm.
+    /// Axial depth of the limit, mm.
     pub depth_mm: f64,
     /// True for the first limit at the speed, so that the plan leaves the speed out. False for a deeper lobe: the
     /// interval of the first limit then does not include that this lobe may become the lowest.
@@ -41,10 +42,11 @@ pub struct WithoutDerivative {
 }
 
 impl KnownLimit {
-    /// The stability limit at a spindle speed, and the lobes there without derivatives with respect to the unknowns.
+    /// The stability limit at a spindle speed, and the lobes there without derivatives with respect to the unknowns
+    /// that are met before [`LOBES`] lobes with derivatives are found.
     ///
     /// The limit is `None` if stability is not lost up to the largest depth of the chart, or if the first limit is
-    /// among those without derivatives. The gradient of every lobe has `size` entries; those of unknowns that affect
+    /// among those without derivatives. The gradients of every lobe have `size` entries; those of unknowns that affect
     /// only tests are zero.
     pub(super) fn new(
         line: &SpeedLine,
@@ -54,7 +56,8 @@ impl KnownLimit {
         Self::of_planes(line, linearized.planes(line), size)
     }
 
-    /// [`KnownLimit::new`] from the linearized losses of stability at the spindle speed, first limit first.
+    /// [`KnownLimit::new`] with the linearization of every loss of stability among the switches of `line`, in their
+    /// order.
     pub(super) fn of_planes(
         line: &SpeedLine,
         planes: Vec<Result<Plane, StabilityError>>,
@@ -122,7 +125,7 @@ impl KnownLimit {
 pub(super) struct KnownChart {
     pub(super) limits: Vec<KnownLimit>,
     /// Quasi-random points of the standard normal distribution: one list for each number of dimensions from 1 to
-    /// [`LOBES`].
+    /// [`LOBES`], in ascending order.
     points: Vec<Vec<DVector<f64>>>,
 }
 
@@ -135,7 +138,8 @@ impl KnownChart {
         }
     }
 
-    /// The 90 % interval of every stability limit, mm, if the unknowns have the inverse covariance `information`.
+    /// The 90 % interval of every stability limit in the order of `limits`, mm, if the unknowns have the inverse
+    /// covariance `information`.
     pub(super) fn intervals(&self, information: &DMatrix<f64>) -> Vec<[f64; 2]> {
         // The inverse covariance starts as the identity and information is only added, so it is positive definite
         // unless a number overflows.
@@ -148,8 +152,8 @@ impl KnownChart {
             .collect()
     }
 
-    /// Width of the 90 % interval of every stability limit, relative to the limit, if the unknowns have the inverse
-    /// covariance `information`.
+    /// Width of the 90 % interval of every stability limit in the order of `limits`, relative to the limit, if the
+    /// unknowns have the inverse covariance `information`.
     pub(super) fn widths(&self, information: &DMatrix<f64>) -> Vec<f64> {
         let intervals = self.intervals(information);
         let pairs = intervals.iter().zip(&self.limits);
@@ -195,7 +199,7 @@ fn solved(root: &Cholesky<f64, Dyn>, gradient: &DVector<f64>) -> DVector<f64> {
         .unwrap_or_else(|| gradient.clone())
 }
 
-/// Coordinates of the vectors in an orthonormal basis of their span; the first axis of the basis lies along the first
+/// Coordinates of the vectors along Gram–Schmidt axes, one axis for each vector; the first axis lies along the first
 /// vector.
 fn triangular(vectors: &[DVector<f64>]) -> Vec<DVector<f64>> {
     let size = vectors.len();

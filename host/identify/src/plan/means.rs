@@ -28,8 +28,8 @@ pub struct Means {
 }
 
 impl Default for Means {
-    /// Default tests: a 500 N hammer, an accelerometer of 75 µg/√Hz, sensors calibrated to 2 %, and brackets of 5 % of
-    /// the limit.
+    /// Default tests: impacts of 500 N, an accelerometer of 75 µg/√Hz, sensors calibrated to 2 %, and brackets of 5 %
+    /// of the limit.
     fn default() -> Self {
         Self {
             bracket: 0.05,

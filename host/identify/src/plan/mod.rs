@@ -55,8 +55,8 @@ pub struct Request {
 /// Reason why a plan of tests cannot be computed.
 #[derive(Debug, thiserror::Error)]
 pub enum PlanError {
-    /// The case is refused, for example for its cubic terms, or its stability at a speed of the chart cannot be
-    /// computed.
+    /// The case is refused, for example for its cubic terms; the case is invalid after a change of an unknown parameter
+    /// in either direction; or its stability at a speed of the chart cannot be computed.
     #[error(transparent)]
     Stability(#[from] StabilityError),
     /// At no speed of the chart is stability lost up to the largest depth.
@@ -71,7 +71,7 @@ pub enum PlanError {
         /// Largest depth of the chart, mm.
         depth_mm: f64,
     },
-    /// The stability limits of the case have no derivatives by the unknown parameters, no parameter is unknown, the
+    /// No first stability limit of the chart has derivatives by the unknown parameters, no parameter is unknown, the
     /// modes of the structure cannot be computed, or the Fisher information of a test cannot be computed.
     #[error("{case}: limits have no derivatives with respect to the unknowns: {what}")]
     NoDerivatives {
@@ -124,8 +124,8 @@ pub struct Step {
 pub struct Obstacle {
     /// Width of the limits' 90 % intervals if every candidate test is repeated a thousand times.
     pub at_best: Width,
-    /// Up to three unknown parameters whose exact values would then narrow the widest interval of a limit most. Empty
-    /// if a thousand repetitions of every test reach the required width.
+    /// Up to three unknown parameters whose exact values would then narrow the widest interval of a limit most, the
+    /// most effective first. Empty if a thousand repetitions of every test reach the required width.
     pub if_known: Vec<IfKnown>,
 }
 
@@ -153,8 +153,7 @@ pub struct Plan {
     /// Names of the unknown parameters, including differences at standstill and sensor gains, each with its standard
     /// deviation in percent where it is assumed.
     pub unknowns: Vec<String>,
-    /// True if the case states standard deviations of its parameters; otherwise those of the request's prior are
-    /// assumed.
+    /// True if the case states uncertainties of its parameters; otherwise those of the request's prior are assumed.
     pub stated: bool,
     /// Width of the limits' 90 % intervals before any test.
     pub before: Width,
@@ -168,8 +167,8 @@ pub struct Plan {
     /// Spindle speeds that the plan leaves out, rev/min: without a stability limit up to the largest depth, or with a
     /// first limit without derivatives.
     pub without_limit_rpm: Vec<f64>,
-    /// Stability limits without derivatives with respect to the unknown parameters, with the reasons. The speeds of
-    /// first limits are among [`Plan::without_limit_rpm`].
+    /// First limits and deeper lobes without derivatives with respect to the unknown parameters, with the reasons. The
+    /// speeds of the first limits among them are in [`Plan::without_limit_rpm`].
     #[serde(skip)]
     pub without_derivative: Vec<WithoutDerivative>,
     /// All spindle speeds of the chart whose stability limit counts in the plan.
@@ -180,8 +179,7 @@ pub struct Plan {
 const AT_BEST: f64 = 1000.0;
 
 /// The cheapest set of tests found after which the 90 % interval of every stability limit of the chart has at most the
-/// required width. If no such set is found, the plan contains the tests that narrow the intervals most per cost. Calls
-/// `progress` after each speed.
+/// required width. If no such set is found, [`Plan::obstacle`] states the reason. Calls `progress` after each speed.
 ///
 /// Intervals follow from limits that are linearized in the unknown parameters: they hold for machines whose parameters
 /// lie within a few standard deviations of the case. At each speed the lowest of several lobes counts.

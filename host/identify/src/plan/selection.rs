@@ -168,8 +168,8 @@ impl<'a> Selection<'a> {
         })
     }
 
-    /// A cheaper set that reaches the required width, in which one or two tests are exchanged for one other; `None` if
-    /// there is none.
+    /// The cheapest set that reaches the required width at a lower total cost, with one or two tests exchanged for one
+    /// candidate; `None` if there is none.
     fn with_another(&self, chosen: &[Chosen]) -> Option<Vec<Chosen>> {
         let total = Self::total(chosen);
         let count = chosen.len();
@@ -182,8 +182,8 @@ impl<'a> Selection<'a> {
                         let kept = (0..count)
                             .filter(|&index| index != a && index != b)
                             .map(|index| chosen[index].candidate);
-                        // Tests that inform about all limits come before tests that bracket one limit: then the
-                        // intervals are narrower and the brackets need fewer cuts.
+                        // Tests that bracket a limit come last: then the intervals are narrower and the brackets need
+                        // fewer cuts.
                         let mut order: Vec<usize> = kept.chain([other]).collect();
                         order.sort_by_key(|&candidate| self.is_bracket(candidate));
                         self.if_cheaper(order, total)

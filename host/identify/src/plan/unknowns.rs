@@ -54,8 +54,8 @@ pub(super) struct Unknowns {
 /// The case parameter of an entry (row, column) of a mass, damping or stiffness matrix.
 type Entry = fn(usize, usize) -> Parameter;
 
-/// Name of a mode, and the changes of the case's parameters for a relative change of 1 (100 %) in its frequency, in its
-/// damping ratio, and in its stiffness or compliance.
+/// Name of a mode or joint, and the changes of the case's parameters for a relative change of 1 (100 %) in its
+/// frequency, in its damping ratio, and in its stiffness or compliance.
 type ModeChanges = (String, [Vec<Deviation>; 3]);
 
 /// An unknown variable of the plan with its name for the user.
@@ -232,9 +232,9 @@ fn of_joint((index, joint): (usize, &Joint)) -> ModeChanges {
     )
 }
 
-/// Names of the undamped modes Kφ = ω²Mφ of matrices, and the changes of the matrices for a relative change of 1 (100
-/// %) in frequency, damping ratio and stiffness of each mode. With φᵀMφ = 1 and φᵀCφ = 2ζω, a change of one mode alone
-/// is a multiple of Mφφᵀ M.
+/// Names of the undamped modes Kφ = ω²Mφ of matrices, lowest frequency first, and the changes of the matrices for a
+/// relative change of 1 (100 %) in frequency, damping ratio and stiffness of each mode. With φᵀMφ = 1 and φᵀCφ = 2ζω, a
+/// change of one mode alone is a multiple of Mφφᵀ M.
 ///
 /// Modes are those of the symmetric parts of the matrices; modes with ω² ≤ 0 are left out. Damping that couples modes
 /// does not change.

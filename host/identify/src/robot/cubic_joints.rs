@@ -29,7 +29,7 @@ use quietcut_model::structure::{Direction, Robot};
 /// Steady tones at one posture.
 #[derive(Clone, Debug)]
 pub struct PostureDwells {
-    /// Joint angles of the posture, rad.
+    /// Joint angles of the posture in the order of the joints, rad.
     pub angles_rad: Vec<f64>,
     /// The steady tones measured at the posture.
     pub dwells: Vec<Dwell>,
@@ -46,7 +46,8 @@ pub struct CubicJointFit {
     pub covariance: DMatrix<f64>,
     /// χ² per degree of freedom of the tool's predicted motion: near 1 if the residual is within the noise.
     pub misfit: f64,
-    /// NRMSE of the fundamental of the tool's predicted motion over all tones.
+    /// NRMSE of the fundamental of the tool's predicted motion over the tones for which the fitted robot gives a
+    /// prediction.
     pub relative_error: f64,
     /// True if the covariance of the parameters comes from the scatter between tones (sandwich covariance), not from
     /// the noise.
@@ -57,7 +58,7 @@ pub struct CubicJointFit {
 /// Fits the joints of a robot, with `start` as the first guess, to steady tones at several postures.
 ///
 /// `terms` are cubic stiffness, cubic damping or both; with `payload` the mass of the last link is a parameter, too.
-/// All dwells have `harmonics` harmonics.
+/// All dwells must have `harmonics` harmonics.
 ///
 /// # Errors
 /// See [`JointFitError`].
@@ -177,7 +178,8 @@ fn parameters(joints: usize, terms: &[NonlinearTerm], payload: bool) -> Vec<Join
     parameters
 }
 
-/// The robot with linear joints, fitted to the receptances at the lowest force of every frequency.
+/// The robot `start` with the linear parameters of its joints fitted to the receptances at the lowest force of every
+/// frequency.
 fn first_guess(start: &Robot, postures: &[PostureDwells], payload: bool) -> Result<Robot, JointFitError> {
     let tables: Vec<PostureFrf> = postures
         .iter()
@@ -188,6 +190,7 @@ fn first_guess(start: &Robot, postures: &[PostureDwells], payload: bool) -> Resu
 }
 
 /// Receptances of the tool under force in direction `force`; at each frequency from the dwell with the smallest force.
+/// `None` if they form no valid table.
 fn lowest(posture: &PostureDwells, force: Direction) -> Option<PostureFrf> {
     let mut dwells: Vec<&Dwell> = posture
         .dwells
@@ -250,8 +253,8 @@ impl CubicJointFit {
     /// deviation of the magnitude of the fundamental in every direction, m.
     ///
     /// The motion is the one reached when the force rises slowly from zero. `None` if the robot without cubic terms is
-    /// undamped and at resonance, or if Newton's method does not follow that branch to the given force, for example
-    /// where it ends in a jump.
+    /// undamped and at resonance, if Newton's method does not follow that branch to the given force, for example where
+    /// it ends in a jump, or if the motion there has no derivatives by the parameters.
     pub fn response(
         &self,
         angles_rad: &[f64],

@@ -126,7 +126,7 @@ impl<'a> Model<'a> {
     }
 
     /// Joint angles per unit force on the tool in x, y and z, without the cubic terms: Z⁻¹ Jᵀ, rad/N, with the dynamic
-    /// stiffness Z of the joints and the Jacobian J of the tool.
+    /// stiffness Z of the joints and the Jacobian J of the tool. `None` if Z is singular.
     pub(super) fn linear(
         &self,
         placed: &PostureMatrices,
@@ -153,7 +153,7 @@ impl<'a> Model<'a> {
             .solve(&placed.jacobian.transpose().map(Complex64::from))
     }
 
-    /// Fourier coefficients of joint angles that consist of the fundamental `q` alone.
+    /// Fourier coefficients of quantities of the joints that consist of the fundamental `q` alone.
     pub(super) fn fundamental(&self, q: &DVector<Complex64>) -> DVector<f64> {
         let width = self.grid.width();
         let mut x = DVector::zeros(q.len() * width);
@@ -165,7 +165,7 @@ impl<'a> Model<'a> {
 
     /// Joint angles that belong to the measured motion u of the tool, if it is due to a force on the tool: Z⁻¹Jᵀ(J
     /// Z⁻¹Jᵀ)⁻¹ u in the measured directions, with the dynamic stiffness Z of the joints and the Jacobian J of the
-    /// tool.
+    /// tool; `linear` is Z⁻¹Jᵀ. `None` if the matrix in parentheses is singular.
     pub(super) fn measured(
         &self,
         placed: &PostureMatrices,
@@ -185,7 +185,7 @@ impl<'a> Model<'a> {
     }
 
     /// Periodic joint angles under the measured force, found by Newton's method from those of the measured motion;
-    /// `None` if there is no solution nearby.
+    /// `None` if Newton's method finds no solution, or if a matrix for its start is singular.
     pub(super) fn solve(
         &self,
         placed: &PostureMatrices,

@@ -66,12 +66,12 @@ impl JointParameter {
         })
     }
 
-    /// The value of the parameter in `robot`.
+    /// The value of the parameter in `robot`; NaN if the robot has no such joint.
     pub fn value(self, robot: &Robot) -> f64 {
         self.slot(&mut robot.clone()).map_or(f64::NAN, |value| *value)
     }
 
-    /// Sets the value of the parameter in `robot`.
+    /// Sets the value of the parameter in `robot`, if the robot has such a joint.
     pub(crate) fn set(self, robot: &mut Robot, value: f64) {
         if let Some(slot) = self.slot(robot) {
             *slot = value;

@@ -28,11 +28,11 @@ use quietcut_numerics::statistics::{NINETY_PERCENT, student_ninety_percent};
 /// Receptances at one posture.
 #[derive(Clone, Debug)]
 pub struct PostureFrf {
-    /// Joint angles of the posture, rad.
+    /// Joint angles of the posture in the order of the joints, rad.
     pub angles_rad: Vec<f64>,
     /// The receptances measured at the posture.
     pub table: FrfTable,
-    /// Standard deviation of the magnitude of each entry of the table at each frequency, m/N.
+    /// Standard deviation of the magnitude of the receptance, by entry of the table, then by frequency, m/N.
     pub deviation: Vec<Vec<f64>>,
 }
 
@@ -43,8 +43,8 @@ pub struct JointFit {
     pub robot: Robot,
     /// The joint parameters that were fitted, in the order of the rows of `covariance`.
     pub parameters: Vec<JointParameter>,
-    /// Covariance of the logarithms of the joint parameters, from the scatter between receptances and the smallest
-    /// assumed relative error of receptances.
+    /// Covariance of the logarithms of the joint parameters, from the scatter between receptances and from an assumed
+    /// error of calibration and of delay that all receptances have in common.
     pub covariance: DMatrix<f64>,
     /// χ² per degree of freedom: near 1 if the residual is within the standard deviations of the receptances.
     pub misfit: f64,
@@ -85,7 +85,7 @@ struct PostureMatrices<'a> {
     payload: Matrix3xX<f64>,
     /// Mass matrix by the joint angles without the mass of the last link, kg m².
     mass: DMatrix<f64>,
-    /// Inverse of the standard deviation of each receptance at each frequency, N/m.
+    /// Weights of the receptances, see [`weights`], by entry of the table, then by frequency, N/m.
     weights: Vec<Vec<f64>>,
 }
 
@@ -95,7 +95,8 @@ struct Normal {
     /// covariance uses it. The errors of one receptance at different lines count as correlated, those of different
     /// receptances as independent.
     scatter: DMatrix<f64>,
-    /// Gradient by the parameters that a common delay of all receptances causes, one of one radian at the highest frequency of each table.
+    /// Gradient by the parameters that a delay of all receptances causes; it is one radian at the highest frequency of
+    /// each table.
     delay: DVector<f64>,
     entries: usize,
     sum: f64,
@@ -105,8 +106,8 @@ struct Normal {
 }
 
 /// Fits the joints of a robot to receptances at several postures. The stiffnesses start from nearly static receptances,
-/// or from those of `start` where these do not determine them; the dampings start from those of `start`. With `payload`
-/// the mass of the last link is a parameter, too.
+/// or from those of `start` where the receptances give no plausible ones; the dampings start from those of `start`.
+/// With `payload` the mass of the last link is a parameter, too.
 ///
 /// # Errors
 /// See [`JointFitError`].
@@ -265,8 +266,8 @@ fn place<'a>(robot: &Robot, frf: &'a PostureFrf) -> PostureMatrices<'a> {
 }
 
 /// Weights 1/σ of the lines of one receptance, with its standard deviation σ of at least [`LEAST_RELATIVE_ERROR`] of
-/// its magnitude. A variance estimated from few averages is inaccurate but smooth over frequency, so it is averaged
-/// over eight lines on either side.
+/// its magnitude; 0 where σ is 0. A variance estimated from few averages is inaccurate but smooth over frequency, so it
+/// is averaged over eight lines on either side.
 fn weights(receptance: &[Complex64], deviation: &[f64]) -> Vec<f64> {
     const NEIGHBOURS: usize = 8;
     (0..deviation.len())
@@ -355,7 +356,8 @@ fn finish(robot: Robot, parameters: Vec<JointParameter>, normal: &Normal) -> Res
     let few = student_ninety_percent(normal.entries.saturating_sub(1)) / NINETY_PERCENT;
     let taken = count / (count - parameters.len() as f64).max(1.0);
     let scatter = &inverse * &normal.scatter * &inverse * (taken * few * few);
-    // A delay common to all receptances, from filters, folding and the interpolation between samples, changes the dampings most.
+    // A delay common to all receptances, from filters, folding and the interpolation between samples, changes the
+    // dampings most.
     let delayed = &inverse * &normal.delay * LEAST_RELATIVE_ERROR;
     Ok(JointFit {
         robot,
