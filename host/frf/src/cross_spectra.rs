@@ -62,7 +62,7 @@ pub(super) struct Segments {
 
 impl Segments {
     /// Overlapping segments of a record of `samples` samples (Welch's method): each has as many samples as `weights`
-    /// and shares the fraction `overlap` of them with the next.
+    /// and shares about the fraction `overlap` of them with the next.
     pub(super) fn overlapping(weights: Vec<f64>, overlap: f64, samples: usize) -> Self {
         let length = weights.len();
         let shift = ((length as f64 * (1.0 - overlap)).round() as usize).clamp(1, length.max(1));

@@ -22,7 +22,7 @@ pub struct MeasuredImpact {
     /// Peak force, N, with its sign, relative to the median force of the record.
     pub peak_n: f64,
     /// Largest second force pulse within the segment: delay after the first peak, s, and height as a fraction of that
-    /// peak; `None` for a single impact.
+    /// peak; `None` for a single impact, and for impacts that are left out for another reason.
     pub second: Option<(f64, f64)>,
     /// Index of the first sample of the force pulse of this impact in the record.
     first: usize,

@@ -62,7 +62,7 @@ impl Interpolation {
     pub fn band_hz(&self) -> (f64, f64) {
         match self.frequency_hz.as_slice() {
             [first, .., last] => (*first, *last),
-            // A table has at least four lines, so that the other arm always matches.
+            // A table has at least four lines, so that the arm above always matches.
             _ => (0.0, 0.0),
         }
     }
@@ -135,10 +135,10 @@ impl Interpolation {
 
     /// Estimate of the largest interpolation error, as a fraction of the largest entry of H.
     ///
-    /// Each line except the first and last three is predicted from the lines at the distances −3, −1, +1 and +3 line
-    /// spacings, a cubic with twice the spacing. The error of a cubic is proportional to the fourth power of the
-    /// spacing, so that the estimate is 1/16 of the largest prediction error. Measurement noise counts as error. The
-    /// estimate is 0 for tables of fewer than seven lines.
+    /// Each line except the first and last three is predicted from the first and the third line on each side, at equal
+    /// spacing a cubic with twice the spacing. The error of a cubic is proportional to the fourth power of the spacing,
+    /// so that the estimate is 1/16 of the largest prediction error. Measurement noise counts as error. The estimate is
+    /// 0 for tables of fewer than seven lines.
     pub fn error(&self) -> f64 {
         let peak = self.lines.iter().map(largest).fold(0.0, f64::max);
         let count = self.lines.len();

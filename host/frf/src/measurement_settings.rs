@@ -24,8 +24,8 @@ pub struct MeasurementSettings {
     pub window: Window,
     /// First and last frequency to evaluate, Hz; `None` for all frequencies.
     pub band_hz: Option<(f64, f64)>,
-    /// Names of the channels to evaluate. Without the name of a force all forces count, and without that of a response
-    /// all responses.
+    /// Names of the channels to evaluate. If forces are among them, no other force counts; the same holds for
+    /// responses.
     pub channels: Vec<String>,
     /// Segment length and exponential window of hammer tests.
     pub hammer: HammerWindows,

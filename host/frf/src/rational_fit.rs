@@ -241,7 +241,7 @@ pub fn residues(
         let values = function.iter().flat_map(|h| [h.re, h.im]);
         let right = DVector::from_iterator(2 * frequency_hz.len(), values);
         let solution = equations.solve(&right);
-        // The residual of each receptance is divided by the receptance itself, so that all receptances have equal
+        // The residual of each receptance is divided by the norm of the receptance, so that all receptances have equal
         // weight.
         let norm = right.norm_squared();
         if norm > 0.0 {

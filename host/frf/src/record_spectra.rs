@@ -50,8 +50,8 @@ pub struct RecordSpectra {
     pub responses: Vec<ChannelLines>,
 }
 
-/// Transforms of recordings with continuous excitation: random, cut or swept sine. `None` if a recording is a hammer or
-/// step-sine test, which is evaluated in segments.
+/// Transforms of recordings with continuous excitation: random, cut or swept sine. `None` if a recording is a hammer,
+/// multisine or step-sine test.
 ///
 /// # Errors
 /// A recording has no force or no response; a chosen channel or an input of the sidecar does not exist; an input is not
@@ -124,7 +124,7 @@ fn of_record(channels: &TestChannels<'_>, band_hz: Option<(f64, f64)>) -> Record
 }
 
 /// Noise plateau of a spectrum: the median of the mean powers of those bands whose mean power exceeds that of the
-/// lowest band by at most six standard deviations (1/√n of the lowest power for n lines per band); `None` if these
+/// lowest band by less than six standard deviations (1/√n of the lowest power for n lines per band); `None` if these
 /// bands are too few or have too few lines. White noise has equal power in all bands, and bands without signal contain
 /// nothing else.
 fn plateau(lines: &[Complex64], scale: f64) -> Option<f64> {

@@ -149,7 +149,8 @@ fn median_force(steps: &[FrequencyStep]) -> f64 {
     forces[forces.len() / 2]
 }
 
-/// The steps of a level, given in the order of time, by ascending frequency and without repeats: see [`ForceLevel::steps`].
+/// The steps of a level, given in the order of time, by ascending frequency and without repeats: see
+/// [`ForceLevel::steps`].
 fn by_frequency(steps: Vec<FrequencyStep>) -> Vec<FrequencyStep> {
     let mut kept: Vec<FrequencyStep> = Vec::with_capacity(steps.len());
     for step in steps {
@@ -259,7 +260,8 @@ fn crossings(force: &[f64], rate: f64) -> Vec<f64> {
 }
 
 /// Phasor ratios response/force over the settled part of a segment of constant frequency, or over its second half if it
-/// does not settle; `None` if the segment has too few periods, or a subsegment of it has too few samples.
+/// does not settle; `None` if the segment has too few periods, a subsegment of it has too few samples, or a phasor is
+/// `None`.
 fn demodulated(
     channels: &TestChannels<'_>,
     force: &[f64],
@@ -403,7 +405,7 @@ impl Phasor {
 }
 
 /// Complex amplitude X of x_k = Re(X e^{iωk}) + offset + linear drift over samples `first .. first + length`, by least
-/// squares.
+/// squares. `None` if the signal ends before or the equations are singular.
 fn phasor(signal: &[f64], first: usize, length: usize, period: f64) -> Option<Phasor> {
     let samples = signal.get(first..first.checked_add(length)?)?;
     let row = |k: usize| {
@@ -451,7 +453,8 @@ mod tests {
             deviation: Vec::new(),
             is_settled: true,
         };
-        // The force numbers the steps in the order of time. The measured frequency of the second step is above that of the repeat.
+        // The force numbers the steps in the order of time. The measured frequency of the second step is above that of
+        // the repeat.
         let kept = by_frequency(vec![
             step(40.0, 1000, 1.0),
             step(20.001, 1000, 2.0),

@@ -40,8 +40,8 @@ impl Frf {
     }
 
     /// Index of the line with the largest |H|. Where the coherence is known, only lines count at which at least half of
-    /// the response comes from the force, if there are any: divided by ω², the noise of an accelerometer is larger at the
-    /// first lines than a resonance.
+    /// the response comes from the force, if there are any: divided by ω², the noise of an accelerometer is larger at
+    /// the first lines than a resonance.
     pub fn peak_line(&self) -> usize {
         let largest = |of: &dyn Fn(usize) -> bool| {
             (0..self.receptance.len())

@@ -2,10 +2,10 @@
 //! given width.
 //!
 //! The uncertain parameters of a machine have a normal distribution (`unknowns`). Exact derivatives propagate it to
-//! every limit (`chart`). The Fisher information of every test (`candidate`) follows from these or from central
-//! differences. After a set of tests with the Fisher information J_t each, Λ = I + Σ J_t is the inverse covariance of
-//! the parameters, in units of the prior standard deviations. `selection` searches for the cheapest set of tests after
-//! which all limits are narrow enough.
+//! every limit (`chart`). The Fisher information of every test (`candidate`) follows from exact derivatives or from
+//! central differences. After a set of tests with the Fisher information J_t each, Λ = I + Σ J_t is the inverse
+//! covariance of the parameters, in units of the prior standard deviations. `selection` searches for the cheapest set
+//! of tests after which all limits are narrow enough.
 
 mod candidate;
 mod chart;
@@ -324,8 +324,7 @@ impl Basis {
         }
     }
 
-    /// Width of the limits' intervals with every candidate test repeated [`AT_BEST`] times, and the unknown parameters
-    /// whose exact values would narrow the intervals most then.
+    /// The [`Obstacle`], with every candidate test repeated [`AT_BEST`] times.
     fn obstacle(&self, selection: &Selection<'_>) -> Obstacle {
         let size = self.unknowns.len();
         let mut information = DMatrix::identity(size, size);

@@ -65,11 +65,11 @@ struct Named {
 }
 
 impl Unknowns {
-    /// The unknowns whose standard deviations or covariance the case states (keys that end in `_std`, `[uncertainty]`),
-    /// or else those of `prior`.
+    /// The unknowns of a plan. Those of the limits are the parameters whose standard deviations or covariance the case
+    /// states (keys that end in `_std`, `[uncertainty]`), or else those of `prior`; `means` adds the others.
     ///
     /// # Errors
-    /// There are no unknowns, or the modes of the matrices cannot be computed; the text gives the reason.
+    /// No parameter of the case is unknown, or the modes of the matrices cannot be computed; the text gives the reason.
     pub(super) fn new(case: &Case, prior: &Prior, means: &Means) -> Result<Self, String> {
         let stated = case.is_uncertain();
         let named = if stated {

@@ -6,7 +6,7 @@
 //! motion of the tool is fitted to the measured one, with the weights of [`steady_fit`](crate::nonlinear::steady_fit).
 //! The first guess comes from the receptances at the lowest force of every frequency. The equivalent linearization of
 //! the joints at the measured amplitudes a_j of their angles, k_j + ¾ k₃_j a_j² and c_j + ¾ c₃_j ω² a_j², then improves
-//! it.
+//! this guess.
 
 use std::f64::consts::TAU;
 use std::path::Path;

@@ -107,7 +107,8 @@ impl<'a> Model<'a> {
         theta
     }
 
-    /// Derivative of the coefficients θ of the equation of motion by the joint parameters; θ is linear in them.
+    /// Derivative of the coefficients θ of the equation of motion by the joint parameters; it does not depend on their
+    /// values.
     pub(super) fn chain(&self, placed: &PostureMatrices) -> DMatrix<f64> {
         DMatrix::from_fn(
             self.law.parameters.len(),
@@ -205,9 +206,10 @@ impl<'a> Model<'a> {
     }
 
     /// Residual of the tool's motion in a dwell, predicted by the equivalent linearization of the joints at the
-    /// measured amplitudes, and the derivative of the predicted motion by the joint parameters. Both are divided by the
-    /// noise and the error of this linearization, added as a root of the sum of squares. This error is relative, so
-    /// off-resonance lines weigh about as much as peaks, and the fit converges from a distant start.
+    /// measured amplitudes, and the derivative of the predicted motion by the joint parameters at these amplitudes.
+    /// Both are divided by the noise and the error of this linearization, added as a root of the sum of squares. This
+    /// error is relative, so off-resonance lines weigh about as much as peaks, and the fit converges from a distant
+    /// start. `None` if [`Model::linear`] or [`Model::measured`] is `None`.
     pub(super) fn linearized(
         &self,
         placed: &PostureMatrices,

@@ -3,9 +3,9 @@
 //! The geometry and inertia of the links are given (drawings, CAD). The mass of the last link, including tool and
 //! payload, may be a parameter. The receptance at a posture q₀ is H(ω) = J Z⁻¹ Jᵀ with Z = K + iωC − ω²M(q₀) (thesis
 //! eqs 3.14, 3.15, without the inverse of J). The fit determines the logarithms of the parameters and weights each
-//! measured receptance by its standard deviation. The first guess of the stiffnesses comes from the lowest frequencies,
-//! where H = Σ J_j J_jᵀ/k_j is linear in the compliances 1/k_j. Cubic terms require tests at several force levels:
-//! [`cubic_joints`](crate::robot::cubic_joints).
+//! measured receptance by the inverse of its standard deviation. The first guess of the stiffnesses comes from the
+//! lowest frequencies, where H = Σ J_j J_jᵀ/k_j is linear in the compliances 1/k_j. Cubic terms require tests at
+//! several force levels: [`cubic_joints`](crate::robot::cubic_joints).
 
 use std::f64::consts::TAU;
 
