@@ -53,6 +53,7 @@ const ROOMS: &[(&str, &[&str])] = &[
             "cutting",
             "robot",
             "ambient",
+            "case_uncertainty",
             "case_file",
             "plan",
             "lib",

@@ -4,6 +4,7 @@ mod distortion;
 mod folding;
 #[cfg(test)]
 mod folding_tests;
+mod measured;
 mod periodic;
 #[cfg(test)]
 mod periodic_tests;
@@ -20,6 +21,7 @@ use std::path::{Path, PathBuf};
 
 use num_complex::Complex64;
 
+pub use measured::Measurement;
 pub use recording_group::RecordingGroup;
 
 use super::criteria::SPARE_AVERAGES;
@@ -35,7 +37,6 @@ use super::test_channels::TestChannels;
 use super::test_plausibility;
 use periodic::{periodic, recognized};
 use quietcut_model::structure::Direction;
-use quietcut_numerics::statistics::{NINETY_PERCENT, student_ninety_percent};
 use quietcut_recording::Recording;
 use recording_group::{MeasuredEntry, MeasuredGroup, receptances};
 use sensor_mass::{accelerated, roving, sensor_mass};
@@ -43,41 +44,6 @@ use steady::steady;
 use stepped::stepped;
 use struck::{common_segment_s, struck};
 use usable_lines::{independent, keep_excited};
-
-/// Measured receptances with their statistics.
-#[derive(Clone, Debug)]
-pub struct Measurement {
-    /// Measured receptances with the coherence of each response, or without it for fewer than three impacts of a
-    /// hammer. With several forces it is the multiple coherence.
-    pub table: FrfTable,
-    /// Standard deviation of |H|, by entry of the table, then by frequency, m/N.
-    pub deviation: Vec<Vec<f64>>,
-    /// One value per entry of the table. False if its standard deviation is meaningless, since it comes from fewer than
-    /// three impacts of a hammer.
-    pub has_deviation: Vec<bool>,
-    /// One value per entry of the table: degrees of freedom of its standard deviations from periodic excitation; `None`
-    /// for other excitation, with normal quantiles.
-    pub freedoms: Vec<Option<usize>>,
-    /// Largest relative error by aliasing of content above half the sample rate, by entry of the table, then by
-    /// frequency. It is estimated for hammer tests only, and 0 for all other excitation.
-    pub folding: Vec<Vec<f64>>,
-    /// Groups of recordings that were evaluated together.
-    pub groups: Vec<RecordingGroup>,
-    /// Warnings for the user, such as of double impacts or of responses that had not settled.
-    pub warnings: Vec<String>,
-}
-
-impl Measurement {
-    /// Half the width of the 90 % interval of an entry of the table, in its standard deviations: 1.645, or more where
-    /// few degrees of freedom determine these.
-    pub fn ninety_percent(&self, entry: usize) -> f64 {
-        self.freedoms
-            .get(entry)
-            .copied()
-            .flatten()
-            .map_or(NINETY_PERCENT, student_ninety_percent)
-    }
-}
 
 /// Measures receptances, m/N, from recordings.
 ///

@@ -1,10 +1,10 @@
 //! `quietcut setup`: a folder and a commented case file for one's own machine, by options, by a file, or by questions.
 
+mod given;
 mod known_case;
 
 use std::fs;
 use std::io::{self, BufRead, IsTerminal, Write};
-use std::num::NonZeroU8;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
@@ -17,6 +17,7 @@ use crate::machine::{
     Answers, Immersion, MachineFolder, MaterialAnswer, MaterialRange, NextStep, RANGES, Section, case_text,
     next_step, section_text,
 };
+use given::Given;
 use known_case::missing_sections;
 
 /// Makes the folder of a machine with a commented case file, or adds the missing sections to its case, and says which taps
@@ -45,67 +46,6 @@ pub struct Args {
     given: Given,
     #[command(flatten)]
     output: Output,
-}
-
-/// Answers of the user about the machine, the tool and the cut, given by options or by a file; each may be missing.
-#[derive(Clone, Debug, Default, clap::Args, Deserialize)]
-#[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
-struct Given {
-    /// Name of the machine and job. Default: the name of the folder.
-    #[arg(long, value_name = "TEXT")]
-    name: Option<String>,
-    /// The machine, such as its type; a comment in the case.
-    #[arg(long, value_name = "TEXT")]
-    machine: Option<String>,
-    /// The tool holder; a comment in the case.
-    #[arg(long, value_name = "TEXT")]
-    holder: Option<String>,
-    /// The sensor and where it sits; a comment in the case.
-    #[arg(long, value_name = "TEXT")]
-    sensor: Option<String>,
-    /// Number of teeth.
-    #[arg(long, value_name = "N", value_parser = count)]
-    teeth: Option<NonZeroU8>,
-    /// Diameter of the tool in mm.
-    #[arg(long, value_name = "D", value_parser = positive)]
-    diameter_mm: Option<f64>,
-    /// Edge angle in degrees; 90 is a square end mill. Default: 90.
-    #[arg(long, value_name = "D", value_parser = angle)]
-    edge_angle_deg: Option<f64>,
-    /// Class of materials, one of the list of --materials, whose coefficients lie in a range.
-    #[arg(long, value_name = "NAME", conflicts_with = "ktc_mpa")]
-    material: Option<String>,
-    /// Tangential cutting coefficient in MPa, instead of --material.
-    #[arg(long, value_name = "K", value_parser = positive)]
-    ktc_mpa: Option<f64>,
-    /// Radial cutting coefficient in MPa. Default: 0.3 of the tangential one; a comment in the case then says so.
-    #[arg(long, value_name = "K", value_parser = finite, requires = "ktc_mpa", allow_negative_numbers = true)]
-    krc_mpa: Option<f64>,
-    /// Axial cutting coefficient in MPa. Default: 0.
-    #[arg(long, value_name = "K", value_parser = finite, requires = "ktc_mpa", allow_negative_numbers = true)]
-    kac_mpa: Option<f64>,
-    /// Standard deviation of the tangential cutting coefficient in MPa; the stability limits then get a probability
-    /// band.
-    #[arg(long, value_name = "S", value_parser = positive, requires = "ktc_mpa")]
-    ktc_mpa_std: Option<f64>,
-    /// Radial depth in mm of a down-milling cut.
-    #[arg(long, value_name = "AE", value_parser = positive, conflicts_with_all = ["up_milling_mm", "slot"])]
-    down_milling_mm: Option<f64>,
-    /// Radial depth in mm of an up-milling cut, instead of --down-milling-mm.
-    #[arg(long, value_name = "AE", value_parser = positive, conflicts_with = "slot")]
-    up_milling_mm: Option<f64>,
-    /// The cut is a slot.
-    #[arg(long)]
-    slot: bool,
-    /// Feed per tooth in mm.
-    #[arg(long, value_name = "F", value_parser = positive)]
-    feed_per_tooth_mm: Option<f64>,
-    /// Lowest and highest spindle speed in rev/min, FIRST:LAST. Advice stays between them.
-    #[arg(long, value_name = "FIRST:LAST")]
-    rpm: Option<String>,
-    /// Power of the spindle in W.
-    #[arg(long, value_name = "W", value_parser = positive)]
-    power_w: Option<f64>,
 }
 
 #[derive(Serialize)]

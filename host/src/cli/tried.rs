@@ -33,7 +33,7 @@ pub(super) fn add(table: &Path, recording: &Path, sidecar: &Sidecar, log: &Verdi
             None => "chatter,".into(),
         },
         None => {
-            let cuts = |verdict: &&'static str| matches!(*verdict, "stable" | "forced" | "runout");
+            let cuts = |verdict: &&'static str| !matches!(*verdict, "air-cut" | "indeterminate");
             if !log.verdicts.iter().any(|entry| cuts(&entry.verdict)) {
                 return Err(Error::input(format!(
                     "--tried: {} has no verdict on a cut; record a longer cut, or write its outcome into {} by hand",

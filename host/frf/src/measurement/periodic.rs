@@ -21,10 +21,7 @@ use crate::test_plausibility::is_cut;
 use quietcut_recording::TestKind;
 
 /// True if the force of a shaker is periodic with several lines in the band to evaluate, so that averages over periods replace windows.
-pub(in crate::measurement) fn recognized(
-    channels: &TestChannels<'_>,
-    settings: &MeasurementSettings,
-) -> bool {
+pub(super) fn recognized(channels: &TestChannels<'_>, settings: &MeasurementSettings) -> bool {
     let ([(_, force)], recording) = (&channels.forces[..], channels.recording) else {
         return false;
     };
@@ -62,7 +59,7 @@ fn stated_samples(
 }
 
 /// Measures the receptances of a group of recordings with periodic excitation, at the excited lines.
-pub(in crate::measurement) fn periodic(
+pub(super) fn periodic(
     mut group: RecordingGroup,
     members: &[TestChannels<'_>],
     settings: &MeasurementSettings,

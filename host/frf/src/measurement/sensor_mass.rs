@@ -1,6 +1,6 @@
 //! Mass of the accelerometers of a test: removed if it is given, bounded if it is not.
 
-use super::Measurement;
+use super::measured::Measurement;
 use crate::accelerometer_mass::{peak_shift, without_accelerometer_mass};
 use crate::criteria::{ASSUMED_ACCELEROMETER_KG, LEAST_PEAK_SHIFT};
 use crate::error::FrfError;

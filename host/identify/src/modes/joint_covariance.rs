@@ -1,10 +1,9 @@
 //! Joint covariance of the parameters of identified modes, in the form in which a case file has them.
 
-use std::f64::consts::TAU;
-
 use nalgebra::DMatrix;
 
 use super::mode::IdentifiedMode;
+use super::pole_derivatives::pole_derivatives;
 use super::refinement::Refined;
 
 impl Refined {
@@ -45,16 +44,4 @@ impl Refined {
         }
         derivatives
     }
-}
-
-/// Derivatives of natural frequency, Hz, and damping ratio by real and imaginary part of the pole λ, rad/s, from
-/// ω = |λ| and ζ = −Re λ/|λ|.
-pub(super) fn pole_derivatives(pole: num_complex::Complex64) -> ([f64; 2], [f64; 2]) {
-    let omega = pole.norm();
-    let of_frequency = [pole.re / omega / TAU, pole.im / omega / TAU];
-    let of_damping = [
-        -pole.im * pole.im / omega.powi(3),
-        pole.re * pole.im / omega.powi(3),
-    ];
-    (of_frequency, of_damping)
 }

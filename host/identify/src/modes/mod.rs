@@ -17,6 +17,7 @@ mod joint_covariance;
 mod leakage;
 mod mode;
 mod model;
+mod pole_derivatives;
 mod pole_residue;
 mod receptances;
 mod record_fit;

@@ -8,9 +8,9 @@ use std::f64::consts::TAU;
 
 use super::covariance::covariance;
 use super::jacobian::{jacobian, normal};
-use super::joint_covariance::pole_derivatives;
 use super::leakage;
 use super::mode::IdentifiedMode;
+use super::pole_derivatives::pole_derivatives;
 use super::pole_residue::{PoleResidue, shared};
 use super::receptances::Receptances;
 use super::shape;

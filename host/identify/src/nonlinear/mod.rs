@@ -15,5 +15,6 @@ pub mod response;
 pub mod restoring_force;
 pub mod spectrum;
 pub mod steady_fit;
+mod surface;
 pub mod sweep;
 pub(crate) mod whitening;

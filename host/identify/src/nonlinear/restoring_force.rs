@@ -13,7 +13,6 @@ use nalgebra::{DMatrix, DVector};
 use quietcut_numerics::least_squares::{LinearProblem, invert_normal_equations};
 
 use crate::criteria::{BAND_SIGNAL_TO_NOISE, LEAST_SLICE_SAMPLES, SAMPLES_PER_TERM};
-use crate::nonlinear::free_decay;
 use crate::nonlinear::spectrum::{Spectral, band_of, dominant_frequency_hz};
 use quietcut_numerics::statistics::NINETY_PERCENT;
 use quietcut_recording::Quantity;
@@ -197,15 +196,16 @@ impl Record<'_> {
         }
     }
 
-    /// Fits the force law to the record and computes its restoring-force surface.
+    /// True if no force acts at any sample, as in a free decay.
+    pub(super) fn is_free(&self) -> bool {
+        self.force.iter().all(|force| *force == 0.0)
+    }
+
+    /// Fits the force law to a record with a force and computes its restoring-force surface.
     ///
     /// # Errors
     /// See [`SurfaceError`].
-    pub fn surface(&self, options: &Options) -> Result<Surface, SurfaceError> {
-        if self.force.iter().all(|force| *force == 0.0) {
-            let mass_kg = options.mass_kg.ok_or(SurfaceError::NoForce)?;
-            return free_decay::surface(self, options, mass_kg);
-        }
+    pub(super) fn driven_surface(&self, options: &Options) -> Result<Surface, SurfaceError> {
         let mut band_hz = options
             .band_hz
             .unwrap_or_else(|| band_of(self.motion, self.rate_hz, BAND_SIGNAL_TO_NOISE));

@@ -1,7 +1,8 @@
 //! Completing a case that exists: the sections that it lacks, and what it already says.
 
-use super::{Error, Given};
+use super::given::Given;
 use crate::case::Case;
+use crate::cli::Error;
 use crate::machine::Section;
 
 /// Sections that `setup` can write and the case lacks, in the order of a case file.
