@@ -7,10 +7,10 @@ use std::fs;
 use std::io::{self, BufRead, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 use super::range::non_negative_ends;
-use super::{Error, Output, angle, count, finite, positive};
+use super::{Error, Output, count, positive};
 use crate::case::Case;
 use crate::file;
 use crate::machine::{

@@ -171,7 +171,7 @@ impl LevelAnswer {
                 .map(|(name, peak)| LevelPeak {
                     name: name.clone(),
                     figures: PeakFigures::new(peak),
-                    amplitude_m: level.is_amplitude.then(|| level.force_n * peak.receptance),
+                    amplitude_m: level.is_amplitude.then_some(level.force_n * peak.receptance),
                 })
                 .collect(),
         }
