@@ -93,7 +93,7 @@ fn matrix(table: &FrfTable, directions: &[Direction], line: usize) -> DMatrix<Co
 }
 
 /// Relative shift of the frequency of the peak of a drive-point receptance by a mass `mass_kg` on it, m/(2 m_modal), with the modal mass from
-/// Re(1/H) = k − m_modal ω² over the lines of the peak; `None` without [`PEAK_LINES_MIN`] lines there.
+/// Re(1/H) = k − m_modal ω² over the lines of the peak; `None` without `PEAK_LINES_MIN` lines there.
 pub fn peak_shift(table: &FrfTable, direction: Direction, mass_kg: f64) -> Option<PeakShift> {
     let entry = table.entry(direction, direction)?;
     let size = |line: usize| entry.receptance[line].norm();

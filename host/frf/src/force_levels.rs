@@ -22,7 +22,7 @@ pub struct LevelMeasurement {
 }
 
 /// Measures the receptances of each force level of the recordings, in ascending order of the level. The levels of a step-sine record are
-/// evaluated one by one; other recordings are averaged if their levels are within the factor [`SAME_FORCE`] of the lowest of them.
+/// evaluated one by one; other recordings are averaged if their levels are within the factor `SAME_FORCE` of the lowest of them.
 ///
 /// # Errors
 /// As [`measure`].

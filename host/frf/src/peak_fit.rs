@@ -35,14 +35,14 @@ impl FittedPeak {
     }
 }
 
-/// Peaks of one receptance of a table, ascending in frequency: the maxima of |H| above [`LEAST_COMPARED_PEAK`] of the largest that fall to
+/// Peaks of one receptance of a table, ascending in frequency: the maxima of |H| above `LEAST_COMPARED_PEAK` of the largest that fall to
 /// half their power on both sides, each with a fit.
 ///
 /// Around a peak, H(s) = (c₀ + c₁ s + c₂ s²)/(s − p) with complex constants: one pole, and the other modes as a straight line. It is fitted
-/// by Sanathanan–Koerner iteration and Gauss–Newton steps to the lines above [`FITTED_PART`] of the peak. The covariance of the complex
+/// by Sanathanan–Koerner iteration and Gauss–Newton steps to the lines above `FITTED_PART` of the peak. The covariance of the complex
 /// parameters is σ²(JᴴJ)⁻¹, with σ² multiplied by the sum of the autocorrelation of the residual over two lines: a Hann window
-/// correlates neighbouring lines. Peaks without [`FITTED_LINES_MIN`] lines have no fit, and those whose damping and size are not above
-/// [`PEAK_ABOVE_NOISE`] deviations are noise; both are left out.
+/// correlates neighbouring lines. Peaks without `FITTED_LINES_MIN` lines have no fit, and those whose damping and size are not above
+/// `PEAK_ABOVE_NOISE` deviations are noise; both are left out.
 pub fn fitted_peaks(table: &FrfTable, entry: &Frf) -> Vec<FittedPeak> {
     let size: Vec<f64> = entry.receptance.iter().map(|h| h.norm()).collect();
     let largest = size.iter().copied().fold(0.0, f64::max);
@@ -84,7 +84,7 @@ fn next_peak(size: &[f64], from: usize, least: f64) -> Option<usize> {
     })
 }
 
-/// The range widened on both sides to [`FITTED_LINES_MIN`] lines, within `count` lines.
+/// The range widened on both sides to `FITTED_LINES_MIN` lines, within `count` lines.
 fn widened(lines: std::ops::Range<usize>, count: usize) -> std::ops::Range<usize> {
     let lacking = FITTED_LINES_MIN.saturating_sub(lines.len()).div_ceil(2);
     lines.start.saturating_sub(lacking)..(lines.end + lacking).min(count)

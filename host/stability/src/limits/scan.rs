@@ -257,7 +257,7 @@ impl<S: Spectrum> Scan<S> {
     }
 }
 
-/// MultiplierPathes between two sampled depths; `None` if a multiplier that may reach the unit circle has no partner at the
+/// Paths of the multipliers between two sampled depths; `None` if a multiplier that may reach the unit circle has no partner at the
 /// other depth.
 fn paths(low: &Sample, high: &Sample) -> Option<Vec<MultiplierPath>> {
     let step_m = high.depth_m - low.depth_m;
