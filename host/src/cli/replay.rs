@@ -99,7 +99,9 @@ pub fn run(args: Args) -> Result<(), Error> {
         Some(port) => on_device(&args, port, &sensed, table.as_deref())?,
         None => on_host(&args, &sensed, table.as_deref())?,
     };
-    if args.port.is_none() && !has_speed_limits(&sensed, table.as_deref()) {
+    // A device without --table uses a table of its own, which may have limits.
+    let knows_table = args.port.is_none() || table.is_some();
+    if knows_table && !has_speed_limits(&sensed, table.as_deref()) {
         log.assume_every_speed();
     }
     if let Some(table) = &args.tried {
