@@ -339,6 +339,15 @@ pub(crate) const VELOCITY_JUMP: f64 = 1e-6;
 /// down takes about a hundred steps.
 pub(crate) const BRANCH_STEP_MAX: f64 = 1.0 / 30.0;
 
+/// Longest step along a branch of forced orbits on which no multiplier comes near the unit circle, in the units of
+/// [`BRANCH_STEP_MAX`]: see [`CIRCLE_SHARE_MAX`]. Unfounded; the limits of `tests/answers` do not depend on it.
+pub(crate) const BRANCH_STEP_CLEAR: f64 = 0.1;
+
+/// Largest move of a multiplier, as a share of its distance from the unit circle before and after, in a step longer
+/// than [`BRANCH_STEP_MAX`]; else the step is repeated with that length. A multiplier that crosses the circle and
+/// returns within the step would have to move by more than twice this distance and turn back. Unfounded.
+pub(crate) const CIRCLE_SHARE_MAX: f64 = 0.5;
+
 /// Length up to which a step along a branch of forced orbits is not halved further, in the units of
 /// [`BRANCH_STEP_MAX`]. In steps up to twice this length each multiplier is paired with the nearest one of the next
 /// orbit, at any distance, since two real multipliers that meet move infinitely fast. Unfounded.

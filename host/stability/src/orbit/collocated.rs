@@ -3,6 +3,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::collocation_matrix::CollocationMatrix;
 use quietcut_numerics::quadrature::Gauss;
 
 /// Collocated motion in a subinterval after one Newton step, from a given state at its start.
@@ -27,28 +28,19 @@ pub(super) struct Linearized<'a> {
     duration_s: f64,
     /// Jacobian ∂ẋ/∂x of the equation of motion at each node.
     jacobians: Vec<DMatrix<f64>>,
-    /// LU factors of the matrix I − h a⊗J of the collocation equations, with the duration h, the Gauss integrals a and
-    /// the Jacobians J.
-    factored: nalgebra::LU<f64, nalgebra::Dyn, nalgebra::Dyn>,
+    /// Factors of the matrix I − h a⊗J of the collocation equations, with the duration h, the Gauss integrals a and the
+    /// Jacobians J.
+    factored: CollocationMatrix,
 }
 
 impl<'a> Linearized<'a> {
     /// Factors the matrix of the collocation equations, from the Jacobians of the equation of motion at the nodes.
     pub(super) fn new(gauss: &'a Gauss, duration_s: f64, jacobians: Vec<DMatrix<f64>>) -> Self {
-        let (order, nodes) = (jacobians[0].nrows(), gauss.nodes.len());
-        let mut matrix = DMatrix::identity(order * nodes, order * nodes);
-        for i in 0..nodes {
-            for (j, jacobian) in jacobians.iter().enumerate() {
-                let weight = duration_s * gauss.integrals[(i, j)];
-                let mut block = matrix.view_mut((i * order, j * order), (order, order));
-                block.zip_apply(jacobian, |entry, value| *entry -= weight * value);
-            }
-        }
         Self {
+            factored: CollocationMatrix::new(gauss, duration_s, &jacobians),
             gauss,
             duration_s,
             jacobians,
-            factored: matrix.lu(),
         }
     }
 
@@ -59,8 +51,8 @@ impl<'a> Linearized<'a> {
 
     /// Solves the collocation equations for the changes of the states at the nodes, (n m) × columns; `None` if they are
     /// singular.
-    pub(super) fn solve(&self, right: &DMatrix<f64>) -> Option<DMatrix<f64>> {
-        self.factored.solve(right)
+    pub(super) fn solve(&self, mut right: DMatrix<f64>) -> Option<DMatrix<f64>> {
+        self.factored.solve_mut(&mut right).then_some(right)
     }
 
     /// Contribution of the states Y_j at the nodes to the state at the end of the subinterval: h Σ b_j J_j Y_j, with
@@ -90,18 +82,22 @@ impl<'a> Linearized<'a> {
     ) -> Option<Advanced> {
         let (order, nodes, columns) = (self.order(), self.gauss.nodes.len(), by.ncols());
         // Right-hand sides: the first column is the residual of the collocation equations, the others belong to the
-        // derivatives with respect to the variables.
+        // derivatives with respect to the variables. Column j of `explicit` holds the rates and forces at node j.
+        let mut explicit = DMatrix::zeros(order * (columns + 1), nodes);
+        for (mut column, (rate, force)) in explicit.column_iter_mut().zip(rates.iter().zip(forces)) {
+            let (of_rate, of_force) = column.as_mut_slice().split_at_mut(order);
+            of_rate.copy_from_slice(rate.as_slice());
+            of_force.copy_from_slice(force.as_slice());
+        }
+        let integrated = &explicit * self.gauss.integrals.transpose() * self.duration_s;
         let mut right = DMatrix::zeros(order * nodes, columns + 1);
-        for i in 0..nodes {
+        for (i, integrated) in integrated.column_iter().enumerate() {
             let mut block = right.view_mut((i * order, 0), (order, columns + 1));
-            block.column_mut(0).copy_from(&(start - states.column(i)));
-            block.columns_mut(1, columns).copy_from(by);
-            for (j, (rate, force)) in rates.iter().zip(forces).enumerate() {
-                let weight = self.duration_s * self.gauss.integrals[(i, j)];
-                block.column_mut(0).axpy(weight, rate, 1.0);
-                let mut others = block.columns_mut(1, columns);
-                others.zip_apply(force, |entry, value| *entry += weight * value);
-            }
+            block.copy_from_slice(integrated.as_slice());
+            let mut residual = block.column_mut(0);
+            residual += start - states.column(i);
+            let mut others = block.columns_mut(1, columns);
+            others += by;
         }
         if !self.factored.solve_mut(&mut right) {
             return None;
@@ -133,7 +129,7 @@ impl<'a> Linearized<'a> {
         let start = DMatrix::from_fn(order * nodes, order, |row, column| {
             f64::from(row % order == column)
         });
-        let values = self.solve(&start)?;
+        let values = self.solve(start)?;
         let mut end = self.gather(&values);
         for i in 0..order {
             end[(i, i)] += 1.0;

@@ -10,11 +10,13 @@ use quietcut_numerics::roots::SignChange;
 
 use super::branch::{Branch, BranchPoint, Event, Extent};
 use super::forced::ForcedProblem;
-use super::pairing::{FOLLOWED, nearest, pair};
-use super::periodic_orbit::{Orbit, OrbitError, PeriodMap, Scale, Tangent};
+use super::pairing::{FOLLOWED, nearest, pair, share_of_distance};
+use super::periodic_orbit::{Orbit, OrbitError, PeriodMap, Predecessor, Scale, Tangent};
 use super::revolution_period::RevolutionPeriod;
 use super::tooth_period::ToothPeriod;
-use crate::criteria::{BRANCH_STEP_MAX, BRANCH_STEP_MIN, LEAST_ERROR, ORBIT_ROOM};
+use crate::criteria::{
+    BRANCH_STEP_CLEAR, BRANCH_STEP_MAX, BRANCH_STEP_MIN, CIRCLE_SHARE_MAX, LEAST_ERROR, ORBIT_ROOM,
+};
 use crate::spectrum::stability_loss::StabilityLoss;
 
 /// Largest number of steps of a branch, failed ones included: ten times the hundred that a branch up and down takes
@@ -130,6 +132,8 @@ pub(super) struct Follower<M> {
 struct Sample {
     orbit: Orbit,
     tangent: Tangent,
+    /// Orbit from which this one was reached; `None` for the first one of a branch.
+    before: Option<Predecessor>,
     /// Floquet multipliers of the orbit near or outside the unit circle, in the upper half plane or on the real axis.
     roots: Vec<Complex64>,
     largest: f64,
@@ -215,6 +219,11 @@ impl<M: PeriodMap> Follower<M> {
                     continue;
                 }
             };
+            let share = share_of_distance(&pairs);
+            if step > BRANCH_STEP_MAX && share > CIRCLE_SHARE_MAX {
+                step = BRANCH_STEP_MAX;
+                continue;
+            }
             let mut events: Vec<(f64, Event)> = pairs
                 .iter()
                 .filter(|(from, to)| (from.norm() > 1.0) != (to.norm() > 1.0))
@@ -228,7 +237,10 @@ impl<M: PeriodMap> Follower<M> {
             if lost || here.orbit.depth_m >= self.scale.depth_m || here.orbit.depth_m <= 0.0 {
                 return Ok(branch);
             }
-            step = (1.5 * step).min(BRANCH_STEP_MAX);
+            // The share that a multiplier moves grows with the step; four fifths of the largest leave room for its
+            // acceleration.
+            let clear = (0.8 * CIRCLE_SHARE_MAX / share * step).clamp(BRANCH_STEP_MAX, BRANCH_STEP_CLEAR);
+            step = (1.5 * step).min(clear);
         }
         Err(OrbitError::NoConvergence {
             depth_mm: here.orbit.depth_m * 1e3,
@@ -237,13 +249,26 @@ impl<M: PeriodMap> Follower<M> {
 
     /// Forced orbit with its multipliers one step further along the branch.
     fn step(&self, from: &Sample, step: f64) -> Result<Sample, OrbitError> {
-        let guess = from.orbit.along(&from.tangent, step, self.scale);
-        self.sample(&guess, &from.tangent.along)
+        let mut next = self.sample(&self.predicted(from, step), &from.tangent.along)?;
+        next.before = Some(Predecessor {
+            orbit: from.orbit.clone(),
+            tangent: from.tangent.clone(),
+            step,
+        });
+        Ok(next)
+    }
+
+    /// Predicted orbit one step further along the branch.
+    fn predicted(&self, from: &Sample, step: f64) -> Orbit {
+        match &from.before {
+            Some(before) => from.orbit.extrapolated(&from.tangent, before, step, self.scale),
+            None => from.orbit.along(&from.tangent, step, self.scale),
+        }
     }
 
     /// Axial depth of the forced orbit one step further along the branch, m.
     fn depth_m(&self, from: &Sample, step: f64) -> Result<f64, OrbitError> {
-        let guess = from.orbit.along(&from.tangent, step, self.scale);
+        let guess = self.predicted(from, step);
         let (orbit, _) = Orbit::correct(&self.map, &guess, self.scale, &from.tangent.along)?;
         Ok(orbit.depth_m)
     }
@@ -264,6 +289,7 @@ impl<M: PeriodMap> Follower<M> {
         Ok(Sample {
             orbit,
             tangent,
+            before: None,
             roots,
             largest,
         })

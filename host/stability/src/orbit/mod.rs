@@ -11,6 +11,7 @@ mod anderson;
 mod branch;
 mod choice;
 mod collocated;
+mod collocation_matrix;
 mod equivalent;
 mod follower;
 mod forced;

@@ -74,6 +74,21 @@ fn is_far(multiplier: Complex64) -> bool {
     (multiplier.norm() - 1.0).abs() > MULTIPLIER_MOVE_MAX
 }
 
+/// Largest move of a paired multiplier as a share of its distance from the unit circle, the smaller one of both orbits;
+/// infinite if a multiplier crosses the circle.
+pub(super) fn share_of_distance(pairs: &[(Complex64, Complex64)]) -> f64 {
+    let distance = |multiplier: Complex64| (multiplier.norm() - 1.0).abs();
+    let share = |&(from, to): &(Complex64, Complex64)| {
+        let is_crossing = (from.norm() > 1.0) != (to.norm() > 1.0);
+        if is_crossing {
+            f64::INFINITY
+        } else {
+            (to - from).norm() / distance(from).min(distance(to))
+        }
+    };
+    pairs.iter().map(share).fold(0.0, f64::max)
+}
+
 /// Multiplier of a list that lies nearest to an expected value; `None` if the list is empty.
 pub(super) fn nearest(roots: &[Complex64], expected: Complex64) -> Option<Complex64> {
     roots
@@ -108,5 +123,18 @@ mod tests {
         assert_eq!(pair(&[at(0.0, 0.99)], &[at(0.2, 1.0)], false), None);
         let near = [(at(0.0, 0.99), at(0.05, 1.0))];
         assert_eq!(pair(&[near[0].0], &[near[0].1], false), Some(near.to_vec()));
+    }
+
+    #[test]
+    fn the_share_of_the_distance_is_that_of_the_multiplier_next_to_the_circle() {
+        let far = (at(0.0, 0.5), at(0.1, 0.5));
+        let near = (at(0.0, 0.8), at(0.0, 0.9));
+        // The second one moves by 0.1 and ends at a distance of 0.1.
+        assert!((share_of_distance(&[far, near]) - 1.0).abs() < 1e-12);
+        assert_eq!(
+            share_of_distance(&[far, (at(0.0, 0.9), at(0.0, 1.1))]),
+            f64::INFINITY
+        );
+        assert_eq!(share_of_distance(&[]), 0.0);
     }
 }

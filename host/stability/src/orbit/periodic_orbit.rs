@@ -121,6 +121,15 @@ pub(super) struct Tangent {
     states: Vec<DMatrix<f64>>,
 }
 
+/// Orbit one step before another one on a branch.
+#[derive(Clone, Debug)]
+pub(super) struct Predecessor {
+    pub(super) orbit: Orbit,
+    pub(super) tangent: Tangent,
+    /// Length of the step to the next orbit, along this orbit's tangent.
+    pub(super) step: f64,
+}
+
 /// Subinterval of the period without entry or exit of a tooth: its start, duration and Gauss nodes.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SubintervalNodes<'a> {
@@ -136,6 +145,10 @@ const SETTLED: f64 = 1e-12;
 /// Size of the preceding Newton step, relative to the orbit, from which on the size of the next step is not predicted
 /// yet. A choice.
 const NEAR: f64 = 1e-3;
+
+/// Least cosine of the angle between the tangents of two successive orbits from which on the next one is predicted by
+/// a cubic. Where the branch turns faster, the tangent predicts it. A choice: the correction does not depend on it.
+const EXTRAPOLATED: f64 = 0.9;
 
 /// Map of a forced problem over a period at one spindle speed on one mesh; forced orbits are its fixed points.
 pub(super) trait PeriodMap: Sized {
@@ -244,6 +257,47 @@ impl Orbit {
             start: &self.start + tangent.along.rows(0, order) * (length * scale.state),
             states: states.map(|(states, by)| states + by * length).collect(),
         }
+    }
+
+    /// Predicted orbit a given arc length further along the branch, from the cubic through this orbit and its
+    /// predecessor with their tangents.
+    ///
+    /// It lies in the hyperplane normal to the tangent in which [`along`](Self::along) predicts it on the tangent.
+    pub(super) fn extrapolated(
+        &self,
+        tangent: &Tangent,
+        before: &Predecessor,
+        length: f64,
+        scale: Scale,
+    ) -> Self {
+        let mut predicted = self.along(tangent, length, scale);
+        let cosine = before.tangent.along.dot(&tangent.along);
+        if cosine < EXTRAPOLATED {
+            return predicted;
+        }
+        // Position on the cubic: 0 at the predecessor and 1 at this orbit. There the derivative is the tangent times
+        // `own`, at the predecessor times `step`.
+        let share = length * cosine / before.step;
+        let (step, own) = (before.step, before.step / cosine);
+        let x = 1.0 + share;
+        let by_orbit = x * x * (2.0 * x - 3.0) + 1.0;
+        let by_before = x * (x - 1.0).powi(2) * step;
+        let by_own = (x * x * (x - 1.0) - share) * own;
+        let order = self.start.len();
+        let mut bend = &before.tangent.along * by_before + &tangent.along * by_own;
+        let mut start = bend.rows_mut(0, order);
+        start += (&before.orbit.start - &self.start) * (by_orbit / scale.state);
+        bend[order] += (before.orbit.depth_m - self.depth_m) * (by_orbit / scale.depth_m);
+        let along = tangent.along.dot(&bend);
+        let change = scale.unscaled(&(bend - &tangent.along * along));
+        predicted.start += change.rows(0, order);
+        predicted.depth_m += change[order];
+        for (index, states) in predicted.states.iter_mut().enumerate() {
+            *states += (&before.orbit.states[index] - &self.states[index]) * by_orbit
+                + &before.tangent.states[index] * by_before
+                + &tangent.states[index] * (by_own - along);
+        }
+        predicted
     }
 
     /// Corrects a predicted orbit on the hyperplane ⟨normal, z − z_guess⟩ = 0, where z holds the start state and the

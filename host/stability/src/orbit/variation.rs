@@ -70,7 +70,7 @@ fn element(
         let (i, state) = (row / order, row % order);
         subinterval.duration * gauss.integrals[(i, port / teeth)] * push[(state, port)]
     });
-    let by_port = linearized.solve(&right)?;
+    let by_port = linearized.solve(right)?;
     let mut drive = linearized.gather(&by_port);
     for port in 0..nodes * teeth {
         let mut column = drive.column_mut(port);
