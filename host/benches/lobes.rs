@@ -1,12 +1,13 @@
 //! Computing time of the stability methods: per point of a chart and per chart, at equal accuracy of the Floquet
-//! multipliers, and per limit.
+//! multipliers, and of stability limits.
 //!
-//! `cargo bench -p quietcut --bench lobes` first prints the time per stability limit of structures with cubic terms. It
-//! then prints the number of steps with which each method in the time domain besides the default reaches a relative
-//! error of 1e-4 of the largest |μ| at all points of a coarse chart with |μ| ≤ 2, μ being the Floquet multipliers, the
-//! time per point with that number of steps and from it the time per chart, and the ratio of the time per chart to that
-//! of the default method, as well as the times of stability limits at 50 speeds. Criterion then measures the default
-//! method on charts of 200 × 100 cells and at one point of each chart. All of it runs on one thread.
+//! `cargo bench -p quietcut --bench lobes` first prints the times of stability limits of structures with cubic terms.
+//! For each of three linear cases it then prints the number of steps with which first-order semi-discretization and
+//! full discretization reach a relative error of 1e-4 of the largest |μ| at all points of a coarse chart with |μ| ≤ 2,
+//! μ being the Floquet multipliers, the time per point with that number of steps and from it the time per chart, and
+//! the ratio of the time per chart to that of the default method, as well as the times of stability limits at 50
+//! speeds. Criterion then measures the default method on charts of 200 × 100 cells and at one point of each chart.
+//! Charts and limits are computed on one thread.
 
 #![allow(missing_docs, clippy::expect_used, clippy::panic)]
 
@@ -21,7 +22,7 @@ use quietcut::stability::{
     Pitched, Problem, Sdm, SdmOrder, SemiDiscretization, Zoa, cell_chart,
 };
 
-/// Largest relative error of |μ| that each stability method may have, μ being the largest Floquet multiplier.
+/// Largest relative error of |μ| that a stability method may have, μ being the largest Floquet multiplier.
 const ACCURACY: f64 = 1e-4;
 
 /// Largest |μ| of a Floquet multiplier whose value must be accurate. Of a larger multiplier, only |μ| > 1 (unstable)
@@ -81,7 +82,7 @@ fn spaced(from: f64, to: f64, count: usize) -> Vec<f64> {
 /// The points ((spindle speed in rev/min, axial depth in mm), |μ|) of a chart, μ being the largest Floquet multiplier.
 type Grid = Vec<((f64, f64), f64)>;
 
-/// A chart of 5 speeds × 5 depths with |μ| of the largest Floquet multiplier by the default method, whose error is
+/// A chart of 5 speeds × 5 depths with |μ| of the largest Floquet multiplier by `method`, whose error estimate must be
 /// below 1e-6 · max(1, |μ|).
 fn reference(method: &dyn Method, setting: &Setting) -> Grid {
     let mut grid = Grid::new();
@@ -107,9 +108,9 @@ fn worst_error(grid: &Grid, size: impl Fn(f64, f64) -> Option<f64>) -> f64 {
         .fold(0.0, f64::max)
 }
 
-/// Number of steps per period with which |μ| reaches [`ACCURACY`] at all chart points: at least 50, else about a tenth
-/// more than the smallest such number; `None` if [`STEPS_MAX`] steps do not reach it. `size` computes |μ| from the
-/// number of steps, the speed in rev/min and the depth in mm, with an error of second order in the step.
+/// Number of steps per period with which [`worst_error`] is at most [`ACCURACY`]: 50 or more, but not always the
+/// smallest such number; `None` if no tried number up to [`STEPS_MAX`] suffices. `size` computes |μ| from the number
+/// of steps, the speed in rev/min and the depth in mm, with an error of second order in the step.
 fn steps_needed(grid: &Grid, size: impl Fn(usize, f64, f64) -> Option<f64>) -> Option<usize> {
     let mut steps = 50;
     while steps <= STEPS_MAX {
@@ -123,8 +124,8 @@ fn steps_needed(grid: &Grid, size: impl Fn(usize, f64, f64) -> Option<f64>) -> O
     None
 }
 
-/// Mean computing time per chart point, s. The points are computed at least once each and for at least 0.2 s; after 20
-/// s no further one begins.
+/// Mean computing time per chart point, s. The points are computed in turn, each at least once and all for at least
+/// 0.2 s, unless 20 s have passed.
 fn seconds_per_point(grid: &Grid, mut run: impl FnMut(f64, f64)) -> f64 {
     let began = Instant::now();
     let mut count = 0;
@@ -206,8 +207,8 @@ fn compare(setting: &Setting) {
     compare_limits(setting, &default, &receptances);
 }
 
-/// Compares the computing times of stability limits at 50 spindle speeds: default method against the methods that use
-/// receptances.
+/// Prints the computing times of stability limits at 50 spindle speeds, by the default method and by the methods that
+/// use receptances.
 fn compare_limits(setting: &Setting, default: &Collocation, receptances: &FrequencyProblem) {
     println!("  limits at 50 speeds up to {} mm", setting.depth_mm);
     let speeds_rpm = setting.speeds_rpm(50);
@@ -248,8 +249,8 @@ fn compare_limits(setting: &Setting, default: &Collocation, receptances: &Freque
     }
 }
 
-/// Computing times of stability limits about the forced orbits of structures with cubic terms, over a wide speed range
-/// and where feed moves the limits most.
+/// Prints the computing times of stability limits about the forced orbits of two structures with cubic terms, in three
+/// speed ranges.
 fn limits_with_cubic_terms() {
     for (file, rpm) in [
         ("kuka-kr90-full-cubic.toml", (480.0, 1_060.0)),

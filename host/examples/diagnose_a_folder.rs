@@ -20,7 +20,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 }
 
 /// The outcome of the diagnosis, the causes with their parameters, and the prediction error (NRMSE) on held-out
-/// segments, without and with these causes, as text.
+/// segments of the case and, if there is one, of the extended case, as text.
 pub fn causes(case: &Path, folder: &Path) -> Result<String, Box<dyn Error>> {
     let case = Case::read(case)?;
     let mut paths: Vec<_> = std::fs::read_dir(folder)?

@@ -21,7 +21,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// The largest value of each receptance from 5 to 40 Hz, as text.
+/// The warnings of the measurement and the largest |H| of each receptance from 5 to 40 Hz, as text.
 pub fn peaks(recordings: &[PathBuf]) -> Result<String, Box<dyn Error>> {
     let recordings = recordings
         .iter()

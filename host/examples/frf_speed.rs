@@ -1,9 +1,10 @@
 //! Computing time and memory for the FRF of a long recording: 60 s of three forces and three accelerations at 10 240
 //! Hz, read as CSV, to a 3 × 3 FRF.
 //!
-//! `cargo run --release -p quietcut --example frf_speed` prints the best of ten rounds on one thread. The time is
-//! processor time where the system reports it, so that other load on the machine does not matter. The memory for
-//! reading is printed as a multiple of the file's size. The file is written to a temporary folder.
+//! `cargo run --release -p quietcut --example frf_speed` prints the shortest times of ten rounds. They are processor
+//! times of one thread where the system reports these, so that other load on the machine hardly matters. Where the
+//! system reports it, the memory for reading is printed in MB and as a multiple of the file's size. The file is written
+//! to a temporary folder.
 
 use std::error::Error;
 use std::io::Write;
@@ -56,7 +57,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Writes a recording file: the time, and noise with nine digits in six channels, as data acquisition writes it.
+/// Writes a recording file: the time with six decimals, and noise with eight decimals in six channels.
 fn write_record(path: &std::path::Path) -> Result<(), Box<dyn Error>> {
     let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(1);
     let mut file = std::io::BufWriter::new(std::fs::File::create(path)?);

@@ -16,11 +16,11 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// The stability limits from 700 to 1300 rev/min as text.
+/// The first stability limit at speeds from 700 to 1300 rev/min, and the verdict at one point of the chart, as text.
 pub fn limits(case: &Path) -> Result<String, Box<dyn Error>> {
     let case = Case::read(case)?;
-    // `CubicTerms::Refuse` returns an error for a structure with cubic terms, because its limits depend on the forced
-    // orbit; `quietcut::orbit::ForcedProblem` computes them.
+    // With `CubicTerms::Refuse` a case with cubic terms is an error, because the limits of such a case depend on the
+    // forced orbit; `quietcut::orbit::ForcedProblem` computes these limits.
     let problem = Problem::new(&case, CubicTerms::Refuse)?;
     let mut text = String::new();
 

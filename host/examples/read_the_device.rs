@@ -1,4 +1,4 @@
-//! Reading a device: its name and firmware, and its reports over two seconds.
+//! Reading a device: its board and firmware, and the reports that it sends within two seconds.
 //!
 //! `cargo run --release -p quietcut --example read_the_device -- /dev/ttyACM0`; without a port the simulated device
 //! answers.
@@ -17,7 +17,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// The name of the device and its reports over some time, as text.
+/// The board and firmware of the device, and the reports that it sends within `time`, as text.
 pub fn reports(port: &str, time: Duration) -> Result<String, Box<dyn Error>> {
     let (mut client, info) = Client::connect(device::open(port, None)?)?;
     let mut text = format!("{} with firmware {}\n", info.board, info.firmware);

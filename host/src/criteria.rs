@@ -15,13 +15,14 @@ pub(crate) const LARGEST_FOLDING: f64 = 0.1;
 /// from folding, however small.
 pub(crate) const SMALL_FOLDING: f64 = 0.01;
 
-/// Largest ratio of the frequencies of a peak in two tables up to which it counts as the same peak, after a change of the tool. A third of the
-/// overhang of a tool changes its frequency by a factor of two; smaller changes are compared. Unfounded.
+/// Ratio of the higher to the lower of two frequencies, of a peak before and a peak after a change of the tool, below
+/// which the two may be the same peak. An overhang that is longer by a third lowers the frequency of a beam by a factor
+/// of 1.8; only smaller changes are compared. Unfounded.
 pub(crate) const SAME_PEAK: f64 = 1.2;
 
-/// Coherence from which the force causes the response at a line: noise then has at most a quarter of the energy of the
-/// response to the force. With three averages the coherence of unrelated signals exceeds it with a probability of 0.2² at
-/// one line, and at three of five neighbouring lines with 6·10⁻⁴.
+/// Least coherence at which the force counts as the cause of the response at a line: noise in the response then has at
+/// most a quarter of the energy of the response to the force. With three averages the coherence of unrelated signals
+/// exceeds it with a probability of 0.2² at one line, and of 6·10⁻⁴ at three or more of five neighbouring lines.
 pub(crate) const RELATED_COHERENCE: f64 = 0.8;
 
 // Identification
@@ -61,13 +62,15 @@ pub(crate) const COARSE_TABLE: f64 = 0.01;
 /// as ln of the depth, so that limits are accurate to about 1e-7; the threshold is ten times that.
 pub(crate) const UNCHANGED_LIMIT: f64 = 1e-6;
 
-/// Share of its axial depth by which a tried cut must lie beyond the interval of the stability limit to contradict it.
-/// Intervals of limits contain the errors of the identification, but not the scatter of cutting coefficients between
-/// batches of a material. Unfounded.
+/// Share of the smaller of two depths by which they must differ for a tried cut to contradict a stability limit: the
+/// depth of a cut with chatter and the larger lower end of the limit's interval, or the depth of a stable cut and the
+/// smaller upper end. The interval follows from the standard deviations of the case, which need not contain the scatter
+/// of cutting coefficients between batches of a material. Unfounded.
 pub(crate) const CONTRADICTED_BEYOND: f64 = 0.1;
 
-/// Probability below which so many contradicting cuts are no chance: the usual level of significance of a test. Of five
-/// cuts two must contradict the limits, of ten three.
+/// Probability that chance alone makes as many tried cuts contradict the limits, below which the limits count as
+/// contradicted: the usual level of significance of a test. Of five cuts at least two must contradict the limits, of
+/// ten at least three.
 pub(crate) const CONTRADICTION_BY_CHANCE: f64 = 0.05;
 
 // Reports

@@ -1,8 +1,9 @@
-//! Mass of the accelerometer: removed from measured receptances, or bounded if it is not known.
+//! Mass of the accelerometer: its removal from measured receptances, and the shift of a resonance by a mass.
 //!
-//! A sensor of mass m that moves with the point of measurement exerts the force −m ẍ on it. The measured receptances H_m are those of the
-//! structure with this mass: H_m = (H⁻¹ − ω² m I)⁻¹ over the directions in which the sensor moves, so that H = (H_m⁻¹ + ω² m I)⁻¹. For one
-//! direction 1/H = 1/H_m + ω² m (Ewins, Modal Testing, 2nd ed. 2000, section 3.4).
+//! A sensor of mass m that moves with the point of measurement exerts the inertial force −m ẍ on the structure. The
+//! measured receptances H_m are those of the structure with this mass: H_m = (H⁻¹ − ω² m I)⁻¹ over the directions in
+//! which the sensor moves, so that H = (H_m⁻¹ + ω² m I)⁻¹. For one direction 1/H = 1/H_m + ω² m (Ewins, Modal Testing,
+//! 2nd ed. 2000, section 3.4).
 
 use std::f64::consts::TAU;
 
@@ -14,14 +15,19 @@ use super::criteria::PEAK_LINES_MIN;
 use super::error::FrfError;
 use super::table::{Frf, FrfTable};
 
-/// Removes the mass of the accelerometer, `mass_kg`, from the receptances of a table, and scales their standard deviations. Returns the
-/// table and the directions in which the mass could not be removed, since the table has no drive-point receptance there.
+/// Removes the mass of the accelerometer, `mass_kg` (kg), from the receptances of a table, and scales the standard
+/// deviations `deviation` (a row for each entry of the table, a value for each line) in place. Returns the table, and
+/// those directions of its responses and forces in which the mass is not removed, since the table has no drive-point
+/// receptance there.
 ///
-/// With the drive points S of the table, H = H_m − ω²m H_m,·S (I + ω²m H_m,SS)⁻¹ H_m,S·. An entry that the table lacks is taken from its
-/// reciprocal, or as zero. The deviation of entry ij is divided by |1 + ω²m H_m,ii| |1 + ω²m H_m,jj|, which is exact for one direction.
+/// With the drive points S of the table, H = H_m − ω²m H_m,·S (I + ω²m H_m,SS)⁻¹ H_m,S·. An entry of H_m that the table
+/// lacks is taken from its reciprocal, or as zero if the table lacks that too. The deviation of entry ij is divided by
+/// |1 + ω²m H_m,ii| |1 + ω²m H_m,jj|, where the factor of a direction without drive point is 1; for a single
+/// drive-point receptance this is a multiplication by |dH/dH_m|. Lines at which I + ω²m H_m,SS is singular stay
+/// unchanged.
 ///
 /// # Errors
-/// The table has no drive-point receptance.
+/// The table has no drive-point receptance, or a corrected receptance is not finite.
 pub fn without_accelerometer_mass(
     table: &FrfTable,
     deviation: &mut [Vec<f64>],
@@ -57,7 +63,7 @@ pub fn without_accelerometer_mass(
         let drive = driven.len();
         let coupled = DMatrix::<Complex64>::identity(drive, drive)
             + loaded.view((0, 0), (drive, drive)).map(|h| h * inertia);
-        // A singular matrix is a free structure of exactly this mass; the line keeps its measured values.
+        // Without an inverse, the line keeps its measured values.
         let Some(inverse) = coupled.try_inverse() else {
             continue;
         };
@@ -82,7 +88,8 @@ pub fn without_accelerometer_mass(
     Ok((table, loaded_only))
 }
 
-/// Receptances of one line among `directions`; one that the table lacks is taken from its reciprocal, or as zero.
+/// Receptance matrix of one line, m/N: rows displacement, columns force, both in the order of `directions`. An entry
+/// that the table lacks is taken from its reciprocal, or as zero if the table lacks that too.
 fn matrix(table: &FrfTable, directions: &[Direction], line: usize) -> DMatrix<Complex64> {
     DMatrix::from_fn(directions.len(), directions.len(), |p, q| {
         let entry = table
@@ -92,8 +99,13 @@ fn matrix(table: &FrfTable, directions: &[Direction], line: usize) -> DMatrix<Co
     })
 }
 
-/// Relative shift of the frequency of the peak of a drive-point receptance by a mass `mass_kg` on it, m/(2 m_modal), with the modal mass from
-/// Re(1/H) = k − m_modal ω² over the lines of the peak; `None` without `PEAK_LINES_MIN` lines there.
+/// Relative decrease m/(2 m_modal) of the frequency of a resonance by a mass m = `mass_kg` (kg). The resonance is that
+/// at the largest |H| of the drive-point receptance in `direction`. The modal mass is that of the straight line
+/// Re(1/H) = k − m_modal ω² fitted to the lines between the half-power points.
+///
+/// `None` if the table lacks the receptance; if |H| does not fall below 1/√2 of its largest value on both sides; if
+/// fewer than `PEAK_LINES_MIN` lines lie between the half-power points; or if the fitted Re(1/H) does not decrease with
+/// ω².
 pub fn peak_shift(table: &FrfTable, direction: Direction, mass_kg: f64) -> Option<PeakShift> {
     let entry = table.entry(direction, direction)?;
     let size = |line: usize| entry.receptance[line].norm();
@@ -127,7 +139,8 @@ pub fn peak_shift(table: &FrfTable, direction: Direction, mass_kg: f64) -> Optio
         .map(|(square, k)| (k - level - slope * (square - mean)).powi(2))
         .sum::<f64>()
         / (count - 2.0).max(1.0);
-    // The resonance lies where the line crosses zero; its error comes from the scatter about the line.
+    // The resonance is where the straight line crosses zero, taken as near the mean of ω², where the standard deviation
+    // of the line is √(scatter/count).
     let frequency_std = (scatter / count).sqrt() / slope.abs() / (2.0 * mean);
     (slope < 0.0).then(|| PeakShift {
         peak_hz: table.frequency_hz()[peak],
@@ -136,14 +149,15 @@ pub fn peak_shift(table: &FrfTable, direction: Direction, mass_kg: f64) -> Optio
     })
 }
 
-/// Shift of a resonance by a mass.
+/// Shift of the frequency of a resonance by a mass, from [`peak_shift`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PeakShift {
-    /// Frequency of the peak, Hz.
+    /// Frequency of the line with the largest |H|, Hz.
     pub peak_hz: f64,
     /// Relative decrease of the frequency of the resonance by the mass.
     pub relative: f64,
-    /// Standard deviation of the frequency of the resonance by the scatter of 1/H about its line, relative.
+    /// Relative standard deviation of the frequency of the resonance, from the scatter of Re(1/H) about the fitted
+    /// straight line.
     pub resonance_std: f64,
 }
 
@@ -247,7 +261,8 @@ mod tests {
         let (free, loaded) = (table(&[(X, X)], 0.0), table(&[(X, X)], 0.005));
         let found = peak_shift(&free, X, 0.005).unwrap();
         let true_shift = 1.0 - peak(&loaded) / peak(&free);
-        // To first order in the mass ratio of 1 %. The mass moves in y as well, with a fifth of the amplitude: 4 % more inertia.
+        // To first order in the mass ratio of 1 %. The mass moves in y as well, with a fifth of the amplitude: 4 % more
+        // inertia.
         assert!(
             (found.relative / true_shift - 1.0).abs() < 0.07,
             "{found:?} {true_shift}"

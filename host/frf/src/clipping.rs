@@ -10,15 +10,16 @@ use super::test_channels::TestChannels;
 /// Clipped samples of the forces and responses of a recording.
 #[derive(Clone, Debug)]
 pub(super) struct Clipping {
-    /// True for each sample at which a channel is clipped; empty if none is.
+    /// One value per sample of the recording: true if at least one channel is clipped there. Empty if no channel is
+    /// clipped.
     pub(super) is_clipped: Vec<bool>,
-    /// Names of the clipped channels, each with the number of its clipped samples.
+    /// Names of the clipped channels, each with the number of its clipped samples; forces first.
     channels: Vec<(String, usize)>,
 }
 
 impl Clipping {
-    /// Finds the clipped samples: all samples at a value at which the channel stays for several samples. Single samples there are clipped
-    /// too, so that the others are not.
+    /// Finds the clipped samples of the selected forces and responses: all that equal one of the [`clipping_levels`] of
+    /// their channel, also single ones.
     pub(super) fn of(channels: &TestChannels<'_>) -> Self {
         let forces = channels.forces.iter().map(|(_, channel)| *channel);
         let responses = channels.responses.iter().map(|response| response.channel);
@@ -44,7 +45,7 @@ impl Clipping {
         found
     }
 
-    /// Clipped channels with their numbers of samples, for messages.
+    /// Clipped channels with their numbers of clipped samples, as a text for messages.
     pub(super) fn names(&self) -> String {
         let names = self.channels.iter();
         let names: Vec<String> = names
@@ -53,7 +54,7 @@ impl Clipping {
         names.join(", ")
     }
 
-    /// True if the samples of a part of the record hold a clipped one.
+    /// True if at least one of the samples with the indices `samples` is clipped.
     pub(super) fn holds(&self, samples: Range<usize>) -> bool {
         let end = samples.end.min(self.is_clipped.len());
         self.is_clipped
@@ -61,10 +62,11 @@ impl Clipping {
             .is_some_and(|samples| samples.contains(&true))
     }
 
-    /// Warning that `clipped` of all `parts` of a record, named by `noun` ("segments"), are left out; `None` if none are.
+    /// Warning that `clipped` of the `parts` parts of a record, named by `noun` ("segments"), are left out; `None` if
+    /// `clipped` is 0.
     ///
     /// # Errors
-    /// More than [`CLIPPED_PARTS`] of the parts are clipped.
+    /// More than the share [`CLIPPED_PARTS`] of the parts is clipped.
     pub(super) fn warning(&self, clipped: usize, parts: usize, noun: &str) -> Result<Option<String>, String> {
         if clipped == 0 {
             return Ok(None);

@@ -7,12 +7,12 @@ use std::sync::Arc;
 
 use super::window::effective_averages;
 
-/// Number of record segments whose Fourier transforms are buffered before their products are added to the sums of the
-/// cross-spectra. A choice that reduces memory traffic.
+/// Largest number of record segments whose Fourier transforms are buffered before their products are added to the sums
+/// of the cross-spectra. A choice that reduces memory traffic.
 const BATCH: usize = 4;
 
-/// Number of frequency lines that are processed together when the products of all channel pairs are added to the
-/// cross-spectra. A choice: the lines of all channels then fit into the cache of a core.
+/// Largest number of frequency lines that are processed together when the products of all channel pairs are added to
+/// the cross-spectra. A choice: the lines of all channels then fit into a cache of a core.
 const LINES: usize = 256;
 
 /// Cross-spectra S_ab(f) ∝ E[A(f) B*(f)] of all pairs of channels, as sums over segments or neighbouring lines; X = H F
@@ -25,9 +25,9 @@ pub(super) struct CrossSpectra {
     pub(super) frequency_hz: Vec<f64>,
     /// Number of channels.
     channels: usize,
-    /// Cross-spectrum S_ab at all frequency lines for each pair of channels a ≤ b, in the order aa, ab, …, bb, …
+    /// Cross-spectrum S_ab, by pair of channels a ≤ b in the order aa, ab, …, bb, …, then by frequency line.
     pairs: Vec<Vec<Complex64>>,
-    /// Effective number of independent averages in each cross-spectrum.
+    /// Effective number of independent averages in each line of each cross-spectrum.
     pub(super) averages: f64,
 }
 
@@ -51,7 +51,7 @@ impl CrossSpectra {
 pub(super) struct Segments {
     /// Window weight of each sample of a segment; the number of weights is the segment length.
     pub(super) weights: Vec<f64>,
-    /// Index of the first sample of each segment.
+    /// Index of the first sample of each segment in the signals, ascending.
     pub(super) starts: Vec<usize>,
     /// True if the mean of each segment is subtracted before its transform.
     pub(super) without_mean: bool,
@@ -77,8 +77,8 @@ impl Segments {
         }
     }
 
-    /// Leaves out the segments for which `is_left_out` holds, and returns their number. The averages are reduced in
-    /// proportion.
+    /// Leaves out the segments for whose range of samples `is_left_out` holds, and returns their number. The averages
+    /// are reduced in proportion.
     pub(super) fn leave_out(&mut self, is_left_out: impl Fn(Range<usize>) -> bool) -> usize {
         let (before, length) = (self.starts.len(), self.weights.len());
         self.starts.retain(|&start| !is_left_out(start..start + length));
@@ -128,9 +128,10 @@ pub(super) fn averaged(
     spectra
 }
 
-/// Cross-spectra of whole `signals` without their means, each summed over successive groups of `width` lines of `band`
-/// (without 0 Hz and half the sample rate); a last group of fewer lines is left out. The fraction `taper` of each
-/// signal is tapered at each end.
+/// Cross-spectra of whole `signals` (all of one length) without their means, each summed over successive groups of
+/// `width` lines of the transform in `band` (without 0 Hz and half the sample rate); a last group of fewer lines is
+/// left out. The frequency of a group is that of its middle. The fraction `taper` of each signal is tapered at each
+/// end.
 pub(super) fn smoothed(
     signals: &[&[f64]],
     sample_rate_hz: f64,
@@ -174,7 +175,8 @@ pub(super) fn smoothed(
     }
 }
 
-/// Tukey window: 1 in the middle, half-cosine tapers over the fraction `taper` of the length at each end.
+/// Tukey window of `length` samples: 1 in the middle, half-cosine tapers over the fraction `taper` of the length, but
+/// at least one sample, at each end.
 fn tukey(length: usize, taper: f64) -> Vec<f64> {
     let ramp = (taper * length as f64).max(1.0);
     (0..length)
@@ -189,7 +191,8 @@ fn tukey(length: usize, taper: f64) -> Vec<f64> {
         .collect()
 }
 
-/// Adds the products A B* of every pair of channels in a batch of segments to the sums `pairs`.
+/// Adds the products A B* of every pair of channels, over the `segments` segments of a batch, to the sums `pairs`. The
+/// batch holds `count` lines for each channel of each segment, by segment, then by channel.
 fn multiply(
     pairs: &mut [Vec<Complex64>],
     batch: &[Complex64],
@@ -238,8 +241,8 @@ impl Transform {
         }
     }
 
-    /// Fourier transform of the weighted samples, with their mean subtracted first if `without_mean`, padded with zeros
-    /// to the transform length.
+    /// Fourier transform, from 0 Hz to half the sample rate, of the samples times `weights`, padded with zeros to the
+    /// transform length. If `without_mean`, the mean of the samples is subtracted before the multiplication.
     pub(super) fn of(&mut self, samples: &[f64], weights: &[f64], without_mean: bool) -> &[Complex64] {
         let mean = if without_mean {
             samples.iter().sum::<f64>() / samples.len().max(1) as f64

@@ -25,16 +25,17 @@ pub enum Estimator {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FrfLine {
     pub(super) frequency_hz: f64,
-    /// FRF matrix, rows responses, columns forces; responses as measured, before integration to displacement.
+    /// FRF matrix, rows responses, columns forces, both in the order of the channels; responses as measured, before
+    /// integration to displacement.
     pub(super) h: Matrix,
-    /// Multiple coherence of each response (thesis eq. 7.10): fraction of the power of the response that is linearly
+    /// Multiple coherence (thesis eq. 7.10), by response: fraction of the power of the response that is linearly
     /// related to the forces.
     pub(super) coherence: [f64; 3],
     /// Standard deviation of the magnitude |H| of the estimate for each response (row) and force (column) from random
     /// errors, in the unit of `h`.
     pub(super) deviation: [[f64; 3]; 3],
-    /// Largest relative error of the FRF of each response by aliasing of content above half the sample rate; 0 except
-    /// for hammer tests.
+    /// Largest relative error of the FRF by aliasing of content above half the sample rate, by response; estimated for
+    /// hammer tests only, otherwise 0.
     pub(super) folding: [f64; 3],
     /// Smallest and largest singular value of the force spectra at this line, with each force divided by its root mean
     /// square; for the pseudo-inverse, those of the stacked matrices S_ff of all tests, with rows of unit norm.
@@ -50,7 +51,8 @@ pub(super) struct ChannelCounts {
     pub(super) responses: usize,
 }
 
-/// FRF estimate at every frequency line, except those at which a matrix that the estimator inverts is singular.
+/// FRF estimate at every frequency line, except those at which a matrix to be inverted is singular: S_ff (for the
+/// pseudo-inverse S Sᴴ, see `stacked`) and, for H2 and the mean with several forces, S_fx.
 ///
 /// All `tests` have the same lines. For several forces, H2 and the mean require equal numbers of responses and forces;
 /// the caller checks it.
@@ -58,7 +60,8 @@ pub(super) struct ChannelCounts {
 /// Random error (Bendat and Piersol, generalised to H = Σ S_xf,i W_i): var H_pq = Σ_i S_ee,p (W_iᴴ S_ff,i W_i)_qq /
 /// n_i, with the residual spectrum S_ee of the responses and n_i averages of test i; the variance of |H| is half of it.
 /// S_ee is the power of X − H F with H from H1 or the pseudo-inverse (H2 and the mean take that of H1), times n/(n −
-/// number of forces), n = Σ n_i. For one force and large n: ε[|H|] = √(1 − γ²) / (|γ| √(2n)).
+/// number of forces) with n = Σ n_i and a denominator of at least 1. For one force and large n: ε[|H|] = √(1 − γ²) /
+/// (|γ| √(2n)).
 pub(super) fn lines(tests: &[CrossSpectra], counts: ChannelCounts, estimator: Estimator) -> Vec<FrfLine> {
     let count = tests.first().map_or(0, |test| test.frequency_hz.len());
     (0..count)
@@ -135,7 +138,7 @@ fn line(
         Estimator::H2 => h2(&xf, &xx, counts)?,
         Estimator::Mean => scaled(&sum(&h1, &h2(&xf, &xx, counts)?), 0.5),
     };
-    // Power of the residual X − H F of the responses with H = `h1`: S_xx − 2 Re(S_xf Hᴴ) + H S_ff Hᴴ.
+    // Terms of the power of the residual X − H F of the responses with H = `h1`: S_xx − 2 Re(S_xf Hᴴ) + H S_ff Hᴴ.
     let explained = product_adjoint(&xf, &h1);
     let modelled = product_adjoint(&product(&h1, &ff), &h1);
     let unbiased = averages / (averages - counts.forces as f64).max(1.0);
@@ -170,8 +173,8 @@ fn line(
     Some(line)
 }
 
-/// Estimate H2 = S_xx S_fx⁻¹. With one force, H2 is computed separately for each response; with several, `None` if S_fx
-/// is singular.
+/// Estimate H2 = S_xx S_fx⁻¹. With one force, H2 is computed separately for each response, and is 0 where S_fx is 0;
+/// with several, `None` if S_fx is singular.
 fn h2(xf: &Matrix, xx: &Matrix, counts: ChannelCounts) -> Option<Matrix> {
     if counts.forces == 1 {
         let mut h = ZERO;

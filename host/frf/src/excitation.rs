@@ -35,8 +35,8 @@ impl Excitation {
         }
     }
 
-    /// Kind of excitation of a recording: that of its sidecar; if this names neither a kind nor a cut, a hammer test if
-    /// the only force of the recording is that of a hammer.
+    /// Kind of excitation of a recording: that of its sidecar; if the sidecar names neither a kind nor parameters of a
+    /// cut, a hammer test if the recording has one force channel only and this is the force of a hammer.
     pub(super) fn of_recording(recording: &Recording) -> Self {
         let sidecar = &recording.sidecar;
         let mut forces = recording

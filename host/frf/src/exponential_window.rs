@@ -1,15 +1,16 @@
 //! Removal of the damping that an exponential window adds to a hammer test.
 //!
-//! With e^{−t/τ} on force and response the estimate is H(iω + 1/τ): every pole λ appears at λ − 1/τ. The resonance
-//! peaks are then too low, and depth limits computed from them too high. Modes are fitted to the estimate, and each is
-//! replaced by the mode with its pole at λ:
+//! With e^{−t/τ} on force and response the estimate is H(iω + 1/τ): every pole of the structure appears moved by −1/τ.
+//! The resonance peaks are then too low, and depth limits computed from them too high. Modes are fitted to the
+//! estimate, and each is replaced by the mode with its pole moved back by 1/τ:
 //!
 //!   H(iω) = H_w(iω) + Σ_r [R_r/(iω − λ_r − 1/τ) − R_r/(iω − λ_r)] + conjugate pairs.
 //!
 //! The sum runs over the poles λ_r and residues R_r fitted to the windowed estimate H_w, as far as they count as modes.
 //! The contribution of modes outside the band is left as it is: it changes little over the distance 1/τ. A relative
 //! error of the measured decay rate σ_w is larger by the factor σ_w/σ for the decay rate σ of the mode itself, and so
-//! is that of the peak 1/σ: the standard deviation of a line grows by the factor |H/H_w|², if this is above 1.
+//! is that of the peak, which is proportional to 1/σ. With |H/H_w| for this factor, the relative standard deviation of
+//! a line grows by |H/H_w| and the absolute one by |H/H_w|², if this is above 1.
 
 use std::f64::consts::TAU;
 
@@ -20,11 +21,11 @@ use super::tool_tip::{mode_numbers, modes};
 use super::{Frf, FrfError, FrfTable};
 
 /// FRF table without the damping that an exponential window of time constant τ (`exponential_s`, s) on all impacts has
-/// added. The standard deviations `deviation` of its entries are scaled in place.
+/// added. The standard deviations `deviation`, by entry of the table, then by line, are scaled in place.
 ///
 /// # Errors
-/// No mode can be fitted, or no fitted mode has a significant peak; the decay rate of a mode is nearly that of the
-/// window alone, so that the damping of the mode is not identifiable; or a corrected receptance is not finite.
+/// No mode can be fitted, or no fitted pole counts as a mode; the decay rate of a mode is nearly that of the window
+/// alone, so that the damping of the mode is not identifiable; or a corrected receptance is not finite.
 pub(super) fn without_exponential_window(
     table: &FrfTable,
     deviation: &mut [Vec<f64>],

@@ -8,7 +8,9 @@ use super::hammer::force_peaks;
 use super::test_channels::TestChannels;
 use super::test_plausibility::is_cut;
 
-/// Force level of a recording, N, over all its forces: median peak of the impacts of a hammer, root mean square of any other force.
+/// Force level of a recording, N: with hammer excitation the median peak of the impacts (0 without an impact),
+/// otherwise the root mean square of the force about its mean. For several forces, the root of the sum of the squares
+/// of their levels.
 pub(super) fn force_level(channels: &TestChannels<'_>, excitation: Excitation) -> f64 {
     let levels = channels.forces.iter().map(|(_, channel)| {
         let samples = &channel.samples;
@@ -22,7 +24,9 @@ pub(super) fn force_level(channels: &TestChannels<'_>, excitation: Excitation) -
     levels.map(|level| level * level).sum::<f64>().sqrt()
 }
 
-/// Warning of averaged recordings of a shaker whose force levels differ by more than [`SAME_FORCE`]. The impacts of a hammer by hand always do.
+/// Warning of averaged recordings of a shaker whose force levels differ by more than the factor [`SAME_FORCE`]. `None`
+/// if they do not, for hammer and step-sine tests, and if any of the recordings is of a cut. The impacts of a hammer by
+/// hand usually differ so much.
 pub(super) fn averaged_levels(excitation: Excitation, members: &[TestChannels<'_>]) -> Option<String> {
     let is_shaker = matches!(
         excitation,

@@ -1,4 +1,4 @@
-//! Receptances at several force levels, each by itself: of a nonlinear structure they differ.
+//! Receptances measured separately at each force level: those of a nonlinear structure differ from level to level.
 
 use super::criteria::SAME_FORCE;
 use super::error::FrfError;
@@ -13,16 +13,20 @@ use quietcut_recording::Recording;
 /// Receptances measured at one force level.
 #[derive(Clone, Debug)]
 pub struct LevelMeasurement {
-    /// Force level, N: amplitude of a stepped sine, median peak of the impacts of a hammer, root mean square of any other force.
+    /// Force level, N. Step-sine test: median of the amplitudes of the frequency steps in the first pass at this level.
+    /// Otherwise the mean over the recordings of the level: of the median peak of the impacts of a hammer, or of the
+    /// root mean square of any other force. Several forces are combined as the root of the sum of their squares.
     pub force_n: f64,
-    /// True if the level is the amplitude of a sine, so that the amplitude of the response is |H| times the level.
+    /// True for a step-sine test: the level is the amplitude of a sine, and |H| times the level is that of the
+    /// response.
     pub is_amplitude: bool,
     /// The receptances at this level.
     pub measurement: Measurement,
 }
 
-/// Measures the receptances of each force level of the recordings, in ascending order of the level. The levels of a step-sine record are
-/// evaluated one by one; other recordings are averaged if their levels are within the factor `SAME_FORCE` of the lowest of them.
+/// Measures the receptances of each force level of the recordings, in ascending order of the level. The levels of a
+/// step-sine record are evaluated one by one; other recordings are measured together if their levels are within the
+/// factor `SAME_FORCE` of the lowest of them.
 ///
 /// # Errors
 /// As [`measure`].

@@ -1,4 +1,4 @@
-//! Unit of a frequency response function, response per force, and the directions in its name.
+//! Unit of a frequency response function, response per force, and the directions in the name of one.
 
 use std::f64::consts::TAU;
 
@@ -7,7 +7,7 @@ use num_complex::Complex64;
 use quietcut_model::structure::Direction;
 use quietcut_recording::{Quantity, Unit};
 
-/// Directions of displacement and force of a receptance.
+/// Direction of the displacement and direction of the force of a receptance.
 pub(super) type DirectionPair = (Direction, Direction);
 
 /// Unit of an FRF: conversion factor to SI, and order of the time derivative of displacement (0 receptance, 1 mobility,
@@ -18,7 +18,7 @@ pub(super) struct FrfUnit {
     pub(super) derivatives: i32,
 }
 
-/// Parses directions such as `xy`: displacement in x, force in y. `None` for any other text.
+/// Parses two of the letters x, y and z, such as `xy`: displacement in x, force in y. `None` for any other text.
 pub(super) fn pair_of(text: &str) -> Option<DirectionPair> {
     let axis = |text: &str| {
         let direction: Direction = text.parse().ok()?;
@@ -52,7 +52,8 @@ impl FrfUnit {
     }
 }
 
-/// Parses the unit of an FRF, such as `um/N`, `m/s^2/N` or `g/N`.
+/// Parses the unit of an FRF, such as `um/N`, `m/s^2/N`, `g/N` or `1/kg`. An error if the text is no unit of a
+/// displacement, velocity or acceleration per unit of force.
 pub(super) fn frf_unit(text: &str) -> Result<FrfUnit, String> {
     let wrong = || {
         format!(

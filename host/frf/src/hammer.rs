@@ -10,8 +10,8 @@ use super::criteria::{
 };
 use super::test_channels::TestChannels;
 
-/// Length of the part of a hammer segment before the force pulse, as a fraction of the segment length. The mean of this
-/// part is subtracted from the segment as the offset of the sensor. A choice.
+/// Length of the part of a hammer segment before the force pulse, as a fraction of the segment length. The mean of each
+/// signal over this part is subtracted from its segment as the offset of the sensor. A choice.
 const BEFORE: f64 = 0.01;
 
 /// One impact of the hammer.
@@ -21,8 +21,8 @@ pub struct MeasuredImpact {
     pub time_s: f64,
     /// Peak force, N, with its sign, relative to the median force of the record.
     pub peak_n: f64,
-    /// Largest second force pulse within the segment: delay after the first peak, s, and height as a fraction of that
-    /// peak; `None` for a single impact, and for impacts that are left out for another reason.
+    /// Second force pulse within the segment: delay after the first peak, s, and height without sign as a fraction of
+    /// that peak; `None` for a single impact, and for impacts that are left out for another reason.
     pub second: Option<(f64, f64)>,
     /// Index of the first sample of the force pulse of this impact in the record.
     first: usize,
@@ -34,19 +34,21 @@ pub struct MeasuredImpact {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct HammerWindows {
     /// Length of the segment of each impact, s. `None` for the inverse of the frequency resolution or, if none is set,
-    /// for the greatest length with which segments neither overlap nor exceed their record in any hammer test that is
-    /// measured together.
+    /// for the greatest length with which segments neither overlap nor exceed the end of their record in any hammer
+    /// test that is measured together.
     pub segment_s: Option<f64>,
-    /// Time constant τ of the exponential window on force and response, s; `None` for no window.
+    /// Time constant τ of the exponential window on force and response, s, which begins with the force pulse; `None`
+    /// for no window.
     ///
-    /// With e^{−t/τ} on both signals the FRF is H(iω + 1/τ): every pole λ moves to λ − 1/τ.
-    /// [`measure`](crate::measure) removes the damping that the window adds.
+    /// With e^{−t/τ} on both signals the FRF is H(iω + 1/τ): every pole λ moves to λ − 1/τ. [`measure`](crate::measure)
+    /// removes the damping that the window adds.
     pub exponential_s: Option<f64>,
 }
 
 /// Windowed segments of the impacts of one hammer record.
 pub(super) struct ImpactSegments {
-    /// Windowed signals: the force, then the responses. The segments of each signal are concatenated.
+    /// Windowed signals: the force, then the responses in the order of the channels. Each signal is the segments of the
+    /// `used` impacts one after the other.
     pub(super) signals: Vec<Vec<f64>>,
     /// Number of samples in the segment of each impact; it is even and equal for all impacts.
     pub(super) length: usize,
@@ -59,7 +61,7 @@ pub(super) struct ImpactSegments {
     /// Impacts too close to the start or end of the record for a segment, which are not evaluated.
     pub(super) cut_short: Vec<MeasuredImpact>,
     /// Largest amplitude of a windowed response at the end of a segment, as a fraction of the peak of that response in
-    /// the segment.
+    /// the segment, over all responses and segments.
     pub(super) end_amplitude: f64,
 }
 
@@ -172,7 +174,8 @@ pub(super) fn segments(
     Ok(cut)
 }
 
-/// True if a force is that of a hammer: its energy lies in short pulses whose peaks have one sign.
+/// True if a force is that of a hammer: it has impacts, their peaks have one sign, and their pulses take up at most the
+/// share [`STRUCK_SHARE`] of the samples and at least the share [`STRUCK_ENERGY`] of the energy.
 pub(super) fn is_struck(force: &[f64], rate: f64) -> bool {
     let impacts = impacts(force, rate);
     let middle = median(&mut force.to_vec()).unwrap_or(0.0);
@@ -191,7 +194,8 @@ pub(super) fn is_struck(force: &[f64], rate: f64) -> bool {
         && struck >= STRUCK_ENERGY * energy(force)
 }
 
-/// Amplitude (√2 · RMS) of the last twentieth of a segment of a response, as a fraction of the peak of the segment.
+/// Amplitude (√2 · RMS) of the last twentieth of a segment of a response, as a fraction of the largest magnitude in the
+/// segment; 0 for a segment of zeros.
 fn end_amplitude(segment: &[f64]) -> f64 {
     let tail = &segment[segment.len() - segment.len() / 20..];
     let power = tail.iter().map(|x| x * x).sum::<f64>() / tail.len().max(1) as f64;
@@ -234,8 +238,8 @@ fn longest_segment(impacts: &[MeasuredImpact], samples: usize) -> usize {
     (shortest as f64 / (1.0 + BEFORE)) as usize
 }
 
-/// Detects the impacts of a hammer in a force signal. Pulses that start within [`BOUNCE_S`] after the start of an
-/// impact are its bounces and do not count.
+/// Detects the impacts of a hammer in a force signal, in the order of time. Pulses that start within [`BOUNCE_S`] after
+/// the start of an impact are its bounces and do not count.
 fn impacts(force: &[f64], rate: f64) -> Vec<MeasuredImpact> {
     let middle = median(&mut force.to_vec()).unwrap_or(0.0);
     let noise = noise(force, middle);
@@ -280,18 +284,19 @@ fn impacts(force: &[f64], rate: f64) -> Vec<MeasuredImpact> {
     impacts
 }
 
-/// Peaks of the impacts in a force signal, N, without sign.
+/// Magnitudes of the peaks of the impacts in a force signal, N, in the order of time.
 pub(super) fn force_peaks(force: &[f64], rate: f64) -> Vec<f64> {
     let impacts = impacts(force, rate);
     impacts.iter().map(|impact| impact.peak_n.abs()).collect()
 }
 
-/// Largest second force pulse before sample `end`: delay after the peak of the impact, s, and height as a fraction of
-/// that peak. `None` if no pulse exceeds the threshold of a double impact.
+/// Second force pulse of an impact: the largest force from one pulse width after the pulse of the impact to before
+/// sample `end`. Delay after the peak of the impact, s, and magnitude as a fraction of that peak. `None` if the force
+/// does not exceed the threshold of a double impact, or if no sample is left.
 fn second_pulse(force: &[f64], impact: &MeasuredImpact, end: usize, rate: f64) -> Option<(f64, f64)> {
     let middle = median(&mut force.to_vec()).unwrap_or(0.0);
     let width = (impact.last - impact.first).max(4);
-    // One pulse width after the first pulse is skipped, since anti-aliasing filters ring there.
+    // One pulse width after the first pulse (at least four samples) is skipped, since anti-aliasing filters ring there.
     let from = (impact.last + width).min(end);
     let (at, size) = (from..end.min(force.len()))
         .map(|k| (k, (force[k] - middle).abs()))
@@ -301,8 +306,8 @@ fn second_pulse(force: &[f64], impact: &MeasuredImpact, end: usize, rate: f64) -
     (size > threshold).then(|| (delay_s, size / impact.peak_n.abs()))
 }
 
-/// Standard deviation of the force noise: 1.4826 · median absolute deviation from `middle`, which holds for Gaussian
-/// noise. Rare impacts do not affect the median.
+/// Standard deviation of the force noise: 1.4826 · median absolute deviation from `middle`, the relation for Gaussian
+/// noise. Rare impacts hardly affect the median.
 fn noise(force: &[f64], middle: f64) -> f64 {
     let mut deviations: Vec<f64> = force.iter().map(|f| (f - middle).abs()).collect();
     1.4826 * median(&mut deviations).unwrap_or(0.0)

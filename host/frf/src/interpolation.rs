@@ -9,16 +9,17 @@ use quietcut_model::structure::feed_axes;
 /// Smallest number of frequency lines of a table that is interpolated: a cubic polynomial needs four points.
 const LINES_MIN: usize = 4;
 
-/// Receptance matrix H(f), m/N, at any frequency, from a table; rows displacement, columns force.
+/// Receptance matrix H(f), m/N, at any frequency, from a table; rows displacement, columns force. Entries that the
+/// table lacks are zero.
 ///
 /// Between the lines each entry is the cubic through the two nearest lines on each side (Lagrange; at the ends of the
 /// table, through its first or last four lines). It equals the table on its lines. Near the resonance of a mode with
 /// the half bandwidth ζf, the error midway between lines at the spacing Δf is 0.56 (Δf/ζf)⁴ of the peak: 0.09 % with
-/// five lines per half bandwidth, 3.5 % with two. [`Interpolation::error`] estimates it from the table itself.
+/// five lines per half bandwidth, 3.5 % with two. [`Interpolation::error`] estimates the error from the table itself.
 ///
 /// Below the first line H is that of stiffness and viscous damping: Re H constant, Im H ∝ f. Above the last line H is
-/// that of inertia, H ∝ f⁻². Both continue the table without a step; their error is the contribution of modes outside
-/// the table. H(−f) is the conjugate of H(f).
+/// that of inertia, H ∝ f⁻². Both continue the table without a step, and hold only far from resonances. For real f,
+/// H(−f) is the conjugate of H(f).
 #[derive(Clone, Debug)]
 pub struct Interpolation {
     frequency_hz: Vec<f64>,
@@ -47,8 +48,8 @@ impl Interpolation {
         Ok(Self { frequency_hz, lines })
     }
 
-    /// Interpolation through every second line of this table and its last line; `None` if fewer than four lines remain.
-    /// The difference between both interpolations shows the effect of the line spacing.
+    /// Interpolation through every second line of this table, from the first, and its last line; `None` if fewer than
+    /// four lines remain. The difference between both interpolations shows the effect of the line spacing.
     pub fn thinned(&self) -> Option<Self> {
         let last = self.lines.len() - 1;
         let kept = || (0..last).step_by(2).chain([last]);
@@ -72,7 +73,8 @@ impl Interpolation {
         &self.frequency_hz
     }
 
-    /// The receptances in feed, normal and axial direction, Rᵀ H R, for a feed at `angle_deg` degrees from x towards y.
+    /// The receptances in feed, normal and axial direction, Rᵀ H R with the columns of R from [`feed_axes`], for a feed
+    /// at `angle_deg` degrees from x towards y.
     pub fn rotated(&self, angle_deg: f64) -> Self {
         let machine_from_feed = feed_axes(angle_deg).map(Complex64::from);
         Self {
@@ -92,8 +94,9 @@ impl Interpolation {
 
     /// Receptance matrix H, m/N, at the complex frequency f = s/(2πi), Hz.
     ///
-    /// Off the real axis the cubic of the nearest lines is continued analytically. It is accurate within about one line
-    /// spacing of the axis, or within the distance of the nearest pole if that is smaller.
+    /// Off the real axis the functions of the real frequency are continued analytically, the cubic of the lines nearest
+    /// to Re f among them. The cubic is accurate only within about one line spacing of the axis, and well within the
+    /// distance of the nearest pole.
     pub fn at(&self, frequency_hz: Complex64) -> Matrix3<Complex64> {
         if frequency_hz.re < 0.0 {
             // H of the conjugate s is the conjugate of H; conjugation of s maps f to −f̄.
@@ -133,12 +136,12 @@ impl Interpolation {
         sum
     }
 
-    /// Estimate of the largest interpolation error, as a fraction of the largest entry of H.
+    /// Estimate of the largest interpolation error, as a fraction of the largest entry of H on the lines.
     ///
-    /// Each line except the first and last three is predicted from the first and the third line on each side, at equal
-    /// spacing a cubic with twice the spacing. The error of a cubic is proportional to the fourth power of the spacing,
-    /// so that the estimate is 1/16 of the largest prediction error. Measurement noise counts as error. The estimate is
-    /// 0 for tables of fewer than seven lines.
+    /// Each line except the first three and the last three is predicted from the first and the third line on each side,
+    /// at equal spacing a cubic with twice the spacing. The error of a cubic is proportional to the fourth power of the
+    /// spacing, so that the estimate is 1/16 of the largest prediction error. Measurement noise counts as error. The
+    /// estimate is 0 for tables of fewer than seven lines and for tables of zeros.
     pub fn error(&self) -> f64 {
         let peak = self.lines.iter().map(largest).fold(0.0, f64::max);
         let count = self.lines.len();

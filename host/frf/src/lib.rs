@@ -1,13 +1,14 @@
 //! Frequency response functions: measured from recordings, tabulated in a file, and interpolated between the lines of a
 //! table.
 //!
-//! Main types: [`measure`] turns recordings of shaker, multisine, hammer, sweep or step-sine tests, or of cuts, into a
+//! Main items: [`measure`] turns recordings of shaker, multisine, hammer, sweep or step-sine tests, or of cuts, into a
 //! [`Measurement`] (receptances with coherence and standard deviation; estimators H1, H2, their mean and the
 //! pseudo-inverse, [`Estimator`]); [`FrfTable`] holds receptances in m/N and reads and writes CSV and UFF 58, and reads
 //! the text tables of other programs; [`Interpolation`] evaluates a table between and beyond its lines.
 //!
 //! "The thesis" in this crate is *Chatter Vibrations in Robotic Milling Considering Structural Nonlinearity*, a
-//! doctoral thesis of the University of Victoria; its equation numbers are given as "thesis eq. 5.16".
+//! doctoral thesis of the University of Victoria; its equation numbers are given as "thesis eq. (4.4)" or "thesis eq.
+//! 7.12".
 //!
 //! ```
 //! use std::f64::consts::TAU;
@@ -36,8 +37,8 @@
 //! # Ok::<(), quietcut_frf::FrfError>(())
 //! ```
 //!
-//! Of a structure, this crate uses only its directions and the axes of the feed: no modal model, no cutting force, no
-//! stability.
+//! From the crate `quietcut_model`, this crate uses only the directions and the axes of the feed: no structure, no
+//! cutting force, no stability.
 
 mod accelerometer_mass;
 mod clipping;

@@ -49,11 +49,12 @@ use usable_lines::{independent, keep_excited};
 ///
 /// Recordings with the same force directions, the same measured responses and the same kind of excitation are averaged;
 /// the others add entries to the receptance matrix. Accelerations and velocities are divided by (iω)² and iω. 0 Hz is
-/// left out. The damping that an exponential window adds is removed.
+/// left out. The damping that an exponential window adds is removed, and the mass of the accelerometer if it is stated.
 ///
 /// # Errors
-/// For example: a recording has no force or no response, or is too short for the resolution; the forces are dependent
-/// at more than half of the frequencies; the recordings have fewer than half of their frequencies in common.
+/// For example: a recording has no force or no response, or is too short for the resolution; two step-sine records
+/// would have to be averaged; the forces are dependent at more than half of the frequencies; the recordings have fewer
+/// than half of their frequencies in common.
 pub fn measure(recordings: &[Recording], settings: &MeasurementSettings) -> Result<Measurement, FrfError> {
     let channels = recordings
         .iter()
@@ -124,10 +125,11 @@ pub fn measure(recordings: &[Recording], settings: &MeasurementSettings) -> Resu
     Ok(measurement)
 }
 
-/// Groups recordings with the same force directions, the same measured responses and the same kind of excitation.
+/// Groups recordings with the same force directions, the same measured responses and the same kind of excitation, in
+/// the order of the first recording of each group.
 ///
-/// The excitation is that of the settings. If they state none, it is [`Excitation::of_recording`], or a multisine
-/// instead of a random one if the force is [`recognized`].
+/// The excitation is that of the settings. If they state none, it is that of [`Excitation::of_recording`], or a
+/// multisine where that is random and the force is [`recognized`].
 ///
 /// # Errors
 /// The force and a response of a recording with random or hammer excitation seem to be swapped.
@@ -185,7 +187,8 @@ fn check_band(recording: &Recording, settings: &MeasurementSettings) -> Result<(
 }
 
 /// Combines the receptances of all groups of recordings in one table, at the frequencies that all groups have in
-/// common.
+/// common. An error if these are none or fewer than half of those of any group, or if two groups have the same
+/// receptance.
 fn merged(path: &Path, measured: Vec<MeasuredGroup>) -> Result<Measurement, FrfError> {
     let refused = |what: String| FrfError::Content {
         path: path.into(),
@@ -326,8 +329,8 @@ fn measure_group(
             counts.forces, counts.responses
         )));
     }
-    // For each hammer test, the largest power of every channel near half the sample rate, from which the error by
-    // aliasing is estimated.
+    // The largest power near half the sample rate, by hammer test, then by channel, from which the error by aliasing is
+    // estimated; empty for other excitation.
     let mut tops: Vec<Vec<f64>> = Vec::new();
     let spectra = match excitation {
         Excitation::Hammer => {
@@ -359,7 +362,8 @@ fn measure_group(
     Ok(receptances(group, &lines, first, warnings))
 }
 
-/// Sets the error by aliasing of every FRF line: the largest over all hammer tests, for each response.
+/// Sets the error by aliasing of every FRF line, for each response: the largest over all tests with `tops`, 0 without
+/// any.
 fn add_folding(lines: &mut [FrfLine], spectra: &[CrossSpectra], tops: &[Vec<f64>], responses: usize) {
     let Some(frequency_hz) = spectra.first().map(|test| &test.frequency_hz) else {
         return;
@@ -376,8 +380,7 @@ fn add_folding(lines: &mut [FrfLine], spectra: &[CrossSpectra], tops: &[Vec<f64>
     }
 }
 
-/// Warning of the frequencies without an estimate, where the matrix of the force spectra is singular; `None` if there
-/// are none.
+/// Warning of the frequencies without an estimate, where a matrix to be inverted is singular; `None` if there are none.
 fn singular_lines(spectra: &[CrossSpectra], lines: &[FrfLine]) -> Option<String> {
     let all_hz = spectra.first().map_or(&[][..], |test| &test.frequency_hz);
     let has_line = |hertz: &f64| lines.iter().any(|line| line.frequency_hz == *hertz);

@@ -14,26 +14,27 @@ pub struct MeasurementSettings {
     pub excitation: Option<Excitation>,
     /// FRF estimator.
     pub estimator: Estimator,
-    /// Frequency resolution (line spacing), Hz. `None` selects about eight half-overlapping segments for each force in
-    /// random excitation, and averages over eight lines for each force in a sweep. In a hammer test it sets the segment
-    /// length if [`HammerWindows`] does not.
+    /// Frequency resolution (line spacing), Hz, without effect on periodic excitation and step-sine tests. In a hammer
+    /// test it sets the segment length if [`HammerWindows`] does not. `None` selects, for each force, about eight
+    /// segments at half overlap in the shortest recording with random excitation, and an average over eight lines in a
+    /// sweep.
     pub resolution_hz: Option<f64>,
     /// Overlap of the segments of random excitation, as a fraction of their length.
     pub overlap: f64,
     /// Time window of the segments of random excitation.
     pub window: Window,
-    /// First and last frequency to evaluate, Hz; `None` for all frequencies.
+    /// First and last frequency to evaluate, Hz; `None` for all frequencies above 0 Hz.
     pub band_hz: Option<(f64, f64)>,
     /// Names of the channels to evaluate. If forces are among them, no other force counts; the same holds for
     /// responses.
     pub channels: Vec<String>,
     /// Segment length and exponential window of hammer tests.
     pub hammer: HammerWindows,
-    /// Mass of the accelerometer at the drive point, kg, whose effect is removed; `None` removes nothing.
+    /// Mass of the accelerometer, kg, whose effect on the receptances is removed; `None` removes nothing.
     pub accelerometer_mass_kg: Option<f64>,
     /// Period of periodic excitation, s; `None` finds it from the force.
     pub period_s: Option<f64>,
-    /// Force level to evaluate in a step-sine test with several levels, N; `None` if the test has one level.
+    /// Force level of a step-sine test to evaluate, N; `None` takes the only level, and a test with several is refused.
     pub force_n: Option<f64>,
 }
 
@@ -55,8 +56,9 @@ impl Default for MeasurementSettings {
     }
 }
 
-/// Indices of the lines within the band to evaluate, of a transform of `length` samples at the sampling rate `rate`,
-/// Hz; 0 Hz is excluded. Without a band, all lines between 0 Hz and half the sampling rate, both excluded.
+/// Indices of the lines within the band to evaluate, without 0 Hz, of a transform of `length` samples at the sampling
+/// rate `rate`, Hz. Lines of the band above half the sampling rate are included. Without a band, the lines 1 to
+/// ⌊`length`/2⌋ − 1.
 pub(super) fn band(settings: &MeasurementSettings, rate: f64, length: usize) -> Range<usize> {
     let line = |hertz: f64| hertz * length as f64 / rate;
     match settings.band_hz {

@@ -20,7 +20,7 @@ pub struct FittedPeak {
     pub damping_ratio: f64,
     /// Standard deviation of the damping ratio.
     pub damping_ratio_std: f64,
-    /// |H| of the fit at the frequency of the pole, m/N.
+    /// |H| of the fit at the frequency Im p/2π, m/N.
     pub receptance: f64,
     /// Standard deviation of |H|, m/N.
     pub receptance_std: f64,
@@ -35,20 +35,25 @@ impl FittedPeak {
     }
 }
 
-/// Peaks of one receptance of a table, ascending in frequency: the maxima of |H| above `LEAST_COMPARED_PEAK` of the largest that fall to
-/// half their power on both sides, each with a fit.
+/// Peaks of one receptance of a table, in the order of its lines, each with a fit: the maxima of |H| above
+/// `LEAST_COMPARED_PEAK` of the largest, from which |H| falls to below half the power on both sides before it rises
+/// above the maximum.
 ///
-/// Around a peak, H(s) = (c₀ + c₁ s + c₂ s²)/(s − p) with complex constants: one pole, and the other modes as a straight line. It is fitted
-/// by Sanathanan–Koerner iteration and Gauss–Newton steps to the lines above `FITTED_PART` of the peak. The covariance of the complex
-/// parameters is σ²(JᴴJ)⁻¹, with σ² multiplied by the sum of the autocorrelation of the residual over two lines: a Hann window
-/// correlates neighbouring lines. Peaks without `FITTED_LINES_MIN` lines have no fit, and those whose damping and size are not above
-/// `PEAK_ABOVE_NOISE` deviations are noise; both are left out.
+/// Around a peak, H(s) = (c₀ + c₁ s + c₂ s²)/(s − p) with complex constants: one pole, and the other modes as a
+/// straight line. It is fitted by Sanathanan–Koerner iteration, then by Gauss–Newton steps, to the lines around the
+/// peak with at least `FITTED_PART` of it, widened to `FITTED_LINES_MIN` lines. The covariance of the complex
+/// parameters is σ²(JᴴJ)⁻¹, with σ² multiplied by 1 + 2(ρ₁ + ρ₂) if this is above 1, where ρ_j is the autocorrelation
+/// of the residual at a lag of j lines: a Hann window correlates neighbouring lines.
+///
+/// Peaks are left out if there are fewer than `FITTED_LINES_MIN` lines around them, the equations are singular, the
+/// pole is farther from the peak than half the width of the fitted band, or the damping ratio or the size is not above
+/// `PEAK_ABOVE_NOISE` standard deviations.
 pub fn fitted_peaks(table: &FrfTable, entry: &Frf) -> Vec<FittedPeak> {
     let size: Vec<f64> = entry.receptance.iter().map(|h| h.norm()).collect();
     let largest = size.iter().copied().fold(0.0, f64::max);
     let mut peaks = Vec::new();
     let mut from = 0;
-    // Regions between two lines below half of the power of their largest line.
+    // Each search begins at the first line after the previous peak that is below half the power of that peak.
     while let Some(peak) = next_peak(&size, from, LEAST_COMPARED_PEAK * largest) {
         let above = |line: &usize| size[*line] >= FITTED_PART * size[peak];
         let first = (0..peak).rev().take_while(above).last().unwrap_or(peak);
@@ -68,7 +73,8 @@ pub fn fitted_peaks(table: &FrfTable, entry: &Frf) -> Vec<FittedPeak> {
     peaks
 }
 
-/// The next maximum from the line `from` on that is above `least` and stands out to half its power on both sides.
+/// Index of the first maximum from the line `from` on that is above `least` and from which |H| falls on both sides
+/// below half the power before it rises above the maximum; `None` if there is none.
 fn next_peak(size: &[f64], from: usize, least: f64) -> Option<usize> {
     let half = std::f64::consts::FRAC_1_SQRT_2;
     (from.max(1)..size.len().saturating_sub(1)).find(|&line| {
@@ -84,7 +90,8 @@ fn next_peak(size: &[f64], from: usize, least: f64) -> Option<usize> {
     })
 }
 
-/// The range widened on both sides to `FITTED_LINES_MIN` lines, within `count` lines.
+/// The range widened equally on both sides until it has `FITTED_LINES_MIN` lines or one more; the part beyond the
+/// `count` lines of the table is cut off.
 fn widened(lines: std::ops::Range<usize>, count: usize) -> std::ops::Range<usize> {
     let lacking = FITTED_LINES_MIN.saturating_sub(lines.len()).div_ceil(2);
     lines.start.saturating_sub(lacking)..(lines.end + lacking).min(count)
@@ -93,15 +100,16 @@ fn widened(lines: std::ops::Range<usize>, count: usize) -> std::ops::Range<usize
 /// Number of complex parameters of the fit.
 const PARAMETERS: usize = 4;
 
-/// Iterations of either kind. A choice: both converge in a few, and a peak that does not is left out.
+/// Number of Sanathanan–Koerner iterations, and of Gauss–Newton steps. A choice: both usually converge within a few.
 const ITERATIONS: usize = 12;
 
-/// Fit of one pole and a quadratic numerator to the receptances `h`; `None` with too few lines, or for a pole that is no resonance there.
+/// Fit of one pole and a quadratic numerator to the receptances `h`; `None` for a peak that [`fitted_peaks`] leaves
+/// out.
 fn fit(frequency_hz: &[f64], h: &[Complex64], peak_hz: f64) -> Option<FittedPeak> {
     if h.len() < FITTED_LINES_MIN {
         return None;
     }
-    // s = i(ω − ω₀)/Δ lies between about −i and i.
+    // s = i(ω − ω₀)/Δ, with ω₀ at the peak and half the width Δ of the fitted band.
     let span_hz = 0.5 * (frequency_hz.last()? - frequency_hz.first()?);
     let scale = h.iter().map(|h| h.norm()).fold(0.0, f64::max);
     let s: Vec<Complex64> = frequency_hz
@@ -109,7 +117,8 @@ fn fit(frequency_hz: &[f64], h: &[Complex64], peak_hz: f64) -> Option<FittedPeak
         .map(|hertz| Complex64::new(0.0, (hertz - peak_hz) / span_hz))
         .collect();
     let h: Vec<Complex64> = h.iter().map(|h| h / scale).collect();
-    // Sanathanan–Koerner: H s = p H + c₀ + c₁ s + c₂ s², weighted with 1/(s − p) of the last pole.
+    // Sanathanan–Koerner: H s = p H + c₀ + c₁ s + c₂ s², weighted with 1/(s − p) of the pole p of the previous
+    // iteration.
     let mut found = Vector4::new(
         Complex64::new(-0.5, 0.0),
         Complex64::ZERO,
@@ -146,7 +155,7 @@ fn fit(frequency_hz: &[f64], h: &[Complex64], peak_hz: f64) -> Option<FittedPeak
     let variance = energy / (h.len() - PARAMETERS) as f64 * correlation(&residual, energy);
     let delta = TAU * span_hz;
     let pole = Complex64::new(0.0, TAU * peak_hz) + found[0] * delta;
-    // The variance of a complex parameter is shared by its real and imaginary part.
+    // The real and the imaginary part of a complex parameter each have half of its variance.
     let pole_std = (0.5 * variance * inverse[(0, 0)].re).sqrt() * delta;
     let at_peak = Complex64::new(0.0, found[0].im);
     let gradient = derivatives(&found, at_peak);
@@ -168,7 +177,8 @@ fn fit(frequency_hz: &[f64], h: &[Complex64], peak_hz: f64) -> Option<FittedPeak
     })
 }
 
-/// Least-squares solution of rows (a, b) with aᵀx = b, and the inverse of the normal matrix Σ a* aᵀ.
+/// Least-squares solution of rows (a, b) with aᵀx = b, and the inverse of the normal matrix Σ a* aᵀ; `None` if that
+/// matrix is singular or the solution is not finite.
 fn solved(
     rows: impl Iterator<Item = (Vector4<Complex64>, Complex64)>,
 ) -> Option<(Vector4<Complex64>, Matrix4<Complex64>)> {
@@ -186,7 +196,8 @@ fn solved(
         .then_some((solution, inverse))
 }
 
-/// Factor of the variance of a smooth fit by the correlation of its residual, 1 + 2 Σ ρ_j over the lags 1 and 2; at least 1.
+/// Factor by which the correlation of the residual increases the variance of a smooth fit: 1 + 2(ρ₁ + ρ₂) with the
+/// autocorrelation ρ_j of the residual at the lag j, but at least 1. `energy` is the sum of the squared residuals.
 fn correlation(residual: &[Complex64], energy: f64) -> f64 {
     let lag = |lag: usize| -> f64 {
         let pairs = residual.iter().zip(residual.get(lag..).unwrap_or_default());

@@ -9,7 +9,7 @@ use super::criteria::{PERIOD_SHIFT, PERIOD_SHIFT_ERRORS, PERIODS_RECORDED_MIN, S
 use super::cross_spectra::Transform;
 use super::window::fast_length;
 
-/// Reason why a force has no period of whole samples.
+/// Reason why no period of whole samples is taken from a force.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum NoPeriod {
     /// The record holds fewer than [`PERIODS_RECORDED_MIN`] periods of the `samples` that were stated.
@@ -19,22 +19,23 @@ pub(super) enum NoPeriod {
         /// Whole periods in the record.
         periods: usize,
     },
-    /// The force does not repeat at any lag up to a quarter of the record.
+    /// At every lag from the first zero of the autocorrelation to a quarter of the record, less than [`SHARE_OF_LINES`]
+    /// of the energy of the force repeats.
     DoesNotRepeat {
-        /// Lag at which the force repeats best, samples; `None` if it has no zero crossing of its autocorrelation.
+        /// Lag of these at which the force repeats best, samples; `None` if there is no such zero.
         best: Option<usize>,
-        /// Share of the energy of the force that does not repeat at that lag.
+        /// Share of the energy of the force that does not repeat at that lag; 1 without it.
         unrepeated: f64,
     },
-    /// The force repeats, but not after a whole number of samples.
+    /// The force repeats after another time than the stated period, or not after a whole number of samples.
     NotWhole {
-        /// Period of the force, samples.
+        /// Estimated period of the force, samples.
         samples: f64,
     },
 }
 
 impl NoPeriod {
-    /// Sentence that says what was found at the sample rate `rate`, Hz, and what would be right.
+    /// Message with what was found, with times at the sample rate `rate`, Hz, and what would be right.
     pub(super) fn sentence(self, rate: f64) -> String {
         match self {
             Self::TooShort { samples, periods } => format!(
@@ -62,11 +63,11 @@ impl NoPeriod {
     }
 }
 
-/// Period of `force` in samples: the stated one, or the smallest lag at which the force repeats.
+/// Period of `force` in samples: the stated one, or the lag at which the force [repeats](repetition), corrected by
+/// whole samples to the period that the lines show.
 ///
-/// The lag is the first at which the normalized autocorrelation r reaches its largest value over all lags from its first zero crossing to a
-/// quarter of the record, within half of its distance from 1. The phases of the lines, which turn by ω·δ per period if the period is δ samples
-/// longer than the lag, check that it is whole.
+/// The lines must confirm the period, see [`PeriodShift::is_whole`]: from one period to the next a line of the
+/// frequency ω turns by −ωδ, if the true period is δ samples longer.
 ///
 /// # Errors
 /// See [`NoPeriod`].
@@ -82,7 +83,7 @@ pub(super) fn period(force: &[f64], stated: Option<usize>) -> Result<usize, NoPe
         None => repetition(force)?,
     };
     let mut samples = samples;
-    // A noisy autocorrelation of a smooth force has its largest value some samples beside the period.
+    // A noisy autocorrelation of a smooth force may have its largest value some samples beside the period.
     for _ in 0..3 {
         let shift = period_shift(force, samples);
         let whole = shift.samples.round();
@@ -102,7 +103,9 @@ pub(super) fn period(force: &[f64], stated: Option<usize>) -> Result<usize, NoPe
     })
 }
 
-/// Smallest lag, in samples, at which `force` repeats as well as at any other.
+/// Lag at which `force` repeats, samples: the first local maximum of the normalized autocorrelation of at least 1.5 r −
+/// 0.5 − [`ROUNDING`], where r is the largest value. The search begins at the first lag without positive correlation
+/// and ends at a quarter of the record. An error if there is no such lag, or if r is below [`SHARE_OF_LINES`].
 fn repetition(force: &[f64]) -> Result<usize, NoPeriod> {
     let longest = force.len() / PERIODS_RECORDED_MIN;
     let correlation = normalized_autocorrelation(force, longest);
@@ -134,7 +137,8 @@ fn repetition(force: &[f64]) -> Result<usize, NoPeriod> {
 /// Share of the energy of a force that rounding in a file of five digits keeps from repeating, with some reserve.
 const ROUNDING: f64 = 1e-8;
 
-/// Autocorrelation r(lag) = Σ f_k f_{k+lag} / √(Σ f_k² Σ f_{k+lag}²) of a force without its mean, for lags up to `longest`.
+/// Autocorrelation r(lag) = Σ f_k f_{k+lag} / √(Σ f_k² Σ f_{k+lag}²) of a force without its mean, for the lags from 0
+/// to `longest`; 0 where the denominator is 0.
 fn normalized_autocorrelation(force: &[f64], longest: usize) -> Vec<f64> {
     let mean = force.iter().sum::<f64>() / force.len().max(1) as f64;
     let length = fast_length(force.len() + longest + 1);
@@ -144,7 +148,8 @@ fn normalized_autocorrelation(force: &[f64], longest: usize) -> Vec<f64> {
     for (padded, sample) in time.iter_mut().zip(force) {
         *padded = sample - mean;
     }
-    // Energy of the first k samples, for the energies of both factors.
+    // Energy of the first k samples, with index k; the two sums in the denominator of r are differences of such
+    // energies.
     let mut energy = Vec::with_capacity(force.len() + 1);
     energy.push(0.0);
     let mut sum = 0.0;
@@ -178,18 +183,20 @@ struct PeriodShift {
     samples: f64,
     /// Standard deviation of `samples`.
     deviation: f64,
-    /// Shift of the highest strong line against its line of the transform, in line spacings.
+    /// Shift of the highest line that [`period_shift`] uses against its line of the transform, in line spacings.
     lines: f64,
 }
 
 impl PeriodShift {
-    /// True if no line leaks, or if the noise leaves that open.
+    /// True if the magnitude of `lines` is at most [`PERIOD_SHIFT`], or that of `samples` at most
+    /// [`PERIOD_SHIFT_ERRORS`] standard deviations.
     fn is_whole(&self) -> bool {
         self.lines.abs() <= PERIOD_SHIFT || self.samples.abs() <= PERIOD_SHIFT_ERRORS * self.deviation
     }
 }
 
-/// Estimates the period of `force` near `period` samples from the mean phase advance of its lines from each period to the next.
+/// Estimates by how much the period of `force` differs from `period` samples, from the mean phase advance of the lines
+/// of `force` from each period to the next.
 fn period_shift(force: &[f64], period: usize) -> PeriodShift {
     let mut transform = Transform::new(period);
     let weights = vec![1.0; period];
@@ -210,7 +217,7 @@ fn period_shift(force: &[f64], period: usize) -> PeriodShift {
     let (mut weight, mut moment, mut square) = (0.0, 0.0, 0.0);
     let mut strong: Vec<(f64, f64, f64)> = Vec::new();
     for (line, sum) in advance.iter().enumerate().skip(1) {
-        // A tenth of the largest power: weaker lines have phases that are mostly noise.
+        // Lines with less than a tenth of the largest power are left out, since noise has more effect on their phases.
         if sum.norm() < 0.1 * largest || largest == 0.0 {
             continue;
         }
@@ -228,7 +235,7 @@ fn period_shift(force: &[f64], period: usize) -> PeriodShift {
             lines: 0.0,
         };
     }
-    // A force that comes δ samples late turns its lines by −ωδ.
+    // If the period is δ samples longer, the lines turn by −ωδ from one period to the next.
     let samples = -moment / square;
     let scatter: f64 = strong
         .iter()
@@ -296,7 +303,8 @@ mod tests {
         let Err(NoPeriod::NotWhole { samples }) = period(&force, Some(1000)) else {
             panic!("{:?}", period(&force, Some(1000)));
         };
-        // The advance of a thousandth of a radian is far below the noise; half a hundredth of a sample is what it allows.
+        // The advance of a thousandth of a radian is far below the noise; half a hundredth of a sample is what it
+        // allows.
         assert!((samples - 1000.3).abs() < 5e-3, "{samples}");
         let mut random = ChaCha8Rng::seed_from_u64(8);
         let noise: Vec<f64> = (0..8192).map(|_| random.random_range(-1.0..1.0)).collect();

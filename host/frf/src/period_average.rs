@@ -8,22 +8,22 @@ use quietcut_numerics::statistics::{f_quantile, median};
 use super::criteria::{EXCITED, FALSE_ALARM, FORCE_CHANGE, LINE_ABOVE_NOISE, SETTLED};
 use super::cross_spectra::Transform;
 
-/// Mean spectra of a record over the periods of its excitation, with the scatter over the periods.
+/// Mean spectra of a record over the used periods of its excitation, with the scatter over these periods.
 #[derive(Clone, Debug)]
 pub(super) struct PeriodAverage {
-    /// Number of the first line, in multiples of the reciprocal of the period.
+    /// Number of the first line of the spectra: its frequency in multiples of the reciprocal of the period.
     pub(super) first_line: usize,
     /// Number of periods in the mean.
     pub(super) used: usize,
-    /// Number of whole periods of the record that are left out, at its ends or as clipped ones.
+    /// Number of whole periods of the record that are not in the mean.
     pub(super) dropped: usize,
-    /// False if the responses still changed from period to period at the end of the record.
+    /// True if [`settled_from`] finds a settled period; otherwise the second half of the periods is used.
     pub(super) is_settled: bool,
-    /// True for each line at which the force is excited.
+    /// True for each line that the force [excites](excited).
     pub(super) is_excited: Vec<bool>,
     /// Mean spectrum of the force.
     pub(super) force: Vec<Complex64>,
-    /// Mean spectra of the responses.
+    /// Mean spectra of the responses, in the order given.
     pub(super) responses: Vec<ResponseAverage>,
 }
 
@@ -32,7 +32,8 @@ pub(super) struct PeriodAverage {
 pub(super) struct ResponseAverage {
     /// Mean spectrum Ȳ.
     pub(super) mean: Vec<Complex64>,
-    /// Variance of one period about the mean, Σ|Y − Ȳ − G(U − Ū)|²/(M − 1), with G = Ȳ/Ū at excited lines and 0 elsewhere.
+    /// At each line, variance of one period about the mean, Σ|Y − Ȳ − G(U − Ū)|²/(M − 1), with G = Ȳ/Ū at excited lines
+    /// and 0 elsewhere; 0 for M = 1.
     pub(super) variance: Vec<f64>,
     /// Power Σ|Y|²/M of the response.
     pub(super) power: Vec<f64>,
@@ -44,22 +45,23 @@ impl PeriodAverage {
         self.responses[response].mean[line] / self.force[line]
     }
 
-    /// Variance of the FRF of one response at an excited line by noise: that of one period over M|Ū|².
+    /// Variance by noise of the FRF of one response at an excited line: the variance of one period divided by M|Ū|².
     pub(super) fn noise_variance(&self, response: usize, line: usize) -> f64 {
         self.responses[response].variance[line] / self.used as f64 / self.force[line].norm_sqr()
     }
 }
 
-/// Spectra of each period of a record: of the force, and of each response.
+/// Spectra of a record: of the force by period and line, of the responses by response, period and line.
 struct PeriodLines {
     force: Vec<Vec<Complex64>>,
     responses: Vec<Vec<Vec<Complex64>>>,
 }
 
-/// Averages a record over periods of `period` samples, at the `lines` of the transform of one period. Periods that hold a sample for which
-/// `is_clipped` is true are left out. `None` if fewer than two periods remain.
+/// Averages a record over periods of `period` samples, at the `lines` of the transform of one period. Left out are
+/// periods in which the force changes, periods that hold a sample for which `is_clipped` is true, and of the remaining
+/// ones those before the responses settle. `None` if fewer than two remain before the last step.
 ///
-/// The periods are counted from the end of the record, since the transient is at its start.
+/// The last period ends with the record, since the transient is at the start of the record.
 pub(super) fn period_average(
     force: &[f64],
     responses: &[&[f64]],
@@ -125,7 +127,8 @@ pub(super) fn period_average(
     })
 }
 
-/// The longest run of consecutive periods over which the force repeats.
+/// Indices of the longest run of consecutive periods, of equal ones the first, between which the force changes by at
+/// most [`FORCE_CHANGE`] times the median change, or by no more than rounding.
 fn steady_force(force: &[f64], period: usize, whole: usize, first: usize) -> Range<usize> {
     let change = |index: usize| -> f64 {
         let start = first + index * period;
@@ -136,7 +139,7 @@ fn steady_force(force: &[f64], period: usize, whole: usize, first: usize) -> Ran
     let changes: Vec<f64> = (0..whole.saturating_sub(1)).map(change).collect();
     let energy = force.iter().map(|sample| sample * sample).sum::<f64>() / whole.max(1) as f64;
     let usual = median(&mut changes.clone()).unwrap_or(0.0);
-    // Rounding of a file of five digits, in case that nothing else scatters.
+    // The lower bound allows for the rounding in a file of five digits, if the force has no other noise.
     let most = (FORCE_CHANGE * usual).max(1e-8 * energy);
     let (mut longest, mut from) = (0..0, 0);
     for index in 0..whole {
@@ -157,7 +160,8 @@ fn mean(periods: &[Vec<Complex64>]) -> Vec<Complex64> {
         .collect()
 }
 
-/// True for each line whose force stands above the noise and within [`EXCITED`] of the largest power.
+/// True for each line at which the power of the mean force is above [`EXCITED`] of the largest such power, and above
+/// [`LINE_ABOVE_NOISE`] times the variance of the mean force.
 fn excited(force: &[Vec<Complex64>]) -> Vec<bool> {
     let mean = mean(force);
     let count = force.len() as f64;
@@ -202,15 +206,18 @@ fn gain(response: Complex64, force: Complex64, is_excited: bool) -> Complex64 {
     }
 }
 
-/// Number of neighbouring lines whose residual energies are compared together in the search for the transient. A choice: the response to
-/// initial conditions is as wide as the resonances.
+/// Number of neighbouring lines whose residual energies are added up in the search for the transient. A choice: the
+/// response to initial conditions is as wide as the resonances.
 const LINES_OF_TRANSIENT: usize = 16;
 
-/// First period from which all responses are settled; `None` if they are not settled in the last two periods.
+/// Index of the first period from which all responses are settled; `None` if no such period is found with two periods
+/// for reference.
 ///
-/// The reference is the second half of the periods. A period of the first half has a transient if, in a band of [`LINES_OF_TRANSIENT`]
-/// lines, its difference from the reference exceeds both [`SETTLED`] of the response and the noise, by an F-test with the probability
-/// [`FALSE_ALARM`] over all its bands. If the last period of the first half has a transient, the second half is divided again.
+/// The reference is the second half of the periods. A period of the first half has a transient if, in a band of
+/// [`LINES_OF_TRANSIENT`] lines of a response, its difference from the mean over the reference exceeds both [`SETTLED`]
+/// of that mean and the noise, by an F-test with the probability [`FALSE_ALARM`] over all bands and responses; the
+/// linear response to a difference of the force does not count. The responses are settled after the last period with a
+/// transient. If this is the last period of the first half, the second half is divided again.
 fn settled_from(spectra: &PeriodLines, is_excited: &[bool]) -> Option<usize> {
     let periods = spectra.force.len();
     let mut from = 0;
@@ -230,7 +237,7 @@ fn settled_from(spectra: &PeriodLines, is_excited: &[bool]) -> Option<usize> {
     }
 }
 
-/// True if a response of `period` differs from its mean over the periods `reference` by more than noise.
+/// True if `period` has a transient against the periods `reference`, see [`settled_from`].
 fn has_transient(spectra: &PeriodLines, is_excited: &[bool], period: usize, reference: Range<usize>) -> bool {
     let count = reference.len() as f64;
     let lines = is_excited.len();

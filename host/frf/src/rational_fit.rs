@@ -2,7 +2,8 @@
 //!
 //! The method is that of Gustavsen and Semlyen (1999) with common poles for all functions, where the unknowns of each
 //! function are eliminated separately (Deschrijver and others, 2008). Tool-tip calibration and the removal of an
-//! exponential window use its poles and residues. Fits with poles from other methods use only its residues.
+//! exponential window use its poles and residues. Fits with poles from other methods use only the function
+//! [`residues`].
 
 use std::f64::consts::TAU;
 
@@ -17,13 +18,14 @@ use quietcut_numerics::singular_values::SingularValueError;
 const ROUNDS: usize = 20;
 
 /// Bound on the singular values of a vector fit's equations, whose receptances or columns are normalized; combinations
-/// of columns with a smaller singular value count as linearly dependent. It is about the rounding error of the sums.
+/// of columns with a singular value up to the bound count as linearly dependent. It is about the rounding error of the
+/// sums.
 const DEPENDENT: Tolerance = Tolerance::Absolute(1e-13);
 
 /// Error of fitting a sum of modes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum RationalFitError {
-    /// Too few frequencies or nonzero receptances for the number of modes, or no mode.
+    /// No mode, fewer frequencies than 4 plus twice the number of modes, or no receptance other than zero.
     #[error("{lines} frequencies and {functions} functions other than zero do not determine {modes} modes")]
     Undetermined {
         /// Number of frequencies.
@@ -44,15 +46,17 @@ pub enum RationalFitError {
     Poles(#[from] EigenvalueError),
 }
 
-/// A sum of modes H_k(s) = Σ_r R_kr/(s − λ_r) + R*_kr/(s − λ*_r) + d_k + e_k/s², s = iω.
+/// Poles and residues of a sum of modes H_k(s) = Σ_r [R_kr/(s − λ_r) + R*_kr/(s − λ*_r)] + d_k + e_k/s², s = iω, fitted
+/// to receptances; d_k and e_k are not kept.
 #[derive(Clone, Debug)]
 pub struct RationalFit {
-    /// Poles λ_r with positive imaginary part, rad/s; those of a vector fit by ascending imaginary part.
+    /// Poles λ_r, rad/s: of a vector fit with positive, ascending imaginary parts; of a fit by [`residues`] the given
+    /// ones.
     pub(crate) poles: Vec<Complex64>,
     /// Residues R_kr, m/(N s): one row for each function, one column for each pole.
     pub residues: Vec<Vec<Complex64>>,
     /// RMS residual of the fit over all receptances other than zero; each residual is divided by the RMS of its
-    /// receptance.
+    /// receptance. 0 if all receptances are zero.
     pub(crate) residual: f64,
 }
 
@@ -74,8 +78,8 @@ impl RationalFit {
 /// Fits `modes` modes with common poles to the receptances `functions`, each with one value per frequency.
 ///
 /// # Errors
-/// There are fewer than 2 · `modes` + 4 frequencies, no modes or no receptance other than zero; a value is not finite;
-/// or an iteration exceeds its bound.
+/// There are fewer than 2 · `modes` + 4 frequencies, no modes or no receptance other than zero; a value is not finite,
+/// or a frequency is 0; or an iteration exceeds its bound.
 pub(super) fn fit(
     frequency_hz: &[f64],
     functions: &[&[Complex64]],
@@ -84,7 +88,7 @@ pub(super) fn fit(
     let (&[first, .., last], false) = (frequency_hz, frequency_hz.len() < 2 * modes + 4 || modes == 0) else {
         return Err(undetermined(frequency_hz, functions, modes));
     };
-    // Start values of the poles: damping ratio 1 %, equally spaced over the band.
+    // Start values of the poles: damping ratio about 1 %, equally spaced over the band.
     let mut poles: Vec<Complex64> = (0..modes)
         .map(|mode| {
             let omega = TAU * (first + (last - first) * (mode as f64 + 0.5) / modes as f64);
@@ -105,8 +109,8 @@ fn pair(s: Complex64, pole: Complex64) -> [Complex64; 2] {
     [a + b, Complex64::i() * (a - b)]
 }
 
-/// Basis functions of an FRF at one frequency: pole pairs, a constant (modes above the band), and 1/s² (modes below the
-/// band).
+/// Basis functions of an FRF at one frequency: pole pairs, the constant 1/`scale` (modes above the band), and
+/// `scale`/s² (modes below the band).
 fn basis(frequency_hz: f64, poles: &[Complex64], scale: f64) -> Vec<Complex64> {
     let s = Complex64::new(0.0, TAU * frequency_hz);
     let mut row: Vec<Complex64> = poles.iter().flat_map(|&pole| pair(s, pole)).collect();
@@ -125,8 +129,8 @@ fn undetermined(frequency_hz: &[f64], functions: &[&[Complex64]], modes: usize) 
     }
 }
 
-/// Relocated poles of a vector fit: the zeros of σ(s) = 1 + Σ c_n φ_n(s), where φ_n are the basis functions of the
-/// previous poles. With the coefficients c_n, σH is best fitted by a sum over the previous poles.
+/// Relocated poles of a vector fit: the [`zeros`] of σ(s) = 1 + Σ c_n φ_n(s), where φ_n are the functions [`pair`] of
+/// the previous poles. The c_n are the coefficients with which σH is best fitted by the [`basis`] of these poles.
 fn relocated(
     frequency_hz: &[f64],
     functions: &[&[Complex64]],
@@ -178,8 +182,9 @@ fn relocated(
     Ok(zeros(poles, &c)?)
 }
 
-/// Zeros of σ = 1 + Σ c_n φ_n: the eigenvalues of A − b cᵀ in real form, where A holds the poles of σ and b the inputs
-/// of its state-space form. Zeros with positive real part are mirrored at the imaginary axis.
+/// Zeros of σ = 1 + Σ c_n φ_n with positive imaginary part: eigenvalues of A − b cᵀ in real form, where A holds the
+/// poles of σ and b the inputs of its state-space form. Zeros with positive real part are mirrored at the imaginary
+/// axis. Other values replace real zeros, so that the number of poles is kept.
 fn zeros(poles: &[Complex64], c: &DVector<f64>) -> Result<Vec<Complex64>, EigenvalueError> {
     let size = 2 * poles.len();
     let mut matrix = DMatrix::<f64>::zeros(size, size);
@@ -198,8 +203,8 @@ fn zeros(poles: &[Complex64], c: &DVector<f64>) -> Result<Vec<Complex64>, Eigenv
         .filter(|value| value.im > 0.0)
         .map(|value| Complex64::new(-value.re.abs(), value.im))
         .collect();
-    // A pair of real zeros of σ is not an oscillatory mode; it is replaced by a start value near the highest
-    // previous pole.
+    // A pair of real zeros of σ is not an oscillatory mode; it is replaced by a start value, at a frequency
+    // proportional to that of the highest previous pole.
     let highest = poles.iter().map(|pole| pole.im).fold(0.0, f64::max);
     while upper.len() < poles.len() {
         let omega = highest * (0.9 + 0.05 * upper.len() as f64);
@@ -227,7 +232,7 @@ pub fn residues(
             matrix[(2 * k + 1, column)] = value.im;
         }
     }
-    // Each basis function is normalized, since their magnitudes span many powers of ten.
+    // The basis functions are normalized, since their magnitudes differ by many powers of ten.
     let norms: Vec<f64> = matrix.column_iter().map(|column| column.norm()).collect();
     for (mut column, norm) in matrix.column_iter_mut().zip(&norms) {
         if *norm > 0.0 {
@@ -241,8 +246,8 @@ pub fn residues(
         let values = function.iter().flat_map(|h| [h.re, h.im]);
         let right = DVector::from_iterator(2 * frequency_hz.len(), values);
         let solution = equations.solve(&right);
-        // The residual of each receptance is divided by the norm of the receptance, so that all receptances have equal
-        // weight.
+        // The squared residual of each receptance is divided by the squared norm of the receptance, so that all
+        // receptances have equal weight in the RMS residual.
         let norm = right.norm_squared();
         if norm > 0.0 {
             residual += (&matrix * &solution - &right).norm_squared() / norm;

@@ -1,4 +1,4 @@
-//! Fourier transforms of whole recordings, for fits without averaging and windows.
+//! Fourier transforms of whole recordings, for fits without averages and windows.
 
 use std::f64::consts::TAU;
 use std::path::PathBuf;
@@ -14,7 +14,7 @@ use super::test_channels::TestChannels;
 use quietcut_model::structure::Direction;
 use quietcut_recording::{Quantity, Recording};
 
-/// Fourier transform of one channel over its whole record.
+/// Fourier transform of one channel over its whole record, in the frequency band of [`RecordSpectra`].
 #[derive(Clone, Debug)]
 pub struct ChannelLines {
     /// Name of the channel.
@@ -29,20 +29,22 @@ pub struct ChannelLines {
     /// Root mean square of the channel's samples, SI unit.
     pub root_mean_square: f64,
     /// Variance of the white noise of the channel per sample, SI unit squared, from the noise plateau of the spectrum;
-    /// `None` if there is no plateau.
+    /// `None` if no plateau is found.
     pub plateau: Option<f64>,
-    /// Transform X(f) = Σ x_k e^{−2πi·fk/rate}/√N at each line; white noise of variance σ² per sample has E|X|² = σ².
+    /// Transform X(f) = Σ x_k e^{−2πi·fk/rate}/√N at each frequency of [`RecordSpectra`]; white noise of variance σ²
+    /// per sample has E|X|² = σ².
     pub lines: Vec<Complex64>,
 }
 
-/// Fourier transform of a whole recording in a frequency band, without window and without removal of the mean.
+/// Fourier transforms of the forces and responses of a whole recording in a frequency band, without window and without
+/// removal of the mean.
 #[derive(Clone, Debug)]
 pub struct RecordSpectra {
     /// File of the recording.
     pub path: PathBuf,
     /// Duration of the recording, s.
     pub seconds: f64,
-    /// Frequencies of the lines, Hz.
+    /// Frequencies of the lines, Hz, ascending.
     pub frequency_hz: Vec<f64>,
     /// Transforms of the force channels, in the order x, y, z.
     pub forces: Vec<ChannelLines>,
@@ -50,8 +52,9 @@ pub struct RecordSpectra {
     pub responses: Vec<ChannelLines>,
 }
 
-/// Transforms of recordings with continuous excitation: random, cut or swept sine. `None` if a recording is a hammer,
-/// multisine or step-sine test.
+/// Transforms of recordings with the excitation [`Excitation::Random`] or [`Excitation::Sweep`], in the order of the
+/// recordings. `None` if one of them has another excitation, stated by the settings or, if they state none, shown by
+/// its sidecar or by a force that is a hammer's.
 ///
 /// # Errors
 /// A recording has no force or no response; a chosen channel or an input of the sidecar does not exist; an input is not
@@ -123,10 +126,10 @@ fn of_record(channels: &TestChannels<'_>, band_hz: Option<(f64, f64)>) -> Record
     }
 }
 
-/// Noise plateau of a spectrum: the median of the mean powers of those bands whose mean power exceeds that of the
-/// lowest band by less than six standard deviations (1/√n of the lowest power for n lines per band); `None` if these
-/// bands are too few or have too few lines. White noise has equal power in all bands, and bands without signal contain
-/// nothing else.
+/// Noise plateau of a spectrum: the median of the mean powers of those bands whose mean power exceeds the lowest one by
+/// less than six standard deviations (1/√n of the lowest power for n lines per band). `None` if these bands are fewer
+/// than [`PLATEAU_BANDS`], or if a band has fewer than [`LINES_PER_BAND_MIN`] lines. Bands without signal are taken to
+/// hold white noise, whose power is equal in all of them. `scale` is the factor of the powers.
 fn plateau(lines: &[Complex64], scale: f64) -> Option<f64> {
     let count = lines.len() / BANDS;
     if count < LINES_PER_BAND_MIN {

@@ -1,4 +1,4 @@
-//! Complex matrices up to 3 × 3, without allocation: a measurement has one for each frequency line.
+//! Complex matrices up to 3 × 3, without allocation: a measurement has several for each frequency line.
 
 use num_complex::Complex64;
 
@@ -66,11 +66,11 @@ pub(super) fn inverse(a: &Matrix, size: usize) -> Option<Matrix> {
 }
 
 /// Smallest and largest eigenvalue of D^−½ A D^−½ for the leading `size` × `size` block (`size` ≤ 3) of a positive
-/// semidefinite Hermitian matrix A with diagonal D. Both eigenvalues lie between 0 and `size`; the smallest is 0 if a
-/// diagonal entry of A is 0.
+/// semidefinite Hermitian matrix A with diagonal D. But for rounding, both lie between 0 and `size`. If a diagonal
+/// entry of A is 0, the result is 0 and `size`.
 ///
-/// Closed form: with a unit diagonal, μ = λ − 1 solves μ³ − pμ − q = 0 with p = Σ_{i<j} |a_ij|² and q = 2 Re(a_12 a_23
-/// a_31).
+/// Closed form for `size` 3: with the entries a_ij of D^−½ A D^−½, μ = λ − 1 solves μ³ − pμ − q = 0 with p = Σ_{i<j}
+/// |a_ij|² and q = 2 Re(a_12 a_23 a_31).
 pub(super) fn extreme_eigenvalues(a: &Matrix, size: usize) -> (f64, f64) {
     let entry = |i: usize, j: usize| {
         let scale = (a[i][i].re * a[j][j].re).sqrt();

@@ -33,40 +33,44 @@ pub(super) struct FrequencyStep {
     samples: usize,
     /// Mean amplitude of the force over the frequency step, N.
     pub(super) force_n: f64,
-    /// Ratio of the response phasor to the force phasor for each response, (m, m/s or m/s²)/N as measured.
+    /// H1 estimate of response per force for each response, in the order of the response channels, (m, m/s or m/s²)/N
+    /// as measured.
     pub(super) h: Vec<Complex64>,
     /// Coherence of each response over the subsegments of the step that are evaluated: the settled ones, or the second
     /// half.
     pub(super) coherence: Vec<f64>,
-    /// Standard deviation of the magnitude of each estimate in `h` (not of one subsegment), in its unit.
+    /// Standard deviation of the magnitude of each estimate in `h` (not of one subsegment), in the unit of the
+    /// estimate.
     pub(super) deviation: Vec<f64>,
     /// True if the phasor ratios of all responses reached their steady state by the middle of the step.
     pub(super) is_settled: bool,
 }
 
-/// All frequency steps of a step-sine record at one level of the force amplitude.
+/// Frequency steps of a step-sine record at one level of the force amplitude.
 #[derive(Clone, Debug)]
 pub(super) struct ForceLevel {
     /// Median of the force amplitudes of the frequency steps in the first pass at this level, N.
     pub(super) force_n: f64,
-    /// Steps by ascending frequency. Of several steps at one frequency the longest is kept; of steps of about equal
-    /// length, the latest.
+    /// Steps by ascending frequency. Of steps at one frequency, a later one replaces the kept one if it is longer than
+    /// the fraction [`REPEATED_STEP`] of that.
     pub(super) steps: Vec<FrequencyStep>,
 }
 
-/// All frequency steps of a step-sine record.
+/// Frequency steps of a step-sine record, by force level.
 #[derive(Clone, Debug)]
 pub(super) struct StepSine {
-    /// Force levels in the order of time.
+    /// Force levels in the order of their first passes.
     pub(super) levels: Vec<ForceLevel>,
-    /// Approximate frequencies of the steps that cannot be evaluated, as a rule for too few samples per period, Hz.
+    /// Approximate frequencies of the steps that cannot be evaluated, as a rule for too few samples per period, Hz, in
+    /// the order of time; equal ones once.
     pub(super) unresolved_hz: Vec<f64>,
 }
 
-/// Frequency steps of a record by force level. Frequencies that are repeated at another force form another level.
+/// Frequency steps of a record by force level: the [`passes`] through the frequency range whose median forces agree
+/// within [`SAME_LEVEL`] are one level.
 ///
 /// # Errors
-/// The record has several forces, no segment of constant frequency, or too few samples per period in all of them.
+/// The record has several forces, no segment of constant frequency, or none that can be evaluated.
 pub(super) fn step_sine(channels: &TestChannels<'_>) -> Result<StepSine, FrfError> {
     let force = channels.only_force("a step-sine test")?;
     let rate = channels.recording.sample_rate_hz;
@@ -120,8 +124,8 @@ pub(super) fn step_sine(channels: &TestChannels<'_>) -> Result<StepSine, FrfErro
     })
 }
 
-/// Divides the frequency steps, in the order of time, into passes through the frequency range: a new pass begins when
-/// the frequency of a step before the last one returns.
+/// Divides the frequency steps, in the order of time, into passes through the frequency range: a step begins a new pass
+/// if its frequency is not that of the step before, but that of an earlier step of the pass.
 fn passes(steps: Vec<FrequencyStep>) -> Vec<Vec<FrequencyStep>> {
     let mut passes: Vec<Vec<FrequencyStep>> = Vec::new();
     for step in steps {
@@ -168,7 +172,7 @@ fn by_frequency(steps: Vec<FrequencyStep>) -> Vec<FrequencyStep> {
 }
 
 /// Segment of a step-sine record with constant frequency: first and last sample, and period in samples, from the upward
-/// zero crossings of the force.
+/// crossings of the force through its mean.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct ToneSegment {
     first: usize,
@@ -186,8 +190,8 @@ fn tone_segments(force: &[f64], rate: f64) -> Vec<ToneSegment> {
         let spread = scatter(&periods[from..to]);
         let tolerance = |mean: f64| (FREQUENCY_STEP * mean).max(PERIOD_SCATTER * spread);
         let mean = |to: usize| (crossings[to] - crossings[from]) / (to - from) as f64;
-        // The candidate segment must not begin within a frequency change, where periods scatter, nor at a pause, which
-        // is one long period.
+        // The first periods of a segment must hold no frequency change, where periods scatter, and no pause, which is
+        // one long period.
         let is_pause = |period: &f64| (period - mean(to)).abs() > PAUSE * mean(to);
         if spread > STEADY_SCATTER * FREQUENCY_STEP * mean(to) || periods[from..to].iter().any(is_pause) {
             from += 1;
@@ -195,8 +199,8 @@ fn tone_segments(force: &[f64], rate: f64) -> Vec<ToneSegment> {
         }
         while to < periods.len() {
             let now = mean(to);
-            // One deviating excitation period may be noise; two in a row, or a slow drift, begin a new frequency step;
-            // a single period with a large deviation is a pause of the sine.
+            // One deviating excitation period may be noise; two in a row, or a slow drift, end the frequency step; a
+            // single period with a large deviation is a pause of the sine and ends it too.
             let off = |k: usize| periods.get(k).map_or(0.0, |period| (period - now).abs());
             let is_off = |k: usize| off(k) > tolerance(now);
             let drift = || (crossings[to] - crossings[to - PERIODS_MIN]) / PERIODS_MIN as f64 - now;
@@ -229,8 +233,8 @@ fn scatter(periods: &[f64]) -> f64 {
     1.4826 * deviations[deviations.len() / 2]
 }
 
-/// Times, in samples, of the upward crossings of the force through its mean. A hysteresis of a third of the local
-/// amplitude rejects noise.
+/// Times, in samples, of the upward crossings of the force through its mean, ascending. A hysteresis of a third of the
+/// local amplitude rejects noise.
 fn crossings(force: &[f64], rate: f64) -> Vec<f64> {
     let mean = force.iter().sum::<f64>() / force.len().max(1) as f64;
     let mut forget = FORGET_S * rate;
@@ -260,8 +264,8 @@ fn crossings(force: &[f64], rate: f64) -> Vec<f64> {
 }
 
 /// Phasor ratios response/force over the settled part of a segment of constant frequency, or over its second half if it
-/// does not settle; `None` if the segment has too few periods, a subsegment of it has too few samples, or a phasor is
-/// `None`.
+/// does not settle; `None` if the segment has too few periods, a subsegment of it has too few samples or begins before
+/// the record, or a [`phasor`] cannot be computed.
 fn demodulated(
     channels: &TestChannels<'_>,
     force: &[f64],
@@ -270,7 +274,8 @@ fn demodulated(
 ) -> Option<FrequencyStep> {
     let period = refined(force, tone);
     let periods = ((tone.last - tone.first) as f64 / period).floor() as usize;
-    // Number of excitation periods in each subsegment; it is whole, so that each subsegment averages over full periods.
+    // Number of excitation periods in each subsegment; it is whole, so that each subsegment covers full periods but for
+    // the rounding to samples.
     let periods_per_subsegment = (periods / SUBSEGMENTS).max(1);
     let subsegments = periods / periods_per_subsegment;
     let length = (periods_per_subsegment as f64 * period).round() as usize;
@@ -328,7 +333,7 @@ fn demodulated(
     Some(step)
 }
 
-/// H1 estimate of H over the subsegments of a frequency step, its coherence, and the standard deviation of the
+/// H1 estimate of H over the given subsegments of a frequency step, its coherence, and the standard deviation of the
 /// magnitude of this estimate (not of one subsegment).
 fn averaged(forces: &[Phasor], responses: &[Phasor]) -> (Complex64, f64, f64) {
     let count = forces.len() as f64;
@@ -347,10 +352,11 @@ fn averaged(forces: &[Phasor], responses: &[Phasor]) -> (Complex64, f64, f64) {
     (h, coherence, (0.5 * variance).sqrt())
 }
 
-/// First subsegment from which all responses are settled; `None` if the second half is not settled.
+/// Index of the first subsegment from which all responses are settled; `None` if one of them is not settled in the
+/// second half of the step, or without responses.
 ///
-/// Settled: the phasor ratio differs from its mean over the second half by less than [`SETTLED`] (relative) or
-/// [`SETTLED_NOISE`] standard deviations.
+/// Settled: the phasor ratio differs from its mean over the second half by at most [`SETTLED`] (relative) or by at most
+/// [`SETTLED_NOISE`] standard deviations of the ratio.
 fn settled_from(ratios: &[Vec<Phasor>]) -> Option<usize> {
     let subsegments = ratios.first()?.len();
     let first = |ratio: &Vec<Phasor>| {
@@ -386,7 +392,7 @@ fn refined(force: &[f64], tone: ToneSegment) -> f64 {
     period
 }
 
-/// Complex amplitude of a sine, and the variance of this amplitude due to noise.
+/// Complex amplitude of a sine, or ratio of two such amplitudes, and its variance due to noise.
 #[derive(Clone, Copy, Debug)]
 struct Phasor {
     value: Complex64,
@@ -404,8 +410,8 @@ impl Phasor {
     }
 }
 
-/// Complex amplitude X of x_k = Re(X e^{iωk}) + offset + linear drift over samples `first .. first + length`, by least
-/// squares. `None` if the signal ends before or the equations are singular.
+/// Complex amplitude X of x_k = Re(X e^{iωk}) + offset + linear drift over the samples `first .. first + length` of
+/// `signal`, by least squares. `None` if the signal has fewer samples or the equations are singular.
 fn phasor(signal: &[f64], first: usize, length: usize, period: f64) -> Option<Phasor> {
     let samples = signal.get(first..first.checked_add(length)?)?;
     let row = |k: usize| {

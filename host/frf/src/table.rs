@@ -39,8 +39,8 @@ impl Frf {
         format!("{}{}", self.response, self.force)
     }
 
-    /// Index of the line with the largest |H|. Where the coherence is known, only lines count at which at least half of
-    /// the response comes from the force, if there are any: divided by ω², the noise of an accelerometer is larger at
+    /// Index of the line with the largest |H|; 0 without any line. Where the coherence is known, only lines with a
+    /// coherence of at least 0.5 count, if there are any: divided by ω², the noise of an accelerometer may be larger at
     /// the first lines than a resonance.
     pub fn peak_line(&self) -> usize {
         let largest = |of: &dyn Fn(usize) -> bool| {
@@ -53,7 +53,7 @@ impl Frf {
             .unwrap_or(0)
     }
 
-    /// True if at least half of the response at a line comes from the force, or if the coherence is not known.
+    /// True if the coherence at a line is at least [`UNRELATED`], or is not known.
     pub(crate) fn is_related(&self, line: usize) -> bool {
         let coherence = self.coherence.as_ref().and_then(|coherence| coherence.get(line));
         coherence.is_none_or(|coherence| *coherence >= UNRELATED)
@@ -156,7 +156,7 @@ impl FrfTable {
             .find(|entry| entry.response == response && entry.force == force)
     }
 
-    /// Names (such as `xy`) of the receptances in x, y and z that the table lacks.
+    /// Names (such as `xy`) of the receptances in x, y and z that the table lacks, in the order xx, xy, …, zz.
     pub fn missing(&self) -> Vec<String> {
         const AXES: [Direction; 3] = [Direction::X, Direction::Y, Direction::Z];
         AXES.iter()

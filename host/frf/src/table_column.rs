@@ -25,7 +25,7 @@ pub(super) enum Part {
     Real,
     Imaginary,
     Magnitude,
-    /// Magnitude in decibels: 20·log₁₀ of the magnitude in the unit of the column.
+    /// Magnitude in decibels: 20·log₁₀ of the magnitude in [`Meaning::unit`].
     Decibel,
     Phase(PhaseUnit),
 }
@@ -42,13 +42,14 @@ pub(super) enum PhaseUnit {
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Meaning {
     pub(super) content: Content,
-    /// Directions of response and force.
+    /// Directions of response and force; `None` for frequencies, and if neither title nor user states them.
     pub(super) directions: Option<(Direction, Direction)>,
-    /// Unit of the FRF values in the column, response per force; `None` if neither file nor user states it, and for a
-    /// phase.
+    /// Unit of the FRF values in the column, response per force; `None` if neither file nor user states it, for a
+    /// phase, and for other content than [`Content::Value`].
     pub(super) unit: Option<FrfUnit>,
-    /// Title of the column in lower case without the words for real part, phase and the like or, for a column with a
-    /// stated name, the directions in this name; it is equal for the two columns of one receptance.
+    /// Text that is equal for the two columns of one receptance: for a column with a stated name the directions in this
+    /// name; otherwise the words of the title in lower case, without those for part, coherence and kind of FRF and
+    /// those in [`EMPTY`].
     pub(super) label: String,
     /// Order of the time derivative of displacement that a word of the column title names: 1 for mobility, 2 for
     /// accelerance, otherwise 0.
@@ -67,7 +68,7 @@ impl Meaning {
     }
 }
 
-/// Words that mark a column of frequencies without a unit if they occur in its title, in lower case.
+/// Words in lower case, one of which in the title of a column without a unit marks it as one of frequencies.
 const FREQUENCY: &[&str] = &["frequency", "freq", "frequenz", "frequencies", "hz"];
 
 /// For each part of a complex FRF value, the words that mark it in a column title, in lower case.
@@ -92,10 +93,10 @@ const PARTS: &[(Part, &[&str])] = &[
 const EMPTY: &[&str] = &["frf", "h", "part", "of", "the", "in", "response", "function"];
 
 /// Meaning of a column of a text table: from the name that the option `--map` or the sidecar states, otherwise from its
-/// title.
+/// title. The unit is that of `--map`, otherwise of the sidecar, otherwise of the file.
 ///
 /// # Errors
-/// The unit is unknown, or contradicts the stated name.
+/// The unit of a real part, imaginary part or magnitude is no displacement, velocity or acceleration per force.
 pub(super) fn meaning(
     column: &TextColumn,
     map: Option<&ColumnMap>,
@@ -165,7 +166,7 @@ fn by_name(name: &str, unit: Option<&str>, in_degrees: bool) -> Result<Meaning, 
     })
 }
 
-/// Unit in the level units `dB re 1 m/N` and `dB m/N`, here `m/N`; empty for `dB` alone.
+/// Unit without a level prefix, as `m/N` in `dB re 1 m/N` and `dB m/N`; empty for `dB` alone.
 fn unit_of_level(unit: &str) -> &str {
     let lower = unit.to_lowercase();
     let rest = lower
@@ -254,8 +255,8 @@ fn by_words(name: &str, unit: Option<&str>) -> Result<Meaning, String> {
     Ok(found)
 }
 
-/// Splits titles such as `Hxx Real (m/N)` and `Hxx (dB re 1 m/N)` into name and unit. The reader of recordings leaves
-/// such units in the title, since they are no units of a channel.
+/// Splits titles such as `Hxx Real (m/N)` and `Hxx (dB re 1 m/N)` into name and unit; other titles stay whole, without
+/// unit. The reader of recordings leaves such units in the title, since they are no units of a channel.
 fn name_and_ratio(title: &str) -> (String, Option<String>) {
     let inner = title.trim().strip_suffix(')');
     if let Some(inner) = inner {
@@ -273,7 +274,7 @@ fn name_and_ratio(title: &str) -> (String, Option<String>) {
 }
 
 /// Order of the time derivative of displacement that a word of a column title names: 0 receptance, 1 mobility, 2
-/// accelerance.
+/// accelerance; `None` for other words.
 fn derivatives(word: &str) -> Option<i32> {
     match word {
         "receptance" | "compliance" | "flexibility" | "nachgiebigkeit" => Some(0),
@@ -283,7 +284,8 @@ fn derivatives(word: &str) -> Option<i32> {
     }
 }
 
-/// Directions of response and force in the words of a label: `hxx`, `xy`, `x y`, `ax fx`.
+/// Directions of response and force in the words of a label: `hxx`, `xy`, `x y`, `ax fx`. `None` if no word is a pair
+/// and not exactly two words are axes.
 fn directions(label: &[&str]) -> Option<(Direction, Direction)> {
     let whole = label
         .iter()
@@ -304,7 +306,7 @@ fn directions(label: &[&str]) -> Option<(Direction, Direction)> {
 }
 
 /// True if the column titles are those of an FRF table: one begins with `frequency_hz`, or one column has frequencies
-/// and another has a part of an FRF.
+/// and another a part of an FRF or a wrong unit.
 pub(super) fn is_head(titles: &[String]) -> bool {
     let of = |title: &String| {
         let (name, unit) = match title.strip_suffix(']').and_then(|inner| inner.rsplit_once('[')) {

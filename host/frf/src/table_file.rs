@@ -36,8 +36,8 @@ impl FrfTable {
     /// Reads an FRF table from a text file, or from UFF 58 with the extension uff, unv or bunv.
     ///
     /// Units: displacement, velocity or acceleration per force, such as um/N or g/N. Mobility and accelerance are
-    /// converted to receptance. In a table with the column `frequency_hz`, a header without unit means m/N, and lines
-    /// that begin with # are comments.
+    /// converted to receptance. In a table with the column `frequency_hz`, the header of a receptance without unit
+    /// means m/N, and lines that begin with # are comments.
     ///
     /// # Errors
     /// For example: the file cannot be read; a column has an unknown name or unit, or lacks its real or imaginary part;
@@ -46,8 +46,8 @@ impl FrfTable {
         Self::import(path, &Import::default()).map(|imported| imported.table)
     }
 
-    /// Reads an FRF table with what the user states about its columns; the result also describes the meaning found for
-    /// each column.
+    /// Reads an FRF table with what the user states about its columns; for a text table of another program, the result
+    /// also describes the meaning found for the columns.
     ///
     /// Text tables of other programs have real and imaginary part, or magnitude (also in dB) and phase.
     ///
@@ -84,7 +84,8 @@ impl FrfTable {
         })
     }
 
-    /// True if the head of a file is that of an FRF table and not of a recording over time.
+    /// True if a file is an FRF table and not a recording over time: a text file by its column titles, a UFF file if it
+    /// can be read as an FRF table. Files with other extensions than those of text and UFF count as none.
     ///
     /// # Errors
     /// A text file cannot be read; a UFF file that cannot be read counts as no table.
@@ -99,10 +100,10 @@ impl FrfTable {
         }
     }
 
-    /// Parses a table from CSV text; `path` is used in messages.
+    /// Parses a table from text in the CSV format of this program; `path` is used in messages.
     ///
     /// # Errors
-    /// As [`FrfTable::read`].
+    /// As [`FrfTable::read`] of a file with this text.
     pub fn parse(path: &Path, text: &str) -> Result<Self, FrfError> {
         let mut reader = csv::ReaderBuilder::new()
             .flexible(true)
@@ -126,7 +127,7 @@ impl FrfTable {
 
     /// Writes the table to `path` as CSV, atomically: on an error the previous file stays unchanged.
     ///
-    /// Numbers are written with all digits, so that reading the file gives the same table.
+    /// Numbers are written with all digits, so that the file gives the same frequencies, receptances and coherences.
     ///
     /// # Errors
     /// The file cannot be written.
@@ -298,7 +299,7 @@ fn assemble(path: &Path, columns: Vec<Column>) -> Result<FrfTable, FrfError> {
                 column.title
             )));
         };
-        // Real and imaginary column form one receptance; it is created at its real column, and the imaginary column is
+        // Real and imaginary column form one receptance; it is created at the real column, and the imaginary column is
         // skipped.
         if part == ComplexPart::Imaginary {
             continue;

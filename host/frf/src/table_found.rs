@@ -22,8 +22,8 @@ use quietcut_recording::{Import, Sidecar, TextColumn, TextTable};
 pub struct ImportedTable {
     /// The table, receptances in m/N.
     pub table: FrfTable,
-    /// Description of the columns and their meaning in one line; `None` for a CSV table in the format of this program
-    /// and for UFF.
+    /// One line with the columns of each receptance, what they mean, and notes on the reading; `None` for a CSV table
+    /// in the format of this program and for UFF.
     pub understood: Option<String>,
 }
 
@@ -120,7 +120,7 @@ fn assemble(
             coherence,
         });
     }
-    // Mobility and accelerance cannot be integrated at 0 Hz, so the table has no line there.
+    // Mobility and accelerance cannot be integrated at 0 Hz: with one of them, the table has no line there.
     if frequency_hz.first() == Some(&0.0)
         && entries
             .iter()
@@ -143,7 +143,8 @@ fn assemble(
     })
 }
 
-/// Pairs the two columns of each receptance: real and imaginary part, or magnitude and phase.
+/// Pairs the two columns of each receptance: real and imaginary part, or magnitude and phase. An error if there is no
+/// pair, or if one of these columns stands alone.
 fn pairs<'a>(path: &Path, columns: &'a [(&'a TextColumn, Meaning)]) -> Result<Vec<Pair<'a>>, FrfError> {
     let mut pairs: Vec<Pair<'a>> = Vec::new();
     for (column, meaning) in columns {
@@ -210,8 +211,9 @@ fn alone(path: &Path, column: &TextColumn) -> FrfError {
     }
 }
 
-/// Refuses column pairs without directions, unit of response per force, or unit of the phase. The message names the
-/// option that states them.
+/// Refuses column pairs of which the directions, the unit of response per force or the unit of the phase is not known;
+/// the last one may follow from the [values](phase_unit). The message proposes the option and the keys of the sidecar
+/// that state them.
 fn require_statements(path: &Path, pairs: &[Pair<'_>]) -> Result<(), FrfError> {
     const PROPOSED: [&str; 9] = ["xx", "yx", "zx", "xy", "yy", "zy", "xz", "yz", "zz"];
     let mut taken: Vec<String> = pairs
@@ -297,8 +299,8 @@ impl Pair<'_> {
         self.first.1.directions
     }
 
-    /// Unit of response per force of the column pair: that of its first column, or if it has none, that of its column
-    /// of the imaginary part.
+    /// Unit of response per force of the column pair: that of the first column or, if it states none, of a column of
+    /// the imaginary part; `None` without either.
     fn unit(&self) -> Option<FrfUnit> {
         self.first.1.unit.or(match self.second.1.content {
             Content::Value(Part::Imaginary) => self.second.1.unit,
@@ -306,7 +308,7 @@ impl Pair<'_> {
         })
     }
 
-    /// Complex FRF values of the column pair, in the unit of the file.
+    /// Complex FRF values of the column pair, in the unit of the file. An error if a magnitude is negative.
     fn values(&self, path: &Path) -> Result<Vec<Complex64>, FrfError> {
         let (first, second) = (&self.first.0.values, &self.second.0.values);
         let to_radians = match self.second.1.content {
@@ -347,12 +349,11 @@ impl Pair<'_> {
     }
 }
 
-/// Factor to radians of a column of phases whose unit is not stated; `None` if the values allow both degrees and
-/// radians.
+/// Factor to radians of a column of phases whose unit is not stated; `None` if the values do not decide.
 ///
-/// An absolute value above two revolutions (4π) is in degrees: the phase of a few modes stays within one revolution.
-/// Values within ±π that span 1.5 or more are radians: a phase that spans 1.5 degrees would not show any resonance in
-/// the band.
+/// Values are taken as degrees if the largest magnitude exceeds two revolutions (4π): the phase of a few modes stays
+/// below. They are taken as radians if all are within about ±π and span 1.5 or more: a phase that spans few degrees
+/// would not show any resonance in the band.
 fn phase_unit(values: &[f64]) -> Option<f64> {
     let (low, high) = values
         .iter()
@@ -369,8 +370,8 @@ fn phase_unit(values: &[f64]) -> Option<f64> {
     }
 }
 
-/// Coherence of the receptance with the given directions or column label; if the table has one receptance only, its
-/// first coherence.
+/// Coherence of the receptance, from the first coherence column with the given directions or label; if the table has
+/// one receptance only, from the first coherence column of all. `None` if there is no such column.
 fn coherence(
     columns: &[(&TextColumn, Meaning)],
     label: &str,

@@ -23,7 +23,8 @@ impl From<RecordingError> for FrfError {
     }
 }
 
-/// Reads an FRF table from UFF 58: the functions of type 4, each with its coherence (type 6) if the file has it.
+/// Reads an FRF table from UFF 58: the functions of type 4, each with its coherence (type 6) if the file has one with
+/// as many values.
 pub(super) fn read(path: &Path) -> Result<FrfTable, FrfError> {
     let sets = data_sets(path)?;
     let found: Vec<i64> = sets.iter().map(|set| set.header.function.code()).collect();
@@ -41,7 +42,8 @@ pub(super) fn read(path: &Path) -> Result<FrfTable, FrfError> {
         let frequencies = frequencies(set).map_err(wrong)?;
         let mut entry = receptance(set, &frequencies).map_err(wrong)?;
         let keep = frequency_hz.get_or_insert_with(|| without_zero_hz(&entry, &frequencies));
-        // Mobility and accelerance cannot be integrated at 0 Hz, so the table has no line there.
+        // Mobility and accelerance cannot be integrated at 0 Hz: the table begins at the first frequency at which the
+        // first FRF gives a receptance.
         let from = frequencies.len().saturating_sub(keep.len());
         if frequencies.get(from..) != Some(keep.as_slice()) {
             return Err(wrong(format!(
@@ -70,7 +72,8 @@ pub(super) fn read(path: &Path) -> Result<FrfTable, FrfError> {
     FrfTable::new(path, frequency_hz.unwrap_or_default(), entries)
 }
 
-/// Frequencies of an FRF without 0 Hz, if its receptance is not finite there (mobility or accelerance).
+/// Frequencies of an FRF; a first one of 0 Hz is left out if the receptance is not finite there (from mobility or
+/// accelerance).
 fn without_zero_hz(entry: &Frf, frequencies: &[f64]) -> Vec<f64> {
     let begins_at_zero = frequencies.first() == Some(&0.0);
     let from =
@@ -131,7 +134,7 @@ fn direction(dof: &DegreeOfFreedom, what: &str) -> Result<(Direction, f64), Stri
 }
 
 /// Conversion factor of an FRF to SI, and order of the time derivative of displacement: 0 receptance, 1 mobility, 2
-/// accelerance.
+/// accelerance. An error for a unit of none of them.
 fn compliance(set: &DataSet) -> Result<(f64, i32), String> {
     let needed = "receptance (m/N), mobility (m/s/N) or accelerance (m/s^2/N) is needed";
     let (ordinate, denominator) = ratio(set)?;
@@ -147,8 +150,8 @@ fn compliance(set: &DataSet) -> Result<(f64, i32), String> {
     Ok((ordinate.factor / denominator.factor, derivatives))
 }
 
-/// Units of response and force of an FRF. Some programs write both into the unit label of the ordinate, such as
-/// `(m/s^2)/N`.
+/// Units of numerator (response) and denominator (force) of an FRF. Some programs write both into the unit label of the
+/// ordinate, such as `(m/s^2)/N`.
 fn ratio(set: &DataSet) -> Result<(Unit, Unit), String> {
     let Header {
         ordinate,
@@ -193,8 +196,9 @@ fn is_coherence_of(other: &DataSet, set: &DataSet) -> bool {
 
 impl FrfTable {
     /// Writes the table to `path` as UFF 58, receptances in m/N, atomically: on an error the previous file stays
-    /// unchanged. Text keeps thirteen digits of receptances and seven of frequencies; binary keeps all digits of
-    /// receptances.
+    /// unchanged. Text keeps thirteen digits of receptances and coherences, binary all. An evenly spaced table is
+    /// written with seven digits of first frequency and spacing; otherwise text keeps seven digits of each frequency,
+    /// binary all.
     ///
     /// # Errors
     /// The file cannot be written.

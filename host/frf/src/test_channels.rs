@@ -14,7 +14,7 @@ pub(super) struct TestChannels<'a> {
     pub(super) forces: Vec<(Direction, &'a Channel)>,
     /// Response channels, in the order x, y, z.
     pub(super) responses: Vec<Response<'a>>,
-    /// Warnings for the user: of several response channels in one direction, only one is used.
+    /// Warnings for the user: one for each direction with several response channels, of which only one is used.
     pub(super) warnings: Vec<String>,
 }
 
@@ -29,14 +29,15 @@ pub(super) struct Response<'a> {
 }
 
 impl<'a> TestChannels<'a> {
-    /// Selects forces and responses. If `chosen` names forces, only these count; the same holds for responses.
+    /// Selects forces and responses. If `chosen` names force channels, only these count as forces; if it names other
+    /// channels, only these count as responses.
     ///
-    /// Forces are those of fx, fy and fz that the sidecar names as inputs; without that key, those that are not
+    /// Forces are those of fx, fy and fz that the sidecar names as inputs; if it names no inputs, those that are not
     /// constant. Of several response channels in one direction, displacement takes precedence over velocity, and
     /// velocity over acceleration.
     ///
     /// # Errors
-    /// There is no force or no response; a chosen channel or an input does not exist; an input is not a force.
+    /// No force or no response is left; a chosen channel or an input does not exist; an input is not a force.
     pub(super) fn of(recording: &'a Recording, chosen: &[String]) -> Result<Self, FrfError> {
         let refused = |error: RecordingError| FrfError::Recording(error);
         for name in chosen {
@@ -74,7 +75,7 @@ impl<'a> TestChannels<'a> {
         self.forces.iter().map(|(direction, _)| *direction).collect()
     }
 
-    /// Direction of each response channel, and the order of the time derivative of displacement that it measures.
+    /// Direction and [`Response::derivatives`] of each selected response channel.
     pub(super) fn response_kinds(&self) -> Vec<(Direction, i32)> {
         self.responses
             .iter()
@@ -82,7 +83,7 @@ impl<'a> TestChannels<'a> {
             .collect()
     }
 
-    /// Samples of all selected channels: the forces, followed by the responses.
+    /// Samples of each selected channel: the forces, followed by the responses.
     pub(super) fn signals(&self) -> Vec<&'a [f64]> {
         let forces = self.forces.iter().map(|(_, channel)| channel.samples.as_slice());
         let responses = self
@@ -95,7 +96,7 @@ impl<'a> TestChannels<'a> {
     /// The single force channel.
     ///
     /// # Errors
-    /// The recording has several forces. `needed` names the kind of test for the message.
+    /// Several forces are selected. `needed` names the kind of test for the message.
     pub(super) fn only_force(&self, needed: &str) -> Result<&'a Channel, FrfError> {
         match self.forces.as_slice() {
             [(_, channel)] => Ok(channel),

@@ -1,5 +1,4 @@
-//! Plausibility of the recordings of a test: force and response that are swapped, hum of the mains, spikes, clipping, a
-//! force that is a set of lines, and receptances that no drive point has.
+//! Plausibility of the recordings of a test and of the receptances measured from them.
 
 use std::f64::consts::TAU;
 
@@ -15,12 +14,12 @@ use super::excitation::Excitation;
 use super::table::FrfTable;
 use super::test_channels::TestChannels;
 
-/// Description of a force and a response whose names or columns are swapped; `None` if nothing speaks for it, or if
-/// there are several forces.
+/// Message about a force and a response that seem to be swapped; `None` if no pair does, or if several forces are
+/// selected.
 ///
-/// A hammer's force is short pulses of one sign that come first, and the response rings after them. If the channel that
-/// is called a force rings longer than a response that is pulses of one sign, and rings after these pulses rather than
-/// before, the two are swapped.
+/// A hammer's force is short pulses of one sign, and the response rings after them. A force and a response seem to be
+/// swapped if the response is such pulses, and the force lasts longer and has more power after the largest of them than
+/// before. The powers are not compared if too few samples precede that pulse.
 pub(super) fn swapped(channels: &TestChannels<'_>) -> Option<String> {
     let [(_, force)] = channels.forces[..] else {
         return None;
@@ -40,7 +39,7 @@ pub(super) fn swapped(channels: &TestChannels<'_>) -> Option<String> {
     ))
 }
 
-/// Acceleration channels of the recording, also those that another response of their direction replaces.
+/// All acceleration channels of the recording, also those that are not selected as responses.
 fn accelerations<'a>(channels: &TestChannels<'a>) -> impl Iterator<Item = &'a Channel> {
     channels
         .recording
@@ -57,7 +56,7 @@ fn are_swapped(force: &[f64], response: &[f64]) -> bool {
     if !is_shorter || spike(response).is_some() {
         return false;
     }
-    // Samples near the noise have any sign: only those above a fifth of the peak count.
+    // Samples near the noise have any sign: only those larger in magnitude than a fifth of the peak count.
     let (mut one, mut all) = (0.0, 0.0);
     for sample in response.iter().filter(|sample| sample.abs() > 0.2 * peak.abs()) {
         all += sample * sample;
@@ -83,14 +82,15 @@ fn are_swapped(force: &[f64], response: &[f64]) -> bool {
     one > ONE_SIGN * all && rings_after
 }
 
-/// Index of the sample of largest magnitude, and this sample with its sign; `None` if all samples are zero.
+/// Index of the sample of largest magnitude, and this sample with its sign; `None` if all samples are zero, or if there
+/// are none.
 fn largest(samples: &[f64]) -> Option<(usize, f64)> {
     let at = (0..samples.len()).max_by(|&a, &b| samples[a].abs().total_cmp(&samples[b].abs()))?;
     (samples[at] != 0.0).then_some((at, samples[at]))
 }
 
 /// Effective number of samples over which the energy of a signal is spread, (Σx²)²/Σx⁴ with the deviations x from its
-/// mean.
+/// mean; 0 for a constant signal.
 fn effective_samples(samples: &[f64]) -> f64 {
     let mean = samples.iter().sum::<f64>() / samples.len().max(1) as f64;
     let (mut second, mut fourth) = (0.0, 0.0);
@@ -106,7 +106,7 @@ fn effective_samples(samples: &[f64]) -> f64 {
     }
 }
 
-/// Warnings about the channels of one recording.
+/// Warnings about the selected channels of one recording.
 pub(super) fn of_channels(excitation: Excitation, channels: &TestChannels<'_>) -> Vec<String> {
     let rate = channels.recording.sample_rate_hz;
     let start_s = channels.recording.start_s;
@@ -143,13 +143,13 @@ pub(super) fn of_channels(excitation: Excitation, channels: &TestChannels<'_>) -
     warnings
 }
 
-/// True if the forces of a record that is taken as random excitation consist of single frequency lines, as in a cut.
-/// Receptances from such a record are noise between the lines, and so are their signs.
+/// True if a record is evaluated as random excitation although each force has at least the share [`SHARE_OF_LINES`] of
+/// its energy in single frequency lines, as in a cut. Between the lines the receptances are noise.
 pub(super) fn is_periodic(excitation: Excitation, channels: &TestChannels<'_>) -> bool {
     excitation == Excitation::Random && least_share_of_lines(channels) >= SHARE_OF_LINES
 }
 
-/// Least share of energy in single frequency lines over all forces of a record.
+/// Least share of energy in single frequency lines among the selected forces of a record.
 fn least_share_of_lines(channels: &TestChannels<'_>) -> f64 {
     let shares = channels
         .forces
@@ -158,7 +158,8 @@ fn least_share_of_lines(channels: &TestChannels<'_>) -> f64 {
     shares.fold(1.0, f64::min)
 }
 
-/// Appends a warning if every force consists of single frequency lines, as in a cut; true if so.
+/// Appends a warning and returns true if each force has at least the share [`SHARE_OF_LINES`] of its energy in single
+/// frequency lines, as in a cut.
 fn has_lines(channels: &TestChannels<'_>, warnings: &mut Vec<String>) -> bool {
     let share = least_share_of_lines(channels);
     if share < SHARE_OF_LINES {
@@ -178,7 +179,8 @@ fn has_lines(channels: &TestChannels<'_>, warnings: &mut Vec<String>) -> bool {
     true
 }
 
-/// True if a recording is of a cut: by its kind, its parameters or its tachometer.
+/// True if the sidecar of a recording says that it is of a cut or gives a parameter of a cut, or if the recording has a
+/// channel `tacho`.
 pub(super) fn is_cut(recording: &Recording) -> bool {
     let sidecar = &recording.sidecar;
     sidecar.kind == Some(TestKind::Cutting)
@@ -190,7 +192,8 @@ pub(super) fn is_cut(recording: &Recording) -> bool {
 /// choice.
 const LONGEST: usize = 1 << 17;
 
-/// Share of the energy of a signal, without its mean, that lies in frequency lines well above the lines around them.
+/// Share of the energy of a signal, without its mean, that lies in peaks of the spectrum well above the lines around
+/// them; 0 with fewer than 256 samples.
 fn share_of_lines(samples: &[f64]) -> f64 {
     // The length of the transform is a power of two.
     let length = match samples.len().min(LONGEST) {
@@ -237,13 +240,15 @@ fn share_of_lines(samples: &[f64]) -> f64 {
     if total > 0.0 { in_lines / total } else { 0.0 }
 }
 
-/// Number of lines on each side that form the neighbourhood of a line; a choice.
+/// Half the number of lines in the range around a peak whose lines, except for its [`MAIN_LOBE`], the peak is compared
+/// with; a choice.
 const NEIGHBOURS: usize = 32;
 
 /// Number of lines on each side of a peak that belong to it with a Hann window.
 const MAIN_LOBE: usize = 2;
 
-/// Warning about hum of the mains that carries most of the energy of a channel.
+/// Warnings about hum of the mains: one for each selected channel in which it carries more than the share [`HUM_SHARE`]
+/// of the energy.
 fn hum(channels: &TestChannels<'_>) -> Vec<String> {
     let rate = channels.recording.sample_rate_hz;
     let forces = channels.forces.iter().map(|(_, channel)| *channel);
@@ -268,12 +273,13 @@ fn hum(channels: &TestChannels<'_>) -> Vec<String> {
         .collect()
 }
 
-/// Longest part of a record, s, in which hum of the mains is searched: its lines are then at most 0.01 Hz apart, so that
-/// the search within 0.2 Hz takes at most 81 steps. A choice.
+/// Longest part of a record, s, in which hum of the mains is searched. The lines of such a part are 0.01 Hz apart, and
+/// the search within 0.2 Hz tries about 81 frequencies. A choice.
 const HUM_S: f64 = 100.0;
 
-/// Largest share of the energy of a signal in one sine within 0.2 Hz of `hertz`. The mains stay within that in normal
-/// operation.
+/// Largest share of the energy of a signal, without its mean, in one sine within 0.2 Hz of `hertz`; 0 for a constant
+/// signal and with fewer than 16 samples. Only the start of the signal counts, see [`LONGEST`] and [`HUM_S`]. In normal
+/// operation the mains stay within 0.2 Hz.
 fn share_near(samples: &[f64], rate: f64, hertz: f64) -> f64 {
     let samples = &samples[..samples.len().min(LONGEST).min((HUM_S * rate).ceil() as usize)];
     let count = samples.len() as f64;
@@ -302,8 +308,8 @@ fn share_near(samples: &[f64], rate: f64, hertz: f64) -> f64 {
         .fold(0.0, f64::max)
 }
 
-/// Index of a spike: one sample far above all others, whose neighbours are small, all relative to the median. `None` if
-/// there is no such sample.
+/// Index of a spike: one sample much farther from the median than all others ([`SPIKE_ABOVE`], [`SPIKE_NEIGHBOURS`]).
+/// `None` if there is no such sample, or if all other samples equal the median.
 fn spike(samples: &[f64]) -> Option<usize> {
     let mut sorted: Vec<f64> = samples.to_vec();
     let middle = sorted.len().checked_sub(1)? / 2;
@@ -321,9 +327,9 @@ fn spike(samples: &[f64]) -> Option<usize> {
         .then_some(at)
 }
 
-/// Warnings about measured receptances: a drive point that feeds energy in, a response that the force does not cause,
-/// and peaks beyond those of any machine. The sign of a drive point says nothing if a force was periodic
-/// (`has_periodic_force`): between its lines the receptance is noise.
+/// Warnings about measured receptances: a drive point that feeds energy in, a response that the force hardly causes,
+/// and a peak outside the plausible range. With `has_periodic_force` the drive points are not checked: between the
+/// lines of a periodic force the receptance is noise.
 pub(super) fn of_table(table: &FrfTable, has_periodic_force: bool) -> Vec<String> {
     let frequency_hz = table.frequency_hz();
     let mut warnings = Vec::new();
@@ -331,8 +337,9 @@ pub(super) fn of_table(table: &FrfTable, has_periodic_force: bool) -> Vec<String
         let name = entry.name();
         let size = |line: usize| entry.receptance[line].norm();
         let peak = entry.peak_line();
-        // The mean of the sine of the phase, weighted with |H|²: −1 at the resonances of a passive drive point. Lines whose
-        // response is mostly noise have any phase, and as accelerations divided by ω² the largest |H| of all.
+        // The mean of the sine of the phase over the related lines, weighted with |H|². At a resonance of a passive
+        // drive point the sine is −1. Lines whose response is mostly noise have any phase, and may have the largest
+        // |H|.
         let related = (0..entry.receptance.len()).filter(|line| entry.is_related(*line));
         let (imaginary, power) = related.fold((0.0, 0.0), |(sum, all), line| {
             let h = entry.receptance[line];

@@ -12,8 +12,7 @@ use super::{Frf, FrfError, FrfTable};
 use quietcut_model::structure::Direction;
 
 /// Largest number of modes that a vector fit tries for the tool-tip calibration and for the removal of an exponential
-/// window. A choice; vector fitting of more modes
-/// needs a narrower band.
+/// window. A choice; if a band has more modes, it must be narrowed.
 const MODES_MAX: usize = 8;
 
 /// Ratio of the mode shape at tool tip and sensor, for one mode and response direction.
@@ -25,12 +24,13 @@ pub struct ModeRatio {
     pub response: Direction,
     /// Mode shape ratio φ_T/φ_S: displacement of the tool tip T over that of the sensor S on the housing.
     pub ratio: f64,
-    /// RMS deviation of the residues at the tip from `ratio` times those at the sensor, relative to this product. A
-    /// rigid body in a measurement with little noise gives a few 0.01.
+    /// RMS deviation of the residues at the tip from `ratio` times those at the sensor, relative to the RMS of this
+    /// product; 0 for a rigid body without noise.
     pub misfit: f64,
 }
 
-/// Computes receptances at the tool tip from receptances at a sensor on the housing.
+/// Computes receptances at the tool tip from receptances at a sensor on the housing; returns also the mode shape ratios
+/// of the calibration, by mode and then response direction.
 ///
 /// `housing` and `tip` are the calibration: responses at the sensor and at the tip to forces at the tip. `measured` has
 /// responses at the same sensor. Each mode r of `measured` is fitted and, for each response direction, scaled with the
@@ -38,8 +38,8 @@ pub struct ModeRatio {
 /// is thesis eq. (7.14).
 ///
 /// # Errors
-/// The calibration tables have different frequencies or no common receptance; no mode can be fitted; a mode has no
-/// counterpart in the calibration.
+/// The calibration tables have different frequencies or no common receptance; no mode can be fitted to them or to
+/// `measured`; a mode of `measured` has no calibrated mode near it for a response direction; a result is not finite.
 pub fn calibrate(
     measured: &FrfTable,
     housing: &FrfTable,
@@ -92,7 +92,8 @@ fn nearest(ratios: &[ModeRatio], hertz: f64, response: Direction) -> Option<&Mod
         .min_by(|a, b| off(a).total_cmp(&off(b)))
 }
 
-/// Mode shape ratios of all modes and response directions of a calibration.
+/// Mode shape ratios of a calibration, by mode and then response direction; without those whose residues at the sensor
+/// are zero.
 fn ratios(housing: &FrfTable, tip: &FrfTable) -> Result<Vec<ModeRatio>, FrfError> {
     let refused = |what: String| FrfError::Content {
         path: tip.path().into(),
@@ -155,16 +156,16 @@ fn ratios(housing: &FrfTable, tip: &FrfTable) -> Result<Vec<ModeRatio>, FrfError
     Ok(ratios)
 }
 
-/// Fits receptances by the smallest number of modes, up to [`MODES_MAX`], beyond which the residual hardly decreases,
-/// or with which it is small. If no fit succeeds, the error of the first failed fit is returned.
+/// Fits receptances with 1, 2, … modes, up to [`MODES_MAX`], until the residual is small or two more fits hardly
+/// decrease it; returns the last fit that did decrease it. If no fit succeeds, the error of the first is returned.
 pub(super) fn modes(
     frequency_hz: &[f64],
     functions: &[&[Complex64]],
 ) -> Result<RationalFit, RationalFitError> {
     let mut best: Option<RationalFit> = None;
     let mut refused = None;
-    // Number of successive fits, each with one mode more, without improvement of the residual. The search stops after
-    // two, since a further mode may help only with the next.
+    // Number of successive fits that hardly decrease the residual. The search stops after two, since a further mode
+    // may help only with the next.
     let mut without_improvement = 0;
     for count in 1..=MODES_MAX {
         let next = match fit(frequency_hz, functions, count) {

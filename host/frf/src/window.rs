@@ -1,4 +1,4 @@
-//! Time windows of segments, and the number of independent averages of overlapping segments.
+//! Time windows of segments, the number of independent averages of overlapping segments, and lengths for a fast FFT.
 
 use std::f64::consts::TAU;
 

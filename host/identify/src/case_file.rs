@@ -31,7 +31,7 @@ pub enum CaseFileError {
     /// A required parameter was not identified: the mass, or a cutting coefficient.
     #[error("a case needs {0}, which this method does not give")]
     Missing(&'static str),
-    /// Parameters of the same extension were identified in two directions, but a case holds an extension once.
+    /// Parameters of one extension have different directions, but a case holds an extension once.
     #[error(
         "[extension.{0}] is needed in two directions; a case holds one: identify the directions one by one"
     )]
@@ -52,7 +52,7 @@ pub enum CaseFileError {
 /// A value has no form in TOML.
 fn written(case: &Table) -> Result<String, CaseFileError> {
     let mut case = case.clone();
-    // A covariance in one line could not be read by a person.
+    // The crate `toml` writes the covariance in one line, which no person can read.
     let uncertainty = case.remove(case_uncertainty::SECTION);
     let text = toml::to_string(&case).map_err(|error| CaseFileError::Toml(error.to_string()))?;
     Ok(text + &uncertainty.map_or_else(String::new, |section| case_uncertainty::text(&section)))
@@ -62,7 +62,7 @@ fn written(case: &Table) -> Result<String, CaseFileError> {
 const OTHERS: [&str; 4] = ["tool", "material", "cut", "limits"];
 
 /// Case file `text` whose sections tool, material, cut and limits are replaced by those that the case `other` has, and
-/// to whose `[uncertainty]` the covariance of their parameters is added.
+/// to whose `[uncertainty]` the covariance is added that `other` has of parameters of these four sections.
 ///
 /// # Errors
 /// The text is not valid TOML, or the result cannot be written as TOML.
@@ -79,9 +79,10 @@ pub fn with_sections(text: &str, other: &Table) -> Result<String, CaseFileError>
     written(&case)
 }
 
-/// The case `other` with the name, the tool and the material of `identified`, a case of [`cutting`]. Keys of the tool that
-/// `identified` lacks, and the name of the material, stay those of `other`; coefficients of `other` that were not identified
-/// do not stay.
+/// The case `other` with the name, the tool and the material of `identified`, a case of [`cutting`].
+///
+/// The name of the material and the keys of the tool that `identified` lacks are those of `other`; but if `identified`
+/// has a runout, no key of the runout of `other` stays. Force coefficients that were not identified do not stay.
 pub fn with_coefficients(identified: &Table, other: &Table) -> Table {
     let mut case = other.clone();
     for (section, value) in identified {
@@ -106,8 +107,8 @@ pub fn with_coefficients(identified: &Table, other: &Table) -> Table {
     case
 }
 
-/// Text of a case file with the complex modes of `model`, in the directions that are both excited and measured, and with
-/// the joint covariance of their parameters.
+/// Text of a case file with the complex modes of `model`, in the directions that are both excited and measured, the
+/// joint covariance of their parameters, and the assumptions of the identification.
 ///
 /// # Errors
 /// No direction is both excited and measured, or a value has no form in TOML.
@@ -159,11 +160,11 @@ pub fn text_of_modes(name: &str, model: &ModalModel) -> Result<String, CaseFileE
     written(&case)
 }
 
-/// Assumption of a modal identification without errors of the sensors' gains.
+/// Assumption written into a case if the covariance of the modes contains no errors of the sensors' gains.
 const EXACT_GAINS: &str = "the gains of force and response sensors are taken as exact: limits are off by as many percent as these; \
     --calibration-percent of identify puts their error into the intervals";
 
-/// A sentence for each of x, y and z that is not among the directions of a case with the modes of `model`.
+/// A sentence for each of x, y and z that is not among `directions`, those that are both excited and measured.
 fn left_out(model: &ModalModel, directions: &[Direction]) -> Vec<String> {
     let axes = [Direction::X, Direction::Y, Direction::Z].into_iter();
     axes.filter(|axis| !directions.contains(axis))
@@ -311,15 +312,14 @@ fn extension_of(key: &str) -> Option<&'static str> {
     Some(effect.name())
 }
 
-/// Text of a case file with mass, damping, stiffness and cubic terms as matrices, and all other terms as extensions.
-/// With a quintic stiffness, the cubic stiffness is in the same extension.
+/// Text of a case file with mass, damping, stiffness and cubic terms as matrices, and the other terms as extensions.
+/// With a quintic stiffness, the cubic stiffness is in the same extension. A constant force is left out.
 ///
-/// A law without a damping or a stiffness term, such as that of a drive that moves freely, has a zero matrix there. Its standard
-/// deviation is zero too: the law states that the term is absent.
+/// A law without a damping or a stiffness term, such as that of a drive that moves freely, has a zero matrix there. The
+/// standard deviations of the matrix are zero too: the law states that the term is absent.
 ///
 /// # Errors
-/// The mass was not identified, one extension is needed in two directions, or a value has no form in
-/// TOML.
+/// The mass was not identified, one extension is needed with different directions, or a value has no form in TOML.
 pub fn text(name: &str, directions: &[Direction], estimates: &[Estimate]) -> Result<String, CaseFileError> {
     let mut structure = Table::new();
     structure.insert("kind".into(), "matrices".into());

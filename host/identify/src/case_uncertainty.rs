@@ -15,7 +15,8 @@ pub(crate) const SECTION: &str = "uncertainty";
 const PARAMETERS: &str = "parameters";
 const COVARIANCE: &str = "covariance";
 
-/// The section for the modes of a model in the given directions: frequency, damping ratio and both shapes of each mode.
+/// The section for the modes of a model: frequency, damping ratio, and the entries of both shapes in the given
+/// directions, mode by mode.
 pub(crate) fn of_modes(model: &ModalModel, directions: &[Direction]) -> Table {
     let place = |all: &[Direction], direction: &Direction| all.iter().position(|known| known == direction);
     let (lefts, rights) = (2 * model.forces.len(), 2 * model.responses.len());
@@ -47,7 +48,7 @@ pub(crate) fn of_modes(model: &ModalModel, directions: &[Direction]) -> Table {
     }
     let covariance = DMatrix::from_fn(places.len(), places.len(), |i, j| {
         let (a, b) = (places[i], places[j]);
-        // Rounding leaves the two triangles slightly different.
+        // Rounding leaves the two triangles of the covariance slightly different.
         0.5 * (model.covariance[(a, b)] + model.covariance[(b, a)])
     });
     let names: Vec<String> = parameters.iter().map(|parameter| parameter.name()).collect();
@@ -58,8 +59,9 @@ pub(crate) fn of_modes(model: &ModalModel, directions: &[Direction]) -> Table {
     section(&names, &semidefinite(&known))
 }
 
-/// The covariance with the same variances, and with the nearest correlations that are possible together: negative
-/// eigenvalues of the correlation matrix, which averages over few lines leave, count as 0.
+/// The covariance, with the same variances and without negative eigenvalues of its correlation matrix, which averages
+/// over few lines leave: they are set to 0, and rows and columns are scaled back. If the eigenvalues cannot be
+/// computed, the variances alone.
 fn semidefinite(known: &ParameterCovariance) -> DMatrix<f64> {
     let Ok(eigen) = of_symmetric(known.correlation()) else {
         return DMatrix::from_diagonal(&known.covariance.diagonal());
@@ -86,7 +88,8 @@ fn section(names: &[String], covariance: &DMatrix<f64>) -> Table {
     section
 }
 
-/// Names and covariance of a section; `None` if it is no such section.
+/// Names of the parameters and their covariance; `None` if one is missing, if a name is no string or an entry no
+/// number, or if there is not one entry for each pair of names.
 fn parts(section: &Value) -> Option<(Vec<String>, DMatrix<f64>)> {
     let names = section.get(PARAMETERS)?.as_array()?;
     let names: Vec<String> = names
@@ -108,7 +111,7 @@ fn parts(section: &Value) -> Option<(Vec<String>, DMatrix<f64>)> {
 }
 
 /// Puts into `case` the covariance that the case `other` has of parameters of the sections `sections`, beside that of
-/// the identified parameters. Both are independent, since they come from different measurements.
+/// the identified parameters. The covariance between the two sets is 0, since they come from different measurements.
 pub(crate) fn take_over(case: &mut Table, other: &Table, sections: &[&str]) {
     let Some((names, covariance)) = other.get(SECTION).and_then(parts) else {
         return;
@@ -140,7 +143,7 @@ pub(crate) fn take_over(case: &mut Table, other: &Table, sections: &[&str]) {
     case.insert(SECTION.into(), Value::Table(section(&all, &joint)));
 }
 
-/// The section as text, with one line for each parameter and each row; nothing if it is no such section.
+/// The section as text, with one line for each parameter and each row; empty if [`parts`] gives `None`.
 pub(crate) fn text(section: &Value) -> String {
     let Some((names, covariance)) = parts(section) else {
         return String::new();

@@ -22,17 +22,18 @@ pub(crate) const OVERDAMPED: f64 = 0.5;
 /// normal variable exceeds three standard deviations in magnitude with a probability of 0.3 %.
 pub(crate) const LEAST_RESIDUE_SIGNIFICANCE: f64 = 3.0;
 
-/// Residual of a modal fit, as χ² per degree of freedom, below which no further mode is searched. The variance of a
-/// receptance is estimated from at least three impacts and nine lines, which raises χ² by up to 6 %; the rest is margin.
+/// Residual of a modal fit to receptances of known variance, as χ² per degree of freedom, below which no further mode
+/// is searched. The variance is estimated from at least three impacts and nine lines, which raises χ² by up to 6 %; the
+/// rest is margin.
 pub(crate) const FURTHER_MISFIT: f64 = 1.1;
 
-/// NRMSE of the fitted receptances below which no further mode is searched: a mode as small moves no limit by a percent.
-/// Unfounded.
+/// NRMSE of the fitted receptances below which no further mode is searched: a mode of this size moves no stability
+/// limit by a percent. Unfounded.
 pub(crate) const FURTHER_ERROR: f64 = 1e-3;
 
 /// Norm of the residue matrix of a further mode, in standard deviations of the norm, from which it is accepted. A pole
-/// that is fitted freely to noise explains some 10 of χ² with its ten parameters, and the best of a thousand places
-/// some 4 ln 1000 = 28 more: six standard deviations. The two above are margin.
+/// that is fitted freely to noise explains some 10 of χ² with the ten parameters of a mode in two directions, and the
+/// best of a thousand places some 4 ln 1000 = 28 more: √38, six standard deviations. The two above are margin.
 pub(crate) const FURTHER_SIGNIFICANCE: f64 = 8.0;
 
 /// NRMSE of the fitted receptances above which a warning says that the modal model does not fit. Unfounded.
@@ -71,10 +72,12 @@ pub(crate) const ORDERS_SHARE: f64 = 0.25;
 pub(crate) const LEAST_ORDERS: usize = 4;
 
 /// Larger one of the relative differences of frequency and damping ratio of two stable poles up to which they are the
-/// same mode, in multiples of `SAME_FREQUENCY` and `SAME_DAMPING`. Unfounded.
+/// same mode if their residues agree (`SAME_POLE_SHAPE`), in multiples of `SAME_FREQUENCY` and `SAME_DAMPING`.
+/// Unfounded.
 pub(crate) const SAME_POLE_DISTANCE: f64 = 3.0;
 
-/// Modal assurance criterion between the residues of two stable poles above which they are the same mode. Unfounded.
+/// Modal assurance criterion between the residues of two stable poles above which they are the same mode if frequency
+/// and damping ratio agree (`SAME_POLE_DISTANCE`). Unfounded.
 pub(crate) const SAME_POLE_SHAPE: f64 = 0.9;
 
 /// Height of the resonance peak of a stable pole, relative to that of the strongest pole, below which the pole is not a
@@ -192,7 +195,7 @@ pub(crate) const JUMP_DEVIATIONS: f64 = 6.0;
 /// Unfounded.
 pub(crate) const JUMP_SHARE: f64 = 0.05;
 
-/// Relative difference of two motion amplitudes at one frequency from which they count as two excitation levels.
+/// Relative difference of two motion amplitudes at one frequency above which they count as two excitation levels.
 /// Unfounded.
 pub(crate) const DIFFERENT_LEVELS: f64 = 0.05;
 
@@ -253,12 +256,14 @@ pub(crate) const LEAST_RECIPROCITY_CHANGE: f64 = 0.01;
 /// restoring-force fit. Unfounded.
 pub(crate) const BAND_SIGNAL_TO_NOISE: f64 = 1e3;
 
-/// Number of segments of a free decay of which each is left out once for the intervals of its force law. With 10, 20 and 40 segments the
-/// intervals of k3 held the truth in 94, 91 and 90 % of 400 random decays through sensor filters.
+/// Largest number of blocks into which the equations of a free decay are divided; each block is left out once for the
+/// intervals of the force law. With 10, 20 and 40 blocks the 90 % intervals of k3 held the truth in 94, 91 and 90 % of
+/// 400 random decays through sensor filters.
 pub(crate) const DECAY_BLOCKS: usize = 40;
 
-/// Factors on the length of the modulating function of a free decay, at which its law is fitted once more: the scatter belongs into the
-/// interval. They span the bands within a factor of two, which a user may choose as well as the first.
+/// Factors on the length of the modulating function with each of which the law of a free decay is fitted once more: the
+/// scatter belongs into the interval. The two bands differ in width by a factor of two; a user may choose them as well
+/// as the first.
 pub(crate) const DECAY_SUPPORTS: [f64; 2] = [0.7, 1.4];
 
 // Cutting tests
@@ -316,8 +321,10 @@ pub(crate) const VAGUE_SHARE: f64 = 0.5;
 
 // Robots
 
-/// Smallest relative error of a measured receptance of a robot. The noise of the force in H1, and errors of sensors,
-/// windows and sample rates are common to all lines, so that no scatter shows them. Unfounded.
+/// Smallest relative error of a measured receptance of a robot; also the relative standard deviation of a calibration
+/// error that all its receptances have in common, and the standard deviation, in radians at the highest frequency, of a
+/// common delay. The noise of the force in H1, and errors of sensors, windows and sample rates are common to all lines,
+/// so that no scatter shows them. Unfounded.
 pub(crate) const LEAST_RELATIVE_ERROR: f64 = 3e-3;
 
 /// Frequency up to which a receptance of a robot counts as static in the first guess of joint stiffnesses, as a ratio r

@@ -1,11 +1,11 @@
 //! Thresholds by which this crate decides, each with the source of its number.
 //!
 //! A number without a derivation or a campaign behind it is marked "Unfounded" or "a choice". Bounds of the values of a
-//! case that are physical, such as a damping ratio below 1, stand with their keys.
+//! case that are physical, such as a damping ratio below 1, stand in the code that reads the case.
 
-/// Sum of the residues of a structure given by modes, relative to n·max|C|·max|B| with n states, above which its
-/// velocity jumps with the force. The sum is zero if the structure has a mass matrix. Mode shapes with seven digits in
-/// the case file leave up to this much: two factors with an error of 5e-7 in each of n products.
+/// Largest entry of C B, for modes the sum of their residues, relative to n·max|C|·max|B| with n states, above which
+/// the velocity of the tool jumps with the force. C B is zero if the structure has a mass matrix. Mode shapes with
+/// seven digits in the case file leave up to this much: two factors with an error of 5e-7 in each of n products.
 pub(crate) const VELOCITY_JUMP: f64 = 1e-6;
 
 /// Magnitude of an eigenvalue of a mass, damping or stiffness matrix with its positive diagonal entries scaled to 1,
@@ -19,7 +19,7 @@ pub(crate) const ZERO_EIGENVALUE: f64 = 1e-9;
 pub(crate) const SAME_POLE: f64 = 1e-6;
 
 /// Largest relative residual ‖A P − λ P‖/(|λ|·‖P‖) for a pole λ with as many mode shapes as its multiplicity, P being
-/// the projector on its modes. Poles that form one mode differ by [`SAME_POLE`]; the factor of ten is margin.
+/// the projector on its modes. Poles that form one mode differ by less than [`SAME_POLE`]; the factor of ten is margin.
 /// Unfounded.
 pub(crate) const DEFECTIVE: f64 = 10.0 * SAME_POLE;
 
@@ -37,26 +37,27 @@ pub(crate) const PITCH_SUM_DEG: f64 = 0.01;
 pub(crate) const TEETH_MAX: i64 = 64;
 
 /// Range of tool diameters in a case, mm; outside, the unit is taken for wrong. Micro end mills have 5 µm, the largest
-/// face mills 600 mm.
+/// face mills 600 mm; the distance from these is a choice.
 pub(crate) const DIAMETER_MM: [f64; 2] = [1e-3, 1e3];
 
 /// Largest feed per tooth in a case, mm. High-feed milling reaches 4 mm; a feed in µm is hundreds. The value between is
 /// a choice.
 pub(crate) const FEED_PER_TOOTH_MAX_MM: f64 = 20.0;
 
-/// Largest cutting coefficient in a case, MPa. Hardened steel and superalloys at thin chips reach some 10⁴; a
-/// coefficient in Pa is 10⁸ and more. The value between is a choice.
+/// Largest magnitude of a cutting coefficient in a case, MPa. Hardened steel and superalloys at thin chips reach some
+/// 10⁴; a coefficient in Pa is 10⁸ and more. The value between is a choice.
 pub(crate) const COEFFICIENT_MAX_MPA: f64 = 1e6;
 
 /// Largest spindle speed in the limits of a case, rev/min. Air-bearing spindles reach 300 000. A choice above them.
 pub(crate) const SPEED_MAX_RPM: f64 = 1e6;
 
-/// Largest error of a correlation in `[uncertainty]` of a case that counts as rounding: of the symmetry of the matrix, and, times the number of
-/// parameters, of an eigenvalue below 0. Covariances with seven digits err by 5e-8 of the product of the standard deviations; the factor of 20
-/// above it is a choice.
+/// Largest error of a correlation in `[uncertainty]` of a case that counts as rounding: difference of the entries
+/// (i, j) and (j, i), excess of a magnitude over 1 and, times the number of parameters, an eigenvalue below 0.
+/// Covariances with seven digits err by up to 5e-7 of the product of the standard deviations; the factor of two above
+/// it is a choice.
 pub(crate) const COVARIANCE_ROUNDING: f64 = 1e-6;
 
-/// Share of a parameter's variance that other parameters leave unexplained up to which the parameter follows from them. What is dropped is a
-/// standard deviation of 1e-4 of that of the parameter, which moves no limit; the rounding of a covariance of 16 digits is some 1e-12. The
-/// value between is a choice.
+/// Share of a parameter's variance that earlier parameters leave unexplained, up to which the parameter counts as
+/// following from them. Up to 1e-4 of the standard deviation of the parameter is dropped, which hardly moves a limit;
+/// rounding of a covariance of 16 digits leaves far smaller shares. The value between is a choice.
 pub(crate) const DEPENDENT_PARAMETER: f64 = 1e-8;

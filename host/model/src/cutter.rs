@@ -7,13 +7,13 @@ use crate::ModelError;
 pub use crate::milling::Immersion;
 use crate::milling::{Cut, EdgeAngle, Material, Runout, Tool};
 
-/// The engaged tool in SI units and in the machine's axes.
+/// The engaged tool in the machine's axes.
 ///
 /// Tooth j is at the immersion angle φⱼ = θ + ψⱼ with the spindle angle θ, clockwise from the normal of the feed
 /// (thesis Fig. 3.1). A tooth with larger ψ passes earlier: tooth j cuts the surface left by tooth j + 1.
 #[derive(Clone, Debug)]
 pub struct Cutter {
-    /// The teeth in the order of their angle ψ on the tool.
+    /// The teeth in the order of ascending angle ψ on the tool.
     pub teeth: Vec<Tooth>,
     /// Immersion angle of entry, rad.
     pub start_rad: f64,
@@ -25,7 +25,7 @@ pub struct Cutter {
     pub feed_per_tooth_m: f64,
     /// Radius of the tool, m; `None` if the case has no diameter.
     pub radius_m: Option<f64>,
-    /// True if the axial depth follows the axial vibration, b = b₀ − z (thesis eq. 3.5).
+    /// True if the axial depth follows the axial vibration, b = b₀ − z (thesis eq. 3.5), but at least 0.
     pub axial_depth_modulation: bool,
     /// Cutting force law.
     pub force: ForceLaw,
@@ -42,11 +42,11 @@ pub struct Tooth {
     pub angle_rad: f64,
     /// Radial runout of the tooth, m: its radius minus the radius without runout.
     pub radial_m: f64,
-    /// Index of the tooth that passes before this one and left the surface that this one cuts.
+    /// Index of the tooth that passes immediately before this one.
     pub ahead: usize,
-    /// Index of the tooth that passes after this one and cuts the surface that this one leaves.
+    /// Index of the tooth that passes immediately after this one.
     pub behind: usize,
-    /// Pitch angle to the tooth that passes before this one, rad.
+    /// Pitch angle to the tooth `ahead`, rad.
     pub pitch_rad: f64,
     /// Feed of the tool while it rotates by the pitch angle of this tooth, m.
     pub feed_m: f64,
@@ -56,8 +56,8 @@ impl Cutter {
     /// The tool in a cut of the axial depth `axial_depth_m`, m.
     ///
     /// # Errors
-    /// The tool has no teeth, the number of pitch angles differs from the number of teeth, or their sum is not 360
-    /// degrees.
+    /// The tool has no teeth, the number of pitch angles differs from the number of teeth, or the sum of the pitch
+    /// angles is not 360 degrees.
     pub fn new(tool: &Tool, material: &Material, cut: &Cut, axial_depth_m: f64) -> Result<Self, ModelError> {
         let edge = EdgeAngle::new(tool.edge_angle_deg);
         let feed_rad = cut.feed_direction_deg.to_radians();
@@ -104,7 +104,7 @@ impl Cutter {
         self
     }
 
-    /// Sets the radial runout of all teeth from the offset of the tool axis to the spindle axis.
+    /// Sets the radial runout of all teeth to that of `runout`.
     pub fn set_runout(&mut self, runout: Runout) {
         for tooth in &mut self.teeth {
             tooth.radial_m = runout.radial_m(tooth.angle_rad);

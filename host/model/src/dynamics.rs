@@ -9,9 +9,9 @@ use quietcut_numerics::dormand_prince::Quartic;
 /// Equation of motion ẋ = A x + B F − f₃(x), u = C x: [`FirstOrder`] with the cubic terms f₃ of the structure, if it
 /// has any.
 ///
-/// Axes are the machine's x, y, z; SI units: m, m/s, N. Velocity and acceleration of the tool are u̇ = C ẋ and
-/// ü = C A ẋ. The latter holds where C B = 0, as for all matrices. Complex modes whose residues do not sum to zero have
-/// C B ≠ 0: there a jump of the force is a jump of the *velocity*, and the acceleration has an impulse.
+/// Axes are the machine's x, y, z; SI units: m, m/s, N. The velocity of the tool is u̇ = C ẋ. Its acceleration is
+/// ü = C A ẋ if C B = 0, as for structures given by matrices or joints. Complex modes whose residues do not sum to zero
+/// have C B ≠ 0: a jump of the force is then a jump of the *velocity*, and the acceleration has an impulse.
 #[derive(Clone, Debug)]
 pub struct Dynamics {
     order: usize,
@@ -54,7 +54,7 @@ impl Dynamics {
         };
         // Magnitude of a state at a tool displacement of 1 m: the inverse of the largest |C| of the state for modes and
         // joints. It is 1 for their states that do not displace the tool, and for matrices, whose states are
-        // displacements in m or rotations in rad.
+        // displacements in m, rotations in rad, and velocities scaled to these units.
         let size = |state: usize| {
             let moved = c.column(state).amax();
             match &structure.form {
@@ -143,14 +143,14 @@ impl Dynamics {
         self.order
     }
 
-    /// Magnitude of each state that belongs to a displacement of the tool of 1 m: the scale of the integrator's error
-    /// control.
+    /// Scale of each state for the integrator's error control: for modes and joints the magnitude that displaces the
+    /// tool by 1 m, 1 for a state that does not displace it; 1 for all states of matrices.
     pub fn sizes(&self) -> &[f64] {
         &self.sizes
     }
 
-    /// True if a jump of the force makes the velocity jump (C B ≠ 0): the acceleration is then an impulse at that
-    /// instant.
+    /// True if a jump of the force makes the velocity of the tool jump (C B ≠ 0): the acceleration then has an impulse
+    /// at that instant.
     pub fn velocity_jumps(&self) -> bool {
         self.velocity_jumps
     }
@@ -205,12 +205,13 @@ impl Dynamics {
         }
     }
 
-    /// C A B, 1/kg: acceleration of the tool per force on the tool.
+    /// C A B, 1/kg: acceleration of the tool per force on the tool, if its velocity does not jump.
     pub fn acceleration_per_force(&self) -> [[f64; 3]; 3] {
         self.cab
     }
 
     /// Sets the velocity of the tool along one axis to zero by an impulse along that axis, as at the onset of stick.
+    /// Nothing changes if an impulse along the axis does not accelerate the tool along it.
     pub fn halt(&self, axis: usize, x: &mut [f64]) {
         let per_impulse = self.cab[axis][axis];
         if per_impulse > 0.0 {

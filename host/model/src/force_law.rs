@@ -6,8 +6,8 @@ use crate::milling::{EdgeAngle, EdgeForce, Immersion, Material};
 /// and axial components are F = b·(K_c·h + K_e/sin γ) each. Optional extensions:
 ///
 /// - power law of the chip thickness: K_c·h₀·(h/h₀)^p instead of K_c·h;
-/// - process damping: −(C/V)·b·v_n along the chip thickness, and μ times that force tangentially, against the spindle
-///   rotation;
+/// - process damping at the cutting speed V: −(C/V)·b·v_n along the chip thickness, with the velocity v_n in that
+///   direction, and μ·(C/V)·b·v_n tangentially, against the spindle rotation;
 /// - wear: the whole force times 1 + r·t.
 #[derive(Clone, Copy, Debug)]
 pub struct ForceLaw {
@@ -34,8 +34,8 @@ pub struct ChipLaw {
 }
 
 impl ChipLaw {
-    /// Effective chip thickness h₀·(h/h₀)^p, m; odd in h, as in the linear model a negative chip thickness gives a
-    /// negative force.
+    /// Effective chip thickness h₀·(|h|/h₀)^p·sgn h, m: as in the linear law, a negative chip thickness gives a
+    /// negative cutting force.
     pub fn effective_m(self, thickness_m: f64) -> f64 {
         self.reference_m
             * (thickness_m.abs() / self.reference_m)
@@ -43,13 +43,14 @@ impl ChipLaw {
                 .copysign(thickness_m)
     }
 
-    /// Derivative p·(h/h₀)^(p − 1) of the effective chip thickness with respect to h; infinite at h = 0 for p < 1.
+    /// Derivative p·(|h|/h₀)^(p − 1) of the effective chip thickness with respect to h; infinite at h = 0 for p < 1.
     pub fn slope(self, thickness_m: f64) -> f64 {
         self.exponent * (thickness_m.abs() / self.reference_m).powf(self.exponent - 1.0)
     }
 }
 
-/// Process damping: the flank force −(C/V)·b·v_n at the cutting speed V and the velocity v_n along the chip thickness.
+/// Coefficients of process damping: C of the flank force −(C/V)·b·v_n along the chip thickness, and its friction; see
+/// [`ForceLaw`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ProcessDamping {
     /// Process damping coefficient C, N/m.
@@ -103,7 +104,8 @@ impl ForceLaw {
     }
 
     /// Cutting force on the tool, N, with a separate effective depth, m, for each component: tangential, towards the
-    /// tool axis, along the tool axis. In solid material the three depths are equal, see [`Self::force_n`].
+    /// tool axis, along the tool axis; without process damping and wear. In solid material the three depths are equal,
+    /// see [`Self::force_n`].
     pub fn force_of_n(&self, at: Immersion, thickness_m: f64, depths_m: [f64; 3]) -> [f64; 3] {
         let thickness_m = self
             .chip
@@ -117,7 +119,8 @@ impl ForceLaw {
         .at(at)
     }
 
-    /// Matrix D of process damping, N s/m, in the force F = −D v at the cutting speed V, m/s; without wear.
+    /// Matrix D of process damping, N s/m, in the force F = −D v at the axial depth, m, and cutting speed, m/s; without
+    /// wear. Zero without process damping.
     pub fn damping_ns_per_m(&self, at: Immersion, depth_m: f64, cutting_speed_m_per_s: f64) -> [[f64; 3]; 3] {
         let Some(damping) = self.process_damping else {
             return [[0.0; 3]; 3];

@@ -2,7 +2,7 @@
 //!
 //! Main types: [`case::Case`] (the case file), [`structure::Structure`] (M, C, K matrices, complex modes or joints of a
 //! robot), [`milling::Tool`], [`milling::Material`] and [`milling::Cut`], [`Dynamics`] (first-order equation of
-//! motion), [`Effects`] (deviations of structure, cutting force, spindle and sensors from the linear model of a case).
+//! motion, with cubic terms), [`Effects`] (deviations of machine, cut and sensors from the model of a case).
 //!
 //! "The thesis" in this crate is *Chatter Vibrations in Robotic Milling Considering Structural Nonlinearity*, a
 //! doctoral thesis of the University of Victoria; its equation numbers are given as "thesis eq. 5.16".
@@ -39,8 +39,8 @@
 //! # Ok::<(), quietcut_model::case::CaseError>(())
 //! ```
 //!
-//! This crate integrates no motion, computes no stability limit and estimates no parameter. Apart from the text of a
-//! case file it reads no file.
+//! This crate integrates no motion, computes no stability limit and estimates no parameter. The only files that it
+//! reads are case files.
 
 pub mod case;
 mod criteria;

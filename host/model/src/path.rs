@@ -2,20 +2,20 @@
 
 use super::{MotionState, Regime, RestoringForce};
 
-/// Displacement and velocity of the tool in the machine's axes, sampled at constant intervals. An axis without motion
-/// has empty vectors.
+/// Displacement and velocity of the tool in the machine's axes, sampled at constant intervals. An axis with empty
+/// vectors is at rest.
 #[derive(Clone, Debug, Default)]
 pub struct SampledMotion {
     /// Sampling interval, s.
     pub step_s: f64,
-    /// Time of the first sample from the start of the recording, s.
+    /// Time of the first sample, s.
     pub start_s: f64,
-    /// Displacement of the tool by axis, m.
+    /// Displacement of the tool, m: for x, y and z, one value per sample or none.
     pub x: [Vec<f64>; 3],
-    /// Velocity of the tool by axis, m/s.
+    /// Velocity of the tool, m/s: for x, y and z, one value per sample or none.
     pub v: [Vec<f64>; 3],
-    /// Velocity by axis, m/s, below which the tool cannot be told from rest, such as the noise level of a measured
-    /// velocity.
+    /// For x, y and z, the speed, m/s, below which the tool cannot be told from rest, such as the noise level of a
+    /// measured velocity.
     pub rest_m_per_s: [f64; 3],
 }
 
@@ -41,7 +41,8 @@ impl SampledMotion {
         self.x.iter().map(peak_to_peak).fold(0.0, f64::max)
     }
 
-    /// Time, displacement and velocity of the tool at a sample.
+    /// Time, displacement and velocity of the tool at a sample; displacement and velocity are 0 where there is no
+    /// value.
     pub fn at(&self, sample: usize) -> MotionState {
         let of = |signal: &[Vec<f64>; 3]| {
             std::array::from_fn(|axis| signal[axis].get(sample).copied().unwrap_or(0.0))
@@ -53,8 +54,8 @@ impl SampledMotion {
         }
     }
 
-    /// Shifts the motion along an axis to earlier times by `seconds`: sample k gets the value that was `seconds` after
-    /// it.
+    /// Shifts the motion along an axis to earlier times by `seconds`: sample k gets the [`interpolated`] value from
+    /// `seconds` after it.
     pub fn advance(&mut self, axis: usize, seconds: f64) {
         let place = seconds / self.step_s;
         for signal in [&mut self.x[axis], &mut self.v[axis]] {
@@ -76,8 +77,9 @@ impl SampledMotion {
     }
 }
 
-/// Catmull–Rom (cubic) interpolation of a signal at `place`, counted in samples; the end samples are repeated as
-/// neighbours. Outside the signal the cubic polynomial of the end is extrapolated.
+/// Catmull–Rom (cubic) interpolation of a signal at `place`, counted in samples from 0; the first and the last sample
+/// are repeated beyond the ends. Before the first sample the polynomial of the first interval is extrapolated, after
+/// the last one that of the interval between the last sample and its repetition. 0 for a signal without samples.
 pub fn interpolated(samples: &[f64], place: f64) -> f64 {
     let Some(last) = samples.len().checked_sub(1) else {
         return 0.0;
@@ -94,11 +96,12 @@ pub fn interpolated(samples: &[f64], place: f64) -> f64 {
     b + 0.5 * u * (c - a + u * (2.0 * a - 5.0 * b + 4.0 * c - d + u * (3.0 * (b - c) + d - a)))
 }
 
-/// Restoring force f_r, N, in the machine's axes at each sample of `motion`.
+/// Restoring force f_r, N: for x, y and z, one value per sample of `motion`.
 ///
-/// For dry friction without internal states, f_r is interpolated linearly between its values in the two slip directions
-/// while the speed is below [`SampledMotion::rest_m_per_s`]. The regimes of every other restoring force follow the
-/// motion, see [`restoring_from`].
+/// For a force with a locked regime and without internal states, such as dry friction, f_r is interpolated linearly
+/// between its values in the two slip directions while the speed along its axis is below
+/// [`SampledMotion::rest_m_per_s`]. Every other force is that of [`restoring_from`], with the initial states of
+/// [`RestoringForce::begin`].
 pub fn restoring_along(restoring_force: &dyn RestoringForce, motion: &SampledMotion) -> [Vec<f64>; 3] {
     if let Some(axis) = restoring_force.holds().filter(|_| restoring_force.states() == 0) {
         let mut force: [Vec<f64>; 3] = std::array::from_fn(|_| vec![0.0; motion.len()]);
@@ -120,8 +123,9 @@ pub fn restoring_along(restoring_force: &dyn RestoringForce, motion: &SampledMot
     restoring_from(restoring_force, motion, &mut own)
 }
 
-/// Restoring force f_r, N, along `motion` for a force that has internal states or no locked regime; updates the
-/// internal states `own` from the first sample to the last. The holding force is taken as 0.
+/// Restoring force f_r, N, for a force that has internal states or no locked regime: for x, y and z, one value per
+/// sample of `motion`. `own` holds the internal states at the first sample before the call, and those at the last
+/// sample after it. The holding force is taken as 0.
 pub fn restoring_from(
     restoring_force: &dyn RestoringForce,
     motion: &SampledMotion,
@@ -148,7 +152,7 @@ pub fn restoring_from(
     force
 }
 
-/// The regime of a restoring force at the instant `at`, from its `regime` at the previous sample.
+/// The regime of a restoring force at the instant `at`, from its last `regime`; `None` before the first sample.
 fn regime_at(
     restoring_force: &dyn RestoringForce,
     regime: Option<Regime>,
@@ -167,8 +171,8 @@ fn regime_at(
     now
 }
 
-/// Integrates the internal states from one sample to the next with two steps of Heun's method; the motion is linear
-/// between samples.
+/// Integrates the internal states from one sample to the next with two steps of Heun's method; displacement and
+/// velocity are taken as linear between the samples.
 fn step(
     restoring_force: &dyn RestoringForce,
     regime: Regime,

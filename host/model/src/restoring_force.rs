@@ -28,28 +28,28 @@ pub struct Slopes {
     pub damping: [[f64; 3]; 3],
 }
 
-/// Regime of a restoring force, numbered by each force itself: within a regime, such as stick or slip, f_r is smooth.
+/// Number of a regime of a restoring force, such as stick or slip; each force numbers its own regimes.
 pub type Regime = u8;
 
 /// A restoring force f_r, N, along x, y, z in the equation of motion M ẍ + C ẋ + K x + f_r = F.
 ///
-/// A restoring force may have internal states and several regimes, such as stick and slip, in each of which it is
-/// smooth. The integrator ends a step where [`RestoringForce::margin`] falls below zero; [`RestoringForce::next`] then
-/// selects the next regime. A [`RestoringForce::locked`] regime keeps one axis at rest, as sticking friction does: f_r
-/// then balances all other forces on that axis.
+/// A restoring force may have internal states and several regimes, such as stick and slip; the integrator takes f_r as
+/// smooth within each. The integrator ends a step where [`RestoringForce::margin`] falls below zero;
+/// [`RestoringForce::next`] then selects the next regime. A [`RestoringForce::locked`] regime keeps one axis at rest,
+/// as sticking friction does: f_r then balances all other forces on that axis.
 pub trait RestoringForce: Debug + Send + Sync {
     /// Number of internal states. Each is a displacement in m, which the error control of the integrator assumes.
     fn states(&self) -> usize {
         0
     }
 
-    /// Updates the internal states `own` to the displacement of `at`, if they depend on the path of the displacement
-    /// only. Returns false if they depend on its rate and must be integrated.
+    /// Updates the internal states `own` to the displacement of `at` and returns true, if the force has a formula for
+    /// them. Otherwise returns false and leaves them unchanged: if there are any, they must be integrated.
     fn follow(&self, _at: &MotionState, _own: &mut [f64]) -> bool {
         false
     }
 
-    /// Limits the internal states `own` to their admissible range, which a long integration step may leave.
+    /// Limits the internal states `own` to their admissible range, which an integration error may leave.
     fn confine(&self, _own: &mut [f64]) {}
 
     /// Sets the internal states `own` at the first sample of a given motion, such as a recording or a periodic orbit,
@@ -64,13 +64,14 @@ pub trait RestoringForce: Debug + Send + Sync {
         None
     }
 
-    /// Describing function N(X, ω), N/m: under x = X·sin ωt along its axis the fundamental of f_r is N·x, its real part
-    /// in phase with x and its imaginary part in phase with the velocity. `None` for a force that does not provide it.
+    /// Describing function N(X, ω), N/m: the fundamental of f_r under x = X·sin ωt along the axis of the force, divided
+    /// by X. The real part of N is in phase with x, the imaginary part with the velocity. `None` for a force that does
+    /// not provide it.
     fn describing_function(&self, _amplitude_m: f64, _omega: f64) -> Option<Complex64> {
         None
     }
 
-    /// Time derivatives of the internal states, m/s.
+    /// Writes the time derivatives of the internal states, m/s.
     fn rate(&self, _regime: Regime, _at: &MotionState, _own: &[f64], _rate: &mut [f64]) {}
 
     /// The axis that a locked regime keeps at rest; `None` for a force without a locked regime.
@@ -84,20 +85,21 @@ pub trait RestoringForce: Debug + Send + Sync {
         false
     }
 
-    /// Event function of `regime`: negative from the end of the regime on. `holding_n` is the force f_r, N, that keeps
-    /// the axis at rest; 0 without a locked regime.
+    /// Event function of `regime`: it becomes negative where the regime ends. `holding_n` is the force f_r, N, that
+    /// keeps the axis of [`Self::holds`] at rest; 0 unless `regime` is locked.
     fn margin(&self, _regime: Regime, _at: &MotionState, _own: &[f64], _holding_n: f64) -> f64 {
         f64::INFINITY
     }
 
     /// The regime from the instant `at` on: the first one if `before` is `None`, otherwise the one that follows the
-    /// ended regime `before`.
+    /// ended regime `before`. `holding_n` is the force f_r, N, that would keep the axis of [`Self::holds`] at rest; 0
+    /// if the force has no such axis, and along a given motion.
     fn next(&self, _before: Option<Regime>, _at: &MotionState, _own: &[f64], _holding_n: f64) -> Regime {
         0
     }
 }
 
-/// The current regime of each restoring force of a model, in their order.
+/// The current regime of each restoring force of a model, in the order of the forces.
 #[derive(Clone, Copy, Debug)]
 pub struct Regimes<'a>(pub &'a [Regime]);
 
@@ -109,11 +111,11 @@ pub fn states(restoring_forces: &[Box<dyn RestoringForce>]) -> usize {
         .sum()
 }
 
-/// Writes ẏ of structure and restoring forces under the external `force`, N, at the time `t`, s, and displacement `x`,
-/// m.
+/// Writes ẏ of structure and restoring forces under the external `force`, N, at the time `t`, s, and the displacement
+/// `x` of the tool, m.
 ///
-/// `y` holds the states of the structure, followed by the internal states of the restoring forces in their order.
-/// Returns the force f_r, N, of sticking axes along x, y, z.
+/// `y` holds the states of the structure, followed by the internal states of the restoring forces in the order of the
+/// forces. Returns the force of [`holding_n`] for the sticking axes, N, along x, y, z; zero if none sticks.
 pub fn rate(
     dynamics: &Dynamics,
     restoring_forces: &[Box<dyn RestoringForce>],
@@ -132,9 +134,8 @@ pub fn rate(
     };
     let mut left = minus(force, restoring(restoring_forces, regimes, &at, own_y));
     if dynamics.velocity_jumps() {
-        // For a structure whose velocity depends on the force, and with a restoring force that depends on the velocity,
-        // a fixed-point iteration solves for both. It converges if damping forces are small compared with inertial
-        // forces.
+        // Here the velocity of the tool depends on the force, and a restoring force may depend on the velocity: a
+        // fixed-point iteration solves for both. It converges if the norm of C B ∂f_r/∂v is below 1.
         for _ in 0..40 {
             let before = at.v;
             at.v = dynamics.velocity_under(&y[..order], left);
@@ -168,7 +169,7 @@ fn minus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     std::array::from_fn(|axis| a[axis] - b[axis])
 }
 
-/// Sum of f_r, N, of all restoring forces that are not locked.
+/// Sum of f_r, N, of all restoring forces whose regime is not locked.
 fn restoring(
     restoring_forces: &[Box<dyn RestoringForce>],
     regimes: Regimes<'_>,
@@ -192,8 +193,8 @@ fn restoring(
     sum
 }
 
-/// Sets the accelerations of the locked (sticking) axes to zero in `rate`; returns the holding force f_r, N, that does
-/// so.
+/// Adds the effect of [`holding_n`] for the locked (sticking) axes to ẏ in `rate`, and returns that force, N; zero if
+/// no axis is locked.
 fn hold(
     dynamics: &Dynamics,
     restoring_forces: &[Box<dyn RestoringForce>],
@@ -218,8 +219,9 @@ fn hold(
     holding
 }
 
-/// The holding force f_r, N, that makes the accelerations of the `locked` axes zero; `rate` is ẏ without it. Zero if
-/// the velocity jumps with the force.
+/// The holding force f_r, N, along x, y, z that makes the accelerations of the `locked` axes zero; `rate` is ẏ of the
+/// structure without this force. Zero if the velocity jumps with the force, or if the matrix of acceleration per force
+/// of the locked axes is singular.
 pub fn holding_n(dynamics: &Dynamics, locked: [bool; 3], rate: &[f64]) -> [f64; 3] {
     let Some(free) = dynamics.acceleration(rate) else {
         return [0.0; 3];

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use quietcut_numerics::roots::monotone;
 
-/// Spindle motion; at t = 0 the spindle angle is 0 and tooth 1 is at the immersion angle 0.
+/// Spindle motion; at t = 0 the spindle angle is 0 and the first tooth is at the immersion angle 0.
 ///
 /// The speed is constant, modulated as Ω(t) = Ω₀(1 + δ sin(2πf_m t + ψ)), or changes linearly from one speed to
 /// another.
@@ -14,7 +14,6 @@ pub struct Spindle {
     profile: SpeedProfile,
 }
 
-/// Variation of the spindle speed over time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum SpeedProfile {
     Steady,
@@ -22,7 +21,7 @@ enum SpeedProfile {
     Sweep(LinearSweep),
 }
 
-/// A linear change of the spindle speed from t = 0 on; the speed is constant before and after it.
+/// A linear change of the spindle speed from t = 0 to t = `seconds`; the speed is constant before and after it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct LinearSweep {
     /// Spindle speed before and after the change, rad/s.
@@ -38,8 +37,8 @@ impl LinearSweep {
 
     fn angle_rad(self, t: f64) -> f64 {
         let within = t.clamp(0.0, self.seconds);
-        // Spindle angle within the sweep at the mean of its first and present speed, plus the angle at the constant
-        // speed before or after the sweep.
+        // Spindle angle within the sweep, at the mean of the speeds at the times 0 and `within`, plus the angle at the
+        // constant speed before or after the sweep.
         0.5 * (self.speeds[0] + self.speed(within)) * within + self.speed(t) * (t - within)
     }
 
@@ -52,7 +51,8 @@ impl LinearSweep {
         if angle_rad >= whole {
             return self.seconds + (angle_rad - whole) / last;
         }
-        // Root t of first·t + ½·a·t² = angle with a the angular acceleration, in the form without cancellation.
+        // Root t of first·t + ½·a·t² = angle with a the angular acceleration, in the form in which first and square
+        // root are added, not subtracted.
         let acceleration = (last - first) / self.seconds;
         2.0 * angle_rad / (first + (first * first + 2.0 * acceleration * angle_rad).sqrt())
     }
@@ -70,7 +70,8 @@ pub struct Fluctuation {
 }
 
 impl Fluctuation {
-    /// Lead of the modulated spindle over its mean rotation, as a time in s: δ·∫ sin(2πf_m s + ψ) ds from 0 to `t`.
+    /// Lead of the spindle angle over a rotation at the mean speed, divided by the mean speed, s: δ·∫ sin(2πf_m s + ψ)
+    /// ds from 0 to `t`.
     fn ahead_s(self, t: f64) -> f64 {
         let omega = TAU * self.frequency_hz;
         self.delta / omega * (self.phase_rad.cos() - (omega * t + self.phase_rad).cos())
@@ -91,8 +92,8 @@ impl Spindle {
         }
     }
 
-    /// A spindle whose speed changes linearly from `first_rpm` to `last_rpm`, rev/min, within `seconds`, s; all
-    /// positive. Its mean speed is the arithmetic mean of both.
+    /// A spindle whose speed changes linearly from `first_rpm` to `last_rpm`, rev/min, from t = 0 to t = `seconds`, s;
+    /// all positive. Its mean speed is the arithmetic mean of both speeds.
     pub fn sweeping(first_rpm: f64, last_rpm: f64, seconds: f64) -> Self {
         let speeds = [first_rpm, last_rpm].map(|rpm| rpm * TAU / 60.0);
         Self {
@@ -101,7 +102,7 @@ impl Spindle {
         }
     }
 
-    /// This spindle with speed modulation about its mean speed.
+    /// A spindle with the mean speed of this one and speed modulation about it, without sweep.
     #[must_use]
     pub fn fluctuating(self, fluctuation: Fluctuation) -> Self {
         Self {
@@ -177,7 +178,8 @@ impl Spindle {
         -self.delay_s(t, -angle_rad)
     }
 
-    /// Lower and upper bound of the time in which the spindle rotates by `angle_rad`, s; exact for a constant speed.
+    /// Lower and upper bound of the time, s, in which the spindle rotates by the positive angle `angle_rad`; equal for
+    /// a constant speed.
     pub fn bounds_s(&self, angle_rad: f64) -> [f64; 2] {
         let fastest_and_slowest = match self.profile {
             SpeedProfile::Steady => [self.speed_rad_per_s; 2],
@@ -191,8 +193,8 @@ impl Spindle {
     }
 }
 
-/// Solves t + lead(t) = `mean_s` for the time t, s, by Newton's method with bisection as safeguard; t + lead(t)
-/// increases monotonically.
+/// Solves t + lead(t) = `mean_s` for the time t, s, with the lead of `Fluctuation::ahead_s`, by Newton's method with
+/// bisection as safeguard; t + lead(t) increases monotonically.
 fn inverse(fluctuation: Fluctuation, mean_s: f64) -> f64 {
     let reach_s = 2.0 * fluctuation.delta.abs() / (TAU * fluctuation.frequency_hz);
     monotone([mean_s - reach_s, mean_s + reach_s], mean_s, |t| {

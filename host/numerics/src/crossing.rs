@@ -1,17 +1,19 @@
-//! First zero crossing of a smooth function within a time step.
+//! First change of a function to negative values within a time step.
 
 use crate::roots::bisection;
 
-/// Fractions of the time step at which a function is evaluated in the search for its first zero crossing. They are
-/// dense at the start of the step, where a state that has just changed, such as a contact, may change back. Unfounded.
+/// Fractions of the time step, after its start, at which a function is evaluated in the search for negative values.
+/// They are dense at the start of the step, where a state that has just changed, such as a contact, may change back.
+/// Unfounded.
 const LOOKED_AT: [f64; 7] = [0.03, 0.12, 0.3, 0.5, 0.7, 0.85, 1.0];
 
-/// Last fraction u in [0, 1] of a time step, to 1e-12, before the function `f` of u first becomes negative; `None` if
-/// no negative value is detected.
+/// Last fraction u in [0, 1] of a time step, to 1e-12, before the first detected negative value of the function `f` of
+/// u; `None` if none is detected.
 ///
-/// Detects every interval of negative values that contains one of the evaluated fractions. Between two of them, it
-/// detects an interval that contains the minimum of the parabola through three neighbouring points, if that minimum is
-/// below half the middle value. A negative value at u = 0 counts as zero, since the state has just changed there.
+/// An interval of negative values is detected if it contains one of seven fixed fractions, or the argument of the
+/// minimum of the parabola through three successive evaluated points, of which the middle one is lowest; this minimum
+/// must be below half the middle value. A negative value at u = 0 counts as zero, since the state has just changed
+/// there.
 pub fn first_below_zero(f: impl Fn(f64) -> f64) -> Option<f64> {
     let (mut before, mut last) = ((0.0, f64::NAN), (0.0, f(0.0).max(0.0)));
     for u in LOOKED_AT {
@@ -31,8 +33,8 @@ pub fn first_below_zero(f: impl Fn(f64) -> f64) -> Option<f64> {
 }
 
 /// Argument of the minimum of the parabola through three points (u, f), of which the middle one is lowest. `None` if
-/// another point is lower, or if the minimum is above half the middle value, so that f is unlikely to be negative
-/// there.
+/// another point is lower, a value is not a number, all three values are equal, or the minimum is not below half the
+/// middle value, so that f is unlikely to be negative there.
 fn dip(a: (f64, f64), b: (f64, f64), c: (f64, f64)) -> Option<f64> {
     if a.1.is_nan() || b.1 > a.1 || b.1 > c.1 {
         return None;
@@ -44,8 +46,8 @@ fn dip(a: (f64, f64), b: (f64, f64), c: (f64, f64)) -> Option<f64> {
     (bend > 0.0 && lowest < 0.5 * b.1 && (a.0..c.0).contains(&u)).then_some(u)
 }
 
-/// Last argument before the sign change of `f` between `above`, where `f` is not negative, and `below`, where `f` is
-/// negative, by bisection.
+/// The end nearer to `above` of an interval of 1e-12 in which the sign of `f` changes, by bisection between `above`,
+/// where `f` counts as not negative, and `below`, where `f` is negative.
 fn last_not_below(f: &impl Fn(f64) -> f64, above: f64, below: f64) -> f64 {
     let [last, _] = bisection([above, below], 1e-12, |u| {
         let is_below = f(u) < 0.0;

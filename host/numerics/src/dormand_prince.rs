@@ -2,7 +2,7 @@
 //!
 //! Coefficients and interpolant: Hairer, Nørsett, Wanner, *Solving Ordinary Differential Equations I*, II.5 and II.6
 //! (code DOPRI5). The local error is O(h⁶) for a step and O(h⁵) for the interpolant. A delay equation whose delayed
-//! values are taken from the interpolant keeps the global order 5.
+//! values are taken from the interpolant keeps the global order 5 if steps end where the solution is not smooth.
 
 /// Polynomial of degree 4 in the fraction u = (t − t₀)/h of a time step, u in [0, 1]: the coefficients of 1, u, … u⁴.
 pub type Quartic = [f64; 5];
@@ -65,8 +65,7 @@ const INTERPOLANT: [f64; 7] = [
     69997945.0 / 29380423.0,
 ];
 
-/// One step of the Dormand–Prince method: stages, result and error estimate. An integration reuses one such value for
-/// all its steps.
+/// Stages and result of one step of the Dormand–Prince method. An integration uses the same value for all steps.
 #[derive(Clone, Debug)]
 pub struct DormandPrince {
     stages: [Vec<f64>; 7],
@@ -85,7 +84,7 @@ impl DormandPrince {
     }
 
     /// Computes the derivative ẏ at the start of the next step; required before the first step and after every jump of
-    /// ẏ.
+    /// y or ẏ.
     pub fn start(&mut self, t: f64, y: &[f64], mut rate: impl FnMut(f64, &[f64], &mut [f64])) {
         rate(t, y, &mut self.stages[0]);
     }
@@ -95,7 +94,8 @@ impl DormandPrince {
         self.stages.swap(0, 6);
     }
 
-    /// Computes a trial step of the differential equation ẏ = rate(t, y) from y at t to t + h.
+    /// Computes a trial step of the differential equation ẏ = rate(t, y) from y at t to t + h; ẏ at t is that of
+    /// [`Self::start`] or [`Self::follow`].
     pub fn attempt(&mut self, t: f64, h: f64, y: &[f64], mut rate: impl FnMut(f64, &[f64], &mut [f64])) {
         for (index, weights) in STAGES.iter().enumerate() {
             let stage = index + 1;
@@ -121,7 +121,7 @@ impl DormandPrince {
     }
 
     /// Root mean square of the estimated errors of the elements of y in the last trial step of length `h`, each divided
-    /// by the `tolerance` of its element. Up to 1 the step meets the tolerances.
+    /// by the `tolerance` of its element. Up to 1 the step is within tolerance.
     pub fn error(&self, h: f64, tolerance: impl Fn(usize) -> f64) -> f64 {
         let sum: f64 = (0..self.end.len())
             .map(|element| {

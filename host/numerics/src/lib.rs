@@ -4,14 +4,14 @@
 //! | module | |
 //! |---|---|
 //! | [`eigenvalues`] | eigenvalues of real, complex, symmetric and companion matrices |
-//! | [`singular_values`] | decomposition A = U Σ Vᵀ |
+//! | [`singular_values`] | decomposition A = U Σ Vᴴ |
 //! | [`least_squares`] | linear, from normal equations, nonlinear |
 //! | [`newton`] | Newton's method for numbers and vectors |
 //! | [`roots`] | bisection, Newton's method with a bracket, regula falsi, golden section |
 //! | [`crossing`] | the first zero crossing within a time step |
 //! | [`quadrature`] | Gauss–Legendre nodes and weights |
 //! | [`dormand_prince`] | one step of an integration in time |
-//! | [`statistics`] | quantiles of the normal, Student's, χ² and F distributions, intervals of a proportion |
+//! | [`statistics`] | quantiles of the normal, Student's, χ² and F distributions, intervals of a proportion, median |
 //!
 //! ```
 //! use nalgebra::{DMatrix, DVector};
@@ -28,12 +28,12 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! Arguments and results are matrices of `nalgebra`. Every iteration ends, and the results of [`newton`] and of
-//! nonlinear least squares state why it stopped.
+//! Matrices are those of `nalgebra`. Every iteration ends, and the results of [`newton`] and of nonlinear least squares
+//! state why it stopped.
 //!
-//! `benches/linear_algebra.rs` measures least squares and eigenvalues beside nalgebra and faer. faer is not used: for
-//! ten columns its times are between 0.85 and 2.3 times those of this crate, and it brings duplicate versions of three
-//! packages.
+//! `benches/linear_algebra.rs` measures least squares and eigenvalues beside nalgebra and faer. This crate does not
+//! use faer: for ten columns the times of faer are between 0.85 and 2.3 times those of this crate, and it brings
+//! duplicate versions of three packages.
 
 pub mod crossing;
 pub mod dormand_prince;

@@ -1,7 +1,8 @@
-//! Newton's method x ← x − J⁻¹ r(x) for r(x) = 0, with a bound on the growth of its steps and the reason to stop.
+//! Newton's method x ← x − J⁻¹ r(x) for r(x) = 0, with an optional bound on the growth of its steps and the reason to
+//! stop.
 //!
 //! The caller computes the step J⁻¹ r by a method of its choice: a quotient, an LU decomposition or an iterative
-//! solver. [`Newton`] limits the step and decides when to stop, in the same way for numbers and vectors.
+//! solver. [`Newton`] limits the step and tests it for convergence, in the same way for numbers and vectors.
 
 use nalgebra::DVector;
 use num_complex::Complex64;
@@ -59,7 +60,7 @@ impl Unknown for Vec<f64> {
     }
 }
 
-/// Newton's method with bounds on the number and the growth of its steps.
+/// Newton's method with a bound on the number of its steps and an optional one on their growth.
 ///
 /// ```
 /// use quietcut_numerics::Stop;
@@ -99,7 +100,7 @@ impl<X> Root<X> {
 impl Newton {
     /// Newton's method with full steps, until ‖step‖ ≤ `tolerance` · ‖x‖ or after `iterations_max` steps.
     ///
-    /// Convergence is quadratic: the step after one of 1e-9 · ‖x‖ is below rounding.
+    /// Near a simple root convergence is quadratic: the step after one of 1e-9 · ‖x‖ is usually below rounding.
     pub fn new(iterations_max: usize, tolerance: f64) -> Self {
         Self {
             iterations_max,
@@ -119,8 +120,8 @@ impl Newton {
         }
     }
 
-    /// Limits each step to `factor` times the length of the preceding step, which keeps Newton's method from jumping to
-    /// a distant solution.
+    /// Limits each step but the first and that which meets the tolerance to `factor` times the length of the preceding
+    /// step, as it was applied. This keeps Newton's method from jumping to a distant solution.
     #[must_use]
     pub fn with_growth(self, factor: f64) -> Self {
         Self {
@@ -132,7 +133,7 @@ impl Newton {
     /// Searches the root of r(x) = 0 near `start`; `step` returns the Newton step J⁻¹ r at a given x, or the reason for
     /// which it cannot be computed.
     ///
-    /// The search always ends; [`Root::stop`] states the reason. The last step before convergence is applied in full.
+    /// The search always ends; [`Root::stop`] states the reason. The step that meets the tolerance is applied in full.
     pub fn solve<X: Unknown>(&self, start: X, mut step: impl FnMut(&X) -> Result<X, Stop>) -> Root<X> {
         let mut root = Root {
             x: start,

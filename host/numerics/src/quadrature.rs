@@ -21,7 +21,7 @@ use nalgebra::DMatrix;
 pub struct Gauss {
     /// Nodes c_i, in ascending order.
     pub nodes: Vec<f64>,
-    /// Weights b_i of the nodes.
+    /// Weights b_i on [0, 1], in the order of the nodes.
     pub weights: Vec<f64>,
     /// Integrals S_ij = ∫₀^{c_i} ℓ_j of the Lagrange polynomials ℓ_j of the nodes c, m × m.
     pub integrals: DMatrix<f64>,
@@ -31,7 +31,8 @@ pub struct Gauss {
 const SHARED: usize = 41;
 
 impl Gauss {
-    /// Gauss–Legendre rule with `count` nodes, at most 40, which is computed once and cached.
+    /// Gauss–Legendre rule with the number of nodes from 1 to 40 that is nearest to `count`; it is computed once and
+    /// cached.
     pub fn shared(count: usize) -> &'static Self {
         static RULES: [OnceLock<Gauss>; SHARED] = [const { OnceLock::new() }; SHARED];
         let count = count.clamp(1, SHARED - 1);
@@ -41,8 +42,8 @@ impl Gauss {
     /// Computes the Gauss–Legendre rule with `count` nodes, at least 1.
     pub fn new(count: usize) -> Self {
         let (points, weights): (Vec<f64>, Vec<f64>) = (0..count).map(|i| root(count, i)).unzip();
-        // ℓ_j(x) = Σ_k (2k + 1)/2 w_j P_k(x_j) P_k(x) for k < m, exact since the rule integrates ℓ_j P_k exactly;
-        // ∫_{−1}^x P_k = (P_{k+1} − P_{k−1})/(2k + 1), and x + 1 for k = 0.
+        // On [−1, 1]: ℓ_j(x) = Σ_k (2k + 1)/2 w_j P_k(x_j) P_k(x) for k < m, exact since the rule integrates ℓ_j P_k
+        // exactly; ∫_{−1}^x P_k = (P_{k+1} − P_{k−1})/(2k + 1), and x + 1 for k = 0.
         let values: Vec<Vec<f64>> = points.iter().map(|&x| legendre(count + 1, x)).collect();
         let integrals = DMatrix::from_fn(count, count, |i, j| {
             let sum: f64 = (1..count)
@@ -57,7 +58,7 @@ impl Gauss {
         }
     }
 
-    /// Values of all Lagrange polynomials ℓ_j of the nodes at the coordinate `place` in [0, 1].
+    /// Values of the Lagrange polynomials ℓ_j at the coordinate `place` in [0, 1], in the order of their nodes.
     pub fn lagrange(&self, place: f64) -> Vec<f64> {
         let nodes = &self.nodes;
         let weight = |i: usize| -> f64 {
@@ -70,7 +71,7 @@ impl Gauss {
     }
 }
 
-/// Legendre polynomials P_0 … P_{count} at x.
+/// Legendre polynomials P_0 … P_{count} at x, for `count` ≥ 1.
 fn legendre(count: usize, x: f64) -> Vec<f64> {
     let mut values = vec![1.0, x];
     for k in 1..count {
@@ -80,13 +81,13 @@ fn legendre(count: usize, x: f64) -> Vec<f64> {
     values
 }
 
-/// The i-th root of the Legendre polynomial P_count in ascending order and its quadrature weight on [−1, 1], by
-/// Newton's method from Tricomi's estimate.
+/// The i-th root, i from 0, of the Legendre polynomial P_count in ascending order, and its quadrature weight for an
+/// integral over [−1, 1], by Newton's method from the first term of Tricomi's estimate.
 fn root(count: usize, i: usize) -> (f64, f64) {
     let n = count as f64;
     let mut x = -(PI * (i as f64 + 0.75) / (n + 0.5)).cos();
     let mut slope = 1.0;
-    // Newton's method doubles the number of correct digits: from an error of 1e-2, four steps reach machine precision.
+    // Newton's method about doubles the number of correct digits in each step.
     for _ in 0..6 {
         let values = legendre(count, x);
         slope = n * (x * values[count] - values[count - 1]) / (x * x - 1.0);

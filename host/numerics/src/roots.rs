@@ -1,11 +1,11 @@
-//! Roots and extrema of functions of one real variable: bisection, Newton's method with a bracket, regula falsi, golden
+//! Roots and minima of functions of one real variable: bisection, Newton's method with a bracket, regula falsi, golden
 //! section.
 
-/// Narrows the bracket [below, above] of a root by bisection, until it is no wider than `width`, or until no number
-/// lies between its ends.
+/// Narrows the bracket [below, above] of a root, with finite ends, by bisection, until it is no wider than `width`, or
+/// until no number lies between its ends.
 ///
 /// The condition `is_below` is true at the first end and false at the second; either end may be the larger number. With
-/// `width` 0 the root is found to the last bit.
+/// `width` 0 the ends that are returned are neighbouring numbers.
 ///
 /// ```
 /// use quietcut_numerics::roots::bisection;
@@ -36,11 +36,11 @@ pub fn bisection(
 /// Largest number of steps of [`monotone`]. Bisection alone needs about 52 to reduce the bracket to rounding.
 const STEPS_MAX: usize = 100;
 
-/// Root of an increasing function in [low, high] by Newton's method, in which bisection replaces a step that leaves the
-/// bracket.
+/// Root of an increasing function in [low, high] by Newton's method from `start`, in which bisection of the bracket
+/// replaces a step that does not end inside it.
 ///
 /// `function` returns value and derivative. The search ends after a step of at most 2 ε · max(|x|, (high − low)/2),
-/// with the machine precision ε, or after 100 steps.
+/// with the given bracket and the machine precision ε, or after 100 steps.
 pub fn monotone([mut low, mut high]: [f64; 2], start: f64, function: impl Fn(f64) -> [f64; 2]) -> f64 {
     let reach = 0.5 * (high - low);
     let mut x = start;
@@ -70,19 +70,19 @@ pub fn monotone([mut low, mut high]: [f64; 2], start: f64, function: impl Fn(f64
 /// (1973) 253).
 ///
 /// The caller evaluates the function at [`Self::next`] and passes the value to [`Self::narrow`], so that an evaluation
-/// may fail or have further results. The order of convergence is 1.7. If four evaluations have not halved the bracket,
-/// the next one bisects it.
+/// may fail or have further results. The order of convergence is about 1.7. If four evaluations have not halved the
+/// bracket, the next one bisects it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SignChange {
     ends: [[f64; 2]; 2],
     /// Index of the end of the bracket that the last step replaced; `None` before the first step.
     replaced: Option<usize>,
-    /// Width of the bracket when it was last halved, and number of evaluations of the function since then.
+    /// Width of the bracket when it was last halved, or at the start before that, and number of evaluations of the
+    /// function since then.
     halved: (f64, usize),
 }
 
-/// Number of evaluations of the function without a halving of the bracket after which it is bisected. Regula falsi
-/// halves it within three if it converges.
+/// Number of evaluations of the function without a halving of the bracket after which the bracket is bisected.
 const EVALUATIONS_PER_HALVING: usize = 4;
 
 impl SignChange {
@@ -99,8 +99,9 @@ impl SignChange {
     pub fn next(&self) -> f64 {
         let [[a, fa], [b, fb]] = self.ends;
         let x = a + (b - a) * fa / (fa - fb);
-        // The secant through both ends of the bracket has its root here. Rounding may place it outside the bracket, and
-        // equal values have no such root: then the bracket is bisected.
+        // The secant through both ends, of which one value may be reduced, has its root at x. Rounding may place x
+        // outside the bracket, and equal values have no such root: then the bracket is bisected, as after four
+        // evaluations without a halving.
         if self.halved.1 < EVALUATIONS_PER_HALVING && (a.min(b)..=a.max(b)).contains(&x) {
             x
         } else {
@@ -108,13 +109,13 @@ impl SignChange {
         }
     }
 
-    /// Replaces the end of the bracket whose value has the sign of `value` by the point (`x`, `value`); returns the
-    /// index of that end, 0 or 1.
+    /// Replaces the end of the bracket whose value has the sign of `value` by the point (`x`, `value`); a `value` of 0
+    /// counts as negative. Returns the index of that end, 0 or 1.
     pub fn narrow(&mut self, x: f64, value: f64) -> usize {
         let index = usize::from((value > 0.0) != (self.ends[0][1] > 0.0));
         if self.replaced == Some(index) {
-            // The other end of the bracket has stayed for two steps. Its value is reduced, since regula falsi would
-            // otherwise converge slowly.
+            // The other end of the bracket has stayed for at least two steps. Its value is reduced, since regula falsi
+            // would otherwise converge slowly.
             let gained = 1.0 - value / self.ends[index][1];
             self.ends[1 - index][1] *= if gained > 0.0 { gained } else { 0.5 };
         }
@@ -145,7 +146,8 @@ const GOLDEN: f64 = 0.618_033_988_749_894_8;
 /// Argument of the minimum of a function with a single minimum in [from, to], by golden-section search (Kiefer, Proc.
 /// AMS 4 (1953) 502) until the bracket is no wider than `width` or reaches rounding.
 ///
-/// Rounding limits the accuracy of the argument to about the square root of the machine precision.
+/// Returns the middle of the last bracket. Rounding of the function usually limits the accuracy to about the square
+/// root of the machine precision.
 pub fn minimum([mut from, mut to]: [f64; 2], width: f64, function: impl Fn(f64) -> f64) -> f64 {
     let (mut left, mut right) = (to - GOLDEN * (to - from), from + GOLDEN * (to - from));
     let (mut at_left, mut at_right) = (function(left), function(right));

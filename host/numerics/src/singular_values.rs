@@ -1,9 +1,9 @@
-//! Singular value decomposition A = U Σ Vᵀ with a bounded iteration.
+//! Singular value decomposition A = U Σ Vᴴ with a bounded iteration.
 
 use nalgebra::{ComplexField, DMatrix, DVector, Dyn, SVD};
 
-/// Largest number of QR iterations on a matrix, divided by the number of its singular values; two or three are usual,
-/// more end the decomposition with an error.
+/// Number of QR iterations on a matrix, divided by the number of its singular values, at which the decomposition ends
+/// with an error; two or three are usual.
 const ITERATIONS_PER_VALUE: usize = 100;
 
 /// Error of the singular value decomposition of a matrix.

@@ -1,8 +1,10 @@
 //! Quantiles of the normal, Student's, χ² and F distributions, and intervals of a proportion.
 //!
-//! A quantile inverts the monotone distribution function by bracketing and bisection, that of the normal distribution
-//! by Halley's method. The number of iterations is bounded for every argument. Continued fractions and series of the
-//! incomplete gamma and beta functions: Press et al., *Numerical Recipes*, 3rd edition, 6.2 and 6.4 (Lentz's method).
+//! A quantile of a distribution inverts the monotone distribution function by bracketing and bisection, that of the
+//! normal distribution by Halley's method. The number of iterations is bounded for every argument. In the tests, with
+//! 0.3 to 300 degrees of freedom and given probabilities from 0.001 to 0.999, the probability at a quantile differs
+//! from the given one by less than 1e-11. Continued fractions and series of the incomplete gamma and beta functions:
+//! Press et al., *Numerical Recipes*, 3rd edition, 6.2 and 6.4 (Lentz's method).
 
 use std::f64::consts::{PI, SQRT_2};
 
@@ -29,15 +31,14 @@ pub fn normal_probability(x: f64) -> f64 {
 ///
 /// A `share` below 1e-300 or above 1 − 2.2e-16 is replaced by this bound.
 pub fn normal_quantile(share: f64) -> f64 {
-    // A double cannot represent probabilities far below 1e-300, nor the difference of a probability from 1 below its
-    // rounding.
+    // A double cannot represent probabilities far below 1e-300, nor those that differ from 1 by less than its rounding.
     let share = share.clamp(1e-300, 1.0 - f64::EPSILON);
     // Φ⁻¹ is antisymmetric about the probability 1/2. In the lower half, erfc keeps its relative precision.
     if share > 0.5 {
         return -normal_quantile(1.0 - share);
     }
-    // Start value of the quantile from the tail bound of Φ. Halley's method then triples the number of correct digits
-    // in each iteration.
+    // Start value of the quantile from the tail bound of Φ. Halley's method then about triples the number of correct
+    // digits in each iteration.
     let mut x = -(-2.0 * (2.0 * share).ln()).sqrt();
     for _ in 0..8 {
         let density = (-0.5 * x * x).exp() / (2.0 * PI).sqrt();
@@ -51,15 +52,15 @@ pub fn normal_quantile(share: f64) -> f64 {
     x
 }
 
-/// The probability that |t| of Student's distribution with ν degrees of freedom stays below `t`: 1 − I_{ν/(ν +
-/// t²)}(ν/2, 1/2).
+/// The probability that |t| of Student's distribution with ν = `freedoms` degrees of freedom stays below `t`: 1 −
+/// I_{ν/(ν + t²)}(ν/2, 1/2).
 fn student_two_sided_probability(t: f64, freedoms: f64) -> f64 {
-    // The complement I_{t²/(ν + t²)}(1/2, ν/2), which is free of cancellation for small t.
+    // As I_{t²/(ν + t²)}(1/2, ν/2), which is equal and free of cancellation for small t.
     incomplete_beta(0.5, 0.5 * freedoms, t * t / (freedoms + t * t))
 }
 
 /// Half the width of the interval about zero that contains a variable of Student's distribution with the probability
-/// `share`; error 1e-10.
+/// `share`.
 ///
 /// Infinite without degrees of freedom.
 fn student_two_sided_quantile(share: f64, freedoms: f64) -> f64 {
@@ -69,18 +70,18 @@ fn student_two_sided_quantile(share: f64, freedoms: f64) -> f64 {
     quantile(share, |t| student_two_sided_probability(t, freedoms))
 }
 
-/// Half the width of the 90 % interval of an estimate, in multiples of its standard deviation, if that is estimated
-/// with `freedoms` degrees of freedom.
+/// Half the width of the 90 % interval of an estimate, in multiples of the standard deviation of the estimate, if
+/// this standard deviation is estimated with `freedoms` degrees of freedom; infinite for 0.
 pub fn student_ninety_percent(freedoms: usize) -> f64 {
     student_two_sided_quantile(0.9, freedoms as f64)
 }
 
-/// The probability that χ² with ν degrees of freedom stays below x: P(ν/2, x/2).
+/// The probability that χ² with ν = `freedoms` degrees of freedom stays below x: P(ν/2, x/2).
 pub fn chi_squared_probability(x: f64, freedoms: f64) -> f64 {
     incomplete_gamma(0.5 * freedoms, 0.5 * x)
 }
 
-/// The number below which χ² with ν degrees of freedom stays with the probability `share`; relative error 1e-10.
+/// The number below which χ² with `freedoms` degrees of freedom stays with the probability `share`.
 pub fn chi_squared_quantile(share: f64, freedoms: f64) -> f64 {
     quantile(share, |x| chi_squared_probability(x, freedoms))
 }
@@ -90,7 +91,7 @@ fn f_probability(x: f64, [above, below]: [f64; 2]) -> f64 {
     incomplete_beta(0.5 * above, 0.5 * below, above * x / (above * x + below))
 }
 
-/// The number below which F with (ν₁, ν₂) degrees of freedom stays with the probability `share`; relative error 1e-10.
+/// The number below which F with the degrees of freedom (ν₁, ν₂) = `freedoms` stays with the probability `share`.
 pub fn f_quantile(share: f64, freedoms: [f64; 2]) -> f64 {
     quantile(share, |x| f_probability(x, freedoms))
 }
@@ -117,8 +118,8 @@ pub fn median(values: &mut [f64]) -> Option<f64> {
     (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
 
-/// Quantile of a `sorted` sample, interpolated linearly between the order statistics at (i + 1/2)/n (Hazen); `None` for
-/// an empty sample.
+/// Quantile of a sample in ascending order, interpolated linearly between the order statistics at (i + 1/2)/n, i from 0
+/// (Hazen), and constant beyond the first and the last; `None` for an empty sample.
 pub fn sample_quantile(sorted: &[f64], share: f64) -> Option<f64> {
     let position = (share * sorted.len() as f64 - 0.5).max(0.0);
     let (below, rest) = (position.floor() as usize, position.fract());
@@ -133,7 +134,8 @@ pub fn sample_quantile(sorted: &[f64], share: f64) -> Option<f64> {
     })
 }
 
-/// Inverts a distribution function on [0, ∞): the argument at which `probability` reaches the value `share`.
+/// Inverts a distribution function on [0, ∞): the argument at which `probability` reaches the value `share`; infinite
+/// if it does not below about 1e200.
 fn quantile(share: f64, probability: impl Fn(f64) -> f64) -> f64 {
     if share.is_nan() {
         return f64::NAN;
@@ -214,8 +216,8 @@ fn incomplete_beta(a: f64, b: f64, x: f64) -> f64 {
 
 /// ln B(a, b) = ln Γ(a) + ln Γ(b) − ln Γ(a + b).
 ///
-/// If the larger argument l is large, ln Γ(l) and ln Γ(a + b) cancel. Their difference is then computed from Stirling's
-/// series, which does not cancel (Abramowitz & Stegun 6.1.41).
+/// If the larger argument l is 20 or more, ln Γ(l) − ln Γ(a + b) is computed from Stirling's series, without
+/// cancellation (Abramowitz & Stegun 6.1.41).
 fn log_beta(a: f64, b: f64) -> f64 {
     let (small, large) = (a.min(b), a.max(b));
     // For arguments from 20 on, four terms of Stirling's series are accurate to 1e-14.
@@ -231,7 +233,7 @@ fn log_beta(a: f64, b: f64) -> f64 {
     libm::lgamma(small) - ratio
 }
 
-/// Continued fraction b₀ + a₁/(b₁ + a₂/(b₂ + …)) by Lentz's method; `step(k)` gives [a_k, b_k].
+/// Continued fraction b₀ + a₁/(b₁ + a₂/(b₂ + …)) by Lentz's method; b₀ is `first`, and `step(k)` gives [a_k, b_k].
 fn continued_fraction(first: f64, step: impl Fn(usize) -> [f64; 2]) -> f64 {
     let tiny = |value: f64| if value.abs() < 1e-300 { 1e-300 } else { value };
     let mut value = tiny(first);

@@ -128,8 +128,8 @@ fn is_case(text: &str) -> bool {
 }
 
 impl Sidecar {
-    /// Description of the channel with a standard name such as `ax`, also if the file calls it by another name, or if the
-    /// description states the name with a sign (`-ax`); `None` if the sidecar has no description of it.
+    /// Description of the channel with a standard name such as `ax`, also if the file calls it by another name, or if
+    /// the description states the name with a sign (`-ax`); `None` if the sidecar has no description of it.
     pub fn channel(&self, name: &str) -> Option<&RecordedChannel> {
         let is_named = |stated: &str| stated.strip_prefix('-').unwrap_or(stated) == name;
         let renamed = self

@@ -79,8 +79,9 @@ impl ChannelSummary {
     }
 }
 
-/// Values at which a channel is clipped: its largest or smallest one, if some consecutive samples have it and it is far from the median.
-/// Single samples of such a value are clipped too.
+/// Values at which a channel is clipped, ascending: its smallest and its largest sample, each only if at least three
+/// consecutive samples have this value and it is far from the median. Empty for a constant channel and for one without
+/// dimension, such as a tachometer.
 pub fn clipping_levels(channel: &Channel) -> Vec<f64> {
     let samples = channel.samples.as_slice();
     let ends = samples
@@ -91,16 +92,16 @@ pub fn clipping_levels(channel: &Channel) -> Vec<f64> {
     levels(channel, &runs(samples), ends)
 }
 
-/// Values at which a channel with these `runs` and these smallest and largest values is clipped.
+/// [`clipping_levels`] of a channel with these [`runs`] and these smallest and largest samples.
 fn levels(channel: &Channel, runs: &[(usize, usize)], [minimum, maximum]: [f64; 2]) -> Vec<f64> {
     let samples = channel.samples.as_slice();
-    // A tachometer has two levels and is not checked at all.
+    // A tachometer has runs at two levels without being clipped.
     if minimum == maximum || channel.quantity == Quantity::Level {
         return Vec::new();
     }
     let rest = median(&mut samples.to_vec()).unwrap_or(0.0);
-    // Equal samples at an extreme value near the median are no clipping: the force of an impact test rests at its
-    // smallest value.
+    // Equal samples at an extreme value near the median are no clipping: the force of an impact test may rest at
+    // its smallest value.
     [minimum, maximum]
         .into_iter()
         .filter(|&value| (value - rest).abs() > FAR_FROM_REST * (maximum - minimum))

@@ -31,8 +31,8 @@ const INTERVAL_WORDS: &[&str] = &[
     "dt",
 ];
 
-/// Sample rate, samples per second, that a line such as `Fs = 25600 Hz` or `dt: 0.1 ms` states; `None` if it states
-/// none.
+/// Sample rate, samples per second, from the rate or the interval that a line such as `Fs = 25600 Hz` or `dt: 0.1 ms`
+/// states; `None` if no positive number is found after such a word.
 pub(super) fn rate(line: &str, decimal_comma: bool) -> Option<f64> {
     let lower = line.to_lowercase();
     let after = |words: &[&str]| {
@@ -66,7 +66,7 @@ pub(super) fn rate(line: &str, decimal_comma: bool) -> Option<f64> {
             .any(|part| part == word)
     };
     if let Some((value, units)) = after(RATE_WORDS).and_then(|rest| number(&rest)) {
-        // `MS/s` are samples per second; `ms` alone would be the interval in brackets behind a rate.
+        // `MS/s` are 10⁶ samples per second; `ms` alone is the unit of an interval, as in brackets behind a rate.
         let factor = if has(&units, "khz") || has(&units, "ks") {
             1e3
         } else if has(&units, "mhz") || units.contains("ms/s") {

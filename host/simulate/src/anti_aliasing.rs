@@ -1,5 +1,5 @@
-//! Anti-aliasing filter and decimation: attenuates components above half the sampling rate, which would alias into the
-//! band.
+//! Anti-aliasing filter and decimation: attenuates components above half the output sampling rate, which would alias
+//! into the band below it.
 
 use std::f64::consts::{PI, TAU};
 
@@ -12,9 +12,9 @@ const HALF: usize = 12;
 /// transition band from 0.35 to 0.5.
 const CORNER: f64 = 0.425;
 
-/// Every `factor`-th sample of `samples` after a linear-phase low pass without delay and with unit gain at 0 Hz
-/// (Hann-windowed sinc). The signal is extended by its first and last values. A `factor` of 1 leaves `samples`
-/// unchanged.
+/// Every `factor`-th sample of `samples`, from the first on, after a linear-phase low pass without delay and with unit
+/// gain at 0 Hz (Hann-windowed sinc). The signal is extended by its first and last values. A `factor` of 0 or 1 leaves
+/// `samples` unchanged.
 pub(super) fn decimated(samples: Vec<f64>, factor: usize) -> Vec<f64> {
     let Some(last) = samples.len().checked_sub(1).filter(|_| factor > 1) else {
         return samples;
@@ -34,7 +34,8 @@ pub(super) fn decimated(samples: Vec<f64>, factor: usize) -> Vec<f64> {
         .collect()
 }
 
-/// Weight of the anti-aliasing filter for an input sample at a distance of `u` output samples from the filter's centre.
+/// Weight, before normalization, of the anti-aliasing filter for an input sample at a distance of `u` output samples
+/// from the filter's centre.
 fn weight(u: f64) -> f64 {
     let angle = TAU * CORNER * u;
     let sinc = if u == 0.0 { 1.0 } else { angle.sin() / angle };

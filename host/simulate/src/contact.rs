@@ -41,26 +41,28 @@ struct ToothState {
     in_arc: bool,
     /// Time of the tooth's next entry into, or exit from, the engagement arc, s.
     next_switch_s: f64,
-    /// Number of the tooth's present passing through the engagement arc, or of its next one while it is outside,
-    /// counted by the spindle angle.
+    /// Number of the tooth's present passing through the engagement arc, or of its next one while it is outside; one
+    /// per revolution.
     pass: f64,
     windows: MaterialWindows,
     in_material: bool,
-    /// True while the edge cuts or touches the surface; otherwise the surface of the earlier passing persists.
+    /// True if the edge of the tooth in the arc counts as in contact with the surface in front; otherwise that surface
+    /// persists. Unchanged while the tooth is outside the arc.
     at_surface: bool,
-    /// Time of the tooth's last change of contact, s; a second change at the same time shows that it can neither keep
-    /// nor lose contact.
+    /// Time of the last [`Contact::change`] of the tooth, s; −∞ before the first.
     changed_s: f64,
     surface: Surface,
-    /// Kinks of the machined surface in front of the tooth, where a derivative of its height over time is
-    /// discontinuous: time at which the tooth meets each kink, s, and order of that derivative.
+    /// Kinks of the machined surface in front of the tooth that it has not yet met, in the order of time: time at which
+    /// the tooth meets the kink, s, and order of the lowest derivative of the surface's height over time that is
+    /// discontinuous there.
     kinks: VecDeque<(f64, u8)>,
 }
 
-/// Chip thickness of one tooth at its present immersion angle.
+/// Chip thickness of one tooth at one instant.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Chip {
-    /// Chip thickness, m: distance from the surface in front to the edge; negative out of contact.
+    /// Chip thickness, m: distance from the surface in front to the edge, negative if the edge does not reach it; with
+    /// [`Regeneration::None`] that of feed and runout.
     pub(super) thickness_m: f64,
     immersion: Immersion,
 }
@@ -131,7 +133,8 @@ impl<'a> Contact<'a> {
         self.within = [from_s + inset, to_s - inset];
     }
 
-    /// Cutting force of all teeth on the tool, N, at the time `t`, s, and displacement `x`, m; without process damping.
+    /// Cutting force of all teeth on the tool, N, at the time `t`, s, and displacement `x`, m; with wear, without
+    /// process damping.
     pub(super) fn force_n(&self, t: f64, x: [f64; 3]) -> [f64; 3] {
         let cutter = &self.cutting.cutter;
         let depth_m = self.depth_m(t, x);
@@ -158,8 +161,8 @@ impl<'a> Contact<'a> {
         let depth_m = self.depth_m(t, x);
         let mut sum = [[0.0; 3]; 3];
         for tooth in self.cutting_teeth() {
-            // The whole flank force, which acts along the chip thickness, is taken with the radial fraction of the
-            // axial depth.
+            // The radial factor on the axial depth is taken for the whole flank force, its tangential friction
+            // included.
             let depth_m = depth_m * self.shares(tooth, t)[1];
             let damping = cutter
                 .force
@@ -180,7 +183,7 @@ impl<'a> Contact<'a> {
         }
     }
 
-    /// The teeth that are in contact with material and cut.
+    /// The teeth that have material in front of them and are in contact.
     fn cutting_teeth(&self) -> impl Iterator<Item = &Tooth> {
         let teeth = self.cutting.cutter.teeth.iter().zip(&self.teeth);
         teeth
@@ -188,7 +191,7 @@ impl<'a> Contact<'a> {
             .map(|(tooth, _)| tooth)
     }
 
-    /// Axial depth of cut at the time `t`, m.
+    /// Axial depth of cut, m, at the time `t` and displacement `x`.
     fn depth_m(&self, t: f64, x: [f64; 3]) -> f64 {
         let cutter = &self.cutting.cutter;
         cutter.depth_at_m(cutter.depth_m * self.cutting.traverse.depth_share(t), x[2])
@@ -274,7 +277,7 @@ impl<'a> Contact<'a> {
         }
     }
 
-    /// Moves a tooth into or out of the engagement arc if its entry or exit lies before the time `now`, s; true if it
+    /// Moves a tooth into or out of the engagement arc if its entry or exit is not after the time `now`, s; true if it
     /// entered.
     fn switch_arc(&mut self, index: usize, now: f64) -> bool {
         let mut entered = false;
@@ -324,13 +327,11 @@ impl<'a> Contact<'a> {
     }
 
     /// Decides for each tooth that has just entered the engagement arc whether it is in contact, from the sign of its
-    /// chip thickness shortly afterwards.
+    /// chip thickness shortly afterwards. Without [`Regeneration::AllPasses`] all stay in contact.
     fn decide_contact_after_entry(&mut self, t: f64, x: [f64; 3], v: [f64; 3]) {
         if self.cutting.regeneration != Regeneration::AllPasses {
             return;
         }
-        // The time after entry must resolve the growth of the chip from zero and be short enough for linear
-        // extrapolation of the motion.
         let soon_s = CONTACT_DECIDED * self.shortest_delay_s();
         let then = std::array::from_fn(|axis| x[axis] + soon_s * v[axis]);
         self.set_step(t, t + soon_s);
@@ -342,8 +343,9 @@ impl<'a> Contact<'a> {
         }
     }
 
-    /// The first loss or regain of contact in the step from `t` to `t + h`, s, while the tool moves along
-    /// `displacement`.
+    /// The first loss or regain of contact detected in the step from `t` to `t + h`, s, while the tool moves along
+    /// `displacement`. `None` if there is none, if the tool has left the workpiece for good, and without
+    /// [`Regeneration::AllPasses`].
     pub(super) fn first_change(&self, t: f64, h: f64, displacement: &[Quartic; 3]) -> Option<Change> {
         if self.cutting.regeneration != Regeneration::AllPasses
             || self
@@ -377,8 +379,8 @@ impl<'a> Contact<'a> {
         first_below_zero(margin).map(|u| Change { tooth: index, u })
     }
 
-    /// Changes the contact of a tooth at the time `t`. False if it has already changed at this time: then the motion
-    /// can continue neither in contact nor out of contact.
+    /// Changes the contact of a tooth at the time `t`. False if its last change was at the same time; several such
+    /// changes in succession show that it can neither keep nor lose contact.
     pub(super) fn change(&mut self, index: usize, t: f64) -> bool {
         let jumps = self.cutting.cutter.force.jumps_at_contact();
         let again = (t - self.teeth[index].changed_s).abs() <= self.same_time_s * 1e-3;
@@ -392,7 +394,8 @@ impl<'a> Contact<'a> {
         !again
     }
 
-    /// Appends the accepted step from `t` to `t + h`, s, to the surfaces of all teeth in the arc.
+    /// Appends the accepted step from `t` to `t + h`, s, to the surfaces of all teeth in the arc, and removes their
+    /// pieces that are no longer needed.
     pub(super) fn record(&mut self, t: f64, h: f64, displacement: &[Quartic; 3]) {
         let forget_before = t - 1.5 * self.longest_delay_s;
         for index in 0..self.teeth.len() {
@@ -427,8 +430,8 @@ impl<'a> Contact<'a> {
         }
     }
 
-    /// Notes a kink at the time `t`, s, of the surface that tooth `index` leaves: the next tooth meets it one
-    /// regenerative delay later.
+    /// Notes a kink, at the time `t`, s, in derivative `order` of the surface that tooth `index` leaves: the next tooth
+    /// meets it one regenerative delay later. Orders from [`SMOOTH_FROM`] on are ignored.
     fn kink_behind(&mut self, index: usize, t: f64, order: u8) {
         if order >= SMOOTH_FROM {
             return;
@@ -445,8 +448,9 @@ impl<'a> Contact<'a> {
         }
     }
 
-    /// Passes on the kinks of the surface in front of tooth `index` that the tooth meets up to the time `now`, s: out
-    /// of contact to the surface behind it, in contact to the force and so to all surfaces being cut.
+    /// Removes the kinks of the surface in front of tooth `index` that the tooth meets up to the time `now`, s, and
+    /// passes on those met in the arc: out of contact to the surface that the tooth leaves, in contact with material to
+    /// the force and so to all surfaces being cut.
     fn pass_kinks(&mut self, index: usize, now: f64) {
         while let Some((when, order)) = self.teeth[index]
             .kinks

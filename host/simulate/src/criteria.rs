@@ -10,23 +10,24 @@
 /// errors. Ten times the relative tolerance of the integration, 1e-8, for a vibration as large as the feed.
 pub(crate) const CONTACT_TOLERANCE: f64 = 1e-7;
 
-/// Smallest value of [`CONTACT_TOLERANCE`] times the feed per tooth, m, for a cut without feed. Rounding of
-/// displacements up to 1 mm is 2e-19 m; the factor of 5000 is unfounded.
+/// Tolerance of contact, m, if [`CONTACT_TOLERANCE`] times the feed per tooth is smaller, as in a cut without feed.
+/// Rounding of displacements up to 1 mm is 2e-19 m; the factor of 5000 is unfounded.
 pub(crate) const CONTACT_TOLERANCE_MIN_M: f64 = 1e-15;
 
-/// Time after its entry, in tooth-passing periods, at which the chip thickness of a tooth decides whether it is in
-/// contact. Long enough for a chip that grows from zero, short enough for linear extrapolation of the motion.
+/// Time after its entry, in shortest tooth-passing periods, at which the chip thickness of a tooth decides whether it
+/// is in contact. Long enough for a chip that grows from zero, short enough for linear extrapolation of the motion.
 /// Unfounded.
 pub(crate) const CONTACT_DECIDED: f64 = 1e-4;
 
 /// Largest number of repeated changes of contact without an integration step between them; more end the run with an
-/// error. A tooth that can keep or lose contact needs none. Unfounded.
+/// error. Changes of regime are counted too. A tooth that can keep or lose contact needs none. Unfounded.
 pub(crate) const REPEATED_CONTACT_CHANGES_MAX: u32 = 3;
 
 // Regimes of restoring forces
 
-/// Largest number of changes of regime without an integration step between them; more end the run with an error. A
-/// consistent regime of a few restoring forces needs one change each. Unfounded.
+/// Largest number of changes of regime without an integration step between them; more end the run with an error.
+/// Repeated changes of contact are counted too. A consistent regime of a few restoring forces needs one change each.
+/// Unfounded.
 pub(crate) const REGIME_CHANGES_MAX: u32 = 10 * REPEATED_CONTACT_CHANGES_MAX;
 
 // Motion
@@ -43,6 +44,6 @@ pub(crate) const LARGEST_DISPLACEMENT_M: f64 = 0.1;
 
 // Recorded tachometer
 
-/// Smallest pitch of a tachometer wheel, in samples: two for the rise of an edge, two for its fall, and one for each
+/// Smallest pitch of a tachometer wheel, in samples: two for the rise of a pulse, two for its fall, and one for each
 /// level between them.
 pub(crate) const SAMPLES_PER_PITCH_MIN: f64 = 6.0;

@@ -4,7 +4,7 @@ use super::pores::Pores;
 use super::workpiece_traverse::WorkpieceTraverse;
 use quietcut_model::{Cutter, Spindle};
 
-/// The cutting process of one simulated cut: cutter, spindle, traverse of the workpiece and regeneration.
+/// The cutting process of one simulated cut: cutter, spindle, traverse of the workpiece, regeneration and pores.
 #[derive(Clone, Debug)]
 pub struct Cutting {
     /// Geometry of the teeth, engagement and cutting force law of the tool.
@@ -26,10 +26,9 @@ pub enum Regeneration {
     /// All earlier tooth passings (multiple regeneration): a tooth that does not reach the surface they left has no
     /// force (thesis eqs 6.20 to 6.27).
     AllPasses,
-    /// The last tooth passing only; a negative chip thickness gives a negative force. This is the linear delay model of
-    /// stability charts.
+    /// The last tooth passing only; every tooth in material counts as in contact, even where its chip thickness is
+    /// negative. This is the delay model of stability charts.
     LastPass,
-    /// No vibration at all: the chip thickness is that of feed and runout. The motion is the forced vibration, to which
-    /// a stable cut converges.
+    /// No vibration at all: the chip thickness is that of feed and runout.
     None,
 }

@@ -25,7 +25,7 @@ pub struct Motion {
     /// Acceleration of the tool or at the sensor, m/s²; `None` if a step of the force makes the velocity jump, see
     /// [`super::Dynamics::velocity_jumps`].
     pub acceleration_m_per_s2: Option<[f64; 3]>,
-    /// Force on the tool, N: cutting force plus external excitation.
+    /// Force on the tool, N: cutting force plus external excitation, without restoring forces.
     pub force_n: [f64; 3],
 }
 

@@ -5,7 +5,7 @@ use quietcut_model::ModelError;
 /// A simulation that cannot be set up or cannot continue.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SimulateError {
-    /// The equation of motion cannot be assembled.
+    /// The machine model cannot be assembled: see [`ModelError`].
     #[error(transparent)]
     Model(#[from] ModelError),
     /// The tool diameter is missing, which entry through a face of the workpiece and porous material require.
@@ -25,7 +25,7 @@ pub enum SimulateError {
         /// Largest state of the structure, converted into a displacement of the tool, mm.
         displacement_mm: f64,
     },
-    /// The integration took more steps than [`super::Settings::steps_max`].
+    /// The integration took more steps, accepted and rejected, than [`super::Settings::steps_max`].
     #[error(
         "at {time_s:.6} s {steps} steps were taken, and no more are allowed: the equations are too stiff"
     )]
@@ -45,7 +45,7 @@ pub enum SimulateError {
         /// Number of the tooth, from 1.
         tooth: usize,
     },
-    /// A restoring force without a consistent regime, such as two friction forces that act against each other.
+    /// Restoring forces without a consistent regime, such as two friction forces that act against each other.
     #[error(
         "at {time_s:.6} s no regime of the restoring forces (friction, backlash) is consistent with the motion: two of them act against each other"
     )]

@@ -15,11 +15,11 @@ use quietcut_numerics::dormand_prince::{DormandPrince, Quartic, at};
 pub struct Statistics {
     /// Accepted steps.
     pub steps: u64,
-    /// Number of integration steps rejected because their error exceeded the tolerance.
+    /// Number of integration steps rejected because their error was not within the tolerance.
     pub rejected: u64,
-    /// Number of times that a tooth lost or regained contact.
+    /// Number of times that a tooth lost or regained contact within the engagement arc.
     pub contact_changes: u64,
-    /// Number of times that a restoring force changed its regime, such as from stick to slip.
+    /// Number of times that a regime of a restoring force, such as stick or slip, ended.
     pub regime_changes: u64,
 }
 
@@ -33,11 +33,11 @@ pub(super) struct Integrator<'a> {
     y: Vec<f64>,
     quartics: Vec<Quartic>,
     displacement: [Quartic; 3],
-    /// Length of the next integration step, s, unless a stop, an event or a rejection shortens it.
+    /// Planned length of the next integration step, s.
     next_h: f64,
     statistics: Statistics,
     workspace: Workspace,
-    /// The regime of each restoring force of the model, such as stick or slip.
+    /// The regime of each restoring force, such as stick or slip, in the order of [`Model::restoring_forces`].
     regimes: Vec<Regime>,
     /// Start and end of the integration step that is evaluated, s, moved inwards by a rounding margin.
     within: [f64; 2],
@@ -85,7 +85,7 @@ impl<'a> Integrator<'a> {
         }
     }
 
-    /// Integrates to the time `end_s`, s; `observe` receives every integration step in the order of time.
+    /// Integrates to the time `end_s`, s; `observe` receives every accepted step in the order of time.
     pub(super) fn run(
         mut self,
         end_s: f64,
@@ -156,7 +156,8 @@ impl<'a> Integrator<'a> {
         Ok(())
     }
 
-    /// The regime of a restoring force at the current time; an axis that begins to stick gets zero velocity.
+    /// The regime of a restoring force from the current time on. If it is locked, the velocity along its axis is set to
+    /// zero.
     fn next_regime(&mut self, index: usize, before: Option<Regime>) -> Regime {
         let restoring_force = &self.model.restoring_forces[index];
         let (at, state_range) = (self.at(self.t, &self.y), self.state_range(index));
@@ -186,7 +187,8 @@ impl<'a> Integrator<'a> {
         from..from + restoring_forces[index].states()
     }
 
-    /// The force f_r, N, that keeps the axis of a restoring force at rest at the time `t`; 0 if it cannot stick.
+    /// The force f_r, N, that keeps the axis of a restoring force at rest at the time `t`; 0 for a restoring force
+    /// without a locked regime.
     fn holding_n(&mut self, index: usize, t: f64, y: &[f64]) -> f64 {
         let Some(axis) = self.model.restoring_forces[index].holds() else {
             return 0.0;
@@ -255,8 +257,9 @@ impl<'a> Integrator<'a> {
         }
     }
 
-    /// Attempts steps until the error is within tolerance. Returns the length, s, and the event at the end of the step,
-    /// which is not yet accepted. Length 0 means that the event is at the current time.
+    /// Attempts steps from the current time until the error is within tolerance; fails if the step would be shorter
+    /// than the rounding of the time. Returns the length, s, of the step, which is not yet accepted, and the event at
+    /// its end, if there is one. Length 0 means that the event is at the current time.
     fn step_towards(&mut self, stop_s: f64) -> Result<(f64, Option<Event>), SimulateError> {
         let mut h = self.next_h;
         let is_held = self.is_held();
@@ -268,8 +271,8 @@ impl<'a> Integrator<'a> {
             let error = self.attempt(h);
             if error <= 1.0 {
                 let grown = h * (0.9 * error.max(1e-8).powf(-0.2)).clamp(0.2, 5.0);
-                // If a step was shortened only to end at a stop (a time at which the right-hand side is not smooth),
-                // the next step keeps the length planned before.
+                // If the step was shortened, but not by a rejection, the next step is planned at least as long as this
+                // one was, before the limits below.
                 self.next_h = if h < self.next_h {
                     grown.max(self.next_h)
                 } else {
@@ -301,12 +304,12 @@ impl<'a> Integrator<'a> {
         if shorter <= self.rounding_s() {
             return Ok((0.0, Some(event)));
         }
-        // The error of the shortened step needs no test: it is at most that of the longer step, which was acceptable.
+        // The error of the shortened step is not tested: that of the longer step was acceptable.
         self.attempt(shorter);
         Ok((shorter, Some(event)))
     }
 
-    /// The first event within the last attempted integration step of length `h`, s.
+    /// The first event detected within the last attempted integration step of length `h`, s; `None` if there is none.
     fn first_event(&mut self, h: f64) -> Option<Event> {
         let contact = self
             .contact
@@ -419,7 +422,7 @@ impl<'a> Integrator<'a> {
         contact.switch(self.t, x, v);
     }
 
-    /// The next time, s, at which the right-hand side is not smooth, or the end of the run.
+    /// The next time known in advance, s, at which the right-hand side is not smooth, at most `end_s`.
     fn next_stop(&self, end_s: f64) -> f64 {
         let contact = self
             .contact
@@ -440,7 +443,7 @@ impl<'a> Integrator<'a> {
     }
 
     /// The longest step while the tool is at rest or friction sticks, s. The motion has then no error that would
-    /// shorten the step, so the excitation force limits it.
+    /// shorten the step, so the excitation force limits it; infinite without one.
     fn longest_step_at_rest(&self) -> f64 {
         let drive = self.model.drive.as_ref();
         drive.map_or(f64::INFINITY, |drive| drive.longest_step_s())
@@ -451,7 +454,7 @@ impl<'a> Integrator<'a> {
         regimes.any(|(restoring_force, regime)| restoring_force.locked(*regime))
     }
 
-    /// A step of about `h`, s, chosen so that no very short step is left before `stop_s`.
+    /// Length of the step, s: `h`, or all or half of the time left to `stop_s`, so that no very short step is left.
     fn fitted(&self, h: f64, stop_s: f64) -> f64 {
         let left = stop_s - self.t;
         if h >= 0.99 * left {

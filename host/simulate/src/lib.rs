@@ -2,8 +2,8 @@
 //! that record them.
 //!
 //! The equations are those of thesis chapters 3 and 6. Entry and exit of the teeth are not smoothed: a tooth enters and
-//! leaves exactly at its angles. The chip thickness follows from the surface that all earlier tooth passings left
-//! (thesis eqs 6.20 to 6.27). A tooth that does not reach the surface has no force.
+//! leaves exactly at its angles. In a [`VirtualCut`] the chip thickness follows from the surface that all earlier tooth
+//! passings left (thesis eqs 6.20 to 6.27), and a tooth that does not reach the surface has no force.
 //!
 //! Main types: [`VirtualCut`] describes a cut of a case, [`Model`] is its equation of motion, [`DenseStep`] the motion
 //! over one step with dense output, [`rig::Rig`] a test with shaker, hammer or free decay, [`Recorder`] the recording

@@ -21,7 +21,8 @@ pub struct Model {
     pub restoring_forces: Vec<Box<dyn RestoringForce>>,
 }
 
-/// Quantities that are fixed during one integration step: contact of the teeth and regimes of the restoring forces.
+/// Quantities that are fixed during one integration step: contact of the teeth, limits of the step, and regimes of the
+/// restoring forces.
 #[derive(Clone, Copy)]
 pub(super) struct StepContext<'a> {
     pub(super) contact: Option<&'a Contact<'a>>,
@@ -72,8 +73,8 @@ impl Model {
         let jump = self.dynamics.velocity_per_force();
         let jump = Matrix3::from_fn(|i, j| jump[i][j]);
         let free = Vector3::from(force) - damping * v;
-        // D C B, by which the damping force reacts on the velocity that the force causes, is small compared with 1: the
-        // matrix I + D C B is regular.
+        // D C B, by which the damping force reacts on the velocity that the force causes, is small compared with 1, so
+        // that I + D C B has an inverse; without one, C B F is left out.
         (Matrix3::identity() + damping * jump)
             .lu()
             .solve(&free)

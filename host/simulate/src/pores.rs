@@ -6,11 +6,11 @@ use quietcut_model::spindle::Spindle;
 /// A random foam whose pores are columns along the tool axis.
 ///
 /// Each node of a square lattice in the plane of feed and normal is solid or a pore at random. Between nodes the solid
-/// fraction s is interpolated twice differentiably. A tooth cuts the fraction s of its axial depth, so its force is s
-/// times the force in solid material; the surface that it leaves is the same. The tangential, radial and axial cutting
-/// pressures vary independently by ± `strength` from node to node. The tool feeds between two tooth passings, so that
-/// the force has a broad spectrum between the harmonics of the tooth-passing frequency, and its three components are
-/// not proportional (thesis section 7.2.1).
+/// fraction s is interpolated twice differentiably. A tooth cuts the fraction s of its axial depth, so each component
+/// of its force is s times that in solid material; the surface that it leaves is the same. The tangential, radial and
+/// axial cutting pressures also vary independently by ± `strength` from node to node. The tool feeds between two tooth
+/// passings, so that the force has a broad spectrum between the harmonics of the tooth-passing frequency, and its three
+/// components are not proportional (thesis section 7.2.1).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pores {
     /// Probability that a lattice node is a pore, 0 to 1.
@@ -65,7 +65,7 @@ impl Pores {
     }
 }
 
-/// A point between four lattice nodes: the lower left node and the interpolation weights of the upper and right ones.
+/// A point between four lattice nodes: the lower left node and the interpolation weights of the right and upper ones.
 struct LatticeCell {
     nodes: (i64, i64),
     weights: (f64, f64),
@@ -92,7 +92,7 @@ fn smooth(u: f64) -> f64 {
     u * u * u * (10.0 + u * (6.0 * u - 15.0))
 }
 
-/// The finalizer of SplitMix64 (Steele, Lea and Flood, 2014): each input bit flips half of the output bits on average.
+/// One step of SplitMix64 (Steele, Lea and Flood, 2014): the increment, then the mixing of the bits.
 fn hashed(bits: u64) -> u64 {
     let mut z = bits.wrapping_add(0x9e37_79b9_7f4a_7c15);
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);

@@ -8,8 +8,8 @@ use super::effect::Pickup;
 use super::section_filter::SectionFilter;
 use quietcut_recording::Quantity;
 
-/// Number of intervals per sample in which the dynamics of a sensor are integrated. A choice: the parabola through a
-/// tone of a fifth of the sampling rate then has an error of 2·10⁻⁴, most of which cancels in the integral.
+/// Least number of intervals per sample in which the dynamics of a sensor are integrated. A choice: the parabola
+/// through a tone of a fifth of the sampling rate then has an error of 2·10⁻⁴, most of which cancels in the integral.
 const INTERVALS_PER_SAMPLE: f64 = 4.0;
 
 /// Samples of one channel, collected while the motion is integrated.
@@ -24,8 +24,8 @@ pub struct Reading {
     is_mean: bool,
     /// Dynamics of the sensor along the motion; `None` for a sensor without dynamics, and before the first step.
     filter: Option<SectionFilter<1>>,
-    /// Samples of the channel. If `is_mean`: velocities half a sampling interval before each sample, and half an
-    /// interval after the last.
+    /// Samples taken so far, in the order of time. If `is_mean`: velocities half a sampling interval before each
+    /// sample, and half an interval after the last.
     values: Vec<f64>,
 }
 
@@ -77,7 +77,8 @@ impl Reading {
         self.filtered(step.to_s(), step);
     }
 
-    /// Reading of a sensor with dynamics at the time `t`, s, within the step; `None` for a sensor without dynamics.
+    /// Integrates the dynamics of the sensor to the time `t`, s, within the step, and returns the reading; `None` for a
+    /// sensor without dynamics.
     fn filtered(&mut self, t: f64, step: &DenseStep<'_>) -> Option<f64> {
         let mut filter = self.filter.take()?;
         let from_s = filter.until_s;

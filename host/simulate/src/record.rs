@@ -17,7 +17,8 @@ use quietcut_recording::{Channel, Quantity, RecordedChannel, RecordedCut, Record
 /// Model of the data acquisition that records the motion of the tool.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Recorder {
-    /// The digital accelerometer with its bandwidth, range, noise, 16-bit resolution and clock error.
+    /// The digital accelerometer with its bandwidth, range, noise, 16-bit resolution and clock error; other quantities
+    /// are sampled ideally.
     Sensor {
         /// Sensor model.
         accelerometer: Accelerometer,
@@ -36,7 +37,7 @@ pub enum Recorder {
         /// Sampling rate, Hz.
         rate_hz: f64,
         /// Rate at which the simulated motion is evaluated before the filter, divided by the sampling rate of the
-        /// recording.
+        /// recording. With 0 or 1 there is no filter.
         oversampling: usize,
     },
 }
@@ -61,8 +62,8 @@ impl VirtualCut {
     /// Simulates the cut and records the [measured](Self::measured) quantities along those of x, y and z that the
     /// structure has, and the tachometer. `path` is the path of the recording's file.
     ///
-    /// The time base is the true time, so that a sensor with a clock error has its true sampling rate. Forces and
-    /// displacements are sampled at the same instants as the acceleration.
+    /// The time base is the true time, so that a sensor with a clock error has its true sampling rate. Forces,
+    /// displacements and velocities are sampled at the same instants as the acceleration.
     ///
     /// # Errors
     /// As [`VirtualCut::sense`]; also a tachometer wheel too fine for the sampling rate.
@@ -136,7 +137,8 @@ impl VirtualCut {
         Ok((recording, statistics))
     }
 
-    /// The pickups of a virtual cut's response channels, ordered by quantity and direction.
+    /// The pickups of a virtual cut's response channels: for each quantity in the order of `measured`, along x, y and
+    /// z.
     fn pickups(&self, case: &Case) -> Result<Vec<Pickup>, VirtualCutError> {
         let directions = &case.structure()?.directions;
         let effects = Effects::of_case(case)?.and(&self.effects);
@@ -189,8 +191,7 @@ impl VirtualCut {
         seed: Option<u64>,
     ) -> Result<Vec<f64>, VirtualCutError> {
         let [pitch_s, _] = spindle.bounds_s(TAU / f64::from(tachometer.wheel.positions));
-        // Shortest pitch of the wheel, s, that the sampling resolves: two samples for the rise, two for the fall, and
-        // one for each level between them.
+        // Shortest pitch period of the wheel, s, that the sampling resolves.
         let least = SAMPLES_PER_PITCH_MIN / rate_hz;
         if pitch_s < least {
             return Err(VirtualCutError::WheelTooFine {
@@ -225,7 +226,8 @@ impl VirtualCut {
     }
 }
 
-/// The accelerometers of a recording: one for each combination of delay, dynamics and sensor location.
+/// The accelerometers of a recording: one for each combination of delay, dynamics and sensor location; none without
+/// [`Recorder::Sensor`].
 struct Sensors {
     accelerometer: Option<(Accelerometer, u64)>,
     /// Each simulated accelerometer, with the pickup of one of the channels that read it.

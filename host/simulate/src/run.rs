@@ -8,7 +8,7 @@ use super::settings::Settings;
 use super::workpiece_traverse::WorkpieceTraverse;
 
 impl Model {
-    /// Integrates from rest at t = 0 to `end_s`, s; `observe` receives every integration step in the order of time.
+    /// Integrates from rest at t = 0 to `end_s`, s; `observe` receives every accepted step in the order of time.
     ///
     /// The local error is controlled (see [`Settings`]). Steps end where the right-hand side is not smooth: for example
     /// where a tooth enters or leaves the arc, loses or regains contact, meets a kink of the surface from one of these
@@ -47,8 +47,8 @@ impl Model {
         Integrator::new(self, settings, y).run(end_s, observe)
     }
 
-    /// Motion at the times `first_s` + k·`every_s` up to `end_s`, s, from the initial states `y`; otherwise as
-    /// [`Self::run_from`].
+    /// Motion at the times `first_s` + k·`every_s` up to `end_s`, s, in the order of k, from the initial states `y`;
+    /// otherwise as [`Self::run_from`]. `first_s` is at least 0, `every_s` positive.
     ///
     /// # Errors
     /// As [`Self::run`].

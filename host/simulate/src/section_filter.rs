@@ -5,12 +5,12 @@ use super::effect::FirstOrderSection;
 /// Readings of a sensor with dynamics: N signals that each pass the same first-order sections in series.
 ///
 /// A section H(s) = (b₀ + b₁·s)/(1 + T·s) has one state w, T·ẇ = x − w, and the output y = (b₁/T)·x + (b₀ − b₁/T)·w.
-/// Over a short interval the input x is a parabola through its values at the ends and in the middle, for which ẇ is
-/// integrated exactly.
+/// Over a short interval the input x is taken as the parabola through its values at the ends and in the middle, for
+/// which ẇ is integrated exactly.
 #[derive(Clone, Debug)]
 pub(crate) struct SectionFilter<const N: usize> {
     sections: Vec<FirstOrderSection>,
-    /// By section: the states of the signals.
+    /// By section: the state of each signal.
     states: Vec<[f64; N]>,
     /// Time up to which the states are integrated, s.
     pub(crate) until_s: f64,
@@ -35,7 +35,8 @@ impl<const N: usize> SectionFilter<N> {
         }
     }
 
-    /// The output after an interval of `duration_s`, s, in which the input has the values `start`, `middle` and `end`.
+    /// Integrates over an interval of `duration_s`, s, in which the input has the values `start`, `middle` and `end`;
+    /// returns the output at the end.
     pub(crate) fn pass(&mut self, duration_s: f64, [start, middle, end]: [[f64; N]; 3]) -> [f64; N] {
         self.until_s += duration_s;
         std::array::from_fn(|signal| {
@@ -48,7 +49,8 @@ impl<const N: usize> SectionFilter<N> {
     }
 }
 
-/// Input `x` and returned output at start, middle and end of an interval of `duration_s`, s; `w` is the state.
+/// Input `x` and returned output at start, middle and end of an interval of `duration_s`, s; `w` is the state,
+/// integrated to the end. Without a positive duration it stays.
 fn pass(section: &FirstOrderSection, w: &mut f64, duration_s: f64, x: [f64; 3]) -> [f64; 3] {
     let feedthrough = section.derivative_s / section.time_constant_s;
     let output = |x: f64, w: f64| feedthrough * x + (section.static_gain - feedthrough) * w;

@@ -95,7 +95,8 @@ pub struct Sampler {
     delay_s: f64,
     filter: [f64; 2 * TAPS_PER_SIDE + 1],
     workspace: Workspace,
-    /// Number of tool velocities evaluated so far. Velocity k belongs to the time (k − ½)·`step_s` − `delay_s`.
+    /// Number of velocities of tool or sensor location taken so far. Velocity k belongs to the time (k − ½)·`step_s` −
+    /// `delay_s`.
     taken: usize,
     velocity: [f64; 3],
     /// First-order sections in front of the accelerometer, which filter the velocity; `None` if there are none.
@@ -146,7 +147,7 @@ impl Sampler {
     }
 
     /// Time that the simulation must continue after the last sample, s, apart from the sensor's delay: half the length
-    /// of the anti-aliasing filter.
+    /// of the anti-aliasing filter, rounded up to oversampled intervals.
     pub fn tail_s(&self) -> f64 {
         (TAPS_PER_SIDE + 1) as f64 * self.step_s
     }

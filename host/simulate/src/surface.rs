@@ -9,8 +9,8 @@ use quietcut_numerics::dormand_prince::{Quartic, at};
 /// equidistant nodes give a polynomial of degree 5, the order of the integrator.
 pub(super) const SURFACE_NODES: [f64; 6] = [0.0, 0.2, 0.4, 0.6, 0.8, 1.0];
 
-/// The machined surface that one tooth left during at least the last 1.5 longest regenerative delays, as a function of
-/// the time at which the tooth passed.
+/// The machined surface that one tooth left in its engagement arc during at least the last 1.5 longest regenerative
+/// delays, as a function of the time at which the tooth passed.
 ///
 /// Heights of the surface, m, are along the chip thickness as in [`Cutter::reach_m`], in the frame that feeds with the
 /// tool.

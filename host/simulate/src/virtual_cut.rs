@@ -65,21 +65,21 @@ pub enum VirtualCutError {
     /// The equation of motion cannot be assembled.
     #[error(transparent)]
     Model(#[from] ModelError),
-    /// The time integration failed.
+    /// The simulation cannot be set up or cannot continue.
     #[error(transparent)]
     Simulate(#[from] SimulateError),
-    /// Tachometer pulses too short for the sampling rate.
+    /// A tachometer wheel whose shortest pitch period is below six sampling intervals.
     #[error(
         "a tachometer wheel with {positions} positions at {spindle_rpm} rev/min is too fine for {rate_hz:.0} samples per second: at least {needed_hz:.0} Hz are needed"
     )]
     WheelTooFine {
         /// Positions on the wheel.
         positions: u16,
-        /// Spindle speed, rev/min.
+        /// Spindle speed at the start of the cut, rev/min.
         spindle_rpm: f64,
         /// Sampling rate, Hz.
         rate_hz: f64,
-        /// Smallest sampling rate that resolves the pulses of this tachometer wheel, Hz.
+        /// Smallest sampling rate that is not refused for this tachometer wheel, Hz.
         needed_hz: f64,
     },
     /// Wear that makes the cutting force negative within the duration of the virtual cut.
@@ -92,7 +92,7 @@ pub enum VirtualCutError {
         /// Duration of the cut, s.
         seconds: f64,
     },
-    /// A virtual cut too short to reach full engagement.
+    /// A virtual cut that is not longer than air, entry and exit together.
     #[error(
         "{seconds} s are too short: with {air_s} s of air at both ends, way in and way out take {needed_s:.2} s, so give more than that"
     )]
@@ -118,8 +118,8 @@ pub struct SensedCut {
 }
 
 impl VirtualCut {
-    /// A cut of `depth_mm` at constant speed that enters and leaves through the faces of the workpiece, with 0.2 s
-    /// without contact at each end.
+    /// A cut of `depth_mm` at constant speed that enters and leaves through the faces of the workpiece, with 0.2 s of
+    /// air cutting at each end.
     pub fn new(spindle_rpm: f64, depth_mm: f64, seconds: f64) -> Self {
         Self {
             spindle_rpm,
@@ -137,8 +137,9 @@ impl VirtualCut {
     /// The equation of motion of this cut of `case`.
     ///
     /// # Errors
-    /// The case lacks a section or has an extension that cannot be simulated, the duration is too short, wear makes the
-    /// cutting force negative, or the tool diameter is required and missing.
+    /// The case lacks a section or has an extension that cannot be simulated, tool or structure is refused, an effect
+    /// does not apply to the case, the duration is too short, wear makes the cutting force negative, or the tool
+    /// diameter is required and missing.
     pub fn model(&self, case: &Case) -> Result<Model, VirtualCutError> {
         let effects = Effects::of_case(case)?.and(&self.effects);
         let mean_rpm = self.spindle_motion().speed_rad_per_s() * 60.0 / TAU;
@@ -257,7 +258,8 @@ impl VirtualCut {
         }
     }
 
-    /// Simulates the cut and the output of accelerometer and tachometer; the same `seed` gives the same noise.
+    /// Simulates the cut and the output of accelerometer and tachometer; the same `seed` gives the same noise and
+    /// jitter.
     ///
     /// # Errors
     /// As [`Self::model`] and [`Model::run`].

@@ -59,15 +59,15 @@ impl MaterialWindows {
 }
 
 impl WorkpieceTraverse {
-    /// Time from the first contact with the front face of the workpiece to full engagement at the feed speed, s; the
-    /// exit through the end face takes as long.
+    /// Time, s, at the mean feed speed, from the instant at which the circle of the teeth touches the front face of the
+    /// workpiece to full engagement; the exit through the end face takes as long.
     ///
     /// # Errors
     /// The tool has no diameter.
     pub fn entry_duration_s(cutter: &Cutter, spindle: &Spindle) -> Result<f64, SimulateError> {
         let radius_m = cutter.radius_m.ok_or(SimulateError::NoDiameter)?;
-        // The tool is fully engaged when the last point of its engagement arc has passed the workpiece face: always one
-        // of the two ends of the arc.
+        // The tool is fully engaged when the last point of its engagement arc has passed the workpiece face: one of the
+        // two ends of an arc within 0 to 180 degrees.
         let last = cutter.start_rad.sin().min(cutter.exit_rad.sin());
         Ok(radius_m * (1.0 - last) / feed_speed(cutter, spindle))
     }
@@ -94,7 +94,8 @@ impl WorkpieceTraverse {
         }
     }
 
-    /// The first time after `t`, s, at which the rate of the axial depth is discontinuous.
+    /// The first time after `t`, s, at which the rate of the axial depth may be discontinuous; infinite if there is
+    /// none.
     pub fn next_knot(&self, t: f64) -> f64 {
         let Self::Ramp {
             start_s,
@@ -118,7 +119,7 @@ impl WorkpieceTraverse {
             .fold(f64::INFINITY, f64::min)
     }
 
-    /// True if the tool has left the workpiece for good at the time `t`, s.
+    /// True if the tool does not meet the workpiece any more from the time `t`, s, on.
     pub fn is_over(&self, t: f64, cutter: &Cutter, spindle: &Spindle) -> bool {
         match *self {
             Self::Air => true,
@@ -152,7 +153,7 @@ impl WorkpieceTraverse {
                 let sin = |t: f64| (cutter.start_rad + (spindle.angle_rad(t) - opened_rad)).sin();
                 let window = [open_s, close_s];
                 // sin φ minus (position of a face)/R is positive where the tooth is beyond that face. This difference
-                // is concave in t, since the spindle speed varies slowly compared with a tooth passing.
+                // is taken as concave in t: the spindle speed varies slowly compared with a tooth passing.
                 let behind_front = positive(|t| sin(t) - (1.0 - speed * (t - start_s)), window);
                 let behind_end = positive(|t| sin(t) - (1.0 - speed * (t - end_s)), window);
                 let [before, after] = complement(behind_end, window);
@@ -178,7 +179,8 @@ fn intersection(a: Option<[f64; 2]>, b: Option<[f64; 2]>) -> Option<[f64; 2]> {
     (both[0] < both[1]).then_some(both)
 }
 
-/// The two subintervals of `window` that lie before and after the subinterval `excluded`.
+/// The parts of `window` before and after the subinterval `excluded`, each `None` if empty; without `excluded` the
+/// whole `window` and `None`.
 fn complement(excluded: Option<[f64; 2]>, window: [f64; 2]) -> [Option<[f64; 2]>; 2] {
     match excluded {
         None => [Some(window), None],

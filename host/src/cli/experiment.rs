@@ -206,7 +206,7 @@ fn direction(options: &Experiment, structure: &Structure) -> Result<Direction, S
         .ok_or_else(|| "the structure has no direction in which a force can act".into())
 }
 
-/// Default number of periods of a multisine. A choice: some for the transient, and six for the scatter.
+/// Default number of periods of a multisine. A choice: two for the transient, and six for the scatter.
 const PERIODS: f64 = 8.0;
 
 /// Default sampling rate of a simulated vibration test in Hz: the smallest power of two of at least 20 times the

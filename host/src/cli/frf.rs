@@ -64,18 +64,19 @@ pub fn run(args: Args) -> Result<(), Error> {
 
 /// Adds a warning about the receptance whose peak aliasing (content above half the sample rate, folded into the record)
 /// may change most, if this relative change is above [`SMALL_FOLDING`]. A change above [`LARGEST_FOLDING`] is an error.
+/// Only drive points count, if the measurement has any.
 fn check_folding(measurement: &mut Measurement) -> Result<(), Error> {
-    // The peak is taken at the line with the largest |H| divided by the relative error by aliasing. |H| alone may be
-    // largest where the force spectrum almost vanishes; one term of the error is inversely proportional to that
-    // spectrum, so that the quotient is small there.
+    // The peak is taken at the line with the largest |H| divided by the relative error by aliasing, among the lines
+    // where the force causes the response. |H| alone may be largest where the force spectrum almost vanishes; one term
+    // of the error is inversely proportional to that spectrum, so that the quotient is small there.
     let at_peak = |(entry, folding): (&Frf, &Vec<f64>)| {
         let excited = |line: usize| entry.receptance[line].norm() / folding[line].max(f64::MIN_POSITIVE);
         let peak = related_lines::largest(entry, excited);
         (entry.name(), folding.get(peak).copied().unwrap_or(0.0))
     };
     let entries = measurement.table.entries();
-    // Near half the sample rate the response in a weakly coupled direction is noise of its sensor, of which this error cannot
-    // tell what folds: drive points decide, where there are any.
+    // Near half the sample rate the response in a weakly coupled direction may be noise of its sensor. The error by
+    // aliasing does not tell how much of this noise folds.
     let has_drive_point = entries.iter().any(|entry| entry.response == entry.force);
     let worst = entries
         .iter()

@@ -387,7 +387,7 @@ fn resolution_as_text(chart: &Chart, resolution: &Resolution) -> String {
     text
 }
 
-/// Stability chart of a case with what is shown beside it in a file.
+/// Stability chart of a case, with the trial cuts and assumptions that its files may show.
 struct ShownChart<'a> {
     case: &'a Case,
     chart: &'a Chart,
@@ -422,7 +422,7 @@ impl ShownChart<'_> {
 
     fn picture(&self) -> Result<String, Error> {
         let columns: Vec<Column> = self.chart.lines().into_iter().map(Column::from).collect();
-        // The chart cannot be drawn if the user gives only one spindle speed: this is an input error.
+        // The chart cannot be drawn from only one spindle speed or without a depth: this is an input error.
         let title = format!("{}, method: {}", self.case.name, self.chart.label);
         lobe_chart(&title, &columns, self.depth_mm, &self.marks).map_err(Error::input)
     }

@@ -172,7 +172,8 @@ impl MethodChoice {
         Ok(())
     }
 
-    /// Sentences that state the assumptions behind the structure: those of the case, or with `--frf` those of the table.
+    /// Sentences that state the assumptions behind the structure: those of the case, or with `--frf` those of the
+    /// table.
     ///
     /// # Errors
     /// The table of `--frf` cannot be read.

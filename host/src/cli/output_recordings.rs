@@ -25,10 +25,10 @@ impl OutputRecordings {
         Self { first, copies }
     }
 
-    /// Writes the recording and its sidecar to every file.
+    /// Writes the recording to every file, each with a sidecar beside it.
     ///
     /// # Errors
-    /// A file cannot be written.
+    /// As [`Recording::write`], for the first file that fails.
     pub(super) fn write(&self, recording: &Recording) -> Result<(), Error> {
         for path in std::iter::once(&self.first).chain(&self.copies) {
             recording.write(path)?;

@@ -101,7 +101,7 @@ struct Tests {
     standstill_damping_percent: f64,
 }
 
-/// A plan, and what the speed limits of the spindle mean for it.
+/// A plan, with the assumptions behind it and the speeds that it leaves out.
 #[derive(Serialize)]
 struct PlanOutput<'a> {
     #[serde(flatten)]
@@ -174,7 +174,8 @@ fn leave_out_impossible(case: &Case, request: &mut Request) -> Result<Vec<f64>, 
     Ok(impossible)
 }
 
-/// Text about the speeds that the spindle cannot run at, and about limits that the case does not state.
+/// Text about the speeds outside the limits of the spindle, or about limits that the case does not state; empty if
+/// there is neither.
 fn about_speeds(case: &Case, outside_limits_rpm: &[f64]) -> String {
     match case.limits {
         None => {

@@ -99,7 +99,7 @@ pub fn run(args: Args) -> Result<(), Error> {
         Some(port) => on_device(&args, port, &sensed, table.as_deref())?,
         None => on_host(&args, &sensed, table.as_deref())?,
     };
-    // A device without --table uses a table of its own, which may have limits.
+    // Without --table a device uses the table that it holds, if any, and this table may have limits.
     let knows_table = args.port.is_none() || table.is_some();
     if knows_table && !has_speed_limits(&sensed, table.as_deref()) {
         log.assume_every_speed();

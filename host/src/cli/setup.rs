@@ -188,8 +188,9 @@ struct Question {
 }
 
 impl Given {
-    /// These answers of the user; each that is missing here is taken from `other`. Answers about the material are not
-    /// mixed, and neither are those about the immersion: `other` gives them only if these answers have none.
+    /// These answers of the user; each that is missing here is taken from `other`. `other` gives no answer about the
+    /// material if these answers have its class or its tangential coefficient, and none about the immersion if these
+    /// have one.
     fn or(self, other: Self) -> Self {
         let has_material = self.material.is_some() || self.ktc_mpa.is_some();
         let has_cut = self.down_milling_mm.is_some() || self.up_milling_mm.is_some() || self.slot;

@@ -10,11 +10,14 @@ use crate::report::answer::VerdictLog;
 /// Head of a new table of tried cuts.
 const HEAD: &str = "rpm [rev/min],depth [mm],outcome,chatter [Hz]";
 
-/// Adds the outcome of a recorded cut to the table of tried cuts at `table`, which is made if there is none: `chatter` with
-/// the first chatter frequency, or `stable` if the tool cut without chatter. Speed and depth are those of the sidecar.
+/// Adds the outcome of a recorded cut to the table of tried cuts at `table`, which is made if there is none: `chatter`
+/// if the log has a verdict of chatter, otherwise `stable`. Speed and depth are those of the sidecar. The chatter
+/// frequency is that of the first verdict of chatter; it is left empty if unknown, and left out under a head without
+/// its column.
 ///
 /// # Errors
-/// The sidecar does not state speed or depth, the log has no verdict on a cut, or the table has another head.
+/// The sidecar does not state speed or depth, the log has no verdict on a cut, the table cannot be read or written, is
+/// no valid table of tried cuts, or has another head than [`HEAD`] with or without its last column.
 pub(super) fn add(table: &Path, recording: &Path, sidecar: &Sidecar, log: &VerdictLog) -> Result<(), Error> {
     let of_cut = sidecar.cut.unwrap_or_default();
     let (Some(rpm), Some(depth_mm)) = (of_cut.spindle_rpm, of_cut.axial_depth_mm) else {

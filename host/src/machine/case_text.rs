@@ -124,7 +124,7 @@ pub enum Section {
 }
 
 impl Section {
-    /// All sections, in the order in which a case file has them.
+    /// All sections, in the order in which [`case_text`] writes them.
     pub const ALL: [Self; 4] = [Self::Tool, Self::Material, Self::Cut, Self::Limits];
 
     /// Name of the section in a case file.
@@ -138,7 +138,8 @@ impl Section {
     }
 }
 
-/// Text of some sections of a case file from the answers of the user, to be appended to a case that lacks them.
+/// Text of the given sections of a case file, in their order, from the answers of the user; it is appended to a case
+/// that lacks them.
 pub fn section_text(answers: &Answers, sections: &[Section]) -> String {
     let mut text = String::new();
     for section in sections {

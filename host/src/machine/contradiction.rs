@@ -9,25 +9,27 @@ use crate::trial_cuts::{Call, Outcome, TrialCut, call};
 /// Share of the drawn machines whose first limit lies below the 5 % percentile, and of those above the 95 % percentile.
 const OUTSIDE: f64 = 0.05;
 
-/// Number of equal steps in axial depth at which Floquet multipliers are computed at the speed of a tried cut.
+/// Number of equal steps in axial depth at the speed of a tried cut, as [`Method::line`] takes it.
 const SAMPLES: usize = 60;
 
-/// Tried cuts whose outcomes the limits of a case do not allow, although they have an interval.
+/// Tried cuts that contradict the limits of a case: more of them than chance explains.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Contradiction {
-    /// Number of tried cuts that were stable or chattered.
+    /// Number of all compared cuts: the tried cuts that were stable or chattered, but not the marginal ones.
     pub(super) cuts: usize,
-    /// Tried cuts that contradict the limit, each with the limit: `9000 rev/min, 3.2 mm: stable, limit 2.44 mm`.
+    /// Tried cuts that contradict the limit, in the order of the table, each with the limit:
+    /// `9000 rev/min, 3.20 mm: stable, limit 2.44 mm`.
     pub(super) contradicted: Vec<String>,
 }
 
 /// Compares the outcomes of tried cuts with the limits of a case. `None` if no more cuts contradict them than chance
-/// allows, or if the limits cannot be computed.
+/// explains, or if the stability method refuses the case.
 ///
-/// A cut contradicts the limit at its speed if it chattered at a depth below the 5 % percentile of the first limit, or
-/// was stable above the 95 % percentile, by more than [`CONTRADICTED_BEYOND`] of the depth. If the case is right, this
-/// happens to a cut with at most the probability p = 5 %, and to k or more of n cuts with the tail probability of the
-/// binomial distribution, which must be below [`CONTRADICTION_BY_CHANCE`].
+/// A cut contradicts the limit at its speed if the case predicts the other outcome, and if the cut chattered at a depth
+/// below the 5 % percentile of the first limit, or was stable above the 95 % percentile, by more than
+/// [`CONTRADICTED_BEYOND`]. A cut whose limit cannot be computed does not contradict it. If the case is right, a cut
+/// contradicts the limit with a probability of at most 5 %, and k or more of n independent cuts do with at most the
+/// tail probability of the binomial distribution; `Some` if this is below [`CONTRADICTION_BY_CHANCE`].
 pub(super) fn contradiction(case: &Case, cuts: &[TrialCut]) -> Option<Contradiction> {
     let method_of = |case: &Case| collocation_of(case).map_err(|error| error.to_string());
     let method = method_of(case).ok()?;
@@ -44,9 +46,10 @@ pub(super) fn contradiction(case: &Case, cuts: &[TrialCut]) -> Option<Contradict
     (tail(cuts, contradicted.len()) < CONTRADICTION_BY_CHANCE).then_some(Contradiction { cuts, contradicted })
 }
 
-/// The cut and the limit that it contradicts, in words; `None` if it does not, or if the limit cannot be computed.
+/// The cut and the limit that it contradicts, in words; `None` if it contradicts none, or if the limit or its interval
+/// cannot be computed.
 fn against(method: &dyn Method, uncertainty: Option<&Uncertainty<'_>>, cut: &TrialCut) -> Option<String> {
-    // The first limit is needed up to where a stable cut would contradict it, and beyond a cut with chatter.
+    // Limits at larger depths than that of the cut are needed too: a cut with chatter contradicts them.
     let deepest_mm = 2.0 * cut.depth_mm;
     let line = method.line(cut.rpm, deepest_mm, SAMPLES).ok()?;
     if !call(std::slice::from_ref(&line), cut).is_wrong() {
@@ -73,8 +76,8 @@ fn against(method: &dyn Method, uncertainty: Option<&Uncertainty<'_>>, cut: &Tri
     })
 }
 
-/// The 5 % and the 95 % percentile of the first limit, mm; the limit itself twice for a case without standard
-/// deviations. Beyond the last depth the value is infinite.
+/// The 5 % and the 95 % percentile of the first limit, mm; the limit of the case itself twice without `uncertainty`. A
+/// value beyond the depth `deepest_mm` is infinite. `None` if the percentiles cannot be computed.
 fn interval(uncertainty: Option<&Uncertainty<'_>>, line: &SpeedLine, deepest_mm: f64) -> Option<[f64; 2]> {
     let beyond = |depth_mm: Option<f64>| depth_mm.unwrap_or(f64::INFINITY);
     match uncertainty {
@@ -87,7 +90,8 @@ fn interval(uncertainty: Option<&Uncertainty<'_>>, line: &SpeedLine, deepest_mm:
     }
 }
 
-/// Probability that `least` or more of `cuts` cuts lie outside their interval by chance.
+/// Probability that `least` or more of `cuts` independent cuts contradict their limits, if each does with the
+/// probability [`OUTSIDE`].
 fn tail(cuts: usize, least: usize) -> f64 {
     let (mut term, mut below) = ((1.0 - OUTSIDE).powf(cuts as f64), 0.0);
     for k in 0..least.min(cuts) {

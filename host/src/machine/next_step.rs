@@ -142,7 +142,8 @@ pub fn next_step(folder: &MachineFolder) -> NextStep {
     after_the_chart(folder, &step)
 }
 
-/// The next step of a machine whose chart and lobe table are newer than its case: cuts, and what they say.
+/// The next step of a machine whose chart and lobe table are not older than its case: about its cuts, the case that
+/// the diagnosis extended, or the upload of the lobe table.
 fn after_the_chart(folder: &MachineFolder, step: &dyn Fn(String, &str) -> NextStep) -> NextStep {
     let at = |name: &str| quoted(&folder.path.join(name));
     let (case, ranges) = (at("case.toml"), ranges(folder));
@@ -215,8 +216,7 @@ fn after_the_chart(folder: &MachineFolder, step: &dyn Fn(String, &str) -> NextSt
     )
 }
 
-/// Files from which modes are identified: the taps, whose recordings also tell the errors of sampling and the noise, or
-/// without taps the tables of receptances.
+/// Files from which modes are identified: the recordings of taps, or, without any, the tables of receptances.
 fn measured(folder: &MachineFolder) -> &[DatedFile] {
     if folder.taps.is_empty() {
         &folder.receptances
@@ -225,7 +225,8 @@ fn measured(folder: &MachineFolder) -> &[DatedFile] {
     }
 }
 
-/// The first recorded cut whose speed and depth, as its sidecar states them, stand in no row of the table of tried cuts.
+/// The first recorded cut whose speed and depth, as its sidecar states them, stand together in no row of the table of
+/// tried cuts. A cut whose sidecar does not state both is passed over.
 fn untried(folder: &MachineFolder) -> Option<&DatedFile> {
     let tried = tried_cuts(folder);
     folder.cuts.iter().find(|file| {
@@ -235,13 +236,15 @@ fn untried(folder: &MachineFolder) -> Option<&DatedFile> {
     })
 }
 
+/// Rows of the table of tried cuts; none if there is no table or if it cannot be read.
 fn tried_cuts(folder: &MachineFolder) -> Vec<cut_table::TrialCut> {
     let file = folder.tried.as_ref();
     file.and_then(|file| cut_table::read(&file.path).ok())
         .unwrap_or_default()
 }
 
-/// Reason to tap again: the tried cuts contradict the limits of the case. `None` if they do not, or if there are no taps.
+/// Reason to tap again: the tried cuts contradict the limits of the case. `None` without a case or taps, and where
+/// [`contradiction`] finds none.
 fn contradicted(folder: &MachineFolder) -> Option<String> {
     let (_, case) = folder.case.as_ref()?;
     if folder.taps.is_empty() {

@@ -87,7 +87,8 @@ pub struct VerdictLog {
     pub summary: Summary,
 }
 
-/// Summary of a sequence of reports: main verdict and counts of blocks, clipped samples and gaps.
+/// Summary of a sequence of reports: main verdict, counts of blocks, clipped samples and gaps, and an assumption of the
+/// advice.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Summary {
     /// Main verdict of a sequence of reports: the first kind of chatter that was detected; without chatter the last
@@ -102,8 +103,8 @@ pub struct Summary {
     pub clipped: u32,
     /// Number of gaps in the sequence of samples: reports that count more lost samples than the report before.
     pub gaps: u32,
-    /// True if a speed was advised and the speed limits of the spindle are not known: the advice then assumes that every
-    /// speed is possible.
+    /// True if some advice is to change the speed while the speed limits of the spindle are not known, so that the
+    /// advice assumes that every speed is possible. Only [`VerdictLog::assume_every_speed`] sets it.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub assumes_every_speed: bool,
     #[serde(skip)]
@@ -135,7 +136,8 @@ impl fmt::Display for Summary {
 }
 
 impl VerdictLog {
-    /// Notes that the speed limits of the spindle are not known; the summary says so if a speed was advised.
+    /// Notes that the speed limits of the spindle are not known; the summary says so if an entry of the log so far
+    /// advises a change of speed.
     pub fn assume_every_speed(&mut self) {
         self.summary.assumes_every_speed = self
             .verdicts

@@ -9,7 +9,8 @@ use crate::frf::{Frf, FrfTable};
 /// Width of the chart and height of each of its panels in pixels.
 const SIZE: (u32, u32) = (900, 300);
 
-/// Draws the magnitude in µm/N of each receptance that both tables have, one panel for each, as SVG.
+/// Draws the magnitude, in µm/N, of each receptance that both tables have, as SVG: one panel for each receptance, with
+/// one curve from each table.
 ///
 /// # Errors
 /// The tables have no receptance in common, or the drawing library fails.

@@ -42,7 +42,7 @@ pub struct Column {
 }
 
 impl Column {
-    /// Stability at each spindle speed from one layer of a lobe table, with the depths as the device rounds them.
+    /// Stability at each spindle speed from one layer of a lobe table, with the depths that the table stores.
     pub fn of_table(table: &LobeTable<'_>, layer: usize) -> Vec<Self> {
         let speeds = table.speeds().enumerate();
         speeds

@@ -70,9 +70,9 @@ pub(crate) const NORMAL: f64 = 1e7;
 /// element, so that 4000 elements cover three thousand vibrations; cuts that need more are refused. Unfounded.
 pub(crate) const ELEMENTS_MAX: f64 = 4000.0;
 
-/// Share of the largest depth of a scan for which the first mesh of the period is built. Each further mesh covers at least
-/// twice the depth of the one before, up to the largest depth. The share changes the computing time only, since every mesh
-/// resolves the depths it is built for; its value is unfounded.
+/// Share of the largest depth of a scan up to which the first mesh of the period is valid. Each further mesh is valid
+/// to at least twice the depth of the one before, or to the largest depth. The share is chosen for computing time,
+/// since every mesh resolves the depths it is built for; its value is unfounded.
 pub(crate) const FIRST_MESH_SHARE: f64 = 0.125;
 
 /// Largest number of instants in a revolution at which the displacement may have a kink: entries and exits of teeth,
@@ -118,13 +118,14 @@ pub(crate) const WINDING_ERRORS: [f64; 3] = [0.02, 0.1, 0.4];
 /// each line).
 pub(crate) const CHART_SAMPLES_MIN: usize = 40;
 
-/// Number of halvings of a depth interval in which multipliers cannot be followed. With 10 intervals the last one is
-/// 6e-6 of the depth range; in it the number of multipliers outside the unit circle is bisected. Unfounded.
+/// Largest number of halvings of a depth interval in which multipliers cannot be followed. With 10 intervals the
+/// shortest half is 6e-6 of the depth range; if multipliers cannot be followed there either, a crossing is found by
+/// bisection on the number of multipliers outside the unit circle. Unfounded.
 pub(crate) const LINE_LEVELS: u32 = 14;
 
-/// Least |μ| of the multipliers that are followed along the depth. The number outside the unit circle is compared at
-/// every sample, so that a smaller multiplier that crosses the circle between two samples is noticed; the value is
-/// unfounded.
+/// Least |μ|, at one end of a depth interval at least, of a multiplier that is followed along the depth. The crossings
+/// found in an interval must explain the change in the number of multipliers outside the unit circle between its ends,
+/// so that a smaller multiplier that is outside at one end only is noticed; the value is unfounded.
 pub(crate) const LINE_FOLLOWED: f64 = 0.3;
 
 /// Distance of |μ| from 1 within which Newton's method corrects a multiplier of the scan over the depth before it
@@ -137,25 +138,28 @@ pub(crate) const LINE_POLISHED: f64 = 1e-3;
 /// A pair with a larger distance is taken as two different multipliers. Unfounded.
 pub(crate) const TANGENT_MISS: f64 = 0.25;
 
-/// As [`TANGENT_MISS`], for the path of ln μ along a line. Newton's method half way confirms each pair. Unfounded;
-/// `tests/scan.rs` checks the switches of random machines.
+/// As [`TANGENT_MISS`], for the path of ln μ along a line. Newton's method half way confirms each pair that may reach
+/// the unit circle. Unfounded; `tests/scan.rs` checks the switches of random machines.
 pub(crate) const PATH_MISS: f64 = 0.25;
 
 /// Largest error in ln μ, half way between two sampled depths, of the cubic by which a multiplier is followed along the
-/// depth; the error is then subtracted. Unfounded; `tests/scan.rs` checks the switches of random machines.
+/// depth. An error up to this size is corrected by a quartic; a larger one halves the depth interval. Unfounded;
+/// `tests/scan.rs` checks the switches of random machines.
 pub(crate) const PATH_TOLERANCE: f64 = 5e-3;
 
-/// Safety factor on |d(ln μ)/dw| × (step in depth), the linear estimate of the move of ln μ. A multiplier is followed if
-/// its distance ln|μ| from the unit circle is at most this factor times that move, plus [`REACH_LEAST`]. Unfounded.
+/// Safety factor on |d(ln μ)/dw| × (step in depth), the linear estimate of the move of ln μ. A multiplier may reach the
+/// unit circle within the step if |ln|μ|| is less than this factor times that move, plus [`REACH_LEAST`]. Unfounded.
 pub(crate) const REACH_FACTOR: f64 = 3.0;
 
-/// Distance of ln|μ| from 0 within which a multiplier is followed along the depth, however small its derivative dμ/dw.
+/// Distance of ln|μ| from 0 within which a multiplier may reach the unit circle, however small its derivative dμ/dw.
 /// Unfounded.
 pub(crate) const REACH_LEAST: f64 = 0.02;
 
-/// Least distance from the unit circle that ln|μ| may reach at an extremum between two sampled depths, as a share of its
-/// second difference there over a sixteenth of the depth interval. If it comes closer, the multiplier may touch the
-/// circle, and the depth interval is halved. A parabola needs an eighth. Unfounded.
+/// Where ln|μ| comes nearest to 0 between two sampled depths without a change of sign, the share of its second
+/// difference over sixteenths of the depth interval by which it must stay away from 0, beside the error of the cubic.
+/// If it comes nearer, the multiplier may touch the unit circle, and the depth interval is halved. At an end of the
+/// interval the share is one of the initial change of ln|μ| over a sixteenth. A parabola needs an eighth, at an end a
+/// quarter. Unfounded.
 pub(crate) const TOUCHING: f64 = 0.5;
 
 // Charts between the requested speeds.

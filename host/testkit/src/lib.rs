@@ -1,7 +1,8 @@
-//! Support for tests of several crates: the project's cases, the folder of measured recordings, rates that are claimed, and
-//! the files of campaign results.
+//! Support for tests of several crates: the project's cases, the folder of measured recordings, rates that are claimed,
+//! and the files of campaign results.
 //!
-//! A dev-dependency only. It depends on `quietcut-model` and the crates below, so that these cannot use it in their tests.
+//! A dev-dependency only. It depends on `quietcut-model` and the crates below, so that these cannot use it in their
+//! tests.
 //!
 //! ```
 //! let case = quietcut_testkit::case("kuka-kr90-acetal");
@@ -24,8 +25,8 @@ pub fn tests_folder() -> PathBuf {
 
 /// Path of the file `name` in the folder of measured recordings, given by the environment variable `QUIETCUT_DATA`.
 ///
-/// A test that uses such a file has `measured` in its name and is `#[ignore]`d, so that it is skipped without the recordings; `tests/run`
-/// runs it if they are present.
+/// A test that uses such a file has `measured` in its name and is `#[ignore]`d, so that it is skipped without the
+/// recordings; `tests/run` runs it if they are present.
 ///
 /// # Panics
 /// `QUIETCUT_DATA` is not set.
@@ -47,7 +48,7 @@ pub fn case(name: &str) -> Case {
 /// The robot of the case `six-joint-robot`.
 ///
 /// # Panics
-/// The case is no robot.
+/// The case cannot be read, or its structure is not given by joints.
 pub fn robot() -> Robot {
     match case("six-joint-robot").structure.expect("a structure").form {
         Form::Joints(robot) => *robot,

@@ -2,11 +2,11 @@
 
 use quietcut_numerics::statistics::binomial_interval;
 
-/// Level of the binomial intervals: a correct claim is rejected once in a thousand slices.
+/// Level of the binomial intervals: a correct claim is rejected with a probability of at most 0.001.
 const LEVEL: f64 = 0.999;
 
-/// Asserts that a counted share agrees with the `claimed` probability: the claim lies in the 99.9 % binomial interval (Clopper–Pearson)
-/// of `hits` in `trials`.
+/// Asserts that a counted share agrees with the `claimed` probability: the claim lies in the 99.9 % binomial interval
+/// (Clopper–Pearson) of `hits` in `trials`.
 ///
 /// The trials must be independent; for correlated ones, such as all parameters of one fit, see [`assert_pooled_share`].
 ///
@@ -21,8 +21,8 @@ pub fn assert_share(what: &str, claimed: f64, hits: usize, trials: usize) {
     );
 }
 
-/// Asserts that the mean of correlated shares agrees with the `claimed` probability. Its variance is at most that of a share in
-/// `draws` independent trials, which is that of full correlation.
+/// Asserts that `share`, the mean of correlated shares, agrees with the `claimed` probability. The variance of this
+/// mean is at most that of a share in `draws` independent trials, which is that of full correlation.
 ///
 /// # Panics
 /// The claim lies outside of the 99.9 % binomial interval of `share` in `draws` trials.
@@ -31,8 +31,8 @@ pub fn assert_pooled_share(what: &str, claimed: f64, share: f64, draws: usize) {
     assert_share(what, claimed, (share * draws as f64).round() as usize, draws);
 }
 
-/// Asserts that a counted share is not below the `least` claimed probability: the upper end of the 99.9 % binomial interval of `hits`
-/// in `trials` reaches it.
+/// Asserts that a counted share is not below the `least` claimed probability: the upper end of the 99.9 % binomial
+/// interval of `hits` in `trials` reaches `least`.
 ///
 /// # Panics
 /// The interval lies below the claim.

@@ -18,7 +18,7 @@ pub struct Campaign<'a> {
 }
 
 impl Campaign<'_> {
-    /// Writes name and value of each figure to the result file, with commit and compiler version.
+    /// Writes the campaign, name and value of each figure, commit and compiler version to the result file.
     ///
     /// # Panics
     /// The file cannot be written.
@@ -43,7 +43,7 @@ impl Campaign<'_> {
     }
 }
 
-/// First line of a program's output; `None` if the program is missing or fails.
+/// First line of a program's output; `None` if the program cannot be run, fails, or prints no line or no UTF-8.
 fn first_line_of(program: &str, arguments: &[&str]) -> Option<String> {
     let output = Command::new(program)
         .args(arguments)

@@ -24,7 +24,8 @@ const SHARES_OF_FEED: [f64; 2] = [0.1, 0.25];
 /// cos ψ and e sin ψ, µm.
 const LEAST_UM: f64 = 0.01;
 
-/// Least sine of the angle of a tooth from the first that is no rounding error of π.
+/// |sin| of the angle between a tooth and the first one up to which the tooth counts as on the line through the axis
+/// and the first tooth: rounding of π gives less.
 const ASIDE: f64 = 1e-9;
 
 fn teeth(study: &Study<'_>) -> usize {

@@ -80,8 +80,8 @@ impl SpindleMotion {
     /// adds is proportional to the mean speed, so that the angle at an edge is linear in start angle and mean speed.
     fn fitted(mut self) -> Self {
         let count = self.edges_s.len() as f64;
-        // At tachometer edge k the spindle angle is 2πk. It is linear in the edge time plus the lead of the speed
-        // modulation, s.
+        // At tachometer edge k, from 0 on, the spindle angle is 2πk. The fitted angle is linear in the sum of the edge
+        // time and the lead of the speed modulation, both in s.
         let times: Vec<f64> = self.edges_s.iter().map(|t| t + self.modulation_s(*t)).collect();
         let mean_t = times.iter().sum::<f64>() / count;
         let mean_k = 0.5 * (count - 1.0);

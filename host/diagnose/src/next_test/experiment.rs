@@ -84,8 +84,8 @@ fn of_structure(bench: &Bench<'_>, direction: Direction) -> Vec<Experiment> {
         experiment(sweep(1.0, 4.0), 1.5),
     ];
     // The spectrum of a half-sine pulse has its first zero at the frequency 1.5/`pulse_s`, twice the highest natural
-    // frequency. The impulse is chosen so that the tool reaches the largest displacement x = ω·impulse/k in the
-    // records, with the lowest natural frequency ω and the static stiffness k.
+    // frequency. The impulse is chosen so that ω·impulse/k, with the lowest natural frequency ω and the static
+    // stiffness k, is the largest displacement of the tool in the records, unless its peak is below `LEAST_IMPACT_N`.
     let pulse_s = 0.75 / highest_hz;
     let impulse_ns = bench.largest_m / (TAU * lowest_hz * bench.static_compliance());
     let peak_n = (impulse_ns / (2.0 / PI * pulse_s)).max(LEAST_IMPACT_N);
@@ -105,7 +105,7 @@ fn of_structure(bench: &Bench<'_>, direction: Direction) -> Vec<Experiment> {
 }
 
 /// Proposed cuts: the recorded cut again, at another spindle speed, axial depth or feed per tooth, and over a longer
-/// time.
+/// time. None without a recorded cut, and none at a speed outside the limits of the case.
 fn of_cuts(bench: &Bench<'_>) -> Vec<Experiment> {
     let Some(so_far) = &bench.cut else {
         return Vec::new();
@@ -122,7 +122,8 @@ fn of_cuts(bench: &Bench<'_>) -> Vec<Experiment> {
         (1.0, 1.0, 2.0, 1.0),
         (1.0, 1.0, 1.0, 4.0),
     ];
-    // Speeds outside the limits of the spindle are never proposed.
+    // Speeds outside the section `[limits]` of the case are not proposed; without the section every speed counts as
+    // possible.
     let is_possible = |rpm: f64| bench.case.limits.is_none_or(|limits| limits.allows(rpm));
     factors
         .into_iter()
@@ -158,8 +159,8 @@ impl Experiment {
     /// Simulated readings of all sensors in this test if `case` is the true machine; of a cut without its transient.
     ///
     /// # Errors
-    /// The experiment cannot be simulated, the simulation diverges, or the tool moves too far in a cut; the error is a
-    /// sentence.
+    /// The experiment cannot be simulated, the simulation lacks a channel of the records or diverges, or the tool moves
+    /// too far in a cut; the error is a sentence.
     pub(super) fn readings(&self, bench: &Bench<'_>, case: &Case) -> Result<Vec<SimulatedReading>, String> {
         let mounted = self.recording(bench, case)?;
         // A second sensor next to a mounted one is taken as free of errors, so the sensor extensions of the case are

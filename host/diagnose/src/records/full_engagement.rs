@@ -288,7 +288,9 @@ impl Levels {
             .fold(f64::INFINITY, f64::min)
     }
 
-    /// Ranges of successive revolutions in which the tool is in air, by the smallest vibration level of all channels.
+    /// Ranges of successive revolutions in air, by the smallest vibration level of all channels: at least
+    /// `LEAST_AIR_AT_ENDS` revolutions at an end of the recording, `LEAST_AIR_WITHIN` elsewhere. A range at the
+    /// beginning does not count if the vibration grows from rest.
     fn in_air(&self) -> Vec<Range<usize>> {
         let mut in_air = Vec::new();
         let mut revolution = 0;
@@ -311,8 +313,9 @@ impl Levels {
         in_air
     }
 
-    /// True if the vibration level of every channel that is below `AIR_LEVEL` in the first revolution grows in the
-    /// second, as it does when a cut begins with the recording; false for a recording of less than two revolutions.
+    /// True if every channel whose vibration level is below `AIR_LEVEL` in the first revolution exceeds, in the second,
+    /// `GROWTH_FROM_REST` times that level plus the noise, as when a cut begins with the recording. False if such a
+    /// channel has no second revolution.
     fn grows_from_rest(&self) -> bool {
         self.of
             .iter()
@@ -333,8 +336,8 @@ fn deviation(samples: &[f64], noise: f64) -> f64 {
     (square - noise * noise).max(0.0).sqrt()
 }
 
-/// The longest range of revolutions that is not in air, of `count` revolutions, given the ranges in air; `None` if no
-/// revolution is in air.
+/// The longest range of revolutions that is not in air, of `count` revolutions, given the ranges in air; `None` if
+/// there is no range in air.
 fn longest_gap(in_air: &[Range<usize>], count: usize) -> Option<Range<usize>> {
     if in_air.is_empty() {
         return None;

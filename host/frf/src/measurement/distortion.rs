@@ -9,10 +9,12 @@ use crate::period_average::PeriodAverage;
 use crate::periodic_test::{DistortionLevel, ResponseDistortion};
 use crate::test_channels::TestChannels;
 
-/// Smallest number of lines whose variances are averaged for a level. A choice: the level of a few lines scatters by some decibels.
+/// Smallest number of lines over which a level is averaged, if there are so many. A choice: the level of a few lines
+/// scatters by some decibels.
 const LINES_OF_LEVEL: usize = 5;
 
-/// Noise and nonlinear distortion of each response around the peak of its receptance. `excited` holds the indices of the lines of `lines`.
+/// Noise and nonlinear distortion of each response around the peak of its receptance, in the order of the responses.
+/// `excited` holds, for each of the `lines`, its index in the spectra of the `averages`.
 pub(super) fn distortion(
     averages: &[PeriodAverage],
     excited: &[usize],
@@ -48,7 +50,9 @@ pub(super) fn distortion(
         .collect()
 }
 
-/// Lines around the line `peak` whose size is above 1/√2 of that of the peak, and at least [`LINES_OF_LEVEL`] of all `count` lines.
+/// Contiguous lines around the line `peak` whose size is at least 1/√2 of that of the peak; if these are fewer than
+/// [`LINES_OF_LEVEL`], the range is widened on the side of the larger size to that number (at most to all `count`
+/// lines).
 fn around_peak(count: usize, peak: usize, size: impl Fn(usize) -> f64) -> std::ops::Range<usize> {
     let (mut from, mut to) = (peak, peak + 1);
     let least = size(peak) * std::f64::consts::FRAC_1_SQRT_2;
@@ -74,8 +78,8 @@ fn around_peak(count: usize, peak: usize, size: impl Fn(usize) -> f64) -> std::o
     }
 }
 
-/// Relative noise of the mean receptance at the lines `near`, and the relative distortion of one realization from the scatter over the
-/// recordings beyond that noise.
+/// Relative noise of the mean FRF at the lines `near`, and the relative distortion of one realization from the scatter
+/// over the recordings beyond that noise; no distortion (`None`) for a single recording, or if the mean FRF is zero.
 fn of_realizations(
     averages: &[PeriodAverage],
     response: usize,
@@ -90,7 +94,7 @@ fn of_realizations(
             .collect();
         let mean = gains.iter().sum::<Complex64>() / count;
         power += mean.norm_sqr();
-        // Both variances are those of the mean of the recordings.
+        // Both variances, `noise` and `total`, are those of the mean over the recordings.
         noise += averages
             .iter()
             .map(|average| average.noise_variance(response, line))
@@ -110,8 +114,9 @@ fn of_realizations(
     ((noise / power).sqrt(), level)
 }
 
-/// Lines of a parity (0 even, 1 odd) that no recording excites, between the first and the last excited line: those between the lines `near`
-/// the peak, or the [`LINES_OF_LEVEL`] nearest to them.
+/// Lines of a parity (0 even, 1 odd) that no recording excites, between the first and the last line of `excited`: those
+/// nearest to the middle of the lines `near[0]` to `near[1]`, as many as lie within these, but at least
+/// [`LINES_OF_LEVEL`] if there are so many.
 fn silent_lines(
     averages: &[PeriodAverage],
     excited: &[usize],
@@ -136,8 +141,9 @@ fn silent_lines(
     silent
 }
 
-/// Level of the response at `silent` lines beyond the noise, relative to the response at the lines `near` the peak; `None` without such
-/// lines. The response to the little force that a shaker has there is subtracted, with the receptance interpolated between excited lines.
+/// Level of the response at the `silent` lines beyond the noise, relative to the response at the lines `near` the peak;
+/// `None` without silent lines, or if the response near the peak is zero. The response to the little force that a
+/// shaker has at silent lines is subtracted, with the FRF interpolated between excited lines.
 fn detected(
     averages: &[PeriodAverage],
     response: usize,
@@ -168,7 +174,8 @@ fn detected(
     (reference > 0.0).then(|| level(1.0 / lines / reference, power, noise, freedoms))
 }
 
-/// Level √(scale·(power − noise)) of a distortion, with an F-test of `power` against `noise` with the degrees of freedom of both.
+/// Level √(scale·(power − noise)) of a distortion, 0 if the noise is larger. The level is significant if it exceeds
+/// [`LEAST_DISTORTION`] and an F-test of `power` against `noise`, with the degrees of freedom of both in this order.
 fn level(scale: f64, power: f64, noise: f64, freedoms: [f64; 2]) -> DistortionLevel {
     let ratio = (scale * (power - noise).max(0.0)).sqrt();
     let is_above_noise = power > noise * f_quantile(1.0 - FALSE_ALARM, freedoms);
@@ -178,7 +185,7 @@ fn level(scale: f64, power: f64, noise: f64, freedoms: [f64; 2]) -> DistortionLe
     }
 }
 
-/// Receptance of one recording at a line between two excited lines, by linear interpolation.
+/// FRF Ȳ/Ū of one recording at a line between two excited lines, by linear interpolation; 0 at other lines.
 fn between(average: &PeriodAverage, response: usize, excited: &[usize], line: usize) -> Complex64 {
     let above = excited.partition_point(|&other| other < line);
     let (Some(&low), Some(&high)) = (

@@ -1,16 +1,17 @@
 //! Error of hammer tests by aliasing: an analog-to-digital converter without an anti-aliasing filter folds content
 //! above half the sample rate into the record.
 //!
-//! A sample rate f_s folds the content at f_s − f and f_s + f onto the line f. The record does not show this content,
-//! but it bounds it: at half the sample rate the contents of both sides of f_s/2 add up, so that the level A(f_s/2) of
-//! the record is up to twice the true one. The force of an impact begins and ends at zero without a jump, and the
-//! spectrum of such a pulse falls as 1/f² (Bracewell, The Fourier Transform and Its Applications, chapter 8). At k f_s
-//! ± f, with f far below f_s/2, it is therefore at most A(f_s/2)/(8 k²), and all k and both sides together fold at most
+//! A sample rate f_s folds the contents at k f_s − f and k f_s + f, k = 1, 2, …, onto the line f. The record does not
+//! show them, but allows an estimate: at half the sample rate the contents of both sides of f_s/2 add up, so that the
+//! level A(f_s/2) of the record is up to twice the true one, and is taken as twice the true one. The force of an impact
+//! begins and ends at zero without a jump, and the spectrum of such a pulse falls as 1/f² (Bracewell, The Fourier
+//! Transform and Its Applications, chapter 8). At k f_s ± f, with f far below f_s/2, it is therefore estimated as
+//! A(f_s/2)/(8 k²), and all k and both sides together fold at most
 //!
 //!   A(f_s/2)/4 · Σ 1/k² = π²/24 · A(f_s/2)
 //!
-//! onto the line. The same bound holds for the response, even as an acceleration, which follows a force without jumps.
-//! The bounds of force and response, each relative to the level of its channel at the line, add up to the largest
+//! onto the line. The same holds for the response, even as an acceleration, which follows a force without jumps. The
+//! estimates for force and response, each relative to the level of its channel at the line, add up to the largest
 //! relative error of the frequency response function.
 
 use crate::cross_spectra::{CrossSpectra, Segments, averaged};
@@ -18,17 +19,17 @@ use crate::test_channels::TestChannels;
 
 /// Width of the band below half the sample rate from which the level there is estimated, as a fraction of half the
 /// sample rate. The largest level of the band, scaled to half the sample rate by 1/f², is used. The spectrum of a pulse
-/// of n samples has zeros at every n-th part of the sample rate: an eighth of the sample rate, the width of the band,
-/// holds a maximum between zeros for pulses of more than 8 samples.
+/// of n samples has zeros at about every n-th part of the sample rate: an eighth of the sample rate, the width of the
+/// band, holds a maximum between zeros for pulses of more than 8 samples.
 const TOP: f64 = 0.25;
 
-/// Largest spectral level that aliasing adds to a frequency line, as a fraction of the level at half the sample rate:
-/// π²/24.
+/// Largest spectral level that aliasing adds to a frequency line far below half the sample rate, as a fraction of the
+/// level at half the sample rate: π²/24.
 const FOLDED: f64 = std::f64::consts::PI * std::f64::consts::PI / 24.0;
 
-/// Largest power of every channel of a hammer test near half the sample rate, scaled to half the sample rate by 1/f⁴,
-/// at the scale of the cross-spectra; 0 for a channel for which the sidecar states an anti-aliasing filter. Forces come
-/// first.
+/// Largest power near half the sample rate of every channel of a hammer test, by channel, forces first. Each power is
+/// scaled to half the sample rate by 1/f⁴ and at the scale of the cross-spectra; it is 0 for a channel for which the
+/// sidecar states an anti-aliasing filter.
 pub(super) fn top_powers(
     channels: &TestChannels<'_>,
     signals: &[&[f64]],
@@ -65,7 +66,8 @@ pub(super) fn top_powers(
         .collect()
 }
 
-/// Largest relative error by aliasing of the frequency response function of one response at one line, with one force.
+/// Estimate of the largest relative error by aliasing of the frequency response function of one response at one line,
+/// with one force; `tops` are the [`top_powers`] of the test.
 pub(super) fn relative_error(spectra: &CrossSpectra, tops: &[f64], line: usize, response: usize) -> f64 {
     let share = |channel: usize| {
         let power = spectra.at(line, channel, channel).re;

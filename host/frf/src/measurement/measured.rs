@@ -8,19 +8,19 @@ use crate::table::FrfTable;
 /// Measured receptances with their statistics.
 #[derive(Clone, Debug)]
 pub struct Measurement {
-    /// Measured receptances with the coherence of each response, or without it for fewer than three impacts of a
+    /// Measured receptances with the coherence of each response, or without it for fewer than three single impacts of a
     /// hammer. With several forces it is the multiple coherence.
     pub table: FrfTable,
     /// Standard deviation of |H|, by entry of the table, then by frequency, m/N.
     pub deviation: Vec<Vec<f64>>,
     /// One value per entry of the table. False if its standard deviation is meaningless, since it comes from fewer than
-    /// three impacts of a hammer.
+    /// three single impacts of a hammer.
     pub has_deviation: Vec<bool>,
     /// One value per entry of the table: degrees of freedom of its standard deviations from periodic excitation; `None`
     /// for other excitation, with normal quantiles.
     pub freedoms: Vec<Option<usize>>,
-    /// Largest relative error by aliasing of content above half the sample rate, by entry of the table, then by
-    /// frequency. It is estimated for hammer tests only, and 0 for all other excitation.
+    /// Estimate of the largest relative error by aliasing of content above half the sample rate, by entry of the table,
+    /// then by frequency: for hammer tests only, and 0 for all other excitation.
     pub folding: Vec<Vec<f64>>,
     /// Groups of recordings that were evaluated together.
     pub groups: Vec<RecordingGroup>,
@@ -29,8 +29,8 @@ pub struct Measurement {
 }
 
 impl Measurement {
-    /// Half the width of the 90 % interval of an entry of the table, in its standard deviations: 1.645, or more where
-    /// few degrees of freedom determine these.
+    /// Half the width of the 90 % interval of an entry of the table, in its standard deviations: 1.645, or the larger
+    /// quantile of Student's distribution where the entry has `freedoms`.
     pub fn ninety_percent(&self, entry: usize) -> f64 {
         self.freedoms
             .get(entry)

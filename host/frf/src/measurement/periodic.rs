@@ -1,7 +1,8 @@
-//! Receptances of periodic excitation: best linear approximation with the variances of noise and of nonlinear distortion.
+//! Receptances measured with periodic excitation, with the standard deviation of their magnitudes.
 //!
-//! Robust method of Pintelon and Schoukens, System Identification, 2nd ed. (2012), ch. 4: the scatter over the periods of one realization is
-//! noise, the scatter over realizations with other random phases is noise and nonlinear distortion.
+//! Robust method of Pintelon and Schoukens, System Identification, 2nd ed. (2012), ch. 4: the scatter over the periods
+//! of one realization is noise; the scatter over realizations with different random phases is noise and nonlinear
+//! distortion.
 
 use num_complex::Complex64;
 
@@ -20,7 +21,9 @@ use crate::test_channels::TestChannels;
 use crate::test_plausibility::is_cut;
 use quietcut_recording::TestKind;
 
-/// True if the force of a shaker is periodic with several lines in the band to evaluate, so that averages over periods replace windows.
+/// True if a recording can be evaluated by averages over periods instead of windows: it has one force, is of a shaker
+/// or of no stated kind and is not [of a cut](is_cut), and either the settings state a period, or the force has one and
+/// at least [`MULTISINE_LINES_MIN`] excited lines in the band to evaluate.
 pub(super) fn recognized(channels: &TestChannels<'_>, settings: &MeasurementSettings) -> bool {
     let ([(_, force)], recording) = (&channels.forces[..], channels.recording) else {
         return false;
@@ -39,7 +42,8 @@ pub(super) fn recognized(channels: &TestChannels<'_>, settings: &MeasurementSett
         .is_some_and(|average| average.is_excited.iter().filter(|is| **is).count() >= MULTISINE_LINES_MIN)
 }
 
-/// The stated period in samples; an error if it is no whole number.
+/// The stated period in samples; `None` if the settings state none. An error if it is not a whole number of two or
+/// more.
 fn stated_samples(
     channels: &TestChannels<'_>,
     settings: &MeasurementSettings,
@@ -49,7 +53,7 @@ fn stated_samples(
     };
     let rate = channels.recording.sample_rate_hz;
     let samples = seconds * rate;
-    // A period that is written with six digits.
+    // A period that was rounded to six digits is within this tolerance.
     if (samples - samples.round()).abs() > 1e-5 * samples || samples.round() < 2.0 {
         return Err(format!(
             "a period of {seconds} s is {samples:.3} samples at {rate} Hz; a whole number of two or more is needed"
@@ -58,7 +62,7 @@ fn stated_samples(
     Ok(Some(samples.round() as usize))
 }
 
-/// Measures the receptances of a group of recordings with periodic excitation, at the excited lines.
+/// Measures the receptances of a group of recordings with periodic excitation, at the lines that all of them excite.
 pub(super) fn periodic(
     mut group: RecordingGroup,
     members: &[TestChannels<'_>],
@@ -129,7 +133,8 @@ pub(super) fn periodic(
     let excited = common_lines(&averages).map_err(refused)?;
     let realizations = realizations(&averages);
     if realizations > 1 && realizations < averages.len() {
-        // The scatter over recordings of which some share their phases is no variance of the distortion.
+        // If some recordings share their phases and others do not, the scatter over all of them is no variance of the
+        // distortion.
         return Err(refused(format!(
             "{} recordings with {realizations} different sets of phases; take one recording of each realization, or only repetitions of one",
             averages.len()
@@ -159,7 +164,8 @@ pub(super) fn periodic(
     Ok(receptances(group, &lines, first, warnings))
 }
 
-/// Number of periods with clipped samples, and of all whole periods, counted from the end of a record of `samples` samples.
+/// Number of the whole periods that hold a clipped sample, and of all whole periods, in a record of `samples` samples.
+/// The last period ends with the record.
 fn clipped_periods(clipping: &Clipping, period: usize, samples: usize) -> (usize, usize) {
     let (whole, first) = (samples / period, samples % period);
     let clipped = (0..whole).filter(|index| {
@@ -169,7 +175,8 @@ fn clipped_periods(clipping: &Clipping, period: usize, samples: usize) -> (usize
     (clipped.count(), whole)
 }
 
-/// Degrees of freedom of the deviations: two for each realization or, with one recording, for each period, less one.
+/// Degrees of freedom of the standard deviations: 2(M − 1) of one recording with M averaged periods, 2(R − 1) of R
+/// recordings.
 fn freedoms(averages: &[PeriodAverage]) -> usize {
     match averages {
         [only] => 2 * (only.used - 1),
@@ -177,7 +184,8 @@ fn freedoms(averages: &[PeriodAverage]) -> usize {
     }
 }
 
-/// Indices of the lines that all recordings excite. An error if these are fewer than half of those of any.
+/// Indices of the lines that all recordings excite, ascending. An error if there are none, or if any recording excites
+/// more than twice as many.
 fn common_lines(averages: &[PeriodAverage]) -> Result<Vec<usize>, String> {
     let count = |average: &PeriodAverage| average.is_excited.iter().filter(|is| **is).count();
     let most = averages.iter().map(count).max().unwrap_or(0);
@@ -194,7 +202,7 @@ fn common_lines(averages: &[PeriodAverage]) -> Result<Vec<usize>, String> {
     Ok(common)
 }
 
-/// Number of different sets of phases among the recordings, whatever their shifts in time.
+/// Number of different forces among the recordings; forces that [have the same phases](have_same_phases) count once.
 fn realizations(averages: &[PeriodAverage]) -> usize {
     let mut different: Vec<&PeriodAverage> = Vec::new();
     for average in averages {
@@ -205,7 +213,8 @@ fn realizations(averages: &[PeriodAverage]) -> usize {
     different.len()
 }
 
-/// True if two forces are the same signal at different times: their correlation over all shifts in time exceeds [`SAME_PHASES`].
+/// True if two forces are the same signal but for a shift in time: at some shift, the magnitude of the correlation of
+/// the lines that both excite exceeds [`SAME_PHASES`].
 fn have_same_phases(a: &PeriodAverage, b: &PeriodAverage) -> bool {
     let products: Vec<(f64, Complex64)> = (0..a.force.len())
         .filter(|&line| a.is_excited[line] && b.is_excited[line])
@@ -213,7 +222,8 @@ fn have_same_phases(a: &PeriodAverage, b: &PeriodAverage) -> bool {
         .collect();
     let whole: f64 = products.iter().map(|(_, product)| product.norm()).sum();
     let highest = products.last().map_or(1.0, |(line, _)| *line);
-    // Sixteen shifts per period of the highest line: half a shift turns a line by 0.2 rad at most, which costs 2 % of its part.
+    // Sixteen shifts per period of the highest common line: half a shift turns a line by 0.2 rad at most. This costs 2
+    // % of the part of the line in the correlation.
     let shifts = (16.0 * highest).ceil() as usize;
     (0..shifts).any(|shift| {
         let turn = std::f64::consts::TAU * shift as f64 / shifts as f64;
@@ -225,10 +235,12 @@ fn have_same_phases(a: &PeriodAverage, b: &PeriodAverage) -> bool {
     })
 }
 
-/// FRF lines at the `excited` lines: mean over the recordings of G = Ȳ/Ū, with its standard deviation.
+/// FRF at the lines with the indices `excited`: mean over the recordings of G = Ȳ/Ū, with the standard deviation of its
+/// magnitude.
 ///
-/// Of one recording with M periods, var G = Σ|Y − Ȳ − G(U − Ū)|²/(M(M − 1)|Ū|²); of R recordings it is Σ|G_r − Ḡ|²/(R(R − 1)), which
-/// includes noise and nonlinear distortion. The variance of |G| is half of it.
+/// Of one recording with M periods, var G = Σ|Y − Ȳ − G(U − Ū)|²/(M(M − 1)|Ū|²), the variance by noise. Of R recordings
+/// it is Σ|G_r − Ḡ|²/(R(R − 1)); with different realizations this includes nonlinear distortion. The variance of the
+/// magnitude is half of var G.
 fn lines(averages: &[PeriodAverage], excited: &[usize], spacing_hz: f64, responses: usize) -> Vec<FrfLine> {
     let first_line = averages.first().map_or(0, |average| average.first_line);
     let count = averages.len() as f64;
@@ -255,7 +267,7 @@ fn lines(averages: &[PeriodAverage], excited: &[usize], spacing_hz: f64, respons
                         gains.iter().map(|gain| (gain - mean).norm_sqr()).sum::<f64>() / (count - 1.0) / count
                     }
                 };
-                // Part of the power of the response that is linear in the force, over all periods of all recordings.
+                // Power of the linear response to the mean force, summed over the averaged periods of all recordings.
                 let linear: f64 = averages
                     .iter()
                     .map(|average| average.used as f64 * (mean * average.force[line]).norm_sqr())

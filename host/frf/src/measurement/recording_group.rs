@@ -22,27 +22,27 @@ pub struct RecordingGroup {
     /// Kind of excitation.
     pub excitation: Excitation,
     /// Effective number of independent averages of the spectra of the group: for periodic excitation the number of
-    /// periods, for a step-sine test 1.
+    /// averaged periods of all recordings, for a step-sine test 1.
     pub averages: f64,
-    /// Frequencies left out because the forces of the group are linearly dependent there, Hz; without those at which no
-    /// FRF can be computed at all.
+    /// Frequencies left out because the forces of the group are linearly dependent there, Hz, ascending. Frequencies at
+    /// which no FRF can be computed at all are not listed.
     pub left_out_hz: Vec<f64>,
     /// Smallest singular value of the force spectra over the frequencies of the group that are not left out, each force
     /// normalized at each frequency; 1 for a single force.
     pub least_singular: f64,
-    /// Single impacts (used) and double impacts (left out) of a hammer test; `None` for other excitation.
+    /// Impacts of a hammer test: first the used single ones, second the double ones, which are left out; each in the
+    /// order of the recordings and of time. `None` for other excitation.
     pub impacts: Option<(Vec<MeasuredImpact>, Vec<MeasuredImpact>)>,
     /// Degrees of freedom of the standard deviations of a test with periodic excitation; `None` for other excitation,
-    /// with normal quantiles.
+    /// whose intervals have normal quantiles.
     pub freedoms: Option<usize>,
     /// Periods, realizations and distortion of a test with periodic excitation; `None` for other excitation.
     pub periodic: Option<PeriodicTest>,
 }
 
 impl RecordingGroup {
-    /// True if coherence and standard deviation of the group are meaningful. False for a hammer test with fewer than
-    /// three single impacts: one impact has the coherence 1 by construction, and the scatter of two determines no
-    /// interval.
+    /// True if coherence and standard deviation of the group are meaningful: for any excitation but a hammer, and for a
+    /// hammer test with three or more used impacts.
     pub fn has_scatter(&self) -> bool {
         self.impacts
             .as_ref()
@@ -68,7 +68,8 @@ pub(super) struct MeasuredGroup {
     pub(super) warnings: Vec<String>,
 }
 
-/// Converts FRF lines to receptances in m/N: integrates velocities and accelerations.
+/// Converts FRF lines to receptances in m/N: divides velocities by iω and accelerations by (iω)². Adds a warning if the
+/// group has frequencies that are left out.
 pub(super) fn receptances(
     group: RecordingGroup,
     lines: &[FrfLine],

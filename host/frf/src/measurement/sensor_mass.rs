@@ -1,4 +1,5 @@
-//! Mass of the accelerometers of a test: removed if it is given, bounded if it is not.
+//! Mass of the accelerometers of a test: removed if it is given; otherwise its possible effect is estimated for a
+//! warning.
 
 use super::measured::Measurement;
 use crate::accelerometer_mass::{peak_shift, without_accelerometer_mass};
@@ -8,7 +9,7 @@ use crate::test_channels::TestChannels;
 use quietcut_model::structure::Direction;
 use quietcut_numerics::statistics::NINETY_PERCENT;
 
-/// Directions whose response is an acceleration in any of the `recordings`.
+/// Directions whose response is an acceleration in at least one of the `recordings`.
 pub(super) fn accelerated(recordings: &[TestChannels<'_>]) -> Vec<Direction> {
     let mut directions = Vec::new();
     for response in recordings.iter().flat_map(|channels| &channels.responses) {
@@ -19,7 +20,8 @@ pub(super) fn accelerated(recordings: &[TestChannels<'_>]) -> Vec<Direction> {
     directions
 }
 
-/// Warning of columns that were measured with sensors at different positions, by the key `at` of their channels.
+/// Warning that the accelerometers were at different positions, by the key `at` of their channels in the sidecars;
+/// `None` if these state at most one position.
 pub(super) fn roving(recordings: &[TestChannels<'_>]) -> Option<String> {
     let mut positions: Vec<&str> = Vec::new();
     for channels in recordings {
@@ -45,11 +47,15 @@ pub(super) fn roving(recordings: &[TestChannels<'_>]) -> Option<String> {
     })
 }
 
-/// Removes the mass `mass_kg` of the accelerometer from the receptances of a measurement; without it, warns of the shift of a peak by a
-/// usual accelerometer where that is larger than the interval of its frequency.
+/// Removes the mass `mass_kg` of the accelerometer from the receptances of a measurement, and warns of directions in
+/// which a mass above 0 cannot be removed.
+///
+/// If `mass_kg` is `None`, nothing is removed. A warning then names each of the directions `accelerated` in which a
+/// mass of [`ASSUMED_ACCELEROMETER_KG`] would shift the drive-point peak by more than [`LEAST_PEAK_SHIFT`] and by more
+/// than half the 90 % interval of its frequency.
 ///
 /// # Errors
-/// A mass is given, and there is no drive-point receptance.
+/// A mass is given, and there is no drive-point receptance or a corrected receptance is not finite.
 pub(super) fn sensor_mass(
     measurement: &mut Measurement,
     mass_kg: Option<f64>,

@@ -8,8 +8,9 @@ use crate::measurement_settings::{MeasurementSettings, band};
 use crate::test_channels::TestChannels;
 use crate::window::fast_length;
 
-/// Auto- and cross-spectra of a record with continuous excitation, at the frequency lines of the band to evaluate.
-/// Segments of random excitation with clipped samples are left out.
+/// Auto- and cross-spectra of the record `channels` within the band to evaluate: of a sweep over groups of neighbouring
+/// lines, of random excitation over the segments without clipped samples. If the settings have no resolution, the
+/// shortest of the records `members` determines the length of the segments.
 pub(super) fn steady(
     excitation: Excitation,
     channels: &TestChannels<'_>,
@@ -78,12 +79,13 @@ pub(super) fn steady(
     ))
 }
 
-/// Number of half-overlapping segments of the shortest random record for each force if no frequency resolution is set,
-/// before the segment length is rounded up for the FFT. A choice between random error and resolution.
+/// Number of segments for each force into which half overlap divides the shortest random record if no frequency
+/// resolution is set, before the segment length is rounded up for the FFT. A choice between random error and
+/// resolution.
 const SEGMENTS_PER_FORCE: usize = 8;
 
-/// Number of neighbouring frequency lines averaged in a swept-sine test for each force if no frequency resolution is
-/// set. A choice between random error and resolution.
+/// Number of neighbouring frequency lines averaged in a sweep for each force if no frequency resolution is set. A
+/// choice between random error and resolution.
 const LINES_PER_FORCE: usize = 8;
 
 /// Length of the taper at each end of the record of a sweep, as a fraction of the record. A choice: the taper reduces

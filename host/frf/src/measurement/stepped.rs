@@ -1,4 +1,4 @@
-//! Receptances of a step-sine test: one phasor ratio per frequency step.
+//! Receptances of a step-sine test: one frequency line per frequency step.
 
 use super::recording_group::{MeasuredGroup, RecordingGroup, receptances};
 use crate::criteria::{SAME_FORCE, SUBSEGMENT_SAMPLES_MIN};
@@ -84,7 +84,8 @@ pub(super) fn stepped(
 }
 
 /// Force level of a step-sine test to evaluate: without `force_n` (N) the only level of the test, otherwise the level
-/// nearest to `force_n` and within the factor [`SAME_FORCE`] of it; an error if there is no such level.
+/// whose ratio to `force_n` is nearest to 1, if it is within the factor [`SAME_FORCE`]. An error if there is no such
+/// level.
 fn level(
     channels: &TestChannels<'_>,
     mut levels: Vec<ForceLevel>,

@@ -10,9 +10,9 @@ use crate::hammer::{self, HammerWindows, MeasuredImpact};
 use crate::measurement_settings::{MeasurementSettings, band};
 use crate::test_channels::TestChannels;
 
-/// Length of the segments of all hammer tests, s, if their groups differ in force or response: the shortest of the
-/// lengths that [`hammer::segments`] selects for the recordings. With segments of different lengths, taps in x and in y
-/// would have no frequency line in common. `None` with fewer than two groups of hammer tests.
+/// Length of the segments of all hammer tests, s, if they form several groups: the shortest of the lengths that
+/// [`hammer::segments`] selects for the recordings by default. With segments of different lengths, taps in x and in y
+/// would have different frequency lines. `None` with fewer than two groups of hammer tests.
 ///
 /// # Errors
 /// As [`hammer::segments`].
@@ -35,8 +35,8 @@ pub(super) fn common_segment_s(
     Ok(Some(shortest_s))
 }
 
-/// Auto- and cross-spectra of hammer tests with one segment for each single impact, and the largest powers of the
-/// channels near half the sample rate; one result for each recording.
+/// Auto- and cross-spectra of hammer tests with one segment for each used impact, and the [`top_powers`] of the
+/// channels; one result for each recording. Sets the impacts of `group`.
 pub(super) fn struck(
     group: &mut RecordingGroup,
     members: &[TestChannels<'_>],

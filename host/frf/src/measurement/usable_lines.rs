@@ -5,8 +5,8 @@ use crate::criteria::{DEPENDENT, EXCITED};
 use crate::cross_spectra::CrossSpectra;
 use crate::estimate::{ChannelCounts, FrfLine};
 
-/// Removes the frequency lines of a sweep at which the power of all forces together is at most [`EXCITED`] of its
-/// largest value over the lines: they lie outside the swept range.
+/// Removes the frequency lines of a sweep at which the power of the forces, summed over all forces and tests, is at
+/// most [`EXCITED`] of the largest such power of all lines; they count as outside the swept range.
 pub(super) fn keep_excited(lines: &mut Vec<FrfLine>, spectra: &[CrossSpectra], counts: ChannelCounts) {
     let power = |line: usize| -> f64 {
         let forces = (0..counts.forces).map(|force| {
@@ -26,8 +26,9 @@ pub(super) fn keep_excited(lines: &mut Vec<FrfLine>, spectra: &[CrossSpectra], c
     lines.retain(is_excited);
 }
 
-/// Removes the frequency lines at which the forces are linearly dependent, and lists them in `group`. An error if these
-/// are more than half of all lines, or if there is no line.
+/// Removes the frequency lines at which the smallest singular value of the forces is below [`DEPENDENT`], and lists
+/// their frequencies in `group`. For several forces, also sets [`RecordingGroup::least_singular`]. An error if more
+/// than half of the lines are dependent, or if there is no line.
 pub(super) fn independent(
     lines: &mut Vec<FrfLine>,
     group: &mut RecordingGroup,

@@ -34,9 +34,10 @@ pub struct Dwell {
     /// (AᵀA)⁻¹ of the harmonic regression with design matrix A. Multiplied by the noise variance of a channel it is the
     /// covariance of the coefficients of that channel.
     pub gram_inverse: DMatrix<f64>,
-    /// Fourier series of each force channel, in the order of the recording.
+    /// Fourier series of each force channel whose name gives a direction, in the order of the recording.
     pub forces: Vec<FourierSeries>,
-    /// Fourier series of each motion channel that is not zero throughout the recording, in the order of the recording.
+    /// Fourier series of each motion channel whose name gives a direction and that is not zero throughout the
+    /// recording, in the order of the recording.
     pub motions: Vec<FourierSeries>,
 }
 
@@ -81,7 +82,7 @@ pub(crate) fn direction_of(channel: &Channel) -> Option<Direction> {
 const BLOCK_S: f64 = 0.1;
 
 /// The segments of `recording` with a constant excitation frequency, found from the force channel with the largest
-/// energy. Empty without a force channel.
+/// energy. Segments of few periods are left out. Empty without a force channel.
 ///
 /// A segment ends where the force pauses or its frequency steps. A step without a pause shows as a change of the local
 /// frequency, from the times of zero crossings of the force, that far exceeds the scatter of that frequency.
@@ -184,8 +185,8 @@ fn split(samples: &[f64], from: usize, rate_hz: f64, found: &mut Vec<DwellSegmen
     }
 }
 
-/// Fractional sample indices of the rising zero crossings of the force, with a hysteresis of at most half its RMS, so
-/// that weaker noise gives no second crossing.
+/// Fractional sample indices of the rising zero crossings of the force from sample `from` on. Before each crossing the
+/// force must fall below minus half the RMS of these samples, so that weaker noise gives no second crossing.
 fn rising_crossings(samples: &[f64], from: usize) -> Vec<f64> {
     let held = &samples[from.min(samples.len())..];
     let size = (energy(held) / held.len().max(1) as f64).sqrt();
@@ -203,9 +204,10 @@ fn rising_crossings(samples: &[f64], from: usize) -> Vec<f64> {
 
 impl Dwell {
     /// Fits the periodic motion with `harmonics` harmonics to a segment of a recording; the frequency is refined with
-    /// all force and motion channels.
+    /// all fitted force and motion channels.
     ///
-    /// `None` if the fit is not possible, for example with too few samples in the segment or without a force channel.
+    /// `None` if the segment has fewer than four samples per coefficient or exceeds the recording, if the coefficients
+    /// are not determined, if no channel shows the frequency, or without a force channel whose name gives a direction.
     pub fn fit(recording: &Recording, stretch: DwellSegment, harmonics: usize) -> Option<Self> {
         let count = stretch.to.checked_sub(stretch.from)?;
         if count < 4 * (2 * harmonics + 1) {

@@ -1,5 +1,5 @@
-//! Modes that the stabilization diagram misses: poles that stay the same over too few model orders, since noise in small
-//! receptances changes their shapes, although the residual of the fit shows them clearly.
+//! Modes that the stabilization diagram misses: poles that stay the same over too few model orders, since noise in
+//! small receptances changes their shapes, although the residual of the fit shows them clearly.
 
 use num_complex::Complex64;
 
@@ -9,13 +9,14 @@ use super::refinement::{Refined, refine};
 use super::stabilization::Stabilization;
 use crate::criteria::{FURTHER_ERROR, FURTHER_MISFIT, FURTHER_SIGNIFICANCE};
 
-/// Largest number of poles of the diagram that are tried as a further mode, those with the highest peaks first. A choice.
+/// Largest number of poles of the stabilization diagram that are tried as a further mode. A choice.
 const TRIED: usize = 8;
 
-/// The fit with one more mode, if the residual is more than noise and a pole of the diagram explains a part of it
-/// significantly.
+/// The fit with one more mode, with the first of the poles of [`Stabilization::further`] that gives a smaller NRMSE, a
+/// significant mode and no spurious one. `None` if there is no such pole, or if the residual of `refined` is noise or
+/// small already.
 ///
-/// `is_spurious` says whether any mode of a fit is none.
+/// `is_spurious` is true for a fit with a spurious mode.
 pub(super) fn with_further_mode(
     data: &Receptances,
     refined: &Refined,

@@ -9,15 +9,16 @@ impl ModalModel {
     /// Adds the errors of calibrations to the covariance and the standard deviations of the modes: the gain of every
     /// sensor has the relative standard deviation `relative`.
     ///
-    /// A gain g of the force sensor, one and the same for all directions, multiplies all left shapes by 1 + g, and that of
-    /// the sensor of a response its entry of all right shapes. These errors are common to all modes: frequencies and
-    /// damping ratios have none.
+    /// A relative error g of the gain of the force sensor, which is one for all directions, multiplies all left shapes
+    /// by 1 + g; that of the sensor of a response multiplies the entry of this response in all right shapes. The errors
+    /// are common to all modes. Frequencies and damping ratios have none.
     pub fn add_gain_errors(&mut self, relative: f64) {
         self.gain_error = Some(relative);
         let (lefts, rights) = (self.forces.len(), self.responses.len());
         let width = 2 + 2 * (lefts + rights);
         let size = self.covariance.nrows();
-        // One vector for each sensor: the change of all parameters by one standard deviation of its gain.
+        // One vector for each sensor, that of the force first: the change of all parameters by one standard deviation
+        // of the gain of the sensor.
         let mut changes = vec![DVector::<f64>::zeros(size); 1 + rights];
         for (index, found) in self.modes.iter_mut().enumerate() {
             let mut put = |change: usize, at: usize, value: Complex64, std: &mut [f64; 2]| {

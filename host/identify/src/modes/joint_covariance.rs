@@ -1,4 +1,4 @@
-//! Joint covariance of the parameters of identified modes, in the form in which a case file has them.
+//! Joint covariance of the parameters of identified modes, with frequency and damping ratio in place of the pole.
 
 use nalgebra::DMatrix;
 
@@ -7,7 +7,7 @@ use super::pole_derivatives::pole_derivatives;
 use super::refinement::Refined;
 
 impl Refined {
-    /// The modes by frequency, and their joint covariance as in
+    /// The modes in ascending order of frequency, and their joint covariance as in
     /// [`ModalModel::covariance`](super::model::ModalModel::covariance).
     pub(super) fn sorted(&self) -> (Vec<IdentifiedMode>, DMatrix<f64>) {
         let mut order: Vec<usize> = (0..self.fit.modes.len()).collect();
@@ -20,8 +20,8 @@ impl Refined {
         (modes, &derivatives * &self.covariance * derivatives.transpose())
     }
 
-    /// Derivatives of the parameters of the modes of a case, in the given order of the modes, by the parameters of the
-    /// fit.
+    /// Derivatives of the parameters of the modes as a case has them (rows), in the given order of the modes, by the
+    /// parameters of the fit (columns).
     fn derivatives(&self, order: &[usize]) -> DMatrix<f64> {
         let width = self.fit.modes.first().map_or(0, |mode| mode.width());
         let mut derivatives = DMatrix::<f64>::zeros(width * order.len(), self.covariance.nrows());

@@ -1,9 +1,11 @@
 //! Leakage of receptances that are averages over windowed segments, and the error of the modes that it causes.
 //!
-//! A window W of length T smooths the cross spectrum: the expected receptance is ∫|W(ν)|² H(f − ν) dν = H + ½ μ H″, with the mean square
-//! bandwidth μ = ∫|w′|² dt/(4π² ∫w² dt) of the window, 1/(3T²) for a Hann window (Bendat and Piersol, Random Data, 4th ed. 2010, section
-//! 8.5, with the window's bandwidth). The part of the response that the smoothed receptance does not explain has the power μ Σ|H′|² per power of
-//! the force, and lowers the coherence. So coherence bounds μ: a hammer test whose response dies within the window has none of both.
+//! A window w of length T with the transform W, ∫|W|² dν = 1, smooths the cross spectrum: the expected receptance is
+//! ∫|W(ν)|² H(f − ν) dν ≈ H + ½ μ H″, with the mean square bandwidth μ = ∫|w′|² dt/(4π² ∫w² dt) of the window, 1/(3T²)
+//! for a Hann window (Bendat and Piersol, Random Data, 4th ed. 2010, section 8.5, with the window's bandwidth). The
+//! part of the response that the smoothed receptance does not explain has the power μ Σ|H′|² per power of the force,
+//! with the sum over the forces, and lowers the coherence. So coherence bounds μ: a hammer test whose response dies
+//! within the window has neither leakage nor a coherence that it lowers.
 
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
@@ -15,15 +17,16 @@ use super::pole_residue::{PoleResidue, shared};
 use super::receptances::Receptances;
 use super::weights::Weights;
 
-/// Step of the numerical derivatives of the fitted receptance, relative to the distance of the lines. A choice: the fitted receptance is
-/// smooth over many lines.
+/// Step of the numerical derivatives of the fitted receptance, relative to the distance of the lines. A choice: the
+/// fitted receptance is smooth over many lines.
 const STEP: f64 = 0.25;
 
-/// Error of the parameters of a modal fit by leakage, in the order of [`PoleResidue::parameters`]: the change of the parameters that the
-/// expected error ½ μ H″ of every receptance causes. Zero without coherence. `None` if the data do not determine the parameters.
+/// Error of the parameters of a modal fit by leakage, in the order of [`PoleResidue::parameters`]: the linearized
+/// change of the parameters that the expected error ½ μ H″ of every receptance causes. Zero if the standard deviations
+/// of the data do not follow from coherence. `None` as for [`constrained_inverse`].
 ///
-/// The bandwidth μ is that by which the coherence is explained, and at most that of a Hann window whose resolution is the distance of the
-/// lines.
+/// The bandwidth μ is that of [`explaining_bandwidth`], but at most that of a Hann window of length T = 1/(distance of
+/// the lines).
 pub(super) fn error(data: &Receptances, fit: &PoleResidue, weights: &Weights) -> Option<DVector<f64>> {
     let unknowns = fit.parameters().len();
     if !data.has_coherence {
@@ -47,7 +50,8 @@ pub(super) fn error(data: &Receptances, fit: &PoleResidue, weights: &Weights) ->
     Some(inverse * gradient)
 }
 
-/// Bandwidth μ, Hz², of which μ Σ|H′|² is the unexplained power of the responses that the coherence states, by least squares over the lines.
+/// Bandwidth μ, Hz², for which μ Σ|H′|², with the sum over the forces of a response, fits the squared standard
+/// deviations from coherence best, by least squares over the lines of all receptances; 0 if all H′ are 0.
 fn explaining_bandwidth(data: &Receptances, fit: &PoleResidue) -> f64 {
     let (mut explained, mut all) = (0.0, 0.0);
     for (k, deviation) in data.deviation.iter().enumerate() {
@@ -64,7 +68,7 @@ fn explaining_bandwidth(data: &Receptances, fit: &PoleResidue) -> f64 {
     if all > 0.0 { explained / all } else { 0.0 }
 }
 
-/// Fitted receptance `k` at a frequency in Hz, and its first and second derivative by the frequency.
+/// Fitted receptance `k` at a frequency in Hz, and its first and second numerical derivative by that frequency.
 fn derivatives(data: &Receptances, fit: &PoleResidue, k: usize, hertz: f64) -> [Complex64; 3] {
     let step = STEP * data.spacing_hz();
     let at = |hertz: f64| fit.value(data.places[k], k, Complex64::new(0.0, TAU * hertz));

@@ -21,12 +21,12 @@ pub struct ModalModel {
     pub responses: Vec<Direction>,
     /// The modes, sorted by frequency.
     pub modes: Vec<IdentifiedMode>,
-    /// Joint covariance of the parameters of all modes. For each mode in turn: natural frequency in Hz, damping ratio,
-    /// entries of the left shape in the order of `forces`, entries of the right shape in the order of `responses`, real
-    /// before imaginary part.
+    /// Joint covariance of the parameters of all modes. For each mode, in the order of `modes`: natural frequency in
+    /// Hz, damping ratio, entries of the left shape in the order of `forces`, entries of the right shape in the order
+    /// of `responses`; of each entry the real part before the imaginary one.
     pub covariance: DMatrix<f64>,
-    /// Relative standard deviation of the gain of every sensor that the covariance contains; `None` if the gains are taken
-    /// as exact.
+    /// Relative standard deviation of the gain of every sensor, whose effect `covariance` contains; `None` if the gains
+    /// are taken as exact.
     pub gain_error: Option<f64>,
     /// For each pair of response and force direction: the compliance of the modes above the band, m/N, and the inertia
     /// term of the modes below it, the coefficient of 1/s², in 1/kg.

@@ -28,7 +28,8 @@ pub struct Receptances {
     /// True if standard deviations of the receptances were measured; false if they follow from coherence up to a
     /// factor, or are not known.
     pub has_deviation: bool,
-    /// True if the standard deviations follow from coherence: the receptances are averages over windowed segments, which leak.
+    /// True if the standard deviations of all receptances follow from coherence: the receptances are then taken as
+    /// averages over windowed segments, which leak.
     pub has_coherence: bool,
 }
 

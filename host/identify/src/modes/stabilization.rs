@@ -14,7 +14,8 @@ use crate::criteria::{
 };
 use quietcut_frf::rational_fit::{RationalFitError, residues};
 
-/// Distance of two poles, as a fraction of the decay rate of one, below which both lead a modal fit to the same mode. A choice.
+/// Distance of a pole from another one, relative to the decay rate −Re λ of the former, below which both are taken to
+/// lead a modal fit to the same mode. A choice.
 const SAME_START: f64 = 0.3;
 
 /// A pole of the model of one order in the stabilization diagram.
@@ -71,7 +72,7 @@ impl Stabilization {
     /// Stable poles of the upper half of the model orders that are not among the poles `known`, those with the highest
     /// peaks first, at most `count`.
     ///
-    /// Poles count as the same if they are closer than a fraction of the decay rate, [`SAME_START`].
+    /// Of poles that count as the same by [`SAME_START`], only the one with the highest peak is taken.
     pub(super) fn further(&self, known: &[Complex64], count: usize) -> Vec<Complex64> {
         let mut stable: Vec<&Candidate> = self
             .candidates

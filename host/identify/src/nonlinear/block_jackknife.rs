@@ -1,17 +1,17 @@
-//! Standard deviations of least squares from the scatter of the solutions without one block of the rows.
+//! Standard deviations of a least-squares solution, from the scatter of the solutions without one block of the rows.
 
 use nalgebra::{DMatrix, DVector};
 use quietcut_numerics::least_squares::invert_normal_equations;
 
-/// Standard deviations of the least-squares solution θ of X·θ = y with the residual `left`, by the delete-a-block jackknife (Shao and Wu,
-/// Annals of Statistics 17 (1989) 1176): s² = (g − 1)/g Σ (θ₋ⱼ − θ̄)², with the solution θ₋ⱼ without block j of g = `blocks` contiguous
-/// blocks of rows.
+/// Standard deviations of the least-squares solution θ of X·θ = y with X = `matrix` and the residual `left`, by the
+/// delete-a-block jackknife (Shao and Wu, Annals of Statistics 17 (1989) 1176): s² = (g − 1)/g Σ (θ₋ⱼ − θ̄)², with the
+/// solution θ₋ⱼ without block j of g contiguous blocks of rows, and the mean θ̄ of the θ₋ⱼ. g is at most `blocks`.
 ///
-/// The residual may be correlated within a block, and may grow with the motion. An error of the model that differs between the parts of a
-/// record is contained. The blocks have equal sums of the leverages xᵢ(XᵀX)⁻¹xᵢᵀ, so that each holds the same share of the
-/// information: the first block of a free decay is short.
+/// The residual may be correlated within a block, and may grow with the motion. The scatter contains an error of the
+/// model that differs between the blocks. The blocks have about equal sums of the leverages xᵢ(XᵀX)⁻¹xᵢᵀ, so that each
+/// holds the same share of the information: the first block of a free decay is short.
 ///
-/// `None` if the rows without a block do not determine the solution.
+/// `None` if all rows, or all rows without one of the blocks, do not determine the solution.
 pub(super) fn deviations(matrix: &DMatrix<f64>, left: &DVector<f64>, blocks: usize) -> Option<DVector<f64>> {
     let normal = matrix.tr_mul(matrix);
     let half = matrix * invert_normal_equations(&normal)?;
@@ -28,7 +28,8 @@ pub(super) fn deviations(matrix: &DMatrix<f64>, left: &DVector<f64>, blocks: usi
         if is_last || is_full {
             let part = matrix.rows(from, row + 1 - from);
             let gradient = part.tr_mul(&left.rows(from, row + 1 - from));
-            // At θ the gradient of all rows is zero, so that of the other rows is the negative of the gradient of the block.
+            // At θ the gradient of all rows is zero, so that the gradient of the other rows is the negative of that of
+            // the block.
             let others = invert_normal_equations(&(&normal - part.tr_mul(&part)))?;
             changes.push(-(others * gradient));
             from = row + 1;

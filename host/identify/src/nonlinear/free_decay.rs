@@ -1,13 +1,14 @@
-//! Force law of a free decay, fitted in weak form: no end of the record and no derivative of a measured signal enters its linear terms.
+//! Force law of a free decay, fitted in weak form: its linear terms need no derivative of a measured signal.
 //!
-//! Each equation is the law multiplied by a modulating function φ = ψ″ of compact support and integrated over time (Shinbrot, Trans. ASME 79
-//! (1957) 1131). Integration by parts moves the derivatives to φ:
+//! Each equation is the law multiplied by a modulating function φ = ψ″ of compact support and integrated over time
+//! (Shinbrot, Trans. ASME 79 (1957) 1131). Integration by parts moves the derivatives to φ:
 //!
 //!   ∫φ q̈ dt = ∫φ″ q dt,  ∫φ q̇ dt = −∫φ′ q dt,  and for a measured acceleration  ∫ψ″ q dt = ∫ψ q̈ dt.
 //!
-//! φ vanishes with its derivatives at both ends of its support, which lies within the record, so that neither the step with which a decay
-//! begins nor a sensor's offset or drift moves the linear terms. A filter of the sensor changes all linear terms alike. Nonlinear terms
-//! use displacement and velocity by filters of the whole record; equations near its ends are left out.
+//! φ and its first three derivatives vanish at both ends of its support, which lies within the record. So the step with
+//! which a decay begins does not enter the linear terms, nor, if displacement is measured, an offset or a linear drift
+//! of the sensor. A linear filter of the sensor changes all linear terms alike. Nonlinear terms use displacement and
+//! velocity by filters of the whole record; therefore equations near its ends are left out.
 
 use std::f64::consts::{PI, TAU};
 
@@ -20,15 +21,17 @@ use crate::criteria::{DECAY_BLOCKS, DECAY_SUPPORTS, SAMPLES_PER_TERM};
 use quietcut_numerics::least_squares::LinearProblem;
 use quietcut_numerics::statistics::{NINETY_PERCENT, student_ninety_percent};
 
-/// Periods of the centre frequency from one equation to the next, inverse. A choice: the band of ψ reaches up to twice the centre
-/// frequency, which needs four.
+/// Number of equations per period of the centre frequency of ψ, if the sample rate allows as many. A choice: the band
+/// of ψ reaches up to twice the centre frequency, which needs four.
 const EQUATIONS_PER_PERIOD: f64 = 8.0;
 
-/// Power of the cosine that bounds ψ. With 6 its fifth derivative is continuous, and φ″ = ψ⁗ falls to zero at the ends. A choice.
+/// Power of the cosine that bounds ψ. With 6 the fifth derivative of ψ is continuous, and φ″ = ψ⁗ falls to zero at the
+/// ends. A choice.
 const POWER: i32 = 6;
 
-/// Periods at each end of the record that no equation uses: the impulse response of [`Spectral::near_resonance`] has died there, for a
-/// measured displacement, and for its integrals. A choice.
+/// Number of periods of the largest spectral line that no equation uses at each end of the record: for a measured
+/// displacement, and for a measured velocity or acceleration, which is integrated. Over them the error of
+/// [`Spectral::near_resonance`] from the ends dies out. A choice.
 const MARGIN_PERIODS: [f64; 2] = [2.0, 4.0];
 
 /// A modulating function ψ(t) = cos⁶(πt/L) cos(2πft) for |t| < L/2.
@@ -57,7 +60,8 @@ impl Modulating {
         }
     }
 
-    /// Samples of the derivative of ψ of this order at `rate_hz`, about the middle sample.
+    /// Samples of the derivative of ψ of this order at `rate_hz`, about the middle sample, times the sample interval:
+    /// their scalar product with a signal is an integral.
     ///
     /// cos⁶u = (10 + 15 cos 2u + 6 cos 4u + cos 6u)/32 makes ψ a sum of cosines.
     fn samples(self, order: i32, rate_hz: f64) -> Vec<f64> {
@@ -88,23 +92,23 @@ struct FreeDecay<'a> {
     record: &'a Record<'a>,
     /// Displacement, velocity and acceleration about the resonance, for the nonlinear terms.
     motion: Motion,
-    /// Natural frequency, Hz, as far as the spectrum shows it.
+    /// Frequency of [`peak_frequency_hz`], Hz: an estimate of the natural frequency.
     peak_hz: f64,
 }
 
-/// One fit of the law.
 struct Fit {
     matrix: DMatrix<f64>,
     theta: DVector<f64>,
     left: DVector<f64>,
-    /// NRMSE of the force, relative to m q̈.
+    /// Norm of the residual `left` over that of the integrals ∫φ·m q̈ dt.
     error: f64,
 }
 
 /// Fits the force law of `options` to a record without force, for the moving mass `mass_kg`.
 ///
-/// The standard deviations are those of the delete-a-block jackknife, as multiples that give Student's interval. They are at least the
-/// scatter between fits with other bands of the modulating function, which an error of the law or of a filter causes.
+/// The standard deviations are those of the delete-a-block jackknife, multiplied so that 90 % intervals by the normal
+/// distribution are Student's. They are at least the RMS change of the coefficients in fits with other lengths of the
+/// modulating function, which an error of the law or of a filter causes.
 ///
 /// # Errors
 /// The record is too short for the terms, or does not determine them.
@@ -191,10 +195,10 @@ impl<'a> FreeDecay<'a> {
         })
     }
 
-    /// Integrals ∫φ·term dt of a term, one for each equation of a law of `count` terms.
+    /// Integrals ∫φ·term dt of a term of a law of `count` terms, one for each equation, in the order of time.
     ///
     /// # Errors
-    /// The record is shorter than the support of φ, the margins and the equations that the law needs.
+    /// The record is shorter than the support of φ, both margins and the equations that the law needs are together.
     fn integrals(
         &self,
         term: ForceTerm,
@@ -209,7 +213,7 @@ impl<'a> FreeDecay<'a> {
             ForceTerm::Stiffness => Some(0),
             _ => None,
         };
-        // With the measured derivative m, ∫ψ″ q⁽ⁿ⁾ dt = (−1)ⁿ⁻ᵐ ∫ψ⁽²⁺ⁿ⁻ᵐ⁾ q⁽ᵐ⁾ dt.
+        // If q⁽ᵐ⁾ is measured, the term q⁽ⁿ⁾ has the integral ∫ψ″ q⁽ⁿ⁾ dt = (−1)ⁿ⁻ᵐ ∫ψ⁽²⁺ⁿ⁻ᵐ⁾ q⁽ᵐ⁾ dt.
         let order = linear.map_or(2, |derivative: i32| 2 + derivative - measured);
         let sign = if order % 2 == 0 { 1.0 } else { -1.0 };
         let kernel = modulating.samples(order, rate_hz);

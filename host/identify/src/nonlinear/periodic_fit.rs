@@ -197,8 +197,8 @@ impl Balance {
 
     /// Periodic displacement under `force`, by Newton's method from `start`; `None` without convergence.
     fn solve(&self, theta: &DVector<f64>, force: &[f64], start: Vec<f64>) -> Option<Vec<f64>> {
-        // GMRES leaves a relative error of 1e-9 in each Newton step: after a step of 1e-9 of the motion, both are
-        // rounding.
+        // GMRES solves each Newton step to a residual of 1e-9 of the right-hand side. What it leaves of a step of 1e-9 of
+        // the motion is of the size of rounding.
         let newton = Newton::new(25, 1e-9);
         let found = newton.solve(start, |x: &Vec<f64>| {
             let mut residual: Vec<f64> = force.iter().map(|f| -f).collect();

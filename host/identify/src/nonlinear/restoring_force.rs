@@ -1,11 +1,11 @@
 //! The restoring-force surface f_r(q̇, q) = f − m q̈ (thesis eq. 5.4), its slices, and the force law fitted to it.
 //!
-//! The force law is fitted by least squares between force and motion *within a band* of frequencies. Force and every
-//! term of the law, nonlinear terms included, pass the same filter: the filtered signals satisfy the same equation, and
-//! noise of derivatives outside the band has no effect. A free decay is fitted in weak form. If a force acts and the law has a spring, the error of the
-//! force is weighted by the receptance of the law and becomes an error of the *motion*, which carries the noise
-//! (Sanathanan–Koerner weighting). One motion channel is sufficient; displacement, velocity and acceleration follow
-//! from it by differentiation or integration.
+//! If a force acts, the law is fitted by least squares between force and motion *within a band* of frequencies. Force
+//! and every term of the law, nonlinear terms included, pass the same filter: the filtered signals satisfy the same
+//! equation, and noise of derivatives outside the band has no effect. If the law has a stiffness term k q, the error of
+//! the force is weighted by the receptance of the law and becomes an error of the *motion*, which carries the noise
+//! (Sanathanan–Koerner weighting). A free decay is fitted in weak form. One motion channel is sufficient; displacement,
+//! velocity and acceleration follow from it by differentiation or integration.
 
 use std::f64::consts::TAU;
 
@@ -98,12 +98,13 @@ pub struct Options {
     pub terms: Vec<ForceTerm>,
     /// Given moving mass, kg; `None` if the fit determines it. Required for a record without force.
     pub mass_kg: Option<f64>,
-    /// Frequency band in which the force law is fitted, Hz; `None` takes the band in which the measured motion exceeds its noise. If the
-    /// motion is integrated, the band starts at a quarter of the dominant frequency at least. For a free decay `None` takes a third to
-    /// five thirds of its frequency.
+    /// Frequency band in which the force law is fitted, Hz. With a force, `None` takes the band in which the measured
+    /// motion exceeds its noise; if velocity or acceleration is measured, a given band too starts at a quarter of the
+    /// dominant frequency at least. For a free decay, `None` takes a third to five thirds of the frequency of the
+    /// largest spectral line.
     pub band_hz: Option<[f64; 2]>,
-    /// Duration that is left out of the fit at each end of the record, s; at most a quarter of the
-    /// record at each end. The law of a free decay is fitted to the whole record; only its surface is trimmed.
+    /// Duration that is left out of the fit and the surface at each end of the record, s; at most a quarter of the
+    /// record at each end. Of a free decay only the surface is trimmed.
     pub trim_s: f64,
 }
 
@@ -125,15 +126,15 @@ pub struct Surface {
     pub terms: Vec<ForceTerm>,
     /// Coefficients of the terms, in the order of `terms`, SI units.
     pub theta: DVector<f64>,
-    /// Standard deviations of the coefficients of the force law, from the residual and its correlation in time; for a free decay from the
-    /// scatter between its segments and between bands.
+    /// Standard deviations of the coefficients, in the order of `terms`, from the residual and its correlation in time;
+    /// for a free decay from the scatter of fits without one part of it, and of fits with other bands.
     pub deviations: DVector<f64>,
     /// NRMSE of the force within the band: RMS of the residual over RMS of the force, or of m q̈ in a record without
     /// force.
     pub force_error: f64,
     /// Frequency band in which the force law was fitted, Hz.
     pub band_hz: [f64; 2],
-    /// Motion at the samples of the record that the fit uses.
+    /// Motion at the samples of the record, without the trimmed ends.
     pub motion: Motion,
     /// Restoring force f_r = f − m q̈ at the samples of `motion`, N.
     pub restoring_n: Vec<f64>,
@@ -147,10 +148,10 @@ pub enum SurfaceError {
         "no force acts in the record, so that only ratios to the mass can be found; give the mass (--mass-kg)"
     )]
     NoForce,
-    /// The record has too few samples for the number of terms of the force law.
+    /// The record has too few samples for the fit of the force law.
     #[error("{samples} samples are too few for {terms} terms; at least {needed} are needed")]
     TooShort {
-        /// Number of samples after trimming.
+        /// Number of samples: after trimming with a force, of the whole record for a free decay.
         samples: usize,
         /// Number of terms.
         terms: usize,
@@ -187,7 +188,8 @@ impl Record<'_> {
         }
     }
 
-    /// Number of time derivatives of the displacement that the record measures.
+    /// Order of the time derivative of the displacement that is measured: 1 for velocity, 2 for acceleration, otherwise
+    /// 0.
     pub(super) fn derivatives(&self) -> i32 {
         match self.quantity {
             Quantity::Velocity => 1,
@@ -196,7 +198,7 @@ impl Record<'_> {
         }
     }
 
-    /// True if no force acts at any sample, as in a free decay.
+    /// True if the force is zero at all samples, as in a free decay.
     pub(super) fn is_free(&self) -> bool {
         self.force.iter().all(|force| *force == 0.0)
     }
@@ -270,8 +272,8 @@ impl Record<'_> {
         let whole = spectral.weighted(self.force, |f| f64::from(u8::from(within(f))));
         let scale = DVector::from_column_slice(&whole[range.clone()]).norm();
         let mut force_error = left.norm() / scale;
-        // Each frequency is weighted with the receptance of the fitted linear terms, relative to the static compliance; this
-        // needs a stiffness term.
+        // Each frequency is weighted with the receptance of the fitted linear terms, relative to the static compliance;
+        // this needs a stiffness term.
         if terms.contains(&ForceTerm::Stiffness) {
             for _ in 0..REWEIGHTINGS {
                 let receptance = receptance(&terms, &theta, mass);
@@ -311,8 +313,8 @@ impl Record<'_> {
         })
     }
 
-    /// Residual force of a law that was fitted elsewhere, relative to the force within `band_hz`: ‖f − Σ θ·term‖/‖f‖,
-    /// as [`Surface::force_error`] for a record with force.
+    /// Residual force of a law that was fitted elsewhere, relative to the force, both within `band_hz` and without the
+    /// trimmed ends: ‖f − Σ θ·term‖/‖f‖, as [`Surface::force_error`] for a record with force.
     pub fn force_error(&self, law: &[(ForceTerm, f64)], band_hz: [f64; 2], trim_s: f64) -> f64 {
         let motion = self.motion([0.0, 0.5 * self.rate_hz]);
         let left: Vec<f64> = (0..self.motion.len())

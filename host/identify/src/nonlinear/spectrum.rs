@@ -2,8 +2,9 @@
 //!
 //! A record is not periodic. For a band from 0 Hz, and for a weighted spectrum, the straight line through its ends is
 //! subtracted, and the remaining signal is continued by point reflection about its end, so that value and slope are
-//! continuous. For a higher band the record is mirrored at its ends. At both ends of the filtered record an error
-//! remains, over about one period of the lowest frequency of the band; callers leave these ends out.
+//! continuous. For a higher band, and about a resonance, the record is mirrored at its ends. At both ends of the
+//! filtered record an error remains, over about one period of the lowest frequency of the band; callers leave these
+//! ends out.
 
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -132,10 +133,11 @@ impl Spectral {
         })
     }
 
-    /// The record about `centre_hz`, differentiated `order` times over time, or integrated for a negative order, by a filter whose impulse
-    /// response dies within a few periods of the centre frequency: an error at an end of the record stays there. Its gain rises smoothly
-    /// from 0 at a tenth of the centre frequency to 1 at 0.7 of it, and falls from 1 at 3.5 times the frequency, above the third harmonic,
-    /// to 0 at 5 times it.
+    /// The record about `centre_hz`, differentiated `order` times over time, or integrated for a negative order, by a
+    /// filter whose impulse response dies within a few periods of the centre frequency: an error at an end of the
+    /// record stays there. Apart from the factor of the derivative, the gain of the filter rises smoothly from 0 at a
+    /// tenth of the centre frequency to 1 at 0.7 of it, and falls from 1 at 3.5 times this frequency, above the third
+    /// harmonic, to 0 at 5 times it.
     pub(crate) fn near_resonance(&self, samples: &[f64], order: i32, centre_hz: f64) -> Vec<f64> {
         let nyquist = 0.5 * self.rate_hz;
         let filter = |frequency: f64| {
@@ -162,7 +164,7 @@ impl Spectral {
     }
 }
 
-/// Step from 0 at u = 0 to 1 at u = 1 with two continuous derivatives, u − sin(2πu)/2π.
+/// Step with two continuous derivatives: 0 up to u = 0, u − sin(2πu)/2π between, 1 from u = 1 on.
 fn smooth_step(u: f64) -> f64 {
     let u = u.clamp(0.0, 1.0);
     u - (TAU * u).sin() / TAU
@@ -216,10 +218,12 @@ pub fn dominant_frequency_hz(samples: &[f64], rate_hz: f64) -> f64 {
     (strongest(&smooth) as f64 + 0.5) * width_hz
 }
 
-/// Frequency of the largest line of the spectrum of a free decay, Hz, with the resolution of its duration; of the velocity if a displacement
-/// is measured. The velocity after a release at the static displacement x₀ has lines of x₀/(2ζ) at the resonance, and the drift of a high
-/// pass none above x₀. There is no window, since it would remove the beginning, where the decay is large.
-/// With `band_hz` the largest line within that band.
+/// Frequency of the largest line of the spectrum of a free decay above 0 Hz, in Hz; with `band_hz` of the largest line
+/// within that band. The lines are 1/duration apart.
+///
+/// It is the spectrum of the velocity if displacement or velocity is measured, otherwise that of the acceleration. The
+/// velocity after a release at the static displacement x₀ has lines of x₀/(2ζ) at the resonance, and the drift of a
+/// high pass none above x₀. There is no window, since it would remove the beginning, where the decay is large.
 pub(super) fn peak_frequency_hz(
     samples: &[f64],
     rate_hz: f64,
@@ -243,8 +247,8 @@ pub(super) fn peak_frequency_hz(
     largest.1 as f64 * hertz
 }
 
-/// Frequency band in which a record exceeds its noise, Hz: the contiguous intervals around the dominant frequency whose smoothed
-/// power exceeds the noise power by a factor of more than `margin`.
+/// Frequency band in which a record exceeds its noise, Hz: the contiguous intervals around the dominant frequency whose
+/// smoothed power exceeds the noise power by a factor of more than `margin`.
 ///
 /// The noise power is the 5 % quantile of the smoothed power spectrum.
 pub fn band_of(samples: &[f64], rate_hz: f64, margin: f64) -> [f64; 2] {

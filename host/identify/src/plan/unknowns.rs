@@ -121,7 +121,8 @@ fn percent(share: f64) -> String {
 fn of_case(case: &Case) -> Vec<Named> {
     let named = |variable: Variable| {
         let keys: Vec<String> = variable.parts().iter().map(|part| part.parameter.key()).collect();
-        // A variable of a covariance moves its first parameter and all those correlated with it.
+        // Only a variable of a covariance has more than two parameters: the first, and later ones that correlate with
+        // it.
         let name = match keys.as_slice() {
             [first, _, _, ..] => format!("{first} with {} correlated parameters", keys.len() - 1),
             few => few.join(" with "),
@@ -144,8 +145,8 @@ fn of_forces(case: &Case, relative: f64) -> Vec<Named> {
         .collect()
 }
 
-/// Unknowns for frequency, damping ratio and stiffness of each mode with the relative standard deviations `relative`; a
-/// deviation of 0 gives no unknown.
+/// Unknowns for frequency, damping ratio and stiffness of each mode or robot joint, with the relative standard
+/// deviations `relative` in this order; a deviation of 0 gives no unknown.
 ///
 /// # Errors
 /// The modes of the matrices cannot be computed.
@@ -234,7 +235,7 @@ fn of_joint((index, joint): (usize, &Joint)) -> ModeChanges {
 
 /// Names of the undamped modes Kφ = ω²Mφ of matrices, lowest frequency first, and the changes of the matrices for a
 /// relative change of 1 (100 %) in frequency, damping ratio and stiffness of each mode. With φᵀMφ = 1 and φᵀCφ = 2ζω, a
-/// change of one mode alone is a multiple of Mφφᵀ M.
+/// change of one mode alone is a multiple of MφφᵀM.
 ///
 /// Modes are those of the symmetric parts of the matrices; modes with ω² ≤ 0 are left out. Damping that couples modes
 /// does not change.

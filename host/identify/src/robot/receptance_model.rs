@@ -17,12 +17,13 @@ pub(super) struct Model {
 }
 
 impl Model {
-    /// The robot at the angular frequency `omega`, rad/s, with the mass matrix of its joints; `None` at an undamped resonance.
+    /// The robot at the angular frequency `omega`, rad/s; `mass` is the mass matrix of its joints. `None` if the
+    /// dynamic stiffness of the joints is singular (undamped resonance).
     pub(super) fn new(robot: &Robot, mass: &DMatrix<f64>, omega: f64) -> Option<Self> {
         Self::with(robot, &robot.jacobian(), mass, omega)
     }
 
-    /// As [`Model::new`], with the Jacobian of the tool.
+    /// As [`Model::new`], with the Jacobian of the tool as `jacobian`.
     pub(super) fn with(
         robot: &Robot,
         jacobian: &Matrix3xX<f64>,

@@ -1,4 +1,4 @@
-//! Conversion of a case file to a case, with a check of every value.
+//! Conversion of a case file to a case, with checks of its values.
 
 mod extensions;
 mod job;
@@ -19,8 +19,8 @@ impl Case {
     /// Reads a case file.
     ///
     /// # Errors
-    /// The file cannot be read, is not TOML, has an unknown key, lacks a required key, has a value that no machine,
-    /// tool or cut can have, or has extensions that are not possible together.
+    /// The file cannot be read, is not TOML, has an unknown key, lacks a required key, has a value that is not
+    /// possible, or has extensions that are not possible together.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, CaseError> {
         let path = path.as_ref();
         Self::parse(path, &quietcut_recording::file::read_text(path)?)
@@ -29,7 +29,7 @@ impl Case {
     /// A case from the text of a case file. `path` gives the default name of the case and is named in error messages.
     ///
     /// # Errors
-    /// As [`Case::read`].
+    /// As [`Case::read`], except that no file is read.
     pub fn parse(path: &Path, text: &str) -> Result<Self, CaseError> {
         case(path, text)
     }
@@ -151,8 +151,8 @@ impl Check<'_> {
         self.number(value, key, |x| x > 0.0, "a number greater than 0")
     }
 
-    /// A number within `[low, high]`, in `unit`. The error of a number of larger magnitude than `high` suggests the
-    /// number divided by `factor`, as if it was given in the unit `smaller`.
+    /// A number within `[low, high]`, in `unit`. The error of a finite number of larger magnitude than `high` suggests
+    /// the number divided by `factor`, in case it was meant in the unit `smaller`.
     fn sized(
         &self,
         value: &Number,

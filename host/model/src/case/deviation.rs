@@ -1,20 +1,21 @@
 //! Standard deviations of the parameters of a case.
 
-/// The standard deviation of one parameter, in the unit of that parameter: a key `…_std` of the case.
+/// Standard deviation of one parameter.
 ///
-/// The errors of these parameters are normally distributed and independent, except for entries (i, j) and (j, i) of a matrix
-/// with equal values and equal standard deviations: they vary together. For other correlations see
-/// [`ParameterCovariance`](super::ParameterCovariance).
+/// The errors of the parameters in [`Case::deviations`](super::Case::deviations) are normally distributed and
+/// independent, except that entries (i, j) and (j, i) of a matrix vary together if their values and standard deviations
+/// are equal. For other correlations see [`ParameterCovariance`](super::ParameterCovariance).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Deviation {
     /// The uncertain parameter.
     pub parameter: Parameter,
-    /// Standard deviation of the parameter, in the unit of the parameter. It is positive in a case; among parameters
-    /// that vary together, a negative one belongs to a parameter that falls when the others rise.
+    /// Standard deviation of the parameter, in the unit of the parameter. It is positive in a case. In
+    /// [`independent_parts`](super::ParameterCovariance::independent_parts) it is negative if the parameter falls when
+    /// the variable rises.
     pub std: f64,
 }
 
-/// A parameter of a case that may have a standard deviation. Indices of rows, columns, modes and joints count from 0.
+/// A parameter of a case that may have a standard deviation. Indices count from 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Parameter {
     /// Mass matrix entry: row, column.
@@ -27,9 +28,9 @@ pub enum Parameter {
     CubicDamping(usize, usize),
     /// Entry of the matrix of cubic stiffness, which multiplies the cubes of the displacements: row, column.
     CubicStiffness(usize, usize),
-    /// Natural frequency of a mode, Hz.
+    /// Natural frequency of a mode, Hz: index of the mode.
     Frequency(usize),
-    /// Damping ratio of a mode.
+    /// Damping ratio of a mode: index of the mode.
     DampingRatio(usize),
     /// Real (false) or imaginary (true) part of one entry of a left mode shape: index of the mode, index of the entry,
     /// part.
@@ -37,11 +38,12 @@ pub enum Parameter {
     /// Real (false) or imaginary (true) part of one entry of a right mode shape: index of the mode, index of the entry,
     /// part.
     Right(usize, usize, bool),
-    /// Stiffness of a robot joint.
+    /// Stiffness of a robot joint: index of the joint.
     JointStiffness(usize),
-    /// Damping of a robot joint.
+    /// Damping of a robot joint: index of the joint.
     JointDamping(usize),
-    /// Cubic stiffness of a robot joint, which multiplies the cube of the joint angle: index of the joint.
+    /// Cubic stiffness of a robot joint, which multiplies the cube of the vibration of the joint angle: index of the
+    /// joint.
     JointCubicStiffness(usize),
     /// Cubic damping of a robot joint, which multiplies the cube of the angular velocity: index of the joint.
     JointCubicDamping(usize),
@@ -76,7 +78,8 @@ pub enum Parameter {
 }
 
 impl Parameter {
-    /// Key of the parameter in the case file; in keys, rows, columns, modes and joints count from 1.
+    /// Key of the parameter in the case file, with rows, columns, modes, joints and entries of mode shapes counted from
+    /// 1, such as `structure.mass[1][2]` or `structure.mode[1].left[2] real`.
     pub fn key(self) -> String {
         let entry = |matrix: &str, i: usize, j: usize| format!("structure.{matrix}[{}][{}]", i + 1, j + 1);
         let shape = |mode: usize, side: &str, index: usize, imaginary: bool| {

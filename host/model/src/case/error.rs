@@ -1,4 +1,4 @@
-//! Errors of a case file, with their line and the expected value.
+//! Errors of a case file, and of tasks that a case does not allow.
 
 use std::path::PathBuf;
 
@@ -7,13 +7,14 @@ use quietcut_recording::file::FileError;
 use super::sections::Section;
 use crate::effects::EffectError;
 
-/// A case file that cannot be used. Every message names the file.
+/// A case file that cannot be used, or not for the requested task. Every message names the file.
 #[derive(Debug, thiserror::Error)]
 pub enum CaseError {
     /// The file cannot be read.
     #[error(transparent)]
     File(#[from] FileError),
-    /// A file that is not TOML, an unknown key, a missing key, or a value of the wrong type.
+    /// A file that is not TOML or, outside of the tables `[extension.NAME]`, an unknown key, a missing key or a value
+    /// of the wrong type.
     #[error("{}: line {line}, `{source_line}`: {message}", path.display())]
     Syntax {
         /// The file.
@@ -22,24 +23,24 @@ pub enum CaseError {
         line: usize,
         /// Text of the line.
         source_line: String,
-        /// Message of the TOML parser: the fault, and what it expected.
+        /// The fault: the message of the TOML parser, or all keys that the section lacks.
         message: String,
     },
-    /// A value that no machine, tool or cut can have.
+    /// A value that is not possible, a key or extension that is not allowed, or a key that the other ones require.
     #[error("{}: line {line}, {key}: found {found}; {expected} is needed", path.display())]
     Value {
         /// The file.
         path: PathBuf,
         /// Line, from 1.
         line: usize,
-        /// The key of the refused value with its table, such as `tool.teeth`.
+        /// The refused or missing key with its table, such as `tool.teeth`.
         key: String,
-        /// The refused value of the case file, or words for it.
+        /// The refused value of the case file, or words for the fault.
         found: String,
         /// The expected value.
         expected: String,
     },
-    /// Extensions with a missing key, or with values that are possible alone but not together.
+    /// Extensions of which a key is missing, or whose keys or values are not possible together.
     #[error("{}: line {line}: {error}", path.display())]
     Effect {
         /// The file.
@@ -66,12 +67,12 @@ pub enum CaseError {
         path: PathBuf,
         /// Name of the extension.
         name: String,
-        /// The reason why the computation cannot treat the extension, and a remedy.
+        /// The reason why the computation cannot treat the extension.
         reason: String,
     },
 }
 
-/// Message part: the required keys of a missing section, with units and lines to paste.
+/// Message part: the required keys of a missing section, with units and lines to paste; empty for `structure`.
 fn keys_of(section: &str) -> String {
     Section::of(section).map_or_else(String::new, |section| format!("; {}", section.whole()))
 }

@@ -1,6 +1,6 @@
 //! Limits of the machine's spindle.
 
-/// Limits of spindle speed and power of the machine; advised speeds stay within them.
+/// Limits of spindle speed and power of the machine.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MachineLimits {
     /// Slowest spindle speed, rev/min.
@@ -12,7 +12,7 @@ pub struct MachineLimits {
 }
 
 impl MachineLimits {
-    /// True if the spindle may run at the speed `rpm`, rev/min: both ends of its range are allowed.
+    /// True if the spindle may run at the speed `rpm`, rev/min: from `rpm_min` to `rpm_max`, both included.
     pub fn allows(&self, rpm: f64) -> bool {
         (self.rpm_min..=self.rpm_max).contains(&rpm)
     }

@@ -1,4 +1,4 @@
-//! The case file: structure, tool, material and cut of one machine and job.
+//! The case file: structure, tool, material, cut and further sections of one machine and job.
 //!
 //! A section may be missing if a command does not need it; an unknown key is an error. x, y and z are the machine's
 //! axes, z that of the tool. Angles are in degrees, lengths of tool and cut in mm, all other quantities in SI units
@@ -50,9 +50,10 @@ pub struct Case {
     pub limits: Option<MachineLimits>,
     /// Posture of the robot to which the structure belongs.
     pub posture: Posture,
-    /// Standard deviations of the parameters of the case (keys `…_std`).
+    /// Standard deviations above 0 of parameters of the case (keys `…_std`); not those of extensions.
     pub deviations: Vec<Deviation>,
-    /// Joint covariance of further parameters (section `[uncertainty]`), none of which is among the [`deviations`](Self::deviations).
+    /// Joint covariance of further parameters (section `[uncertainty]`), none of which is among the
+    /// [`deviations`](Self::deviations); `None` if the case has no such section.
     pub covariance: Option<ParameterCovariance>,
     /// Assumptions under which the case was identified (section `[provenance]`), one sentence each; see
     /// [`assumptions`](Self::assumptions).
@@ -108,7 +109,7 @@ impl Case {
         })
     }
 
-    /// True if the case states how uncertain any of its parameters is: by a standard deviation or by a covariance.
+    /// True if the case has [`deviations`](Self::deviations) or a [`covariance`](Self::covariance).
     pub fn is_uncertain(&self) -> bool {
         !self.deviations.is_empty() || self.covariance.is_some()
     }
@@ -118,7 +119,7 @@ impl Case {
         self.extensions.contains_key(effect.name())
     }
 
-    /// The specifications of the effects that the case has as extensions, in the order of their names.
+    /// The specifications of the effects that the case has as extensions, by name in alphabetical order.
     pub fn effects(&self) -> impl Iterator<Item = &'static EffectSpec> + '_ {
         let known = self.extensions.keys().filter_map(|name| name.parse().ok());
         known.map(EffectName::spec)

@@ -33,15 +33,16 @@ impl ParameterCovariance {
     }
 
     /// Independent standard normal variables z that give the parameters their covariance: with C = L Lᵀ the errors are
-    /// L z. One list for each variable: a column of the lower triangular L, without the zeros. Entries may be negative.
+    /// L z. One list for each variable: a column of the lower triangular L, from left to right, without the zeros.
+    /// Entries may be negative.
     ///
-    /// Parameters that depend linearly on earlier ones have no variable of their own, such as the entries of mode shapes
-    /// of which the norm is fixed.
+    /// A parameter whose variance is zero, or whose error follows linearly from those of earlier parameters, has no
+    /// variable of its own.
     pub fn independent_parts(&self) -> Vec<Vec<Deviation>> {
         let size = self.parameters.len();
         let std = self.covariance.diagonal().map(f64::sqrt);
-        // Cholesky factorization of the correlation matrix, whose pivots are the shares of a variance that earlier
-        // parameters leave unexplained.
+        // Cholesky factorization of the correlation matrix. Each pivot is the share of a parameter's variance that
+        // earlier parameters leave unexplained.
         let mut rest = self.correlation();
         let mut variables = Vec::new();
         for k in 0..size {

@@ -7,7 +7,8 @@ use super::deviation::Parameter;
 use crate::structure::{Form, Joint, Matrices, Mode};
 
 impl Parameter {
-    /// All parameters of a case that may be uncertain.
+    /// All parameters of a case that may be uncertain, in the order structure, tool, material, cut; not those of
+    /// extensions.
     pub fn of_case(case: &Case) -> Vec<Self> {
         let structure = case.structure.as_ref();
         let size = structure.map_or(0, |structure| structure.directions.len());

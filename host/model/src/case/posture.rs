@@ -2,7 +2,7 @@
 
 use quietcut_recording::RecordedPosture;
 
-/// Posture of the robot to which the structure belongs: where it was measured, or for which it follows from the joints.
+/// Posture of the robot at which the structure was measured or, for a structure given by joints, is computed.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Posture {
     /// Index of the posture, shared by host and device; 0 if the case gives none, as for a machine tool.

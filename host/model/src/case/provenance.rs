@@ -5,8 +5,8 @@ use crate::milling::Process;
 use crate::structure::Direction;
 
 impl Case {
-    /// Sentences that state the assumptions behind the structure of the case: those of its section `[provenance]`, and
-    /// that the tool is rigid in z if the structure has no z and this can change the limits.
+    /// Sentences that state the assumptions behind the structure of the case: those of its section `[provenance]` and,
+    /// if the structure has no z, the [`effect_of_rigid_z`](Self::effect_of_rigid_z).
     pub fn assumptions(&self) -> Vec<String> {
         let mut assumptions = self.assumed.clone();
         let lacks_z = self.structure.as_ref().is_some_and(|structure| {
@@ -19,12 +19,12 @@ impl Case {
         assumptions
     }
 
-    /// Sentence that says how much limits may differ if the tool is not rigid in z; `None` if z has no part in the cut:
-    /// neither an axial force nor a chip that follows z.
+    /// Sentence that says by which factor limits could differ if the tool is not rigid in z; `None` if tool, material
+    /// or cut are missing, or if the factor is below 1.005 or not finite.
     ///
-    /// At the middle of the engagement, the chip follows z as c = |n_z|/|n_xy| of the motion in x and y, and the axial force
-    /// is f = |k_z|/|k_xy| of that in x and y. With all receptances equal, the loop gain of the cut, and with it the
-    /// limiting depth, then changes by the factor (1 + c)(1 + f).
+    /// The factor (1 + c)(1 + f) is an estimate with all receptances equal, at the middle of the engagement. The ratio
+    /// c = |n_z|/|n_xy| compares z with x and y in the chip-thickness direction n, the ratio f = |k_z|/|k_xy| in the
+    /// cutting force k.
     pub fn effect_of_rigid_z(&self) -> Option<String> {
         let (tool, material, cut) = (self.tool.as_ref()?, self.material.as_ref()?, self.cut.as_ref()?);
         let process = Process::new(tool, material, cut, self.axial_depth_modulation());
@@ -33,7 +33,7 @@ impl Case {
         let chip = share(process.force.normal.at(middle));
         let force = share(process.force.cutting.at(middle));
         let factor = (1.0 + chip) * (1.0 + force);
-        // A factor that rounds to 1.00 is that of a square end mill without axial force.
+        // A smaller factor rounds to 1.00; for a square end mill without axial force it is 1.
         (factor >= 1.005 && factor.is_finite()).then(|| {
             format!(
                 "the tool is taken as rigid in z: with receptances hzz, hxz and hyz as large as hxx and hyy, limits could differ by a factor of {factor:.2}; \

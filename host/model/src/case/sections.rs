@@ -1,10 +1,9 @@
-//! Required keys of the sections of a case, with units and example values: what a message says of a missing section or
-//! key.
+//! Required keys of sections of a case, with units and example values, for messages about a missing section or key.
 
 /// A section of a case with its required keys.
 pub(super) struct Section {
     name: &'static str,
-    /// Key, unit or meaning, and an example value.
+    /// Each required key with its unit or meaning and an example value.
     keys: &'static [(&'static str, &'static str, &'static str)],
 }
 
@@ -54,13 +53,13 @@ const SECTIONS: [Section; 5] = [
 ];
 
 impl Section {
-    /// The section of this name; `None` if its keys depend on the case or if there is no such section.
+    /// The section of this name; `None` if it is not among the [`SECTIONS`].
     pub(super) fn of(name: &str) -> Option<&'static Self> {
         SECTIONS.iter().find(|section| section.name == name)
     }
 
-    /// The section whose header is the last one among the first `line` lines of the text of a case; `None` if there
-    /// is none, or if its keys depend on the case.
+    /// The section whose header is the last one among the first `line` lines of the text of a case; `None` if there is
+    /// no header, or if the section is not among the [`SECTIONS`].
     pub(super) fn at(text: &str, line: usize) -> Option<&'static Self> {
         let headers = text.lines().take(line).filter_map(|line| {
             let header = line.trim().strip_prefix('[')?;
@@ -85,7 +84,7 @@ impl Section {
         (!missing.is_empty()).then(|| format!("[{}] lacks {}", self.name, described(&missing)))
     }
 
-    /// Message part: the whole section with its required keys.
+    /// Message part: the advice to add this section, with its required keys.
     pub(super) fn whole(&self) -> String {
         let keys: Vec<_> = self.keys.iter().collect();
         format!("add [{}] with {}", self.name, described(&keys))

@@ -1,5 +1,6 @@
 //! Backlash: a share s of the spring does not act within a gap of total width g,
-//! f_r += s·k·(d(x) − x) with d(x) = 0 for |x| ≤ g/2 and x ∓ g/2 beyond; k is the stiffness along the direction.
+//! f_r += s·k·(d(x) − x) with d(x) = 0 for |x| ≤ g/2 and x ∓ g/2 beyond; k is the entry of the static stiffness matrix
+//! for the direction. A backlash in series with friction is part of `coulomb_friction`.
 
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -141,8 +142,8 @@ impl RestoringForce for BacklashSpring {
         match before {
             None if x > self.half_gap_m => ABOVE,
             None if x < -self.half_gap_m => BELOW,
-            // In the middle regime the displacement has reached an edge of the gap and continues beyond it; from
-            // outside, it returns into the gap.
+            // At the end of the regime within the gap the displacement goes beyond an edge of the gap; at the end of
+            // the other regimes it returns into the gap.
             Some(WITHIN) if x > 0.0 => ABOVE,
             Some(WITHIN) => BELOW,
             _ => WITHIN,

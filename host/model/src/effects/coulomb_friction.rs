@@ -1,4 +1,5 @@
-//! Dry friction: f_r += fc·sign(v); at rest, f_r balances any other force within ±fc.
+//! Dry friction: f_r += fc·sign(v); at rest, f_r balances any other force within ±fc. For negative velocity fc may have
+//! another value.
 //!
 //! With a backlash of total width g in series, the friction acts on a slider at the position w, which the tool moves
 //! only while |x − w| = g/2: after each reversal of the motion there is no force until the backlash is crossed.
@@ -89,7 +90,8 @@ fn describing_function(at: Harmonic) -> [Complex64; 2] {
 }
 
 /// Moves gap and contact of a backlash in series with friction (`[extension.backlash]` with
-/// `before = "coulomb-friction"`) to the values of the friction.
+/// `before = "coulomb-friction"`) to the values of the friction, and removes the backlash. Without the key `before`
+/// nothing changes.
 ///
 /// # Errors
 /// The key `before` is no word or names another effect, there is no friction, the gap is missing, or gap or contact are
@@ -141,7 +143,7 @@ const STICK: Regime = 0;
 const SLIP_FORWARD: Regime = 1;
 const SLIP_BACKWARD: Regime = 2;
 
-/// Slider on which the dry friction acts: the tool moves it while their distance is `reach_m`, m.
+/// Slider on which the dry friction acts: the tool moves it while tool and slider are `reach_m`, m, apart.
 #[derive(Debug)]
 struct Slider {
     axis: usize,

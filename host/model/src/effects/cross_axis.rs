@@ -53,7 +53,7 @@ impl Effect for CrossAxis {
     fn alter_channel(&self, channel: &mut Pickup) {
         if let Some(axis) = self.direction.axis()
             && acts_on(self.channel.as_deref(), channel)
-            // If the effect names no channel, channels that already read its source direction are not changed.
+            // If the effect names no channel, channels that already read `self.direction` are not changed.
             && (self.channel.is_some() || channel.weights[axis] == 0.0)
         {
             channel.weights[axis] += self.fraction;

@@ -1,4 +1,4 @@
-//! The damping differs from the case: C → C·(1 + r).
+//! The damping differs from the case, by a relative change r or by an absolute value; see `linear_change`.
 
 use super::linear_change::{Matrix, RELATIVE_CHANGE, build};
 use super::{Argument, Class, EffectName, EffectSpec, Locations, Parameter, Prior, Treatment};

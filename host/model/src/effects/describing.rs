@@ -5,7 +5,7 @@
 
 use num_complex::Complex64;
 
-/// The harmonic motion at which a describing function is evaluated.
+/// Harmonic motion at which a describing function is evaluated, with the bend of its force law.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Harmonic {
     /// Displacement amplitude X, m.
@@ -34,6 +34,6 @@ impl Harmonic {
     }
 }
 
-/// Describing functions N(X, ω) of the terms of a restoring force, each for a unit coefficient. The terms stand in the
-/// order of the linear parameters; the second is zero if the force has only one term.
+/// Describing functions N(X, ω) of up to two terms of a restoring force, each for a unit coefficient, such as those of
+/// x³ and x⁵. The second is zero if the force has only one term.
 pub type DescribingFunction = fn(Harmonic) -> [Complex64; 2];

@@ -1,4 +1,7 @@
 //! Stiffness that changes with time: K → K·(1 + r·t), or K·(1 + a·(1 − e^(−t/T))).
+//!
+//! K is the static stiffness matrix at the tool along x, y and z; with a direction, only the diagonal entry of that
+//! direction changes.
 
 use std::sync::Arc;
 

@@ -1,4 +1,4 @@
-//! The edge coefficients K_te, K_re, K_ae differ from those of the case.
+//! One or more of the edge coefficients K_te, K_re, K_ae differ from those of the case.
 
 use std::sync::Arc;
 

@@ -21,12 +21,12 @@ pub trait Effect: Debug + Send + Sync {
     /// Changes parameters of the structure that a case can also state.
     ///
     /// # Errors
-    /// For example: the structure has no such parameter, or does not have the direction of the effect.
+    /// The effect does not apply to the structure: see [`EffectError::Structure`].
     fn alter_structure(&self, _structure: &mut Structure) -> Result<(), EffectError> {
         Ok(())
     }
 
-    /// Changes the equation of motion of `structure` in a way that no case can state, such as an additional mode.
+    /// Changes `dynamics`, the equation of motion of `structure`, for example by an additional mode.
     ///
     /// # Errors
     /// The direction of the effect cannot be used: see [`EffectError::Direction`].
@@ -43,7 +43,7 @@ pub trait Effect: Debug + Send + Sync {
         Ok(Vec::new())
     }
 
-    /// Changes tool, cut or cutting force. The tool has the mean spindle speed of the cut, if that is known.
+    /// Changes tool, cut or cutting force. `cutter` holds the mean spindle speed of the cut, if that is known.
     ///
     /// # Errors
     /// The tool or the cut lacks a quantity that the effect requires.

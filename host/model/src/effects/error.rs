@@ -1,4 +1,5 @@
-//! Errors of an effect with impossible or missing values, or that does not apply to the model.
+//! Errors of effects: unknown names or keys, impossible or missing values, or a model to which an effect does not
+//! apply.
 
 use super::{EffectName, nearest};
 
@@ -11,20 +12,22 @@ pub enum EffectError {
     /// An unknown name.
     #[error("effect `{0}` is not known; {names} is needed", names = nearest::expected(.0, EffectName::ALL.into_iter().map(EffectName::name)))]
     Unknown(String),
-    /// A key that the effect does not have, or does not use beside the other given keys.
+    /// A key, or the VALUE of `--effect NAME=VALUE`, that the effect does not have, or does not use with the other
+    /// values as given.
     #[error("effect `{name}` has no key `{key}`; it has {known}", name = .effect.name(), known = .effect.spec().keys_in_words())]
     Key {
         /// The effect.
         effect: EffectName,
-        /// The key.
+        /// The key; the words "a value" for VALUE.
         key: String,
     },
-    /// A missing key that the effect with this name requires.
+    /// An effect without a value that it requires: neither this key nor, where there is one, another in its place is
+    /// given.
     #[error("effect `{name}` needs {key}")]
     Missing {
         /// The effect.
         name: &'static str,
-        /// The key.
+        /// The key, or a phrase that begins with it.
         key: &'static str,
     },
     /// Drift or wear given as change over the whole recording, for a recording of unknown length.
@@ -36,20 +39,20 @@ pub enum EffectError {
         key: &'static str,
     },
     /// A value that is not possible for its key, such as a negative damping ratio, or not possible beside the other
-    /// given values.
+    /// given values and effects.
     #[error("effect `{name}{dot}{key}`: `{found}` is not possible; {needed} is needed", dot = if .key.is_empty() { "" } else { "." })]
     Value {
         /// The effect.
         name: &'static str,
         /// The key of the refused value; empty for the VALUE of `--effect NAME=VALUE`.
         key: String,
-        /// The value as given.
+        /// The refused value.
         found: String,
         /// Description of the possible values.
         needed: &'static str,
     },
-    /// A direction of an effect that cannot be used: for example one that the structure does not have, a rotation
-    /// instead of an axis, or none although the structure has several.
+    /// A direction of an effect that the structure does not have, or that is a rotation instead of an axis; or no
+    /// direction, although the structure has not exactly as many axes as the effect needs.
     #[error("effect `{name}`: {what}; the structure has the directions {directions}")]
     Direction {
         /// The effect.
@@ -59,16 +62,17 @@ pub enum EffectError {
         /// The directions of the structure.
         directions: String,
     },
-    /// An effect that this structure does not allow: for example with a parameter that this kind of structure does not
-    /// have, or if its static stiffness is not known.
+    /// An effect that this structure does not allow: for example one with a parameter that this kind of structure does
+    /// not have, or one that needs a static stiffness that is not known.
     #[error("effect `{name}`: {what}")]
     Structure {
         /// The effect.
         name: &'static str,
-        /// The fault, and the remedy.
+        /// The fault, in some cases with the remedy.
         what: String,
     },
-    /// An effect that requires a quantity of the tool or the cut that is not given.
+    /// An effect of the cut that requires a quantity of the tool or the cut that is not given, or that the structure
+    /// does not allow.
     #[error("effect `{name}`: {what}")]
     Cut {
         /// The effect.
@@ -76,7 +80,8 @@ pub enum EffectError {
         /// The fault, and the remedy.
         what: &'static str,
     },
-    /// Friction on a structure given by modes that have no mass matrix, so that the tool cannot stick.
+    /// Friction with a stick regime on a structure given by modes whose residues do not sum to zero, so that it has no
+    /// mass matrix: stick is not computed there.
     #[error(
         "{name}: the modes of this structure add up to no mass (their residues do not sum to zero), so that no friction can hold it; use mass, damping and stiffness matrices",
         name = EffectName::CoulombFriction.name()
@@ -85,8 +90,8 @@ pub enum EffectError {
 }
 
 impl EffectError {
-    /// Name of the effect and key that are at fault; the key is empty if the error does not record one. An unknown
-    /// effect is given by the name that was found; `None` for a text without `=`.
+    /// Name of the effect at fault, or the unknown name, and the key of [`Self::Key`] or [`Self::Value`]; the key is
+    /// empty for all other errors. `None` for a text without `=`.
     pub fn location(&self) -> Option<(&str, &str)> {
         match self {
             Self::Form(_) => None,

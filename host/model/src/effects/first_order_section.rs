@@ -24,7 +24,7 @@ impl FirstOrderSection {
         }
     }
 
-    /// Value H(s) of the transfer function; s = iω for a harmonic motion, and a pole of the structure for a free decay.
+    /// Value H(s) of this section; s = iω for a harmonic motion, and a pole of the structure for a free decay.
     pub fn at(&self, s: Complex64) -> Complex64 {
         (self.static_gain + self.derivative_s * s) / (1.0 + self.time_constant_s * s)
     }

@@ -1,4 +1,4 @@
-//! The cutting coefficients K_tc, K_rc, K_ac differ from those of the case.
+//! One or more of the cutting coefficients K_tc, K_rc, K_ac differ from those of the case.
 
 use std::sync::Arc;
 

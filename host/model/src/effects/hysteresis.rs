@@ -1,6 +1,7 @@
 //! Bouc–Wen hysteresis: f_r += k_h·(z − x), ż = v·(1 − |z/z_y|ⁿ·(γ·sgn(v·z) + β)).
 //!
-//! γ and β are shape parameters with γ + β = 1, so that z saturates at ±z_y. At small motion z = x, and f_r is zero.
+//! γ and β are shape parameters with γ + β = 1, so that z saturates at ±z_y. At motion much smaller than z_y about
+//! x = z = 0, z ≈ x and f_r ≈ 0.
 
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -78,7 +79,7 @@ const ZERO_TO_ONE: Prior = Prior {
 fn describing_function(at: Harmonic) -> [Complex64; 2] {
     let (amplitude, yield_m) = (at.amplitude_m, at.bend_m);
     // Half a period from the upper to the lower peak of x: z unloads from +z₀ with slope 1 to 0, then loads over the
-    // rest s of the stroke as z = −z_y(1 − e^{−s/z_y}), to −z₀. The peak z₀ is the fixed point of this map.
+    // rest s = 2X − z₀ of the stroke as z = −z_y(1 − e^{−s/z_y}), to −z₀: in the steady loop, reached(z₀) = z₀.
     let stroke = 2.0 * amplitude;
     let reached = |z: f64| -yield_m * (-(stroke - z) / yield_m).exp_m1();
     let [low, high] = bisection([0.0, yield_m.min(stroke)], 0.0, |z| reached(z) > z);
@@ -96,7 +97,7 @@ fn describing_function(at: Harmonic) -> [Complex64; 2] {
             yield_m * (-(gone - top) / yield_m).exp_m1()
         };
         let rest = z - amplitude * p.cos();
-        // Component of z − x in phase with the displacement cos p, and in phase with the velocity −sin p.
+        // Products of z − x with cos p, as the displacement, and with −sin p, as the velocity.
         sum += Complex64::new(rest * p.cos(), -rest * p.sin());
     }
     [sum * (2.0 / (f64::from(count) * amplitude)), Complex64::ZERO]
@@ -163,8 +164,8 @@ impl RestoringForce for BoucWen {
             gamma,
             ..
         } = self.effect;
-        // Within a regime of the Bouc–Wen law the sign of z is constant. The signed power |z/z_y|ⁿ·sgn continues the
-        // law smoothly if a stage of the integrator lies beyond the end of the regime.
+        // Within a regime of the Bouc–Wen law the sign of z is constant. If a stage of the integrator lies beyond the
+        // end of the regime, where z has the other sign, the power −|z/z_y|ⁿ continues the law without a kink.
         let share = of_z * own[0] / yield_m;
         let power = share.signum() * share.abs().powf(exponent);
         let shape = gamma * of_velocity * of_z + (1.0 - gamma);
@@ -178,8 +179,8 @@ impl RestoringForce for BoucWen {
 
     fn margin(&self, regime: Regime, at: &MotionState, own: &[f64], _: f64) -> f64 {
         let (of_velocity, of_z) = Self::signs(regime);
-        // The smaller of two quantities of different units, velocity and hysteretic displacement: only the sign of this
-        // margin is used.
+        // Velocity and hysteretic displacement z have different units, but the smaller of them, each times its sign in
+        // the regime, is negative exactly if at least one has changed its sign.
         (of_velocity * at.v[self.axis]).min(of_z * own[0])
     }
 
@@ -192,8 +193,8 @@ impl RestoringForce for BoucWen {
             regime |= NEGATIVE;
         }
         let Some(before) = before else { return regime };
-        // A Bouc–Wen regime ends where velocity or z becomes zero; in the next regime the smaller of the two has
-        // changed its sign.
+        // A Bouc–Wen regime ends where velocity or z becomes zero. Of the two, each times its sign in the ended regime,
+        // the smaller has changed its sign in the next regime.
         let (of_velocity, of_z) = Self::signs(before);
         let (v, z) = (of_velocity * at.v[self.axis], of_z * own[0]);
         // One of the two is at zero, the other inside its regime: their units do not matter.

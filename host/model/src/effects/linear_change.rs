@@ -1,10 +1,10 @@
-//! Mass, stiffness or damping that differs from the case: VALUE is a relative change r, a key may give an absolute
-//! value.
+//! Mass, stiffness or damping that differs from the case, by a relative change r or by an absolute value.
 //!
 //! In a structure given by matrices, the whole matrix M, C or K is scaled by 1 + r; with a direction, only the diagonal
-//! entry of that direction is scaled or replaced. In a structure given by modes, all modes change as if M, C or K were
-//! scaled: stiffness multiplies ω by √(1 + r) and divides ζ and the residues by it; mass divides all three by √(1 + r);
-//! damping multiplies ζ by 1 + r. A structure given by joints is refused.
+//! entry of that direction is scaled or replaced. In a structure given by modes, r changes all modes as scaling M, C or
+//! K would at light damping: stiffness multiplies ω by √(1 + r) and divides ζ and the residues by it; mass divides all
+//! three by √(1 + r); damping multiplies ζ by 1 + r. An absolute value replaces the frequency or damping ratio of the
+//! only mode. A structure given by joints is refused.
 
 use std::sync::Arc;
 
@@ -13,8 +13,8 @@ use nalgebra::DMatrix;
 use super::{Effect, EffectError, EffectName, Parameter, Prior, Values};
 use crate::structure::{Direction, Form, Mode, Structure};
 
-/// Parameter for the relative change r of mass, stiffness or damping. It is above −1: a matrix or entry that vanishes
-/// or changes its sign is not possible.
+/// Parameter for the relative change r of mass, stiffness or damping. It is above −1, so that no matrix or entry
+/// vanishes or changes its sign.
 pub(super) const RELATIVE_CHANGE: Parameter = Parameter::number(
     "relative_change",
     "",

@@ -8,8 +8,7 @@ macro_rules! list {
     ($($variant:ident => $module:ident::$spec:ident,)+) => {
         /// The name of an effect.
         ///
-        /// A crate that treats effects one by one matches on it without a wildcard, so that the compiler asks for the
-        /// treatment of a new effect.
+        /// A match on [`EffectName`] without a wildcard makes the compiler ask for the treatment of a new effect.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
         pub enum EffectName {
             $(#[doc = concat!("The effect of the file `", stringify!($module), ".rs`.")] $variant,)+

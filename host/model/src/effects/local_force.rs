@@ -36,8 +36,7 @@ struct ForceAlongAxis {
     axis: usize,
 }
 
-/// Regime of motion towards positive displacement; also the only regime of a force law without a jump in its
-/// derivatives.
+/// Regime of positive velocity; also the only regime of a force with `bends_at_rest` false.
 const FORWARD: Regime = 0;
 const BACKWARD: Regime = 1;
 

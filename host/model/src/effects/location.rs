@@ -40,8 +40,8 @@ pub(super) fn directions_in_words(structure: &Structure) -> String {
 }
 
 /// Static stiffness matrix at the tool along x, y and z, N/m: the inverse of the static receptance. For a structure
-/// given by matrices, all of whose directions are axes, it is the stiffness matrix K. Rows and columns of axes that the
-/// structure does not have are zero.
+/// given by matrices, all of whose directions are axes, its entries are those of the stiffness matrix K. Rows and
+/// columns of axes that the structure does not have are zero.
 pub(super) fn static_stiffness(
     structure: &Structure,
     name: &'static str,

@@ -1,5 +1,5 @@
-//! One more mode in the receptance of a direction: H += 1/(m·(ω_m² − ω² + 2iζω_m·ω)) at the frequency ω, with the
-//! mode's natural frequency ω_m, damping ratio ζ and modal mass m.
+//! One more mode in the receptance of a direction: H += 1/(m·(ω_m² − ω² + 2iζω_m·ω)) at the angular frequency ω, with
+//! the natural angular frequency ω_m, damping ratio ζ and modal mass m of this mode.
 
 use std::sync::Arc;
 

@@ -1,9 +1,9 @@
-//! Effects: deviations of a machine, a cut or a sensor from the linear model of the case. Each effect has one file with
-//! its [`EffectSpec`] and its physics; effects with the same physics share further files.
+//! Effects: deviations of a machine, a cut or a sensor from the model of a case. Each effect has one file with its
+//! [`EffectSpec`]; its physics stands there or in a file that several effects share.
 //!
-//! [`EffectName`] is the only list of effects. Names, keys, help, the table of the documentation, the checks of cases,
-//! the simulation and the treatment in stability computations follow from it. To add an effect: write its file and name
-//! it twice in `effects/mod.rs`, as a module and in the list.
+//! [`EffectName`] lists all effects. Names, keys, help and the table of the documentation follow from their
+//! specifications. To add an effect: write its file, name it twice in `effects/mod.rs`, as a module and in the list,
+//! and treat it where the compiler asks for it.
 
 mod axial_depth_modulation;
 mod backlash;

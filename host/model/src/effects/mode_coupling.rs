@@ -1,5 +1,5 @@
-//! Two directions that share a nonlinear potential V = ½·k_xxyy·x²y² + k_xxy·x²y, with x and y the displacements along
-//! them; either coefficient may be zero.
+//! Two directions that share a nonlinear potential V = ½·k_xxyy·x²y² + k_xxy·x²y, with x the displacement along the
+//! first and y that along the second; either coefficient may be zero.
 //!
 //! f_r += (k_xxyy·x·y² + 2·k_xxy·x·y, k_xxyy·x²·y + k_xxy·x²).
 

@@ -16,8 +16,9 @@ fn edit_distance(from: &str, to: &str) -> usize {
     row[to.len()]
 }
 
-/// The known word closest to `word`: the only one that begins with `word`; otherwise the one with the least edit
-/// distance, among those whose distance is below half the number of their letters. `None` if there is no such word.
+/// The known word closest to `word`: if `word` is not empty and exactly one known word begins with it, that one.
+/// Otherwise the first with the least edit distance among those whose distance is below half the number of their
+/// letters; `None` if there are none.
 pub(crate) fn nearest<'a>(word: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let known: Vec<&str> = known.into_iter().collect();
     let mut beginning = known.iter().filter(|known| known.starts_with(word));

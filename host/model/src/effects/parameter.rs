@@ -8,9 +8,9 @@ pub struct Parameter {
     pub key: &'static str,
     /// Unit of the parameter; empty for words, switches and dimensionless numbers.
     pub unit: &'static str,
-    /// Type of the value: number, word or switch.
+    /// Type of the value, such as number, word or switch.
     pub kind: ValueKind,
-    /// True if the effect is linear in this parameter.
+    /// True only if the equation of the effect is linear in this parameter; not set for all such parameters.
     pub linear: bool,
     /// True for the parameter that VALUE sets in `--effect NAME=VALUE`.
     pub main: bool,

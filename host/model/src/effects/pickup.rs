@@ -15,8 +15,8 @@ pub struct Pickup {
     pub quantity: Quantity,
     /// Weights of the measured quantity along the machine's x, y and z in the reading, gain included.
     pub weights: [f64; 3],
-    /// For each mode of a structure given by modes: ratio of the motion of the sensor to that of the tool. Empty if no
-    /// mode has a ratio of its own.
+    /// Ratio of the motion of the sensor to that of the tool in each mode of a structure given by modes, in the order
+    /// of the modes. Empty if no mode has a ratio of its own.
     pub modes: Vec<f64>,
     /// Delay of the reading behind the measured quantity, s.
     pub delay_s: f64,
@@ -45,15 +45,16 @@ impl Pickup {
         }
     }
 
-    /// Transfer function of the sensor's dynamics at s, rad/s: the product of its [sections](Self::sections), without
-    /// gain and delay.
+    /// Transfer function of the sensor's dynamics at s, rad/s: the product of the [sections](Self::sections), without
+    /// weights and delay.
     pub fn dynamics(&self, s: Complex64) -> Complex64 {
         self.sections
             .iter()
             .fold(Complex64::ONE, |product, section| product * section.at(s))
     }
 
-    /// The reading, without delay and dynamics, if the measured quantity has the components `value` along x, y and z.
+    /// Weighted sum of the components `value` of the measured quantity along x, y and z: the reading without delay and
+    /// sensor dynamics.
     pub fn read(&self, value: [f64; 3]) -> f64 {
         self.weights
             .iter()

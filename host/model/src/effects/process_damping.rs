@@ -1,6 +1,7 @@
 //! The flank rubs on the wave that the edge has just cut. The force on the edge along the chip thickness is
 //! −(C/V)·b·v_n, with the process damping coefficient C, the cutting speed V, the axial depth b and the velocity v_n of
-//! the edge in that direction; the tangential force is the friction coefficient times it.
+//! the edge in that direction; the tangential force is (C/V)·b·v_n times the friction coefficient, against the spindle
+//! rotation.
 
 use std::sync::Arc;
 

@@ -41,8 +41,8 @@ pub(super) const QUADRATIC_DAMPING: EffectSpec = EffectSpec {
     },
 };
 
-/// Describing function of c2·|v|·v for c2 = 1: (8/3π)·ω²·X in phase with the velocity, which is an equivalent damping
-/// of (8/3π)·ω·X.
+/// Describing function of c2·|v|·v for c2 = 1: 8/(3π)·ω²·X in phase with the velocity, which is an equivalent damping
+/// of 8/(3π)·ω·X.
 fn describing_function(at: Harmonic) -> [Complex64; 2] {
     let damping = 8.0 / (3.0 * PI) * at.omega * at.omega * at.amplitude_m;
     [Complex64::new(0.0, damping), Complex64::ZERO]

@@ -1,5 +1,5 @@
-//! Runout: the tool axis is offset by e from the spindle axis, so that tooth j of N, from 0, is on the radius R +
-//! e·cos(ψ + 2πj/N).
+//! Runout: the tool axis is offset by e from the spindle axis, so that tooth j is on the radius R + e·cos(ψ + θ_j),
+//! with its angle θ_j from the first tooth.
 
 use std::sync::Arc;
 

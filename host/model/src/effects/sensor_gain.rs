@@ -57,7 +57,8 @@ impl Effect for SensorGain {
     }
 }
 
-/// True if a sensor effect acts on `channel`: the channel of that name, or without a name every channel of motion.
+/// True if a sensor effect acts on `channel`: if it has the name `name`, or, where that is `None`, if it does not
+/// measure a force.
 pub(super) fn acts_on(name: Option<&str>, channel: &Pickup) -> bool {
     match name {
         Some(name) => channel.name == name,

@@ -1,8 +1,8 @@
 //! The sensor sits away from the tool tip, so that it reads each mode with the ratio of the mode shape at the sensor to
 //! that at the tool.
 //!
-//! y = Σ ratio_r·u_r with u_r the displacement of the tool in mode r. A structure that is not given by modes has one
-//! ratio for all motion.
+//! y = Σ ratio_r·u_r with u_r the motion of the tool in mode r. A structure that is not given by modes has one ratio
+//! for all motion.
 
 use std::sync::Arc;
 
@@ -46,7 +46,8 @@ pub(super) const SENSOR_OFFSET_FROM_TOOL_TIP: EffectSpec = EffectSpec {
 
 #[derive(Clone, Debug)]
 struct SensorOffset {
-    /// Ratios of the motion at the sensor to that at the tool tip: one for all modes, or one for each mode.
+    /// Ratios of the motion at the sensor to that at the tool tip: one for all modes, or one for each mode in their
+    /// order.
     ratios: Vec<f64>,
     channel: Option<String>,
 }

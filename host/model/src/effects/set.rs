@@ -9,7 +9,7 @@ use super::{EffectError, EffectName, coulomb_friction};
 use crate::structure::Structure;
 use crate::{Cutter, Dynamics, ModelError, RestoringForce, Spindle};
 
-/// The effects of one simulation, in the order in which they act.
+/// Effects on one model, in the order in which they act.
 #[derive(Clone, Debug, Default)]
 pub struct Effects(pub Vec<Arc<dyn Effect>>);
 
@@ -17,17 +17,18 @@ impl Effects {
     /// Effects from `NAME=VALUE` and `NAME.KEY=VALUE`, in any order.
     ///
     /// # Errors
-    /// A text of another form, an unknown name or key, a missing key, or a value that is not possible. Drift or wear
-    /// given by VALUE, since the length of the recording is not known: see [`Self::parse_over`].
+    /// A text without `=`, an unknown name, an unknown or unused key, a missing key, or a value that is not possible.
+    /// Also a VALUE that is a change over the whole recording, whose length is not known: see [`Self::parse_over`].
     pub fn parse<'a>(texts: impl IntoIterator<Item = &'a str>) -> Result<Self, EffectError> {
         Self::parse_over(texts, None)
     }
 
-    /// Effects from `NAME=VALUE` and `NAME.KEY=VALUE` for a recording of the length `record_s`, s. The VALUE of drift
-    /// and wear is the change over the whole recording.
+    /// Effects from `NAME=VALUE` and `NAME.KEY=VALUE` for a recording of the length `record_s`, s; `None` if the length
+    /// is not known. The VALUE of wear, and of drift without `time_constant_s`, is the relative change over the whole
+    /// recording.
     ///
     /// # Errors
-    /// As [`Self::parse`]; drift or wear given by VALUE only if `record_s` is `None`.
+    /// As [`Self::parse`]; such a VALUE only if `record_s` is `None`.
     pub fn parse_over<'a>(
         texts: impl IntoIterator<Item = &'a str>,
         record_s: Option<f64>,
@@ -52,10 +53,10 @@ impl Effects {
         Self::build(all)
     }
 
-    /// The effect of one table `[extension.NAME]`.
+    /// The effect of one table `[extension.NAME]`; several if its `direction` or `channel` is a list.
     ///
     /// # Errors
-    /// An unknown extension, an unknown or missing key, or a value that is not possible.
+    /// An unknown extension, an unknown, unused or missing key, or a value that is not possible.
     pub fn of_extension(name: &str, table: &toml::Table) -> Result<Self, EffectError> {
         Self::build(vec![extension(name, table)?])
     }
@@ -64,7 +65,7 @@ impl Effects {
     /// table.
     ///
     /// # Errors
-    /// An unknown extension, an unknown or missing key, or a value that is not possible.
+    /// An unknown extension, an unknown, unused or missing key, or a value that is not possible.
     pub fn of_extensions<'a>(
         tables: impl IntoIterator<Item = (&'a str, &'a toml::Table)>,
     ) -> Result<Self, EffectError> {
@@ -103,7 +104,7 @@ impl Effects {
     /// part of it.
     ///
     /// # Errors
-    /// An effect that the structure cannot have.
+    /// An effect that does not apply to the structure: see [`EffectError::Structure`].
     pub fn altered(&self, structure: &Structure) -> Result<Structure, EffectError> {
         let mut structure = structure.clone();
         for effect in &self.0 {

@@ -1,5 +1,5 @@
-//! A spring that softens and then hardens: f_r += k3·x³ + k5·x⁵ with k3 < 0 < k5. Its
-//! secant stiffness f_r/x is least at x² = −k3/(2·k5).
+//! A spring that, for k3 < 0 < k5, softens and then hardens: f_r += k3·x³ + k5·x⁵. The ratio (k3·x³ + k5·x⁵)/x is then
+//! least at x² = −k3/(2·k5).
 
 use std::sync::Arc;
 

@@ -21,32 +21,34 @@ pub struct EffectSpec {
     pub parameters: &'static [Parameter],
     /// Treatment of the effect in stability computations, such as linearization about the forced orbit.
     pub treatment: Treatment,
-    /// Forms of the effect, such as different friction laws, that compete as candidate models in a diagnosis.
+    /// Forms of the effect in words, such as different friction laws, that compete as candidate models in a diagnosis.
     pub candidates: &'static [&'static str],
     /// Effects that share a term of the equation with this one, so that the two are not identifiable together at one
     /// location.
     pub shares_term_with: &'static [EffectName],
-    /// The effect in one sentence.
+    /// The effect in one phrase or sentence.
     pub summary: &'static str,
     /// Equation of the effect: the change of the model.
     pub equation: &'static str,
     /// Signs of the effect in a recording, by which it is recognised.
     pub shows: &'static str,
-    /// Recordings that do not show the effect, and other effects that look the same.
+    /// Conditions under which recordings do not show the effect, other effects that look the same, and changes that
+    /// this effect does not cause.
     pub hidden_by: &'static str,
-    /// Publication of the equation of the effect.
+    /// Source of the equation of the effect, such as a publication or a standard.
     pub source: &'static str,
     /// Example: the lines of a table `[extension.NAME]` of a case.
     pub example: &'static str,
-    /// Describing function of the effect's restoring force; `None` for an effect without one, or without a closed form
-    /// of it.
+    /// Describing function of the effect's restoring force: of friction without a backlash in series, of hysteresis
+    /// with exponent 1 and γ = ½. `None` if the effect does not provide one.
     pub describing_function: Option<DescribingFunction>,
-    /// Builds the effect from the given values and removes from them those that it uses; a key left over is an error.
+    /// Builds the effect from the given values and removes from them those that it uses; `Values::finish` refuses a key
+    /// left over.
     pub(super) build: fn(&mut Values) -> Result<Arc<dyn Effect>, EffectError>,
 }
 
 impl EffectSpec {
-    /// The parameter that the VALUE of `--effect NAME=VALUE` stands for.
+    /// The parameter that the VALUE of `--effect NAME=VALUE` stands for; `None` if none is marked so.
     pub fn main(&self) -> Option<&'static Parameter> {
         self.parameters.iter().find(|parameter| parameter.main)
     }
@@ -56,7 +58,7 @@ impl EffectSpec {
         self.parameters.iter().find(|parameter| parameter.key == key)
     }
 
-    /// All keys of the table `[extension.NAME]` of the effect; keys of the location last.
+    /// The keys of the effect's parameters in the table `[extension.NAME]`, then those of its location.
     pub fn keys(&self) -> impl Iterator<Item = &'static str> + '_ {
         let own = self.parameters.iter().map(|parameter| parameter.key);
         own.filter(|key| !key.is_empty())
@@ -140,7 +142,7 @@ impl Locations {
     }
 }
 
-/// The treatment of an effect in stability computations.
+/// The treatment of an effect in stability computations. Some methods refuse effects that others treat.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Treatment {
     /// The effect changes the matrices or modes of the linear structure.
@@ -150,10 +152,10 @@ pub enum Treatment {
     /// The effect changes coefficients of the linear cutting process with the spindle speed: they are evaluated at each
     /// speed.
     ProcessOfSpeed,
-    /// A smooth restoring force: it is linearized about the forced periodic orbit.
+    /// A smooth restoring force: it is linearized about the forced periodic orbit, or left out for vanishing feed.
     Smooth,
-    /// The cutting force has either a power law of the chip thickness, linearized about the chip thickness by the feed
-    /// alone, or process damping, which is linear in the velocity.
+    /// The effect gives the cutting force a power law of the chip thickness, linearized about the chip thickness by the
+    /// feed alone, or process damping, which is linear in the velocity.
     ChipLaw,
     /// A restoring force that is not smooth. Stability computations replace it by its equivalent stiffness and damping
     /// along the forced periodic orbit.

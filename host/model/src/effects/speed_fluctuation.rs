@@ -44,8 +44,8 @@ pub(super) const SPEED_FLUCTUATION: EffectSpec = EffectSpec {
     },
 };
 
-/// Bounds of the relative amplitude δ: at a bound the spindle stops for an instant, beyond it rotates backwards at
-/// times.
+/// Bounds of the relative amplitude δ, themselves excluded: at a bound the spindle would stop for an instant in each
+/// modulation period, beyond it would rotate backwards at times.
 const BELOW_ONE: Prior = Prior::open(-1.0, 1.0, "a number between -1 and 1");
 
 #[derive(Clone, Copy, Debug)]

@@ -12,7 +12,7 @@ fn key_in_words(parameter: &Parameter) -> String {
     }
 }
 
-/// The table of all effects in Markdown: name, equation, keys with units, example.
+/// The table of all effects in Markdown: name, equation, keys with units and meanings, example.
 pub fn markdown() -> String {
     let mut table = String::from("| name | equation | keys | example |\n|---|---|---|---|\n");
     for spec in ALL {

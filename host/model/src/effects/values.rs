@@ -20,8 +20,8 @@ pub enum Value {
 }
 
 impl Value {
-    /// Value of a text from the command line: a number if the text is one, 1 or 0 for `true` or `false`, a list of
-    /// numbers or words if it has commas, otherwise a word.
+    /// Value of a text from the command line: a number if the text is one, 1 or 0 for `true` or `false`. A text with
+    /// commas is a list of numbers if all its parts are numbers, otherwise a list of words; any other text is a word.
     pub fn of_text(text: &str) -> Self {
         let text = text.trim();
         if let Ok(number) = text.parse() {
@@ -80,9 +80,9 @@ impl Value {
 #[derive(Clone, Debug)]
 pub struct Values {
     effect: EffectName,
-    /// Values by the key of the parameter; the VALUE of the command line has the empty key.
+    /// Values by the key of the parameter or the location; the VALUE of the command line has the empty key.
     by_key: BTreeMap<String, Value>,
-    /// Length of the recording, s, to which the VALUE of drift and wear refers; `None` if it is not known.
+    /// Length of the recording, s, over which the VALUE of [`Self::rate`] is a change; `None` if it is not known.
     record_s: Option<f64>,
 }
 
@@ -95,8 +95,8 @@ impl Values {
         }
     }
 
-    /// These values for a recording of the length `record_s`, s; the VALUE of drift and wear is the relative change
-    /// over that length.
+    /// These values for a recording of the length `record_s`, s, over which the VALUE of [`Self::rate`] is a change;
+    /// `None` if it is not known.
     pub(super) fn over(mut self, record_s: Option<f64>) -> Self {
         self.record_s = record_s;
         self
@@ -110,7 +110,8 @@ impl Values {
         self.by_key.insert(key.into(), value);
     }
 
-    /// The bounds of the effect's parameter with this key; for the empty key (VALUE) those of the main parameter.
+    /// The bounds of the effect's parameter with this key; for the empty key (VALUE) those of the main parameter; any
+    /// finite number if there is no such parameter.
     fn prior(&self, key: &str) -> Prior {
         let parameter = if key.is_empty() {
             self.effect.spec().main()
@@ -134,11 +135,11 @@ impl Values {
     }
 
     /// Splits values whose `direction` or `channel` is a list into one set of values for each location. A list of
-    /// numbers has one number for each location; a single number applies to all. An effect with one number per mode
-    /// acts on one channel, so that its channels are not split.
+    /// numbers has one number for each location; a single value applies to all. The channels of an effect with one
+    /// number per mode are not split.
     ///
     /// # Errors
-    /// The number of values in a list differs from the number of locations, or the list of locations is empty or names
+    /// The length of a list of numbers differs from the number of locations, or the list of locations is empty or names
     /// one twice.
     pub(super) fn by_location(self) -> Result<Vec<Self>, EffectError> {
         let has_number_per_mode = self
@@ -243,12 +244,12 @@ impl Values {
         }
     }
 
-    /// The error of a value that is possible alone but not together with the other values.
+    /// The error for the refused value `found` of a key; `needed` describes the possible values.
     pub(super) fn clash(&self, key: &str, found: impl ToString, needed: &'static str) -> EffectError {
         self.wrong(key, &Value::Text(found.to_string()), needed)
     }
 
-    /// A word.
+    /// Removes the word with this key from the given values and returns it; `None` if it is not given.
     pub(super) fn text(&mut self, key: &str) -> Result<Option<String>, EffectError> {
         match self.by_key.remove(key) {
             None => Ok(None),
@@ -274,7 +275,8 @@ impl Values {
         self.text("channel")
     }
 
-    /// Value of the key `directions`, two directions: `["x", "y"]` in a case or `x,y` on the command line.
+    /// Value of the key `directions`, two different directions: `["x", "y"]` in a case or `x,y` on the command line.
+    /// `None` if it is not given.
     pub(super) fn directions(&mut self) -> Result<Option<[Direction; 2]>, EffectError> {
         let key = "directions";
         let Some(value) = self.by_key.remove(key) else {
@@ -302,7 +304,7 @@ impl Values {
     /// Checks that the effect has used all given values.
     ///
     /// # Errors
-    /// A key is left: the effect does not have it, or does not use it beside the other given keys.
+    /// A key or VALUE is left: see [`EffectError::Key`].
     pub(super) fn finish(self) -> Result<(), EffectError> {
         match self.by_key.into_keys().next() {
             None => Ok(()),

@@ -45,7 +45,8 @@ impl Engagement {
         }
     }
 
-    /// The subintervals of one tooth-passing period in the order of the phase; together they cover [0, θ].
+    /// The subintervals of one tooth-passing period that are not empty, in the order of the phase; together they cover
+    /// [0, θ].
     pub fn subintervals(&self) -> Vec<Subinterval> {
         let pitches = (self.exit - self.start) / self.pitch;
         let mut always = pitches.floor();
@@ -57,7 +58,7 @@ impl Engagement {
             rest = 0.0;
         }
         let switch = rest * self.pitch;
-        // The number of teeth in the cut is small and not negative.
+        // The number of teeth that cut all the time is small and not negative.
         let always = always as usize;
         let mut subintervals = Vec::with_capacity(2);
         if switch > 0.0 {

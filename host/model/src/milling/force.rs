@@ -18,8 +18,8 @@ pub struct RotatingVector {
 }
 
 impl RotatingVector {
-    /// The coefficients of a vector function of the immersion angle φ that is linear in (sin φ, cos φ) with a constant,
-    /// from its values.
+    /// The coefficients of a vector function that is linear in (sin φ, cos φ) with a constant. Its values at the pairs
+    /// (0, 0), (0, 1) and (1, 0) determine them.
     fn of(of: impl Fn(Immersion) -> [f64; 3]) -> Self {
         let at = |sin: f64, cos: f64| {
             Vector3::from(of(Immersion {
@@ -80,11 +80,11 @@ impl RotatingVector {
 /// F = a·(cutting(φ)·h + edge(φ)), on the tool, in feed, normal and axial direction.
 ///
 /// The chip thickness is h = normal(φ)ᵀ(f_t e_x + u − u_τ), where u is the displacement of the tool and u_τ that one
-/// tooth-passing period before, when the preceding tooth was at the same angle. The coefficients are forces per axial
-/// depth, in N/m² and N/m.
+/// tooth-passing period before, when the preceding tooth was at the same angle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ToothForce {
-    /// K_tc times the direction of the cutting force, Pa: thesis eq. 7.2 with +k_rc cos γ in row 3.
+    /// Cutting force per axial depth and chip thickness, Pa: K_tc times its direction, thesis eq. 7.2 with +k_rc cos γ
+    /// in row 3.
     pub cutting: RotatingVector,
     /// Direction in which a displacement of the tool makes the chip thicker, without unit (thesis eq. 3.1).
     pub normal: RotatingVector,
@@ -110,7 +110,8 @@ impl ToothForce {
         }
     }
 
-    /// Directional coefficient matrix α(φ) = cutting·normalᵀ of one tooth, Pa: force per axial depth and displacement.
+    /// Directional coefficient matrix K_tc α(φ) = cutting·normalᵀ of one tooth, Pa: force per axial depth and
+    /// displacement.
     pub fn directional(&self, angle: f64) -> Matrix3<f64> {
         self.cutting.at(angle) * self.normal.at(angle).transpose()
     }
@@ -120,8 +121,8 @@ impl ToothForce {
         self.cutting.at(angle) * (self.normal.at(angle).x * feed_per_tooth_m) + self.edge.at(angle)
     }
 
-    /// Directional coefficients and force per axial depth, averaged over a tooth-passing period, which zeroth-order
-    /// approximation and Nyquist criterion use.
+    /// [`Averaged`] directional coefficients and force per axial depth, which zeroth-order approximation and Nyquist
+    /// criterion use.
     pub fn averaged(&self, engagement: &Engagement, feed_per_tooth_m: f64) -> Averaged {
         let Engagement { start, exit, pitch } = *engagement;
         let directional = self.cutting.product_integral(&self.normal, start, exit) / pitch;
@@ -130,8 +131,8 @@ impl ToothForce {
     }
 }
 
-/// Directional coefficients and force per axial depth, summed over the teeth in cut and averaged over one tooth-passing
-/// period.
+/// Directional coefficients, and force per axial depth without vibration, summed over the teeth in cut and averaged
+/// over one tooth-passing period.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Averaged {
     /// Averaged directional coefficient matrix K_tc α₀, Pa.

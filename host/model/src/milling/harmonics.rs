@@ -5,8 +5,8 @@ use num_complex::Complex64;
 
 use super::{Engagement, RotatingVector, ToothForce};
 
-/// One coefficient of the Fourier series of the sum over all teeth in cut, α(t) = Σ_k α_k e^{ikΩt} with Ω = 2π/τ. The
-/// tooth-passing period τ starts when a tooth enters.
+/// The k-th coefficients of the Fourier series Σ_k α_k e^{ikΩt}, Ω = 2π/τ, of the directional coefficients and of the
+/// force without vibration, each summed over all teeth in cut. The tooth-passing period τ starts when a tooth enters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Harmonic {
     /// Coefficient K_tc α_k of the directional matrix, Pa.
@@ -16,8 +16,8 @@ pub struct Harmonic {
 }
 
 impl ToothForce {
-    /// The k-th harmonic of the tooth-passing frequency, in closed form. Harmonic −k is its complex conjugate, harmonic
-    /// 0 the average.
+    /// The k-th [`Harmonic`] of this force over the tooth-passing period, in closed form. Harmonic −k is its complex
+    /// conjugate, harmonic 0 the average.
     pub fn harmonic(&self, engagement: &Engagement, feed_per_tooth_m: f64, k: i32) -> Harmonic {
         let (cutting, normal, edge) = (
             exponentials(&self.cutting),
@@ -56,8 +56,7 @@ fn integral(engagement: &Engagement, m: i32, k: i32) -> Complex64 {
     let (m, harmonic_rate) = (f64::from(m), f64::from(k) * std::f64::consts::TAU / pitch);
     let rate = m - harmonic_rate;
     let sum = if rate.abs() < 1e-9 {
-        // The exponent m − kN is an integer, so that it is zero or at least one in magnitude: the threshold 1e-9
-        // decides safely.
+        // But for rounding, m − kN is an integer: zero, or at least one in magnitude.
         Complex64::cis(harmonic_rate * start) * (exit - start)
     } else {
         let at_exit = Complex64::cis(m * exit - harmonic_rate * (exit - start));

@@ -2,8 +2,8 @@
 
 /// Force coefficients of the linear-edge model (thesis eqs 3.2, 3.6).
 ///
-/// On a tooth with axial depth a, chip thickness h and edge angle γ:
-/// F_t = K_te·a/sin γ + K_tc·h·a, and likewise radial (r) and axial (a).
+/// On a tooth with axial depth a, chip thickness h and edge angle γ: F_t = K_te·a/sin γ + K_tc·h·a, and likewise F_r
+/// with K_re and K_rc, F_a with K_ae and K_ac.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Material {
     /// Tangential cutting coefficient K_tc, MPa (N/mm²), positive.

@@ -1,4 +1,4 @@
-//! The cut: tool, material, engagement, and the forces that a chip makes.
+//! The cut: tool, material, engagement, and the forces on the teeth.
 
 mod cut;
 mod engagement;

@@ -1,10 +1,10 @@
-//! The linear cutting process: force on the tool from its displacement.
+//! The linear cutting process: force law of a tooth, engagement and feed.
 
 use nalgebra::Vector3;
 
 use super::{Cut, EdgeAngle, Engagement, Material, Tool, ToothForce};
 
-/// The linear cutting process of a tool with equal pitch: force coefficients, engagement and feed.
+/// The linear cutting process of a tool with equal pitch and without runout.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Process {
     /// Force on one tooth.
@@ -19,7 +19,7 @@ pub struct Process {
 }
 
 impl Process {
-    /// The linear cutting process of a tool with equal pitch in a cut.
+    /// The linear cutting process of a tool in a cut. The teeth are taken at equal pitch and without runout.
     pub fn new(tool: &Tool, material: &Material, cut: &Cut, axial_depth_modulation: bool) -> Self {
         Self {
             force: ToothForce::new(EdgeAngle::new(tool.edge_angle_deg), material),
@@ -29,8 +29,9 @@ impl Process {
         }
     }
 
-    /// Force per axial depth, N/m, of the `teeth` in cut at a phase of the tooth-passing period, rad, at the chip
-    /// thickness of the feed. On an orbit with the tooth-passing period the vibration cancels in the chip thickness.
+    /// Force per axial depth, N/m, summed over the `teeth` teeth in cut at a phase of the tooth-passing period, rad, at
+    /// the chip thickness of the feed alone. On an orbit with the tooth-passing period the vibration cancels in the
+    /// chip thickness.
     pub fn forced(&self, teeth: usize, phase: f64) -> Vector3<f64> {
         (0..teeth)
             .map(|tooth| {

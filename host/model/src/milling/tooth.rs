@@ -8,8 +8,8 @@
 //!   chip-thickness direction     n = o·sin γ − e_z·cos γ
 //!   force                        F = F_t·t − (F_r·sin γ + F_a·cos γ)·o + (F_r·cos γ − F_a·sin γ)·e_z
 //!
-//! Each is linear in (sin φ, cos φ) up to a constant: [`RotatingVector`](super::RotatingVector) holds their
-//! coefficients.
+//! Each of these vectors, the force at constant F_t, F_r and F_a, is a constant plus a linear function of (sin φ, cos
+//! φ). A [`RotatingVector`](super::RotatingVector) holds the coefficients of one such vector.
 
 /// Sine and radial direction at one immersion angle φ.
 #[derive(Clone, Copy, Debug)]
@@ -30,8 +30,8 @@ impl Immersion {
         }
     }
 
-    /// The radial direction of the same immersion in the machine's x and y; `[a, b]` is the unit vector of the feed in
-    /// these axes.
+    /// The same immersion with the radial direction in the machine's x and y; `[a, b]` is the unit vector of the feed
+    /// in these axes.
     pub(crate) fn in_machine(self, [a, b]: [f64; 2]) -> Self {
         let [sin, cos] = self.outward;
         Self {
@@ -82,19 +82,19 @@ impl EdgeAngle {
     }
 
     /// Position of an edge along the chip thickness, m, at the displacement `x`, m, of a tool whose tooth has the
-    /// radial runout `radial_m`, m: n·x + r·sin γ, thesis eq. 3.1 without feed.
+    /// radial runout r = `radial_m`, m: n·x + r·sin γ, thesis eq. 3.1 without feed.
     pub fn reach_m(self, at: Immersion, radial_m: f64, x: [f64; 3]) -> f64 {
         let outward = at.outward[0] * x[0] + at.outward[1] * x[1];
         (outward + radial_m) * self.sin - x[2] * self.cos
     }
 
-    /// Contribution f·sin φ·sin γ of the feed `feed_m`, m, to the chip thickness, m.
+    /// Contribution f·sin φ·sin γ of the feed f = `feed_m`, m, to the chip thickness, m.
     pub fn recession_m(self, at: Immersion, feed_m: f64) -> f64 {
         feed_m * at.sin * self.sin
     }
 
-    /// Force on an edge, with components along tool radius and tool axis, from the tangential, radial and axial
-    /// component of the force law.
+    /// Force on an edge in the directions of [`EdgeForce`], from the tangential, radial and axial component of the
+    /// force law.
     pub fn force(self, [tangential, radial, axial]: [f64; 3]) -> EdgeForce {
         EdgeForce {
             tangential,
@@ -103,9 +103,8 @@ impl EdgeAngle {
         }
     }
 
-    /// Directions (n − μ·t)·nᵀ of process damping, rows force, columns velocity. Minus this matrix times the velocity
-    /// is the force on the flank for a unit coefficient: against the velocity along the chip thickness, with its
-    /// friction μ against the spindle rotation.
+    /// Directions (n − μ·t)·nᵀ of process damping, rows force, columns velocity. Minus this matrix times the velocity v
+    /// is the force on the flank for a unit coefficient: −(n·v)·n, and the friction μ·(n·v)·t.
     pub fn flank(self, friction: f64, at: Immersion) -> [[f64; 3]; 3] {
         let normal = self.normal(at);
         let force = self.force([friction, 1.0, 0.0]).at(at);
@@ -113,7 +112,7 @@ impl EdgeAngle {
     }
 }
 
-/// Force on an edge by its components along tangential direction, tool radius and tool axis.
+/// Force on an edge by components along tangential direction, tool radius and tool axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EdgeForce {
     /// Tangential component, against the cutting motion of the tooth.
@@ -136,7 +135,7 @@ impl EdgeForce {
         ]
     }
 
-    /// True if tangential, radial and axial component of the edge's force are all zero.
+    /// True if all three components are zero.
     pub fn is_zero(self) -> bool {
         self.tangential == 0.0 && self.inward == 0.0 && self.axial == 0.0
     }

@@ -4,13 +4,14 @@ use nalgebra::DMatrix;
 
 use super::{Matrices, Structure, StructureError};
 
-/// Cubic terms f₃(q, v) = C₃ v∘³ + K₃ q∘³, with ∘³ the cube of each element, and their derivatives.
+/// Cubic terms f₃(q, v) = C₃ v∘³ + K₃ q∘³, with ∘³ the cube of each element.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CubicForce {
     /// Number of displacements q.
     size: usize,
-    /// Matrices of cubic damping C₃ and cubic stiffness K₃, row by row.
+    /// Matrix C₃ of cubic damping, row by row.
     damping: Vec<f64>,
+    /// Matrix K₃ of cubic stiffness, row by row.
     stiffness: Vec<f64>,
 }
 
@@ -19,7 +20,7 @@ impl CubicForce {
     /// their matrices are M⁻¹C₃·scale² and M⁻¹K₃/scale.
     ///
     /// # Errors
-    /// The mass matrix is singular.
+    /// The mass matrix is singular, and there is a cubic matrix to divide by it.
     pub fn in_first_order(matrices: &Matrices, scale: f64) -> Result<Self, StructureError> {
         let size = matrices.mass.nrows();
         let mass = matrices.mass.clone().lu();
@@ -71,8 +72,7 @@ impl CubicForce {
         self.size
     }
 
-    /// The elements of the cubic force f₃(q, v) at displacements `q` and velocities `v`, in the order of the degrees of
-    /// freedom.
+    /// The elements of f₃(q, v), in the order of the elements of `q`.
     pub fn at<'a>(&'a self, q: &'a [f64], v: &'a [f64]) -> impl Iterator<Item = f64> + 'a {
         let rows = self.damping.chunks_exact(self.size);
         rows.zip(self.stiffness.chunks_exact(self.size))

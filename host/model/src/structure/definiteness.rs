@@ -1,4 +1,4 @@
-//! Definiteness of mass, damping and stiffness matrices, and the entries that violate it.
+//! Definiteness of mass, damping and stiffness matrices, and changes of entries that restore it.
 
 use std::fmt;
 
@@ -9,8 +9,8 @@ use crate::criteria::ZERO_EIGENVALUE;
 
 use super::{Direction, Matrices};
 
-/// A mass matrix that is not positive definite, or a damping or stiffness matrix that is not positive semidefinite,
-/// which no passive structure can have.
+/// A mass matrix whose symmetric part is not positive definite, or a damping or stiffness matrix whose symmetric part
+/// is not positive semidefinite.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Indefinite {
     /// Name of the matrix: mass, damping or stiffness.
@@ -18,34 +18,35 @@ pub struct Indefinite {
     /// Smallest eigenvalue of the indefinite matrix's symmetric part, in the unit of the matrix; NaN if it cannot be
     /// computed.
     pub eigenvalue: f64,
-    /// One or two entries whose change makes the matrix definite; empty if neither one reversed sign, nor one larger
-    /// diagonal entry, nor one of each does.
+    /// One change, or two changes together, that make the matrix definite; empty if the search finds none. It tries one
+    /// reversed sign, one larger diagonal entry, and one of each, in this order.
     pub remedy: Vec<Remedy>,
 }
 
-/// A change of one entry that, alone or together with another, makes the matrix definite.
+/// A change of a matrix that, alone or together with another, makes the matrix definite.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Remedy {
-    /// The off-diagonal entries (row, column) and (column, row) of the matrix have the wrong sign.
+    /// Reversed sign of the off-diagonal entries (row, column) and (column, row).
     Sign {
         /// Row, from 1.
         row: usize,
         /// Column, from 1.
         column: usize,
-        /// The entry as it is.
+        /// Mean of both entries as they are.
         value: f64,
-        /// Names of the two degrees of freedom that the off-diagonal entry couples.
+        /// Degrees of freedom of the row and of the column.
         directions: (Direction, Direction),
     },
-    /// A diagonal entry of the matrix is too small.
+    /// Larger diagonal entry.
     Diagonal {
         /// Row and column, from 1.
         row: usize,
         /// The entry as it is.
         value: f64,
-        /// Lower bound that the diagonal entry must exceed for a definite matrix, in the unit of the matrix.
+        /// Lower bound that the diagonal entry must exceed for a definite matrix, after the other change if there is
+        /// one, in the unit of the matrix.
         above: f64,
-        /// Name of the degree of freedom to which the diagonal entry belongs.
+        /// Degree of freedom of the row.
         direction: Direction,
     },
 }
@@ -127,8 +128,9 @@ fn violation(
     })
 }
 
-/// Tests a symmetric matrix after scaling its positive diagonal entries to 1, since translations and rotations have
-/// different units.
+/// True if a symmetric matrix is positive definite, or, unless `strict`, at least positive semidefinite, within
+/// [`ZERO_EIGENVALUE`]. Rows and columns are first scaled so that positive diagonal entries become 1, since
+/// translations and rotations have different units.
 fn is_definite(symmetric: &DMatrix<f64>, strict: bool) -> bool {
     let scale = symmetric
         .diagonal()
@@ -136,7 +138,8 @@ fn is_definite(symmetric: &DMatrix<f64>, strict: bool) -> bool {
     let scaled = DMatrix::from_fn(symmetric.nrows(), symmetric.ncols(), |i, j| {
         symmetric[(i, j)] * scale[i] * scale[j]
     });
-    // The eigenvalues of a matrix with entries that are not finite cannot be computed: it is not definite.
+    // A matrix whose eigenvalues cannot be computed, such as one with an entry that is not finite, counts as not
+    // definite.
     let Ok(eigenvalues) = of_symmetric(scaled).map(|eigen| eigen.eigenvalues) else {
         return false;
     };
@@ -152,12 +155,11 @@ fn smallest_eigenvalue(symmetric: &DMatrix<f64>) -> f64 {
     of_symmetric(symmetric.clone()).map_or(f64::NAN, |eigen| eigen.eigenvalues.min())
 }
 
-/// Searches for a change of one entry, then of two, that makes the matrix definite: a reversed sign, a larger diagonal
-/// entry, or both.
+/// The first change that makes the matrix definite, in the order of [`Indefinite::remedy`]; empty if none is found.
 ///
-/// If entries (i,j), (j,k) and (i,k) have a product of the wrong sign, reversing any one of them corrects the product.
-/// Mass, damping and stiffness of a mechanism follow from diagonal matrices by the same change of coordinates, so
-/// entries whose sign differs from that in the mass matrix are tried first.
+/// The sign to reverse need not be unique: if entries (i,j), (j,k) and (i,k) have a product of the wrong sign,
+/// reversing any one of them corrects the product. Entries whose sign differs from that in the mass matrix are tried
+/// first.
 fn remedy(
     symmetric: &DMatrix<f64>,
     strict: bool,
@@ -210,8 +212,9 @@ fn with_reversed_sign(symmetric: &DMatrix<f64>, (i, j): (usize, usize)) -> DMatr
     reversed
 }
 
-/// Lower bound of the diagonal entry `row` for a definite matrix, sᵀ R⁻¹ s (Schur complement): s is the remainder of
-/// the row, R the matrix without row and column. `None` if R is not positive definite.
+/// Lower bound of the diagonal entry `row` for a definite matrix, sᵀ R⁻¹ s (from the Schur complement): s is the
+/// remainder of the row, R the matrix without row and column; 0 for a matrix of one row. `None` if R is not positive
+/// definite.
 fn least_diagonal(symmetric: &DMatrix<f64>, row: usize, strict: bool) -> Option<f64> {
     let rest = symmetric.clone().remove_row(row).remove_column(row);
     if rest.is_empty() {

@@ -1,11 +1,11 @@
-//! Names of the degrees of freedom.
+//! Degrees of freedom of the structure, and the axes of a feed direction.
 
 use std::fmt;
 use std::str::FromStr;
 
 use nalgebra::Matrix3;
 
-/// A displacement of, or a rotation about, an axis of the machine.
+/// A displacement along, or a rotation about, an axis of the machine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Direction {
     /// Displacement along x.
@@ -23,7 +23,7 @@ pub enum Direction {
 }
 
 impl Direction {
-    /// All six degrees of freedom of a rigid body.
+    /// All six directions, in the order x, y, z, rx, ry, rz.
     pub const ALL: [Self; 6] = [Self::X, Self::Y, Self::Z, Self::Rx, Self::Ry, Self::Rz];
 
     /// The name of the direction in files: x, y, z, rx, ry, rz.
@@ -38,8 +38,8 @@ impl Direction {
         }
     }
 
-    /// Index 0, 1, 2 of x, y, z; `None` for rotations: the cutting force has no moment about the tool centre point, and
-    /// the chip thickness does not depend on rotations.
+    /// Index 0, 1, 2 of x, y, z; `None` for rotations: in the model neither cutting forces nor chip thickness depend on
+    /// them, nor have cutting forces a moment.
     pub fn axis(self) -> Option<usize> {
         match self {
             Self::X => Some(0),
@@ -56,7 +56,8 @@ impl fmt::Display for Direction {
     }
 }
 
-/// Matrix whose columns are the feed, normal and axial direction of a feed at `angle_deg` from x towards y, degrees.
+/// Matrix whose columns are the feed, normal and axial direction of a feed at `angle_deg` from x towards y, degrees;
+/// rows are the machine's x, y, z.
 pub fn feed_axes(angle_deg: f64) -> Matrix3<f64> {
     let (sin, cos) = angle_deg.to_radians().sin_cos();
     Matrix3::new(cos, -sin, 0.0, sin, cos, 0.0, 0.0, 0.0, 1.0)

@@ -6,10 +6,10 @@ use quietcut_numerics::eigenvalues::EigenvalueError;
 
 use super::Indefinite;
 
-/// A structure that is not passive, or whose equation of motion cannot be solved.
+/// Reason for which a structure is refused.
 #[derive(Clone, Debug, PartialEq)]
 pub enum StructureError {
-    /// Mass, damping or stiffness matrices that are indefinite.
+    /// The indefinite matrices, at least one, in the order mass, stiffness, damping.
     Indefinite(Vec<Indefinite>),
     /// The mass matrix has no inverse.
     SingularMass,

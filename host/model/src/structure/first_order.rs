@@ -6,18 +6,18 @@ use num_complex::Complex64;
 use super::{Direction, Form, Matrices, Mode, Structure, StructureError, feed_axes};
 use quietcut_numerics::eigenvalues::{EigenvalueError, of_real};
 
-/// First-order form ẋ = A x + B F, u = C x; F is the force on the tool centre point and u its displacement, along x, y,
-/// z.
+/// First-order form ẋ = A x + B F, u = C x; F is the force on the tool centre point and u the displacement of that
+/// point, along x, y, z.
 ///
-/// All n states are real. From matrices, x = (q, q̇/s) with s the larger of √‖M⁻¹K‖ and ‖M⁻¹C‖, so that all entries of
-/// A are frequencies. From complex modes, x holds real and imaginary part of each modal coordinate η̇ = λη + Ψᴸᵀ F, and
-/// u = 2 Re(Ψᴿ η). That is exact also if the residues do not sum to zero, so that no mass matrix exists. The structure
-/// is rigid in directions that it does not have: zero columns of B, zero rows of C.
+/// All n states are real. From matrices and joints, x = (q, q̇/s) with the constant s, 1/s, the larger of √‖M⁻¹K‖ and
+/// ‖M⁻¹C‖, or 1 if both are zero. From complex modes, x holds real and imaginary part of each modal coordinate η̇ = λη
+/// + Ψᴸᵀ F, and u = 2 Re(Ψᴿ η). This form needs no mass matrix: the residues need not sum to zero. Along an axis that
+/// is not a direction of the structure, the structure is rigid: a zero column of B, a zero row of C.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FirstOrder {
     /// A, n × n, 1/s.
     pub a: DMatrix<f64>,
-    /// Input matrix B, n × 3: effect of a force of 1 N along x, y, z on the state derivatives.
+    /// Input matrix B, n × 3: effect of a force of 1 N along x, y, z on the time derivatives of the states.
     pub b: MatrixXx3<f64>,
     /// Output matrix C, 3 × n: displacement of the tool along x, y, z, m, per state.
     pub c: Matrix3xX<f64>,
@@ -31,14 +31,14 @@ impl FirstOrder {
 
     /// Receptance H(iω), m/N, rows displacement, columns force; ω in rad/s.
     ///
-    /// `None` where iω is a pole.
+    /// `None` if iω − A is singular, as where iω is a pole.
     pub fn receptance(&self, omega: f64) -> Option<Matrix3<Complex64>> {
         self.transfer(Complex64::new(0.0, omega))
     }
 
     /// H(s) = C (s − A)⁻¹ B, m/N, rows displacement, columns force; s in rad/s.
     ///
-    /// `None` where s is a pole.
+    /// `None` if s − A is singular, as where s is a pole.
     pub fn transfer(&self, s: Complex64) -> Option<Matrix3<Complex64>> {
         let mut dynamic = self.a.map(|entry| Complex64::new(-entry, 0.0));
         for i in 0..self.order() {
@@ -62,8 +62,8 @@ impl FirstOrder {
     }
 
     /// This structure with the motion of a sensor away from the tool as output u: `modes[r]` is the shape of mode r at
-    /// the sensor divided by its shape at the tool, 1 for modes beyond the list. Only for modal structures, whose two
-    /// states per mode are adjacent.
+    /// the sensor divided by its shape at the tool, 1 for modes beyond the list. Only for structures given by modes,
+    /// whose two states per mode are adjacent.
     #[must_use]
     pub fn at_sensor(&self, modes: &[f64]) -> Self {
         let mut at_sensor = self.clone();
@@ -76,8 +76,7 @@ impl FirstOrder {
 
     /// Poles of the structure (eigenvalues of A), rad/s, sorted by imaginary part.
     ///
-    /// [`Structure::first_order`] refuses a structure whose poles cannot be computed. If an entry of A is set to a
-    /// value that is not finite afterwards, the list is empty.
+    /// Empty if they cannot be computed; [`Structure::first_order`] refuses such a structure.
     pub fn poles(&self) -> Vec<Complex64> {
         self.try_poles().unwrap_or_default()
     }
@@ -126,8 +125,7 @@ fn from_second_order(matrices: &Matrices, jacobian: &Matrix3xX<f64>) -> Result<F
         .ok_or(StructureError::SingularMass)?;
     let stiffness = &inverse_mass * &matrices.stiffness;
     let damping = &inverse_mass * &matrices.damping;
-    // Scale s of the velocity states q̇/s, 1/s: the larger of √‖M⁻¹K‖ and ‖M⁻¹C‖, or one per second for a structure
-    // without stiffness and damping.
+    // Scale s of the velocity states q̇/s, see [`FirstOrder`].
     let scale = match stiffness.norm().sqrt().max(damping.norm()) {
         scale if scale > 0.0 => scale,
         _ => 1.0,

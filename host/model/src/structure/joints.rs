@@ -1,13 +1,14 @@
 //! A robot of rigid links on compliant joints, linearized at a posture.
 //!
 //! Let q be the deviations of the joint angles from the posture q₀. Then M(q₀) q̈ + C q̇ + K q + C₃ q̇∘³ + K₃ q∘³ = Jᵀ
-//! F and u = J q. Where J has an inverse, their linear part equals that of the tool-space matrices J⁻ᵀ M J⁻¹, J⁻ᵀ C J⁻¹
-//! and J⁻ᵀ K J⁻¹ of thesis eq. 3.14. The equations also hold where J has none (a straight wrist), and for any number of
-//! joints.
+//! F and u = J q. For six joints, let J₆ be J with three more rows for the rotation of the tool. Where J₆ has an
+//! inverse, the linear part of these equations equals that of the tool-space matrices J₆⁻ᵀ M J₆⁻¹, J₆⁻ᵀ C J₆⁻¹ and J₆⁻ᵀ
+//! K J₆⁻¹ (thesis eq. 3.14). The equations in joint angles also hold where J₆ has none (a straight wrist), and for any
+//! number of joints.
 //!
 //! Two things are neglected: the change of M and J within a vibration, and gravity. Gravity deflects the joints by
 //! about a milliradian from the commanded angles; q and its cubes count from the deflected position. For the robot of
-//! the cases that moves peaks of the receptance by 0.3 %, as a test shows.
+//! the cases, gravity changes the height of peaks of the receptance by up to 0.3 %, as a test prints.
 
 use nalgebra::{DMatrix, Matrix3, Matrix3xX, Rotation3, Unit, Vector3};
 
@@ -16,7 +17,8 @@ use super::Matrices;
 /// A joint and the link that it carries. Positions are in the base frame, with all joint angles at zero.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Joint {
-    /// Joint axis, of length 1: the link rotates about it by the right-hand rule.
+    /// Direction of the joint axis in the base frame, with all joint angles at zero: the link rotates about it by the
+    /// right-hand rule.
     pub axis: Unit<Vector3<f64>>,
     /// A point on the joint's axis in the base frame, with all joint angles at zero, m.
     pub point_m: Vector3<f64>,
@@ -52,9 +54,10 @@ pub struct Robot {
 
 /// Positions and orientations of joints, links and tool at a posture, in the base frame.
 struct PostureGeometry {
-    /// For each joint, the direction of its axis and a point on that axis, m.
+    /// For each joint, in the order from the base, the direction of its axis and a point on that axis, m.
     axes: Vec<(Vector3<f64>, Vector3<f64>)>,
-    /// For each link, its rotation from the zero position and its centre of mass, m.
+    /// For each link, in the order of its joint, the rotation from the position with all joint angles at zero, and the
+    /// position of the centre of mass, m.
     links: Vec<(Rotation3<f64>, Vector3<f64>)>,
     tool_m: Vector3<f64>,
 }
@@ -96,13 +99,13 @@ impl Robot {
         self.geometry().tool_m
     }
 
-    /// Jacobian J, 3 × n: displacement of the tool centre point, m, per joint angle, rad.
+    /// Jacobian J, 3 × n: displacement of the tool centre point along x, y, z, m, per joint angle, rad.
     pub fn jacobian(&self) -> Matrix3xX<f64> {
         let geometry = self.geometry();
         jacobian(&geometry, self.joints.len(), geometry.tool_m)
     }
 
-    /// Displacement of the centre of mass of the last link, m, per joint angle, rad.
+    /// Displacement of the centre of mass of the last link along x, y, z, m, per joint angle, rad; 3 × n.
     pub fn payload_jacobian(&self) -> Matrix3xX<f64> {
         let geometry = self.geometry();
         let center = geometry
@@ -158,7 +161,8 @@ impl Robot {
     }
 }
 
-/// Displacement of a point, m, per angle of each of the first `count` joints, rad; these joints carry the point.
+/// Displacement of a point along x, y, z, m, per angle of each of the first `count` joints, rad; these joints move the
+/// point.
 fn jacobian(geometry: &PostureGeometry, count: usize, point: Vector3<f64>) -> Matrix3xX<f64> {
     let columns: Vec<Vector3<f64>> = geometry.axes[..count]
         .iter()

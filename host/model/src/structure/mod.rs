@@ -25,8 +25,8 @@ pub use modes::Mode;
 /// The structure of a case, in the machine's directions.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Structure {
-    /// The direction of each degree of freedom (matrices) or of each entry of the mode shapes (modes). Cutting forces
-    /// and chip thickness depend on x, y and z only.
+    /// For matrices the direction of each row and column, for modes that of each entry of the mode shapes, for joints
+    /// x, y and z of the base. Cutting forces and chip thickness depend on x, y and z only.
     pub directions: Vec<Direction>,
     /// Representation of the dynamics: matrices, modes or joints.
     pub form: Form,
@@ -37,24 +37,23 @@ pub struct Structure {
 pub enum Form {
     /// Mass, damping and stiffness.
     Matrices(Matrices),
-    /// Complex modes with left and right shapes.
+    /// Complex modes in the order of the case file.
     Modes(Vec<Mode>),
-    /// Compliant joints at a posture; the directions are x, y and z of the base.
+    /// Links on compliant joints, at a posture.
     Joints(Box<Robot>),
 }
 
 impl Structure {
-    /// Checks that the mass matrix of a structure given by matrices is positive definite, and damping and stiffness at
-    /// least positive semidefinite. Modes and joints pass unchecked.
+    /// Checks that, in a structure given by matrices, the symmetric part of the mass matrix is positive definite, and
+    /// those of damping and stiffness at least positive semidefinite. Modes and joints pass unchecked.
     ///
     /// # Errors
-    /// Indefinite matrices, each with its smallest eigenvalue and, if they are found, the entries whose change makes it
-    /// definite.
+    /// A matrix does not meet this; see [`Indefinite`].
     pub fn check(&self) -> Result<(), StructureError> {
         let found = match &self.form {
             Form::Matrices(matrices) => definiteness::indefinite(matrices, &self.directions),
-            // The matrices of a robot are definite: a case gives each link a positive mass and inertia, and each joint
-            // a positive stiffness and a damping of 0 or more.
+            // The matrices of a robot meet this: a case gives each link a positive mass and a positive definite
+            // inertia, and each joint a positive stiffness and a damping of 0 or more.
             Form::Modes(_) | Form::Joints(_) => Vec::new(),
         };
         if found.is_empty() {
@@ -64,7 +63,7 @@ impl Structure {
         }
     }
 
-    /// The matrices of the equation of motion in physical coordinates, displacements or joint angles; `None` for modes,
+    /// The matrices of the equation of motion in displacements and rotations, or in joint angles; `None` for modes,
     /// which have no such matrices.
     pub fn equation(&self) -> Option<Cow<'_, Matrices>> {
         match &self.form {

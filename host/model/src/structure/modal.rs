@@ -1,4 +1,4 @@
-//! Modes of a structure in first-order form, and the change of its matrix A with a pole at constant mode shapes.
+//! Modes of a structure in first-order form, and the change of the matrix A with a pole at constant mode shapes.
 
 use nalgebra::{DMatrix, Matrix3};
 use num_complex::Complex64;
@@ -9,12 +9,12 @@ use super::FirstOrder;
 
 /// Modal part of A for one pole pair λ = −ζω + iω√(1 − ζ²).
 ///
-/// Without real poles A = Σ_r λ_r P_r + conjugates, with projectors P_r. A change of the pole at constant mode shapes
-/// leaves P_r unchanged, and thus the residue right·leftᵀ of the receptance, for structures given by matrices and by
-/// modes. Repeated poles, as of a round tool, form one modal part.
+/// Without real and defective poles, A = Σ_r λ_r P_r + conjugates, with projectors P_r. A change by [`Self::moved`]
+/// leaves P_r unchanged, and thus the residue C P_r B of the receptance. Repeated poles, as of a round tool, form one
+/// modal part.
 #[derive(Clone, Debug)]
 pub struct ModalPart {
-    /// Pole λ, rad/s, with positive imaginary part.
+    /// Pole λ, rad/s, with positive imaginary part; the mean of repeated poles.
     pub pole: Complex64,
     /// Projector P, n × n.
     projector: DMatrix<Complex64>,
@@ -42,23 +42,24 @@ impl ModalPart {
         self.moved(Complex64::new(-omega, -omega * zeta / (1.0 - zeta * zeta).sqrt()))
     }
 
-    /// Residue C P B of the receptance of `structure` at the pole λ, m/(N s); rows are displacements, columns forces.
+    /// Residue C P B of the receptance at the pole λ, m/(N s), for the `structure` of which this is a part; rows are
+    /// displacements, columns forces.
     pub fn residue(&self, structure: &FirstOrder) -> Matrix3<Complex64> {
         let complex = |entry: f64| Complex64::new(entry, 0.0);
         let residue = structure.c.map(complex) * &self.projector * structure.b.map(complex);
         Matrix3::from_fn(|i, j| residue[(i, j)])
     }
 
-    /// Change of A for a change δλ of the pole, rad/s, at constant mode shapes: 2 Re(δλ P).
+    /// Change of A for a change δλ = `by` of the pole, rad/s, at constant mode shapes: 2 Re(δλ P).
     pub fn moved(&self, by: Complex64) -> DMatrix<f64> {
         self.projector.map(|entry| 2.0 * (entry * by).re)
     }
 }
 
 impl FirstOrder {
-    /// The oscillatory modes in the order of increasing frequency; real poles are excluded.
+    /// The oscillatory modes in the order of increasing natural frequency; real poles are excluded.
     ///
-    /// A defective pole, as at critical damping, is also excluded: it has no full set of mode shapes.
+    /// A defective pole is also excluded: it has fewer mode shapes than its multiplicity.
     pub fn modal_parts(&self) -> Vec<ModalPart> {
         let mut groups: Vec<Vec<Complex64>> = Vec::new();
         for pole in self.poles().into_iter().filter(|pole| pole.im > 0.0) {
@@ -81,19 +82,19 @@ impl FirstOrder {
         let left = invariant(&self.a.transpose(), pole, group.len())?;
         let projector = &right * (left.transpose() * &right).try_inverse()? * left.transpose();
         // P is a projector (P² = P) by construction. A P = λ P holds only for a pole λ that has as many mode shapes as
-        // its multiplicity; others are excluded.
+        // its multiplicity; other poles are excluded.
         let miss = self.a.map(Complex64::from) * &projector - &projector * pole;
         (miss.norm() < DEFECTIVE * pole.norm() * projector.norm()).then_some(ModalPart { pole, projector })
     }
 }
 
 /// Orthonormal basis of the invariant subspace of `matrix` at the eigenvalue `pole`, from inverse iteration with
-/// `count` vectors.
+/// `count` vectors. `None` if the shifted matrix is singular or the result is not finite.
 fn invariant(matrix: &DMatrix<f64>, pole: Complex64, count: usize) -> Option<DMatrix<Complex64>> {
     let size = matrix.nrows();
-    // A shift away from the pole λ by 1e-7·|λ| keeps the matrix of the inverse iteration regular. Each of the three
-    // iterations then reduces the parts of eigenvectors whose poles differ from λ by about |λ| by a factor of about
-    // 1e7.
+    // The shift lies 1e-7·|λ| away from the pole λ, at which the matrix of the inverse iteration is singular. Each of
+    // the three iterations then reduces the parts of eigenvectors whose poles differ from λ by about |λ| by a factor of
+    // about 1e7.
     let shift = pole * (1.0 + 1e-7);
     let lu = (matrix.map(Complex64::from) - DMatrix::identity(size, size) * shift).lu();
     let start =

@@ -2,8 +2,8 @@
 
 use num_complex::Complex64;
 
-/// One complex mode. It contributes right·leftᵀ/(s − λ) to the receptance H(s), plus the complex conjugate term at the
-/// conjugate pole.
+/// One complex mode. It contributes right·leftᵀ/(s − λ) to the receptance H(s), plus the same term with residue and
+/// pole conjugated.
 ///
 /// The pole is λ = −ζω + iω√(1 − ζ²) with ω = 2π·frequency. The residue right·leftᵀ has no conjugation and no further
 /// factor.
@@ -13,9 +13,10 @@ pub struct Mode {
     pub frequency_hz: f64,
     /// Damping ratio ζ, in [0, 1).
     pub damping_ratio: f64,
-    /// Left mode shape Ψᴸ, by which forces excite the mode; one entry per direction.
+    /// Left mode shape Ψᴸ, by which forces excite the mode; one entry per direction of the structure, in their order.
     pub left: Vec<Complex64>,
-    /// Right mode shape Ψᴿ, by which the mode displaces the structure; one entry per direction.
+    /// Right mode shape Ψᴿ, by which the mode displaces the structure; one entry per direction of the structure, in
+    /// their order.
     pub right: Vec<Complex64>,
 }
 

@@ -5,22 +5,22 @@ use num_complex::Complex64;
 
 use super::error::{EigenvalueError, size_of};
 
-/// Largest number of QR iterations for one eigenvalue of a complex matrix; more end the computation with an error. Two
-/// or three are usual; an exceptional shift in every tenth iteration breaks cycles.
+/// Largest number of QR iterations on a complex matrix until the next eigenvalue is split off; more end the computation
+/// with an error. Two or three are usual; an exceptional shift in every tenth iteration breaks cycles.
 const ITERATIONS_MAX: usize = 90;
 
 /// Largest number of rows of a complex matrix whose eigenvalues are all computed, although only the largest are wanted;
 /// larger matrices are projected on a Krylov space. A choice.
 const WHOLE: usize = 20;
 
-/// Relative change of an eigenvalue of the projected matrix, while the Krylov space grows by four dimensions, below
-/// which the eigenvalue has converged. A choice.
+/// Relative change of an eigenvalue of the projected matrix, while the Krylov space grows by four dimensions, up to
+/// which the eigenvalue counts as converged. A choice.
 const SETTLED: f64 = 1e-11;
 
-/// All eigenvalues of a complex matrix, unordered; the method is backward stable.
+/// All eigenvalues of a complex matrix, unordered.
 ///
 /// # Errors
-/// The matrix is not square, has an entry that is not finite, or the iteration exceeds its bound.
+/// The matrix is not square, has an entry that is not finite, or the QR iteration exceeds its bound.
 pub fn of_complex(matrix: DMatrix<Complex64>) -> Result<Vec<Complex64>, EigenvalueError> {
     match size_of(&matrix)? {
         0 => Ok(Vec::new()),
@@ -33,12 +33,14 @@ pub fn of_complex(matrix: DMatrix<Complex64>) -> Result<Vec<Complex64>, Eigenval
 /// Eigenvalues of `matrix` with an absolute value of `floor` and above, and possibly smaller ones, in descending order
 /// of the absolute value.
 ///
-/// For a small matrix, all eigenvalues are computed. For a large one, a Krylov space grows until the eigenvalues above
-/// `floor` no longer change, at most until it is invariant or the whole space. An eigenvalue with several
-/// eigenvectors is then found once, unless rounding repeats it.
+/// For a matrix with up to 20 rows, all eigenvalues are computed. For a larger one, a Krylov space grows until the
+/// eigenvalues from `floor` on of the matrix projected on this space no longer change, at most until the space is
+/// invariant or the whole space. An eigenvalue with several eigenvectors is then found once, unless rounding repeats
+/// it.
 ///
 /// # Errors
-/// The matrix is not square, has an entry that is not finite, or the iteration exceeds its bound.
+/// The matrix is not square, an entry of it or of a product with a vector is not finite, or the QR iteration exceeds
+/// its bound.
 pub fn dominant(matrix: &DMatrix<Complex64>, floor: f64) -> Result<Vec<Complex64>, EigenvalueError> {
     let size = size_of(matrix)?;
     if size <= WHOLE {
@@ -77,15 +79,15 @@ fn sorted(mut values: Vec<Complex64>) -> Vec<Complex64> {
 /// Orthonormal basis of a Krylov space, and the matrix projected on it (Arnoldi process).
 struct Krylov {
     basis: Vec<DVector<Complex64>>,
-    /// Columns of the projected matrix: column j has the coefficients of M q_j in the basis vectors q, with the matrix
-    /// M that is projected.
+    /// Columns of the projected matrix: column j has the coefficients of M q_j in the basis vectors q_0 to q_(j+1),
+    /// with the matrix M that is projected.
     columns: Vec<Vec<Complex64>>,
 }
 
 impl Krylov {
     fn new(size: usize) -> Self {
-        // The start vector has a different component in each direction, so that it does not lie in an invariant
-        // subspace by accident.
+        // The start vector has a different component in each direction, so that it is unlikely to lie in an invariant
+        // subspace.
         let start = DVector::from_fn(size, |i, _| Complex64::cis(1.0 + 2.399_963 * (i * i) as f64));
         let norm = start.norm();
         Self {
@@ -94,8 +96,9 @@ impl Krylov {
         }
     }
 
-    /// Extends the Krylov space by one dimension and the projected matrix by one column; true if the space is invariant
-    /// and thus not extended. `None` if the new vector is not finite.
+    /// Extends the Krylov space by one dimension and the projected matrix by one column; true if the space is
+    /// invariant, except for rounding, and gets no new basis vector. `None` if the norm of the new vector is not
+    /// finite.
     fn extend(&mut self, matrix: &DMatrix<Complex64>) -> Option<bool> {
         let mut next = matrix * self.basis.last()?;
         let size = next.norm();
@@ -136,7 +139,8 @@ fn pair(m: &DMatrix<Complex64>, first: usize) -> [Complex64; 2] {
     let (c, d) = (m[(first + 1, first)], m[(first + 1, first + 1)]);
     let (mean, half) = ((a + d) * 0.5, (a - d) * 0.5);
     let root = (half * half + b * c).sqrt();
-    // The larger eigenvalue of the block is computed without cancellation, the smaller one from the determinant.
+    // The larger eigenvalue of the block is mean ± root with the sign at which the two do not cancel; the smaller one
+    // follows from the determinant.
     let large = if (mean.conj() * root).re >= 0.0 {
         mean + root
     } else {

@@ -5,7 +5,7 @@ use nalgebra::{ComplexField, DMatrix};
 /// Error of an eigenvalue problem.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum EigenvalueError {
-    /// The matrix is not square, or the matrices of a pencil differ in size.
+    /// The matrix, or one of a pencil, is not square, or the matrices of a pencil differ in size.
     #[error("a matrix of {rows} × {columns} has no eigenvalues; it must be square")]
     NotSquare {
         /// Rows.
@@ -13,15 +13,15 @@ pub enum EigenvalueError {
         /// Columns.
         columns: usize,
     },
-    /// An entry of the matrix, or of its product with a vector, is infinite or not a number.
+    /// An entry of the matrix, or of a matrix or vector computed from it, is infinite or not a number.
     #[error(
         "a matrix of {size} × {size} has an entry that is not finite; check the data for gaps, overflow and division by zero"
     )]
     NotFinite {
-        /// Number of rows, equal to that of columns, of the matrix with the entry.
+        /// Number of rows, equal to that of columns, of the matrix.
         size: usize,
     },
-    /// The matrix M of a symmetric pencil is not positive definite.
+    /// The matrix M of a symmetric pencil is not positive definite within rounding.
     #[error(
         "the mass matrix of {size} × {size} is not positive definite; every degree of freedom needs a mass"
     )]
@@ -29,14 +29,15 @@ pub enum EigenvalueError {
         /// Number of rows, equal to that of columns, of the matrix M.
         size: usize,
     },
-    /// The QR iteration for the eigenvalues exceeds its bound.
+    /// The QR iteration for the eigenvalues reaches its bound.
     #[error(
         "the QR iteration on a matrix of {size} × {size} does not converge within {iterations} iterations; use a lower model order, or scale the data to similar magnitudes"
     )]
     NotConverged {
         /// Number of rows, equal to that of columns, of the matrix whose eigenvalues do not converge.
         size: usize,
-        /// Largest number of iterations.
+        /// Largest number of iterations: for all eigenvalues of a symmetric or Hermitian matrix, otherwise until the
+        /// next eigenvalue or pair is split off.
         iterations: usize,
     },
 }

@@ -1,4 +1,4 @@
-//! Eigenvalues of real, complex, symmetric and companion matrices. Every iteration is bounded.
+//! Eigenvalues of real, complex, symmetric and companion matrices, and eigenvectors. Every iteration is bounded.
 //!
 //! | matrix | function | method |
 //! |---|---|---|
@@ -8,12 +8,12 @@
 //! | real symmetric, Hermitian | [`of_symmetric`] | tridiagonal form, implicit QR with Wilkinson's shift |
 //! | symmetric pencil K v = λ M v | [`of_symmetric_pencil`] | Cholesky factor of M, then as above |
 //! | one eigenvector | [`eigenvector`], or [`inverse_iteration`] with a solver of one's own | inverse iteration |
-//! | a vector of the null space | [`null_vector`] | inverse iteration |
+//! | a vector v with A v ≈ 0 | [`null_vector`] | inverse iteration |
 //! | polynomial | [`polynomial_roots`] | companion matrix |
 //!
-//! For a matrix with an entry that is not finite, or on which an iteration exceeds its bound, the functions for
-//! eigenvalues return an [`EigenvalueError`] that names the size; those for one eigenvector return `None`. Every
-//! function ends, and none panics on square matrices.
+//! For a matrix with an entry that is not finite, or on which a QR iteration exceeds its bound, the functions for
+//! eigenvalues return an [`EigenvalueError`] that names the size. Those for one eigenvector return `None` if they find
+//! none. Every function ends, and none panics on square matrices.
 
 mod complex;
 mod error;

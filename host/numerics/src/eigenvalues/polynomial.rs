@@ -8,12 +8,13 @@ use super::error::EigenvalueError;
 
 /// The roots of the polynomial Σₖ cₖ zᵏ, unordered, from its coefficients c₀ … cₙ in ascending powers.
 ///
-/// Coefficients of zero at the highest powers are dropped, so that the number of roots is the degree. The roots are the
-/// eigenvalues of the companion matrix. They are the exact roots of a polynomial whose coefficients differ from
-/// `coefficients` by a few rounding errors of the largest one (Edelman and Murakami, Math. Comp. 64 (1995) 763).
+/// Coefficients of zero at the highest powers are dropped, so that the number of roots is the degree; a constant, zero
+/// included, has none. The roots are the eigenvalues of the companion matrix; for their rounding errors see Edelman and
+/// Murakami, Math. Comp. 64 (1995) 763.
 ///
 /// # Errors
-/// A coefficient, or its ratio to the leading one, is not finite, or the QR iteration exceeds its bound.
+/// The ratio of the coefficient of a lower power to the leading one is not finite, or the QR iteration exceeds its
+/// bound.
 pub fn polynomial_roots(coefficients: &[Complex64]) -> Result<Vec<Complex64>, EigenvalueError> {
     let Some(degree) = coefficients.iter().rposition(|c| *c != Complex64::ZERO) else {
         return Ok(Vec::new());

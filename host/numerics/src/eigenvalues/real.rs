@@ -1,7 +1,7 @@
 //! Eigenvalues of a real matrix by the Francis double-shift QR iteration.
 //!
 //! The QR iteration of nalgebra has no exceptional shifts and does not end for some matrices of period maps. Method:
-//! Wilkinson & Reinsch, Handbook for Automatic Computation II, procedures balance, orthes and hqr.
+//! balancing by nalgebra, then Wilkinson & Reinsch, Handbook for Automatic Computation II, procedures orthes and hqr.
 
 use nalgebra::DMatrix;
 use nalgebra::linalg::balancing::balance_parlett_reinsch;
@@ -9,15 +9,15 @@ use num_complex::Complex64;
 
 use super::error::{EigenvalueError, size_of};
 
-/// Largest number of QR iterations for one eigenvalue of a real matrix; more end the computation with an error. Three
-/// are usual; an exceptional shift after every ten iterations breaks cycles.
+/// Largest number of QR iterations on a real matrix until the next eigenvalue or pair is split off; more end the
+/// computation with an error. Three are usual; an exceptional shift after every ten iterations breaks cycles.
 const ITERATIONS_MAX: usize = 90;
 
 /// All eigenvalues of a real matrix, unordered: complex ones in exact conjugate pairs, real ones with the imaginary
 /// part zero.
 ///
-/// The method is backward stable: the results are the exact eigenvalues of a matrix that differs from the balanced one
-/// by a few rounding errors of its norm.
+/// The method is backward stable: the error is that of a change of the balanced matrix by a few rounding errors of its
+/// norm.
 ///
 /// # Errors
 /// The matrix is not square, has an entry that is not finite, or the iteration exceeds its bound.
@@ -39,8 +39,8 @@ pub fn of_real(mut matrix: DMatrix<f64>) -> Result<Vec<Complex64>, EigenvalueErr
     Ok(found)
 }
 
-/// Divisor by which a matrix is scaled before balancing. If its `largest` entry is so large or small that squares might
-/// overflow or underflow, which keeps balancing from ending, it is a power of two near this entry; otherwise 1.
+/// Divisor by which a matrix with the largest absolute entry `largest` is scaled before balancing: a power of two near
+/// `largest` if squares of entries might overflow or underflow, otherwise 1. Overflow would keep balancing from ending.
 fn unit(largest: f64) -> f64 {
     if (1e-100..1e100).contains(&largest) || largest == 0.0 {
         1.0
@@ -110,7 +110,7 @@ impl Rows {
     }
 
     /// Eigenvalues of this Hessenberg matrix by QR iteration with double shifts; converged eigenvalues are split off
-    /// from the last row on.
+    /// from the last row upwards.
     fn iterate(mut self) -> Result<Vec<Complex64>, EigenvalueError> {
         let n = self.size;
         let norm: f64 = self.entries.iter().map(|entry| entry.abs()).sum();
@@ -160,8 +160,11 @@ impl Rows {
         Ok(found)
     }
 
-    /// First row of the diagonal block that ends at row `last` and has no negligible entry on its subdiagonal; `norm`
-    /// is the sum of all absolute entries.
+    /// First row of the largest diagonal block that ends at row `last` and has no negligible entry on its subdiagonal;
+    /// sets the negligible entry to the left of the block to zero.
+    ///
+    /// `norm`, the sum of all absolute entries before the iteration, is the scale of a subdiagonal entry if both
+    /// neighbouring diagonal entries are zero.
     fn split(&mut self, last: usize, norm: f64) -> usize {
         let mut row = last;
         while row > 0 {
@@ -176,8 +179,8 @@ impl Rows {
         row
     }
 
-    /// Both eigenvalues of the 2 × 2 diagonal block that ends at row `last`, plus the sum `shifted` of the exceptional
-    /// shifts so far.
+    /// Both eigenvalues of the 2 × 2 diagonal block that ends at row `last`, each plus `shifted`, the sum that
+    /// exceptional shifts have subtracted from the diagonal so far.
     fn pair(&self, last: usize, shifted: f64) -> [Complex64; 2] {
         let x = self.at(last, last);
         let w = self.at(last, last - 1) * self.at(last - 1, last);
@@ -194,7 +197,8 @@ impl Rows {
         }
     }
 
-    /// One Francis QR step with two shifts on the diagonal block from row `first` to row `last`.
+    /// One Francis QR step with two shifts on the diagonal block from row `first` to row `last` of a Hessenberg matrix;
+    /// entries outside the block are not updated. The step begins at the row of [`Self::start`].
     fn sweep(&mut self, first: usize, last: usize, shift: Shift) {
         let (start, mut vector) = self.start(first, last, shift);
         for i in start + 2..=last {
@@ -237,8 +241,8 @@ impl Rows {
         }
     }
 
-    /// Applies a Householder reflection of a QR step from the left to rows k and k + 1 and, if it is not beyond `last`,
-    /// to row k + 2.
+    /// Applies the Householder reflection I − (x, y, z)ᵀ(1, q, r) of a QR step from the left to rows k, k + 1 and, if
+    /// it is not beyond `last`, k + 2, in columns k to `last`.
     fn reflect_rows(&mut self, k: usize, last: usize, [q, r]: [f64; 2], [x, y, z]: [f64; 3]) {
         let n = self.size;
         let (row_k, rest) = self.entries[k * n..].split_at_mut(n);
@@ -261,8 +265,8 @@ impl Rows {
         }
     }
 
-    /// Applies a Householder reflection of a QR step from the right to columns k, k + 1 and, if `triple`, k + 2, in the
-    /// given rows.
+    /// Applies the Householder reflection I − (x, y, z)ᵀ(1, q, r) of a QR step from the right to columns k, k + 1 and,
+    /// if `triple`, k + 2, in the given rows.
     fn reflect_columns(
         &mut self,
         k: usize,
@@ -293,8 +297,9 @@ impl Rows {
         }
     }
 
-    /// Row at which the QR step with two shifts may start, after two successive small subdiagonal entries, and the
-    /// first vector that the step reflects.
+    /// Row of the block at which the QR step with two shifts starts, and the vector that determines its first
+    /// reflection. It is the last row where two successive small subdiagonal entries permit a start; without such
+    /// entries, `first`.
     fn start(&self, first: usize, last: usize, shift: Shift) -> (usize, [f64; 3]) {
         let mut m = last - 2;
         loop {
@@ -325,8 +330,8 @@ impl Rows {
     }
 }
 
-/// The two shifts of a QR step, given by the last 2 × 2 diagonal block: its two diagonal entries x and y, and the
-/// product w of the other two.
+/// The two shifts of a QR step: the eigenvalues of a 2 × 2 matrix with the diagonal entries x and y, and the product w
+/// of the other two entries.
 #[derive(Clone, Copy)]
 struct Shift {
     x: f64,

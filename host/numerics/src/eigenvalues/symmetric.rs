@@ -4,14 +4,14 @@ use nalgebra::{Cholesky, ComplexField, DMatrix, DVector, Dyn, SymmetricEigen};
 
 use super::error::{EigenvalueError, size_of};
 
-/// Largest number of QR iterations on a symmetric matrix, divided by the number of its eigenvalues; two or three are
-/// usual, more end the computation with an error.
+/// Number of QR iterations on a symmetric or Hermitian matrix, divided by the number of its eigenvalues, at which the
+/// computation ends with an error; two or three are usual.
 const ITERATIONS_PER_EIGENVALUE: usize = 60;
 
 /// Eigenvalues (real) and orthonormal eigenvectors of a real symmetric or Hermitian matrix, unordered.
 ///
-/// Only the lower triangle of the matrix is used. The error of each eigenvalue is a few rounding errors of the norm of
-/// the matrix.
+/// The entries above the diagonal are taken from those below it. The error of each eigenvalue is a few rounding errors
+/// of the norm of the matrix.
 ///
 /// # Errors
 /// The matrix is not square, has an entry that is not finite, or the iteration exceeds its bound.
@@ -30,10 +30,11 @@ pub fn of_symmetric<T: ComplexField<RealField = f64>>(
         .ok_or(EigenvalueError::NotConverged { size, iterations })
 }
 
-/// Eigenvalues λ and eigenvectors v of K v = λ M v, unordered, with K symmetric and M symmetric positive definite.
+/// Eigenvalues λ and eigenvectors v of K v = λ M v, unordered, with K = `stiffness` symmetric and M = `mass` symmetric
+/// positive definite.
 ///
-/// With M = L Lᵀ the eigenvalues are those of L⁻¹ K L⁻ᵀ; the eigenvectors, columns of V, satisfy Vᵀ M V = I and
-/// Vᵀ K V = diag λ. For a mass and a stiffness matrix, λ = ω².
+/// With M = L Lᵀ the eigenvalues are those of L⁻¹ K L⁻ᵀ; the eigenvectors, columns of V, satisfy Vᵀ M V = I and Vᵀ K V
+/// = diag λ. The λ are the squares of the natural angular frequencies, the v the mode shapes.
 ///
 /// # Errors
 /// See [`EigenvalueError`].

@@ -3,16 +3,16 @@
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 
-/// Number of steps of the inverse iteration for an eigenvector. With a shift at the distance [`BESIDE`], each step
-/// amplifies the wanted eigenvector by about 1e8 relative to those of well separated eigenvalues.
+/// Number of steps of [`inverse_iteration`]. With a shift at the relative distance [`BESIDE`] from the eigenvalue, each
+/// step amplifies the wanted eigenvector by about 1e8 relative to those of well separated eigenvalues.
 const STEPS: usize = 3;
 
-/// Distance of the shift of an inverse iteration from the eigenvalue, relative to the eigenvalue; it keeps the shifted
-/// matrix regular.
+/// Distance of the shift in [`eigenvector`] from an eigenvalue other than zero, relative to that eigenvalue; it keeps
+/// the shifted matrix regular.
 const BESIDE: f64 = 1e-8;
 
-/// Right eigenvector of length 1 of a square matrix for an approximate eigenvalue. `None` if the matrix is not square, not
-/// finite, or singular after the shift.
+/// Right eigenvector of length 1 of a square matrix for an approximate eigenvalue. `None` if the matrix is not square,
+/// or if [`null_vector`] of the matrix minus a shift next to the eigenvalue is `None`.
 pub fn eigenvector(matrix: &DMatrix<Complex64>, eigenvalue: Complex64) -> Option<DVector<Complex64>> {
     if !matrix.is_square() {
         return None;
@@ -26,8 +26,9 @@ pub fn eigenvector(matrix: &DMatrix<Complex64>, eigenvalue: Complex64) -> Option
     null_vector(matrix - DMatrix::identity(order, order) * shift)
 }
 
-/// Vector v of length 1 with A v ≈ 0, of a matrix A that is nearly singular, but not exactly: its eigenvector of the
-/// eigenvalue nearest to zero. `None` if A is not square, exactly singular or not finite.
+/// Vector v of length 1 with A v ≈ 0, of a matrix A that is nearly singular, but not exactly: approximately its
+/// eigenvector of the eigenvalue nearest to zero. `None` if A is not square or [`inverse_iteration`] returns `None`, as
+/// it does if the LU decomposition of A has a pivot of zero.
 pub fn null_vector(matrix: DMatrix<Complex64>) -> Option<DVector<Complex64>> {
     if !matrix.is_square() {
         return None;
@@ -38,8 +39,8 @@ pub fn null_vector(matrix: DMatrix<Complex64>) -> Option<DVector<Complex64>> {
     inverse_iteration(start, |vector| lu.solve_mut(vector))
 }
 
-/// Inverse iteration: `solve` replaces v by (A − σI)⁻¹ v, and v is scaled to length 1 after each of three steps. `None`
-/// if a step has no solution or leaves the range of numbers.
+/// Inverse iteration from `start`: `solve` replaces v by (A − σI)⁻¹ v, and v is scaled to length 1 after each of three
+/// steps. `None` if `solve` returns false, or a vector whose norm is zero or not finite.
 pub fn inverse_iteration(
     start: DVector<Complex64>,
     mut solve: impl FnMut(&mut DVector<Complex64>) -> bool,

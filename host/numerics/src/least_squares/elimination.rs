@@ -3,10 +3,12 @@
 use nalgebra::DMatrix;
 
 /// Least-squares equations for the parameters of the last columns of A = `matrix`, after elimination of the parameters
-/// of its first `count` columns: the lower right block of the triangle R of A = Q R.
+/// of its first `count` columns: the lower right block of the triangle R of A = Q R. The right side of the problem may
+/// be one of the last columns.
 ///
-/// The parameters of the first columns may have any units. The remaining equations have the same solution and residual
-/// as the whole problem. Several problems with common parameters are therefore solved together from their remaining
+/// The parameters of the first columns may have any units. If these columns are linearly independent, the remaining
+/// equations have the same solution for the other parameters, and the same sum of squared residuals, as the whole
+/// problem. Several problems whose other parameters are common can therefore be solved together from their remaining
 /// equations (Golub and Pereyra, SIAM J. Numer. Anal. 10 (1973) 413).
 pub fn eliminated(mut matrix: DMatrix<f64>, count: usize) -> DMatrix<f64> {
     for mut column in matrix.column_iter_mut().take(count) {

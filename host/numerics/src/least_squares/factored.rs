@@ -4,9 +4,9 @@ use nalgebra::{ColPivQR, DMatrix, DVector, Dyn};
 
 use super::LeastSquaresError;
 
-/// Size of a pivot of the QR decomposition, relative to the first pivot, below which it is rounding, so that the data
-/// do not determine its parameter. Rounding errors of 2e-16 in some thousand rows of scaled columns give pivots below
-/// 1e-12.
+/// Absolute value of a pivot of the QR decomposition, relative to the first pivot, up to which it counts as zero, so
+/// that the data do not determine its parameter. Rounding errors of 2e-16 in some thousand rows of scaled columns give
+/// pivots below 1e-12.
 const RANK_TOLERANCE: f64 = 1e-12;
 
 /// Decomposition A D P = Q R of a matrix A, where D scales each column to length 1 and P orders the columns by their
@@ -15,7 +15,7 @@ const RANK_TOLERANCE: f64 = 1e-12;
 pub(super) struct Factored {
     decomposed: ColPivQR<f64, Dyn, Dyn>,
     triangle: DMatrix<f64>,
-    /// Lengths of the columns of A, the inverse of D.
+    /// Lengths of the columns of A, the inverse of the diagonal of D.
     lengths: DVector<f64>,
     /// Indices of the columns of A in the order of their pivots.
     order: Vec<usize>,
@@ -25,7 +25,7 @@ impl Factored {
     /// Decomposes a matrix of m × n finite entries with n > 0.
     ///
     /// # Errors
-    /// The rank of the matrix is below n.
+    /// The rank of the matrix, as determined with [`RANK_TOLERANCE`], is below n.
     pub(super) fn new(mut matrix: DMatrix<f64>) -> Result<Self, LeastSquaresError> {
         let (rows, parameters) = matrix.shape();
         let lengths = DVector::from_iterator(parameters, matrix.column_iter().map(|column| column.norm()));
@@ -79,7 +79,7 @@ impl Factored {
         x
     }
 
-    /// Covariance of the solution x for unit-variance noise in b: (AᵀA)⁻¹ = D P R⁻¹ R⁻ᵀ Pᵀ D.
+    /// Covariance of the solution x for independent noise of variance 1 in b: (AᵀA)⁻¹ = D P R⁻¹ R⁻ᵀ Pᵀ D.
     pub(super) fn covariance(&self) -> DMatrix<f64> {
         let parameters = self.order.len();
         let mut inverse = DMatrix::identity(parameters, parameters);
@@ -94,8 +94,8 @@ impl Factored {
         covariance
     }
 
-    /// First pivot of the QR decomposition divided by the last one, an estimate of the condition number of A with
-    /// columns of length 1.
+    /// Absolute value of the first pivot of the QR decomposition divided by that of the last one, an estimate of the
+    /// condition number of A with columns of length 1.
     pub(super) fn condition(&self) -> f64 {
         let last = self.order.len() - 1;
         (self.triangle[(0, 0)] / self.triangle[(last, last)]).abs()

@@ -9,7 +9,7 @@ use crate::stop::Stop;
 /// deviation of their noise.
 ///
 /// The caller chooses the type of the parameters θ: a vector, or the parts of a model. Value and derivatives are
-/// computed by separate methods, since most trial steps need no derivatives.
+/// computed by separate methods, since a rejected step needs no derivatives.
 pub trait Objective {
     /// Type of the parameters θ.
     type Point;
@@ -17,38 +17,40 @@ pub trait Objective {
     /// The sum of squares at given parameters θ, with the intermediate results that comparison and linearization use.
     type Value;
 
-    /// The sum of squares at the parameters `point`; `None` if the model is not valid there.
+    /// The sum of squares at the parameters `point`; `None` if it cannot be computed or is not finite.
     fn value(&mut self, point: &Self::Point) -> Option<Self::Value>;
 
     /// The normal equations at the parameters `point`; `None` if they cannot be computed.
     fn linearize(&mut self, point: &Self::Point, value: &Self::Value) -> Option<NormalSums>;
 
-    /// The parameters θ + δ with θ = `point` and δ = `step`, limited to the bounds of the parameters.
+    /// The parameters θ + δ with θ = `point` and δ = `step`, limited to the bounds of the parameters, if any.
     fn moved(&self, point: &Self::Point, step: &DVector<f64>) -> Self::Point;
 
-    /// The step δ, shortened if it exceeds the largest change that the model allows in one step.
+    /// The step δ, shortened if it exceeds the largest change that the model allows in one step; by default the step
+    /// itself.
     fn limited(&self, step: DVector<f64>) -> DVector<f64> {
         step
     }
 
-    /// True if the sum of squares `next` is not larger than `now`, so that the step is accepted.
+    /// True if a step from the value `now` to the value `next` is accepted, usually because it does not increase the
+    /// sum of squares.
     fn is_no_worse(&self, next: &Self::Value, now: &Self::Value) -> bool;
 
     /// True if the minimization has converged with a step of `length` = √(δᵀNδ), in standard deviations of the
     /// parameters, from the value `now` to the value `next`.
     ///
-    /// The last step may increase the sum slightly: weights that depend on the parameters keep it from decreasing close
-    /// to the minimum.
+    /// This step is accepted without [`Self::is_no_worse`], so that it may increase the sum slightly: weights that
+    /// depend on the parameters may keep the sum from decreasing close to the minimum.
     fn has_converged(&self, length: f64, next: &Self::Value, now: &Self::Value) -> bool;
 
     /// True if the minimization is to be given up before it is linearized at `value`; `before` is the sum of squares at
-    /// the preceding linearization.
+    /// the preceding linearization, `None` before the first one. `round` counts the linearizations so far.
     fn gives_up(&self, _round: usize, _value: &Self::Value, _before: Option<&Self::Value>) -> bool {
         false
     }
 
-    /// True if the minimization is to be given up because its linearization predicts too small a decrease of the sum of
-    /// squares.
+    /// True if the minimization is to be given up after its linearization `sums` at `value`, usually since that
+    /// predicts too small a decrease of the sum of squares. `round` counts the linearizations before this one.
     fn gives_up_linearized(&self, _round: usize, _value: &Self::Value, _sums: &NormalSums) -> bool {
         false
     }
@@ -84,21 +86,22 @@ pub struct Minimum<P, V> {
 /// Damping λ of the equations (N + λ diag N) δ = g of a step δ, and the rule by which it changes from step to step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Damping {
-    /// Damping λ of the first step; 0 if the start is near the minimum.
+    /// Damping λ of the first step; 0 suits a start near the minimum.
     pub first: f64,
     /// Factor, below 1, by which λ changes after an accepted step.
     pub shrink: f64,
-    /// Factor, above 1, by which λ changes after a rejected step, or if the equations of the step are singular.
+    /// Factor, above 1, by which λ changes after a rejected step, or if the equations of the step have no finite
+    /// solution.
     pub growth: f64,
     /// Smallest λ after an accepted step; to be set above 0 if the normal matrix N may be singular.
     pub least: f64,
-    /// Smallest λ after a rejected step.
+    /// Smallest λ after it has grown.
     pub least_retried: f64,
 }
 
 impl Damping {
-    /// Rule of the damping λ that changes it by a factor of ten, with undamped steps near the minimum; `first` is λ of
-    /// the first step.
+    /// Rule that changes the damping λ by a factor of ten: to at least 1e-3 when it grows, and to 0 after an accepted
+    /// step with λ below 1e-6. `first` is λ of the first step.
     pub fn tenfold(first: f64) -> Self {
         Self {
             first,
@@ -122,8 +125,8 @@ impl Damping {
     }
 }
 
-/// Damping λ of an accepted Levenberg–Marquardt step below which the next step is not damped if [`Damping::least`] is
-/// 0: λ would change a step by about a millionth only.
+/// Damping λ of an accepted Levenberg–Marquardt step below which λ of the next step is 0 if [`Damping::least`] is 0: it
+/// would change a step by about a millionth only, unless the normal matrix is nearly singular.
 const UNDAMPED: f64 = 1e-6;
 
 /// Settings of the damped Gauss–Newton iteration of Levenberg and Marquardt (Marquardt, J. SIAM 11 (1963) 431).
@@ -133,18 +136,18 @@ pub struct LevenbergMarquardt {
     pub damping: Damping,
     /// Largest number of linearizations.
     pub iterations_max: usize,
-    /// Largest number of steps, each with more damping, that are tried from one linearization.
+    /// Largest number of dampings, each larger than the one before, that are tried from one linearization.
     pub trials_max: usize,
-    /// Ridge λ that is added to every damping: it regularizes combinations of parameters whose effects differ by less
-    /// than the accuracy of the derivatives.
+    /// Ridge that is added to the damping λ of every step: it regularizes parameters whose effects are linearly
+    /// dependent within the accuracy of the derivatives.
     pub ridge: f64,
     /// Treatment of parameters that have no effect on the prediction.
     pub idle: Idle,
 }
 
 impl LevenbergMarquardt {
-    /// Searches the parameters with the least sum of squares near `start`; `None` if the model is not valid at the
-    /// start.
+    /// Searches the parameters with the least sum of squares near `start`; `None` if [`Objective::value`] is `None`
+    /// there.
     ///
     /// The search always ends; [`Minimum::stop`] states the reason.
     pub fn minimize<O: Objective>(

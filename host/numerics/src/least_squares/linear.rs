@@ -7,8 +7,8 @@ use super::factored::Factored;
 
 /// Linear least squares: min over x of Σᵢ wᵢ (aᵢᵀx − bᵢ)² + Σⱼ pⱼ (xⱼ − x₀ⱼ)², where A has m rows aᵢᵀ and n columns.
 ///
-/// If the weights are inverse variances, wᵢ = 1/σᵢ², then [`LinearFit::covariance`] is the covariance of the
-/// parameters.
+/// If the weights wᵢ = 1/σᵢ² and the pⱼ are inverse variances of independent errors, then [`LinearFit::covariance`] is
+/// the covariance of the parameters.
 ///
 /// ```
 /// use nalgebra::{DMatrix, DVector};
@@ -34,21 +34,22 @@ pub struct LinearProblem<'a> {
 pub struct LinearFit {
     /// Parameters x, n entries.
     pub parameters: DVector<f64>,
-    /// (AᵀWA + P)⁻¹, n × n: covariance of the parameters if the weights are inverse variances; otherwise multiply by
+    /// (AᵀWA + P)⁻¹, n × n: covariance of the parameters if the weights wᵢ and the pⱼ are inverse variances. If weights
+    /// are known up to a common factor only, and without a prior, the covariance is this matrix times
     /// [`Self::variance`].
     pub covariance: DMatrix<f64>,
     /// Weighted sum of squared residuals Σᵢ wᵢ (aᵢᵀx − bᵢ)², without the term of the prior.
     pub sum_of_squares: f64,
     /// Number of rows with a weight above zero, minus the number of parameters; 0 if the difference is negative.
     pub degrees_of_freedom: usize,
-    /// First pivot of the QR decomposition divided by the last one, for columns scaled to unit length: usually the
-    /// condition number within a factor of √n.
+    /// Estimate of the condition number of the weighted rows with those of the prior, each column scaled to length 1:
+    /// absolute value of the first pivot of the QR decomposition divided by that of the last; 1 without parameters.
     pub condition: f64,
 }
 
 impl LinearFit {
-    /// Variance of the noise of a row of weight 1, estimated from the residuals; infinite or NaN without degrees of
-    /// freedom.
+    /// Variance of the noise of a row of weight 1, estimated from the residuals without regard to a prior; infinite or
+    /// NaN without degrees of freedom.
     pub fn variance(&self) -> f64 {
         self.sum_of_squares / self.degrees_of_freedom as f64
     }
@@ -84,8 +85,8 @@ impl<'a> LinearProblem<'a> {
         }
     }
 
-    /// Solution with the least sum of squares, from Householder QR with pivoting of the scaled columns (Golub and Van
-    /// Loan, *Matrix Computations*, 4th edition, 5.4.2).
+    /// Solution with the least sum of squares, that of the prior included, from Householder QR with pivoting of the
+    /// scaled columns (Golub and Van Loan, *Matrix Computations*, 4th edition, 5.4.2).
     ///
     /// # Errors
     /// See [`LeastSquaresError`].
@@ -159,7 +160,7 @@ impl<'a> LinearProblem<'a> {
                     expected,
                 });
             }
-            // Weights and inverse variances of the prior must not be negative, since their square roots scale the rows.
+            // Weights and inverse variances of the prior must not be negative, since their square roots enter the rows.
             let is_weight = !std::ptr::eq(vector, self.right) && what.starts_with("the vector");
             if vector
                 .iter()

@@ -4,8 +4,8 @@ use nalgebra::{DMatrix, DVector, Dyn, SVD};
 
 use crate::singular_values::{SingularValueError, Vectors, decompose};
 
-/// Least-squares solution of A x = b for a matrix A with linearly dependent columns: of all x with the least ‖A x −
-/// b‖², that of least norm, from the singular value decomposition.
+/// Least-squares solution of A x = b for a matrix A that may have linearly dependent columns: of all x with the least
+/// ‖A x − b‖², that of least norm, from the singular value decomposition.
 ///
 /// The columns are not scaled, so that the solution depends on the units of the parameters.
 #[derive(Clone, Debug)]
@@ -42,8 +42,8 @@ impl MinimumNorm {
     }
 }
 
-/// Bound up to which a singular value of a matrix counts as zero, so that the combination of columns that belongs to it
-/// has no effect.
+/// Bound up to which a singular value of a matrix counts as zero, so that the solution has no component along its right
+/// singular vector.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Tolerance {
     /// Absolute bound on the singular values, in the unit of the entries of the matrix.

@@ -28,17 +28,18 @@ pub use normal_equations::{Idle, NormalEquations, invert_normal_equations, solve
 /// Error of a least-squares problem.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum LeastSquaresError {
-    /// The numbers of entries of matrix, right side, weights or prior do not fit together.
+    /// The number of entries of the right side, the weights or the prior does not fit the matrix.
     #[error("{what} has {found} entries instead of {expected}")]
     Shape {
-        /// Name of the vector or matrix with the wrong number of entries or rows.
+        /// Name of the vector with the wrong number of entries.
         what: &'static str,
-        /// Number of entries or rows that the vector or matrix has.
+        /// Number of entries that the vector has.
         found: usize,
-        /// Number of entries or rows that the vector or matrix should have.
+        /// Number of entries that the vector should have.
         expected: usize,
     },
-    /// An entry of the matrix or of a vector is infinite or not a number.
+    /// An entry of the matrix or of a vector is infinite or not a number, or a weight or an inverse variance of the
+    /// prior is negative.
     #[error("{what} has an entry that is not finite; check the data for gaps, overflow and division by zero")]
     NotFinite {
         /// Name of the vector or matrix with the entry.

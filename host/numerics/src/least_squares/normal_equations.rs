@@ -5,9 +5,10 @@ use nalgebra::{Cholesky, ComplexField, DMatrix, DVector, Dyn};
 /// Treatment of a parameter that has no effect on the prediction, so that its column of A is zero.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Idle {
-    /// A parameter without effect is refused: [`NormalEquations::new`] returns `None`.
+    /// A parameter whose diagonal entry of N is not a positive finite number is refused: [`NormalEquations::new`]
+    /// returns `None`.
     Refuse,
-    /// A parameter without effect, or whose diagonal entry of N is not finite, is fixed at zero, with a covariance of
+    /// A parameter whose diagonal entry of N is not a positive finite number is fixed at zero, with a covariance of
     /// zero.
     Hold,
 }
@@ -15,8 +16,9 @@ pub enum Idle {
 /// Factored normal equations N x = g of least squares, for data that are given as sums or are too many to be held as a
 /// matrix.
 ///
-/// The factors are D N D = L Lᴴ with D = diag(N)^(−1/2), since the parameters of one fit differ by many powers of ten.
-/// The condition number of N is the square of that of A: a [`super::LinearProblem`] loses only half as many digits.
+/// The factors are those of D N D + λI = L Lᴴ with D = diag(N)^(−1/2) and a ridge λ, where D is used since the
+/// parameters of one fit differ by many powers of ten. The condition number of N is the square of that of A: a
+/// [`super::LinearProblem`] loses only half as many digits.
 ///
 /// ```
 /// use nalgebra::{DMatrix, DVector};
@@ -40,8 +42,9 @@ impl<T: ComplexField<RealField = f64>> NormalEquations<T> {
     /// diagonal after it is scaled to 1.
     ///
     /// A ridge λ is the damping of the Levenberg–Marquardt method, or regularizes columns of A that are linearly
-    /// dependent within the accuracy √λ. `None` if N, with the ridge and without the
-    /// parameters that `idle` fixes, is not positive definite or not finite.
+    /// dependent within the accuracy √λ. `None` if `idle` refuses a parameter or the Cholesky decomposition fails: for
+    /// real entries, if N with the ridge and without the fixed parameters is not positive definite or an entry below
+    /// its diagonal is not finite, for complex ones only if a pivot is zero.
     pub fn new(matrix: &DMatrix<T>, ridge: f64, idle: Idle) -> Option<Self> {
         let size = matrix.nrows();
         let mut scale = DVector::zeros(size);
@@ -69,7 +72,7 @@ impl<T: ComplexField<RealField = f64>> NormalEquations<T> {
         })
     }
 
-    /// Solution x of N x = g with g = `right`.
+    /// Solution x of (N + λ diag N) x = g with g = `right` and the ridge λ; 0 for fixed parameters.
     pub fn solve(&self, right: &DVector<T>) -> DVector<T> {
         let mut solution = right.clone();
         self.scaled(&mut solution);
@@ -78,7 +81,8 @@ impl<T: ComplexField<RealField = f64>> NormalEquations<T> {
         solution
     }
 
-    /// Solution X of N X = G, where each column of G = `right` is one right side.
+    /// As [`Self::solve`] for several right sides, each one column of `right`; each column of the result is one
+    /// solution.
     pub fn solve_columns(&self, right: &DMatrix<T>) -> DMatrix<T> {
         let mut solution = right.clone();
         self.scaled(&mut solution);
@@ -87,8 +91,9 @@ impl<T: ComplexField<RealField = f64>> NormalEquations<T> {
         solution
     }
 
-    /// Inverse of N, with its ridge. Without a ridge it is the covariance of the parameters if each row of A is divided
-    /// by the standard deviation of its noise.
+    /// Inverse of N + λ diag N with the ridge λ; its rows and columns are zero for fixed parameters.
+    /// Without a ridge it is the covariance of the parameters if each row of A is divided by the standard deviation of
+    /// its noise, which is independent.
     pub fn inverse(&self) -> DMatrix<T> {
         let mut inverse = self.cholesky.inverse();
         for j in 0..self.scale.len() {
@@ -100,7 +105,8 @@ impl<T: ComplexField<RealField = f64>> NormalEquations<T> {
         inverse
     }
 
-    /// Decrease gᴴ N⁻¹ g of the sum of squared residuals from x = 0 to the solution of N x = g, with g = `right`.
+    /// gᴴ (N + λ diag N)⁻¹ g with g = `right` and the ridge λ: without a ridge, the decrease of the sum of squared
+    /// residuals from x = 0 to the solution x of N x = g.
     pub fn explained(&self, right: &DVector<T>) -> f64 {
         let mut whitened = right.clone();
         self.scaled(&mut whitened);
@@ -118,12 +124,12 @@ impl<T: ComplexField<RealField = f64>> NormalEquations<T> {
     }
 }
 
-/// Solution x of the normal equations N x = g without a ridge; `None` if N is not positive definite.
+/// Solution x of the normal equations N x = g without a ridge; `None` if N is not positive definite or not finite.
 pub fn solve_normal_equations(matrix: &DMatrix<f64>, right: &DVector<f64>) -> Option<DVector<f64>> {
     Some(NormalEquations::new(matrix, 0.0, Idle::Refuse)?.solve(right))
 }
 
-/// Inverse of the normal matrix N without a ridge; `None` if N is not positive definite.
+/// Inverse of the normal matrix N without a ridge; `None` if N is not positive definite or not finite.
 pub fn invert_normal_equations(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     Some(NormalEquations::new(matrix, 0.0, Idle::Refuse)?.inverse())
 }

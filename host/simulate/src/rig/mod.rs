@@ -33,7 +33,7 @@ pub struct Rig {
     pub sample_rate_hz: f64,
     /// Quantities measured besides the force, each along those of x, y and z that the structure has.
     pub measured: Vec<Quantity>,
-    /// Effects of structure and sensors that are added to the case.
+    /// Effects of structure and sensors in this test.
     pub effects: Effects,
 }
 
@@ -133,7 +133,8 @@ impl Rig {
         Ok((recording, statistics))
     }
 
-    /// Sensors of the rig in the order of the channels: the force, then the responses by quantity and direction.
+    /// Sensors of the rig in the order of the channels: the force, then for each quantity in the order of `measured`
+    /// the directions in the order of the structure.
     fn pickups(&self, structure: &Structure, driven: usize) -> Vec<Pickup> {
         let mut pickups = vec![Pickup::of_axis(Quantity::Force, driven)];
         for quantity in &self.measured {

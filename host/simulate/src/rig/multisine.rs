@@ -14,15 +14,15 @@ pub enum MultisineLines {
     All,
     /// Odd lines: even nonlinear distortion falls on lines without force.
     Odd,
-    /// Odd lines, of which one in every group of three, chosen at random, is left out: even and odd distortion fall on lines without force
-    /// (Pintelon and Schoukens, System Identification, 2nd ed. 2012, section 4.3).
+    /// Odd lines, of which one in every full group of three, chosen at random, is left out: even and odd distortion
+    /// fall on lines without force (Pintelon and Schoukens, System Identification, 2nd ed. 2012, section 4.3).
     OddSparse,
 }
 
 impl Signal {
-    /// Random-phase multisine of the period `period_s` with the root mean square `rms_n` and equal amplitudes at its lines from `first_hz` to
-    /// `last_hz`, for `seconds`. The phases come from `seed`; the lines that are left out are the same for every seed, so that
-    /// realizations can be averaged.
+    /// Random-phase multisine of the period `period_s` with the root mean square `rms_n` and equal amplitudes at its
+    /// lines from `first_hz` to `last_hz`, for `seconds`. The phases come from `seed`; the lines that are left out are
+    /// the same for every seed, so that realizations can be averaged.
     ///
     /// Without a line in the band it has no tones.
     pub fn multisine(
@@ -33,7 +33,7 @@ impl Signal {
         seconds: f64,
         seed: u64,
     ) -> Self {
-        // A band that is written in hertz ends at its line in spite of rounding.
+        // A line at an end of the band belongs to the band in spite of rounding.
         let first = (first_hz * period_s * (1.0 - 1e-9)).ceil().max(1.0) as u64;
         let last = (last_hz * period_s * (1.0 + 1e-9)).floor() as u64;
         let mut left_out = ChaCha8Rng::seed_from_u64(first);

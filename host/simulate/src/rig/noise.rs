@@ -11,16 +11,16 @@ use quietcut_recording::{Quantity, Recording};
 /// Standard deviation of the white noise of each channel.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Noise {
-    /// Standard deviation divided by the channel's root mean square, for channels not listed in `absolute`. Those with
-    /// a tachometer level get no noise.
+    /// Standard deviation divided by the channel's root mean square, for channels not listed in `absolute`. Those of
+    /// them with a tachometer level get no noise.
     pub relative: f64,
     /// Standard deviation by channel name, in the SI unit of the channel.
     pub absolute: BTreeMap<String, f64>,
 }
 
 impl Noise {
-    /// Adds noise to every channel whose standard deviation is above 0. The same seed gives the same noise; channels
-    /// are independent of each other.
+    /// Adds noise to every channel whose standard deviation is above 0. The same seed gives the same noise; the noise
+    /// of each channel is independent.
     pub fn add(&self, recording: &mut Recording, seed: u64) {
         for (index, channel) in recording.channels.iter_mut().enumerate() {
             let deviation = self.absolute.get(&channel.name).copied().unwrap_or_else(|| {

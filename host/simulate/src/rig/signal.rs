@@ -196,8 +196,8 @@ impl Signal {
         }
     }
 
-    /// The longest step that resolves the force, s: a quarter of the shortest period. Pulses are resolved by their
-    /// knots.
+    /// The longest step that resolves the force, s: a quarter of the shortest period; infinite for impacts and release,
+    /// which their knots resolve.
     pub fn longest_step_s(&self) -> f64 {
         let highest_hz = match self {
             Self::Tones { tones, .. } => tones
@@ -214,8 +214,8 @@ impl Signal {
         0.25 / highest_hz
     }
 
-    /// The first time after `t`, s, at which the excitation force or one of its low-order time derivatives is
-    /// discontinuous.
+    /// The first time after `t`, s, at which the excitation force or one of its low-order time derivatives may be
+    /// discontinuous; infinite if there is none.
     pub fn next_knot_s(&self, t: f64) -> f64 {
         match self {
             Self::Tones { .. } | Self::Sweep { .. } => f64::INFINITY,

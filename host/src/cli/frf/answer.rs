@@ -200,8 +200,8 @@ impl ReceptanceAnswer {
         } else {
             0.0
         };
-        // Half-width of the 90 % interval of the peak magnitude: the root of the sum of squares of the 90 %
-        // interval of the random error and of the largest error by aliasing, which does not average out.
+        // Half-width of the 90 % interval of the peak magnitude: the peak magnitude times the root of the sum of the
+        // squares of two relative errors, the half-width by the random error and the largest error by aliasing.
         let half =
             (measurement.ninety_percent(index) * relative).hypot(measurement.folding[index][at]) * size(at);
         Self {

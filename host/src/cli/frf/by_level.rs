@@ -19,10 +19,10 @@ struct LevelsOutput {
     warnings: Vec<String>,
 }
 
-/// The largest peak of each receptance at one force level.
+/// The largest fitted peak of each receptance that has one, at one force level.
 #[derive(Serialize)]
 struct LevelAnswer {
-    /// Amplitude of a stepped sine, median peak of impacts, or root mean square of another force, N.
+    /// Force level, N: see [`LevelMeasurement::force_n`].
     force_n: f64,
     peaks: Vec<LevelPeak>,
 }
@@ -36,17 +36,17 @@ struct LevelPeak {
     amplitude_m: Option<f64>,
 }
 
-/// Change of the largest peak of a receptance from the lowest to the highest level.
+/// Change of the largest fitted peak of a receptance from the lowest to the highest level at which it has one.
 #[derive(Serialize)]
 struct Dependence {
     name: String,
-    /// Levels, N.
+    /// Lowest and highest level with a fitted peak of this receptance, N.
     force_n: [f64; 2],
-    /// Relative change of the frequency.
+    /// Change of the frequency, relative to that at the lowest of these levels.
     frequency: Figure,
-    /// Relative change of the damping ratio.
+    /// Change of the damping ratio, relative to that at the lowest of these levels.
     damping_ratio: Figure,
-    /// True if one of the changes excludes 0 in its 90 % interval.
+    /// True if the 90 % interval of one of the two changes does not contain 0.
     is_nonlinear: bool,
 }
 
@@ -111,7 +111,8 @@ pub(super) fn run(args: &Args) -> Result<(), Error> {
     args.output.answer_with(&understood, &answer, text)
 }
 
-/// The largest fitted peak of each receptance of a level, with the name of the receptance.
+/// The largest fitted peak of each receptance of a level that has one, with the name of the receptance; in the order of
+/// the table.
 fn largest_peaks(level: &LevelMeasurement) -> Vec<(String, FittedPeak)> {
     let table = &level.measurement.table;
     let largest = |entry| {

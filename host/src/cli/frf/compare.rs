@@ -23,7 +23,7 @@ struct Comparison {
     before: PathBuf,
     after: PathBuf,
     peaks: Vec<PeakChange>,
-    /// True if a frequency, a damping ratio or a size of a peak changes by more than its interval, or a peak comes or goes.
+    /// True if [`PeakChange::has_changed`] is true for one of the peaks.
     has_changed: bool,
     warnings: Vec<String>,
     out: Vec<PathBuf>,
@@ -36,11 +36,12 @@ struct PeakChange {
     frequency_hz: Change,
     damping_ratio: Change,
     receptance_m_per_n: Change,
-    /// True if one of the three changes excludes 0 in its 90 % interval, or if one table lacks the peak.
+    /// True if the 90 % interval of one of the three changes does not contain 0, or if one table lacks the peak.
     has_changed: bool,
 }
 
-/// A quantity before and after, and the difference; `null` where a table lacks the peak.
+/// A quantity before and after, and the difference after − before; `null` where a table lacks the peak, and the
+/// difference if either does.
 #[derive(Serialize)]
 struct Change {
     before: Option<Figure>,
@@ -50,7 +51,7 @@ struct Change {
 
 impl Change {
     fn new(before: Option<Figure>, after: Option<Figure>) -> Self {
-        // The errors of the two tests are independent: their half-widths add as squares.
+        // The errors of the two tests are independent: the squares of the half-widths of their intervals add.
         let change = before.zip(after).map(|(before, after)| {
             Figure::new(after.value - before.value, before.half().hypot(after.half()))
         });
@@ -201,13 +202,15 @@ fn changes(before: &FrfTable, after: &FrfTable) -> Vec<PeakChange> {
         .collect()
 }
 
-/// Pairs of peaks nearest in frequency, within the factor [`SAME_PEAK`]; a peak without a partner stands alone. Ascending in frequency.
+/// Pairs of a peak before with the free peak after that is nearest in frequency, if the ratio of the two frequencies is
+/// below [`SAME_PEAK`]; a peak without a partner stands alone. Ascending in the frequency before, or after where there
+/// is none before.
 fn matched(
     before: Vec<FittedPeak>,
     mut after: Vec<FittedPeak>,
 ) -> Vec<(Option<FittedPeak>, Option<FittedPeak>)> {
     let distance = |a: &FittedPeak, b: &FittedPeak| (a.frequency_hz / b.frequency_hz).ln().abs();
-    // The largest peaks find their partners first.
+    // The largest peaks before choose first among the peaks after that are still free.
     let mut order = before;
     order.sort_by(|a, b| b.receptance.total_cmp(&a.receptance));
     let mut pairs: Vec<(Option<FittedPeak>, Option<FittedPeak>)> = Vec::new();
@@ -225,7 +228,7 @@ fn matched(
     pairs
 }
 
-/// Warnings of receptances that only one table has.
+/// Warnings about receptances that only one table has.
 fn warnings(before: &FrfTable, after: &FrfTable) -> Vec<String> {
     let lacking = |one: &FrfTable, other: &FrfTable| -> Vec<String> {
         one.entries()

@@ -15,7 +15,7 @@ pub(super) struct Figure {
 }
 
 impl Figure {
-    /// A number with half the width of its interval.
+    /// A number whose interval reaches `half` to each side of it.
     pub(super) fn new(value: f64, half: f64) -> Self {
         Self {
             value,

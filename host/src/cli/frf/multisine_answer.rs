@@ -7,37 +7,38 @@ use serde::Serialize;
 use crate::frf::{DistortionLevel, PeriodicTest, ResponseDistortion};
 use crate::report::digits::significant;
 
-/// Evaluation of a test with periodic excitation, as keys of the columns that it gives.
+/// Evaluation of a test with periodic excitation.
 #[derive(Serialize)]
 pub(super) struct MultisineAnswer {
     period_s: f64,
-    /// Periods of each recording that are averaged.
+    /// Number of averaged periods of each recording, in the order of the recordings.
     periods_used: Vec<usize>,
-    /// Periods of each recording that are left out: transients, and changes of the force.
+    /// Number of whole periods of each recording that are left out, in the order of the recordings.
     periods_dropped: Vec<usize>,
-    /// Different sets of phases among the recordings.
+    /// Number of different sets of phases among the recordings.
     realizations: usize,
     distortion: Vec<DistortionAnswer>,
 }
 
-/// Levels relative to the response around its peak, dB.
+/// Levels of noise and distortion of one response, relative to the response around the peak of the receptance, dB.
 #[derive(Serialize)]
 struct DistortionAnswer {
     response: &'static str,
     peak_hz: f64,
-    /// Noise after averaging; `null` without any.
+    /// Noise after averaging; `null` if it is 0.
     noise_db: Option<f64>,
-    /// Nonlinear distortion from the scatter over realizations; `null` with one realization, or if it is not above the noise.
+    /// Nonlinear distortion from the scatter over realizations; `null` if [`ResponseDistortion::total`] is `None` or
+    /// not significant.
     distortion_db: Option<f64>,
-    /// Distortion at even lines without force; `null` without such lines, or if it is not above the noise.
+    /// Distortion at even lines without force; `null` if [`ResponseDistortion::even`] is `None` or not significant.
     even_db: Option<f64>,
-    /// Distortion at odd lines without force; `null` without such lines, or if it is not above the noise.
+    /// Distortion at odd lines without force; `null` if [`ResponseDistortion::odd`] is `None` or not significant.
     odd_db: Option<f64>,
-    /// True if lines or realizations would have shown a distortion above the noise.
+    /// True if at least one of the three distortions was measured, significant or not.
     is_tested: bool,
 }
 
-/// Level of an amplitude ratio, dB; `None` for 0.
+/// Level of an amplitude ratio, dB; `None` unless the ratio is above 0.
 fn decibel(ratio: f64) -> Option<f64> {
     (ratio > 0.0).then(|| 20.0 * ratio.log10())
 }

@@ -8,8 +8,9 @@ use crate::frf::Frf;
 /// Number of neighbours on each side of a line whose coherence counts with its own.
 const NEIGHBOURS: usize = 2;
 
-/// True if the force causes the response at a line and around it, or if the coherence is not known. Of few impacts the
-/// coherence of a single line is large by chance.
+/// True if the force causes the response at a line and around it: the coherence at the line, and the median of the
+/// coherences at the line and its [`NEIGHBOURS`], are at least [`RELATED_COHERENCE`]. Also true if the coherence is not
+/// known. With few impacts the coherence of a single line can be large by chance.
 pub(super) fn is_related(entry: &Frf, line: usize) -> bool {
     entry.coherence.as_ref().is_none_or(|coherence| {
         let end = coherence.len().min(line + NEIGHBOURS + 1);
@@ -19,8 +20,8 @@ pub(super) fn is_related(entry: &Frf, line: usize) -> bool {
     })
 }
 
-/// Index of the line at which `size` is largest among the lines where the force causes the response; among all lines if
-/// there is none. Divided by ω², the noise of an accelerometer is larger at the first lines than a resonance.
+/// Index of the line at which `size` is largest among the lines that [`is_related`] accepts; among all lines if it
+/// accepts none. Noise of an accelerometer divided by ω² may be larger at the first lines than a resonance.
 pub(super) fn largest(entry: &Frf, size: impl Fn(usize) -> f64) -> usize {
     let among = |of: &dyn Fn(usize) -> bool| {
         (0..entry.receptance.len())

@@ -37,7 +37,7 @@ pub(super) struct IdentifyOutput {
     /// Identified parameters, grouped by direction or pair of directions; cutting coefficients have no direction.
     pub(super) models: Vec<Model>,
     /// Root mean square of the residual divided by that of the data; the method determines which data. `None` for a
-    /// method without a fit.
+    /// method that does not state it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) fit_error: Option<f64>,
     /// Reduced χ² of the identified model: weighted sum of squared residuals divided by (number of residuals − number
@@ -45,7 +45,7 @@ pub(super) struct IdentifyOutput {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) misfit: Option<f64>,
     /// Number of steady sine responses (dwells) taken from the recordings; for `linearity` plus the windows of sines
-    /// with increasing force. `None` for a method that uses no dwells.
+    /// with increasing force. `None` for a method that does not state it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) dwells: Option<usize>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -284,9 +284,8 @@ impl IdentifyOutput {
         }
     }
 
-    /// TOML text of the case file with the identified model, named after `path`. Identified cutting coefficients go into
-    /// the case `other`, which keeps all else; for other methods the sections tool, material, cut and limits that
-    /// `other` has replace those of the identified model.
+    /// TOML text of the case file with the identified model. A case `other` is combined with identified cutting
+    /// coefficients as by [`case_file::with_coefficients`], with another model as by [`case_file::with_sections`].
     pub(super) fn case(&self, path: &Path, other: Option<&toml::Table>) -> Result<String, Error> {
         if let (Some(_), Some(table), Some(other)) = (&self.cutting, &self.table, other) {
             return toml::to_string(&case_file::with_coefficients(table, other))

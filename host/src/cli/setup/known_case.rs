@@ -57,8 +57,8 @@ impl Given {
         }
     }
 
-    /// These answers, completed so that only the sections that `case` lacks are asked for. The answers of sections that
-    /// the case has are not written: any valid value stands for them.
+    /// These answers, completed so that only what the missing sections of `case` need is asked for. Answers for
+    /// sections that the case has are not written: any valid value stands for them.
     pub(super) fn known_from(self, case: &Case) -> Self {
         let tool = case.tool.as_ref();
         let has_cut = case.cut.is_some();

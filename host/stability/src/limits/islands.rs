@@ -2,8 +2,8 @@
 
 use super::speed_line::SpeedLine;
 
-/// Width in speed of the narrowest region of stability or of chatter that begins and ends between the first and the
-/// last speed of a chart, rev/min; `None` if there is none.
+/// Width in speed, rev/min, of the narrowest region of stability or of chatter that contains neither the first nor the
+/// last speed of a chart; `None` if there is none. `lines` are in ascending order of speed.
 pub(super) fn narrowest_island_rpm(lines: &[SpeedLine], depth_mm: f64) -> Option<f64> {
     let rpm: Vec<f64> = lines.iter().map(|line| line.rpm).collect();
     let stable: Vec<_> = lines.iter().map(|line| line.stable_mm.clone()).collect();
@@ -30,16 +30,16 @@ fn complement(intervals: &[[f64; 2]], depth_mm: f64) -> Vec<[f64; 2]> {
         .collect()
 }
 
-/// Widths in speed of all connected regions that touch neither the first nor the last speed of a chart, rev/min.
-/// `intervals` are the depth intervals at each speed. Intervals at neighbouring speeds belong to one region if they
-/// overlap in depth. A region extends half way to the next speeds.
+/// Widths in speed, rev/min, of all connected regions that contain neither the first nor the last speed of a chart.
+/// `intervals` has the depth intervals at each speed, in the order of `rpm`. Intervals at neighbouring speeds belong to
+/// one region if they overlap in depth. A region extends half way to the next lower and the next higher speed.
 fn island_widths_rpm(rpm: &[f64], intervals: &[Vec<[f64; 2]>]) -> Vec<f64> {
     let nodes: Vec<(usize, [f64; 2])> = intervals
         .iter()
         .enumerate()
         .flat_map(|(speed, of)| of.iter().map(move |interval| (speed, *interval)))
         .collect();
-    // The region of each interval, by the number of one of its intervals.
+    // The region to which each of `nodes` belongs, by the index of one node of this region.
     let mut region: Vec<usize> = (0..nodes.len()).collect();
     for (a, (speed, one)) in nodes.iter().enumerate() {
         for (b, (next, other)) in nodes.iter().enumerate().skip(a + 1) {

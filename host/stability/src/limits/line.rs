@@ -13,8 +13,8 @@ use crate::spectrum::collocated::Collocated;
 use crate::spectrum::crossing::Crossing;
 use crate::spectrum::stability_loss::StabilityLoss;
 
-/// Number of depth intervals at whose ends all multipliers are computed first. Each is halved until its multipliers can
-/// be followed. A choice: more cost time, fewer are halved at once.
+/// Largest number of depth intervals at whose ends multipliers are computed first. An interval is halved where its
+/// multipliers cannot be followed. A choice: more cost time, fewer are halved at once.
 const INTERVALS: usize = 10;
 
 /// Relative error of the depth of a crossing on a given mesh, due to the tolerance of Newton's method.
@@ -23,12 +23,13 @@ const ROOT: f64 = 1e-9;
 /// All crossings of the unit circle by Floquet multipliers at one spindle speed (rev/min), from axial depth 0 to
 /// `depth_mm`; the largest multiplier is stated at `samples` equal steps.
 ///
-/// All multipliers are computed at the ends of a few depth intervals. Between them each multiplier that may reach the
-/// circle is followed as ln μ by the cubic through both ends with their derivatives, which Newton's method confirms half
-/// way. Where it cannot be followed, or may touch the circle and return, the interval is halved, up to 14 times.
-/// Crossings are computed with the characteristic matrix, to about 1e-9 relative; each must lie on its cubic and have its
-/// direction. At every sample the number of multipliers outside must agree with the crossings found. Where it does not
-/// after all halvings, one crossing is found by bisection on that number.
+/// The larger multipliers are computed at the ends of at most ten depth intervals. Between them each multiplier that
+/// may reach the circle is followed as ln μ by the cubic through both ends with their derivatives, which Newton's
+/// method half way confirms and corrects. Crossings are computed with the characteristic matrix, to about 1e-9
+/// relative; each must lie on the path of its multiplier and have its direction. The crossings in an interval must
+/// agree with the numbers of multipliers outside the circle at its ends. If they do not, or if a multiplier cannot be
+/// followed or may touch the circle and return, the interval is halved, up to 14 times. After that, one crossing is
+/// found by bisection on the number of multipliers outside, or none if the number is the same at both ends.
 ///
 /// # Errors
 /// Speed or depth out of range, too many vibrations in a tooth period, or a computation that breaks down, for example

@@ -13,7 +13,7 @@ use crate::spectrum::root::Root;
 use crate::spectrum::stability_loss::StabilityLoss;
 
 /// Number of equal steps at which a path between two depths is evaluated to find its crossings of the unit circle. A
-/// choice: the second difference bounds what lies between two steps.
+/// choice; [`TOUCHING`] covers what may lie between two steps.
 const STEPS: usize = 16;
 
 /// Logarithm of a Floquet multiplier at one axial depth, with its derivative.
@@ -51,8 +51,9 @@ impl Exponent {
     }
 
     /// Removes from `free`, the multipliers one step deeper, the one on the same path, and returns it: that of the
-    /// same kind whose tangent comes closest to the tangent of this one half way. `None` if the tangents pass each other
-    /// by more than the share [`PATH_MISS`] of the distance travelled.
+    /// same kind whose tangent comes closest to the tangent of this one half way. `None` if there is none of the same
+    /// kind, or if the two tangents miss each other by more than 1e-6 plus the share [`PATH_MISS`] of the distance
+    /// travelled.
     pub(super) fn take_next(&self, free: &mut Vec<Self>, step_m: f64) -> Option<Self> {
         let middle = self.value + self.slope * (0.5 * step_m);
         let miss = |to: &Self| (middle - (to.value - to.slope * (0.5 * step_m))).norm();
@@ -78,7 +79,7 @@ pub(super) struct MultiplierPath {
     from: Exponent,
     to: Exponent,
     step_m: f64,
-    /// Coefficient of the quartic: 16 times the error of the cubic half way.
+    /// Coefficient of the quartic: 16 times the error of the cubic half way; 0 before [`MultiplierPath::correct`].
     correction: Complex64,
 }
 
@@ -100,7 +101,8 @@ impl MultiplierPath {
         }
     }
 
-    /// True if the multiplier may reach the unit circle between the two depths.
+    /// True if the multiplier may reach the unit circle between the two depths, and is large enough to be followed at
+    /// one of them at least.
     pub(super) fn may_reach(&self) -> bool {
         let ends = [&self.from, &self.to];
         ends.iter().any(|end| end.is_followed()) && ends.iter().any(|end| end.may_reach(self.step_m))
@@ -126,20 +128,20 @@ impl MultiplierPath {
         }
     }
 
-    /// Sets the quartic from the multiplier half way; returns the error of the cubic in ln μ there.
+    /// Sets the quartic from the multiplier half way; returns the absolute error of the cubic in ln μ there.
     pub(super) fn correct(&mut self, middle: Complex64) -> f64 {
         let error = (middle / self.multiplier_at(0.5)).ln();
         self.correction = error * 16.0;
         error.norm()
     }
 
-    /// Error of the cubic in ln μ half way.
+    /// Absolute error of the cubic in ln μ half way; 0 before [`correct`](Self::correct).
     pub(super) fn error(&self) -> f64 {
         self.correction.norm() / 16.0
     }
 
-    /// Crossings of the unit circle between the two depths, by ascending depth; `None` if the path may touch the
-    /// circle, or a real multiplier, in between.
+    /// Crossings of the unit circle between the two depths, by ascending depth. `None` if the path may touch the circle
+    /// in between, or if the path of a complex multiplier reaches the real axis.
     pub(super) fn crossings(&self) -> Option<Vec<PathCrossing>> {
         let points: [Complex64; STEPS + 1] = std::array::from_fn(|step| self.at(step as f64 / STEPS as f64));
         let is_complex = self.from.kind == StabilityLoss::Hopf;
@@ -160,7 +162,8 @@ impl MultiplierPath {
             let [a, b, c] = [three[0].re, three[1].re, three[2].re];
             let is_nearest =
                 are_on_one_side(a, b) && are_on_one_side(b, c) && b.abs() <= a.abs().min(c.abs());
-            // A parabola through three points passes its extremum by an eighth of the second difference at most.
+            // The extremum of a parabola through three points lies beyond the nearest of them by an eighth of their
+            // second difference at most.
             is_nearest && b.abs() < self.error() + TOUCHING * (a - 2.0 * b + c).abs()
         });
         let [first, second, .., last_but_one, last] = points.map(|point| point.re);

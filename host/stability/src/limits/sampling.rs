@@ -19,7 +19,7 @@ impl Variable {
     ///
     /// Deviations are independent, except for entries (i, j) and (j, i) of a matrix: with equal values and equal
     /// deviations they are one number and vary together. Parameters with a joint covariance follow from further
-    /// independent variables, each of which moves several of them.
+    /// independent variables, each of which moves one or more of them.
     pub fn of_case(case: &Case) -> Vec<Self> {
         let mut variables: Vec<Self> = Vec::new();
         for &deviation in &case.deviations {
@@ -62,8 +62,8 @@ impl Variable {
             .all(|part| part.parameter.shift(case, part.std * deviations))
     }
 
-    /// Shifts the parameters of a case to the machine at the values `machine` of the variables; false if a value is then
-    /// not valid.
+    /// Shifts the parameters of a case to the machine at the values `machine` of the variables; false if a value is
+    /// then not valid.
     ///
     /// A parameter that several variables move is shifted once, by their sum: the bounds of its value hold for the sum
     /// alone.

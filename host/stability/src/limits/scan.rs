@@ -10,21 +10,23 @@ use crate::spectrum::crossing::Crossing;
 use crate::spectrum::root::Root;
 use crate::spectrum::stability_loss::StabilityLoss;
 
-/// All Floquet multipliers at one axial depth that may come near the unit circle.
+/// Floquet multipliers larger than [`SCANNED`] at one axial depth.
 #[derive(Clone, Debug)]
 pub(super) struct Sample {
     depth_m: f64,
-    /// Absolute value of the largest multiplier at this depth, to the error of the scan.
+    /// Absolute value of the largest multiplier at this depth, not refined by Newton's method; 0 if none is found.
     largest: f64,
+    /// Logarithms of the multipliers, each conjugate pair by its upper one.
     exponents: Vec<Exponent>,
     /// Multipliers outside the unit circle, each conjugate pair by its upper one.
     outer: Vec<Complex64>,
-    /// True if every multiplier has a derivative over the depth.
+    /// True if every multiplier found at this depth whose absolute value is at least [`LINE_FOLLOWED`] has a derivative
+    /// over the depth.
     is_smooth: bool,
 }
 
 impl Sample {
-    /// Number of multipliers outside the unit circle at this depth.
+    /// Number of multipliers outside the unit circle at this depth, two for each conjugate pair.
     pub(super) fn outside(&self) -> i32 {
         let counts = self.outer.iter().map(|outer| StabilityLoss::of(*outer).count());
         counts.sum()
@@ -59,7 +61,7 @@ impl<S: Spectrum> Scan<S> {
         }
     }
 
-    /// Computes all multipliers at an axial depth.
+    /// Computes the multipliers larger than [`SCANNED`] at an axial depth.
     ///
     /// # Errors
     /// The equations have no finite solution, or the eigenvalues cannot be computed.
@@ -93,8 +95,9 @@ impl<S: Spectrum> Scan<S> {
         Ok(sample)
     }
 
-    /// Floquet multiplier with its derivative dμ/dw; `None` if it has none. Newton's method, if it converges, refines the
-    /// multiplier, so that it counts on the right side of the unit circle.
+    /// Floquet multiplier with its derivative dμ/dw, `None` if this cannot be computed. The multiplier is refined by
+    /// [`Spectrum::root_near`], and next to the unit circle by [`Spectrum::multiplier_near`], so that it counts on the
+    /// right side; a refinement that fails is left out.
     fn root(&mut self, coarse: Complex64, depth_m: f64) -> (Complex64, Option<Complex64>) {
         let spectrum = &mut self.spectrum;
         let root = spectrum.root_near(coarse, depth_m);
@@ -111,6 +114,7 @@ impl<S: Spectrum> Scan<S> {
     }
 
     /// Finds the crossings of the unit circle between two sampled depths, and states the largest multiplier there.
+    /// `level` is the number of halvings that led to this depth interval.
     ///
     /// # Errors
     /// As [`sample`](Self::sample).
@@ -133,8 +137,10 @@ impl<S: Spectrum> Scan<S> {
         self.between(&middle, high, level + 1)
     }
 
-    /// Follows each multiplier that may reach the unit circle between two sampled depths; `None` if one cannot be
-    /// followed, may touch the circle, or crosses it at a depth that is not found.
+    /// Follows each multiplier that may reach the unit circle between two sampled depths. Returns the paths of all
+    /// multipliers with a partner at the other depth, and the crossings by ascending depth. `None` if a multiplier
+    /// cannot be followed, may touch the circle, or crosses it at a depth that is not found; also if the interval is
+    /// longer than the `step_m` of the scan and one of the samples is not smooth.
     fn follow(
         &mut self,
         low: &Sample,
@@ -163,8 +169,8 @@ impl<S: Spectrum> Scan<S> {
         Some((paths, found))
     }
 
-    /// Crossing of the unit circle by a path, by Newton's method; `None` if it fails, or finds the crossing of another
-    /// path or in the other direction.
+    /// Crossing of the unit circle by a path, by Newton's method. `None` if the method fails, if it finds the crossing
+    /// of another path or in the other direction, or if the multiplier has no derivative there.
     fn cross(
         &mut self,
         low: &Sample,
@@ -179,7 +185,7 @@ impl<S: Spectrum> Scan<S> {
             multiplier: path.multiplier_at(share),
         };
         let crossing = self.spectrum.crossing_near(guess, low.depth_m, high.depth_m)?;
-        // The crossing must lie on this path to within the error of its interpolant.
+        // The crossing must lie on this path to within the error of the path's cubic and 1e-6.
         let on_path = path.multiplier_at((crossing.depth_m - low.depth_m) / step_m);
         let slope = self.spectrum.sensitivity(crossing.multiplier, crossing.depth_m)?;
         let is_outward = (crossing.multiplier.conj() * slope).re > 0.0;
@@ -187,8 +193,8 @@ impl<S: Spectrum> Scan<S> {
         (is_same && is_outward == outward).then_some(DirectedCrossing { crossing, outward })
     }
 
-    /// Bisects a depth interval on the number of multipliers outside the unit circle, where multipliers cannot be
-    /// followed even over this short interval. Finds one crossing, or none if the number is the same at both ends.
+    /// Bisects a depth interval on the number of multipliers outside the unit circle. Finds one crossing, or none if
+    /// the number is the same at both ends.
     fn by_halving(&mut self, low: &Sample, high: &Sample) -> Result<Vec<DirectedCrossing>, StabilityError> {
         let (mut low, mut high) = (low.clone(), high.clone());
         if low.outside() == high.outside() {
@@ -224,7 +230,7 @@ impl<S: Spectrum> Scan<S> {
     }
 
     /// States the largest multiplier at the multiples of the step from `low` to before `high`: that of the paths, or,
-    /// where they may miss the largest, the exponential through both ends.
+    /// if they may miss the largest, the larger of that and the exponential through both ends.
     fn state_largest(&mut self, low: &Sample, high: &Sample, paths: &[MultiplierPath]) {
         if self.step_m <= 0.0 {
             return;
@@ -257,8 +263,8 @@ impl<S: Spectrum> Scan<S> {
     }
 }
 
-/// Paths of the multipliers between two sampled depths; `None` if a multiplier that may reach the unit circle has no partner at the
-/// other depth.
+/// Paths between two sampled depths of the multipliers that have a partner at the other depth; `None` if one without a
+/// partner is followed and may reach the unit circle.
 fn paths(low: &Sample, high: &Sample) -> Option<Vec<MultiplierPath>> {
     let step_m = high.depth_m - low.depth_m;
     let mut free = high.exponents.clone();

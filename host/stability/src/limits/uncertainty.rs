@@ -45,7 +45,8 @@ const SAMPLES: usize = 40;
 /// Function that builds the stability method for a case; the reason if the case is not a valid machine.
 pub type MethodOfCase<'a> = dyn Fn(&Case) -> Result<Box<dyn Method>, String> + Sync + 'a;
 
-/// Case with standard deviations or a covariance of its parameters, and the stability method for machines drawn from them.
+/// Case with standard deviations or a covariance of its parameters, and the stability method for machines that are
+/// drawn from these.
 pub struct Uncertainty<'a> {
     case: &'a Case,
     method_of: &'a MethodOfCase<'a>,

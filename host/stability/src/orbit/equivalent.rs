@@ -105,8 +105,9 @@ impl EquivalentProblem {
     /// Builds the stability problem of a case with friction, backlash or hysteresis.
     ///
     /// # Errors
-    /// As [`ForcedProblem::new`], or the structure has no mass at the tool, or the teeth have unequal pitch or
-    /// runout: the orbit, and with it the equivalent springs, would repeat once a revolution.
+    /// As [`ForcedProblem::new`] for the case without friction, backlash and hysteresis, or one of these cannot be
+    /// applied to the case, or the structure has no mass at the tool, or the teeth have unequal pitch or runout: the
+    /// orbit, and with it the equivalent springs, would repeat once a revolution.
     pub fn new(case: &Case) -> Result<Self, StabilityError> {
         let mut rest = case.clone();
         for spec in ALL

@@ -25,7 +25,8 @@ use quietcut_model::{ChipLaw, MotionState, ProcessDamping, RestoringForce};
 /// (cutting·n_x f_t + edge), with z the axial displacement under axial-depth modulation, otherwise 0.
 ///
 /// With unequal pitch, or runout on a nonlinear structure, an orbit has the period of the revolution. The chip of tooth
-/// j on such an orbit is n_x f_j + n(u − u(t − τ_j)) + (r_j − r_{j−1}) sin γ, with the feed f_j during the delay τ_j.
+/// j on such an orbit is n_x f_j + n(u − u(t − τ_j)) + (r_j − r_p) sin γ, with the feed f_j during the delay τ_j and
+/// the preceding tooth p.
 /// The force is linear in the chip thickness through zero: a tooth that would leave the surface pulls, as in the linear
 /// problem.
 ///
@@ -57,8 +58,9 @@ pub struct ForcedProblem {
 pub(super) struct Uneven {
     /// Linear delay problem with the revolution as its period.
     pub(super) pitched: Pitched,
-    /// Increase of the chip thickness of each tooth, m: the radius difference to the preceding tooth (runout) times the
-    /// sine of the edge angle.
+    /// Change of the chip thickness of each tooth by runout, m, by tooth number: its radius minus that of the tooth
+    /// that cuts before it, times the sine of the edge angle. That tooth has the next number, after the last one the
+    /// first.
     pub(super) runout_m: Vec<f64>,
 }
 
@@ -81,7 +83,7 @@ impl Uneven {
     }
 }
 
-/// True if the teeth of the case have unequal pitch or runout.
+/// True if the teeth of the case have unequal pitch, or runout that changes their chip thickness.
 pub(super) fn has_unequal_teeth(case: &Case) -> Result<bool, StabilityError> {
     let pitched = Pitched::new(case, CubicTerms::Kept)?;
     Ok(Uneven::of(case, &pitched)?.is_some())

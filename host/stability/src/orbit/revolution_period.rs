@@ -1,10 +1,10 @@
 //! Forced orbit of unequal teeth over one revolution, with several delays, by collocation.
 //!
 //! Teeth with unequal pitch or radii cut unequal chips: on an orbit of the revolution u ≠ u(t − τ_j), and the
-//! previously cut surface acts. With p_j = n_jᵀ u along the chip of tooth j, w − z the depth, and c_j the chip due to
-//! feed and runout,
+//! surface that tooth j + 1, the preceding one, has cut acts. With p_j = n_jᵀ u along the chip of tooth j, w − z the
+//! depth, and c_j the chip due to feed and runout,
 //!
-//!   ẋ = A x + B Σ_j ((w − z)(cutting_j (c_j + p_j − p_{j−1}(t − τ_j)) + edge_j)) − N(x).
+//!   ẋ = A x + B Σ_j ((w − z)(cutting_j (c_j + p_j − p_{j+1}(t − τ_j)) + edge_j)) − N(x).
 //!
 //! The state of the map over the revolution is x and those p of the preceding revolution whose surface is still to be
 //! cut, as in the linear problem. Its fixed points are the orbits; the eigenvalues of its derivative there are their

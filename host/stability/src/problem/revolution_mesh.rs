@@ -1,11 +1,12 @@
 //! Mesh of one revolution with several delays, and the location of the previously cut surface for every chip.
 //!
-//! Tooth j at an immersion angle observes p_j = nᵀ u; the preceding tooth observed p_{j−1} at the same angle, one pitch
-//! earlier. That displacement lies in another subinterval, between its nodes, of this revolution or the preceding one.
-//! It is interpolated by the polynomial through the nodes of that subinterval, which requires p to be smooth there. The
-//! displacement has a kink (a jump in some derivative) wherever a tooth enters or leaves. The cut surface carries the
-//! kink to the next tooth one delay later, where the structure smooths it. Subintervals therefore end at the entries
-//! and exits (generation 0), one delay after them (generation 1), and so on for several generations.
+//! Tooth j at an immersion angle observes p_j = nᵀ u; the preceding tooth, j + 1, observed p_{j+1} at the same
+//! angle, one pitch earlier. That displacement lies in another subinterval, between its nodes, of this revolution
+//! or the preceding one. It is interpolated by the polynomial through the nodes of that subinterval, which requires
+//! p to be smooth there. The displacement has a kink (a jump in some derivative) wherever a tooth enters or leaves.
+//! The cut surface carries the kink to the next tooth one delay later, where the structure smooths it. Subintervals
+//! therefore end at the entries and exits (generation 0), one delay after them (generation 1), and so on for
+//! several generations.
 
 use super::period::{DECAY_MAX, Rates};
 use super::pitched::Pitched;

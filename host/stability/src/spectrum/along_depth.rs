@@ -36,7 +36,8 @@ pub(crate) trait Spectrum {
         Some(Root { multiplier, slope })
     }
 
-    /// Floquet multiplier near a guess, to the square of the guess's error; a real guess gives a real multiplier.
+    /// Floquet multiplier near a guess, with an error of about the square of that of the guess, or a smaller one; a
+    /// real guess gives a real multiplier.
     ///
     /// `None` if no multiplier is found within 5 % of |guess|.
     fn corrected(&mut self, guess: Complex64, depth_m: f64) -> Option<Complex64> {

@@ -64,7 +64,7 @@ fn stem(key: &str) -> &str {
         .unwrap_or(key)
 }
 
-/// The parameter of the effect `spec` whose key differs from `key` in the unit only; `None` if there is none.
+/// The first parameter of the effect `spec` whose key differs from `key` in the unit only; `None` if there is none.
 fn of_other_unit(spec: &EffectSpec, key: &str) -> Option<&'static Parameter> {
     let with_key = || {
         spec.parameters
@@ -98,7 +98,7 @@ impl Check<'_> {
         Ok(extensions)
     }
 
-    /// Refuses extensions with a missing key, or with values that are possible alone but not together.
+    /// Refuses extensions of which a key is missing, or whose keys or values are not possible together.
     fn extensions_together(
         &self,
         file: &ExtensionsFile,
@@ -173,7 +173,8 @@ impl Check<'_> {
         Err(self.wrong(value, &full, value.get_ref(), format!("{needed}{unit}")))
     }
 
-    /// Checks the value of a key that sets the location of an effect: a name, or a list of names.
+    /// Checks the value of a key that sets the location of an effect: a name, or a list of names; for `directions` only
+    /// a list.
     fn location(&self, value: &Spanned<Value>, full: &str, key: &str) -> Result<(), CaseError> {
         let fits = |word: &Value| match word.as_str() {
             Some(word) => key == "channel" || word.parse::<Direction>().is_ok(),

@@ -1,4 +1,4 @@
-//! Reads the structure of a robot from the case file: joints, links, and the joint angles of the posture.
+//! Reads the structure of a robot from the case file: joints, links and tool position.
 
 use nalgebra::{Cholesky, Matrix3, Unit, Vector3};
 use toml::Spanned;

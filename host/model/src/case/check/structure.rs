@@ -1,4 +1,5 @@
-//! Reads the structure given by matrices or modes from the case file, with the standard deviations of its parameters.
+//! Reads the structure from the case file, with the standard deviations of its parameters: here matrices and modes, in
+//! `joints` those of a robot.
 
 use nalgebra::DMatrix;
 use num_complex::Complex64;

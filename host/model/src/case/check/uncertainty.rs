@@ -14,7 +14,7 @@ const PARAMETERS: &str = "uncertainty.parameters";
 const COVARIANCE: &str = "uncertainty.covariance";
 
 impl Check<'_> {
-    /// The section `[uncertainty]` of a case whose other sections are read.
+    /// The section `[uncertainty]` of a case whose other sections are already read.
     pub(super) fn uncertainty(
         &self,
         file: &UncertaintyFile,
@@ -121,7 +121,8 @@ impl Check<'_> {
         Ok(DMatrix::from_row_iterator(size, size, entries))
     }
 
-    /// Checks that entry (i, j) equals entry (j, i), and that it does not exceed the product of the standard deviations.
+    /// Checks that entries (i, j) and (j, i) are equal, and that the magnitude of entry (i, j) does not exceed the
+    /// product of the standard deviations of both parameters; both up to [`COVARIANCE_ROUNDING`].
     fn pair_of_covariance(
         &self,
         row: &Spanned<Vec<f64>>,
