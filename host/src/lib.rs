@@ -51,7 +51,7 @@ pub use quietcut_diagnose as diagnose;
 pub use quietcut_frf as frf;
 pub use quietcut_identify as identify;
 pub use quietcut_identify::plan;
-pub use quietcut_model::{case, milling, structure};
+pub use quietcut_model::{case, cutting_load, milling, structure};
 pub use quietcut_recording as recording;
 pub use quietcut_recording::file;
 pub use quietcut_simulate as simulate;

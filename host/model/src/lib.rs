@@ -45,6 +45,7 @@
 pub mod case;
 mod criteria;
 pub mod cutter;
+pub mod cutting_load;
 mod dynamics;
 pub mod effects;
 mod error;
@@ -56,6 +57,7 @@ pub mod spindle;
 pub mod structure;
 
 pub use cutter::{Cutter, Tooth};
+pub use cutting_load::CuttingLoad;
 pub use dynamics::Dynamics;
 pub use effects::{Effect, EffectError, Effects};
 pub use error::ModelError;

@@ -5,17 +5,20 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
+use super::lobes_spindle::Spindle;
 use super::lobes_spread::{intervals, percentiles};
 use super::method::MethodChoice;
 use super::varied::{self, Varied};
-use super::{Endings, Error, Output, Range, assumed, lobes_cells, lobes_csv, plausible_structure};
+use super::{
+    Endings, Error, Output, Range, assumed, lobes_cells, lobes_csv, lobes_points, plausible_structure,
+};
 use crate::case::Case;
 use crate::file;
 use crate::report::digits::significant;
-use crate::report::lobe_chart::{Column, lobe_chart};
+use crate::report::lobe_chart::{Column, lobe_chart_of_spindle};
 use crate::report::marks::Mark;
 use crate::report::page::{figure, page};
-use crate::stability::{Chart, CutStability, Label, Method, Resolution, SpeedLine, Uncertainty, chart};
+use crate::stability::{Chart, Method, Resolution, SpeedLine, Uncertainty, chart};
 use crate::trial_cuts::{self, Calls, TrialCut};
 
 /// Computes stability limits over the spindle speed, or the dominant Floquet multiplier at given points.
@@ -70,15 +73,6 @@ pub struct Args {
     at: Vec<(f64, f64)>,
     #[command(flatten)]
     output: Output,
-}
-
-#[derive(Serialize)]
-struct PointsOutput<'a> {
-    #[serde(flatten)]
-    label: Label,
-    points: Vec<CutStability>,
-    #[serde(skip_serializing_if = "<[String]>::is_empty")]
-    assumed: &'a [String],
 }
 
 impl Args {
@@ -165,53 +159,7 @@ pub fn run(args: Args) -> Result<(), Error> {
                 args.output,
             )
         }
-        _ => run_points(method.as_ref(), &args.at, &assumed, args.output),
-    }
-}
-
-fn run_points(
-    method: &dyn Method,
-    at: &[(f64, f64)],
-    assumed: &[String],
-    output: Output,
-) -> Result<(), Error> {
-    let points = at
-        .iter()
-        .map(|&(rpm, depth_mm)| method.point(rpm, depth_mm))
-        .collect::<Result<Vec<_>, _>>()?;
-    let label = Label::of(method);
-    let mut text = format!("method: {label}");
-    for point in &points {
-        let chatter = point
-            .chatter_hz
-            .map_or_else(String::new, |hz| format!(", {hz:.2} Hz"));
-        // Writing to a String cannot fail.
-        let _ = write!(
-            text,
-            "\n{} rev/min, {} mm: {}, |Floquet multiplier| = {} ± {} ({}{chatter})",
-            point.rpm,
-            point.depth_mm,
-            point.verdict.name(),
-            modulus(point.multiplier_abs),
-            significant(point.error, 1),
-            point.kind.name(),
-        );
-    }
-    text.push_str(&assumed::lines(assumed));
-    let answer = PointsOutput {
-        label,
-        points,
-        assumed,
-    };
-    output.answer(&answer, text)
-}
-
-/// Modulus of a Floquet multiplier as text: six decimals below 1000, seven significant digits from 1000 on.
-fn modulus(value: f64) -> String {
-    if value < 1e3 {
-        format!("{value:.6}")
-    } else {
-        significant(value, 7)
+        _ => lobes_points::run(&case, method.as_ref(), &args.at, &assumed, args.output),
     }
 }
 
@@ -234,6 +182,8 @@ struct LobesOutput<'a> {
     cuts: Option<Calls>,
     #[serde(skip_serializing_if = "<[String]>::is_empty")]
     assumed: &'a [String],
+    #[serde(skip_serializing_if = "Option::is_none")]
+    spindle: Option<&'a Spindle>,
 }
 
 fn run_chart(
@@ -275,6 +225,7 @@ fn run_chart(
     if let Some(warning) = error_warning(&chart) {
         tracing::warn!("{}: {warning}", case.path.display());
     }
+    let spindle = Spindle::of_chart(case, &chart)?;
     let calls = cuts.as_deref().map(|cuts| Calls::new(method, cuts)).transpose()?;
     let shown = ShownChart {
         case,
@@ -282,11 +233,12 @@ fn run_chart(
         depth_mm: deepest_mm,
         marks: cuts.iter().flatten().map(Mark::from).collect(),
         assumed: &assumed,
+        spindle: spindle.as_ref(),
     };
     for path in out {
         shown.write(path)?;
     }
-    let mut text = limits_as_text(&chart);
+    let mut text = limits_as_text(&chart, spindle.as_ref());
     if let Some(resolution) = &chart.resolution {
         text.push_str(&resolution_as_text(&chart, resolution));
     }
@@ -297,6 +249,7 @@ fn run_chart(
             calls.wrong, calls.cuts, calls.missed_chatter, calls.false_alarms, calls.undecided
         );
     }
+    text.push_str(&spindle.as_ref().map_or_else(String::new, Spindle::as_text));
     text.push_str(&assumed::lines(&assumed));
     for path in out {
         let _ = write!(text, "\n{}", path.display());
@@ -305,6 +258,7 @@ fn run_chart(
         chart: &chart,
         cuts: calls,
         assumed: &assumed,
+        spindle: spindle.as_ref(),
     };
     output.answer(&answer, text)
 }
@@ -326,7 +280,7 @@ fn error_warning(chart: &Chart) -> Option<String> {
     })
 }
 
-fn limits_as_text(chart: &Chart) -> String {
+fn limits_as_text(chart: &Chart, spindle: Option<&Spindle>) -> String {
     let mut text = format!(
         "method: {}\n  rev/min  first limit [mm]  kind   chatter [Hz]  stable [mm]",
         chart.label
@@ -360,6 +314,7 @@ fn limits_as_text(chart: &Chart) -> String {
                 let _ = write!(text, " {percentile} ({from}–{to})");
             }
         }
+        text.push_str(&spindle.map_or_else(String::new, |spindle| spindle.beside(line.rpm)));
     }
     text
 }
@@ -394,6 +349,7 @@ struct ShownChart<'a> {
     depth_mm: f64,
     marks: Vec<Mark>,
     assumed: &'a [String],
+    spindle: Option<&'a Spindle>,
 }
 
 impl ShownChart<'_> {
@@ -404,6 +360,7 @@ impl ShownChart<'_> {
                     chart: self.chart,
                     cuts: None,
                     assumed: self.assumed,
+                    spindle: self.spindle,
                 };
                 serde_json::to_string(&answer).map_err(Error::other)?
             }
@@ -424,7 +381,9 @@ impl ShownChart<'_> {
         let columns: Vec<Column> = self.chart.lines().into_iter().map(Column::from).collect();
         // The chart cannot be drawn from only one spindle speed or without a depth: this is an input error.
         let title = format!("{}, method: {}", self.case.name, self.chart.label);
-        lobe_chart(&title, &columns, self.depth_mm, &self.marks).map_err(Error::input)
+        let area = self.spindle.map(Spindle::area);
+        lobe_chart_of_spindle(&title, &columns, self.depth_mm, &self.marks, area.as_ref())
+            .map_err(Error::input)
     }
 
     fn page(&self) -> Result<String, Error> {
@@ -440,6 +399,7 @@ impl ShownChart<'_> {
             h1 { (case.name) }
             (figure(&svg, &caption))
             (assumed::section(self.assumed))
+            @if let Some(spindle) = self.spindle { (spindle.section()) }
             h2 { "Limits" }
             table {
                 tr {

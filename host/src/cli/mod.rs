@@ -16,6 +16,8 @@ pub mod info;
 pub mod lobes;
 mod lobes_cells;
 mod lobes_csv;
+mod lobes_points;
+mod lobes_spindle;
 mod lobes_spread;
 pub mod look;
 mod method;

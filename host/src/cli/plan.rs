@@ -155,7 +155,7 @@ pub fn run(args: Args) -> Result<(), Error> {
 /// # Errors
 /// No speed lies within the limits.
 fn leave_out_impossible(case: &Case, request: &mut Request) -> Result<Vec<f64>, Error> {
-    let Some(limits) = case.limits else {
+    let Some(limits) = &case.limits else {
         return Ok(Vec::new());
     };
     let (possible, impossible) = request
@@ -177,7 +177,7 @@ fn leave_out_impossible(case: &Case, request: &mut Request) -> Result<Vec<f64>, 
 /// Text about the speeds outside the limits of the spindle, or about limits that the case does not state; empty if
 /// there is neither.
 fn about_speeds(case: &Case, outside_limits_rpm: &[f64]) -> String {
-    match case.limits {
+    match &case.limits {
         None => {
             "\nthe case has no section [limits]: every speed is taken as possible; add rpm_min and rpm_max"
                 .into()

@@ -215,6 +215,7 @@ impl Given {
             feed_per_tooth_mm: self.feed_per_tooth_mm.or(other.feed_per_tooth_mm),
             rpm: self.rpm.or(other.rpm),
             power_w: self.power_w.or(other.power_w),
+            torque_nm: self.torque_nm.or(other.torque_nm),
         }
     }
 
@@ -255,6 +256,7 @@ impl Given {
                 .ok_or_else(|| wrong("--feed-per-tooth-mm"))?,
             rpm,
             power_w: self.power_w,
+            torque_nm: self.torque_nm,
             name: self.name.unwrap_or_else(|| default_name.into()),
         })
     }

@@ -324,6 +324,7 @@ fn as_text(path: &Path, shown: &TableOutput) -> String {
             .speeds
             .iter()
             .filter_map(|column| Some((column.unstable.first()?, column.rpm)))
+            .filter(|(interval, _)| interval.kind != "undecided")
             .min_by(|(a, _), (b, _)| a.from_mm.total_cmp(&b.from_mm));
         // Writing to a String cannot fail.
         let _ = write!(

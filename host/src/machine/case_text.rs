@@ -84,6 +84,8 @@ pub struct Answers {
     pub rpm: (f64, f64),
     /// Power of the spindle, W; `None` if not given.
     pub power_w: Option<f64>,
+    /// Torque of the spindle, N·m; `None` if not given.
+    pub torque_nm: Option<f64>,
 }
 
 /// Text of a case file from the answers of the user, with comments. The case has no structure: `identify` adds the
@@ -180,6 +182,9 @@ fn write_section(text: &mut String, answers: &Answers, section: Section) -> std:
             )?;
             if let Some(power_w) = answers.power_w {
                 writeln!(text, "power_w = {}", float(power_w))?;
+            }
+            if let Some(torque_nm) = answers.torque_nm {
+                writeln!(text, "torque_nm = {}", float(torque_nm))?;
             }
             Ok(())
         }

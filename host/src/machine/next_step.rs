@@ -271,7 +271,7 @@ fn is_newer(file: &Option<DatedFile>, than: SystemTime) -> bool {
 fn ranges(folder: &MachineFolder) -> String {
     let case = folder.case.as_ref().map(|(_, case)| case);
     let speeds = case.and_then(|case| {
-        if let Some(limits) = case.limits {
+        if let Some(limits) = &case.limits {
             // No cut exists at rest: the chart begins at the lowest speed of the spindle, but not below a twentieth of
             // the highest.
             return Some((limits.rpm_min.max(0.05 * limits.rpm_max), limits.rpm_max));

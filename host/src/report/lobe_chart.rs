@@ -11,6 +11,7 @@ pub use crate::stability::StabilityLoss as LimitKind;
 
 use super::marks::{Mark, draw_marks};
 use super::picture::{Axes, BLUE, INK, Labels, ORANGE, PictureError, VIOLET, axes, draw, text};
+use super::spindle_area::{SpindleArea, draw_spindle};
 use crate::stability::SpeedLine;
 
 /// Smallest axial depth at which stability is lost at one spindle speed, with the kind of loss.
@@ -117,6 +118,20 @@ pub fn lobe_chart(
     depth_max_mm: f64,
     marks: &[Mark],
 ) -> Result<String, PictureError> {
+    lobe_chart_of_spindle(title, columns, depth_max_mm, marks, None)
+}
+
+/// Draws the stability lobe diagram as [`lobe_chart`], with what the spindle can reach if that is known.
+///
+/// # Errors
+/// As [`lobe_chart`].
+pub fn lobe_chart_of_spindle(
+    title: &str,
+    columns: &[Column],
+    depth_max_mm: f64,
+    marks: &[Mark],
+    spindle: Option<&SpindleArea>,
+) -> Result<String, PictureError> {
     let (Some(first), Some(last)) = (columns.first(), columns.last()) else {
         return Err(PictureError::nothing("a chart needs at least two speeds"));
     };
@@ -142,6 +157,9 @@ pub fn lobe_chart(
         draw_percentiles(&mut chart, columns, depth_max_mm)?;
         for kind in [LimitKind::Hopf, LimitKind::Flip, LimitKind::Fold] {
             draw_limits(&mut chart, columns, depth_max_mm, kind)?;
+        }
+        if let Some(area) = spindle {
+            draw_spindle(&mut chart, area, [first.rpm, last.rpm], depth_max_mm)?;
         }
         draw_marks(canvas, &mut chart, marks)?;
         chart

@@ -15,6 +15,7 @@ mod picture;
 pub mod plan_chart;
 mod residual_pictures;
 pub mod spectrum;
+pub mod spindle_area;
 pub mod stabilization_chart;
 pub mod stroboscope;
 pub mod time;

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use quietcut_frf::FrfError;
 use quietcut_model::ModelError;
 use quietcut_model::case::CaseError;
+use quietcut_model::cutting_load::LoadError;
 use quietcut_model::structure::StructureError;
 use quietcut_numerics::eigenvalues::EigenvalueError;
 
@@ -31,6 +32,9 @@ pub enum StabilityError {
         /// Reason, from the model of the extension's effect.
         cause: Box<ModelError>,
     },
+    /// The torque or power of the cut cannot be computed.
+    #[error(transparent)]
+    Load(#[from] LoadError),
     /// The method does not cover a feature of the case.
     #[error("{}: {what}", path.display())]
     NotCovered {

@@ -7,6 +7,7 @@ use super::bench::Bench;
 use super::reading::{SensorOf, Sensors, SimulatedReading};
 use crate::conclusion::answer::NextTest;
 use crate::criteria::LARGEST_PROPOSED_MOTION;
+use quietcut_model::CuttingLoad;
 use quietcut_model::case::Case;
 use quietcut_model::effects::{Class, EffectName};
 use quietcut_model::milling::Cut;
@@ -124,10 +125,14 @@ fn of_cuts(bench: &Bench<'_>) -> Vec<Experiment> {
     ];
     // Speeds outside the section `[limits]` of the case are not proposed; without the section every speed counts as
     // possible.
-    let is_possible = |rpm: f64| bench.case.limits.is_none_or(|limits| limits.allows(rpm));
+    let is_possible = |rpm: f64| bench.case.limits.as_ref().is_none_or(|limits| limits.allows(rpm));
     factors
         .into_iter()
         .filter(|(by_rpm, ..)| is_possible(by_rpm * so_far.rpm))
+        .filter(|factors| {
+            let deeper = factors.0 != 1.0 || factors.1 > 1.0 || factors.2 > 1.0;
+            !deeper || can_be_driven(bench, *factors)
+        })
         .map(|(by_rpm, by_depth, by_feed, longer)| Experiment {
             excitation: Excitation::Cut {
                 rpm: by_rpm * so_far.rpm,
@@ -139,6 +144,24 @@ fn of_cuts(bench: &Bench<'_>) -> Vec<Experiment> {
             effort: if longer > 1.0 { 1.0 } else { 0.8 },
         })
         .collect()
+}
+
+/// True unless a cut with these factors on speed, depth and feed of the recorded cut exceeds the power or torque of the
+/// spindle; without the load of the cut, as of a tool without diameter, every cut counts as possible.
+fn can_be_driven(bench: &Bench<'_>, (by_rpm, by_depth, by_feed, _): (f64, f64, f64, f64)) -> bool {
+    let Some(so_far) = &bench.cut else {
+        return true;
+    };
+    let mut case = bench.case.clone();
+    case.cut = Some(Cut {
+        feed_per_tooth_mm: by_feed * so_far.cut.feed_per_tooth_mm,
+        ..so_far.cut
+    });
+    let Ok(Some(load)) = CuttingLoad::of_limited(&case) else {
+        return true;
+    };
+    let driven = load.driven_depth(by_rpm * so_far.rpm).ok().flatten();
+    driven.is_none_or(|driven| by_depth * so_far.depth_mm <= driven.depth_mm)
 }
 
 impl Experiment {

@@ -78,7 +78,7 @@ fn cuts_are_proposed_within_the_speed_limits_of_the_spindle_only() {
     case.limits = Some(quietcut_model::case::MachineLimits {
         rpm_min: 800.0,
         rpm_max: 1000.0,
-        power_w: None,
+        ..Default::default()
     });
     let limited = speeds_rpm(&case);
     assert_eq!(limited.len(), free.len() - 2);

@@ -11,6 +11,7 @@ use serde::Serialize;
 use super::chart::{KnownChart, KnownLimit};
 use super::means::Means;
 use super::unknowns::Unknowns;
+use quietcut_model::CuttingLoad;
 use quietcut_model::case::Case;
 use quietcut_model::structure::{Direction, FirstOrder, Structure, StructureError};
 use quietcut_simulate::STANDARD_GRAVITY;
@@ -90,7 +91,8 @@ pub(super) enum CandidateError {
     },
 }
 
-/// All candidate tests of a plan: hammer tests, a force test, and cuts that bracket stability limits.
+/// All candidate tests of a plan: hammer tests, a force test, and cuts that bracket stability limits, as far as the
+/// spindle can drive them.
 ///
 /// # Errors
 /// A structure or a cut cannot be computed, for the nominal parameters or after one step of an unknown.
@@ -113,7 +115,26 @@ pub(super) fn candidates(
             .step_by(step)
             .map(|(index, limit)| cuts(index, limit, means)),
     );
+    // Without the load, as of a tool without diameter, every depth counts as possible.
+    if let Ok(Some(load)) = CuttingLoad::of_limited(case) {
+        candidates.retain(|candidate| can_be_driven(&candidate.test, &load));
+    }
     Ok(candidates)
+}
+
+/// True if the spindle can drive the cuts of a test: a force test at its depth, a bracket up to its upper end.
+fn can_be_driven(test: &Test, load: &CuttingLoad) -> bool {
+    let (rpm, deepest_mm) = match test {
+        Test::Hammer { .. } => return true,
+        Test::Force { rpm, depth_mm, .. } => (*rpm, *depth_mm),
+        Test::Cuts {
+            rpm,
+            about_mm,
+            bracket_mm,
+        } => (*rpm, about_mm + 0.5 * bracket_mm),
+    };
+    let driven = load.driven_depth(rpm).ok().flatten();
+    driven.is_none_or(|driven| deepest_mm <= driven.depth_mm)
 }
 
 /// Candidate test that brackets a stability limit by cuts. It measures the depth of the limit, uniformly distributed

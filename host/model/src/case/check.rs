@@ -3,6 +3,7 @@
 mod extensions;
 mod job;
 mod joints;
+mod limits;
 mod structure;
 mod tool;
 mod uncertainty;

@@ -132,7 +132,11 @@ pub(super) struct CutFile {
 pub(super) struct LimitsFile {
     pub(super) rpm_min: Number,
     pub(super) rpm_max: Number,
+    pub(super) ranges_rpm: Option<Spanned<Vec<[f64; 2]>>>,
     pub(super) power_w: Option<Number>,
+    pub(super) torque_nm: Option<Number>,
+    pub(super) power_curve_rpm_w: Option<Spanned<Vec<[f64; 2]>>>,
+    pub(super) torque_curve_rpm_nm: Option<Spanned<Vec<[f64; 2]>>>,
 }
 
 #[derive(Deserialize)]

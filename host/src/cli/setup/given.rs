@@ -65,4 +65,7 @@ pub(super) struct Given {
     /// Power of the spindle in W.
     #[arg(long, value_name = "W", value_parser = positive)]
     pub(super) power_w: Option<f64>,
+    /// Torque of the spindle in N·m.
+    #[arg(long, value_name = "NM", value_parser = positive)]
+    pub(super) torque_nm: Option<f64>,
 }

@@ -41,6 +41,7 @@ impl Given {
             ),
             (self.rpm.is_some(), "--rpm", Section::Limits),
             (self.power_w.is_some(), "--power-w", Section::Limits),
+            (self.torque_nm.is_some(), "--torque-nm", Section::Limits),
         ];
         // The diameter of the tool is also needed for the immersion of a cut, where the case does not give it.
         let lacks_diameter = case.tool.as_ref().is_some_and(|tool| tool.diameter_mm.is_none());
@@ -70,7 +71,7 @@ impl Given {
             ktc_mpa: case.material.as_ref().map(|_| 1.0),
             slot: has_cut,
             feed_per_tooth_mm: case.cut.as_ref().map(|cut| cut.feed_per_tooth_mm),
-            rpm: case.limits.map(|_| "1:2".into()),
+            rpm: case.limits.as_ref().map(|_| "1:2".into()),
             ..Self::default()
         };
         self.or(known)

@@ -8,7 +8,7 @@ use quietcut_model::structure::FirstOrder;
 /// Lowest and highest spindle speed, rev/min: the speed limits of the spindle if the case has them, otherwise 1/2 to 5
 /// tooth passings per vibration period of the most flexible mode.
 pub fn default_speeds(case: &Case, structure: &FirstOrder, teeth: usize) -> (f64, f64) {
-    if let Some(limits) = case.limits {
+    if let Some(limits) = &case.limits {
         // A lowest speed below a hundredth of the highest speed is replaced by that hundredth, since no cut exists at
         // 0.
         return (limits.rpm_min.max(0.01 * limits.rpm_max), limits.rpm_max);

@@ -8,6 +8,7 @@ use super::encoding::Table;
 use super::entries::{self, Entry};
 use super::error::BuildError;
 use super::request::TableRequest;
+use super::spindle_limit::SpindleLimit;
 use super::{grid, layers};
 use crate::criteria::{LAYER_PROBES, TABLE_TOLERANCE};
 use crate::limits::chart::Refinement;
@@ -31,8 +32,8 @@ const GUARDED: usize = 3;
 pub struct BuiltTable {
     /// Bytes of the lobe table, header and CRC included.
     pub bytes: Vec<u8>,
-    /// Warnings about limits without derivatives, one for each layer with such limits; empty if derivatives were not
-    /// requested or all exist.
+    /// Warnings: about limits without derivatives, one for each layer with such limits, and about cases whose power or
+    /// torque of the spindle cannot be considered.
     pub warnings: Vec<String>,
 }
 
@@ -44,7 +45,8 @@ pub struct BuiltTable {
 /// between speeds is checked against the method at two more speeds or more, and at further ones if these disagree with
 /// the table, in every layer and half way between layers. If the table is too deep there, on flanks too steep for its
 /// speeds, the surrounding entries become as shallow as the gap; see [`InterpolationError`] for the stated error.
-/// Depths with two stable orbits, which only nonlinear cases have, count as unstable.
+/// Depths with two stable orbits, which only nonlinear cases have, count as unstable; depths beyond the power or torque
+/// of the spindle, and speeds outside its ranges, as undecided.
 ///
 /// # Errors
 /// No case, different numbers of teeth, a request that does not fit a case, two layers for the same cut, or a case
@@ -126,6 +128,7 @@ pub fn build_table(cases: &[Case], request: &TableRequest) -> Result<BuiltTable,
         warnings: derivatives
             .iter()
             .filter_map(|layer| layer.warning.clone())
+            .chain(cases.iter().filter_map(|case| SpindleLimit::of_case(case).1))
             .collect(),
     })
 }

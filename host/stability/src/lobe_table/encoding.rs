@@ -70,7 +70,7 @@ impl Table<'_> {
                 .table_layers
                 .first()
                 .map_or(0, |table_layer| table_layer.teeth as u8),
-            limits: self.first.limits.map(|limits| Limits {
+            limits: self.first.limits.as_ref().map(|limits| Limits {
                 rpm_min: Rpm(limits.rpm_min as f32),
                 rpm_max: Rpm(limits.rpm_max as f32),
             }),

@@ -1,6 +1,7 @@
 //! Spindle speeds and largest depth of a lobe table.
 
 use super::layers::TableLayer;
+use super::spindle_limit::SpindleLimit;
 use crate::error::StabilityError;
 use crate::limits::chart::{Refinement, chart};
 use crate::limits::speed_line::SpeedLine;
@@ -52,6 +53,11 @@ pub(super) fn lines_of_all(
         );
     }
     let mut speeds: Vec<f64> = known.iter().flatten().map(|line| line.rpm).collect();
+    if let (Some(&first), Some(&last)) = (coarse.first(), coarse.last()) {
+        let ends = table_layers.iter().filter_map(|layer| layer.spindle.as_ref());
+        let ends = ends.flat_map(SpindleLimit::speeds_rpm);
+        speeds.extend(ends.filter(|rpm| (first..=last).contains(rpm)));
+    }
     speeds.sort_by(f64::total_cmp);
     // The table stores speeds in single precision: speeds that become equal are merged.
     speeds.dedup_by_key(|rpm| *rpm as f32);

@@ -8,6 +8,7 @@ use rayon::prelude::*;
 
 use super::error::BuildError;
 use super::request::TableRequest;
+use super::spindle_limit::SpindleLimit;
 use crate::criteria::LAYERS_MAX;
 use crate::error::StabilityError;
 use crate::limits::chart::chart;
@@ -38,6 +39,8 @@ pub(super) struct TableLayer {
     /// Feed direction of the layer, degrees; `None` if the table does not state it.
     pub(super) direction_deg: Option<f64>,
     pub(super) teeth: usize,
+    /// Limits of the spindle beyond its lowest and highest speed.
+    pub(super) spindle: Option<SpindleLimit>,
     case: Case,
     percentile: Option<f64>,
 }
@@ -70,6 +73,7 @@ impl TableLayer {
             direction_deg,
             teeth: linear.teeth,
             linear,
+            spindle: SpindleLimit::of_case(&case).0,
             case,
             percentile,
         })
@@ -134,6 +138,15 @@ impl TableLayer {
         lines.extend(known.into_iter().filter(|line| own.contains(&line.rpm)));
         let place = |line: &SpeedLine| speeds_rpm.iter().position(|rpm| *rpm == line.rpm);
         lines.sort_by_key(place);
+        let lines = self.at_percentile(lines, depth_mm)?;
+        match &self.spindle {
+            Some(spindle) => lines.into_iter().map(|line| spindle.limited(line)).collect(),
+            None => Ok(lines),
+        }
+    }
+
+    /// Lines with the percentile of the layer in place of the nominal limits; unchanged without a percentile.
+    fn at_percentile(&self, lines: Vec<SpeedLine>, depth_mm: f64) -> Result<Vec<SpeedLine>, StabilityError> {
         let Some(percent) = self.percentile else {
             return Ok(lines);
         };

@@ -9,6 +9,7 @@ mod error;
 mod grid;
 mod layers;
 mod request;
+mod spindle_limit;
 
 pub use build::{BuiltTable, build_table};
 pub use error::BuildError;

@@ -1,11 +1,11 @@
-//! Reads the job from the case file: material, cut, limits of the machine and posture of the robot.
+//! Reads the job from the case file: material, cut and posture of the robot.
 
 use toml::Spanned;
 
 use super::Check;
-use crate::case::file::{CutFile, LimitsFile, MaterialFile, Number, PostureFile};
-use crate::case::{CaseError, MachineLimits, Parameter, Posture};
-use crate::criteria::{COEFFICIENT_MAX_MPA, FEED_PER_TOOTH_MAX_MM, SPEED_MAX_RPM};
+use crate::case::file::{CutFile, MaterialFile, Number, PostureFile};
+use crate::case::{CaseError, Parameter, Posture};
+use crate::criteria::{COEFFICIENT_MAX_MPA, FEED_PER_TOOTH_MAX_MM};
 use crate::milling::{Cut, Material};
 
 impl Check<'_> {
@@ -81,25 +81,6 @@ impl Check<'_> {
             exit_deg,
             feed_per_tooth_mm,
             feed_direction_deg,
-        })
-    }
-
-    pub(super) fn limits(&self, file: &LimitsFile) -> Result<MachineLimits, CaseError> {
-        let rpm_min = self.number(&file.rpm_min, "limits.rpm_min", |x| x >= 0.0, "0 or more")?;
-        let rpm_max = self.number(
-            &file.rpm_max,
-            "limits.rpm_max",
-            |x| x > rpm_min && x <= SPEED_MAX_RPM,
-            &format!("a speed above limits.rpm_min ({rpm_min}) and up to {SPEED_MAX_RPM} rev/min"),
-        )?;
-        let power_w = match &file.power_w {
-            Some(power) => Some(self.positive(power, "limits.power_w")?),
-            None => None,
-        };
-        Ok(MachineLimits {
-            rpm_min,
-            rpm_max,
-            power_w,
         })
     }
 

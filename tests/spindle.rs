@@ -1,0 +1,221 @@
+//! Speed ranges, power and torque of the spindle: the cutting torque of a simulated cut, and no proposal beyond them
+#![allow(clippy::expect_used)]
+
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
+use std::path::Path;
+
+use quietcut_tests::command::{cases, folder, quietcut};
+use serde_json::Value;
+
+/// A case of the folder `tests/cases` with a diameter of the tool, other lines and further ones at its end.
+fn write(folder: &Path, name: &str, replace: &[(&str, &str)], end: &str) {
+    let mut text = std::fs::read_to_string(cases().join(name)).expect("a case");
+    if !text.contains("diameter_mm") {
+        text = text.replace(
+            "edge_angle_deg = 90.0",
+            "edge_angle_deg = 90.0\ndiameter_mm = 12.0",
+        );
+    }
+    for (old, new) in replace {
+        assert!(text.contains(old), "{name} has no {old}");
+        text = text.replace(old, new);
+    }
+    std::fs::write(folder.join("case.toml"), format!("{text}\n{end}")).expect("written");
+}
+
+/// Speeds of the robot's spindle with two gears, rev/min.
+const LIMITS: &str =
+    "[limits]\nrpm_min = 700.0\nrpm_max = 2000.0\nranges_rpm = [[700.0, 1150.0], [1250.0, 2000.0]]\n";
+
+/// Depth, mm, that 7 W drive at a speed, rev/min, in the cut of `kuka-kr90-acetal`: 2 teeth, 6.35 mm radius, down-milling
+/// at half immersion, 119 MPa and 0.15 mm per tooth need 0.0361 N·m/mm. It is 1.85 mm at 1 000 rev/min.
+fn driven_mm(rpm: f64) -> f64 {
+    let torque_nm_per_mm = 2.0 * 6.35e-3 / TAU * 119.0 * 0.15;
+    7.0 / (torque_nm_per_mm * TAU * rpm / 60.0)
+}
+
+/// True for a cut within [`LIMITS`] and 7 W.
+fn is_possible(rpm: f64, depth_mm: f64) -> bool {
+    let allowed = (700.0..=1150.0).contains(&rpm) || (1250.0..=2000.0).contains(&rpm);
+    // Depths in a table are rounded to 16 bits.
+    allowed && depth_mm <= driven_mm(rpm) * (1.0 + 1e-4)
+}
+
+fn json(folder: &Path, line: &str) -> Value {
+    let arguments: Vec<&str> = line.split_whitespace().collect();
+    quietcut(folder, &arguments).json()
+}
+
+#[test]
+fn the_torque_of_a_simulated_cut_is_that_of_the_limit() {
+    let folder = folder();
+    // 1 N·m of torque: the depth that the spindle can drive is the reciprocal of the torque per mm.
+    write(
+        folder.path(),
+        "insperger-2dof-ad0.5.toml",
+        &[("kte_n_per_mm = 0.0", "kte_n_per_mm = 15.0")],
+        "[limits]\nrpm_min = 5000.0\nrpm_max = 20000.0\ntorque_nm = 1.0\n",
+    );
+    let answer = json(
+        folder.path(),
+        "lobes case.toml --rpm 9000:10000:2 --depth-mm 0:1:40 --no-refine --json",
+    );
+    let driven = &answer["spindle"]["driven"][1];
+    assert_eq!(driven["by"], "torque", "{answer}");
+    let torque_nm_per_mm = 1.0 / driven["depth_mm"].as_f64().expect("a depth");
+    // The forces of a simulated cut 0.1 mm deep, with the vibration of the tool. One of the two teeth cuts at a time,
+    // from 90° to 180°, so that the tangential force follows from the force in feed and normal direction.
+    quietcut(
+        folder.path(),
+        &"simulate case.toml --rpm 10000 --depth-mm 0.1 --seconds 1 --sample-rate-hz 50000 --ideal --measure none --out cut.csv"
+            .split_whitespace()
+            .collect::<Vec<_>>(),
+    );
+    let text = std::fs::read_to_string(folder.path().join("cut.csv")).expect("a recording");
+    // Within full engagement, over 30 whole revolutions.
+    let (mut sum, mut count) = (0.0, 0.0);
+    for line in text.lines().skip(1) {
+        let row: Vec<f64> = line
+            .split(',')
+            .map(|cell| cell.parse().expect("a number"))
+            .collect();
+        if (0.4..0.58).contains(&row[0]) {
+            let phi = (TAU * 10_000.0 / 60.0 * row[0]) % PI;
+            if phi > FRAC_PI_2 {
+                sum += row[2] * phi.sin() - row[1] * phi.cos();
+            }
+            count += 1.0;
+        }
+    }
+    let simulated = 0.006 * sum / count / 0.1;
+    // Ends of the engagement fall between samples: one of 150 samples of a tooth's quarter revolution at each end, where
+    // the force is at most a few times its mean, but drawn evenly; and the transient of the entry at 0.23 s.
+    assert!(
+        (simulated / torque_nm_per_mm - 1.0).abs() < 0.01,
+        "{simulated} {torque_nm_per_mm}"
+    );
+}
+
+#[test]
+fn no_cut_beyond_the_spindle_is_proposed() {
+    let folder = folder();
+    write(
+        folder.path(),
+        "kuka-kr90-acetal.toml",
+        &[],
+        &format!("{LIMITS}power_w = 7.0\n"),
+    );
+    let lobes = json(
+        folder.path(),
+        "lobes case.toml --rpm 700:2000:14 --depth-mm 0:6:60 --json --out lobes.svg --out lobes.html",
+    );
+    let proposal = &lobes["spindle"]["proposal"];
+    let number = |value: &Value, key: &str| value[key].as_f64().expect("a number");
+    assert!(
+        is_possible(number(proposal, "rpm"), number(proposal, "depth_mm")),
+        "{proposal}"
+    );
+    assert_eq!(
+        lobes["spindle"]["allowed_rpm"],
+        serde_json::json!([[700.0, 1150.0], [1250.0, 2000.0]])
+    );
+    for driven in lobes["spindle"]["driven"].as_array().expect("depths") {
+        assert_eq!(driven["by"], "power");
+        let expected = driven_mm(number(driven, "rpm"));
+        assert!(
+            (number(driven, "depth_mm") / expected - 1.0).abs() < 1e-9,
+            "{driven}"
+        );
+    }
+    for file in ["lobes.svg", "lobes.html"] {
+        let chart = std::fs::read_to_string(folder.path().join(file)).expect("a chart");
+        assert!(
+            chart.contains("beyond the spindle") && chart.contains("power or torque"),
+            "{file}"
+        );
+    }
+    let points = json(
+        folder.path(),
+        "lobes case.toml --at 1200,1 --at 1380,2 --at 1380,1 --json",
+    );
+    let beyond: Vec<_> = points["beyond_spindle"]
+        .as_array()
+        .expect("points")
+        .iter()
+        .map(|one| &one["by"])
+        .collect();
+    assert_eq!(beyond, ["speed", "power"]);
+    // plan.
+    let plan = json(
+        folder.path(),
+        "plan case.toml --rpm 700:2000:14 --depth-mm 0:6:60 --width-percent 15 --json",
+    );
+    let mut cuts = 0;
+    for test in plan["tests"].as_array().expect("tests") {
+        let depth = ["about_mm", "depth_mm"]
+            .iter()
+            .find_map(|key| test[*key].as_f64());
+        if let (Some(rpm), Some(depth_mm)) = (test["rpm"].as_f64(), depth) {
+            cuts += 1;
+            assert!(is_possible(rpm, depth_mm), "{test}");
+        }
+    }
+    assert!(cuts > 0, "{plan}");
+}
+
+#[test]
+fn the_device_advises_no_cut_beyond_the_spindle() {
+    let folder = folder();
+    write(
+        folder.path(),
+        "kuka-kr90-acetal.toml",
+        &[],
+        &format!("{LIMITS}power_w = 7.0\n"),
+    );
+    let run = |line: &str| {
+        let arguments: Vec<&str> = line.split_whitespace().collect();
+        quietcut(folder.path(), &arguments)
+    };
+    run("simulate case.toml --rpm 1045 --depth-mm 2 --seconds 6 --out cut.csv");
+    run("table case.toml --depth-mm 5 --speeds 60 --out limited.qct");
+    write(folder.path(), "kuka-kr90-acetal.toml", &[], "");
+    run("table case.toml --rpm 700:2000 --depth-mm 5 --speeds 60 --out free.qct");
+    let advised = |table: &str| -> Vec<(f64, f64)> {
+        let answer = json(folder.path(), &format!("replay cut.csv --table {table} --json"));
+        let verdicts = answer["verdicts"].as_array().expect("verdicts").clone();
+        let advice = verdicts.iter().map(|verdict| &verdict["advice"]);
+        advice
+            .filter(|advice| advice["action"] != "keep")
+            .filter_map(|advice| Some((advice["rpm"].as_f64()?, advice["depth_mm"].as_f64()?)))
+            .collect()
+    };
+    // Without limits 2 mm at 1 024 rev/min are advised.
+    let (free, limited) = (advised("free.qct"), advised("limited.qct"));
+    assert!(
+        free.iter().any(|(rpm, depth)| !is_possible(*rpm, *depth)),
+        "{free:?}"
+    );
+    assert!(
+        !limited.is_empty() && limited.iter().all(|(rpm, depth)| is_possible(*rpm, *depth)),
+        "{limited:?}"
+    );
+}
+
+#[test]
+fn power_of_a_tool_without_diameter_is_not_considered_and_the_key_is_named() {
+    let folder = folder();
+    write(
+        folder.path(),
+        "insperger-1dof-ad1.toml",
+        &[("diameter_mm = 12.0\n", "")],
+        "[limits]\nrpm_min = 5000.0\nrpm_max = 20000.0\npower_w = 100.0\n",
+    );
+    for line in [
+        "lobes case.toml --rpm 9000:10000:2 --depth-mm 0:1:40",
+        "table case.toml --speeds 20 --out a.qct",
+    ] {
+        let arguments: Vec<&str> = line.split_whitespace().collect();
+        let output = quietcut(folder.path(), &arguments);
+        assert!(output.stderr.contains("diameter_mm"), "{line}: {}", output.stderr);
+    }
+}
