@@ -57,7 +57,8 @@ struct PeriodLines {
     responses: Vec<Vec<Vec<Complex64>>>,
 }
 
-/// Averages a record over periods of `period` samples, at the `lines` of the transform of one period. Left out are
+/// Averages a record over periods of `period` samples, at the `lines` of the transform of one period as far
+/// as half the sample rate. Left out are
 /// periods in which the force changes, periods that hold a sample for which `is_clipped` is true, and of the remaining
 /// ones those before the responses settle. `None` if fewer than two remain before the last step.
 ///
@@ -81,6 +82,8 @@ pub(super) fn period_average(
     if starts.len() < 2 {
         return None;
     }
+    let end = lines.end.min(period / 2 + 1);
+    let lines = lines.start.min(end)..end;
     let mut transform = Transform::new(period);
     let weights = vec![1.0; period];
     let mut spectra = |signal: &[f64]| -> Vec<Vec<Complex64>> {

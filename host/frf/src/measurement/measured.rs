@@ -9,12 +9,12 @@ use crate::table::FrfTable;
 #[derive(Clone, Debug)]
 pub struct Measurement {
     /// Measured receptances with the coherence of each response, or without it for fewer than three single impacts of a
-    /// hammer. With several forces it is the multiple coherence.
+    /// hammer and for one period of periodic excitation. With several forces it is the multiple coherence.
     pub table: FrfTable,
     /// Standard deviation of |H|, by entry of the table, then by frequency, m/N.
     pub deviation: Vec<Vec<f64>>,
     /// One value per entry of the table. False if its standard deviation is meaningless, since it comes from fewer than
-    /// three single impacts of a hammer.
+    /// three single impacts of a hammer, or from one period of periodic excitation.
     pub has_deviation: Vec<bool>,
     /// One value per entry of the table: degrees of freedom of its standard deviations from periodic excitation; `None`
     /// for other excitation, with normal quantiles.

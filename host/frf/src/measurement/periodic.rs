@@ -105,7 +105,13 @@ pub(super) fn periodic(
                 "the force changes from period to period; fewer than two periods of {found} samples repeat"
             ))
         })?;
-        if !average.is_settled {
+        if average.used < 2 {
+            warnings.push(format!(
+                "{}: only two periods repeat, of which the first may hold the transient: one period has no scatter, and it is unknown whether the \
+                 response had settled; record more periods",
+                channels.recording.path.display()
+            ));
+        } else if !average.is_settled {
             warnings.push(format!(
                 "{}: the response had not settled: it changes between the last periods by more than the noise, which is in the interval; record \
                  more periods",
@@ -190,6 +196,11 @@ fn common_lines(averages: &[PeriodAverage]) -> Result<Vec<usize>, String> {
     let count = |average: &PeriodAverage| average.is_excited.iter().filter(|is| **is).count();
     let most = averages.iter().map(count).max().unwrap_or(0);
     let lines = averages.first().map_or(0, |average| average.is_excited.len());
+    if most == 0 {
+        return Err(
+            "in the band no line of the force stands above its noise; check the band and the period".into(),
+        );
+    }
     let common: Vec<usize> = (0..lines)
         .filter(|&line| averages.iter().all(|average| average.is_excited[line]))
         .collect();

@@ -80,6 +80,60 @@ fn a_multisine_is_recognized_and_gives_receptances_without_its_transient() {
 }
 
 #[test]
+fn a_band_above_half_the_sample_rate_ends_there() {
+    let mut random = random(68);
+    let force = multisine(&tones(40..121, &mut random), 2.0, 6.0);
+    let recording = record(TestKind::Shaker, along_y(force), 1e-4, &mut random);
+    let settings = MeasurementSettings {
+        band_hz: Some((5.0, RATE)),
+        ..MeasurementSettings::default()
+    };
+    let measurement = measure(std::slice::from_ref(&recording), &settings).unwrap();
+    assert_eq!(measurement.groups[0].excitation, Excitation::Multisine);
+    assert_eq!(measurement.table.frequency_hz().len(), 81);
+    let said = |warning: &String| warning.contains("the band ends at 256 Hz");
+    assert!(
+        measurement.warnings.iter().any(said),
+        "{:?}",
+        measurement.warnings
+    );
+    // A band between two lines of the transform.
+    let settings = MeasurementSettings {
+        band_hz: Some((31.1, 31.2)),
+        excitation: Some(Excitation::Multisine),
+        ..settings
+    };
+    let refused = measure(std::slice::from_ref(&recording), &settings).unwrap_err();
+    assert!(refused.to_string().contains("no line of the force"), "{refused}");
+}
+
+/// Of two periods that repeat, the first may hold the transient; one period has no scatter.
+#[test]
+fn one_period_gives_no_interval() {
+    let mut random = random(69);
+    let first = tones(40..121, &mut random);
+    let mut force = multisine(&first, 2.0, 4.0);
+    for sample in &mut force[..2 * PERIOD] {
+        *sample *= 0.5;
+    }
+    let recording = record(TestKind::Shaker, along_y(force), 1e-4, &mut random);
+    let settings = MeasurementSettings {
+        period_s: Some(PERIOD as f64 / RATE),
+        ..MeasurementSettings::default()
+    };
+    let mut measurement = measure(std::slice::from_ref(&recording), &settings).unwrap();
+    println!("{:?}", measurement.groups[0].periodic);
+    assert_eq!(measurement.groups[0].periodic.as_ref().unwrap().used, [1]);
+    assert!(!measurement.has_deviation.contains(&true));
+    let entries = measurement.table.entries();
+    assert!(entries.iter().all(|entry| entry.coherence.is_none()));
+    measurement
+        .warnings
+        .retain(|warning| warning.contains("one period has no scatter"));
+    assert_eq!(measurement.warnings.len(), 1);
+}
+
+#[test]
 fn a_periodic_chirp_is_periodic_too() {
     let mut random = random(61);
     let chirp = |k: usize| {

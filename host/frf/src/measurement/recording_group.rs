@@ -42,11 +42,14 @@ pub struct RecordingGroup {
 
 impl RecordingGroup {
     /// True if coherence and standard deviation of the group are meaningful: for any excitation but a hammer, and for a
-    /// hammer test with three or more used impacts.
+    /// hammer test with three or more used impacts. False too if [`Self::freedoms`] are 0: one recording of periodic
+    /// excitation, of which one period is used.
     pub fn has_scatter(&self) -> bool {
-        self.impacts
+        let has_impacts = self
+            .impacts
             .as_ref()
-            .is_none_or(|(used, _)| used.len() >= IMPACTS_MIN)
+            .is_none_or(|(used, _)| used.len() >= IMPACTS_MIN);
+        has_impacts && self.freedoms != Some(0)
     }
 }
 

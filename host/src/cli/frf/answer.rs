@@ -59,7 +59,7 @@ struct ReceptanceAnswer {
 struct PeakEstimate {
     value: f64,
     /// 90 % interval of the peak magnitude of a receptance; `null` for a hammer test with fewer than three single
-    /// impacts, whose scatter gives no standard deviation.
+    /// impacts, whose scatter gives no standard deviation, and for one period of periodic excitation.
     ci90: Option<[f64; 2]>,
 }
 
@@ -136,7 +136,7 @@ impl FrfOutput {
                     significant(1e6 * from, 5),
                     significant(1e6 * to, 5)
                 ),
-                None => write!(text, ", no interval from so few impacts"),
+                None => write!(text, ", no interval from so few impacts or periods"),
             };
             if let Some(coherence) = &receptance.coherence {
                 let _ = write!(

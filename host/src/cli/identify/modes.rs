@@ -63,7 +63,7 @@ pub(super) fn modes(args: &Args, understood: &mut Vec<Understood>) -> Result<Ide
 
 /// Receptances from which the modes are identified, with their standard deviations by entry of the table and frequency
 /// line. The standard deviations are `None` for a table from a file, and if a hammer test has fewer than three single
-/// impacts.
+/// impacts or a test with periodic excitation one period.
 struct Source {
     table: FrfTable,
     deviation: Option<Vec<Vec<f64>>>,
