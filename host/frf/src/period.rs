@@ -27,7 +27,16 @@ pub(super) enum NoPeriod {
         /// Share of the energy of the force that does not repeat at that lag; 1 without it.
         unrepeated: f64,
     },
-    /// The force repeats after another time than the stated period, or not after a whole number of samples.
+    /// The force does not repeat after the period that was stated, but after another one.
+    Differs {
+        /// Stated period, samples.
+        samples: usize,
+        /// Share of the energy of the force that does not repeat after the stated period.
+        unrepeated: f64,
+        /// Lag at which the force repeats, samples.
+        found: usize,
+    },
+    /// The force repeats, but not after a whole number of samples.
     NotWhole {
         /// Estimated period of the force, samples.
         samples: f64,
@@ -55,6 +64,17 @@ impl NoPeriod {
                     "the force has no period of which the record holds {PERIODS_RECORDED_MIN}{best}: record more periods, or say --excitation random"
                 )
             }
+            Self::Differs {
+                samples,
+                unrepeated,
+                found,
+            } => format!(
+                "after the stated period of {samples} samples ({:.4} s) {:.0} % of the energy of the force does not repeat, but it repeats after \
+                 {found} samples: say --period-s {}, or omit the option",
+                samples as f64 / rate,
+                100.0 * unrepeated,
+                found as f64 / rate
+            ),
             Self::NotWhole { samples } => format!(
                 "the force repeats after {samples:.3} samples, which is no whole number: its lines leak into each other; let generator and \
                  recorder share one clock, and choose a period of whole samples, or say --excitation random"
@@ -78,29 +98,46 @@ pub(super) fn period(force: &[f64], stated: Option<usize>) -> Result<usize, NoPe
             if periods < PERIODS_RECORDED_MIN {
                 return Err(NoPeriod::TooShort { samples, periods });
             }
+            check_stated(force, samples)?;
             samples.max(1)
         }
         None => repetition(force)?,
     };
     let mut samples = samples;
+    let mut shift = period_shift(force, samples);
     // A noisy autocorrelation of a smooth force may have its largest value some samples beside the period.
     for _ in 0..3 {
-        let shift = period_shift(force, samples);
         let whole = shift.samples.round();
         if whole == 0.0 || stated.is_some() {
-            return if shift.is_whole() {
-                Ok(samples)
-            } else {
-                Err(NoPeriod::NotWhole {
-                    samples: samples as f64 + shift.samples,
-                })
-            };
+            break;
         }
         samples = ((samples as f64 + whole).max(2.0) as usize).min(force.len() / PERIODS_RECORDED_MIN);
+        shift = period_shift(force, samples);
     }
-    Err(NoPeriod::NotWhole {
-        samples: samples as f64 + period_shift(force, samples).samples,
-    })
+    if shift.is_whole() {
+        Ok(samples)
+    } else {
+        Err(NoPeriod::NotWhole {
+            samples: samples as f64 + shift.samples,
+        })
+    }
+}
+
+/// Refuses the stated period if the force does not repeat after it, but after another lag.
+fn check_stated(force: &[f64], samples: usize) -> Result<(), NoPeriod> {
+    let correlation = normalized_autocorrelation(force, force.len() / PERIODS_RECORDED_MIN);
+    let unrepeated = |lag: usize| 1.0 - correlation.get(lag).copied().unwrap_or(0.0);
+    if unrepeated(samples) <= 1.0 - SHARE_OF_LINES {
+        return Ok(());
+    }
+    match repetition(force) {
+        Ok(found) if unrepeated(samples) > AS_WELL * unrepeated(found) + ROUNDING => Err(NoPeriod::Differs {
+            samples,
+            unrepeated: unrepeated(samples),
+            found,
+        }),
+        _ => Ok(()),
+    }
 }
 
 /// Lag at which `force` repeats, samples: the first local maximum of the normalized autocorrelation of at least 1.5 r −
@@ -124,7 +161,7 @@ fn repetition(force: &[f64]) -> Result<usize, NoPeriod> {
             unrepeated,
         });
     }
-    let enough = 1.0 - (1.5 * unrepeated + ROUNDING);
+    let enough = 1.0 - (AS_WELL * unrepeated + ROUNDING);
     let mut lag = (zero..best)
         .find(|&lag| correlation[lag] >= enough)
         .unwrap_or(best);
@@ -133,6 +170,10 @@ fn repetition(force: &[f64]) -> Result<usize, NoPeriod> {
     }
     Ok(lag)
 }
+
+/// Largest ratio of the energies that do not repeat at two lags at which a force repeats equally well. A choice: half of the distance of the
+/// largest correlation from 1 is left to its scatter.
+const AS_WELL: f64 = 1.5;
 
 /// Share of the energy of a force that rounding in a file of five digits keeps from repeating, with some reserve.
 const ROUNDING: f64 = 1e-8;
@@ -306,6 +347,16 @@ mod tests {
         // The advance of a thousandth of a radian is far below the noise; half a hundredth of a sample is what it
         // allows.
         assert!((samples - 1000.3).abs() < 5e-3, "{samples}");
+        // A stated period that is no period of the force, and one that is twice the smallest.
+        let force = multisine(21..91, 1, 1000.0, 8300, 0.1);
+        for wrong in [900, 998, 1500] {
+            let found = period(&force, Some(wrong));
+            let Err(NoPeriod::Differs { samples, found, .. }) = found else {
+                panic!("{wrong}: {found:?}");
+            };
+            assert_eq!((samples, found), (wrong, 1000));
+        }
+        assert_eq!(period(&force, Some(2000)), Ok(2000));
         let mut random = ChaCha8Rng::seed_from_u64(8);
         let noise: Vec<f64> = (0..8192).map(|_| random.random_range(-1.0..1.0)).collect();
         assert!(matches!(

@@ -58,9 +58,8 @@ struct PeriodLines {
 }
 
 /// Averages a record over periods of `period` samples, at the `lines` of the transform of one period as far
-/// as half the sample rate. Left out are
-/// periods in which the force changes, periods that hold a sample for which `is_clipped` is true, and of the remaining
-/// ones those before the responses settle. `None` if fewer than two remain before the last step.
+/// as half the sample rate. Left out are periods in which the force changes, periods that hold a sample for which
+/// `is_clipped` is true, and of the remaining ones those before the responses settle. `None` if fewer than two remain before the last step.
 ///
 /// The last period ends with the record, since the transient is at the start of the record.
 pub(super) fn period_average(
