@@ -117,13 +117,47 @@ pub(super) fn meaning(
         matches!(&map.scale, Some(Scale::Unit(unit)) if (unit.factor - std::f64::consts::PI / 180.0).abs() < 1e-6)
     });
     match stated {
+        Some(name) if name == "frequency_hz" => stated_frequency(column, unit),
         Some(name) => by_name(&name, unit.as_deref(), in_degrees),
         None => by_words(&column.name, unit.as_deref()),
     }
 }
 
-/// Meaning of a column from the name that option or sidecar state for it, such as `hxx_re`, `hxy_phase`, `coherence_xx`
-/// or `frequency_hz`.
+/// Meaning of a column for which option or sidecar state the name `frequency_hz`: frequencies in its unit, which is that
+/// of its title if none is stated, or else Hz.
+///
+/// # Errors
+/// The unit is none of a frequency.
+fn stated_frequency(column: &TextColumn, unit: Option<String>) -> Result<Meaning, String> {
+    let unit = unit
+        .or_else(|| name_and_ratio(&column.name).1)
+        .unwrap_or_default();
+    let factor = match unit.trim() {
+        "" => 1.0,
+        unit => hertz(unit)
+            .ok_or_else(|| format!("frequency_hz in \"{unit}\"; frequencies are in Hz, kHz or rad/s"))?,
+    };
+    Ok(Meaning {
+        content: Content::Frequency(factor),
+        directions: None,
+        unit: None,
+        label: "frequency_hz".into(),
+        word_derivatives: 0,
+    })
+}
+
+/// Factor that converts a frequency in this unit to Hz; `None` if it is no unit of a frequency.
+fn hertz(unit: &str) -> Option<f64> {
+    match unit.to_lowercase().as_str() {
+        "hz" | "hertz" | "1/s" => Some(1.0),
+        "khz" => Some(1e3),
+        "rad/s" => Some(1.0 / std::f64::consts::TAU),
+        _ => None,
+    }
+}
+
+/// Meaning of a column from the name that option or sidecar state for it, such as `hxx_re`, `hxy_phase` or
+/// `coherence_xx`.
 fn by_name(name: &str, unit: Option<&str>, in_degrees: bool) -> Result<Meaning, String> {
     let of = |content, directions, unit| Meaning {
         content,
@@ -132,9 +166,6 @@ fn by_name(name: &str, unit: Option<&str>, in_degrees: bool) -> Result<Meaning, 
         label: name.to_owned(),
         word_derivatives: 0,
     };
-    if name == "frequency_hz" {
-        return Ok(of(Content::Frequency(1.0), None, None));
-    }
     if let Some(pair) = name.strip_prefix("coherence_").and_then(pair_of) {
         return Ok(of(Content::Coherence, Some(pair), None));
     }
@@ -209,12 +240,7 @@ fn by_words(name: &str, unit: Option<&str>) -> Result<Meaning, String> {
         label: String::new(),
         word_derivatives: 0,
     };
-    let hertz = match plain_unit.to_lowercase().as_str() {
-        "hz" | "hertz" | "1/s" => Some(1.0),
-        "khz" => Some(1e3),
-        "rad/s" => Some(1.0 / std::f64::consts::TAU),
-        _ => None,
-    };
+    let hertz = hertz(plain_unit);
     let is_frequency = words.iter().any(|word| FREQUENCY.contains(word)) || words == ["f"];
     if hertz.is_some() || is_frequency && plain_unit.is_empty() {
         found.content = Content::Frequency(hertz.unwrap_or(1.0));

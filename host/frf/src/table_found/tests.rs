@@ -128,3 +128,23 @@ fn the_unit_of_a_phase_is_taken_only_where_values_leave_no_choice() {
     assert_eq!(phase_unit(&[-0.3, 0.1]), None);
     assert_eq!(phase_unit(&[-7.0, 0.1]), None);
 }
+
+#[test]
+fn a_stated_frequency_column_keeps_its_unit() {
+    let map = ["w=frequency_hz", "2=hxx_re:m/N", "3=hxx_im:m/N"];
+    for (unit, factor) in [
+        (" [kHz]", 1e3),
+        (" [rad/s]", 1.0 / TAU),
+        (" [Hz]", 1.0),
+        ("", 1.0),
+    ] {
+        let table = import(&format!("w{unit},a,b\n10,1,2\n20,1,1\n"), &map).unwrap();
+        assert_eq!(
+            table.table.frequency_hz(),
+            [10.0 * factor, 20.0 * factor],
+            "{unit}"
+        );
+    }
+    let refused = import("w [mm],a,b\n10,1,2\n20,1,1\n", &map).unwrap_err();
+    assert!(refused.contains("frequency_hz in \"mm\""), "{refused}");
+}
