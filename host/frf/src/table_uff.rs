@@ -29,7 +29,9 @@ pub(super) fn read(path: &Path) -> Result<FrfTable, FrfError> {
     let sets = data_sets(path)?;
     let found: Vec<i64> = sets.iter().map(|set| set.header.function.code()).collect();
     let mut entries: Vec<Frf> = Vec::new();
-    let mut frequency_hz: Option<Vec<f64>> = None;
+    let mut above_zero: Option<Vec<f64>> = None;
+    // Mobility and accelerance cannot be integrated at 0 Hz: then the table has no line there.
+    let mut has_zero_hz = true;
     for set in sets
         .iter()
         .filter(|set| set.header.function == Function::FrequencyResponse)
@@ -41,23 +43,21 @@ pub(super) fn read(path: &Path) -> Result<FrfTable, FrfError> {
         };
         let frequencies = frequencies(set).map_err(wrong)?;
         let mut entry = receptance(set, &frequencies).map_err(wrong)?;
-        let keep = frequency_hz.get_or_insert_with(|| without_zero_hz(&entry, &frequencies));
-        // Mobility and accelerance cannot be integrated at 0 Hz: the table begins at the first frequency at which the
-        // first FRF gives a receptance.
-        let from = frequencies.len().saturating_sub(keep.len());
-        if frequencies.get(from..) != Some(keep.as_slice()) {
+        let begins_at_zero = frequencies.first() == Some(&0.0);
+        has_zero_hz &= begins_at_zero && entry.receptance.first().is_some_and(|value| value.is_finite());
+        let own = &frequencies[usize::from(begins_at_zero)..];
+        if above_zero.get_or_insert_with(|| own.to_vec()) != own {
             return Err(wrong(format!(
-                "h{} has {} frequencies, and the first FRF has others; all must have the same",
+                "h{} has {} frequencies, and the first FRF has others; above 0 Hz all must have the same",
                 entry.name(),
                 frequencies.len()
             )));
         }
-        entry.receptance.drain(..from);
         let coherence = sets.iter().find(|other| is_coherence_of(other, set));
         if let Some(Ordinate::Real(values)) = coherence.map(|other| &other.ordinate)
             && values.len() == frequencies.len()
         {
-            entry.coherence = Some(values[from..].to_vec());
+            entry.coherence = Some(values.clone());
         }
         entries.push(entry);
     }
@@ -69,16 +69,22 @@ pub(super) fn read(path: &Path) -> Result<FrfTable, FrfError> {
             ),
         });
     }
-    FrfTable::new(path, frequency_hz.unwrap_or_default(), entries)
+    let mut frequency_hz = above_zero.unwrap_or_default();
+    if has_zero_hz {
+        frequency_hz.insert(0, 0.0);
+    }
+    for entry in &mut entries {
+        keep_last(&mut entry.receptance, frequency_hz.len());
+        if let Some(coherence) = &mut entry.coherence {
+            keep_last(coherence, frequency_hz.len());
+        }
+    }
+    FrfTable::new(path, frequency_hz, entries)
 }
 
-/// Frequencies of an FRF; a first one of 0 Hz is left out if the receptance is not finite there (from mobility or
-/// accelerance).
-fn without_zero_hz(entry: &Frf, frequencies: &[f64]) -> Vec<f64> {
-    let begins_at_zero = frequencies.first() == Some(&0.0);
-    let from =
-        usize::from(begins_at_zero && entry.receptance.first().is_some_and(|value| !value.is_finite()));
-    frequencies.get(from..).unwrap_or_default().to_vec()
+/// Removes the first values, so that at most `count` are left.
+fn keep_last<T>(values: &mut Vec<T>, count: usize) {
+    values.drain(..values.len().saturating_sub(count));
 }
 
 fn frequencies(set: &DataSet) -> Result<Vec<f64>, String> {
@@ -336,6 +342,28 @@ mod tests {
              \x20       18    0    0    0 NONE                 Hz\n{ordinate}\n{denominator}\n         0\n\
              \x20 1.0 2.0 1.0 2.0\n 1.0 2.0\n    -1\n"
         )
+    }
+
+    #[test]
+    fn the_line_at_0_hz_is_left_out_whichever_function_has_none_there() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.uff");
+        let force = "        13    0    1    0 NONE                 N";
+        let receptance = function("         8    1    0    0 NONE                 m", force);
+        let accelerance = function("        12    1    0    0 NONE                 m/s^2", force)
+            .replace("1   2 NONE ", "1   1 NONE ");
+        let alone = receptance.clone();
+        for (text, lines) in [
+            (alone, 3),
+            (format!("{receptance}{accelerance}"), 2),
+            (format!("{accelerance}{receptance}"), 2),
+        ] {
+            std::fs::write(&path, text).unwrap();
+            let table = FrfTable::read(&path).unwrap();
+            assert_eq!(table.frequency_hz().len(), lines);
+            let yy = table.entries().iter().find(|entry| entry.name() == "yy").unwrap();
+            assert_eq!(*yy.receptance.last().unwrap(), -Complex64::new(1.0, 2.0));
+        }
     }
 
     #[test]
