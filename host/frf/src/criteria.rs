@@ -120,8 +120,8 @@ pub(crate) const SAME_LEVEL: f64 = 1.05;
 /// force amplitudes of the frequency steps of a level and the levels of averaged shaker recordings. Unfounded.
 pub(crate) const SAME_FORCE: f64 = 1.2;
 
-/// Length of a repeated frequency step above which it replaces the earlier step of about the same frequency, as a
-/// fraction of the length of the earlier step. Unfounded.
+/// Smallest length of a repeated frequency step with which it replaces an earlier step of about the same frequency, as a
+/// fraction of the length of the longest of these steps. Unfounded.
 pub(crate) const REPEATED_STEP: f64 = 0.9;
 
 // Noise plateau of a spectrum

@@ -156,17 +156,26 @@ fn median_force(steps: &[FrequencyStep]) -> f64 {
 /// The steps of a level, given in the order of time, by ascending frequency and without repeats: see
 /// [`ForceLevel::steps`].
 fn by_frequency(steps: Vec<FrequencyStep>) -> Vec<FrequencyStep> {
-    let mut kept: Vec<FrequencyStep> = Vec::with_capacity(steps.len());
+    // Each step that is kept so far, with the length of the longest step at its frequency, samples.
+    let mut kept: Vec<(FrequencyStep, usize)> = Vec::with_capacity(steps.len());
     for step in steps {
-        match kept.iter_mut().find(|earlier| is_same_frequency(earlier, &step)) {
-            Some(earlier) => {
-                if step.samples as f64 > REPEATED_STEP * earlier.samples as f64 {
+        match kept
+            .iter_mut()
+            .find(|(earlier, _)| is_same_frequency(earlier, &step))
+        {
+            Some((earlier, longest)) => {
+                *longest = step.samples.max(*longest);
+                if step.samples as f64 > REPEATED_STEP * *longest as f64 {
                     *earlier = step;
                 }
             }
-            None => kept.push(step),
+            None => {
+                let longest = step.samples;
+                kept.push((step, longest));
+            }
         }
     }
+    let mut kept: Vec<FrequencyStep> = kept.into_iter().map(|(step, _)| step).collect();
     kept.sort_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz));
     kept
 }
@@ -468,8 +477,13 @@ mod tests {
             step(20.0, 1000, 4.0),
             // A repeat that is cut short does not replace the earlier step.
             step(30.001, 300, 5.0),
+            // Of repeats that each are a little shorter, the latest that is about as long as the longest is kept.
+            step(50.0, 1000, 6.0),
+            step(50.0, 920, 7.0),
+            step(50.0, 850, 8.0),
+            step(50.0, 780, 9.0),
         ]);
         let kept: Vec<f64> = kept.iter().map(|step| step.force_n).collect();
-        assert_eq!(kept, [4.0, 3.0, 1.0]);
+        assert_eq!(kept, [4.0, 3.0, 1.0, 7.0]);
     }
 }
