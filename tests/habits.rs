@@ -34,11 +34,11 @@ fn every_verb_answers_with_json() {
 
 #[test]
 fn every_output_file_may_be_repeated() {
-    // A folder is written once; a case is written by identify, and one serves.
+    // A folder is written once.
     for verb in verbs() {
         let outs = options(&verb);
         for option in outs.iter().filter(|option| option.starts_with("--out <")) {
-            let is_once = option.starts_with("--out <DIR>") || verb == "identify";
+            let is_once = option.starts_with("--out <DIR>");
             assert!(is_once || option.contains("May be repeated"), "{verb}: {option}");
         }
     }

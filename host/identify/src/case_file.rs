@@ -152,9 +152,19 @@ pub fn text_of_modes(name: &str, model: &ModalModel) -> Result<String, CaseFileE
     if model.gain_error.is_none() {
         assumed.push(EXACT_GAINS.into());
     }
-    if !assumed.is_empty() {
-        let sentences = assumed.into_iter().map(Value::from).collect();
-        let provenance = Table::from_iter([("assumed".to_owned(), Value::Array(sentences))]);
+    let not_measured = model.not_measured().into_iter();
+    let zero: Vec<String> = not_measured
+        .filter(|(p, q)| directions.contains(p) && directions.contains(q))
+        .map(|(p, q)| format!("h{p}{q}"))
+        .collect();
+    let mut provenance = Table::new();
+    for (key, texts) in [("assumed", assumed), ("zero_receptances", zero)] {
+        if !texts.is_empty() {
+            let texts = texts.into_iter().map(Value::from).collect();
+            provenance.insert(key.to_owned(), Value::Array(texts));
+        }
+    }
+    if !provenance.is_empty() {
         case.insert("provenance".into(), Value::Table(provenance));
     }
     written(&case)

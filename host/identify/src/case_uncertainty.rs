@@ -16,7 +16,8 @@ const PARAMETERS: &str = "parameters";
 const COVARIANCE: &str = "covariance";
 
 /// The section for the modes of a model: frequency, damping ratio, and the entries of both shapes in the given
-/// directions, mode by mode.
+/// directions, mode by mode. Parameters without variance, such as
+/// the shape of a mode in a direction that is taken as uncoupled, are left out.
 pub(crate) fn of_modes(model: &ModalModel, directions: &[Direction]) -> Table {
     let place = |all: &[Direction], direction: &Direction| all.iter().position(|known| known == direction);
     let (lefts, rights) = (2 * model.forces.len(), 2 * model.responses.len());
@@ -46,6 +47,14 @@ pub(crate) fn of_modes(model: &ModalModel, directions: &[Direction]) -> Table {
             }
         }
     }
+    let is_uncertain: Vec<bool> = places
+        .iter()
+        .map(|&at| model.covariance[(at, at)] != 0.0)
+        .collect();
+    let mut kept = is_uncertain.iter();
+    parameters.retain(|_| kept.next() == Some(&true));
+    let mut kept = is_uncertain.iter();
+    places.retain(|_| kept.next() == Some(&true));
     let covariance = DMatrix::from_fn(places.len(), places.len(), |i, j| {
         let (a, b) = (places[i], places[j]);
         // Rounding leaves the two triangles of the covariance slightly different.

@@ -88,6 +88,15 @@ pub(crate) const LEAST_HEIGHT: f64 = 3e-3;
 /// With fewer, the estimate is too inaccurate for weights. Unfounded.
 pub(crate) const LINES_PER_RECEPTANCE: usize = 6;
 
+/// Smallest modal assurance criterion between the shapes of modes of two tests at which they may be one mode. Shapes above 0.9 count as
+/// those of one mode, below 0.1 as those of different modes (Ewins, Modal Testing); with two or three directions shapes scatter more.
+/// Unfounded between.
+pub(crate) const SAME_MODE_SHAPE: f64 = 0.8;
+
+/// Ratio of the natural frequencies of modes of two tests below which they may be one mode. Half the overhang of a tool changes its
+/// frequency by a factor of four; a change of the clamping or wear of the bearings by some percent. Unfounded.
+pub(crate) const SAME_MODE_FREQUENCY: f64 = 1.2;
+
 // Modes from whole records
 
 /// Largest number of frequency lines of all records together in a modal fit to whole records: a fit of more takes

@@ -13,6 +13,10 @@ pub(crate) const VELOCITY_JUMP: f64 = 1e-6;
 /// shift an eigenvalue by 5e-10 per degree of freedom; the number allows for two.
 pub(crate) const ZERO_EIGENVALUE: f64 = 1e-9;
 
+/// Ratio of two limits above which a sentence about assumptions says "far deeper" instead of the number: deeper than
+/// the range in which anyone compares limits. A choice.
+pub(crate) const FAR_DEEPER: f64 = 10.0;
+
 /// Relative distance below which two poles form one mode, because the mode shapes of (nearly) repeated poles are not
 /// defined individually. It lies above the rounding of a double eigenvalue, √(2e-16) ≈ 1.5e-8, and below the spacing of
 /// distinct modes. The value between is unfounded.

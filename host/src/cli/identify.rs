@@ -5,12 +5,17 @@ mod args;
 mod checks;
 mod comments;
 mod cutting;
+mod figure;
 mod joints;
 mod methods;
+mod mode_lines;
 mod mode_options;
 mod modes;
+mod modes_comparison;
 mod records;
+mod stabilization_diagram;
 mod without_force;
+mod written;
 
 use std::path::{Path, PathBuf};
 
@@ -25,8 +30,19 @@ use args::Method;
 
 /// Runs the verb.
 pub fn run(args: Args) -> Result<(), Error> {
-    if let Some(out) = &args.out {
+    for out in &args.out {
         keep_inputs(args.recordings.iter().map(PathBuf::as_path), out)?;
+    }
+    if let Some(other) = args
+        .modes
+        .compare
+        .as_ref()
+        .filter(|_| args.method != Method::Modes)
+    {
+        return Err(Error::input(format!(
+            "--compare {}: it compares modes; --method modes is needed",
+            other.display()
+        )));
     }
     let others = match args.method {
         Method::Joints | Method::InverseStability => args.case.as_deref().or(args.start.as_deref()),
@@ -52,16 +68,8 @@ pub fn run(args: Args) -> Result<(), Error> {
         Method::ForceCoefficients => cutting::force_coefficients(&args, &recordings)?,
         Method::Modes => modes::modes(&args, &mut understood)?,
     };
-    if let Some(path) = &args.out {
-        let text = answer.case(path, other.as_ref())?;
-        let before = path.exists().then(|| crate::file::read_text(path)).transpose()?;
-        let text = match &before {
-            Some(before) => comments::kept(before, &text),
-            None => text,
-        };
-        crate::file::write(path, text.as_bytes())?;
-        answer.case = Some(path.clone());
-    }
+    let lines = text(&answer);
+    written::write(&args.out, &mut answer, other.as_ref(), &lines)?;
     for warning in &answer.warnings {
         tracing::warn!("{warning}");
     }
@@ -100,7 +108,7 @@ fn text(answer: &IdentifyOutput) -> String {
             100.0 * error
         ));
     }
-    if let Some(path) = &answer.case {
+    for path in &answer.out {
         lines.push(format!("written to {}", path.display()));
     }
     lines.join("\n")

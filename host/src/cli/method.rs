@@ -191,7 +191,11 @@ impl MethodChoice {
                 path.display()
             ));
         }
-        if missing.iter().any(|name| name == "zz") {
+        let is_missing = |wanted: &str| missing.iter().any(|name| name == wanted);
+        if is_missing("xy") && is_missing("yx") && !is_missing("xx") && !is_missing("yy") {
+            assumptions.extend(case.effect_of_uncoupled_xy());
+        }
+        if is_missing("zz") {
             assumptions.extend(case.effect_of_rigid_z());
         }
         Ok(assumptions)

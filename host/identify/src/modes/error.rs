@@ -1,6 +1,7 @@
 //! Reasons why no modes are identified from receptances or records.
 
 use quietcut_frf::rational_fit::RationalFitError;
+use quietcut_model::structure::Direction;
 use quietcut_numerics::eigenvalues::EigenvalueError;
 
 /// Reason why no modes are identified from receptances or records.
@@ -28,6 +29,14 @@ pub enum ModesError {
         found: usize,
         /// Number of requested modes.
         wanted: usize,
+    },
+    /// A direction that is identified by itself, since no receptance between it and the others was measured, has no modes.
+    #[error("the direction {axis} by itself, since no receptance couples it with the others: {error}")]
+    Direction {
+        /// First direction of the force.
+        axis: Direction,
+        /// Reason.
+        error: Box<ModesError>,
     },
     /// The modal fit with this number of modes does not converge, the data do not determine its parameters, or a
     /// decomposition in it fails.

@@ -7,6 +7,7 @@
 //! `denominator` computes the poles of every model order, [`stabilization`] selects those that are stable over the
 //! order, and `refinement` fits the modes in pole–residue form with their covariance.
 
+mod comparison;
 mod covariance;
 mod denominator;
 mod error;
@@ -15,6 +16,7 @@ mod gain_errors;
 mod jacobian;
 mod joint_covariance;
 mod leakage;
+mod modal_parameters;
 mod mode;
 mod model;
 mod pole_derivatives;
@@ -25,12 +27,15 @@ mod refinement;
 mod rejected;
 pub(super) mod shape;
 pub mod stabilization;
+mod uncoupled;
 mod weights;
 
 #[cfg(test)]
 mod tests;
 
+pub use comparison::{ComparedMode, ModePair, pairs};
 pub use error::ModesError;
+pub use modal_parameters::ModalParameters;
 pub use mode::IdentifiedMode;
 pub use model::ModalModel;
 pub use receptances::Receptances;
@@ -53,7 +58,7 @@ use crate::criteria::{LEAST_RESIDUE_SIGNIFICANCE, OVERDAMPED};
 pub struct Options {
     /// Highest model order of the stabilization diagram; few frequency lines allow only a lower one.
     pub highest_order: usize,
-    /// Number of stable poles to fit, the strongest ones; `None` takes all stable poles. Poles that are spurious after
+    /// Number of stable poles to fit, the strongest ones, in each part that is identified by itself; `None` takes all stable poles. Poles that are spurious after
     /// refinement are removed.
     pub modes: Option<usize>,
 }
@@ -69,9 +74,32 @@ impl Default for Options {
 
 /// Identifies the modes of measured receptances: poles, stabilization over the model order, and refinement.
 ///
+/// Directions between which no receptance was measured, such as x and y of a table with only h_xx and h_yy, are identified
+/// one by one, each with the number of modes of the options; the receptances between them are zero.
+///
 /// # Errors
 /// See [`ModesError`].
 pub fn identify(data: &Receptances, options: &Options) -> Result<ModalModel, ModesError> {
+    let parts = data.parts();
+    if parts.len() < 2 {
+        return identify_coupled(data, options);
+    }
+    let models = parts
+        .iter()
+        .map(|part| {
+            let of_part = data.of_part(part);
+            let axis = of_part.forces[0];
+            identify_coupled(&of_part, options).map_err(|error| ModesError::Direction {
+                axis,
+                error: Box::new(error),
+            })
+        })
+        .collect::<Result<Vec<_>, _>>()?;
+    Ok(uncoupled::joined(data, models))
+}
+
+/// Identifies the modes of receptances among which every response has one for every force.
+fn identify_coupled(data: &Receptances, options: &Options) -> Result<ModalModel, ModesError> {
     let stabilization = stabilization::stabilize(data, options.highest_order)?;
     let mut rejected = stabilization.rejected();
     let mut starts: Vec<Complex64> = stabilization.selected.clone();

@@ -91,6 +91,16 @@ impl ModalModel {
         both.filter(|direction| self.forces.contains(direction)).collect()
     }
 
+    /// Pairs of response and force direction, among the directions of the model, whose receptance was not measured; that of the
+    /// model is zero there.
+    pub fn not_measured(&self) -> Vec<(Direction, Direction)> {
+        let forces = || self.forces.iter().copied();
+        let pairs = self.responses.iter().flat_map(|&p| forces().map(move |q| (p, q)));
+        pairs
+            .filter(|&(p, q)| !self.outside.iter().any(|&(r, f, _)| (r, f) == (p, q)))
+            .collect()
+    }
+
     /// The fitted receptance, including the terms of modes outside the band, m/N; `None` if the pair of directions was
     /// not measured.
     pub fn receptance(&self, response: Direction, force: Direction, frequency_hz: f64) -> Option<Complex64> {

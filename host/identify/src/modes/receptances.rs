@@ -119,14 +119,75 @@ impl Receptances {
         (to_hz - from_hz) / (self.frequency_hz.len() - 1) as f64
     }
 
-    /// Checks that every response has a receptance for every force: residue matrices of rank one require it.
+    /// Indices of the receptances by part. Two receptances belong to one part if they share a response or a force direction, or if both do so with
+    /// receptances of the part. The directions along which a part is driven and those along which it is measured then have the same names: x of a
+    /// response and x of a force are one.
+    pub(super) fn parts(&self) -> Vec<Vec<usize>> {
+        let directions = |index: usize| {
+            let (p, q) = self.places[index];
+            [self.responses[p], self.forces[q]]
+        };
+        let mut parts: Vec<Vec<usize>> = Vec::new();
+        for index in 0..self.places.len() {
+            let touches = |part: &Vec<usize>| {
+                part.iter().any(|&other| {
+                    directions(other)
+                        .iter()
+                        .any(|direction| directions(index).contains(direction))
+                })
+            };
+            let (joined, apart): (Vec<_>, Vec<_>) = parts.into_iter().partition(touches);
+            let mut part: Vec<usize> = joined.into_iter().flatten().collect();
+            part.push(index);
+            parts = apart;
+            parts.push(part);
+        }
+        parts
+    }
+
+    /// The receptances of one part, with the directions of that part only.
+    pub(super) fn of_part(&self, part: &[usize]) -> Self {
+        let kept = |all: &[Direction], is_of: &dyn Fn(usize) -> Direction| -> Vec<Direction> {
+            let is_kept = |direction: &Direction| part.iter().any(|&index| is_of(index) == *direction);
+            all.iter().copied().filter(is_kept).collect()
+        };
+        let response = |index: usize| self.responses[self.places[index].0];
+        let force = |index: usize| self.forces[self.places[index].1];
+        let responses = kept(&self.responses, &response);
+        let forces = kept(&self.forces, &force);
+        let place = |all: &[Direction], direction: Direction| {
+            all.iter()
+                .position(|known| *known == direction)
+                .unwrap_or_default()
+        };
+        Self {
+            frequency_hz: self.frequency_hz.clone(),
+            places: part
+                .iter()
+                .map(|&index| (place(&responses, response(index)), place(&forces, force(index))))
+                .collect(),
+            responses,
+            forces,
+            values: part.iter().map(|&index| self.values[index].clone()).collect(),
+            deviation: part.iter().map(|&index| self.deviation[index].clone()).collect(),
+            ..*self
+        }
+    }
+
+    /// Checks that within every part of coupled directions each response has a receptance for each force: residue
+    /// matrices of rank one require it.
     fn is_whole(&self) -> Result<(), ModesError> {
-        for (p, response) in self.responses.iter().enumerate() {
-            for (q, force) in self.forces.iter().enumerate() {
-                if !self.places.contains(&(p, q)) {
-                    return Err(ModesError::Data(format!(
-                        "h{response}{force} is missing; every response needs its receptance by every force"
-                    )));
+        for part in self.parts() {
+            let places = || part.iter().map(|&index| self.places[index]);
+            for (p, _) in places() {
+                for (_, q) in places() {
+                    if !self.places.contains(&(p, q)) {
+                        let (response, force) = (self.responses[p], self.forces[q]);
+                        return Err(ModesError::Data(format!(
+                            "h{response}{force} is missing; every response needs its receptance by every force, or, with h{response}{response} and \
+                             h{force}{force} alone, none by the other: then both directions are identified as uncoupled"
+                        )));
+                    }
                 }
             }
         }

@@ -28,6 +28,17 @@ pub(crate) fn rank_one(residues: &DMatrix<Complex64>) -> Option<(Vec<Complex64>,
     Some((right, left, if all > 0.0 { rest.sqrt() / all } else { 0.0 }))
 }
 
+/// Modal assurance criterion |aᴴb|²/(aᴴa · bᴴb) of two shapes; 0 if one of them is zero.
+pub(super) fn assurance(a: &[Complex64], b: &[Complex64]) -> f64 {
+    let power = |shape: &[Complex64]| shape.iter().map(|entry| entry.norm_sqr()).sum::<f64>();
+    let sizes = power(a) * power(b);
+    if sizes == 0.0 {
+        return 0.0;
+    }
+    let inner: Complex64 = a.iter().zip(b).map(|(a, b)| a.conj() * b).sum();
+    inner.norm_sqr() / sizes
+}
+
 /// Scales the right shape of a mode by a complex factor c and the left one by 1/c, unless one of them is zero. Then
 /// both have equal norm over the `shared` entries (index in right, index in left) and differ as little as possible: the
 /// shapes of a reciprocal structure become equal. Without a shared entry, or if one shape is zero in all of them, the

@@ -8,6 +8,7 @@ use super::denominator;
 use super::error::ModesError;
 use super::receptances::Receptances;
 use super::rejected::{Rejected, reject};
+use super::shape::assurance;
 use crate::criteria::{
     LEAST_HEIGHT, LEAST_ORDERS, ORDERS_SHARE, OVERDAMPED, SAME_DAMPING, SAME_FREQUENCY, SAME_POLE_DISTANCE,
     SAME_POLE_SHAPE, SAME_SHAPE,
@@ -53,13 +54,13 @@ impl Candidate {
 }
 
 /// Stabilization diagram: poles of all model orders, and the poles that are modes.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Stabilization {
     /// Poles in the band with a damping ratio above 0 and below 0.5, in ascending model order.
     pub candidates: Vec<Candidate>,
     /// Highest model order.
     pub highest_order: usize,
-    /// Poles selected as modes, strongest first, rad/s.
+    /// Poles selected as modes, strongest first, rad/s; of a structure in several parts, those of one part after the other.
     pub selected: Vec<Complex64>,
     /// Poles of the highest model order in the band whose damping is not positive, rad/s.
     unstable: Vec<Complex64>,
@@ -69,6 +70,20 @@ pub struct Stabilization {
 }
 
 impl Stabilization {
+    /// The diagrams of several parts of a structure in one, with the poles in the order of the parts.
+    pub(super) fn together(diagrams: Vec<Self>) -> Self {
+        let mut all = Self::default();
+        for diagram in diagrams {
+            all.highest_order = all.highest_order.max(diagram.highest_order);
+            all.candidates.extend(diagram.candidates);
+            all.selected.extend(diagram.selected);
+            all.unstable.extend(diagram.unstable);
+            all.discarded.extend(diagram.discarded);
+        }
+        all.candidates.sort_by_key(|candidate| candidate.order);
+        all
+    }
+
     /// Stable poles of the upper half of the model orders that are not among the poles `known`, those with the highest
     /// peaks first, at most `count`.
     ///
@@ -193,15 +208,6 @@ fn distance(a: &Candidate, b: &Candidate) -> f64 {
     let frequency = (a.frequency_hz() / b.frequency_hz() - 1.0).abs() / SAME_FREQUENCY;
     let damping = (a.damping_ratio() / b.damping_ratio() - 1.0).abs() / SAME_DAMPING;
     frequency.max(damping)
-}
-
-/// Modal assurance criterion |aᴴb|² of two shapes of norm 1.
-fn assurance(a: &[Complex64], b: &[Complex64]) -> f64 {
-    a.iter()
-        .zip(b)
-        .map(|(a, b)| a.conj() * b)
-        .sum::<Complex64>()
-        .norm_sqr()
 }
 
 /// Continues chains of poles of the previous model order by poles of this order that agree with them in frequency,

@@ -13,4 +13,5 @@ mod steady;
 mod surface;
 mod tap_coverage;
 mod thesis;
+mod uncoupled;
 mod virtual_taps;

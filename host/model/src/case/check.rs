@@ -4,6 +4,7 @@ mod extensions;
 mod job;
 mod joints;
 mod limits;
+mod provenance;
 mod structure;
 mod tool;
 mod uncertainty;
@@ -58,6 +59,8 @@ fn case(path: &Path, text: &str) -> Result<Case, CaseError> {
     let cut = file.cut.map(|cut| check.cut(&cut)).transpose()?;
     let limits = file.limits.map(|limits| check.limits(&limits)).transpose()?;
     let extensions = check.extensions(file.extension)?;
+    let provenance = file.provenance.unwrap_or_default();
+    let zero_receptances = check.receptances(&provenance.zero_receptances)?;
     let name = file.name.unwrap_or_else(|| {
         path.file_stem()
             .map_or_else(String::new, |stem| stem.to_string_lossy().into_owned())
@@ -73,9 +76,8 @@ fn case(path: &Path, text: &str) -> Result<Case, CaseError> {
         posture,
         deviations: std::mem::take(&mut check.deviations),
         covariance: None,
-        assumed: file
-            .provenance
-            .map_or_else(Vec::new, |provenance| provenance.assumed),
+        assumed: provenance.assumed,
+        zero_receptances,
         extensions,
     };
     case.covariance = file

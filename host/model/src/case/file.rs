@@ -153,9 +153,11 @@ pub(super) struct UncertaintyFile {
     pub(super) covariance: Spanned<Vec<Spanned<Vec<f64>>>>,
 }
 
-#[derive(Deserialize)]
+#[derive(Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct ProvenanceFile {
     #[serde(default)]
     pub(super) assumed: Vec<String>,
+    #[serde(default)]
+    pub(super) zero_receptances: Vec<Spanned<String>>,
 }

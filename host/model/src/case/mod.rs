@@ -58,6 +58,8 @@ pub struct Case {
     /// Assumptions under which the case was identified (section `[provenance]`), one sentence each; see
     /// [`assumptions`](Self::assumptions).
     pub assumed: Vec<String>,
+    /// Receptances that were not measured and are zero in the structure, such as `hxy` (section `[provenance]`).
+    pub zero_receptances: Vec<String>,
     /// Tables `[extension.NAME]` by name. Their names, keys and values agree with the [`EffectSpec`]s; whether the
     /// structure has the direction of an effect is checked when the effect is applied.
     pub extensions: BTreeMap<String, toml::Table>,

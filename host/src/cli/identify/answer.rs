@@ -6,6 +6,8 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 
 use super::Error;
+use super::figure::Figure;
+use super::modes_comparison::ModesComparison;
 use crate::identify::case_file::{self, Estimate};
 use crate::identify::homogeneity::Region;
 use crate::identify::linearity::Verdict;
@@ -14,7 +16,6 @@ use crate::identify::ncma::Map;
 use crate::identify::reciprocity::Reciprocity;
 use crate::identify::sweep::Comparison;
 use crate::structure::Direction;
-use quietcut_numerics::statistics::NINETY_PERCENT;
 
 /// Output of `quietcut identify` for any method; a field that the method does not compute stays empty.
 #[derive(Debug, Default, Serialize)]
@@ -23,6 +24,12 @@ pub(super) struct IdentifyOutput {
     /// Complex modes that `--method modes` identified, in ascending order of natural frequency.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub(super) complex_modes: Vec<ComplexMode>,
+    /// Modal assurance criterion between the shapes of the complex modes, by rows; missing with one direction, where it is 1 by construction.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) mac: Option<Vec<Vec<f64>>>,
+    /// Comparison of the complex modes with those of the case or test of `--compare`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) comparison: Option<ModesComparison>,
     /// Poles of the fitted receptance matrix that were rejected as structural modes, with the reason.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub(super) rejected: Vec<Rejected>,
@@ -63,6 +70,9 @@ pub(super) struct IdentifyOutput {
     pub(super) warnings: Vec<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) case: Option<PathBuf>,
+    /// All files that were written.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub(super) out: Vec<PathBuf>,
     /// Content of the case file that `joints` (robot joints), `inverse-stability` (modes) or `force-coefficients`
     /// (cutting) writes; `None` for the other methods, and for `force-coefficients` without a measured axial force.
     #[serde(skip)]
@@ -76,6 +86,9 @@ pub(super) struct IdentifyOutput {
     pub(super) estimates: Vec<Estimate>,
     #[serde(skip)]
     pub(super) directions: Vec<Direction>,
+    /// Picture of the result as SVG, and its caption; `None` for a method without one, and if no file shows it.
+    #[serde(skip)]
+    pub(super) picture: Option<(String, &'static str)>,
     /// Lines of the text output after those of `models`.
     #[serde(skip)]
     pub(super) messages: Vec<String>,
@@ -92,13 +105,6 @@ pub(super) struct Model {
     pub(super) parameters: BTreeMap<&'static str, Figure>,
 }
 
-/// Estimated value of one parameter with its 90 % interval.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub(super) struct Figure {
-    pub(super) value: f64,
-    pub(super) ci90: [f64; 2],
-}
-
 /// Identified complex mode with its left and right mode shapes (eq. 7.15 of the thesis that the example data come
 /// from).
 #[derive(Debug, Serialize)]
@@ -107,6 +113,21 @@ pub(super) struct ComplexMode {
     pub(super) damping_ratio: Figure,
     pub(super) left: BTreeMap<&'static str, ComplexFigure>,
     pub(super) right: BTreeMap<&'static str, ComplexFigure>,
+    /// Modal mass, damping and stiffness; missing without a direction that is both driven and measured.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) modal: Option<Modal>,
+}
+
+/// Modal mass, damping and stiffness of a mode at its drive point.
+#[derive(Debug, Serialize)]
+pub(super) struct Modal {
+    /// Direction of the drive point.
+    pub(super) direction: &'static str,
+    pub(super) mass_kg: Figure,
+    pub(super) damping_ns_per_m: Figure,
+    pub(super) stiffness_n_per_m: Figure,
+    /// Angle of the residue from that of a real mode, degrees.
+    pub(super) phase_deg: f64,
 }
 
 /// Real and imaginary part of one component of a complex mode shape, each with its 90 % interval.
@@ -204,16 +225,6 @@ pub(super) struct Cutting {
 pub(super) struct Slices {
     pub(super) stiffness: BTreeMap<&'static str, Figure>,
     pub(super) damping: BTreeMap<&'static str, Figure>,
-}
-
-impl Figure {
-    pub(super) fn new(value: f64, deviation: f64) -> Self {
-        let half = NINETY_PERCENT * deviation;
-        Self {
-            value,
-            ci90: [value - half, value + half],
-        }
-    }
 }
 
 impl Coefficients {

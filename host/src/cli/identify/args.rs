@@ -24,9 +24,9 @@ pub struct Args {
     /// Identification method.
     #[arg(long, value_name = "NAME")]
     pub(super) method: Method,
-    /// Case file to write.
-    #[arg(long, value_name = "CASE.toml", value_parser = Endings(&["toml"]).parser())]
-    pub(super) out: Option<PathBuf>,
+    /// Case, report or picture to write; the ending sets the format: toml, html or svg. May be repeated.
+    #[arg(long, value_name = "FILE", value_parser = Endings(&["toml", "html", "svg"]).parser())]
+    pub(super) out: Vec<PathBuf>,
     /// Nonlinear terms of the restoring force that harmonic-balance and joints identify.
     #[arg(
         long,

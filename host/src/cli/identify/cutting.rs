@@ -4,8 +4,10 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use super::Error;
-use super::answer::{Cutting, Figure, IdentifyOutput};
+use super::answer::{Cutting, IdentifyOutput};
 use super::args::Args;
+use super::figure::Figure;
+use super::written;
 use crate::case::Case;
 use crate::identify::case_file::{self, Estimate};
 use crate::identify::force_coefficients::{Fit, KEYS, Value, fit, runout};
@@ -47,14 +49,13 @@ pub(super) fn force_coefficients(args: &Args, recordings: &[Recording]) -> Resul
         })
         .collect();
     let teeth = tests.first().map_or(1, |test| test.teeth);
-    let name = args
-        .out
-        .as_deref()
+    let out = written::case_file(&args.out);
+    let name = out
         .and_then(std::path::Path::file_stem)
         .unwrap_or_default()
         .to_string_lossy();
     let table = case_file::cutting(&name, &estimates, teeth, args.edge_angle_deg, runout(&fit));
-    let table = match (table, &args.out) {
+    let table = match (table, out) {
         (Ok(table), _) => Some(table),
         (Err(_), None) => None,
         (Err(error), Some(path)) => {

@@ -5,9 +5,11 @@ use std::collections::BTreeMap;
 use clap::ValueEnum;
 
 use super::Error;
-use super::answer::{EstimatedJoint, Figure, IdentifyOutput};
+use super::answer::{EstimatedJoint, IdentifyOutput};
 use super::args::Args;
+use super::figure::Figure;
 use super::methods::settling;
+use super::written;
 use crate::case::Case;
 use crate::criteria::{DIFFERENT_LEVELS, LARGEST_JOINT_MISFIT, SAME_POSTURE_DEG};
 use crate::frf::{MeasurementSettings, measure};
@@ -282,9 +284,7 @@ fn answer(args: &Args, found: &JointFit, postures: usize) -> IdentifyOutput {
         .iter()
         .map(|(parameter, _, deviation)| (*parameter, *deviation))
         .collect();
-    let name = args
-        .out
-        .as_deref()
+    let name = written::case_file(&args.out)
         .and_then(std::path::Path::file_stem)
         .unwrap_or_default()
         .to_string_lossy();

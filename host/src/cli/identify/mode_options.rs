@@ -8,12 +8,16 @@ use super::super::{Endings, positive};
 #[derive(Debug, clap::Args)]
 #[command(next_help_heading = "Modes")]
 pub(super) struct ModeOptions {
-    /// Number of modes to select. Default: all stable poles of the stabilization diagram.
+    /// Number of modes to select; of directions that no receptance couples, in each. Default: all stable poles of the stabilization diagram.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     pub(super) modes: Option<u16>,
     /// Highest model order of the stabilization diagram.
     #[arg(long, value_name = "N", default_value_t = 24, value_parser = clap::value_parser!(u16).range(5..=80))]
     pub(super) order: u16,
+    /// Compare the modes with those of an earlier case, table of receptances or recording: pairs by shape (MAC) and frequency, changes of frequency and
+    /// damping with 90 % intervals. With --compare the recording may be a case too.
+    #[arg(long, value_name = "BEFORE")]
+    pub(super) compare: Option<PathBuf>,
     /// Stabilization diagram to write; the ending sets the format: svg or html.
     #[arg(long, value_name = "FILE", value_parser = Endings(&["svg", "html"]).parser())]
     pub(super) stabilization: Option<PathBuf>,

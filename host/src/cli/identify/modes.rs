@@ -1,64 +1,150 @@
 //! `--method modes`: complex modes from receptances or from recordings of force and response.
 
 use std::collections::BTreeMap;
-use std::path::Path;
-
-use maud::html;
+use std::path::{Path, PathBuf};
 
 use super::Error;
-use super::answer::{ComplexFigure, ComplexMode, Figure, IdentifyOutput};
+use super::answer::{ComplexFigure, ComplexMode, IdentifyOutput, Modal};
 use super::args::Args;
+use super::figure::Figure;
+use super::mode_lines::lines;
+use super::modes_comparison::ModesComparison;
+use super::stabilization_diagram::{CAPTION, TITLE, ending, write_diagram};
+use super::written;
+use crate::case::Case;
 use crate::frf::{
     Estimator, FrfError, FrfTable, ImportedTable, MeasurementSettings, RecordSpectra, measure, record_spectra,
 };
-use crate::identify::modes::{self, ChannelNoise, IdentifiedMode, ModalModel, Receptances};
+use crate::identify::modes::{self, ChannelNoise, ComparedMode, ModalModel, Receptances};
 use crate::recording::{Import, Understood};
-use crate::report::page::{figure, page};
 use crate::report::stabilization_chart::stabilization_chart;
 use crate::structure::Direction;
 
-/// Identifies complex modes from the receptances or recordings that the command line names.
+/// Identifies complex modes from the receptances or recordings that the command line names. With `--compare` they are compared with those of
+/// another file; then the first may be a case too.
 pub(super) fn modes(args: &Args, understood: &mut Vec<Understood>) -> Result<IdentifyOutput, Error> {
+    let Some(other) = &args.modes.compare else {
+        return identified(args, understood, &args.recordings).map(|(answer, _)| answer);
+    };
+    let (mut answer, after) = match args.recordings.as_slice() {
+        [case] if is_case(case) => {
+            let answer = IdentifyOutput {
+                method: "modes",
+                ..IdentifyOutput::default()
+            };
+            (answer, of_case(case)?)
+        }
+        recordings => {
+            let (answer, model) = identified(args, understood, recordings)?;
+            (answer, ComparedMode::of_model(&model))
+        }
+    };
+    let before = if is_case(other) {
+        of_case(other)?
+    } else {
+        let model = model_of(args, understood, std::slice::from_ref(other))?.model;
+        ComparedMode::of_model(&model)
+    };
+    let comparison = ModesComparison::new(other, &before, &after)?;
+    answer.messages.extend(comparison.lines());
+    answer.comparison = Some(comparison);
+    Ok(answer)
+}
+
+fn is_case(path: &Path) -> bool {
+    crate::file::ending(path) == "toml"
+}
+
+fn of_case(path: &Path) -> Result<Vec<ComparedMode>, Error> {
+    let case = Case::read(path).map_err(Error::input)?;
+    case.structure().map_err(Error::input)?;
+    ComparedMode::of_case(&case).map_err(|error| Error::input(format!("{}: {error}", path.display())))
+}
+
+/// A modal model and the data to which it was fitted.
+struct Fitted {
+    source: Source,
+    data: Receptances,
+    model: ModalModel,
+    noise: Vec<ChannelNoise>,
+}
+
+fn model_of(args: &Args, understood: &mut Vec<Understood>, recordings: &[PathBuf]) -> Result<Fitted, Error> {
     let options = &args.modes;
-    if let Some(path) = &options.stabilization {
-        ending(path)?;
-    }
-    let source = source(args, understood)?;
-    let band_hz = args.band_hz;
+    let source = source(args, understood, recordings)?;
     let refused =
         |error: modes::ModesError| Error::input(format!("{}: {error}", source.table.path().display()));
-    let data = Receptances::new(&source.table, source.deviation.as_deref(), band_hz).map_err(refused)?;
+    let data = Receptances::new(&source.table, source.deviation.as_deref(), args.band_hz).map_err(refused)?;
     let wanted = modes::Options {
         highest_order: usize::from(options.order),
         modes: options.modes.map(usize::from),
     };
     let mut model = modes::identify(&data, &wanted).map_err(refused)?;
     let mut noise = Vec::new();
-    if let Some(records) = &source.records {
+    // A fit to whole records needs every response to every force in each record.
+    let records = source.records.as_ref();
+    if let Some(records) = records.filter(|_| model.not_measured().is_empty()) {
         (model, noise) = modes::refine_by_records(&model, records).map_err(refused)?;
     }
     if let Some(percent) = options.calibration_percent {
         model.add_gain_errors(0.01 * percent);
     }
-    if let Some(path) = &options.stabilization {
-        draw(path, &data, &model)?;
+    Ok(Fitted {
+        source,
+        data,
+        model,
+        noise,
+    })
+}
+
+fn identified(
+    args: &Args,
+    understood: &mut Vec<Understood>,
+    recordings: &[PathBuf],
+) -> Result<(IdentifyOutput, ModalModel), Error> {
+    if let Some(path) = &args.modes.stabilization {
+        ending(path)?;
+    }
+    let Fitted {
+        source,
+        data,
+        model,
+        noise,
+    } = model_of(args, understood, recordings)?;
+    let mut picture = None;
+    if args.modes.stabilization.is_some() || written::wants_picture(&args.out) {
+        let svg = stabilization_chart(TITLE, &data, &model).map_err(Error::input)?;
+        if let Some(path) = &args.modes.stabilization {
+            write_diagram(path, &svg, &model)?;
+        }
+        picture = Some((svg, CAPTION));
     }
     let mut warnings = source.warnings;
     warnings.extend(model.warnings.iter().cloned());
     warnings.extend(not_in_case(args, &model));
-    Ok(IdentifyOutput {
+    warnings.extend(uncoupled(&model));
+    let mac = model.modal_assurance().map(|mac| {
+        let row = |row: usize| mac.row(row).iter().copied().collect();
+        (0..mac.nrows()).map(row).collect()
+    });
+    let answer = IdentifyOutput {
         method: "modes",
-        complex_modes: model.modes.iter().map(|mode| of_mode(&model, mode)).collect(),
+        complex_modes: (0..model.modes.len())
+            .map(|index| of_mode(&model, index))
+            .collect(),
         rejected: model.rejected.clone(),
         coherence: coherence(&source.table, data.band_hz()),
         fit_error: Some(model.fit_error),
         misfit: model.misfit,
         warnings,
-        messages: sentences(&model, &noise),
+        messages: lines(&model, &noise, mac.as_deref()),
+        mac,
         noise,
-        modal: Some(model),
+        picture,
+        modal: Some(model.clone()),
         ..IdentifyOutput::default()
-    })
+    };
+    Ok((answer, model))
 }
 
 /// Receptances from which the modes are identified, with their standard deviations by entry of the table and frequency
@@ -73,9 +159,9 @@ struct Source {
     records: Option<Vec<RecordSpectra>>,
 }
 
-fn source(args: &Args, understood: &mut Vec<Understood>) -> Result<Source, Error> {
+fn source(args: &Args, understood: &mut Vec<Understood>, recordings: &[PathBuf]) -> Result<Source, Error> {
     let mut no_table = None;
-    if let [path] = args.recordings.as_slice() {
+    if let [path] = recordings {
         match table(path, &args.segment.import())? {
             Ok(imported) => {
                 if let Some(understood) = imported.understood {
@@ -92,15 +178,12 @@ fn source(args: &Args, understood: &mut Vec<Understood>) -> Result<Source, Error
             Err(reason) => no_table = reason,
         }
     }
-    let recorded = args
-        .segment
-        .read(&args.recordings)
-        .map_err(|error| match no_table {
-            Some(reason) => Error::input(format!("{error}; as a table of receptances: {reason}")),
-            None => error,
-        })?;
+    let recorded = args.segment.read(recordings).map_err(|error| match no_table {
+        Some(reason) => Error::input(format!("{error}; as a table of receptances: {reason}")),
+        None => error,
+    })?;
     let recordings = recorded.recordings;
-    *understood = recorded.understood;
+    understood.extend(recorded.understood);
     let settings = MeasurementSettings {
         resolution_hz: args.modes.resolution_hz,
         estimator: if args.modes.pseudo_inverse {
@@ -159,7 +242,8 @@ fn coherence(table: &FrfTable, [from_hz, to_hz]: [f64; 2]) -> BTreeMap<&'static 
     medians
 }
 
-fn of_mode(model: &ModalModel, found: &IdentifiedMode) -> ComplexMode {
+fn of_mode(model: &ModalModel, index: usize) -> ComplexMode {
+    let found = &model.modes[index];
     let shape = |directions: &[Direction], values: &[num_complex::Complex64], deviations: &[[f64; 2]]| {
         let entries = directions.iter().zip(values).zip(deviations);
         entries
@@ -177,6 +261,16 @@ fn of_mode(model: &ModalModel, found: &IdentifiedMode) -> ComplexMode {
         damping_ratio: Figure::new(found.mode.damping_ratio, found.damping_ratio_std),
         left: shape(&model.forces, &found.mode.left, &found.left_std),
         right: shape(&model.responses, &found.mode.right, &found.right_std),
+        modal: model.modal_parameters(index).map(|modal| {
+            let figure = |[value, std]: [f64; 2]| Figure::new(value, std);
+            Modal {
+                direction: modal.direction.name(),
+                mass_kg: figure(modal.mass_kg),
+                damping_ns_per_m: figure(modal.damping_ns_per_m),
+                stiffness_n_per_m: figure(modal.stiffness_n_per_m),
+                phase_deg: modal.phase_rad.to_degrees(),
+            }
+        }),
     }
 }
 
@@ -184,7 +278,7 @@ fn of_mode(model: &ModalModel, found: &IdentifiedMode) -> ComplexMode {
 /// directions that are both excited and measured. `None` if the case file contains all or none of the directions, or if
 /// no case file is written.
 fn not_in_case(args: &Args, model: &ModalModel) -> Option<String> {
-    args.out.as_ref()?;
+    written::case_file(&args.out)?;
     let directions = model.directions();
     let left_out: Vec<&str> = model
         .responses
@@ -201,98 +295,18 @@ fn not_in_case(args: &Args, model: &ModalModel) -> Option<String> {
     })
 }
 
-fn sentences(model: &ModalModel, noise: &[ChannelNoise]) -> Vec<String> {
-    let mut lines = Vec::new();
-    for found in &model.modes {
-        let frequency = Figure::new(found.mode.frequency_hz, found.frequency_std_hz);
-        let damping = Figure::new(found.mode.damping_ratio, found.damping_ratio_std);
-        lines.push(format!(
-            "mode at {:.4} Hz (90 % interval {:.4} to {:.4}), damping ratio {:.5} ({:.5} to {:.5})",
-            frequency.value,
-            frequency.ci90[0],
-            frequency.ci90[1],
-            damping.value,
-            damping.ci90[0],
-            damping.ci90[1]
-        ));
-        let shapes = [
-            ("right", &model.responses, &found.mode.right, &found.right_std),
-            ("left", &model.forces, &found.mode.left, &found.left_std),
-        ];
-        for (name, directions, values, deviations) in shapes {
-            let entries: Vec<String> = directions
-                .iter()
-                .zip(values.iter().zip(deviations))
-                .map(|(direction, (value, [re, im]))| {
-                    format!(
-                        "{direction} {:.3}{:+.3}i (±{:.3}, ±{:.3})",
-                        1e3 * value.re,
-                        1e3 * value.im,
-                        1e3 * re,
-                        1e3 * im
-                    )
-                })
-                .collect();
-            lines.push(format!(
-                "  {name} shape, 10⁻³ (one standard deviation): {}",
-                entries.join(", ")
-            ));
-        }
-    }
-    for channel in noise {
-        lines.push(format!(
-            "noise of {} in {}: {:.3} % of its root mean square",
-            channel.channel, channel.recording, channel.percent
-        ));
-    }
-    for pole in &model.rejected {
-        lines.push(format!(
-            "rejected pole: {:.3} Hz, damping ratio {:.4}: {}",
-            pole.frequency_hz, pole.damping_ratio, pole.why
-        ));
-    }
-    lines
-}
-
-#[derive(Clone, Copy)]
-enum ChartFormat {
-    Svg,
-    Html,
-}
-
-fn ending(path: &Path) -> Result<ChartFormat, Error> {
-    match crate::file::ending(path).as_str() {
-        "svg" => Ok(ChartFormat::Svg),
-        "html" => Ok(ChartFormat::Html),
-        other => Err(Error::input(format!(
-            "--stabilization {}: it ends in \"{other}\"; svg or html is needed",
-            path.display()
-        ))),
-    }
-}
-
-fn draw(path: &Path, data: &Receptances, model: &ModalModel) -> Result<(), Error> {
-    let title = "Stabilization diagram";
-    let svg = stabilization_chart(title, data, model).map_err(Error::input)?;
-    let text = match ending(path)? {
-        ChartFormat::Svg => svg,
-        ChartFormat::Html => {
-            let body = html! {
-                h1 { (title) }
-                (figure(&svg, "Poles whose frequency, damping and mode shape stay constant as the model order increases are modes. Below: measured receptances and their fit."))
-                table {
-                    tr { th { "frequency" } th { "damping ratio" } th { "reason for rejection" } }
-                    @for pole in &model.rejected {
-                        tr {
-                            td { (format!("{:.3} Hz", pole.frequency_hz)) }
-                            td { (format!("{:.4}", pole.damping_ratio)) }
-                            td { (pole.why) }
-                        }
-                    }
-                }
-            };
-            page(title, &body)
-        }
-    };
-    Ok(crate::file::write(path, text.as_bytes())?)
+/// Warning of the receptances that were not measured and are taken as zero; `None` if there are none.
+fn uncoupled(model: &ModalModel) -> Option<String> {
+    let zero: Vec<String> = model
+        .not_measured()
+        .iter()
+        .map(|(p, q)| format!("h{p}{q}"))
+        .collect();
+    (!zero.is_empty()).then(|| {
+        format!(
+            "{} were not measured and are taken as zero: the directions are identified one by one, as uncoupled; a mode oblique to them appears once \
+             in each",
+            zero.join(", ")
+        )
+    })
 }

@@ -1,8 +1,9 @@
 //! Identification from records of force and motion: multisine harmonic balance and restoring-force surface.
 
 use super::Error;
-use super::answer::{Figure, IdentifyOutput, Slices};
+use super::answer::{IdentifyOutput, Slices};
 use super::args::{Args, SurfaceTerm};
+use super::figure::Figure;
 use crate::identify::case_file::Estimate;
 use crate::identify::law::NonlinearTerm;
 use crate::identify::periodic_fit::{self, Period};

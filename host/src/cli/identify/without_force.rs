@@ -1,8 +1,10 @@
 //! `--method output-only` and `--method inverse-stability`: modes without a measured force.
 
 use super::Error;
-use super::answer::{EstimatedMode, Figure, IdentifyOutput};
+use super::answer::{EstimatedMode, IdentifyOutput};
 use super::args::Args;
+use super::figure::Figure;
+use super::written;
 use crate::case::Case;
 use crate::identify::ambient::Ambient;
 use crate::identify::inverse_stability::{
@@ -145,9 +147,7 @@ pub(super) fn inverse_stability(args: &Args) -> Result<IdentifyOutput, Error> {
         .first_order()
         .map_err(|error| Error::input(format!("{}: {error}", start.display())))?;
     let (directions, identified) = identified_modes(&machine, &found);
-    let name = args
-        .out
-        .as_deref()
+    let name = written::case_file(&args.out)
         .and_then(std::path::Path::file_stem)
         .unwrap_or_default()
         .to_string_lossy();
