@@ -9,6 +9,9 @@ use super::refinement::{Refined, refine};
 use super::stabilization::Stabilization;
 use crate::criteria::{FURTHER_ERROR, FURTHER_MISFIT, FURTHER_SIGNIFICANCE};
 
+/// Largest number of known poles at which a second mode is tried, those with the highest peaks of the second part of the residues first. A choice.
+const SPLIT: usize = 4;
+
 /// Largest number of poles of the stabilization diagram that are tried as a further mode. A choice.
 const TRIED: usize = 8;
 
@@ -28,10 +31,17 @@ pub(super) fn with_further_mode(
         return None;
     }
     let known: Vec<Complex64> = refined.fit.modes.iter().map(|mode| mode.pole).collect();
-    stabilization.further(&known, TRIED).into_iter().find_map(|pole| {
-        let mut poles = known.clone();
-        poles.push(pole);
-        let larger = refine(data, PoleResidue::start(data, &poles).ok()?)?;
+    let of_diagram = stabilization
+        .further(&known, TRIED)
+        .into_iter()
+        .filter_map(|pole| {
+            let mut poles = known.clone();
+            poles.push(pole);
+            PoleResidue::start(data, &poles).ok()
+        });
+    let starts = of_diagram.chain(refined.fit.split(data, SPLIT));
+    starts.into_iter().find_map(|start| {
+        let larger = refine(data, start)?;
         let is_mode = larger.significance(known.len()) >= FURTHER_SIGNIFICANCE
             && larger.relative_error < refined.relative_error
             && !is_spurious(&larger);

@@ -124,7 +124,17 @@ fn identify_coupled(data: &Receptances, options: &Options) -> Result<ModalModel,
             });
         }
         let start = PoleResidue::start(data, &starts)?;
-        let mut refined = refinement::refine(data, start).ok_or(ModesError::NotConverged(starts.len()))?;
+        let Some(mut refined) = refinement::refine(data, start) else {
+            // The weakest pole is the last one; two poles of one mode, for example, keep the fit from converging.
+            let count = starts.len();
+            match starts.pop() {
+                Some(pole) if count > 1 && options.modes.is_none() => {
+                    rejected.push(reject(pole, "the fit does not converge with it".into()));
+                    continue;
+                }
+                _ => return Err(ModesError::NotConverged(count)),
+            }
+        };
         let Some((mode, why)) = spurious(&refined, [from_hz, to_hz]) else {
             let is_spurious = |fit: &Refined| spurious(fit, [from_hz, to_hz]).is_some();
             while options.modes.is_none()

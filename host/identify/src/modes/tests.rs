@@ -368,3 +368,71 @@ fn data_without_a_mode_are_refused() {
     let said = refused(&far, None, &Options::default());
     assert!(said.contains("no pole is stable"), "{said}");
 }
+
+/// Modes of x and y of a nearly round machine are one pole of a common denominator, whose residue matrix has rank two.
+#[test]
+fn modes_of_two_directions_closer_than_their_width_are_two() {
+    let real_mode = |hertz: f64, angle_deg: f64| {
+        let omega = TAU * hertz;
+        let damped = omega * (1.0 - 4e-4_f64).sqrt();
+        let factor = (2.0 * Complex64::i() * damped * 1e7 / (omega * omega))
+            .inv()
+            .sqrt();
+        let (sin, cos) = angle_deg.to_radians().sin_cos();
+        let shape = vec![factor * cos, factor * sin];
+        Mode {
+            frequency_hz: hertz,
+            damping_ratio: 0.02,
+            left: shape.clone(),
+            right: shape,
+        }
+    };
+    let (mut covered, mut all, mut missed) = (0, 0, 0);
+    const SEEDS: u64 = 40;
+    for seed in 0..SEEDS {
+        // Distances of the poles of 0.05 to 0.5 of their half-power width, 18 Hz.
+        let apart = 0.9 + 8.1 * seed as f64 / (SEEDS - 1) as f64;
+        let truth = [
+            real_mode(450.0, 5.0),
+            real_mode(450.0 + apart, 97.0),
+            real_mode(800.0, -10.0),
+        ];
+        let structure = Structure {
+            directions: vec![Direction::X, Direction::Y],
+            form: Form::Modes(truth.to_vec()),
+        };
+        let forces = [Direction::X, Direction::Y];
+        let (table, deviation) = table(&structure, &grid(300.0, 950.0, 326), &forces, 0.01, seed);
+        let data = Receptances::new(&table, Some(&deviation), None).unwrap();
+        let found = identify(&data, &Options::default()).unwrap();
+        if found.modes.len() != truth.len() {
+            missed += 1;
+            println!(
+                "seed {seed}: {} modes, χ² per degree of freedom {:?}",
+                found.modes.len(),
+                found.misfit
+            );
+            continue;
+        }
+        // Of poles that are equal to the noise shapes are not determined one by one; their receptance is.
+        for hertz in [430.0, 450.0, 470.0, 800.0] {
+            let exact = structure.first_order().unwrap().receptance(TAU * hertz).unwrap();
+            for (p, response) in forces.into_iter().enumerate() {
+                let fitted = found.receptance(response, response, hertz).unwrap();
+                // Noise of 1 % of the RMS at some nine lines within the width, and four standard deviations.
+                let error = (fitted - exact[(p, p)]).norm() / exact[(p, p)].norm();
+                assert!(error < 0.02, "seed {seed}, {response} at {hertz} Hz: {error}");
+            }
+        }
+        if apart > 2.0 {
+            for (mode, truth) in found.modes.iter().zip(&truth) {
+                all += 1;
+                let off = (mode.mode.frequency_hz - truth.frequency_hz).abs();
+                covered += usize::from(off < 1.645 * mode.frequency_std_hz);
+            }
+        }
+    }
+    println!("{covered} of {all} frequencies, seeds 0 to {SEEDS}");
+    assert_eq!(missed, 0, "of {SEEDS}");
+    quietcut_testkit::rates::assert_share("90 % intervals of frequencies of close modes", 0.9, covered, all);
+}
