@@ -13,12 +13,14 @@ use super::error::EigenvalueError;
 /// Murakami, Math. Comp. 64 (1995) 763.
 ///
 /// # Errors
-/// The ratio of the coefficient of a lower power to the leading one is not finite, or the QR iteration exceeds its
-/// bound.
+/// A coefficient, or its ratio to the leading one, is not finite, or the QR iteration exceeds its bound.
 pub fn polynomial_roots(coefficients: &[Complex64]) -> Result<Vec<Complex64>, EigenvalueError> {
     let Some(degree) = coefficients.iter().rposition(|c| *c != Complex64::ZERO) else {
         return Ok(Vec::new());
     };
+    if coefficients.iter().any(|c| !c.is_finite()) {
+        return Err(EigenvalueError::NotFinite { size: degree });
+    }
     let leading = coefficients[degree];
     of_complex(DMatrix::from_fn(degree, degree, |i, j| {
         if i == 0 {

@@ -217,4 +217,7 @@ fn polynomials_have_the_roots_that_they_are_made_of() {
         assert!(distance(&polynomial_roots(&coefficients).unwrap(), &roots) < 1e-11);
     }
     assert!(polynomial_roots(&[]).unwrap().is_empty());
+    let infinite = Complex64::from(f64::INFINITY);
+    assert!(polynomial_roots(&[infinite]).is_err());
+    assert!(polynomial_roots(&[Complex64::ONE, infinite]).is_err());
 }

@@ -27,10 +27,11 @@ pub fn eigenvector(matrix: &DMatrix<Complex64>, eigenvalue: Complex64) -> Option
 }
 
 /// Vector v of length 1 with A v ≈ 0, of a matrix A that is nearly singular, but not exactly: approximately its
-/// eigenvector of the eigenvalue nearest to zero. `None` if A is not square or [`inverse_iteration`] returns `None`, as
-/// it does if the LU decomposition of A has a pivot of zero.
+/// eigenvector of the eigenvalue nearest to zero. `None` if A is not square or not finite, or if [`inverse_iteration`]
+/// returns `None`, as it does if the LU decomposition of A has a pivot of zero.
 pub fn null_vector(matrix: DMatrix<Complex64>) -> Option<DVector<Complex64>> {
-    if !matrix.is_square() {
+    // An infinite pivot would be divided out unseen.
+    if !matrix.is_square() || matrix.iter().any(|entry| !entry.is_finite()) {
         return None;
     }
     let order = matrix.nrows();
@@ -85,6 +86,11 @@ mod tests {
         let vector = eigenvector(&nilpotent, Complex64::ZERO).unwrap();
         assert!(vector[1].norm() < 1e-9);
         assert!(null_vector(DMatrix::repeat(2, 2, Complex64::from(f64::NAN))).is_none());
+        let infinite = DMatrix::from_diagonal(&DVector::from_vec(vec![
+            Complex64::from(f64::INFINITY),
+            Complex64::ONE,
+        ]));
+        assert!(null_vector(infinite).is_none());
         // No square.
         assert!(null_vector(DMatrix::repeat(2, 3, Complex64::ONE)).is_none());
         assert!(eigenvector(&DMatrix::repeat(3, 2, Complex64::ONE), Complex64::ONE).is_none());

@@ -11,6 +11,7 @@ use nalgebra::DMatrix;
 /// problem. Several problems whose other parameters are common can therefore be solved together from their remaining
 /// equations (Golub and Pereyra, SIAM J. Numer. Anal. 10 (1973) 413).
 pub fn eliminated(mut matrix: DMatrix<f64>, count: usize) -> DMatrix<f64> {
+    let count = count.min(matrix.ncols());
     for mut column in matrix.column_iter_mut().take(count) {
         let length = column.norm();
         if length > 0.0 {

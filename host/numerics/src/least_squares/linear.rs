@@ -138,20 +138,23 @@ impl<'a> LinearProblem<'a> {
 
     fn check(&self) -> Result<(), LeastSquaresError> {
         let (rows, columns) = self.matrix.shape();
-        let mut vectors = vec![("the right side", self.right, rows)];
+        // Weights and inverse variances of the prior must not be negative, since their square roots enter the rows.
+        let [any, not_negative] = [f64::NEG_INFINITY, 0.0];
+        let mut vectors = vec![("the right side", self.right, rows, any)];
         vectors.extend(
             self.weights
-                .map(|weights| ("the vector of weights", weights, rows)),
+                .map(|weights| ("the vector of weights", weights, rows, not_negative)),
         );
         if let Some([mean, inverse_variances]) = self.prior {
-            vectors.push(("the mean of the prior", mean, columns));
+            vectors.push(("the mean of the prior", mean, columns, any));
             vectors.push((
                 "the vector of inverse variances of the prior",
                 inverse_variances,
                 columns,
+                not_negative,
             ));
         }
-        for (what, vector, expected) in vectors {
+        for (what, vector, expected, least) in vectors {
             let found = vector.len();
             if found != expected {
                 return Err(LeastSquaresError::Shape {
@@ -160,12 +163,7 @@ impl<'a> LinearProblem<'a> {
                     expected,
                 });
             }
-            // Weights and inverse variances of the prior must not be negative, since their square roots enter the rows.
-            let is_weight = !std::ptr::eq(vector, self.right) && what.starts_with("the vector");
-            if vector
-                .iter()
-                .any(|entry| !entry.is_finite() || (is_weight && *entry < 0.0))
-            {
+            if vector.iter().any(|entry| !entry.is_finite() || *entry < least) {
                 return Err(LeastSquaresError::NotFinite { what });
             }
         }

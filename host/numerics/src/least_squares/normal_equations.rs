@@ -42,9 +42,9 @@ impl<T: ComplexField<RealField = f64>> NormalEquations<T> {
     /// diagonal after it is scaled to 1.
     ///
     /// A ridge λ is the damping of the Levenberg–Marquardt method, or regularizes columns of A that are linearly
-    /// dependent within the accuracy √λ. `None` if `idle` refuses a parameter or the Cholesky decomposition fails: for
-    /// real entries, if N with the ridge and without the fixed parameters is not positive definite or an entry below
-    /// its diagonal is not finite, for complex ones only if a pivot is zero.
+    /// dependent within the accuracy √λ. `None` if `idle` refuses a parameter, or if a pivot of the Cholesky decomposition
+    /// of N, with the ridge and without the fixed parameters, is not positive and finite: N is then not positive definite
+    /// or has an entry below its diagonal that is not finite.
     pub fn new(matrix: &DMatrix<T>, ridge: f64, idle: Idle) -> Option<Self> {
         let size = matrix.nrows();
         let mut scale = DVector::zeros(size);
@@ -66,10 +66,12 @@ impl<T: ComplexField<RealField = f64>> NormalEquations<T> {
                 scaled[(i, j)] = matrix[(i, j)].clone().scale(scale[i]).scale(scale[j]);
             }
         }
-        Some(Self {
-            cholesky: Cholesky::new(scaled)?,
-            scale,
-        })
+        let cholesky = Cholesky::new(scaled)?;
+        // The decomposition takes the root of any complex pivot but zero; that of a negative one is imaginary.
+        let pivots = cholesky.l_dirty().diagonal();
+        let is_positive =
+            |pivot: &T| pivot.clone().real() > pivot.clone().imaginary().abs() && pivot.is_finite();
+        pivots.iter().all(is_positive).then_some(Self { cholesky, scale })
     }
 
     /// Solution x of (N + λ diag N) x = g with g = `right` and the ridge λ; 0 for fixed parameters.

@@ -162,6 +162,16 @@ fn what_cannot_be_solved_is_refused() {
             .solve()
             .is_err()
     );
+    // One vector as right side and weights.
+    let doubled = LinearProblem::new(&matrix, &negative)
+        .with_weights(&negative)
+        .solve();
+    assert_eq!(
+        doubled.unwrap_err(),
+        LeastSquaresError::NotFinite {
+            what: "the vector of weights"
+        }
+    );
     let mut bad = matrix.clone();
     bad[(0, 1)] = f64::NAN;
     assert_eq!(
@@ -417,6 +427,12 @@ fn complex_normal_equations_have_many_right_sides_and_parameters_that_are_held()
     let ridged = NormalEquations::new(&normal, 1.0, Idle::Hold).unwrap();
     assert!((ridged.solve(&right) - held.solve(&right) * 0.5).amax() < 1e-15);
     assert!(NormalEquations::new(&DMatrix::repeat(2, 2, f64::NAN), 0.0, Idle::Refuse).is_none());
+    // Indefinite or not finite, real and complex.
+    for corner in [2.0, f64::INFINITY, f64::NAN] {
+        let normal = DMatrix::from_row_slice(2, 2, &[1.0, corner, corner, 1.0]);
+        assert!(NormalEquations::new(&normal, 0.0, Idle::Refuse).is_none());
+        assert!(NormalEquations::new(&normal.map(Complex64::from), 0.0, Idle::Refuse).is_none());
+    }
 }
 
 #[test]
@@ -443,6 +459,8 @@ fn eliminated_columns_leave_the_solution_and_the_residual_of_the_whole_problem()
     }
     // Fewer rows than columns to eliminate: nothing remains.
     assert_eq!(eliminated(DMatrix::repeat(2, 5, 1.0), 3).shape(), (0, 2));
+    // More columns to eliminate than there are.
+    assert_eq!(eliminated(DMatrix::repeat(5, 2, 1.0), 3).ncols(), 0);
 }
 
 #[test]
