@@ -63,7 +63,10 @@ impl Section {
     pub(super) fn at(text: &str, line: usize) -> Option<&'static Self> {
         let headers = text.lines().take(line).filter_map(|line| {
             let header = line.trim().strip_prefix('[')?;
-            Some(header.split(']').next().unwrap_or_default().trim())
+            let name = header.trim_start_matches('[').split(']').next()?.trim();
+            // A row of a matrix over several lines begins with a bracket too.
+            name.starts_with(|first: char| first.is_alphabetic())
+                .then_some(name)
         });
         Self::of(headers.last()?)
     }
@@ -102,4 +105,20 @@ fn described(keys: &[&(&str, &str, &str)]) -> String {
         .map(|(key, _, example)| format!("\n  {key} = {example}"))
         .collect();
     format!("{}, such as{lines}", words.join(", "))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_row_of_a_matrix_is_no_header() {
+        let text = "[tool]\nteeth = 2\n[ uncertainty ] # of the material\ncovariance = [\n  [400.0, 1.0],\n[1.0]\n]\n\n[[cuts]]\n";
+        let at = |line| Section::at(text, line).map(|section| section.name);
+        assert_eq!(
+            [at(2), at(4), at(7)],
+            [Some("tool"), Some("uncertainty"), Some("uncertainty")]
+        );
+        assert_eq!(at(9), None);
+    }
 }

@@ -307,6 +307,15 @@ const WRONG_EXTENSIONS: &[(&str, usize, &[&str])] = &[
         &["direction", "\"x\", \"y\" or \"z\""],
     ),
     (
+        "[extension.coulomb-friction]\nfc_n = 3\ndirection = \"rx\"\n",
+        25,
+        &[
+            "extension.coulomb-friction.direction",
+            "rx",
+            "\"x\", \"y\" or \"z\"",
+        ],
+    ),
+    (
         "[extension.mode-coupling]\nkxyy_n_per_m3 = 1e12\ndirections = \"x\"\n",
         25,
         &["a list of two"],

@@ -94,8 +94,9 @@ fn describing_function(at: Harmonic) -> [Complex64; 2] {
 /// nothing changes.
 ///
 /// # Errors
-/// The key `before` is no word or names another effect, there is no friction, the gap is missing, or gap or contact are
-/// not possible.
+/// The key `before` is no word or names another effect; there is no friction; the friction has the keys `play_mm` or
+/// `contact_mm` too; the gap is missing, or gap or contact are not possible; the two directions differ; or the backlash
+/// has another key.
 pub(super) fn take_backlash(all: &mut Vec<Values>) -> Result<(), EffectError> {
     let Some(index) = all
         .iter()
@@ -106,21 +107,34 @@ pub(super) fn take_backlash(all: &mut Vec<Values>) -> Result<(), EffectError> {
     let Some(before) = all[index].text("before")? else {
         return Ok(());
     };
+    let mut backlash = all.remove(index);
     let friction = all
-        .iter()
-        .position(|known| known.effect() == EffectName::CoulombFriction);
+        .iter_mut()
+        .find(|known| known.effect() == EffectName::CoulombFriction);
     let Some(friction) = friction.filter(|_| before == EffectName::CoulombFriction.name()) else {
         let needed = "\"coulomb-friction\", and that effect too,";
-        return Err(all[index].clash("before", before, needed));
+        return Err(backlash.clash("before", before, needed));
     };
-    let mut backlash = all[index].clone();
-    let gap_mm = backlash.main("gap_mm")?;
-    all[friction].put("play_mm", Value::Number(gap_mm));
-    if let Some(contact_mm) = backlash.number("contact_mm")? {
-        all[friction].put("contact_mm", Value::Number(contact_mm));
+    for key in ["play_mm", "contact_mm"] {
+        if let Some(found) = friction.given(key) {
+            let needed = "gap_mm or contact_mm of the backlash before this friction alone";
+            return Err(friction.clash(key, found.in_words(), needed));
+        }
     }
-    all.remove(index);
-    Ok(())
+    let gap_mm = backlash.main("gap_mm")?;
+    friction.put("play_mm", Value::Number(gap_mm));
+    if let Some(contact_mm) = backlash.number("contact_mm")? {
+        friction.put("contact_mm", Value::Number(contact_mm));
+    }
+    if let Some(direction) = backlash.take("direction") {
+        let own = friction.given("direction").map(Value::in_words);
+        if own.is_some_and(|own| own != direction.in_words()) {
+            let needed = "the direction of the friction behind it";
+            return Err(backlash.clash("direction", direction.in_words(), needed));
+        }
+        friction.put("direction", direction);
+    }
+    backlash.finish()
 }
 
 #[derive(Clone, Copy, Debug)]

@@ -45,6 +45,60 @@ fn a_list_of_directions_is_an_effect_along_each() {
 }
 
 #[test]
+fn a_backlash_before_friction_has_no_unused_value() {
+    let of = |more: &[&'static str]| {
+        let series = [
+            "coulomb-friction=3",
+            "backlash=0.05",
+            "backlash.before=coulomb-friction",
+        ];
+        Effects::parse(series.into_iter().chain(more.iter().copied()))
+    };
+    let alone = of(&["coulomb-friction.direction=y"]).unwrap();
+    assert_eq!(alone.0.len(), 1);
+    // The direction may stand at either or both.
+    for more in [
+        &["backlash.direction=y"][..],
+        &["backlash.direction=y", "coulomb-friction.direction=y"],
+    ] {
+        assert_eq!(
+            format!("{:?}", of(more).unwrap()),
+            format!("{alone:?}"),
+            "{more:?}"
+        );
+    }
+    let refused = |more: &[&'static str]| of(more).unwrap_err();
+    assert!(matches!(refused(&["backlash.foo=1"]), EffectError::Key { .. }));
+    for (more, place) in [
+        (
+            &["backlash.direction=x", "coulomb-friction.direction=y"][..],
+            ("backlash", "direction"),
+        ),
+        (&["coulomb-friction.play_mm=0.1"], ("coulomb-friction", "play_mm")),
+        (
+            &["coulomb-friction.contact_mm=0.1"],
+            ("coulomb-friction", "contact_mm"),
+        ),
+    ] {
+        assert_eq!(refused(more).location(), Some(place));
+    }
+}
+
+#[test]
+fn lists_of_directions_and_of_channels_together_are_refused() {
+    let error = Effects::parse([
+        "cross-axis=0.1",
+        "cross-axis.direction=x,y",
+        "cross-axis.channel=ax,ay",
+    ]);
+    let message = error.unwrap_err().to_string();
+    assert!(
+        message.contains("one name beside a list of directions"),
+        "{message}"
+    );
+}
+
+#[test]
 fn each_fault_of_an_effect_has_its_own_error() {
     let error = |text| Effects::parse([text]).unwrap_err();
     assert!(matches!(error("runout"), EffectError::Form(_)));

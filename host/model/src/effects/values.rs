@@ -110,6 +110,16 @@ impl Values {
         self.by_key.insert(key.into(), value);
     }
 
+    /// The value with this key; `None` if it is not given.
+    pub(super) fn given(&self, key: &str) -> Option<&Value> {
+        self.by_key.get(key)
+    }
+
+    /// Removes the value with this key from the given values and returns it; `None` if it is not given.
+    pub(super) fn take(&mut self, key: &str) -> Option<Value> {
+        self.by_key.remove(key)
+    }
+
     /// The bounds of the effect's parameter with this key; for the empty key (VALUE) those of the main parameter; any
     /// finite number if there is no such parameter.
     fn prior(&self, key: &str) -> Prior {
@@ -159,6 +169,9 @@ impl Values {
         let Some((location, names)) = listed else {
             return Ok(vec![self]);
         };
+        if let ("direction", Some(channels @ Value::List(_))) = (location, self.by_key.get("channel")) {
+            return Err(self.wrong("channel", channels, "one name beside a list of directions"));
+        }
         let distinct: BTreeSet<&String> = names.iter().collect();
         if names.is_empty() || distinct.len() < names.len() {
             let found = Value::List(names);

@@ -177,7 +177,9 @@ impl Check<'_> {
     /// a list.
     fn location(&self, value: &Spanned<Value>, full: &str, key: &str) -> Result<(), CaseError> {
         let fits = |word: &Value| match word.as_str() {
-            Some(word) => key == "channel" || word.parse::<Direction>().is_ok(),
+            Some(word) => {
+                key == "channel" || word.parse().is_ok_and(|known: Direction| known.axis().is_some())
+            }
             None => false,
         };
         let (fits, needed) = match value.get_ref() {
