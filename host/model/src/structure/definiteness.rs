@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 use quietcut_numerics::eigenvalues::of_symmetric;
 
 use crate::criteria::ZERO_EIGENVALUE;
@@ -124,7 +124,7 @@ fn violation(
     Some(Indefinite {
         matrix: name,
         eigenvalue: smallest_eigenvalue(&symmetric),
-        remedy: remedy(&symmetric, strict, mass, directions),
+        remedy: remedy(matrix, &symmetric, strict, mass, directions),
     })
 }
 
@@ -132,12 +132,7 @@ fn violation(
 /// [`ZERO_EIGENVALUE`]. Rows and columns are first scaled so that positive diagonal entries become 1, since
 /// translations and rotations have different units.
 fn is_definite(symmetric: &DMatrix<f64>, strict: bool) -> bool {
-    let scale = symmetric
-        .diagonal()
-        .map(|d| if d > 0.0 { d.sqrt().recip() } else { 1.0 });
-    let scaled = DMatrix::from_fn(symmetric.nrows(), symmetric.ncols(), |i, j| {
-        symmetric[(i, j)] * scale[i] * scale[j]
-    });
+    let scaled = scaled(symmetric, &scale(symmetric));
     // A matrix whose eigenvalues cannot be computed, such as one with an entry that is not finite, counts as not
     // definite.
     let Ok(eigenvalues) = of_symmetric(scaled).map(|eigen| eigen.eigenvalues) else {
@@ -151,6 +146,19 @@ fn is_definite(symmetric: &DMatrix<f64>, strict: bool) -> bool {
     }
 }
 
+/// Factors of rows and columns that make positive diagonal entries 1.
+fn scale(symmetric: &DMatrix<f64>) -> DVector<f64> {
+    symmetric
+        .diagonal()
+        .map(|d| if d > 0.0 { d.sqrt().recip() } else { 1.0 })
+}
+
+fn scaled(symmetric: &DMatrix<f64>, scale: &DVector<f64>) -> DMatrix<f64> {
+    DMatrix::from_fn(symmetric.nrows(), symmetric.ncols(), |i, j| {
+        symmetric[(i, j)] * scale[i] * scale[j]
+    })
+}
+
 fn smallest_eigenvalue(symmetric: &DMatrix<f64>) -> f64 {
     of_symmetric(symmetric.clone()).map_or(f64::NAN, |eigen| eigen.eigenvalues.min())
 }
@@ -161,6 +169,7 @@ fn smallest_eigenvalue(symmetric: &DMatrix<f64>) -> f64 {
 /// reversing any one of them corrects the product. Entries whose sign differs from that in the mass matrix are tried
 /// first.
 fn remedy(
+    matrix: &DMatrix<f64>,
     symmetric: &DMatrix<f64>,
     strict: bool,
     mass: &DMatrix<f64>,
@@ -175,7 +184,7 @@ fn remedy(
     let sign = |(i, j): (usize, usize)| Remedy::Sign {
         row: i + 1,
         column: j + 1,
-        value: symmetric[(i, j)],
+        value: matrix[(i, j)],
         directions: (directions[i], directions[j]),
     };
     let diagonal = |row: usize, above: f64| Remedy::Diagonal {
@@ -212,9 +221,9 @@ fn with_reversed_sign(symmetric: &DMatrix<f64>, (i, j): (usize, usize)) -> DMatr
     reversed
 }
 
-/// Lower bound of the diagonal entry `row` for a definite matrix, sᵀ R⁻¹ s (from the Schur complement): s is the
-/// remainder of the row, R the matrix without row and column; 0 for a matrix of one row. `None` if R is not positive
-/// definite.
+/// Lower bound of the diagonal entry `row` for a definite matrix, sᵀ R⁺ s (from the Schur complement): s is the
+/// remainder of the row, R the matrix without row and column; 0 for a matrix of one row. `None` if R is not definite, or
+/// if s is not in the range of a singular R: then no diagonal entry is large enough.
 fn least_diagonal(symmetric: &DMatrix<f64>, row: usize, strict: bool) -> Option<f64> {
     let rest = symmetric.clone().remove_row(row).remove_column(row);
     if rest.is_empty() {
@@ -223,9 +232,25 @@ fn least_diagonal(symmetric: &DMatrix<f64>, row: usize, strict: bool) -> Option<
     if !is_definite(&rest, strict) {
         return None;
     }
-    let side = symmetric.column(row).into_owned().remove_row(row);
-    let solved = rest.cholesky()?.solve(&side);
-    Some(side.dot(&solved))
+    let scale = scale(&rest);
+    let side = symmetric
+        .column(row)
+        .into_owned()
+        .remove_row(row)
+        .component_mul(&scale);
+    let eigen = of_symmetric(scaled(&rest, &scale)).ok()?;
+    let least = ZERO_EIGENVALUE * eigen.eigenvalues.amax();
+    let parts = eigen.eigenvectors.tr_mul(&side);
+    let null: f64 = (0..parts.len())
+        .filter(|&i| eigen.eigenvalues[i] <= least)
+        .map(|i| parts[i] * parts[i])
+        .sum();
+    // The square of a part along the null space is as uncertain as the eigenvalue zero.
+    if null > ZERO_EIGENVALUE * side.norm_squared() {
+        return None;
+    }
+    let terms = (0..parts.len()).filter(|&i| eigen.eigenvalues[i] > least);
+    Some(terms.map(|i| parts[i] * parts[i] / eigen.eigenvalues[i]).sum())
 }
 
 #[cfg(test)]
@@ -262,6 +287,42 @@ mod tests {
             panic!("{:?}", found[1].remedy)
         };
         assert!((above - 489.0).abs() < 1.0, "{above}");
+    }
+
+    #[test]
+    fn a_diagonal_entry_beside_a_free_body_is_blamed() {
+        let directions = [Direction::X, Direction::Y, Direction::Z];
+        let mut mass = DMatrix::identity(3, 3);
+        (mass[(1, 2)], mass[(2, 1)]) = (0.1, 0.1);
+        let of = |values: &[f64]| {
+            let matrix = DMatrix::from_row_slice(3, 3, values);
+            violation("stiffness", &matrix, false, &mass, &directions).unwrap()
+        };
+        // x and y share a spring of 4 and are otherwise free; z is tied to their difference: sᵀ R⁺ s = 4·2²/16.
+        let found = of(&[4.0, -4.0, 2.0, -4.0, 4.0, -2.0, 2.0, -2.0, 0.5]);
+        let [Remedy::Diagonal { row: 3, above, .. }] = found.remedy[..] else {
+            panic!("{found}")
+        };
+        assert!((above - 1.0).abs() < 1e-9, "{above}");
+        // A coupling to the free motion: no entry of z is large enough.
+        let found = of(&[4.0, -4.0, 2.0, -4.0, 4.0, 2.5, 2.0, 2.5, 0.5]);
+        assert!(found.remedy.is_empty(), "{found}");
+        // The entry as it is in a matrix that is not symmetric.
+        let found = of(&[1.0, 0.9, 0.9, 0.9, 1.0, -0.8, 0.9, -0.6, 1.0]);
+        let values: Vec<f64> = found
+            .remedy
+            .iter()
+            .map(|remedy| match remedy {
+                Remedy::Sign {
+                    row: 2,
+                    column: 3,
+                    value,
+                    ..
+                } => *value,
+                other => panic!("{other}"),
+            })
+            .collect();
+        assert_eq!(values, [-0.8]);
     }
 
     #[test]
