@@ -2,7 +2,6 @@
 
 use nalgebra::{DMatrix, Matrix3xX, MatrixXx3};
 
-use crate::criteria::VELOCITY_JUMP;
 use crate::structure::{CubicForce, FirstOrder, Form, Structure, StructureError};
 use quietcut_numerics::dormand_prince::Quartic;
 
@@ -37,14 +36,13 @@ impl Dynamics {
     /// # Errors
     /// Mass, damping or stiffness is indefinite, the mass matrix has no inverse, or the poles cannot be computed.
     pub fn new(structure: &Structure) -> Result<Self, StructureError> {
-        let FirstOrder { a, b, c } = structure.first_order()?;
+        let first_order = structure.first_order()?;
+        let velocity_jumps = first_order.velocity_jumps();
+        let FirstOrder { a, b, c } = first_order;
         let order = a.nrows();
         let row = |matrix: &DMatrix<f64>, axis: usize| matrix.row(axis).iter().copied().collect::<Vec<_>>();
         let c = DMatrix::from_fn(3, order, |axis, state| c[(axis, state)]);
         let ca = &c * &a;
-        let jump = &c * &b;
-        // Modes of a structure with a mass matrix have C B = 0, except for rounding and the digits of the case file.
-        let velocity_jumps = jump.amax() > VELOCITY_JUMP * c.amax() * b.amax() * order as f64;
         let cubic = match structure.equation() {
             Some(matrices) if structure.is_nonlinear() => {
                 let scale = a[(0, matrices.mass.nrows())];
@@ -118,9 +116,11 @@ impl Dynamics {
     /// [`FirstOrder::at_sensor`]. Forces still act on the tool.
     #[must_use]
     pub fn at_sensor(&self, modes: &[f64]) -> Self {
-        let FirstOrder { a, c, .. } = self.first_order().at_sensor(modes);
-        let ca = &c * &a;
+        let first_order = self.first_order().at_sensor(modes);
         let mut at_sensor = self.clone();
+        at_sensor.velocity_jumps = first_order.velocity_jumps();
+        let FirstOrder { a, c, .. } = first_order;
+        let ca = &c * &a;
         for axis in 0..3 {
             at_sensor.c[axis] = c.row(axis).iter().copied().collect();
             at_sensor.ca[axis] = ca.row(axis).iter().copied().collect();
@@ -239,4 +239,34 @@ impl Dynamics {
 
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use num_complex::Complex64;
+
+    use super::*;
+    use crate::structure::{Direction, Mode};
+
+    #[test]
+    fn the_velocity_may_jump_at_a_sensor_and_not_at_the_tool() {
+        // Residues with the real parts 1 and −1: their sum 2 Re(Ψᴿ Ψᴸ) is zero at the tool, but not where one mode has
+        // half of its shape.
+        let mode = |frequency_hz, real| Mode {
+            frequency_hz,
+            damping_ratio: 0.02,
+            left: vec![Complex64::ONE],
+            right: vec![1e-5 * Complex64::new(real, -3.0)],
+        };
+        let dynamics = Dynamics::new(&Structure {
+            directions: vec![Direction::Y],
+            form: Form::Modes(vec![mode(17.0, 1.0), mode(30.0, -1.0)]),
+        })
+        .unwrap();
+        assert!(!dynamics.velocity_jumps());
+        assert!(!dynamics.at_sensor(&[0.5, 0.5]).velocity_jumps());
+        let sensor = dynamics.at_sensor(&[0.5, 1.0]);
+        assert!(sensor.velocity_jumps());
+        assert!((sensor.velocity_per_force()[1][1] + 1e-5).abs() < 1e-15);
+    }
 }

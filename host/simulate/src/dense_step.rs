@@ -58,6 +58,11 @@ impl Workspace {
             ..Self::new(model)
         }
     }
+
+    /// Equations of motion with the motion of the tool, or at the sensor, as output.
+    pub(super) fn dynamics<'a>(&'a self, model: &'a Model) -> &'a Dynamics {
+        self.sensor_dynamics.as_ref().unwrap_or(&model.dynamics)
+    }
 }
 
 impl DenseStep<'_> {
@@ -84,7 +89,7 @@ impl DenseStep<'_> {
             &workspace.state,
             &mut workspace.rate,
         );
-        let dynamics = workspace.sensor_dynamics.as_ref().unwrap_or(&self.model.dynamics);
+        let dynamics = workspace.dynamics(self.model);
         Motion {
             displacement_m: match &workspace.sensor_dynamics {
                 Some(sensor_dynamics) => sensor_dynamics.displacement(&workspace.state),

@@ -32,9 +32,10 @@ pub struct Reading {
 impl Reading {
     /// A channel of `count` samples that `pickup` reads from the motion of `model` at `rate_hz`, in Hz.
     pub fn new(model: &Model, pickup: Pickup, rate_hz: f64, count: usize) -> Self {
-        let is_mean = pickup.quantity == Quantity::Acceleration && model.dynamics.velocity_jumps();
+        let workspace = Workspace::at_sensor(model, &pickup.modes);
+        let is_mean = pickup.quantity == Quantity::Acceleration && workspace.dynamics(model).velocity_jumps();
         Self {
-            workspace: Workspace::at_sensor(model, &pickup.modes),
+            workspace,
             values: Vec::with_capacity(count + 1),
             pickup,
             rate_hz,

@@ -154,7 +154,7 @@ impl VirtualCut {
         if self.pores.is_some() && cutter.radius_m.is_none() {
             return Err(SimulateError::NoDiameter.into());
         }
-        let spindle = effects.spindle(self.spindle_motion());
+        let spindle = self.spindle(case)?;
         let traverse = self.traverse(&cutter, &spindle)?;
         let (dynamics, restoring_forces) = effects.dynamics(case.structure()?)?;
         if cutter.force.process_damping.is_some() && dynamics.velocity_jumps() && !restoring_forces.is_empty()
@@ -184,10 +184,19 @@ impl VirtualCut {
     /// The spindle motion in this cut of `case`, with its speed modulation.
     ///
     /// # Errors
-    /// The case has an extension that cannot be simulated.
+    /// The case has an extension that cannot be simulated, or the speed is modulated in a sweep.
     pub fn spindle(&self, case: &Case) -> Result<Spindle, VirtualCutError> {
         let effects = Effects::of_case(case)?.and(&self.effects);
-        Ok(effects.spindle(self.spindle_motion()))
+        let spindle = effects.spindle(self.spindle_motion());
+        if self.last_rpm.is_some() && spindle.fluctuation().is_some() {
+            return Err(EffectError::Cut {
+                name: EffectName::SpeedFluctuation.name(),
+                what: "the spindle speed changes over the cut, and a modulation about a changing speed is not simulated; \
+                       leave out one of both",
+            }
+            .into());
+        }
+        Ok(spindle)
     }
 
     /// The commanded spindle motion, without speed modulation.

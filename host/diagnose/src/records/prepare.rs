@@ -227,7 +227,12 @@ fn channels(baseline: &Baseline<'_>, recording: &Recording, domain: Domain) -> V
             // too; channels of motion are compared in the response domain.
             let compared =
                 is_force == (domain == Domain::Force) || recording.sidecar.kind == Some(TestKind::Cutting);
-            let is_mean = baseline.velocity_jumps && pickup.quantity == Quantity::Acceleration;
+            let velocity_jumps = if pickup.modes.is_empty() {
+                baseline.velocity_jumps
+            } else {
+                baseline.first_order.at_sensor(&pickup.modes).velocity_jumps()
+            };
+            let is_mean = velocity_jumps && pickup.quantity == Quantity::Acceleration;
             (axes_known && compared).then(|| Observed {
                 mean_s: if is_mean {
                     1.0 / recording.sample_rate_hz

@@ -3,6 +3,8 @@
 use nalgebra::{DMatrix, Matrix3, Matrix3xX, MatrixXx3};
 use num_complex::Complex64;
 
+use crate::criteria::VELOCITY_JUMP;
+
 use super::{Direction, Form, Matrices, Mode, Structure, StructureError, feed_axes};
 use quietcut_numerics::eigenvalues::{EigenvalueError, of_real};
 
@@ -72,6 +74,14 @@ impl FirstOrder {
             shape *= *factor;
         }
         at_sensor
+    }
+
+    /// True if a jump of the force makes the velocity of u jump: an entry of C B is above 1e-6·n·max|C|·max|B|.
+    ///
+    /// Modes of a structure with a mass matrix have C B = 0, except for rounding and the digits of the case file.
+    pub fn velocity_jumps(&self) -> bool {
+        let jump = &self.c * &self.b;
+        jump.amax() > VELOCITY_JUMP * self.c.amax() * self.b.amax() * self.order() as f64
     }
 
     /// Poles of the structure (eigenvalues of A), rad/s, sorted by imaginary part.

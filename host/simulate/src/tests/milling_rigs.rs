@@ -101,6 +101,24 @@ fn the_force_of_a_gliding_spindle_in_foam_is_that_of_the_solid_chip() {
 }
 
 #[test]
+fn a_modulated_sweep_is_refused() {
+    let case = case("kuka-kr90-acetal");
+    let modulation = ["speed-fluctuation=0.1", "speed-fluctuation.frequency_hz=2"];
+    let sweep = VirtualCut {
+        last_rpm: Some(LAST_RPM),
+        effects: Effects::parse(modulation).unwrap(),
+        ..VirtualCut::new(FIRST_RPM, 1.0, SECONDS)
+    };
+    let message = sweep.model(&case).err().unwrap().to_string();
+    assert!(message.contains("leave out one of both"), "{message}");
+    let steady = VirtualCut {
+        last_rpm: None,
+        ..sweep
+    };
+    assert!(steady.spindle(&case).is_ok());
+}
+
+#[test]
 fn without_pores_and_without_change_of_speed_it_is_the_plain_cut() {
     let case = case("kuka-kr90-acetal");
     let plain = VirtualCut {
