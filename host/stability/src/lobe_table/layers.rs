@@ -1,5 +1,6 @@
 //! Layers of a lobe table: cases, feeds per tooth and feed directions.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use quietcut_core::lobes::{FEED_DIRECTION_SPAN, Validity};
@@ -290,10 +291,7 @@ fn division(case: &Case, request: &TableRequest) -> Result<Division, BuildError>
     };
     feeds_mm.sort_by(f64::total_cmp);
     feeds_mm.dedup();
-    let mut directions: Vec<f64> = request.feed_directions_deg.clone();
-    directions.sort_by(f64::total_cmp);
-    // Feed directions of 0 and 360 degrees, next to each other in this order, are one direction.
-    directions.dedup_by_key(|degrees| (degrees.rem_euclid(360.0) * 100.0).round() as i64);
+    let directions = distinct(&request.feed_directions_deg);
     let directions_deg = if directions.is_empty() {
         vec![None]
     } else {
@@ -303,6 +301,16 @@ fn division(case: &Case, request: &TableRequest) -> Result<Division, BuildError>
         feeds_mm,
         directions_deg,
     })
+}
+
+/// Feed directions, degrees, by ascending size; of those that are one direction to a hundredth of a degree, such as 0 and
+/// 360 degrees, the first.
+fn distinct(directions_deg: &[f64]) -> Vec<f64> {
+    let mut directions = directions_deg.to_vec();
+    directions.sort_by(f64::total_cmp);
+    let mut hundredths = BTreeSet::new();
+    directions.retain(|degrees| hundredths.insert((degrees * 100.0).round().rem_euclid(36_000.0) as u32));
+    directions
 }
 
 fn at(case: &Case, feed_mm: f64, direction_deg: Option<f64>) -> Case {
@@ -443,5 +451,16 @@ impl Axis {
             }
         }
         Ok(filled.into_iter().map(|(value, _)| value).collect())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_whole_turn_is_the_same_direction() {
+        assert_eq!(distinct(&[360.0, 90.0, 0.0, 90.001]), [0.0, 90.0]);
+        assert_eq!(distinct(&[359.999, 180.0, 0.0, -180.0]), [-180.0, 0.0]);
     }
 }
