@@ -52,7 +52,7 @@ pub(super) struct ForceLevel {
     /// Median of the force amplitudes of the frequency steps in the first pass at this level, N.
     pub(super) force_n: f64,
     /// Steps by ascending frequency. Of steps at one frequency, a later one replaces the kept one if it is longer than
-    /// the fraction [`REPEATED_STEP`] of that.
+    /// the fraction [`REPEATED_STEP`] of the longest up to it.
     pub(super) steps: Vec<FrequencyStep>,
 }
 

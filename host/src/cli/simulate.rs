@@ -88,8 +88,8 @@ pub struct Args {
     /// Seed of the random numbers (sensor noise, scatter of impacts); the same seed gives the same file.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// Recording to write; the ending sets the format: csv, uff (UFF 58, text) or bunv (UFF 58, binary). Metadata go to
-    /// a sidecar file with the ending .toml. May be repeated.
+    /// Recording to write; the ending sets the format: csv, uff or unv (UFF 58, text) or bunv (UFF 58, binary). Metadata
+    /// go to a sidecar file with the ending .toml. May be repeated.
     #[arg(long, value_name = "REC.csv", value_parser = recording_to_write, required = true)]
     out: Vec<PathBuf>,
     #[command(flatten)]
@@ -132,7 +132,7 @@ fn recording_to_write(text: &str) -> Result<PathBuf, String> {
         Ok(path)
     } else {
         Err(format!(
-            "`{text}` ends in \"{ending}\"; csv, uff or bunv is needed"
+            "`{text}` ends in \"{ending}\"; csv, uff, unv or bunv is needed"
         ))
     }
 }

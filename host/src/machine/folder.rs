@@ -13,12 +13,12 @@ use crate::frf::FrfTable;
 use crate::recording::{Import, Recording, cut_table};
 
 /// File name extensions of the recordings in the folders `taps` and `cuts`.
-const RECORDINGS: [&str; 10] = [
-    "csv", "mat", "uff", "unv", "wav", "txt", "dat", "lvm", "tdms", "uf",
+const RECORDINGS: [&str; 12] = [
+    "csv", "txt", "dat", "tsv", "asc", "mat", "uff", "unv", "bunv", "wav", "lvm", "tdms",
 ];
 
 /// File name extensions of the tables of receptances in the folder `frf`.
-const RECEPTANCES: [&str; 4] = ["csv", "uff", "unv", "uf"];
+const RECEPTANCES: [&str; 4] = ["csv", "uff", "unv", "bunv"];
 
 /// Reason why the folder of a machine cannot be used.
 #[derive(Debug, thiserror::Error)]
