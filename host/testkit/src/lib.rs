@@ -12,6 +12,9 @@
 
 pub mod rates;
 pub mod results;
+mod slice;
+
+pub use slice::slice;
 
 use std::path::PathBuf;
 

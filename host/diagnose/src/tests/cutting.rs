@@ -27,9 +27,9 @@ fn case(feed_mm: &str, more: &str) -> Case {
     Case::parse(Path::new("baseline.toml"), &format!("{text}\n{more}")).unwrap()
 }
 
-/// Recordings of two cuts of four seconds at different speeds and feeds, with 2 % noise.
+/// Recordings of two cuts of two and a half seconds at different speeds and feeds, with 2 % noise.
 fn records(effects: &[&str], forces: bool, seed: u64) -> Vec<Recording> {
-    records_of(4.0, effects, forces, seed)
+    records_of(2.5, effects, forces, seed)
 }
 
 /// Recordings of two cuts of this duration in seconds at different speeds and feeds, with 2 % noise.
@@ -68,9 +68,17 @@ fn summary(diagnosis: &Diagnosis) -> String {
     )
 }
 
-/// Hidden effects: expected cause, effect, and whether forces are measured.
-const HIDDEN: [(&str, &[&str], bool); 6] = [
+/// A hidden effect of a cut: expected cause, effect, and whether forces are measured.
+type Hidden = (&'static str, &'static [&'static str], bool);
+
+/// Hidden effects of every run: one with and one without measured forces.
+const HIDDEN: [Hidden; 2] = [
     ("force-coefficients", &["force-coefficients=0.2"], true),
+    ("process-damping", &["process-damping=2e5"], false),
+];
+
+/// Hidden effects of the campaign.
+const ALSO_HIDDEN: [Hidden; 4] = [
     (
         "edge-force",
         &["edge-force=1.5", "edge-force.kre_n_per_mm=1"],
@@ -81,7 +89,6 @@ const HIDDEN: [(&str, &[&str], bool); 6] = [
         &["force-exponent=0.75", "force-exponent.reference_chip_mm=0.1"],
         false,
     ),
-    ("process-damping", &["process-damping=2e5"], false),
     (
         "speed-fluctuation",
         &["speed-fluctuation=0.01", "speed-fluctuation.frequency_hz=2"],
@@ -92,8 +99,19 @@ const HIDDEN: [(&str, &[&str], bool); 6] = [
 
 #[test]
 fn hidden_effects_are_found_in_cuts_with_and_without_force() {
+    assert_found(&HIDDEN);
+}
+
+#[test]
+#[ignore = "campaign: the other effects of cuts, two minutes"]
+fn further_hidden_effects_are_found_in_cuts() {
+    assert_found(&ALSO_HIDDEN);
+}
+
+/// Asserts that each effect is the first cause that the diagnosis of two cuts names, and that it explains all but noise.
+fn assert_found(hidden: &[Hidden]) {
     let mut wrong = Vec::new();
-    for (name, effects, forces) in HIDDEN {
+    for &(name, effects, forces) in hidden {
         let diagnosis = diagnose(
             &case("0.15", ""),
             &records(effects, forces, 7),
@@ -119,6 +137,7 @@ fn hidden_effects_are_found_in_cuts_with_and_without_force() {
 }
 
 #[test]
+#[ignore = "campaign: two cuts of 30 s, a minute"]
 fn long_cuts_are_searched_in_part_and_validated_on_the_rest() {
     let recordings = records_of(30.0, &["process-damping=2e5"], false, 7);
     let diagnosis = diagnose(&case("0.15", ""), &recordings, &Options::default()).unwrap();
@@ -147,49 +166,47 @@ fn a_cut_without_tachometer_or_depth_is_refused() {
 
 #[test]
 fn a_cause_that_moves_a_resonance_and_another_are_found_without_a_third() {
-    // The masses of the baseline are 97.0 and 188.0 kg. In the second test case, the Jacobian at the baseline is far from that at the
-    // solution.
-    let hidden: [(&[&str], _, _); 2] = [
-        (
-            &[
-                "mass=0.15",
-                "mass.direction=y",
-                "runout=20",
-                "runout.angle_deg=40",
-            ],
-            216.209,
-            ("runout", "runout_um", 20.0),
-        ),
-        (
-            &[
-                "mass=0.28",
-                "mass.direction=x",
-                "edge-force=2",
-                "edge-force.kre_n_per_mm=2",
-            ],
-            124.160,
-            ("edge-force", "kte_n_per_mm", 2.0),
-        ),
+    let effects = [
+        "mass=0.15",
+        "mass.direction=y",
+        "runout=20",
+        "runout.angle_deg=40",
     ];
-    for (effects, mass_kg, (other, key, value)) in hidden {
-        let diagnosis = diagnose(
-            &case("0.15", ""),
-            &records(effects, false, 7),
-            &Options::default(),
-        )
-        .unwrap();
-        println!("{}", summary(&diagnosis));
-        let mut names: Vec<&str> = diagnosis.causes.iter().map(|cause| cause.name).collect();
-        names.sort_unstable();
-        let mut expected = ["mass", other];
-        expected.sort_unstable();
-        assert_eq!(names, expected, "{}", summary(&diagnosis));
-        // The mass is determined within 0.1 %, the other cause, which only steps of the force show, within 3 %.
-        for (name, key, truth, share) in [("mass", "mass_kg", mass_kg, 1e-3), (other, key, value, 0.03)] {
-            let cause = diagnosis.causes.iter().find(|cause| cause.name == name).unwrap();
-            let found = cause.parameters[key].value;
-            assert!((found / truth - 1.0).abs() < share, "{}", summary(&diagnosis));
-        }
+    assert_mass_and_another(&effects, 216.209, ("runout", "runout_um", 20.0));
+}
+
+#[test]
+#[ignore = "campaign: a second pair of causes, a minute"]
+fn a_large_mass_and_an_edge_force_are_found_without_a_third() {
+    // The Jacobian at the baseline is far from that at the solution.
+    let effects = [
+        "mass=0.28",
+        "mass.direction=x",
+        "edge-force=2",
+        "edge-force.kre_n_per_mm=2",
+    ];
+    assert_mass_and_another(&effects, 124.160, ("edge-force", "kte_n_per_mm", 2.0));
+}
+
+/// Asserts that a mass, of the baseline 97.0 and 188.0 kg, and another cause are found with their parameters.
+fn assert_mass_and_another(effects: &[&str], mass_kg: f64, (other, key, value): (&str, &str, f64)) {
+    let diagnosis = diagnose(
+        &case("0.15", ""),
+        &records(effects, false, 7),
+        &Options::default(),
+    )
+    .unwrap();
+    println!("{}", summary(&diagnosis));
+    let mut names: Vec<&str> = diagnosis.causes.iter().map(|cause| cause.name).collect();
+    names.sort_unstable();
+    let mut expected = ["mass", other];
+    expected.sort_unstable();
+    assert_eq!(names, expected, "{}", summary(&diagnosis));
+    // The mass is determined within 0.1 %, the other cause, which only steps of the force show, within 3 %.
+    for (name, key, truth, share) in [("mass", "mass_kg", mass_kg, 1e-3), (other, key, value, 0.03)] {
+        let cause = diagnosis.causes.iter().find(|cause| cause.name == name).unwrap();
+        let found = cause.parameters[key].value;
+        assert!((found / truth - 1.0).abs() < share, "{}", summary(&diagnosis));
     }
 }
 
@@ -237,7 +254,7 @@ fn large_process_damping_is_found_beside_runout() {
     ] {
         let cause = diagnosis.causes.iter().find(|cause| cause.name == name).unwrap();
         let found = cause.parameters[key].value;
-        // With 2 % noise, some 30 000 samples leave an error below 0.2 %.
+        // With 2 % noise, some 20 000 samples leave an error below 0.2 %.
         assert!((found / truth - 1.0).abs() < 2e-3, "{}", summary(&diagnosis));
     }
 }
@@ -254,7 +271,7 @@ fn a_gain_of_the_dynamometer_is_not_taken_for_force_coefficients() {
     let expected = ["fx", "fy"].map(|name| ("sensor-gain", Some(name)));
     assert_eq!(said, expected, "{}", summary(&diagnosis));
     for cause in &diagnosis.causes {
-        // The noise is 2 % in 16 000 samples of each channel.
+        // The noise is 2 % in 10 000 samples of each channel.
         let gain = cause.parameters["gain"].value;
         assert!((gain - 1.1).abs() < 2e-3, "{gain}");
     }

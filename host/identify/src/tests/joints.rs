@@ -23,7 +23,7 @@ use quietcut_stability::{CubicTerms, Problem, line};
 use quietcut_testkit::case;
 use quietcut_testkit::rates::{assert_least_share, assert_pooled_share, assert_share};
 use quietcut_testkit::results::Campaign;
-use quietcut_testkit::robot;
+use quietcut_testkit::{robot, slice};
 
 const AXES: [Direction; 3] = [Direction::X, Direction::Y, Direction::Z];
 
@@ -277,7 +277,7 @@ impl Coverage {
 /// A seeded slice of the campaign.
 #[test]
 fn intervals_of_a_few_robots_hold_the_truth_as_often_as_they_say() {
-    let coverage = Coverage::of(10..16, tool_space);
+    let coverage = Coverage::of(10..10 + slice(3, 6), tool_space);
     println!("{:?}, peaks {}", coverage.joints, coverage.peaks);
     coverage.check();
 }
