@@ -144,9 +144,9 @@ fn stated(case: &Case, parameter: Parameter) -> Option<f64> {
         .filter(|std| *std > 0.0)
 }
 
-/// Pairs of modes of two sets with a common direction, in the order of frequency: those nearest in frequency whose shapes agree, a modal assurance criterion of
-/// [`SAME_MODE_SHAPE`] or more where two common directions define it, and whose frequencies differ by less than the factor
-/// [`SAME_MODE_FREQUENCY`]. Modes without a partner stand alone.
+/// Pairs of modes of two sets with a common direction, in the order of frequency: those nearest in frequency whose
+/// shapes agree, by a modal assurance criterion of 0.8 or more where two common directions define it, and whose
+/// frequencies differ by less than a factor of 1.2. Modes without a partner stand alone.
 pub fn pairs(before: &[ComparedMode], after: &[ComparedMode]) -> Vec<ModePair> {
     let mut possible: Vec<(f64, ModePair)> = Vec::new();
     for (i, old) in before.iter().enumerate() {

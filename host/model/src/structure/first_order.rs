@@ -12,9 +12,9 @@ use quietcut_numerics::eigenvalues::{EigenvalueError, of_real};
 /// point, along x, y, z.
 ///
 /// All n states are real. From matrices and joints, x = (q, q̇/s) with the constant s, 1/s, the larger of √‖M⁻¹K‖ and
-/// ‖M⁻¹C‖, or 1 if both are zero. From complex modes, x holds real and imaginary part of each modal coordinate η̇ = λη
-/// + Ψᴸᵀ F, and u = 2 Re(Ψᴿ η). This form needs no mass matrix: the residues need not sum to zero. Along an axis that
-/// is not a direction of the structure, the structure is rigid: a zero column of B, a zero row of C.
+/// ‖M⁻¹C‖, or 1 if both are zero. From complex modes, x holds real and imaginary part of each modal coordinate,
+/// η̇ = λη + Ψᴸᵀ F, and u = 2 Re(Ψᴿ η). This form needs no mass matrix: the residues need not sum to zero. Along an
+/// axis that is not a direction of the structure, the structure is rigid: a zero column of B, a zero row of C.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FirstOrder {
     /// A, n × n, 1/s.
