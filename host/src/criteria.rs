@@ -10,6 +10,11 @@
 /// receptance, so that the depth errs by about ten per cent at this bound. Unfounded.
 pub(crate) const LARGEST_FOLDING: f64 = 0.1;
 
+/// Relative error of a line of a measured FRF from folding at which the line counts as noise where its coherence is not
+/// known. A response of white noise has 0.4: its level at half the sample rate is that at the line. At half of this
+/// error the response at the line is twice as large as at half the sample rate. A choice.
+pub(crate) const FOLDING_OF_NOISE: f64 = 0.2;
+
 /// Relative error of the peak of a measured FRF from folding (aliasing of content above half the sample rate) above
 /// which `frf` warns. Sensors of the usual class of 1 % err as much. The stated interval of the peak includes the error
 /// from folding, however small.

@@ -2,6 +2,7 @@
 #![allow(clippy::expect_used, clippy::panic)]
 
 mod case_keys;
+mod faults;
 mod generated;
 mod outputs;
 mod snapshots;

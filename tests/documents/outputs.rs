@@ -63,7 +63,7 @@ const OUTPUTS: [(&str, &[&str]); 8] = [
 ];
 
 /// The text with masked numbers and bars. Spaces that align columns are joined to one, those at the start of a line stay.
-fn masked(text: &str) -> String {
+pub(crate) fn masked(text: &str) -> String {
     let mut lines = String::new();
     for line in text.lines() {
         let indent = line.len() - line.trim_start().len();

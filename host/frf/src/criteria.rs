@@ -223,6 +223,11 @@ pub(crate) const INVERTED_PHASE: f64 = 0.2;
 /// choice.
 pub(crate) const PLAUSIBLE_RECEPTANCE: [f64; 2] = [1e-12, 1e-2];
 
+/// Range of plausible forces of the hardest impact of a hammer test, N. The smallest instrumented hammers have a range of
+/// 200 N and resolve some mN, the largest sledges a range of 22 kN. Below a thousandth of the former, and above twice the
+/// latter, a unit is taken for wrong; a choice.
+pub(crate) const PLAUSIBLE_IMPACT_N: [f64; 2] = [0.2, 4.5e4];
+
 /// Smallest ratio of the power of a frequency line of a periodic force to the median power of the lines around it. The
 /// largest of 64 independent exponential powers of a random force exceeds 50 medians with a probability of 64·2⁻⁵⁰.
 pub(crate) const LINE_ABOVE_NEIGHBOURS: f64 = 50.0;

@@ -290,6 +290,18 @@ pub(super) fn force_peaks(force: &[f64], rate: f64) -> Vec<f64> {
     impacts.iter().map(|impact| impact.peak_n.abs()).collect()
 }
 
+/// Numbers of the double impacts, and of all impacts, in a signal that is taken for the force of a hammer. An impact is
+/// double if a second pulse follows before the next impact.
+pub(super) fn double_impacts(force: &[f64], rate: f64) -> (usize, usize) {
+    let impacts = impacts(force, rate);
+    let ends = impacts.iter().skip(1).map(|next| next.first).chain([force.len()]);
+    let double = impacts
+        .iter()
+        .zip(ends)
+        .filter(|(impact, end)| second_pulse(force, impact, *end, rate).is_some());
+    (double.count(), impacts.len())
+}
+
 /// Second force pulse of an impact: the largest force from one pulse width after the pulse of the impact to before
 /// sample `end`. Delay after the peak of the impact, s, and magnitude as a fraction of that peak. `None` if the force
 /// does not exceed the threshold of a double impact, or if no sample is left.

@@ -7,10 +7,11 @@ use realfft::RealFftPlanner;
 use quietcut_recording::{Channel, ChannelSummary, Quantity, RecordedCut, Recording, TestKind};
 
 use super::criteria::{
-    HUM_SHARE, INVERTED_PHASE, LINE_ABOVE_NEIGHBOURS, ONE_SIGN, PLAUSIBLE_RECEPTANCE, PULSE_SHORTER,
-    RINGS_AFTER, SHARE_OF_LINES, SPIKE_ABOVE, SPIKE_NEIGHBOURS, UNRELATED, UNRELATED_PEAK,
+    HUM_SHARE, INVERTED_PHASE, LINE_ABOVE_NEIGHBOURS, ONE_SIGN, PLAUSIBLE_IMPACT_N, PLAUSIBLE_RECEPTANCE,
+    PULSE_SHORTER, RINGS_AFTER, SHARE_OF_LINES, SPIKE_ABOVE, SPIKE_NEIGHBOURS, UNRELATED, UNRELATED_PEAK,
 };
 use super::excitation::Excitation;
+use super::hammer;
 use super::table::FrfTable;
 use super::test_channels::TestChannels;
 
@@ -19,17 +20,26 @@ use super::test_channels::TestChannels;
 ///
 /// A hammer's force is short pulses of one sign, and the response rings after them. A force and a response seem to be
 /// swapped if the response is such pulses, and the force lasts longer and has more power after the largest of them than
-/// before. The powers are not compared if too few samples precede that pulse.
+/// before. The powers are not compared if too few samples precede that pulse. They
+/// also seem to be if every impact in the force is double, as the pulses of a response that rings are, and no impact in
+/// the response is, which is struck.
 pub(super) fn swapped(channels: &TestChannels<'_>) -> Option<String> {
     let [(_, force)] = channels.forces[..] else {
         return None;
     };
+    let rate = channels.recording.sample_rate_hz;
+    let rings =
+        matches!(hammer::double_impacts(&force.samples, rate), (double, all) if double == all && all > 0);
+    let is_single =
+        |samples: &[f64]| hammer::is_struck(samples, rate) && hammer::double_impacts(samples, rate).0 == 0;
     let response = channels
         .responses
         .iter()
         .map(|response| response.channel)
         .chain(accelerations(channels))
-        .find(|response| are_swapped(&force.samples, &response.samples))?;
+        .find(|response| {
+            are_swapped(&force.samples, &response.samples) || rings && is_single(&response.samples)
+        })?;
     Some(format!(
         "{f} and {r} seem to be swapped: {r} has short pulses of one sign, as the force of a hammer, and {f} rings after them, as a response; \
          correct the head, or add --map {f}={r}:{unit_r},{r}={f}:N with the units that hold",
@@ -37,6 +47,18 @@ pub(super) fn swapped(channels: &TestChannels<'_>) -> Option<String> {
         r = response.name,
         unit_r = response.quantity.unit(),
     ))
+}
+
+/// Warning that the hardest impact of a hammer test has a force that no hammer measures; `None` for a plausible one.
+pub(super) fn impact(force: &Channel, hardest_n: f64) -> Option<String> {
+    let [low, high] = PLAUSIBLE_IMPACT_N;
+    (!(low..=high).contains(&hardest_n)).then(|| {
+        format!(
+            "the hardest impact has {hardest_n:.3} N; instrumented hammers measure from some tenths of a N to some 20 000 N: check unit and \
+             sensitivity of {name}; if its numbers are N in spite of the head, add --map {name}={name}:N",
+            name = force.name
+        )
+    })
 }
 
 /// All acceleration channels of the recording, also those that are not selected as responses.
@@ -376,8 +398,9 @@ pub(super) fn of_table(table: &FrfTable, has_periodic_force: bool) -> Vec<String
                 ("small", "below")
             };
             let bound = if size(peak) > high { high } else { low };
+            let digits = if size(peak) > high { 0 } else { 9 };
             warnings.push(format!(
-                "H{name} is implausibly {is}: its peak is {} µm/N, {than} {} µm/N; check the units and sensitivities of force and response",
+                "H{name} is implausibly {is}: its peak is {:.digits$} µm/N, {than} {} µm/N; check the units and sensitivities of force and response",
                 1e6 * size(peak),
                 1e6 * bound
             ));

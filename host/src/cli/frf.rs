@@ -15,7 +15,7 @@ use maud::html;
 use super::Error;
 use super::output::keep_inputs;
 use super::segment::Recorded;
-use crate::criteria::{LARGEST_FOLDING, SMALL_FOLDING};
+use crate::criteria::{FOLDING_OF_NOISE, LARGEST_FOLDING, SMALL_FOLDING};
 use crate::file;
 use crate::frf::{Frf, FrfError, FrfTable, Measurement, calibrate, measure};
 use crate::recording::UffForm;
@@ -69,8 +69,16 @@ fn check_folding(measurement: &mut Measurement) -> Result<(), Error> {
     // The peak is taken at the line with the largest |H| divided by the relative error by aliasing, among the lines
     // where the force causes the response. |H| alone may be largest where the force spectrum almost vanishes; one term
     // of the error is inversely proportional to that spectrum, so that the quotient is small there.
+    // Without coherence, lines of noise cannot be told by it: those count only if no other line does.
     let at_peak = |(entry, folding): (&Frf, &Vec<f64>)| {
-        let excited = |line: usize| entry.receptance[line].norm() / folding[line].max(f64::MIN_POSITIVE);
+        let is_noise = |line: usize| entry.coherence.is_none() && folding[line] >= FOLDING_OF_NOISE;
+        let excited = |line: usize| {
+            if is_noise(line) {
+                0.0
+            } else {
+                entry.receptance[line].norm() / folding[line].max(f64::MIN_POSITIVE)
+            }
+        };
         let peak = related_lines::largest(entry, excited);
         (entry.name(), folding.get(peak).copied().unwrap_or(0.0))
     };

@@ -118,7 +118,8 @@ pub(crate) fn unit(
     Err(DiagnoseError::record(
         path,
         format!(
-            "{name} is {factor:.4e} times the prediction of the case, with the same waveform: its unit, that of the force, or the case is wrong; give units in the header as name [unit].{}",
+            "{name} is {} times the prediction of the case, with the same waveform: its unit, that of the force, or the case is wrong; give units in the header as name [unit].{}",
+            digits(factor, 4),
             said(likely)
         ),
     ))
@@ -156,10 +157,17 @@ pub(crate) fn far_off(
     Err(DiagnoseError::record(
         path,
         format!(
-            "{name} is {factor:.1e} times the prediction of the case, more than any machine differs from its model: its unit, that of its excitation, or the case is wrong; give units in the header as name [unit].{}",
+            "{name} is {} times the prediction of the case, more than any machine differs from its model: its unit, that of its excitation, or the case is wrong; give units in the header as name [unit].{}",
+            digits(factor, 2),
             said(likely(factor))
         ),
     ))
+}
+
+/// A positive number with at least this number of significant digits, and without an exponent.
+fn digits(value: f64, significant: i32) -> String {
+    let after_point = significant - 1 - value.abs().max(f64::MIN_POSITIVE).log10().floor() as i32;
+    format!("{value:.*}", after_point.max(0) as usize)
 }
 
 /// Root mean square of the deviations of the samples from their mean.

@@ -9,6 +9,7 @@ use crate::excitation::Excitation;
 use crate::hammer::{self, HammerWindows, MeasuredImpact};
 use crate::measurement_settings::{MeasurementSettings, band};
 use crate::test_channels::TestChannels;
+use crate::test_plausibility;
 
 /// Length of the segments of all hammer tests, s, if they form several groups: the shortest of the lengths that
 /// [`hammer::segments`] selects for the recordings by default. With segments of different lengths, taps in x and in y
@@ -107,6 +108,12 @@ pub(super) fn struck(
             length as f64 / rate,
             times(&cut_short)
         ));
+    }
+    let hardest_n = used
+        .iter()
+        .fold(0.0_f64, |hardest, impact| hardest.max(impact.peak_n.abs()));
+    if let [(_, force)] = members[0].forces[..] {
+        warnings.extend(test_plausibility::impact(force, hardest_n));
     }
     if used.len() < IMPACTS_MIN {
         warnings.push(format!(

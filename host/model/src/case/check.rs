@@ -56,7 +56,7 @@ fn case(path: &Path, text: &str) -> Result<Case, CaseError> {
         .material
         .map(|material| check.material(&material))
         .transpose()?;
-    let cut = file.cut.map(|cut| check.cut(&cut)).transpose()?;
+    let cut = file.cut.map(|cut| check.cut(&cut, tool.as_ref())).transpose()?;
     let limits = file.limits.map(|limits| check.limits(&limits)).transpose()?;
     let extensions = check.extensions(file.extension)?;
     let provenance = file.provenance.unwrap_or_default();

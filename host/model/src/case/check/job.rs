@@ -6,7 +6,7 @@ use super::Check;
 use crate::case::file::{CutFile, MaterialFile, Number, PostureFile};
 use crate::case::{CaseError, Parameter, Posture};
 use crate::criteria::{COEFFICIENT_MAX_MPA, FEED_PER_TOOTH_MAX_MM};
-use crate::milling::{Cut, Material};
+use crate::milling::{Cut, Material, Tool};
 
 impl Check<'_> {
     pub(super) fn material(&mut self, file: &MaterialFile) -> Result<Material, CaseError> {
@@ -35,7 +35,7 @@ impl Check<'_> {
         self.sized(value, key, size, ("MPa", 1e6, "Pa"))
     }
 
-    pub(super) fn cut(&mut self, file: &CutFile) -> Result<Cut, CaseError> {
+    pub(super) fn cut(&mut self, file: &CutFile, tool: Option<&Tool>) -> Result<Cut, CaseError> {
         let (start, exit) = (*file.start_deg.get_ref(), *file.exit_deg.get_ref());
         let expected = if start > exit {
             format!(
@@ -63,6 +63,20 @@ impl Check<'_> {
             [0.0, FEED_PER_TOOTH_MAX_MM],
             ("mm", 1e3, "µm"),
         )?;
+        if let Some(diameter_mm) = tool.and_then(|tool| tool.diameter_mm)
+            && feed_per_tooth_mm >= diameter_mm
+        {
+            let expected = format!(
+                "less than the diameter of the tool (tool.diameter_mm = {diameter_mm}; {:.3} if the diameter was in m)",
+                1e3 * diameter_mm
+            );
+            return Err(self.wrong(
+                &file.feed_per_tooth_mm,
+                "cut.feed_per_tooth_mm",
+                feed_per_tooth_mm,
+                expected,
+            ));
+        }
         let feed_direction_deg = self.finite_or(&file.feed_direction_deg, "cut.feed_direction_deg", 0.0)?;
         self.deviation(&file.start_deg_std, "cut.start_deg", Parameter::Start)?;
         self.deviation(&file.exit_deg_std, "cut.exit_deg", Parameter::Exit)?;
