@@ -81,7 +81,8 @@ pub(super) fn segments(
         path: channels.recording.path.clone(),
         what,
     };
-    let impacts = impacts(&force.samples, rate);
+    let rest = Rest::of(&force.samples);
+    let impacts = impacts(&force.samples, rest, rate);
     if impacts.is_empty() {
         return Err(refused(format!(
             "{} has no impact of a hammer: no pulse stands out of the noise",
@@ -119,7 +120,7 @@ pub(super) fn segments(
         )));
     }
     for impact in &mut impacts {
-        impact.second = second_pulse(&force.samples, impact, impact.first - before + length, rate);
+        impact.second = second_pulse(&force.samples, rest, impact, impact.first - before + length, rate);
     }
     let (double, used): (Vec<MeasuredImpact>, Vec<MeasuredImpact>) =
         impacts.into_iter().partition(|impact| impact.second.is_some());
@@ -177,8 +178,9 @@ pub(super) fn segments(
 /// True if a force is that of a hammer: it has impacts, their peaks have one sign, and their pulses take up at most the
 /// share [`STRUCK_SHARE`] of the samples and at least the share [`STRUCK_ENERGY`] of the energy.
 pub(super) fn is_struck(force: &[f64], rate: f64) -> bool {
-    let impacts = impacts(force, rate);
-    let middle = median(&mut force.to_vec()).unwrap_or(0.0);
+    let rest = Rest::of(force);
+    let impacts = impacts(force, rest, rate);
+    let middle = rest.middle;
     let energy = |samples: &[f64]| -> f64 { samples.iter().map(|f| (f - middle).powi(2)).sum() };
     let samples: usize = impacts.iter().map(|impact| impact.last - impact.first + 1).sum();
     let struck: f64 = impacts
@@ -240,9 +242,7 @@ fn longest_segment(impacts: &[MeasuredImpact], samples: usize) -> usize {
 
 /// Detects the impacts of a hammer in a force signal, in the order of time. Pulses that start within [`BOUNCE_S`] after
 /// the start of an impact are its bounces and do not count.
-fn impacts(force: &[f64], rate: f64) -> Vec<MeasuredImpact> {
-    let middle = median(&mut force.to_vec()).unwrap_or(0.0);
-    let noise = noise(force, middle);
+fn impacts(force: &[f64], Rest { middle, noise }: Rest, rate: f64) -> Vec<MeasuredImpact> {
     let largest = force
         .iter()
         .fold(0.0_f64, |largest, f| largest.max((f - middle).abs()));
@@ -286,41 +286,61 @@ fn impacts(force: &[f64], rate: f64) -> Vec<MeasuredImpact> {
 
 /// Magnitudes of the peaks of the impacts in a force signal, N, in the order of time.
 pub(super) fn force_peaks(force: &[f64], rate: f64) -> Vec<f64> {
-    let impacts = impacts(force, rate);
+    let impacts = impacts(force, Rest::of(force), rate);
     impacts.iter().map(|impact| impact.peak_n.abs()).collect()
 }
 
-/// Numbers of the double impacts, and of all impacts, in a signal that is taken for the force of a hammer. An impact is
-/// double if a second pulse follows before the next impact.
-pub(super) fn double_impacts(force: &[f64], rate: f64) -> (usize, usize) {
-    let impacts = impacts(force, rate);
+/// True if a signal that is taken for the force of a hammer has impacts, and each of them is double (`is_double`) or each
+/// is single: a second pulse follows before the next impact, or none does.
+pub(super) fn all_impacts_are(is_double: bool, force: &[f64], rate: f64) -> bool {
+    let rest = Rest::of(force);
+    let impacts = impacts(force, rest, rate);
     let ends = impacts.iter().skip(1).map(|next| next.first).chain([force.len()]);
-    let double = impacts
-        .iter()
-        .zip(ends)
-        .filter(|(impact, end)| second_pulse(force, impact, *end, rate).is_some());
-    (double.count(), impacts.len())
+    !impacts.is_empty()
+        && impacts
+            .iter()
+            .zip(ends)
+            .all(|(impact, end)| second_pulse(force, rest, impact, end, rate).is_some() == is_double)
 }
 
 /// Second force pulse of an impact: the largest force from one pulse width after the pulse of the impact to before
 /// sample `end`. Delay after the peak of the impact, s, and magnitude as a fraction of that peak. `None` if the force
 /// does not exceed the threshold of a double impact, or if no sample is left.
-fn second_pulse(force: &[f64], impact: &MeasuredImpact, end: usize, rate: f64) -> Option<(f64, f64)> {
-    let middle = median(&mut force.to_vec()).unwrap_or(0.0);
+fn second_pulse(
+    force: &[f64],
+    Rest { middle, noise }: Rest,
+    impact: &MeasuredImpact,
+    end: usize,
+    rate: f64,
+) -> Option<(f64, f64)> {
     let width = (impact.last - impact.first).max(4);
     // One pulse width after the first pulse (at least four samples) is skipped, since anti-aliasing filters ring there.
     let from = (impact.last + width).min(end);
     let (at, size) = (from..end.min(force.len()))
         .map(|k| (k, (force[k] - middle).abs()))
         .max_by(|a, b| a.1.total_cmp(&b.1))?;
-    let threshold = (SECOND_PULSE * impact.peak_n.abs()).max(PULSE_ABOVE_NOISE * noise(force, middle));
+    let threshold = (SECOND_PULSE * impact.peak_n.abs()).max(PULSE_ABOVE_NOISE * noise);
     let delay_s = at as f64 / rate - impact.time_s;
     (size > threshold).then(|| (delay_s, size / impact.peak_n.abs()))
 }
 
-/// Standard deviation of the force noise: 1.4826 · median absolute deviation from `middle`, the relation for Gaussian
-/// noise. Rare impacts hardly affect the median.
-fn noise(force: &[f64], middle: f64) -> f64 {
-    let mut deviations: Vec<f64> = force.iter().map(|f| (f - middle).abs()).collect();
-    1.4826 * median(&mut deviations).unwrap_or(0.0)
+/// Force of a hammer between its impacts, N. Rare impacts do not affect medians.
+#[derive(Clone, Copy)]
+struct Rest {
+    /// Median force of the record.
+    middle: f64,
+    /// Standard deviation of the noise: 1.4826 times the median absolute deviation from the middle, which holds for
+    /// Gaussian noise.
+    noise: f64,
+}
+
+impl Rest {
+    fn of(force: &[f64]) -> Self {
+        let middle = median(&mut force.to_vec()).unwrap_or(0.0);
+        let mut deviations: Vec<f64> = force.iter().map(|f| (f - middle).abs()).collect();
+        Self {
+            middle,
+            noise: 1.4826 * median(&mut deviations).unwrap_or(0.0),
+        }
+    }
 }

@@ -20,25 +20,25 @@ use super::test_channels::TestChannels;
 ///
 /// A hammer's force is short pulses of one sign, and the response rings after them. A force and a response seem to be
 /// swapped if the response is such pulses, and the force lasts longer and has more power after the largest of them than
-/// before. The powers are not compared if too few samples precede that pulse. They
-/// also seem to be if every impact in the force is double, as the pulses of a response that rings are, and no impact in
-/// the response is, which is struck.
+/// before. The powers are not compared if too few samples precede that pulse. They also seem to be swapped if the response
+/// is struck by single impacts, and every impact in the force is double, as the pulses of a ringing response are.
 pub(super) fn swapped(channels: &TestChannels<'_>) -> Option<String> {
     let [(_, force)] = channels.forces[..] else {
         return None;
     };
     let rate = channels.recording.sample_rate_hz;
-    let rings =
-        matches!(hammer::double_impacts(&force.samples, rate), (double, all) if double == all && all > 0);
-    let is_single =
-        |samples: &[f64]| hammer::is_struck(samples, rate) && hammer::double_impacts(samples, rate).0 == 0;
+    let rings_at_single_impacts = |response: &Channel| {
+        hammer::is_struck(&response.samples, rate)
+            && hammer::all_impacts_are(false, &response.samples, rate)
+            && hammer::all_impacts_are(true, &force.samples, rate)
+    };
     let response = channels
         .responses
         .iter()
         .map(|response| response.channel)
         .chain(accelerations(channels))
         .find(|response| {
-            are_swapped(&force.samples, &response.samples) || rings && is_single(&response.samples)
+            are_swapped(&force.samples, &response.samples) || rings_at_single_impacts(response)
         })?;
     Some(format!(
         "{f} and {r} seem to be swapped: {r} has short pulses of one sign, as the force of a hammer, and {f} rings after them, as a response; \
