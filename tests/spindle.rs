@@ -4,7 +4,7 @@
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use std::path::Path;
 
-use quietcut_tests::command::{cases, folder, quietcut};
+use quietcut_tests::command::{cases, done, folder, quietcut, words};
 use serde_json::Value;
 
 /// A case of the folder `tests/cases` with a diameter of the tool, other lines and further ones at its end.
@@ -42,8 +42,7 @@ fn is_possible(rpm: f64, depth_mm: f64) -> bool {
 }
 
 fn json(folder: &Path, line: &str) -> Value {
-    let arguments: Vec<&str> = line.split_whitespace().collect();
-    quietcut(folder, &arguments).json()
+    quietcut(folder, &words(line)).json()
 }
 
 #[test]
@@ -65,11 +64,9 @@ fn the_torque_of_a_simulated_cut_is_that_of_the_limit() {
     let torque_nm_per_mm = 1.0 / driven["depth_mm"].as_f64().expect("a depth");
     // The forces of a simulated cut 0.1 mm deep, with the vibration of the tool. One of the two teeth cuts at a time,
     // from 90° to 180°, so that the tangential force follows from the force in feed and normal direction.
-    quietcut(
+    done(
         folder.path(),
-        &"simulate case.toml --rpm 10000 --depth-mm 0.1 --seconds 1 --sample-rate-hz 50000 --ideal --measure none --out cut.csv"
-            .split_whitespace()
-            .collect::<Vec<_>>(),
+        "simulate case.toml --rpm 10000 --depth-mm 0.1 --seconds 1 --sample-rate-hz 50000 --ideal --measure none --out cut.csv",
     );
     let text = std::fs::read_to_string(folder.path().join("cut.csv")).expect("a recording");
     // Within full engagement, over 30 whole revolutions.
@@ -214,8 +211,7 @@ fn power_of_a_tool_without_diameter_is_not_considered_and_the_key_is_named() {
         "lobes case.toml --rpm 9000:10000:2 --depth-mm 0:1:40",
         "table case.toml --speeds 20 --out a.qct",
     ] {
-        let arguments: Vec<&str> = line.split_whitespace().collect();
-        let output = quietcut(folder.path(), &arguments);
+        let output = quietcut(folder.path(), &words(line));
         assert!(output.stderr.contains("diameter_mm"), "{line}: {}", output.stderr);
     }
 }
