@@ -21,8 +21,8 @@ impl Segment {
     /// Cuts the segment out of `recording`.
     ///
     /// # Errors
-    /// A given start or end leaves fewer than two samples; a channel has fewer samples than the end of the segment, or
-    /// without a given end the first channel, requires; or the segment has a NaN or infinite sample.
+    /// A given start or end leaves fewer than two samples; a channel has another number of samples than the first one; or
+    /// the segment has a NaN or infinite sample.
     pub(super) fn of(self, recording: Recording) -> Result<Recording, RecordingError> {
         let (count, rate) = (recording.len(), recording.sample_rate_hz);
         let content = |what: String| RecordingError::Content {

@@ -47,7 +47,7 @@ pub struct Args {
     no_force: bool,
     #[command(flatten)]
     milling_rig: MillingRig,
-    /// Effect to add to the case, such as runout=20 (µm) or runout.angle_deg=45; may be repeated; listed below.
+    /// Effect to add to the case, such as runout=20 (µm) or runout.angle_deg=45; may be repeated; --help lists all effects.
     #[arg(long, value_name = "NAME=VALUE")]
     effect: Vec<String>,
     /// Entry into and exit from the workpiece. Default: feed, or ramp if the tool diameter is not given or the duration

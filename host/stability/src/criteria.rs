@@ -123,9 +123,9 @@ pub(crate) const CHART_SAMPLES_MIN: usize = 40;
 /// bisection on the number of multipliers outside the unit circle. Unfounded.
 pub(crate) const LINE_LEVELS: u32 = 14;
 
-/// Least |μ|, at one end of a depth interval at least, of a multiplier that is followed along the depth. The crossings
-/// found in an interval must explain the change in the number of multipliers outside the unit circle between its ends,
-/// so that a smaller multiplier that is outside at one end only is noticed; the value is unfounded.
+/// Least |μ|, at an end of a depth interval, of a multiplier that must not be lost between the ends: if it has no
+/// partner at the other end and may reach the unit circle, the interval is halved. Whatever their size, the crossings
+/// found must also explain the change in the number of multipliers outside the unit circle between the ends. Unfounded.
 pub(crate) const LINE_FOLLOWED: f64 = 0.3;
 
 /// Distance of |μ| from 1 within which Newton's method corrects a multiplier of the scan over the depth before it

@@ -30,7 +30,8 @@ pub struct Slopes {
     /// Derivatives of the limit by the damping ratio of each mode of the layer, in the order of the modes, mm per
     /// relative change; 0 beyond the last mode.
     pub by_damping_ratio: [f32; MODES_MAX],
-    /// Derivative of the limit by the cutting force coefficient K_tc, mm per relative change.
+    /// Derivative of the limit by the cutting force coefficient K_tc at constant ratios K_rc/K_tc and K_ac/K_tc, mm per
+    /// relative change.
     pub by_cutting_force: f32,
 }
 

@@ -1,5 +1,6 @@
-//! Regressors of sensor errors, shared by gain, delay, cross-axis sensitivity and offset. The estimated motion of the
-//! tool stands for the true value y_t of a reading.
+//! What causes of sensor errors share: locations of a gain, a delay and an offset of the sensor from the tool tip, and
+//! regressors of a gain, a delay and a cross-axis sensitivity. The estimated motion of the tool stands for the true value
+//! y_t of a reading.
 
 use num_complex::Complex64;
 

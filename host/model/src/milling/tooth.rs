@@ -41,7 +41,7 @@ impl Immersion {
     }
 }
 
-/// Edge angle γ of the teeth.
+/// Edge angle γ of the teeth, between the cutting edge and the plane normal to the tool axis: 90° for a square end mill.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EdgeAngle {
     degrees: f64,

@@ -73,7 +73,7 @@ impl Structure {
         }
     }
 
-    /// True if the structure has a cubic term different from zero.
+    /// True if the structure has a cubic stiffness or a cubic damping different from zero.
     pub fn is_nonlinear(&self) -> bool {
         match &self.form {
             Form::Matrices(matrices) => [&matrices.cubic_damping, &matrices.cubic_stiffness]

@@ -59,8 +59,8 @@ pub(super) fn mode_count(table_layers: &[TableLayer]) -> Result<usize, BuildErro
     }
 }
 
-/// Derivatives of one limiting depth with respect to natural frequency and damping ratio of each mode and to the
-/// cutting coefficient K_tc, mm per relative change.
+/// Derivatives of one limiting depth with respect to natural frequency and damping ratio of each mode, and to the cutting
+/// coefficient K_tc at constant ratios K_rc/K_tc and K_ac/K_tc and constant edge coefficients, mm per relative change.
 struct SwitchDerivatives {
     depth_mm: f64,
     by_mode: Vec<[f64; 2]>,

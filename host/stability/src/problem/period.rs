@@ -25,7 +25,8 @@ use quietcut_numerics::quadrature::Gauss;
 
 pub(crate) use crate::problem::element::{Element, Port};
 
-/// Resolution of the mesh over a tooth period: length of its elements and error of collocation in each.
+/// Required resolution of the mesh over a tooth period: bounds of the length of its elements, as a phase angle, and of the
+/// error of collocation in each.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Resolution {
     /// Largest phase angle, rad, by which the fastest motion may rotate over one element.
