@@ -265,7 +265,7 @@ fn a_band_above_half_the_rate_and_an_output_over_an_input_are_refused() {
         ("frf hammer.csv --band-hz 12:24 --out hammer.csv", "overwrite"),
         (
             "identify hammer.csv --method modes --out ./hammer.csv",
-            ".toml is needed",
+            ".toml, .html or .svg is needed",
         ),
     ] {
         let arguments: Vec<&str> = line.split(' ').collect();
