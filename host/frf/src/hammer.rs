@@ -127,11 +127,13 @@ pub(super) fn segments(
     let Some(first) = used.first() else {
         let (delay_s, part) = double[0].second.unwrap_or_default();
         return Err(refused(format!(
-            "all {} impacts are double (the first at {:.3} s has a second pulse of {:.0} % {:.1} ms later); strike again, or take shorter segments",
+            "all {} impacts are double (after the first at {:.3} s a second pulse of {:.0} % of its force follows {:.1} ms later); strike again so that \
+             the hammer touches once, or end the segments before the second pulse by --resolution-hz above {:.0}",
             double.len(),
             double[0].time_s,
             100.0 * part,
-            1e3 * delay_s
+            1e3 * delay_s,
+            1.0 / delay_s
         )));
     };
     debug_assert!(first.last >= first.first);

@@ -104,7 +104,8 @@ pub fn measure(recordings: &[Recording], settings: &MeasurementSettings) -> Resu
         .first()
         .map_or(Path::new(""), |recording| &recording.path);
     let mut measurement = merged(path, measured)?;
-    measurement.warnings.extend(doubts);
+    // What is wrong with the recording comes before what follows from it.
+    measurement.warnings.splice(0..0, doubts);
     let of_table = test_plausibility::of_table(&measurement.table, has_periodic_force);
     measurement.warnings.extend(of_table);
     let slowest_hz = recordings

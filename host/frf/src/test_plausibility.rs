@@ -55,7 +55,7 @@ pub(super) fn impact(force: &Channel, hardest_n: f64) -> Option<String> {
     (!(low..=high).contains(&hardest_n)).then(|| {
         format!(
             "the hardest impact has {hardest_n:.3} N; instrumented hammers measure from some tenths of a N to some 20 000 N: check unit and \
-             sensitivity of {name}; if its numbers are N in spite of the head, add --map {name}={name}:N",
+             sensitivity of {name}; if its numbers are N although the file gives another unit, add --map {name}={name}:N",
             name = force.name
         )
     })
@@ -188,8 +188,8 @@ fn has_lines(channels: &TestChannels<'_>, warnings: &mut Vec<String>) -> bool {
         return false;
     }
     let remedy = if is_cut(channels.recording) {
-        "an ordinary cut shows nothing between the tooth passings, where these receptances are noise: compare the cut with a case by quietcut \
-         diagnose CASE REC, or look for chatter by quietcut replay REC"
+        "an ordinary cut shows nothing between the tooth passings, where these receptances are noise; do not use them: for receptances record a \
+         tap test; quietcut replay REC --teeth N looks for chatter in a cut, quietcut diagnose CASE REC compares it with a case of the machine"
     } else {
         "between its lines nothing is excited, and the receptances there are noise: for a stepped sine say --excitation step-sine, for a \
          multisine of whole periods --excitation multisine, for a cut use quietcut diagnose CASE REC or quietcut replay REC"
@@ -285,8 +285,8 @@ fn hum(channels: &TestChannels<'_>) -> Vec<String> {
                 .max_by(|a, b| a.0.total_cmp(&b.0))?;
             (share > HUM_SHARE).then(|| {
                 format!(
-                    "{name} is mostly hum of the mains: {:.0} % of its energy is at {hertz} Hz; check cable, shield and earthing of the sensor, \
-                     and do not use receptances near {hertz} Hz and its multiples",
+                    "{name} is mostly hum of the mains: {:.0} % of its energy is at {hertz} Hz; check cable, shield and earthing of the sensor \
+                     and record again; receptances near {hertz} Hz and its multiples are wrong",
                     100.0 * share,
                     name = channel.name
                 )

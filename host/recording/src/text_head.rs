@@ -172,7 +172,8 @@ fn columns_before(
             return Err((
                 last.number,
                 format!(
-                    "\"{text}\" stands among numbers; a number is needed there, or the header has a number and a row of names is needed"
+                    "\"{text}\" stands among numbers before the first whole row of numbers: if this is a row of the recording, delete it or write \
+                     the number; if it is the header, write a name instead of each number"
                 ),
             ));
         }

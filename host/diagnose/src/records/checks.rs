@@ -67,15 +67,44 @@ pub(crate) fn record(
     Ok(())
 }
 
-/// Ratios by which a wrong unit scales a channel up or down, each with its tolerance as a difference of logarithms, and
-/// the words for the unit that was probably meant.
-const UNITS: [(f64, f64, &str); 6] = [
-    (4.448, POUND_TOLERANCE, "4.45: pounds of force for N"),
-    (1e3, UNIT_TOLERANCE, "a thousand: mm, kN or g for m, N or kg"),
-    (1e6, UNIT_TOLERANCE, "a million: µm for m"),
-    (25.4, UNIT_TOLERANCE, "25.4: inches for mm"),
-    (39.37, UNIT_TOLERANCE, "39.37: inches for m"),
-    (9.806_65, UNIT_TOLERANCE, "9.81: g for m/s²"),
+/// A mix-up of two units.
+struct UnitMixUp {
+    /// Ratio of the two units, above 1.
+    ratio: f64,
+    /// Tolerance of the ratio, as a difference of logarithms.
+    tolerance: f64,
+    /// Words for it where a channel is larger than predicted by the ratio.
+    larger: &'static str,
+    /// Words for it where a channel is smaller than predicted by the ratio.
+    smaller: &'static str,
+}
+
+/// The mix-up of two units whose words do not depend on which of them was read for the other.
+const fn mix_up(ratio: f64, tolerance: f64, words: &'static str) -> UnitMixUp {
+    UnitMixUp {
+        ratio,
+        tolerance,
+        larger: words,
+        smaller: words,
+    }
+}
+
+const UNITS: [UnitMixUp; 6] = [
+    mix_up(4.448, POUND_TOLERANCE, "the ratio of pounds of force and N"),
+    mix_up(
+        1e3,
+        UNIT_TOLERANCE,
+        "a thousand, as of mm and m, N and kN, or g and kg",
+    ),
+    mix_up(1e6, UNIT_TOLERANCE, "a million, as of µm and m"),
+    mix_up(25.4, UNIT_TOLERANCE, "25.4, as of mm and inches"),
+    mix_up(39.37, UNIT_TOLERANCE, "39.37, as of inches and m"),
+    UnitMixUp {
+        ratio: 9.806_65,
+        tolerance: UNIT_TOLERANCE,
+        larger: "9.81, as if numbers in m/s² were read as g",
+        smaller: "1/9.81, as if numbers in g were read as m/s²",
+    },
 ];
 
 /// Refuses a channel whose ratio to the prediction is outside the range from `FRICTION_RATIO` to `WRONG_UNIT_RATIO` at
@@ -176,8 +205,8 @@ fn spread(samples: &[f64]) -> f64 {
     rms(&samples.iter().map(|x| x - mean).collect::<Vec<_>>())
 }
 
-/// The unit mix-up (such as g for m/s²) that a fitted sensor gain may stand for; `None` if the gain is near the ratio
-/// of no such mix-up.
+/// Words for the mix-up of units (such as g and m/s²) that a fitted sensor gain may stand for; `None` if the gain is
+/// near the ratio of no such mix-up.
 pub(crate) fn unit_of_gain(gain: f64) -> Option<&'static str> {
     unit_within(gain.abs(), |_| GAIN_UNIT_TOLERANCE)
 }
@@ -190,10 +219,16 @@ fn likely(factor: f64) -> Option<&'static str> {
 
 fn unit_within(factor: f64, most: impl Fn(f64) -> f64) -> Option<&'static str> {
     let size = factor.max(1.0 / factor);
-    let near = |unit: f64| (size / unit).ln().abs();
-    let units = UNITS.iter().filter(|(unit, share, _)| near(*unit) < most(*share));
-    let nearest = units.min_by(|a, b| near(a.0).total_cmp(&near(b.0)));
-    nearest.map(|(.., meant)| *meant)
+    let near = |mix_up: &UnitMixUp| (size / mix_up.ratio).ln().abs();
+    let known = UNITS
+        .iter()
+        .filter(|mix_up| near(mix_up) < most(mix_up.tolerance));
+    let nearest = known.min_by(|a, b| near(a).total_cmp(&near(b)))?;
+    Some(if factor > 1.0 {
+        nearest.larger
+    } else {
+        nearest.smaller
+    })
 }
 
 fn said(likely: Option<&str>) -> String {
