@@ -131,12 +131,17 @@ impl Sidecar {
     /// Description of the channel with a standard name such as `ax`, also if the file calls it by another name, or if
     /// the description states the name with a sign (`-ax`); `None` if the sidecar has no description of it.
     pub fn channel(&self, name: &str) -> Option<&RecordedChannel> {
+        self.channels.get(self.section_of(name).unwrap_or(name))
+    }
+
+    /// Name in the file of the channel that the sidecar gives the standard name `name`, also with a sign; `None` if the
+    /// sidecar gives it to no channel.
+    pub fn section_of(&self, name: &str) -> Option<&str> {
         let is_named = |stated: &str| stated.strip_prefix('-').unwrap_or(stated) == name;
-        let renamed = self
-            .channels
-            .values()
-            .find(|channel| channel.name.as_deref().is_some_and(is_named));
-        renamed.or_else(|| self.channels.get(name))
+        self.channels
+            .iter()
+            .find(|(_, channel)| channel.name.as_deref().is_some_and(is_named))
+            .map(|(section, _)| section.as_str())
     }
 
     /// Path of the sidecar of `recording`: the same name with the extension `.toml`.

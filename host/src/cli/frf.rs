@@ -18,7 +18,7 @@ use super::segment::Recorded;
 use crate::criteria::{FOLDING_OF_NOISE, LARGEST_FOLDING, SMALL_FOLDING};
 use crate::file;
 use crate::frf::{Frf, FrfError, FrfTable, Measurement, calibrate, measure};
-use crate::recording::UffForm;
+use crate::recording::{Recording, UffForm};
 use crate::report::frf_chart::frf_chart;
 use crate::report::page::{figure, page};
 use answer::FrfOutput;
@@ -42,7 +42,7 @@ pub fn run(args: Args) -> Result<(), Error> {
         understood,
     } = args.segment.read(&args.recordings)?;
     let mut measurement = measure(&recordings, &args.settings())?;
-    check_folding(&mut measurement)?;
+    check_folding(&mut measurement, &recordings, &args.settings().channels)?;
     let (table, calibration) = match (&args.housing, &args.tip) {
         (Some(housing), Some(tip)) => calibrate(
             &measurement.table,
@@ -64,8 +64,12 @@ pub fn run(args: Args) -> Result<(), Error> {
 
 /// Adds a warning about the receptance whose peak aliasing (content above half the sample rate, folded into the record)
 /// may change most, if this relative change is above [`SMALL_FOLDING`]. A change above [`LARGEST_FOLDING`] is an error.
-/// Only drive points count, if the measurement has any.
-fn check_folding(measurement: &mut Measurement) -> Result<(), Error> {
+/// Only drive points count, if the measurement has any. `chosen` holds the names of the channels to evaluate.
+fn check_folding(
+    measurement: &mut Measurement,
+    recordings: &[Recording],
+    chosen: &[String],
+) -> Result<(), Error> {
     // The peak is taken at the line with the largest |H| divided by the relative error by aliasing, among the lines
     // where the force causes the response. |H| alone may be largest where the force spectrum almost vanishes; one term
     // of the error is inversely proportional to that spectrum, so that the quotient is small there.
@@ -80,7 +84,7 @@ fn check_folding(measurement: &mut Measurement) -> Result<(), Error> {
             }
         };
         let peak = related_lines::largest(entry, excited);
-        (entry.name(), folding.get(peak).copied().unwrap_or(0.0))
+        (entry, folding.get(peak).copied().unwrap_or(0.0))
     };
     let entries = measurement.table.entries();
     // Near half the sample rate the response in a weakly coupled direction may be noise of its sensor. The error by
@@ -92,11 +96,15 @@ fn check_folding(measurement: &mut Measurement) -> Result<(), Error> {
         .filter(|(entry, _)| !has_drive_point || entry.response == entry.force)
         .map(at_peak)
         .max_by(|a, b| a.1.total_cmp(&b.1));
-    let Some((name, error)) = worst.filter(|(_, error)| *error > 0.0) else {
+    let Some((entry, error)) = worst.filter(|(_, error)| *error > 0.0) else {
         return Ok(());
     };
-    let remedy = "a softer tip of the hammer, a higher sample rate or an anti-aliasing filter helps; if there was a filter, say \
-                  anti_aliasing = true under [channels.fx] and under the channel of the response in the sidecar";
+    let name = entry.name();
+    let remedy = format!(
+        "a softer tip of the hammer, a higher sample rate or an anti-aliasing filter helps; if there was a filter, say anti_aliasing = true \
+         under {} in the sidecar",
+        sections(entry, recordings, chosen).join(" and ")
+    );
     if error > LARGEST_FOLDING {
         return Err(Error::input(format!(
             "{}: content above half the sample rate folds into the record and may change the peak of H{name} by {:.0} %, more than {:.0} %: {remedy}",
@@ -112,6 +120,27 @@ fn check_folding(measurement: &mut Measurement) -> Result<(), Error> {
         ));
     }
     Ok(())
+}
+
+/// Sections of the sidecar that describe the channels of force and response of a receptance, such as `[channels.fx]`.
+fn sections(entry: &Frf, recordings: &[Recording], chosen: &[String]) -> Vec<String> {
+    let force = format!("f{}", entry.force);
+    let recording = recordings
+        .iter()
+        .find(|recording| recording.channel(&force).is_some());
+    let responses = ["", "v", "a"].map(|letter| format!("{letter}{}", entry.response));
+    let recorded =
+        |name: &&String| recording.is_some_and(|recording| recording.channel(name.as_str()).is_some());
+    let response = responses
+        .iter()
+        .filter(recorded)
+        .find(|name| chosen.contains(name))
+        .or_else(|| responses.iter().find(recorded));
+    let section = |name: &String| {
+        let known = recording.and_then(|recording| recording.sidecar.section_of(name));
+        format!("[channels.{}]", known.unwrap_or(name))
+    };
+    std::iter::once(&force).chain(response).map(section).collect()
 }
 
 fn write(target: &OutputFile, table: &FrfTable, is_binary: bool) -> Result<(), Error> {

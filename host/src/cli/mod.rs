@@ -47,7 +47,7 @@ use std::io::IsTerminal;
 use std::panic;
 use std::process::ExitCode;
 
-use clap::error::ErrorKind;
+use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{ArgAction, Parser, Subcommand};
 
 pub use error::Error;
@@ -95,7 +95,7 @@ pub fn main() -> ExitCode {
     // `error.exit()` of clap ends the process: with exit status 2 for wrong usage, 0 for `--help` and `--version`.
     let cli = Cli::try_parse().unwrap_or_else(|error| {
         let given: Vec<String> = std::env::args().collect();
-        match dashed_value(&given).filter(|_| error.kind() == ErrorKind::UnknownArgument) {
+        match unknown_argument(&error).and_then(|unknown| dashed_value(&given, unknown)) {
             Some(tip) => {
                 eprintln!("error: {tip}");
                 std::process::exit(2);
@@ -123,12 +123,22 @@ pub fn main() -> ExitCode {
     }
 }
 
+/// Argument that the parser does not know, of which it names only the first letter behind a single dash; `None` for
+/// another error.
+fn unknown_argument(error: &clap::Error) -> Option<&str> {
+    match error.get(ContextKind::InvalidArg) {
+        Some(ContextValue::String(unknown)) if error.kind() == ErrorKind::UnknownArgument => Some(unknown),
+        _ => None,
+    }
+}
+
 /// Message for the first option that is followed by a text beginning with a dash and a digit or point, such as `--rpm
-/// -900:1200:7`; `None` if there is none. The parser may take such a text for an option.
-fn dashed_value(given: &[String]) -> Option<String> {
+/// -900:1200:7`, and with `unknown`, which the parser takes for an option; `None` if there is none.
+fn dashed_value(given: &[String], unknown: &str) -> Option<String> {
     let is_value = |text: &str| {
         let mut letters = text.chars();
-        letters.next() == Some('-')
+        text.starts_with(unknown)
+            && letters.next() == Some('-')
             && letters
                 .next()
                 .is_some_and(|next| next.is_ascii_digit() || next == '.')
@@ -235,5 +245,18 @@ mod tests {
                 verb.get_name()
             );
         }
+    }
+
+    #[test]
+    fn the_option_whose_value_is_taken_for_an_option_is_blamed() {
+        let blamed = |line: &str| {
+            let given: Vec<String> = line.split_whitespace().map(String::from).collect();
+            let error = Cli::try_parse_from(&given).err()?;
+            dashed_value(&given, unknown_argument(&error)?)
+        };
+        let message = blamed("quietcut frf a.csv --from-s -1 --band-hz -5:20").unwrap();
+        assert!(message.starts_with("--band-hz -5:20:"), "{message}");
+        let other = "quietcut lobes case.toml --no-such-option 3 --rpm -900:1200:7";
+        assert_eq!(blamed(other), None);
     }
 }

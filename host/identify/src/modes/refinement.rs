@@ -114,7 +114,7 @@ impl Objective for ReceptanceFit<'_> {
 
 fn least_squares(data: &Receptances, weights: &Weights, start: PoleResidue) -> Option<PoleResidue> {
     let found = search(STEPS_MAX).minimize(&mut ReceptanceFit { data, weights }, start)?;
-    (found.stop != Stop::Iterations).then_some(found.point)
+    matches!(found.stop, Stop::Converged | Stop::Stagnated).then_some(found.point)
 }
 
 /// Levenberg–Marquardt settings of a fit of modes, with at most `iterations_max` linearizations.

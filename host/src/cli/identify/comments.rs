@@ -5,8 +5,8 @@ use toml_edit::{DocumentMut, Item, Table};
 /// Text of a case file with the values of `after`, and with the comments, the order and the blank lines of `before`,
 /// the text that it replaces.
 ///
-/// Sections and keys that `after` lacks are removed with their comments; comments within arrays and within the tables
-/// of an array (`[[structure.mode]]`) are lost. The result is `after` itself if `before` has no `#`, if one of the
+/// Sections and keys that `after` lacks are removed with their comments; comments within arrays are lost, and within the
+/// tables of an array (`[[structure.mode]]`) if their number changes. The result is `after` itself if `before` has no `#`, if one of the
 /// texts is not TOML, or if the keys and values of the merged text would differ from those of `after`.
 pub(super) fn kept(before: &str, after: &str) -> String {
     let has_comment = before.lines().any(|line| line.contains('#'));
@@ -40,6 +40,11 @@ fn merge(table: &mut Table, values: &Table) {
     for (key, value) in values.iter() {
         match (table.get_mut(key), value) {
             (Some(Item::Table(inner)), Item::Table(new)) => merge(inner, new),
+            (Some(Item::ArrayOfTables(old)), Item::ArrayOfTables(new)) if old.len() == new.len() => {
+                for (inner, new) in old.iter_mut().zip(new.iter()) {
+                    merge(inner, new);
+                }
+            }
             (Some(Item::Value(old)), Item::Value(new)) => {
                 let decor = old.decor().clone();
                 *old = new.clone();
@@ -70,6 +75,16 @@ mod tests {
             "\"new\"",
             "frequency_hz = 17.0",
         ] {
+            assert!(text.contains(words), "{words}: {text}");
+        }
+        let before = "[structure]\n# Bending.\n[[structure.mode]]\nfrequency_hz = 17.0 # of the spindle\n[[structure.mode]]\nfrequency_hz = 30.0 # of the arm\n";
+        let modes = |one: f64, two: f64| {
+            format!(
+                "[[structure.mode]]\nfrequency_hz = {one:?}\n[[structure.mode]]\nfrequency_hz = {two:?}\n"
+            )
+        };
+        let text = kept(before, &modes(16.5, 31.0));
+        for words in ["# Bending.", "16.5 # of the spindle", "31.0 # of the arm"] {
             assert!(text.contains(words), "{words}: {text}");
         }
         let table = |text: &str| text.parse::<toml::Table>().unwrap();

@@ -150,7 +150,7 @@ impl Objective for RecordFit<'_> {
 }
 
 /// Levenberg–Marquardt iteration for modes and transients with given noise variances; `None` if it does not end within
-/// `STEPS_MAX` steps, or if it cannot be evaluated at the start or linearized.
+/// `STEPS_MAX` steps, cannot be evaluated at the start or linearized, or ends at a singular normal matrix.
 fn least_squares(data: &Data<'_>, variances: &[Variances], unknowns: Unknowns) -> Option<Unknowns> {
     let mut fit = RecordFit {
         data,
@@ -158,8 +158,7 @@ fn least_squares(data: &Data<'_>, variances: &[Variances], unknowns: Unknowns) -
         equations: Vec::new(),
     };
     let found = search(STEPS_MAX).minimize(&mut fit, unknowns)?;
-    let is_found = !matches!(found.stop, Stop::Iterations | Stop::LeftDomain);
-    is_found.then_some(found.point)
+    matches!(found.stop, Stop::Converged | Stop::Stagnated).then_some(found.point)
 }
 
 /// Result of the fit with its covariance B⁻¹ M B⁻¹. M is the covariance of the gradient of half the cost Σ eᴴ C⁻¹ e,
