@@ -126,8 +126,8 @@ static SHARP: [i32; SHARP_SIDE] = half_band(10.3);
 /// Medium filter, pass band to 0.13 and stop band from 0.37 of its input rate: the earlier stages before the tool
 /// band, and the last stage before the structure band.
 static MEDIUM: [i32; MEDIUM_SIDE] = half_band(10.6);
-/// Easy filter, pass band to 0.065 and stop band from 0.435 of its input rate: all other stages before the structure
-/// band.
+/// Easy filter, pass band to 0.065 and stop band from 0.435 of its input rate: the stages between tool band and
+/// structure band, except for the last one.
 static EASY: [i32; EASY_SIDE] = half_band(11.4);
 
 /// State of one filter stage of the decimation: its last LENGTH input samples. They are stored twice in a row, so that

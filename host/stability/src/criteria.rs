@@ -366,8 +366,8 @@ pub(crate) const ORBIT_ROOM: f64 = 10.0;
 /// orbits; a larger change halves the step. Unfounded.
 pub(crate) const MULTIPLIER_MOVE_MAX: f64 = 0.12;
 
-/// Size |μ| above which Floquet multipliers are computed along the depth in cases with friction, backlash or
-/// hysteresis. Unfounded.
+/// Size |μ| above which the Floquet multipliers of a forced orbit are kept in cases with friction, backlash or
+/// hysteresis; smaller ones are dropped. Unfounded.
 pub(crate) const EQUIVALENT_FOLLOWED: f64 = 0.5;
 
 /// Least number of steps in depth at which, in cases with friction, backlash or hysteresis, the number of multipliers

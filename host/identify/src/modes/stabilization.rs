@@ -70,7 +70,8 @@ pub struct Stabilization {
 }
 
 impl Stabilization {
-    /// The diagrams of several parts of a structure in one, with the poles in the order of the parts.
+    /// The stabilization diagrams of several parts of a structure in one. Its candidates are sorted by model order; the
+    /// poles selected as modes and the rejected ones are listed part by part.
     pub(super) fn together(diagrams: Vec<Self>) -> Self {
         let mut all = Self::default();
         for diagram in diagrams {

@@ -52,7 +52,7 @@ impl Structure {
     pub fn check(&self) -> Result<(), StructureError> {
         let found = match &self.form {
             Form::Matrices(matrices) => definiteness::indefinite(matrices, &self.directions),
-            // The matrices of a robot meet this: a case gives each link a positive mass and a positive definite
+            // The matrices of a robot are definite: a case gives each link a positive mass and a positive definite
             // inertia, and each joint a positive stiffness and a damping of 0 or more.
             Form::Modes(_) | Form::Joints(_) => Vec::new(),
         };
