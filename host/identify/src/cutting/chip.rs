@@ -52,7 +52,7 @@ pub fn chips(test: &CuttingTest, runout_m: &[f64]) -> Vec<Vec<Chip>> {
             let u = test.displacement.as_ref().map_or([0.0; 3], |u| u[sample].into());
             let own = test.edge_angle.reach_m(immersion, 0.0, u);
             let recession = test.edge_angle.recession_m(immersion, test.feed_per_tooth_m);
-            // Where no earlier tooth passing is recorded, the surface is that of a tooth passing without vibration.
+            // If no sample of the tooth passing before is recorded, the surface is that of a passing without vibration.
             let before = surface_at(&surface, phi, &mut place).unwrap_or(SurfacePoint {
                 phi,
                 reach_m: 0.0,

@@ -24,7 +24,8 @@ pub(crate) struct Shifted {
 const SHIFT: f64 = 1e-8;
 
 impl Shifted {
-    /// Factors H − s I for an eigenvalue of a matrix H that is zero below its `band`-th lower diagonal.
+    /// LU factors of H − s I, with s slightly off `eigenvalue`, for a matrix H that is zero below its `band`-th lower
+    /// diagonal.
     pub(crate) fn new(matrix: &DMatrix<f64>, band: usize, eigenvalue: Complex64) -> Self {
         let size = matrix.nrows();
         let shift = if eigenvalue == Complex64::ZERO {
