@@ -29,7 +29,7 @@ pub struct CuttingLoad {
     case: Case,
 }
 
-/// Reason why the load of a cut is not known.
+/// Reason why torque and power of a cut are not known.
 #[derive(Debug, thiserror::Error)]
 pub enum LoadError {
     /// The case has no tool, material or cut.

@@ -22,7 +22,7 @@ use crate::report::words;
     after_help = "Example:\n  quietcut simulate tests/cases/kuka-kr90-acetal.toml --rpm 900 --depth-mm 2 --seconds 4 --out cut.csv\n  quietcut replay cut.csv"
 )]
 pub struct Args {
-    /// The recording: CSV, UFF 58, WAV or MAT.
+    /// The recording: CSV or another text table, UFF 58, WAV, MAT, LVM or TDMS.
     #[arg(value_name = "REC")]
     recording: PathBuf,
     /// Lobe table for the advice.

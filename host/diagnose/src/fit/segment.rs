@@ -12,7 +12,8 @@ use crate::signal::dot::dot;
 use crate::signal::grid::SegmentTransform;
 use quietcut_recording::TestKind;
 
-/// One segment of a record, with the transform that makes its values comparable.
+/// One segment of a record, with what brings its measured and predicted samples into the form in which they are
+/// compared: Fourier transform, band, whitening, and the projection that removes free decays and sensor offsets.
 pub(crate) struct Segment {
     /// Index of the segment's record in the study.
     pub(crate) record: usize,

@@ -17,7 +17,7 @@ use crate::frf::{Estimator, Excitation, HammerWindows, MeasurementSettings, Wind
                   Forces that are not selected count as noise."
 )]
 pub struct Args {
-    /// The recordings: CSV, UFF 58, WAV or MAT.
+    /// The recordings: CSV or another text table, UFF 58, WAV, MAT, LVM or TDMS.
     #[arg(value_name = "REC", required_unless_present = "compare")]
     pub(super) recordings: Vec<PathBuf>,
     /// Instead of recordings, compare the peaks of two tables of receptances, such as before and after a change of the tool:

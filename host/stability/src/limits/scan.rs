@@ -229,8 +229,9 @@ impl<S: Spectrum> Scan<S> {
         }])
     }
 
-    /// States the largest multiplier at the multiples of the step from `low` to before `high`: that of the paths, or,
-    /// if they may miss the largest, the larger of that and the exponential through both ends.
+    /// States the absolute value of the largest multiplier at the depths, multiples of `step_m`, from that of `low` to
+    /// before that of `high`: that of the paths, or, if they may miss the largest, the larger of that and the exponential
+    /// through both ends.
     fn state_largest(&mut self, low: &Sample, high: &Sample, paths: &[MultiplierPath]) {
         if self.step_m <= 0.0 {
             return;
