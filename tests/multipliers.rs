@@ -148,11 +148,36 @@ fn multiplier_over(
     // The end is not at an entry or exit of a tooth, where velocities may jump.
     let end_s = (periods as f64 + 0.5) * period_s;
     let motions = motions_from(&model, push, settings, 0.37 * period_s, period_s, end_s);
-    largest_root(&motions[periods / 2..], order)
+    largest_root(&motions[periods / 2..], order, 0.0)
 }
 
-/// The largest root of the linear recurrence of this order that fits the sampled motion.
-fn largest_root(motions: &[Motion], order: usize) -> f64 {
+/// The largest root of the linear recurrence that fits the sampled motion: of the order `order_max`, or of a lower one, if
+/// a singular value of the fit is below the share `noise` of the largest. The motion then has fewer multipliers above its
+/// noise, and further roots would be those of the noise.
+fn largest_root(motions: &[Motion], order_max: usize, noise: f64) -> f64 {
+    let (matrix, _) = recurrence(motions, order_max);
+    let singular = matrix.svd(false, false).singular_values;
+    let order = singular
+        .iter()
+        .filter(|value| **value > noise * singular.max())
+        .count();
+    let (matrix, right) = recurrence(motions, order);
+    let coefficients = matrix.svd(true, true).solve(&right, 1e-9).unwrap();
+    let mut companion = nalgebra::DMatrix::zeros(order, order);
+    for i in 1..order {
+        companion[(i - 1, i)] = 1.0;
+    }
+    companion.row_mut(order - 1).copy_from(&coefficients.transpose());
+    companion
+        .complex_eigenvalues()
+        .iter()
+        .map(|root| root.norm())
+        .fold(0.0, f64::max)
+}
+
+/// The equations of a linear recurrence of this order for the sampled motion: its matrix and its right side. Each window
+/// of the motion is scaled to 1.
+fn recurrence(motions: &[Motion], order: usize) -> (nalgebra::DMatrix<f64>, nalgebra::DVector<f64>) {
     let size = |values: &[[f64; 3]]| values.iter().flatten().fold(0.0_f64, |a, b| a.max(b.abs()));
     let mut rows: Vec<Vec<f64>> = Vec::new();
     for window in motions.windows(order + 1) {
@@ -165,19 +190,9 @@ fn largest_root(motions: &[Motion], order: usize) -> f64 {
             }
         }
     }
-    let a = nalgebra::DMatrix::from_fn(rows.len(), order, |i, j| rows[i][j]);
-    let b = nalgebra::DVector::from_fn(rows.len(), |i, _| rows[i][order]);
-    let coefficients = a.svd(true, true).solve(&b, 1e-9).unwrap();
-    let mut companion = nalgebra::DMatrix::zeros(order, order);
-    for i in 1..order {
-        companion[(i - 1, i)] = 1.0;
-    }
-    companion.row_mut(order - 1).copy_from(&coefficients.transpose());
-    companion
-        .complex_eigenvalues()
-        .iter()
-        .map(|root| root.norm())
-        .fold(0.0, f64::max)
+    let matrix = nalgebra::DMatrix::from_fn(rows.len(), order, |i, j| rows[i][j]);
+    let right = nalgebra::DVector::from_fn(rows.len(), |i, _| rows[i][order]);
+    (matrix, right)
 }
 
 #[test]
@@ -322,7 +337,8 @@ fn growth_of_a_push(mut model: Model, period_s: f64, expected: f64, order: usize
             force_n: [0.0; 3],
         })
         .collect();
-    largest_root(&disturbance[8..], order)
+    // The difference of two simulations has an error of about 1e-6 of the disturbance, and more after its decay.
+    largest_root(&disturbance[8..], order, 2e-4)
 }
 
 #[test]
