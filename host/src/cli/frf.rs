@@ -74,7 +74,7 @@ fn check_folding(
     // where the force causes the response. |H| alone may be largest where the force spectrum almost vanishes; one term
     // of the error is inversely proportional to that spectrum, so that the quotient is small there.
     // Without coherence, lines of noise cannot be told by it: those count only if no other line does.
-    let at_peak = |(entry, folding): (&Frf, &Vec<f64>)| {
+    fn at_peak<'a>((entry, folding): (&'a Frf, &'a Vec<f64>)) -> (&'a Frf, f64) {
         let is_noise = |line: usize| entry.coherence.is_none() && folding[line] >= FOLDING_OF_NOISE;
         let excited = |line: usize| {
             if is_noise(line) {
@@ -85,7 +85,7 @@ fn check_folding(
         };
         let peak = related_lines::largest(entry, excited);
         (entry, folding.get(peak).copied().unwrap_or(0.0))
-    };
+    }
     let entries = measurement.table.entries();
     // Near half the sample rate the response in a weakly coupled direction may be noise of its sensor. The error by
     // aliasing does not tell how much of this noise folds.
