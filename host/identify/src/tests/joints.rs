@@ -277,7 +277,7 @@ impl Coverage {
 /// A seeded slice of the campaign.
 #[test]
 fn intervals_of_a_few_robots_hold_the_truth_as_often_as_they_say() {
-    let coverage = Coverage::of(10..10 + slice(3, 6), tool_space);
+    let coverage = Coverage::of(10..10 + slice(2, 6), tool_space);
     println!("{:?}, peaks {}", coverage.joints, coverage.peaks);
     coverage.check();
 }

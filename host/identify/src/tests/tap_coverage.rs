@@ -22,6 +22,7 @@ use quietcut_model::structure::Mode;
 use quietcut_stability::{Collocation, CubicTerms, Method, Problem, Uncertainty};
 use quietcut_testkit::rates::assert_pooled_share;
 use quietcut_testkit::results::Campaign;
+use quietcut_testkit::slice;
 
 const SEED: u64 = 20_261_125;
 
@@ -418,14 +419,20 @@ fn print(outcomes: &[Outcome]) {
 fn limits_of_tapped_machines_hold_the_truth_as_often_as_they_say() {
     println!("seed {SEED}");
     let began = Instant::now();
-    let outcomes = run(0..24);
+    let machines = slice(12, 24);
+    let outcomes = run(0..machines);
     println!("{:.2} s", began.elapsed().as_secs_f64());
     print(&outcomes);
     for (figure, value) in figures(&outcomes) {
         println!("{figure}: {value}");
     }
     let held = Count::of(limits(&outcomes).map(|(_, limit)| limit.holds()));
-    assert!(held.all >= 22, "{} of {} machines are refused", 24 - held.all, 24);
+    let most_refused = 2;
+    assert!(
+        held.all + most_refused >= machines,
+        "{} of {machines} machines are refused",
+        machines - held.all
+    );
     quietcut_testkit::rates::assert_share("90 % intervals of limits", 0.9, held.held, held.all);
     let (found, missed): (usize, usize) = outcomes
         .iter()

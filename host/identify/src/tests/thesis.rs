@@ -16,7 +16,7 @@ use crate::nonlinear::steady_fit::Data;
 use quietcut_model::structure::Direction;
 use quietcut_recording::Quantity;
 use quietcut_simulate::rig::Noise;
-use quietcut_testkit::{case, slice};
+use quietcut_testkit::case;
 
 /// Exact steady motions of a mode by harmonic balance, in order of rising frequency.
 fn exact(
@@ -116,10 +116,11 @@ const ALL_LEVELS: [f64; 6] = [1.8, 5.8, 9.5, 12.6, 15.6, 17.2];
 /// Recordings with 1 % noise per sample: at 9 and 10.5 Hz the motion jumps at the upper force levels, where the series of thesis
 /// eq. 5.15 does not converge.
 #[test]
+#[ignore = "campaign: step-sine tests at six force levels, half a minute each"]
 fn with_all_levels_higher_order_frf_fail_at_the_softest_modes_and_harmonic_balance_does_not() {
     let law = law();
     let grid = Grid::new(5, law.degree());
-    for name in &["kuka-kr90-y9", "kuka-kr90-z10"][..slice(1, 2) as usize] {
+    for name in ["kuka-kr90-y9", "kuka-kr90-z10"] {
         let structure = case(name).structure.unwrap();
         let (frequencies, _) = test_plan(name);
         let mut recordings = step_sine(&structure, &frequencies, &ALL_LEVELS, 30.0);

@@ -218,7 +218,7 @@ fn the_stated_error_holds_in_all_layers_and_between_them() {
         let table = LobeTable::parse(&bytes).unwrap();
         let ((from, to), depth_mm) = (request.rpm.unwrap(), request.depth_mm.unwrap());
         let mut trial = Trial::new(&table);
-        let drawn: Vec<(Case, Option<f64>, f64)> = (0..slice(200, POINTS))
+        let drawn: Vec<(Case, Option<f64>, f64)> = (0..slice(40, POINTS))
             .map(|_| {
                 let mut there = case.clone();
                 let cut = there.cut.as_mut().unwrap();
@@ -302,7 +302,7 @@ fn the_stated_error_of_a_5_percent_table_holds() {
     let seed = 20_261_121;
     println!("seed {seed}");
     let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
-    let points = slice(100, POINTS);
+    let points = slice(20, POINTS);
     let speeds: Vec<f64> = (0..points).map(|_| rng.random_range(1020.0..1120.0)).collect();
     let mut trial = Trial::new(&table);
     for direct in table_layers[0].lines(&speeds, 6.0).unwrap() {

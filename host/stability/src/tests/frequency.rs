@@ -147,18 +147,15 @@ fn limits_with_rising_harmonics_converge_to_those_of_the_one_period_map_on_all_c
         for rpm in speeds {
             let exact = line(&model, rpm, depth_mm, 40).unwrap().switches;
             let least = HarmonicLoop::least_harmonics(&problem, rpm);
-            let error = |harmonics: Option<usize>| {
+            let error = |harmonics: usize| {
                 let method = MultiFrequency {
                     problem: problem.clone(),
-                    harmonics,
+                    harmonics: Some(harmonics),
                 };
                 difference(&switches(&method, rpm, depth_mm), &exact)
             };
-            let (coarse, fine) = (error(Some(least)), error(Some(2 * least)));
-            println!(
-                "{name} {rpm}: {least} {coarse:.1e} {fine:.1e} {:.1e}",
-                error(None)
-            );
+            let (coarse, fine) = (error(least), error(2 * least));
+            println!("{name} {rpm}: {least} {coarse:.1e} {fine:.1e}");
             // The truncation error falls with the second or third power of the harmonics: by four or more with twice
             // their number, unless it has reached rounding.
             assert!(
