@@ -385,7 +385,7 @@ pub(super) fn of_table(table: &FrfTable, has_periodic_force: bool) -> Vec<String
             warnings.push(format!(
                 "H{name} has the sign of an inverted sensor: its imaginary part is positive at {:.3} Hz, where a drive point takes up energy \
                  and has a negative one; if force and sensor sit at one point, one of them points against its axis: add --map \
-                 COLUMN=-NAME for it (such as --map a{axis}=-a{axis})",
+                 a{axis}=-a{axis} if it is the sensor, or --map f{axis}=-f{axis} if the hammer strikes against the axis (with the names of your columns)",
                 frequency_hz[peak],
                 axis = entry.response
             ));
