@@ -10,7 +10,7 @@ pub enum EffectError {
     #[error("effect `{0}`: NAME=VALUE or NAME.KEY=VALUE is needed, as in {example}=20", example = EffectName::Runout.name())]
     Form(String),
     /// An unknown name.
-    #[error("effect `{0}` is not known; {names} is needed", names = nearest::expected(.0, EffectName::ALL.into_iter().map(EffectName::name)))]
+    #[error("effect `{0}` is not known; {names} is needed{value}", names = nearest::expected(.0, EffectName::ALL.into_iter().map(EffectName::name)), value = value_of_closest(.0))]
     Unknown(String),
     /// A key, or the VALUE of `--effect NAME=VALUE`, that the effect does not have, or does not use with the other
     /// values as given.
@@ -40,7 +40,7 @@ pub enum EffectError {
     },
     /// A value that is not possible for its key, such as a negative damping ratio, or not possible beside the other
     /// given values and effects.
-    #[error("effect `{name}{dot}{key}`: `{found}` is not possible; {needed} is needed", dot = if .key.is_empty() { "" } else { "." })]
+    #[error("effect `{name}{dot}{key}`: `{found}` is not possible; {needed}{unit} is needed", unit = unit(name, key), dot = if .key.is_empty() { "" } else { "." })]
     Value {
         /// The effect.
         name: &'static str,
@@ -87,6 +87,36 @@ pub enum EffectError {
         name = EffectName::CoulombFriction.name()
     )]
     NoInertia,
+}
+
+/// The unit of the parameter of an effect with this key, or with an empty key of VALUE, as words after a description of
+/// possible values; empty for a parameter without unit.
+fn unit(name: &str, key: &str) -> String {
+    let spec = name.parse::<EffectName>().ok().map(EffectName::spec);
+    let parameter = spec.and_then(|spec| {
+        if key.is_empty() {
+            spec.main()
+        } else {
+            spec.parameter(key)
+        }
+    });
+    match parameter {
+        Some(parameter) if !parameter.unit.is_empty() => format!(" in {}, without the unit,", parameter.unit),
+        _ => String::new(),
+    }
+}
+
+/// What VALUE means for the effect whose name is closest to an unknown one, in words after the names; empty without such
+/// an effect or without unit.
+fn value_of_closest(unknown: &str) -> String {
+    let names = EffectName::ALL.into_iter().map(EffectName::name);
+    match nearest::nearest(unknown, names) {
+        Some(closest) => match unit(closest, "") {
+            unit if unit.is_empty() => unit,
+            unit => format!("; the value of {closest} is a number{}", unit.trim_end_matches(',')),
+        },
+        None => String::new(),
+    }
 }
 
 impl EffectError {
