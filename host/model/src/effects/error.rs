@@ -113,7 +113,10 @@ fn value_of_closest(unknown: &str) -> String {
     match nearest::nearest(unknown, names) {
         Some(closest) => match unit(closest, "") {
             unit if unit.is_empty() => unit,
-            unit => format!("; the value of {closest} is a number{}", unit.trim_end_matches(',')),
+            unit => format!(
+                "; the value of {closest} is a number{}",
+                unit.trim_end_matches(',')
+            ),
         },
         None => String::new(),
     }
