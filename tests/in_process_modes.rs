@@ -188,6 +188,7 @@ fn speed_sweeps_with_accelerometers_give_the_modes_of_table_7_1_and_their_lobes(
 }
 
 #[test]
+#[ignore = "campaign: three speed sweeps by averaged receptances, 20 s"]
 fn speed_sweeps_by_a_table_of_receptances_give_the_modes_of_table_7_1_and_their_lobes() {
     let folder = folder();
     let robot = case("kuka-kr90-acetal");

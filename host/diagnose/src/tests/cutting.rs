@@ -11,6 +11,7 @@ use quietcut_model::case::Case;
 use quietcut_model::milling::{EdgeAngle, Engagement, ToothForce};
 use quietcut_recording::{Quantity, Recording};
 use quietcut_simulate::{Effects, Entry, VirtualCut};
+use quietcut_testkit::slice;
 
 fn case(feed_mm: &str, more: &str) -> Case {
     let path = format!(
@@ -71,7 +72,7 @@ fn summary(diagnosis: &Diagnosis) -> String {
 /// A hidden effect of a cut: expected cause, effect, and whether forces are measured.
 type Hidden = (&'static str, &'static [&'static str], bool);
 
-/// Hidden effects of every run: one with and one without measured forces.
+/// Hidden effects of cuts with and without measured forces; the first is sought in every run.
 const HIDDEN: [Hidden; 2] = [
     ("force-coefficients", &["force-coefficients=0.2"], true),
     ("process-damping", &["process-damping=2e5"], false),
@@ -99,7 +100,7 @@ const ALSO_HIDDEN: [Hidden; 4] = [
 
 #[test]
 fn hidden_effects_are_found_in_cuts_with_and_without_force() {
-    assert_found(&HIDDEN);
+    assert_found(&HIDDEN[..slice(1, 2) as usize]);
 }
 
 #[test]
@@ -165,6 +166,7 @@ fn a_cut_without_tachometer_or_depth_is_refused() {
 }
 
 #[test]
+#[ignore = "campaign: a cut with two hidden effects, 13 s; a seed of hidden_effects has a mass in every run"]
 fn a_cause_that_moves_a_resonance_and_another_are_found_without_a_third() {
     let effects = [
         "mass=0.15",

@@ -279,6 +279,7 @@ fn teeth_at_unequal_pitch_have_a_table_of_their_own() {
 }
 
 #[test]
+#[ignore = "campaign: the machines of a percentile at each speed, a minute and more"]
 fn the_stated_error_of_a_5_percent_table_holds() {
     let mut case = case("kuka-kr90-acetal");
     case.deviations = vec![
@@ -302,8 +303,7 @@ fn the_stated_error_of_a_5_percent_table_holds() {
     let seed = 20_261_121;
     println!("seed {seed}");
     let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
-    let points = slice(20, POINTS);
-    let speeds: Vec<f64> = (0..points).map(|_| rng.random_range(1020.0..1120.0)).collect();
+    let speeds: Vec<f64> = (0..POINTS).map(|_| rng.random_range(1020.0..1120.0)).collect();
     let mut trial = Trial::new(&table);
     for direct in table_layers[0].lines(&speeds, 6.0).unwrap() {
         trial.check(&point(&case, 1.0, 0.15), None, &direct);
