@@ -68,6 +68,14 @@ fn the_page_has_every_key_of_a_case() {
         ("[structure]", "[structure]\n".into()),
         ("[[structure.mode]]", format!("{structure}[[structure.mode]]\n")),
         ("[[structure.joint]]", format!("{structure}[[structure.joint]]\n")),
+        (
+            "[[structure.at_speed]]",
+            format!("{structure}[[structure.at_speed]]\n"),
+        ),
+        (
+            "[[structure.at_speed.mode]]",
+            format!("{structure}[[structure.at_speed]]\nrpm = 1.0\n[[structure.at_speed.mode]]\n"),
+        ),
         ("[tool]", "[tool]\n".into()),
         ("[material]", "[material]\n".into()),
         ("[cut]", "[cut]\n".into()),

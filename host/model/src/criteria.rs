@@ -65,3 +65,11 @@ pub(crate) const COVARIANCE_ROUNDING: f64 = 1e-6;
 /// following from them. Up to 1e-4 of the standard deviation of the parameter is dropped, which hardly moves a limit;
 /// rounding of a covariance of 16 digits leaves far smaller shares. The value between is a choice.
 pub(crate) const DEPENDENT_PARAMETER: f64 = 1e-8;
+
+/// Smallest modal assurance criterion (MAC) of two modes of a structure at neighbouring spindle speeds that are the same
+/// mode. Identical shapes have 1, orthogonal ones 0; gyroscopic moments and preload change shapes gradually. Unfounded.
+pub(crate) const LEAST_PAIRED_MAC: f64 = 0.8;
+
+/// Largest ratio of the natural frequencies of two modes of a structure at neighbouring spindle speeds that are the same
+/// mode. Frequencies of spindles fall by some 10 to 20 % up to their highest speed. Unfounded.
+pub(crate) const LARGEST_PAIRED_RATIO: f64 = 1.3;

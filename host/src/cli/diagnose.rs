@@ -46,6 +46,12 @@ pub struct Args {
 /// Runs the verb.
 pub fn run(args: Args) -> Result<(), Error> {
     let case = Case::read(&args.case)?;
+    if case.speed_dependence.is_some() {
+        return Err(Error::input(format!(
+            "{}: structure.at_speed: a diagnosis needs the one structure of the speed of the records; leave [[structure.at_speed]] out and give that one",
+            args.case.display()
+        )));
+    }
     let cuts = match &args.cuts {
         Some(path) => trial_cuts::read(path)?,
         None => Vec::new(),

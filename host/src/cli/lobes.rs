@@ -30,6 +30,10 @@ pub struct Args {
     /// The case file: structure, tool, material, cut.
     #[arg(value_name = "CASE")]
     case: PathBuf,
+    /// Case of the same machine whose structure holds at another spindle speed: both have rpm under [structure], 0 at
+    /// standstill. Modes are interpolated over the speed. May be repeated.
+    #[arg(long, value_name = "CASE", conflicts_with = "frf")]
+    at_speed: Vec<PathBuf>,
     /// Spindle speeds in rev/min, first:last:count or first:last (61 speeds).
     #[arg(long, value_name = "R", value_parser = Range::positive)]
     rpm: Option<Range>,
@@ -116,7 +120,7 @@ impl Args {
 /// Runs the verb.
 pub fn run(args: Args) -> Result<(), Error> {
     args.check()?;
-    let case = Case::read(&args.case).map_err(Error::input)?;
+    let case = read_case(&args)?;
     plausible_structure::warn(&case);
     args.method.announce()?;
     let assumed = args.method.assumptions(&case)?;
@@ -161,6 +165,17 @@ pub fn run(args: Args) -> Result<(), Error> {
         }
         _ => lobes_points::run(&case, method.as_ref(), &args.at, &assumed, args.output),
     }
+}
+
+/// The case, with the structures of the cases of `--at-speed`.
+fn read_case(args: &Args) -> Result<Case, Error> {
+    let case = Case::read(&args.case).map_err(Error::input)?;
+    if args.at_speed.is_empty() {
+        return Ok(case);
+    }
+    let others = args.at_speed.iter().map(Case::read);
+    let others = others.collect::<Result<Vec<_>, _>>().map_err(Error::input)?;
+    case.with_structures_of(&others).map_err(Error::input)
 }
 
 struct ChartRequest {

@@ -139,7 +139,8 @@ fn recording_to_write(text: &str) -> Result<PathBuf, String> {
 
 /// Runs the verb.
 pub fn run(args: Args) -> Result<(), Error> {
-    let case = Case::read(&args.case)?;
+    // Without --rpm the spindle stands still.
+    let case = Case::read(&args.case)?.at_speed(args.rpm.unwrap_or_default());
     for out in &args.out {
         let sidecar = Sidecar::path_of(out);
         if let (Ok(sidecar), Ok(case)) = (sidecar.canonicalize(), args.case.canonicalize())

@@ -5,6 +5,7 @@ mod job;
 mod joints;
 mod limits;
 mod provenance;
+mod speed_dependence;
 mod structure;
 mod tool;
 mod uncertainty;
@@ -47,10 +48,14 @@ fn case(path: &Path, text: &str) -> Result<Case, CaseError> {
     let posture = file
         .posture
         .map_or(Ok(Posture::default()), |posture| check.posture(posture))?;
-    let structure = file
-        .structure
-        .map(|structure| check.structure(structure, &posture.joints_deg))
-        .transpose()?;
+    let mut structure = None;
+    let (mut structure_rpm, mut speed_dependence) = (None, None);
+    if let Some(file) = &file.structure {
+        let checked = check.structure(file, &posture.joints_deg)?;
+        structure_rpm = check.structure_rpm(file.get_ref())?;
+        speed_dependence = check.speed_dependence(file, &checked)?;
+        structure = Some(checked);
+    }
     let tool = file.tool.map(|tool| check.tool(&tool)).transpose()?;
     let material = file
         .material
@@ -69,6 +74,8 @@ fn case(path: &Path, text: &str) -> Result<Case, CaseError> {
         path: path.into(),
         name,
         structure,
+        structure_rpm,
+        speed_dependence,
         tool,
         material,
         cut,

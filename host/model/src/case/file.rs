@@ -35,6 +35,8 @@ pub(super) struct CaseFile {
 pub(super) struct StructureFile {
     pub(super) kind: Spanned<String>,
     pub(super) directions: Spanned<Vec<String>>,
+    pub(super) rpm: Option<Number>,
+    pub(super) at_speed: Option<Vec<Spanned<AtSpeedFile>>>,
     pub(super) mass: Option<Rows>,
     pub(super) mass_std: Option<Rows>,
     pub(super) damping: Option<Rows>,
@@ -81,6 +83,25 @@ pub(super) struct ModeFile {
     pub(super) left_std: Option<Spanned<Vec<[f64; 2]>>>,
     pub(super) right: Spanned<Vec<[f64; 2]>>,
     pub(super) right_std: Option<Spanned<Vec<[f64; 2]>>>,
+}
+
+/// Table `[[structure.at_speed]]`: the modes at a further spindle speed.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct AtSpeedFile {
+    pub(super) rpm: Number,
+    #[serde(default)]
+    pub(super) mode: Vec<ModeAtSpeedFile>,
+}
+
+/// Table `[[structure.at_speed.mode]]`. The deviations of `[[structure.mode]]` hold at all speeds.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct ModeAtSpeedFile {
+    pub(super) frequency_hz: Number,
+    pub(super) damping_ratio: Number,
+    pub(super) left: Spanned<Vec<[f64; 2]>>,
+    pub(super) right: Spanned<Vec<[f64; 2]>>,
 }
 
 #[derive(Deserialize)]

@@ -4,6 +4,7 @@
 //! axes, z that of the tool. Angles are in degrees, lengths of tool and cut in mm, all other quantities in SI units
 //! unless the key names another unit.
 
+mod at_speed;
 mod check;
 mod deviation;
 mod effects;
@@ -20,15 +21,17 @@ mod sections;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
+pub use at_speed::AtSpeedError;
 pub use deviation::{Deviation, Parameter};
 pub use error::CaseError;
 pub use limits::MachineLimits;
 pub use parameter_covariance::ParameterCovariance;
 pub use posture::Posture;
+pub use provenance::AT_STANDSTILL;
 
 use crate::effects::{EffectName, EffectSpec};
 use crate::milling::{Cut, Material, Tool};
-use crate::structure::Structure;
+use crate::structure::{SpeedDependence, Structure};
 
 /// One machine and one job.
 #[derive(Clone, Debug)]
@@ -40,6 +43,10 @@ pub struct Case {
     /// Structure of the machine; `None` if the case has no section `[structure]`. Its values are finite and its
     /// matrices and mode shapes have consistent sizes. [`Structure::check`] tests whether the matrices are definite.
     pub structure: Option<Structure>,
+    /// Spindle speed at which the structure holds, rev/min, 0 at standstill; `None` if the case does not state it.
+    pub structure_rpm: Option<f64>,
+    /// Dependence of the structure on the spindle speed; `None` if one structure holds at all speeds.
+    pub speed_dependence: Option<SpeedDependence>,
     /// The tool.
     pub tool: Option<Tool>,
     /// The workpiece material.

@@ -7,6 +7,10 @@ use crate::criteria::FAR_DEEPER;
 use crate::milling::Process;
 use crate::structure::Direction;
 
+/// Assumption of a structure that was measured at standstill.
+pub const AT_STANDSTILL: &str = "the structure was measured at standstill: a running spindle may have other natural frequencies and damping ratios, \
+    and lobes move with the frequencies; take taps at the speeds of use with the spindle running (several [[structure.at_speed]]), or check a limit by a cut";
+
 impl Case {
     /// Sentences that state the assumptions behind the structure of the case: those of its section `[provenance]`, the
     /// receptances that it states as zero and, if the structure has no z, the
@@ -21,6 +25,7 @@ impl Case {
         if lacks_z {
             assumptions.extend(self.effect_of_rigid_z());
         }
+        assumptions.extend(self.speed_of_structure());
         assumptions
     }
 
@@ -84,6 +89,20 @@ impl Case {
         let (one, other) = (ratio(1.0), ratio(-1.0));
         let ratios = [one.min(other), one.max(other)];
         (ratios[0].is_finite() && !ratios[1].is_nan()).then_some(ratios)
+    }
+
+    /// Sentence about the spindle speeds of the structure: that it was measured at standstill, or between which speeds it
+    /// is interpolated; `None` if the case states no speed, or one speed other than 0.
+    fn speed_of_structure(&self) -> Option<String> {
+        if let Some(dependence) = &self.speed_dependence {
+            let speeds: Vec<String> = dependence.speeds_rpm().iter().map(ToString::to_string).collect();
+            return Some(format!(
+                "the modes are interpolated over the spindle speed between {} rev/min, and level beyond; their deviations are those of the first \
+                 structure at all speeds",
+                speeds.join(", ")
+            ));
+        }
+        (self.structure_rpm == Some(0.0)).then(|| AT_STANDSTILL.into())
     }
 
     /// Sentence that says by which factor limits could differ if the tool is not rigid in z; `None` if tool, material

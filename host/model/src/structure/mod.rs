@@ -9,6 +9,7 @@ mod joints;
 mod matrices;
 mod modal;
 mod modes;
+mod speed_dependence;
 
 use std::borrow::Cow;
 
@@ -21,6 +22,7 @@ pub use joints::{Joint, Robot};
 pub use matrices::Matrices;
 pub use modal::ModalPart;
 pub use modes::Mode;
+pub use speed_dependence::{ModesAtSpeed, PairingError, SpeedDependence};
 
 /// The structure of a case, in the machine's directions.
 #[derive(Clone, Debug, PartialEq)]

@@ -20,6 +20,7 @@ use crate::limits::uncertainty::Uncertainty;
 use crate::orbit::collocation_of;
 use crate::problem::linear::{CubicTerms, Problem};
 use crate::problem::pitched::Pitched;
+use crate::process::speed_dependence::depends_on_speed;
 use crate::process::treatment::needs_orbit;
 use quietcut_model::case::Case;
 
@@ -60,7 +61,9 @@ impl TableLayer {
                 what: "--percentile needs deviations: keys that end in _std, such as ktc_mpa_std = 5.0 beside ktc_mpa, or a section [uncertainty]",
             });
         }
-        let pitched = Pitched::new(&case, CubicTerms::Kept)?;
+        // Of a structure that depends on the spindle speed, its first one: it sets the default range of speeds.
+        let first = case.at_speed(case.structure_rpm.unwrap_or_default());
+        let pitched = Pitched::new(&first, CubicTerms::Kept)?;
         let linear = pitched.with_mean_pitch().clone();
         Ok(Self {
             method: collocation_of(&case)?,
@@ -352,11 +355,14 @@ pub(super) fn table_layers(cases: &[Case], request: &TableRequest) -> Result<Vec
                 expected,
             });
         }
-        let is_followed = !needs_orbit(case) && !has_variable_pitch(case) && request.percentile.is_none();
+        let is_followed = !needs_orbit(case)
+            && !depends_on_speed(case)
+            && !has_variable_pitch(case)
+            && request.percentile.is_none();
         if request.derivatives && !is_followed {
             return Err(BuildError::NotPossible {
                 path: case.path.clone(),
-                what: "--derivatives are those of the limits of a linear structure: without cubic terms, with equal pitch, without --percentile",
+                what: "--derivatives are those of the limits of a linear structure: without cubic terms, with equal pitch, the same at all speeds, without --percentile",
             });
         }
     }

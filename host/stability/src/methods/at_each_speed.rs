@@ -1,4 +1,4 @@
-//! A method with the cutting coefficients of each spindle speed.
+//! A method with the structure and the cutting coefficients of each spindle speed.
 
 use crate::error::StabilityError;
 use crate::limits::cell::Cell;
@@ -12,10 +12,10 @@ use quietcut_model::case::Case;
 /// settings of the method do not depend on the speed.
 const TRIED_RPM: f64 = 1000.0;
 
-/// Gives the method of a case whose cutting coefficients do not depend on the spindle speed.
+/// Gives the method of a case whose structure and cutting coefficients do not depend on the spindle speed.
 type MethodOf = fn(&Case) -> Result<Box<dyn Method>, StabilityError>;
 
-/// Stability method of a case whose cutting coefficients depend on the spindle speed. Each speed has its own problem
+/// Stability method of a case whose structure or cutting coefficients depend on the spindle speed. Each speed has its own problem
 /// and method.
 pub(crate) struct AtEachSpeed {
     case: Case,

@@ -15,7 +15,7 @@ use quietcut_model::case::Case;
 
 /// Collocation method that suits a case: over one tooth period; over the revolution for unequal pitch; about the forced
 /// orbit if limits depend on it, with equivalent stiffness and damping of friction, backlash and hysteresis; with the
-/// cutting coefficients of each spindle speed if they depend on it.
+/// structure and the cutting coefficients of each spindle speed if they depend on it.
 ///
 /// # Errors
 /// The case lacks a section, is not valid, or has a feature that no collocation method treats.

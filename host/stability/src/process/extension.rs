@@ -29,6 +29,13 @@ pub(super) fn wrong(case: &Case, cause: ModelError) -> StabilityError {
 
 /// First-order form of the linear structure of a case with its linear extensions, in the machine's axes.
 pub(crate) fn structure(case: &Case) -> Result<FirstOrder, StabilityError> {
+    if case.speed_dependence.is_some() {
+        return Err(StabilityError::NotCovered {
+            path: case.path.clone(),
+            what: "structure.at_speed: the structure depends on the spindle speed, and here one structure serves all speeds; \
+                   lobes and table with --method collocation and without --linear take that of each speed",
+        });
+    }
     let structure = case.structure()?;
     let effects = effects(case, |spec| spec.treatment == Treatment::LinearStructure)?;
     let whole = if effects.0.is_empty() {

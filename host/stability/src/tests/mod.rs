@@ -11,6 +11,7 @@ mod properties;
 mod random;
 mod scan;
 mod sensitivity;
+mod speed_dependence;
 mod taylor;
 mod uncertainty;
 mod variable_pitch;

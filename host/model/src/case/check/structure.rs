@@ -6,22 +6,22 @@ use num_complex::Complex64;
 use toml::Spanned;
 
 use super::Check;
-use crate::case::file::{ModeFile, Rows, StructureFile};
+use crate::case::file::{ModeFile, Number, Rows, StructureFile};
 use crate::case::{CaseError, Parameter};
 use crate::structure::{Direction, Form, Matrices, Mode, Structure};
 
 impl Check<'_> {
     pub(super) fn structure(
         &mut self,
-        file: Spanned<StructureFile>,
+        file: &Spanned<StructureFile>,
         joints_deg: &[f64],
     ) -> Result<Structure, CaseError> {
         let directions = self.directions(&file.get_ref().directions)?;
-        self.no_joints_but_with_their_kind(&file)?;
+        self.no_joints_but_with_their_kind(file)?;
         let form = match file.get_ref().kind.get_ref().as_str() {
-            "matrices" => Form::Matrices(self.matrices(&file, directions.len())?),
-            "modes" => Form::Modes(self.modes(&file, directions.len())?),
-            "joints" => Form::Joints(Box::new(self.robot(&file, &directions, joints_deg)?)),
+            "matrices" => Form::Matrices(self.matrices(file, directions.len())?),
+            "modes" => Form::Modes(self.modes(file, directions.len())?),
+            "joints" => Form::Joints(Box::new(self.robot(file, &directions, joints_deg)?)),
             other => {
                 let kind = &file.get_ref().kind;
                 return Err(self.wrong(
@@ -209,24 +209,12 @@ impl Check<'_> {
 
     fn mode(&mut self, file: &ModeFile, index: usize, size: usize) -> Result<Mode, CaseError> {
         let key = |name: &str| format!("structure.mode[{}].{name}", index + 1);
-        let frequency_hz = self.positive(&file.frequency_hz, &key("frequency_hz"))?;
-        let percent = *file.damping_ratio.get_ref();
-        let expected = if (1.0..100.0).contains(&percent) {
-            format!(
-                "a damping ratio from 0 to below 1, such as {} for {percent} %,",
-                0.01 * percent
-            )
-        } else {
-            "a damping ratio from 0 to below 1".into()
-        };
-        let damping_ratio = self.number(
-            &file.damping_ratio,
-            &key("damping_ratio"),
-            |x| (0.0..1.0).contains(&x),
-            &expected,
+        let mode = self.poles_and_shapes(
+            (&file.frequency_hz, &file.damping_ratio),
+            (&file.left, &file.right),
+            size,
+            key,
         )?;
-        let left = self.shape(&file.left, &key("left"), size)?;
-        let right = self.shape(&file.right, &key("right"), size)?;
         self.deviation(
             &file.frequency_hz_std,
             &key("frequency_hz"),
@@ -243,11 +231,37 @@ impl Check<'_> {
         self.shape_deviation(&file.right_std, &key("right_std"), size, |entry, imaginary| {
             Parameter::Right(index, entry, imaginary)
         })?;
+        Ok(mode)
+    }
+
+    /// A mode without its deviations; `key` gives the full name of a key for messages.
+    pub(super) fn poles_and_shapes(
+        &self,
+        (frequency_hz, damping_ratio): (&Number, &Number),
+        (left, right): (&Spanned<Vec<[f64; 2]>>, &Spanned<Vec<[f64; 2]>>),
+        size: usize,
+        key: impl Fn(&str) -> String,
+    ) -> Result<Mode, CaseError> {
+        let frequency_hz = self.positive(frequency_hz, &key("frequency_hz"))?;
+        let percent = *damping_ratio.get_ref();
+        let expected = if (1.0..100.0).contains(&percent) {
+            format!(
+                "a damping ratio from 0 to below 1, such as {} for {percent} %,",
+                0.01 * percent
+            )
+        } else {
+            "a damping ratio from 0 to below 1".into()
+        };
         Ok(Mode {
             frequency_hz,
-            damping_ratio,
-            left,
-            right,
+            damping_ratio: self.number(
+                damping_ratio,
+                &key("damping_ratio"),
+                |x| (0.0..1.0).contains(&x),
+                &expected,
+            )?,
+            left: self.shape(left, &key("left"), size)?,
+            right: self.shape(right, &key("right"), size)?,
         })
     }
 

@@ -1,0 +1,104 @@
+//! The structure of a case at one spindle speed.
+
+use super::Case;
+use crate::structure::{Form, ModesAtSpeed, PairingError, SpeedDependence};
+
+/// Reason why the structures of two cases cannot be interpolated over the spindle speed.
+#[derive(Debug, thiserror::Error)]
+pub enum AtSpeedError {
+    /// One of the cases has no modes.
+    #[error("{path}: structure.kind = \"modes\" is needed, since modes are interpolated over the speed")]
+    NoModes {
+        /// Path of the case file.
+        path: String,
+    },
+    /// One of the cases does not state the speed of its structure.
+    #[error(
+        "{path}: rpm is missing under [structure]: the spindle speed at which the structure holds, 0 at standstill"
+    )]
+    NoSpeed {
+        /// Path of the case file.
+        path: String,
+    },
+    /// The structures have other directions.
+    #[error("{path}: the directions of the structure are {found}, and those of the first case {expected}")]
+    Directions {
+        /// Path of the case file.
+        path: String,
+        /// Its directions.
+        found: String,
+        /// Those of the first case.
+        expected: String,
+    },
+    /// The modes cannot be paired.
+    #[error("{path}: {cause}")]
+    Pairing {
+        /// Path of the case file.
+        path: String,
+        /// The fault.
+        cause: PairingError,
+    },
+}
+
+impl Case {
+    /// The case with the structure that it has at the spindle speed `rpm`, rev/min, and no dependence on the speed. A case
+    /// whose structure does not depend on the speed stays as it is.
+    #[must_use]
+    pub fn at_speed(&self, rpm: f64) -> Self {
+        let mut case = self.clone();
+        let dependence = case.speed_dependence.take();
+        if let (Some(dependence), Some(structure)) = (dependence, &mut case.structure)
+            && let Form::Modes(modes) = &mut structure.form
+        {
+            *modes = dependence.at(modes, rpm);
+            case.structure_rpm = Some(rpm);
+        }
+        case
+    }
+
+    /// The case whose structure is interpolated over the spindle speed between its own and those of `others`, cases of the
+    /// same machine at other speeds. Of the others only the structure is used.
+    ///
+    /// # Errors
+    /// See [`AtSpeedError`].
+    pub fn with_structures_of(mut self, others: &[Self]) -> Result<Self, AtSpeedError> {
+        let base = modes_at_speed(&self)?;
+        let directions = |case: &Self| {
+            let structure = case.structure.as_ref();
+            let names = structure.iter().flat_map(|structure| &structure.directions);
+            names.map(ToString::to_string).collect::<Vec<_>>().join(", ")
+        };
+        let mut further = Vec::new();
+        for other in others {
+            let (found, expected) = (directions(other), directions(&self));
+            if found != expected {
+                return Err(AtSpeedError::Directions {
+                    path: other.path.display().to_string(),
+                    found,
+                    expected,
+                });
+            }
+            further.push(modes_at_speed(other)?);
+        }
+        let dependence = SpeedDependence::new(base, further).map_err(|cause| AtSpeedError::Pairing {
+            path: self.path.display().to_string(),
+            cause,
+        })?;
+        self.speed_dependence = Some(dependence);
+        Ok(self)
+    }
+}
+
+fn modes_at_speed(case: &Case) -> Result<ModesAtSpeed, AtSpeedError> {
+    let path = || case.path.display().to_string();
+    let Some(Form::Modes(modes)) = case.structure.as_ref().map(|structure| &structure.form) else {
+        return Err(AtSpeedError::NoModes { path: path() });
+    };
+    let rpm = case
+        .structure_rpm
+        .ok_or_else(|| AtSpeedError::NoSpeed { path: path() })?;
+    Ok(ModesAtSpeed {
+        rpm,
+        modes: modes.clone(),
+    })
+}
