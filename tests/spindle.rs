@@ -215,3 +215,177 @@ fn power_of_a_tool_without_diameter_is_not_considered_and_the_key_is_named() {
         assert!(output.stderr.contains("diameter_mm"), "{line}: {}", output.stderr);
     }
 }
+
+/// Case `name` of a tool with one mode in x of the modal mass 0.04 kg, of the frequency in Hz and the residue −i·`residue`,
+/// at a speed, rev/min.
+fn write_tool(folder: &Path, name: &str, speed: &str, frequency_hz: f64, residue: f64) {
+    let half = residue.sqrt();
+    let text = format!(
+        "[structure]\nkind = \"modes\"\ndirections = [\"x\"]\n{speed}\n[[structure.mode]]\nfrequency_hz = {frequency_hz:?}\n\
+         damping_ratio = 0.02\nleft = [[0.0, {}]]\nright = [[{half}, 0.0]]\n[tool]\nteeth = 2\nedge_angle_deg = 90.0\n[material]\n\
+         ktc_mpa = 600.0\nkrc_mpa = 200.0\nkac_mpa = 0.0\n[cut]\nstart_deg = 90.0\nexit_deg = 180.0\nfeed_per_tooth_mm = 0.1\n",
+        -half
+    );
+    std::fs::write(folder.join(name), text).expect("written");
+}
+
+/// Residue of a real mode of the modal mass 0.04 kg, to first order in the damping ratio: 1/(2ωm).
+fn residue(frequency_hz: f64) -> f64 {
+    1.0 / (2.0 * TAU * frequency_hz * 0.04)
+}
+
+#[test]
+fn limits_follow_the_structure_of_each_speed() {
+    let folder = folder();
+    let at = folder.path();
+    write_tool(at, "still.toml", "rpm = 0", 900.0, residue(900.0));
+    write_tool(at, "fast.toml", "rpm = 20000", 700.0, residue(700.0));
+    write_tool(at, "unknown.toml", "", 700.0, residue(700.0));
+    // The structure half-way, at 10 000 rev/min.
+    write_tool(
+        at,
+        "between.toml",
+        "rpm = 10000",
+        800.0,
+        0.5 * (residue(900.0) + residue(700.0)),
+    );
+    let limits = |files: &str| -> (Vec<f64>, Value) {
+        let answer = json(
+            at,
+            &format!("lobes {files} --rpm 10000:20000:2 --depth-mm 0:20:60 --no-refine --json"),
+        );
+        let speeds = answer["speeds"].as_array().expect("speeds").iter();
+        let depths = speeds.map(|line| line["first_limit"]["depth_mm"].as_f64().expect("a limit"));
+        (depths.collect(), answer["assumed"].clone())
+    };
+    let (both, assumed) = limits("still.toml --at-speed fast.toml");
+    let (between, fast) = (limits("between.toml").0, limits("fast.toml").0);
+    // Each limit states an error of 1e-6 mm.
+    assert!((both[0] - between[0]).abs() < 2e-6, "{both:?} {between:?}");
+    assert!((both[1] - fast[1]).abs() < 2e-6, "{both:?} {fast:?}");
+    assert!(
+        assumed.to_string().contains("between 0, 20000 rev/min"),
+        "{assumed}"
+    );
+    let (still, assumed) = limits("still.toml");
+    assert!((still[1] / fast[1] - 1.0).abs() > 0.1, "{still:?} {fast:?}");
+    assert!(assumed.to_string().contains("at standstill"), "{assumed}");
+    let refused = |line: &str, expected: &[&str]| quietcut(at, &words(line)).refused(expected);
+    refused(
+        "lobes still.toml --at-speed unknown.toml --at 9000,1",
+        &["unknown.toml", "rpm"],
+    );
+    refused(
+        "lobes still.toml --at-speed fast.toml --method zoa --at 9000,1",
+        &["at_speed", "collocation"],
+    );
+}
+
+/// Frequency, Hz, between two others at which the record of a column from a time on has the largest amplitude.
+fn peak_hz(file: &Path, column: usize, from_s: f64, [low, high]: [f64; 2]) -> f64 {
+    let text = std::fs::read_to_string(file).expect("a recording");
+    let rows = text.lines().skip(1).map(|line| {
+        let cells: Vec<f64> = line
+            .split(',')
+            .map(|cell| cell.parse().expect("a number"))
+            .collect();
+        (cells[0], cells[column])
+    });
+    let samples: Vec<(f64, f64)> = rows.filter(|(time_s, _)| *time_s > from_s).collect();
+    let mean = samples.iter().map(|(_, value)| value).sum::<f64>() / samples.len() as f64;
+    let amplitude = |hertz: f64| {
+        let (mut re, mut im) = (0.0, 0.0);
+        for (index, (time_s, value)) in samples.iter().enumerate() {
+            let window = 0.5 - 0.5 * (TAU * index as f64 / samples.len() as f64).cos();
+            re += window * (value - mean) * (TAU * hertz * time_s).cos();
+            im += window * (value - mean) * (TAU * hertz * time_s).sin();
+        }
+        re.hypot(im)
+    };
+    let steps = ((high - low) / 0.25).floor() as usize;
+    let lines = (0..steps).map(|step| low + 0.25 * step as f64);
+    let largest = lines.max_by(|a, b| amplitude(*a).total_cmp(&amplitude(*b)));
+    largest.expect("a frequency")
+}
+
+#[test]
+fn a_check_cut_rescales_the_chart_of_taps_at_standstill() {
+    let folder = folder();
+    let at = folder.path();
+    // The mode of the running spindle has 7 % less frequency, at the same modal mass.
+    write_tool(at, "still.toml", "# By taps.\nrpm = 0", 900.0, residue(900.0));
+    write_tool(at, "true.toml", "rpm = 10500", 837.0, residue(837.0));
+    // A cut 8 % deeper than the true limit, 0.924 mm, chatters. Its tooth-passing frequency is 350 Hz.
+    done(
+        at,
+        "simulate true.toml --rpm 10500 --depth-mm 1 --seconds 1 --sample-rate-hz 8192 --ideal --measure displacement --out cut.csv",
+    );
+    let chatter_hz = peak_hz(&at.join("cut.csv"), 2, 0.4, [750.0, 900.0]);
+    std::fs::write(
+        at.join("cuts.csv"),
+        format!("rpm,depth_mm,chatter_hz,verdict\n10500,1,{chatter_hz},chatter\n"),
+    )
+    .expect("written");
+    let chart = "--rpm 9500:12000:6 --depth-mm 0:8:60 --no-refine --nominal --json";
+    let rescaled = json(
+        at,
+        &format!("lobes still.toml --cuts cuts.csv --rescale {chart} --out running.toml"),
+    );
+    let mode = &rescaled["rescaling"]["modes"][0];
+    let ci90 = [0, 1].map(|end| mode["factor_ci90"][end].as_f64().expect("a number"));
+    assert!((ci90[0]..ci90[1]).contains(&0.93), "{mode}");
+    assert!(ci90[1] - ci90[0] < 0.03, "{mode}");
+    let limits = |answer: &Value| -> Vec<f64> {
+        let speeds = answer["speeds"].as_array().expect("speeds").iter();
+        let depths = speeds.map(|line| line["first_limit"]["depth_mm"].as_f64().expect("a limit"));
+        depths.collect()
+    };
+    let found = limits(&rescaled);
+    let truth = limits(&json(at, &format!("lobes true.toml {chart}")));
+    let still = limits(&json(at, &format!("lobes still.toml {chart}")));
+    // A limit moves by at most 12 % per percent of the natural frequency, at 9 500 rev/min; the factor is within 0.1 %, as the
+    // spectrum of 0.6 s shows its peak within 0.5 Hz.
+    let furthest = |depths: &[f64]| {
+        let errors = depths
+            .iter()
+            .zip(&truth)
+            .map(|(depth, truth)| (depth / truth - 1.0).abs());
+        errors.fold(0.0, f64::max)
+    };
+    assert!(furthest(&found) < 0.02, "{found:?} {truth:?}");
+    assert!(furthest(&still) > 0.5, "{still:?} {truth:?}");
+    // The written case has the same limits, its comments, and says what was done instead of standstill.
+    let text = std::fs::read_to_string(at.join("running.toml")).expect("a case");
+    assert!(
+        text.contains("# By taps.") && text.contains("rpm = 10500.0"),
+        "{text}"
+    );
+    let written = json(at, &format!("lobes running.toml {chart}"));
+    assert_eq!(limits(&written), found);
+    let assumed = written["assumed"].to_string();
+    assert!(
+        assumed.contains("from the chatter frequency of cuts at 10500 rev/min")
+            && !assumed.contains("standstill"),
+        "{assumed}"
+    );
+}
+
+#[test]
+fn a_cut_that_tells_no_frequency_rescales_nothing() {
+    let folder = folder();
+    let at = folder.path();
+    write_tool(at, "still.toml", "rpm = 0", 900.0, residue(900.0));
+    let rows = [
+        ("10500,1,,chatter", "was not measured"),
+        ("10500,1,,stable", "did not chatter"),
+        ("10500,1,525,chatter", "period doubling"),
+    ];
+    for (row, reason) in rows {
+        let table = format!("rpm,depth_mm,chatter_hz,verdict\n{row}\n");
+        std::fs::write(at.join("cuts.csv"), table).expect("written");
+        let line = "lobes still.toml --cuts cuts.csv --rescale --rpm 9500:12000:6 --depth-mm 0:8:60";
+        quietcut(at, &words(line)).refused(&["still.toml", "10500 rev/min, 1 mm", reason]);
+    }
+    let line = "lobes still.toml --rpm 9500:12000:6 --depth-mm 0:8:60 --out other.toml";
+    quietcut(at, &words(line)).refused(&["other.toml", "--rescale"]);
+}

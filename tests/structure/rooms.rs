@@ -39,6 +39,7 @@ const ROOMS: &[(&str, &[&str])] = &[
             "orbit",
             "lobe_table",
             "trial_cuts",
+            "rescaling",
             "lib",
         ],
     ),

@@ -1,24 +1,18 @@
 //! `quietcut lobes`: stability limits of a case over spindle speed, or Floquet multipliers at given points.
 
 use std::fmt::Write;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use serde::Serialize;
-
+use super::lobes_files::{LobesOutput, ShownChart};
+use super::lobes_rescaled::{RescaleOptions, RescaledCase};
 use super::lobes_spindle::Spindle;
 use super::lobes_spread::{intervals, percentiles};
 use super::method::MethodChoice;
 use super::varied::{self, Varied};
-use super::{
-    Endings, Error, Output, Range, assumed, lobes_cells, lobes_csv, lobes_points, plausible_structure,
-};
+use super::{Endings, Error, Output, Range, assumed, lobes_cells, lobes_points, plausible_structure};
 use crate::case::Case;
-use crate::file;
-use crate::report::digits::significant;
-use crate::report::lobe_chart::{Column, lobe_chart_of_spindle};
 use crate::report::marks::Mark;
-use crate::report::page::{figure, page};
-use crate::stability::{Chart, Method, Resolution, SpeedLine, Uncertainty, chart};
+use crate::stability::{Chart, Method, Resolution, Uncertainty, chart};
 use crate::trial_cuts::{self, Calls, TrialCut};
 
 /// Computes stability limits over the spindle speed, or the dominant Floquet multiplier at given points.
@@ -60,6 +54,8 @@ pub struct Args {
     /// counted.
     #[arg(long, value_name = "FILE", conflicts_with = "cells")]
     cuts: Option<PathBuf>,
+    #[command(flatten)]
+    rescale: RescaleOptions,
     /// Compute the limits at the given speeds only. Without this option further speeds are added where limits bend, so
     /// that straight lines between all speeds are right to 1 % in depth or 0.1 % in speed; methods that need seconds
     /// per speed add none.
@@ -68,8 +64,9 @@ pub struct Args {
     /// Seed of the random parameters that are drawn from the standard deviations.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// Chart or table to write; the ending sets the format: svg, html, csv or json. May be repeated.
-    #[arg(long, value_name = "FILE", value_parser = Endings(&["svg", "html", "csv", "json"]).parser())]
+    /// Chart or table to write; the ending sets the format: svg, html, csv or json; with --rescale also toml, the rescaled
+    /// case. May be repeated.
+    #[arg(long, value_name = "FILE", value_parser = Endings(&["svg", "html", "csv", "json", "toml"]).parser())]
     out: Vec<PathBuf>,
     /// Working point at which to compute the dominant Floquet multiplier: spindle speed in rev/min and axial depth in
     /// mm, as RPM,MM; may be repeated.
@@ -120,9 +117,15 @@ impl Args {
 /// Runs the verb.
 pub fn run(args: Args) -> Result<(), Error> {
     args.check()?;
-    let case = read_case(&args)?;
+    let mut case = read_case(&args)?;
     plausible_structure::warn(&case);
     args.method.announce()?;
+    let maker = |case: &Case| args.method.on(case).map_err(|error| error.to_string());
+    let cuts = args.cuts.as_deref().map(trial_cuts::read).transpose()?;
+    let rescaled = args.rescale.of(&case, &maker, cuts.as_deref())?;
+    if let Some(rescaled) = &rescaled {
+        case = rescaled.case.clone();
+    }
     let assumed = args.method.assumptions(&case)?;
     if args.cells || args.varied.variation().is_some() {
         for sentence in &assumed {
@@ -139,19 +142,18 @@ pub fn run(args: Args) -> Result<(), Error> {
             lobes_cells::run(&case, method.as_ref(), grid, &args.out, args.output)
         }
         (Some(rpm), Some(depth_mm)) => {
-            let maker = |case: &Case| args.method.on(case).map_err(|error| error.to_string());
             let uncertainty = if args.nominal {
                 None
             } else {
                 Uncertainty::new(&case, &maker, args.seed)
             };
-            let cuts = args.cuts.as_deref().map(trial_cuts::read).transpose()?;
             let request = ChartRequest {
                 rpm,
                 depth_mm,
                 probability: args.probability,
                 refine: !args.no_refine && !method.takes_seconds(),
                 cuts,
+                rescaled,
                 assumed,
             };
             run_chart(
@@ -185,20 +187,10 @@ struct ChartRequest {
     /// Whether stability limits are also computed at further speeds, where the limits bend.
     refine: bool,
     cuts: Option<Vec<TrialCut>>,
+    /// The case with the natural frequencies of the trial cuts.
+    rescaled: Option<RescaledCase>,
     /// Assumptions behind the structure, one sentence each.
     assumed: Vec<String>,
-}
-
-#[derive(Serialize)]
-struct LobesOutput<'a> {
-    #[serde(flatten)]
-    chart: &'a Chart,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    cuts: Option<Calls>,
-    #[serde(skip_serializing_if = "<[String]>::is_empty")]
-    assumed: &'a [String],
-    #[serde(skip_serializing_if = "Option::is_none")]
-    spindle: Option<&'a Spindle>,
 }
 
 fn run_chart(
@@ -215,6 +207,7 @@ fn run_chart(
         probability,
         refine,
         cuts,
+        rescaled,
         assumed,
     } = request;
     if probability && uncertainty.is_none() {
@@ -249,6 +242,7 @@ fn run_chart(
         marks: cuts.iter().flatten().map(Mark::from).collect(),
         assumed: &assumed,
         spindle: spindle.as_ref(),
+        rescaled: rescaled.as_ref(),
     };
     for path in out {
         shown.write(path)?;
@@ -274,6 +268,7 @@ fn run_chart(
         cuts: calls,
         assumed: &assumed,
         spindle: spindle.as_ref(),
+        rescaling: rescaled.as_ref().map(|rescaled| &rescaled.answer),
     };
     output.answer(&answer, text)
 }
@@ -355,106 +350,6 @@ fn resolution_as_text(chart: &Chart, resolution: &Resolution) -> String {
         );
     }
     text
-}
-
-/// Stability chart of a case, with the trial cuts and assumptions that its files may show.
-struct ShownChart<'a> {
-    case: &'a Case,
-    chart: &'a Chart,
-    depth_mm: f64,
-    marks: Vec<Mark>,
-    assumed: &'a [String],
-    spindle: Option<&'a Spindle>,
-}
-
-impl ShownChart<'_> {
-    fn write(&self, path: &Path) -> Result<(), Error> {
-        let text = match file::ending(path).as_str() {
-            "json" => {
-                let answer = LobesOutput {
-                    chart: self.chart,
-                    cuts: None,
-                    assumed: self.assumed,
-                    spindle: self.spindle,
-                };
-                serde_json::to_string(&answer).map_err(Error::other)?
-            }
-            "csv" => lobes_csv::as_csv(self.chart)?,
-            "svg" => self.picture()?,
-            "html" => self.page()?,
-            _ => {
-                return Err(Error::input(format!(
-                    "{}: the ending of the file sets its format; .svg, .html, .csv or .json is needed",
-                    path.display()
-                )));
-            }
-        };
-        Ok(file::write(path, text.as_bytes())?)
-    }
-
-    fn picture(&self) -> Result<String, Error> {
-        let columns: Vec<Column> = self.chart.lines().into_iter().map(Column::from).collect();
-        // The chart cannot be drawn from only one spindle speed or without a depth: this is an input error.
-        let title = format!("{}, method: {}", self.case.name, self.chart.label);
-        let area = self.spindle.map(Spindle::area);
-        lobe_chart_of_spindle(&title, &columns, self.depth_mm, &self.marks, area.as_ref())
-            .map_err(Error::input)
-    }
-
-    fn page(&self) -> Result<String, Error> {
-        let (case, chart) = (self.case, self.chart);
-        let svg = self.picture()?;
-        let caption = format!(
-            "Stable depths over spindle speed, method: {}. Lines: first loss of stability. Grey areas: undecided within the error \
-         of the method. Grey band with lines: 5 to 95 % percentiles and median of the first limit, from the standard \
-         deviations of the case. Circles: stable trial cuts; crosses: trial cuts with chatter; squares: marginal trial cuts.",
-            chart.label
-        );
-        let body = maud::html! {
-            h1 { (case.name) }
-            (figure(&svg, &caption))
-            (assumed::section(self.assumed))
-            @if let Some(spindle) = self.spindle { (spindle.section()) }
-            h2 { "Limits" }
-            table {
-                tr {
-                    th { "rev/min" } th { "first limit [mm]" } th { "error [mm]" } th { "kind" } th { "chatter [Hz]" } th { "stable [mm]" }
-                    @if chart.speeds.iter().any(|line| line.spread.is_some()) {
-                        th { "5 % percentile of the limit (90 % interval) [mm]" } th { "50 %" } th { "95 %" }
-                    }
-                }
-                @for line in &chart.speeds { (row(line)) }
-            }
-        };
-        Ok(page(&case.name, &body))
-    }
-}
-
-fn row(line: &SpeedLine) -> maud::Markup {
-    let stable: Vec<String> = line
-        .stable_mm
-        .iter()
-        .map(|[from, to]| format!("{from:.3} to {to:.3}"))
-        .collect();
-    maud::html! {
-        tr {
-            td { (format!("{:.1}", line.rpm)) }
-            @if let Some(limit) = line.first_limit {
-                td { (format!("{:.4}", limit.depth_mm)) }
-                td { @if let Some(error_mm) = limit.error_mm { (significant(error_mm, 1)) } }
-                td { (limit.kind.name()) }
-                td { @if let Some(hz) = limit.chatter_hz { (format!("{hz:.2}")) } }
-            } @else {
-                td { "none" } td {} td {} td {}
-            }
-            td { (stable.join(", ")) }
-            @if let Some(spread) = &line.spread {
-                @for (depth, [from, to]) in percentiles(spread, "beyond").into_iter().zip(intervals(spread, "beyond")) {
-                    td { (depth) " (" (from) " to " (to) ")" }
-                }
-            }
-        }
-    }
 }
 
 /// Parses `RPM,MM` or `RPM:MM` into spindle speed in rev/min and axial depth in mm.

@@ -426,3 +426,17 @@ pub(crate) const CHECK_GROWTH: f64 = 1.2;
 /// ([`CHECK_GROWTH`]): together 1.2/0.85 = 1.4. Held by `lobe_table/accuracy_tests.rs` at 999 of 1000 random speeds per
 /// table.
 pub(crate) const TABLE_ROOM: f64 = 1.5;
+
+// Check cuts.
+
+/// Largest factor, and reciprocal of the smallest, between the natural frequency of a mode in the case and that of the running
+/// spindle. Frequencies of spindles fall by some 10 to 20 % up to their highest speed. Unfounded.
+pub(crate) const LARGEST_RESCALING: f64 = 1.25;
+
+/// Step of the logarithm of a natural frequency at which the predicted chatter frequency is first compared with the measured one. Two
+/// lobes beside each other on the way would have to be narrower than 1 % of the frequency to be missed. Unfounded.
+pub(crate) const RESCALING_STEP: f64 = 0.01;
+
+/// Factor by which a second mode must move further than the first, in the logarithm of its natural frequency, beyond the 90 %
+/// intervals of both, for a measured chatter frequency to identify the first. Unfounded.
+pub(crate) const RIVAL_RESCALING: f64 = 2.0;

@@ -72,6 +72,7 @@
 //! | [`orbit`] | forced periodic orbits and their branches |
 //! | [`lobe_table`] | the table of the device |
 //! | [`trial_cuts`] | predictions against tried cuts |
+//! | [`rescaling`] | natural frequencies from the chatter frequencies of check cuts |
 //!
 //! `methods` uses `limits`, since [`Method`] returns limits; `frequency` is the mathematics that four methods share.
 //! Tests across rooms, with a test oracle of Taylor series that shares no code with them, are in `tests`.
@@ -88,6 +89,7 @@ mod methods;
 pub mod orbit;
 mod problem;
 mod process;
+pub mod rescaling;
 mod spectrum;
 pub mod trial_cuts;
 

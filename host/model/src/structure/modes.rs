@@ -29,4 +29,16 @@ impl Mode {
             omega * (1.0 - self.damping_ratio * self.damping_ratio).sqrt(),
         )
     }
+
+    /// This mode with its natural frequency multiplied by `factor` r, positive, at the same modal mass and damping ratio: the
+    /// left shape, and with it the residue, is divided by r, so that its part of the receptance is h(ω/r)/r².
+    #[must_use]
+    pub fn with_frequency_scaled(&self, factor: f64) -> Self {
+        let mut scaled = self.clone();
+        scaled.frequency_hz *= factor;
+        for entry in &mut scaled.left {
+            *entry /= factor;
+        }
+        scaled
+    }
 }
