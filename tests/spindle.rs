@@ -1,10 +1,13 @@
 //! Speed ranges, power and torque of the spindle: the cutting torque of a simulated cut, and no proposal beyond them
-#![allow(clippy::expect_used)]
+#![allow(clippy::expect_used, clippy::panic)]
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use std::path::Path;
 
-use quietcut_tests::command::{cases, done, folder, quietcut, words};
+use quietcut::device::pseudo_terminal::PseudoTerminal;
+use quietcut_tests::command::{alone, binary, cases, done, folder, quietcut, words};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
 use serde_json::Value;
 
 /// A case of the folder `tests/cases` with a diameter of the tool, other lines and further ones at its end.
@@ -388,4 +391,143 @@ fn a_cut_that_tells_no_frequency_rescales_nothing() {
     }
     let line = "lobes still.toml --rpm 9500:12000:6 --depth-mm 0:8:60 --out other.toml";
     quietcut(at, &words(line)).refused(&["other.toml", "--rescale"]);
+}
+
+#[test]
+fn a_terminal_is_asked_once_for_the_speeds_of_the_spindle() {
+    let folder = folder();
+    let at = folder.path();
+    write_tool(at, "tool.toml", "rpm = 0 # by taps", 900.0, residue(900.0));
+    let line = "lobes tool.toml --rpm 8000:12000:5 --depth-mm 0:8:60 --no-refine";
+    // Neither a script nor JSON is asked.
+    done(at, line);
+    let before = std::fs::read_to_string(at.join("tool.toml")).expect("a case");
+    assert!(!before.contains("[limits]"));
+    let said = on_terminal(at, line, "9000:11000\n");
+    assert!(said.contains("Lowest and highest speed of the spindle"), "{said}");
+    let after = std::fs::read_to_string(at.join("tool.toml")).expect("a case");
+    assert!(after.starts_with(before.trim_end()), "{after}");
+    assert!(
+        after.contains("rpm_min = 9000.0") && after.contains("rpm_max = 11000.0"),
+        "{after}"
+    );
+    // The chart of the same command keeps within them, and the second one asks nothing.
+    assert!(said.contains("outside the speeds of the spindle"), "{said}");
+    let said = on_terminal(at, line, "");
+    assert!(!said.contains("Lowest and highest"), "{said}");
+}
+
+/// Output of the command on a terminal where the user types `answer`.
+fn on_terminal(folder: &Path, line: &str, answer: &str) -> String {
+    let guard = alone();
+    let mut terminal = PseudoTerminal::new().expect("a pseudo-terminal");
+    let open = || {
+        let end = std::fs::OpenOptions::new()
+            .read(true)
+            .write(true)
+            .open(terminal.path());
+        std::process::Stdio::from(end.expect("the end of the command"))
+    };
+    let mut child = std::process::Command::new(binary())
+        .args(words(line))
+        .current_dir(folder)
+        .stdin(open())
+        .stdout(open())
+        .stderr(open())
+        .spawn()
+        .expect("the command can be started");
+    drop(guard);
+    let moment = std::time::Duration::from_millis(20);
+    terminal
+        .send(answer.as_bytes(), moment)
+        .expect("the line is there");
+    let (mut said, mut bytes) = (Vec::new(), [0; 4096]);
+    let began = std::time::Instant::now();
+    let mut has_ended = false;
+    loop {
+        let count = terminal.receive(&mut bytes, moment).unwrap_or(0);
+        said.extend_from_slice(&bytes[..count]);
+        if has_ended && count == 0 {
+            break;
+        }
+        has_ended = child.try_wait().expect("the command can be waited for").is_some();
+        if began.elapsed() > std::time::Duration::from_secs(30) {
+            child.kill().expect("the command can be killed");
+            panic!("the command did not end: {}", String::from_utf8_lossy(&said));
+        }
+    }
+    String::from_utf8_lossy(&said).into_owned()
+}
+
+#[test]
+fn taps_at_standstill_are_said_in_the_chart() {
+    let folder = folder();
+    let at = folder.path();
+    write_tool(at, "tool.toml", "", 900.0, residue(900.0));
+    done(
+        at,
+        "simulate tool.toml --experiment hammer --direction x --force-n 50 --pulse-ms 0.2 --impacts 3 --spacing-s 0.5 --sample-rate-hz 8192 --noise-percent 0.1 --out tap.csv",
+    );
+    let identified = |options: &str| {
+        done(
+            at,
+            &format!("identify tap.csv --method modes --case tool.toml --out found.toml {options}"),
+        );
+        let chart = json(at, "lobes found.toml --at 9000,1 --json");
+        chart["assumed"].to_string()
+    };
+    assert!(!identified("").contains("standstill"));
+    assert!(identified("--rpm 0").contains("at standstill"));
+    assert!(!identified("--rpm 9000").contains("standstill"));
+    let refused = quietcut(at, &words("identify tap.csv --method force-coefficients --rpm 0"));
+    refused.refused(&["--rpm", "force-coefficients"]);
+}
+
+#[test]
+fn charts_and_plans_propose_nothing_beyond_random_limits() {
+    let folder = folder();
+    let at = folder.path();
+    let seed = 20_261_126;
+    println!("seed {seed}");
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let mut proposals = 0;
+    for _ in 0..6 {
+        // Two ranges of speed with a gap, and a power from a tenth of the one of the stable cuts to all of it.
+        let mut ends: Vec<f64> = (0..4).map(|_| random.random_range(700.0..2000.0)).collect();
+        ends.sort_by(f64::total_cmp);
+        let power_w = random.random_range(1.0..12.0);
+        let limits = format!(
+            "[limits]\nrpm_min = {:?}\nrpm_max = {:?}\nranges_rpm = [[{:?}, {:?}], [{:?}, {:?}]]\npower_w = {power_w:?}\n",
+            ends[0], ends[3], ends[0], ends[1], ends[2], ends[3]
+        );
+        write(at, "kuka-kr90-acetal.toml", &[], &limits);
+        let check = |cut: &Value, depth_mm: &Value| {
+            let (rpm, depth_mm) = (cut["rpm"].as_f64()?, depth_mm.as_f64()?);
+            let is_allowed = (ends[0]..=ends[1]).contains(&rpm) || (ends[2]..=ends[3]).contains(&rpm);
+            // The depth that 7 W drive, in proportion to the power.
+            let is_driven = depth_mm <= driven_mm(rpm) * power_w / 7.0 * (1.0 + 1e-9);
+            assert!(is_allowed && is_driven, "{limits}: {cut}");
+            Some(())
+        };
+        let lobes = json(
+            at,
+            "lobes case.toml --rpm 700:2000:27 --depth-mm 0:6:60 --no-refine --json",
+        );
+        let proposal = &lobes["spindle"]["proposal"];
+        proposals += usize::from(check(proposal, &proposal["depth_mm"]).is_some());
+        let plan = quietcut(
+            at,
+            &words("plan case.toml --rpm 700:2000:14 --depth-mm 0:6:60 --width-percent 25 --json"),
+        );
+        if plan.status == Some(2) {
+            // No speed of the plan lies within the limits.
+            continue;
+        }
+        for test in plan.json()["tests"].as_array().expect("tests") {
+            for key in ["about_mm", "depth_mm"] {
+                proposals += usize::from(check(test, &test[key]).is_some());
+            }
+        }
+    }
+    assert!(proposals >= 6, "{proposals}");
 }

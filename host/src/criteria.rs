@@ -32,6 +32,14 @@ pub(crate) const RELATED_COHERENCE: f64 = 0.8;
 
 // Identification
 
+/// Time in s over which a tachometer without pulse means that the spindle stood still: it ran at less than 60 rev/min then. Effects of
+/// rotation on modes grow with the speed or its square, and at 60 rev/min are a hundredth of those at 6000 rev/min at most.
+pub(crate) const STANDSTILL_S: f64 = 1.0;
+
+/// Relative difference of spindle speeds up to which recordings belong to the same speed, and of revolutions up to which the speed of
+/// a recording is constant. Drives hold their speed to about this value under load. Unfounded.
+pub(crate) const SAME_SPINDLE_SPEED: f64 = 0.02;
+
 /// Relative difference of two frequencies up to which they belong to the same step of a step-sine test. Unfounded.
 pub(crate) const SAME_FREQUENCY: f64 = 1e-3;
 

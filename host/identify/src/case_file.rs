@@ -79,6 +79,21 @@ pub fn with_sections(text: &str, other: &Table) -> Result<String, CaseFileError>
     written(&case)
 }
 
+/// Case file `text` that states the spindle speed of its structure, rev/min, 0 at standstill. A case without structure stays as it
+/// is.
+///
+/// # Errors
+/// The text is not valid TOML, or the result cannot be written as TOML.
+pub fn with_speed(text: &str, rpm: f64) -> Result<String, CaseFileError> {
+    let mut case: Table = text
+        .parse()
+        .map_err(|error: toml::de::Error| CaseFileError::Toml(error.to_string()))?;
+    if let Some(structure) = case.get_mut("structure").and_then(Value::as_table_mut) {
+        structure.insert("rpm".into(), rpm.into());
+    }
+    written(&case)
+}
+
 /// The case `other` with the name, the tool and the material of `identified`, a case of [`cutting`].
 ///
 /// The name of the material and the keys of the tool that `identified` lacks are those of `other`; but if `identified`

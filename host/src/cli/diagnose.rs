@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::segment::{Recorded, RecordedSegment};
-use super::{Error, Output, progress};
+use super::{Error, Output, progress, speed_question};
 use crate::case::Case;
 use crate::diagnose::answer::Outcome;
 use crate::diagnose::lobes::{baseline_lobes, lobes};
@@ -45,13 +45,14 @@ pub struct Args {
 
 /// Runs the verb.
 pub fn run(args: Args) -> Result<(), Error> {
-    let case = Case::read(&args.case)?;
+    let mut case = Case::read(&args.case)?;
     if case.speed_dependence.is_some() {
         return Err(Error::input(format!(
             "{}: structure.at_speed: a diagnosis needs the one structure of the speed of the records; leave [[structure.at_speed]] out and give that one",
             args.case.display()
         )));
     }
+    speed_question::ask(&mut case, args.output)?;
     let cuts = match &args.cuts {
         Some(path) => trial_cuts::read(path)?,
         None => Vec::new(),

@@ -13,6 +13,7 @@ mod mode_options;
 mod modes;
 mod modes_comparison;
 mod records;
+mod spindle_speed;
 mod stabilization_diagram;
 mod without_force;
 mod written;
@@ -44,6 +45,11 @@ pub fn run(args: Args) -> Result<(), Error> {
             other.display()
         )));
     }
+    if let Some(rpm) = args.rpm.filter(|_| args.method == Method::ForceCoefficients) {
+        return Err(Error::input(format!(
+            "--rpm {rpm}: it is the speed at which a structure was measured, and --method force-coefficients identifies none; leave it out"
+        )));
+    }
     let others = match args.method {
         Method::Joints | Method::InverseStability => args.case.as_deref().or(args.start.as_deref()),
         _ => args.case.as_deref(),
@@ -68,6 +74,13 @@ pub fn run(args: Args) -> Result<(), Error> {
         Method::ForceCoefficients => cutting::force_coefficients(&args, &recordings)?,
         Method::Modes => modes::modes(&args, &mut understood)?,
     };
+    answer.structure_rpm = args
+        .rpm
+        .or(answer.structure_rpm)
+        .or_else(|| spindle_speed::spindle_rpm(&recordings));
+    if args.method == Method::ForceCoefficients {
+        answer.structure_rpm = None;
+    }
     let lines = text(&answer);
     written::write(&args.out, &mut answer, other.as_ref(), &lines)?;
     for warning in &answer.warnings {
@@ -107,6 +120,13 @@ fn text(answer: &IdentifyOutput) -> String {
             "fit error {:.3} % (root mean square, relative to the data)",
             100.0 * error
         ));
+    }
+    match answer.structure_rpm {
+        Some(0.0) => {
+            lines.push("measured at standstill: the modes of a running spindle may be others".into())
+        }
+        Some(rpm) => lines.push(format!("measured at {} rev/min", significant(rpm, DIGITS))),
+        None => (),
     }
     for path in &answer.out {
         lines.push(format!("written to {}", path.display()));

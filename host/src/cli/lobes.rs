@@ -9,7 +9,9 @@ use super::lobes_spindle::Spindle;
 use super::lobes_spread::{intervals, percentiles};
 use super::method::MethodChoice;
 use super::varied::{self, Varied};
-use super::{Endings, Error, Output, Range, assumed, lobes_cells, lobes_points, plausible_structure};
+use super::{
+    Endings, Error, Output, Range, assumed, lobes_cells, lobes_points, plausible_structure, speed_question,
+};
 use crate::case::Case;
 use crate::report::marks::Mark;
 use crate::stability::{Chart, Method, Resolution, Uncertainty, chart};
@@ -118,6 +120,9 @@ impl Args {
 pub fn run(args: Args) -> Result<(), Error> {
     args.check()?;
     let mut case = read_case(&args)?;
+    if args.rpm.is_some() {
+        speed_question::ask(&mut case, args.output)?;
+    }
     plausible_structure::warn(&case);
     args.method.announce()?;
     let maker = |case: &Case| args.method.on(case).map_err(|error| error.to_string());

@@ -39,6 +39,7 @@ pub mod replay;
 mod segment;
 pub mod setup;
 pub mod simulate;
+mod speed_question;
 pub mod table;
 mod tried;
 pub mod upload;

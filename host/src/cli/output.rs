@@ -73,6 +73,11 @@ pub struct Output {
 }
 
 impl Output {
+    /// True with `--json`.
+    pub(super) fn is_json(self) -> bool {
+        self.json
+    }
+
     /// Prints one text line; prints nothing with `--json`.
     pub fn line(self, text: impl Display) -> Result<(), Error> {
         if self.json { Ok(()) } else { print(&text) }

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
-use super::{Endings, Error, Output, Range, assumed, positive, progress};
+use super::{Endings, Error, Output, Range, assumed, positive, progress, speed_question};
 use crate::case::Case;
 use crate::file;
 use crate::plan::{Means, Plan, Prior, Request, Step, Test, WithoutDerivative, plan};
@@ -119,7 +119,8 @@ struct PlanOutput<'a> {
 
 /// Runs the verb.
 pub fn run(args: Args) -> Result<(), Error> {
-    let case = Case::read(&args.case)?;
+    let mut case = Case::read(&args.case)?;
+    speed_question::ask(&mut case, args.output)?;
     let mut request = request(&args);
     let outside_limits_rpm = leave_out_impossible(&case, &mut request)?;
     let bar = progress::bar(

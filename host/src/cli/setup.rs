@@ -149,7 +149,7 @@ Taps: five in x, five in y, saved as taps/x.csv and taps/y.csv (CSV, UFF, MAT, W
         |     hammer in y
         +-----------------> x (feed)
 
-Glue the accelerometer to the tool tip, opposite to the hammer. Let each tap ring out before the next. Sample at ten times the
+The spindle stands still. Glue the accelerometer to the tool tip, opposite to the hammer. Let each tap ring out before the next. Sample at ten times the
 highest frequency of interest, with an anti-aliasing filter. The direction z is stiff on most machines; on a robot tap it too.
 ";
 

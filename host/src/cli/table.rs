@@ -7,7 +7,7 @@ use quietcut_core::lobes::{IntervalKind, IntervalSlopes, LobeTable};
 use serde::Serialize;
 
 use super::method::case_after;
-use super::{Endings, Error, Output, Range};
+use super::{Endings, Error, Output, Range, speed_question};
 use crate::case::Case;
 use crate::file;
 use crate::lobe_table::{TableRequest, build_table};
@@ -145,6 +145,9 @@ pub fn run(args: Args) -> Result<(), Error> {
         .map(Case::read)
         .collect::<Result<Vec<_>, _>>()
         .map_err(Error::input)?;
+    for case in &mut cases {
+        speed_question::ask(case, args.output)?;
+    }
     if let Some(after_s) = args.after_s {
         for case in &mut cases {
             *case = case_after(case, after_s)?;

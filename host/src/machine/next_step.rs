@@ -79,10 +79,10 @@ pub fn next_step(folder: &MachineFolder) -> NextStep {
         return match folder.receptances.last() {
             Some(_) => step(
                 format!(
-                    "quietcut identify {} --method modes --case {case} --out {case}",
+                    "quietcut identify {} --method modes --rpm 0 --case {case} --out {case}",
                     list(measured(folder))
                 ),
-                "the case has no structure; the command fits modes to the frequency response functions of the taps, or to those in frf/, and writes them into the case",
+                "the case has no structure; the command fits modes to the frequency response functions of the taps, or to those in frf/, and writes them into the case, with --rpm 0 as measured at standstill",
             ),
             None => step(
                 format!(
@@ -97,7 +97,7 @@ pub fn next_step(folder: &MachineFolder) -> NextStep {
     if receptances > Some(case_file.changed) {
         return step(
             format!(
-                "quietcut identify {} --method modes --case {case} --out {case}",
+                "quietcut identify {} --method modes --rpm 0 --case {case} --out {case}",
                 list(measured(folder))
             ),
             "the frequency response functions are newer than the case; the command fits its modes again",

@@ -67,6 +67,9 @@ pub(super) struct IdentifyOutput {
     pub(super) modes: Option<Vec<EstimatedMode>>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) joints: Option<Vec<EstimatedJoint>>,
+    /// Spindle speed at which the structure was measured, rev/min, 0 at standstill; missing if neither `--rpm` nor the recordings state it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) structure_rpm: Option<f64>,
     pub(super) warnings: Vec<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) case: Option<PathBuf>,
@@ -302,10 +305,13 @@ impl IdentifyOutput {
             return toml::to_string(&case_file::with_coefficients(table, other))
                 .map_err(|error| Error::other(format!("--out {}: {error}", path.display())));
         }
-        let text = self.structure(path)?;
+        let refused = |error| Error::input(format!("--out {}: {error}", path.display()));
+        let mut text = self.structure(path)?;
+        if let Some(rpm) = self.structure_rpm {
+            text = case_file::with_speed(&text, rpm).map_err(refused)?;
+        }
         match other {
-            Some(other) => case_file::with_sections(&text, other)
-                .map_err(|error| Error::input(format!("--out {}: {error}", path.display()))),
+            Some(other) => case_file::with_sections(&text, other).map_err(refused),
             None => Ok(text),
         }
     }

@@ -97,6 +97,10 @@ pub struct Args {
     /// identified coefficients and runout, and keeps all else. Default: the case of --start.
     #[arg(long, value_name = "CASE", requires = "out")]
     pub(super) case: Option<PathBuf>,
+    /// Spindle speed in rev/min at which the structure was measured, 0 for taps at standstill; the written case states it, and charts from it
+    /// say so. Default: what the recordings state (the tachometer); tables of receptances state none.
+    #[arg(long, value_name = "N", value_parser = non_negative, allow_negative_numbers = true)]
+    pub(super) rpm: Option<f64>,
     #[command(flatten)]
     pub(super) modes: ModeOptions,
     #[command(flatten)]

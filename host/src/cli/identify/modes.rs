@@ -9,6 +9,7 @@ use super::args::Args;
 use super::figure::Figure;
 use super::mode_lines::lines;
 use super::modes_comparison::ModesComparison;
+use super::spindle_speed;
 use super::stabilization_diagram::{CAPTION, TITLE, ending, write_diagram};
 use super::written;
 use crate::case::Case;
@@ -119,6 +120,7 @@ fn identified(
         }
         picture = Some((svg, CAPTION));
     }
+    let structure_rpm = source.structure_rpm;
     let mut warnings = source.warnings;
     warnings.extend(model.warnings.iter().cloned());
     warnings.extend(not_in_case(args, &model));
@@ -142,6 +144,7 @@ fn identified(
         noise,
         picture,
         modal: Some(model.clone()),
+        structure_rpm,
         ..IdentifyOutput::default()
     };
     Ok((answer, model))
@@ -154,6 +157,8 @@ struct Source {
     table: FrfTable,
     deviation: Option<Vec<Vec<f64>>>,
     warnings: Vec<String>,
+    /// Spindle speed that the recordings state, rev/min; `None` likewise.
+    structure_rpm: Option<f64>,
     /// Spectra of the recorded forces and responses, by recording; `None` for a table of receptances, or if a recording
     /// is a hammer or step-sine test.
     records: Option<Vec<RecordSpectra>>,
@@ -172,6 +177,7 @@ fn source(args: &Args, understood: &mut Vec<Understood>, recordings: &[PathBuf])
                     table: imported.table,
                     deviation: None,
                     warnings: Vec::new(),
+                    structure_rpm: None,
                     records: None,
                 });
             }
@@ -203,6 +209,7 @@ fn source(args: &Args, understood: &mut Vec<Understood>, recordings: &[PathBuf])
             .all(|has| *has)
             .then_some(measurement.deviation),
         warnings: measurement.warnings,
+        structure_rpm: spindle_speed::spindle_rpm(&recordings),
         records: record_spectra(&recordings, &settings)?,
     })
 }
