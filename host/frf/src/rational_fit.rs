@@ -52,12 +52,12 @@ pub enum RationalFitError {
 pub struct RationalFit {
     /// Poles λ_r, rad/s: of a vector fit with positive, ascending imaginary parts; of a fit by [`residues`] the given
     /// ones.
-    pub(crate) poles: Vec<Complex64>,
+    pub poles: Vec<Complex64>,
     /// Residues R_kr, m/(N s): one row for each function, one column for each pole.
     pub residues: Vec<Vec<Complex64>>,
     /// RMS residual of the fit over all receptances other than zero; each residual is divided by the RMS of its
     /// receptance. 0 if all receptances are zero.
-    pub(crate) residual: f64,
+    pub residual: f64,
 }
 
 impl RationalFit {
@@ -80,7 +80,7 @@ impl RationalFit {
 /// # Errors
 /// There are fewer than 2 · `modes` + 4 frequencies, no modes or no receptance other than zero; a value is not finite,
 /// or a frequency is 0; or an iteration exceeds its bound.
-pub(super) fn fit(
+pub fn fit(
     frequency_hz: &[f64],
     functions: &[&[Complex64]],
     modes: usize,
@@ -223,11 +223,34 @@ pub fn residues(
     functions: &[&[Complex64]],
     poles: Vec<Complex64>,
 ) -> Result<RationalFit, RationalFitError> {
+    residues_of(frequency_hz, functions, poles, 2)
+}
+
+/// Residues of the receptances `functions` for given poles by linear least squares, without a constant and a term of
+/// 1/s²: d_k = e_k = 0.
+///
+/// # Errors
+/// As [`residues`].
+pub fn residues_of_modes_alone(
+    frequency_hz: &[f64],
+    functions: &[&[Complex64]],
+    poles: Vec<Complex64>,
+) -> Result<RationalFit, RationalFitError> {
+    residues_of(frequency_hz, functions, poles, 0)
+}
+
+/// Implements [`residues`] with the first `further` of the terms d_k and e_k/s².
+fn residues_of(
+    frequency_hz: &[f64],
+    functions: &[&[Complex64]],
+    poles: Vec<Complex64>,
+    further: usize,
+) -> Result<RationalFit, RationalFitError> {
     let scale = TAU * frequency_hz.last().copied().unwrap_or(0.0);
-    let width = 2 * poles.len() + 2;
+    let width = 2 * poles.len() + further;
     let mut matrix = DMatrix::<f64>::zeros(2 * frequency_hz.len(), width);
     for (k, &hertz) in frequency_hz.iter().enumerate() {
-        for (column, value) in basis(hertz, &poles, scale).iter().enumerate() {
+        for (column, value) in basis(hertz, &poles, scale).iter().take(width).enumerate() {
             matrix[(2 * k, column)] = value.re;
             matrix[(2 * k + 1, column)] = value.im;
         }

@@ -3,6 +3,7 @@
 use std::fmt::Write;
 use std::path::PathBuf;
 
+use super::counted::counted_chart;
 use super::lobes_files::{LobesOutput, ShownChart};
 use super::lobes_rescaled::{RescaleOptions, RescaledCase};
 use super::lobes_spindle::Spindle;
@@ -14,7 +15,7 @@ use super::{
 };
 use crate::case::Case;
 use crate::report::marks::Mark;
-use crate::stability::{Chart, Method, Resolution, Uncertainty, chart};
+use crate::stability::{Chart, Method, Resolution, Uncertainty};
 use crate::trial_cuts::{self, Calls, TrialCut};
 
 /// Computes stability limits over the spindle speed, or the dominant Floquet multiplier at given points.
@@ -222,7 +223,7 @@ fn run_chart(
         )));
     }
     let deepest_mm = depth_mm.first().max(depth_mm.last());
-    let mut chart = chart(method, &rpm.values(), deepest_mm, depth_mm.steps_from_zero())?;
+    let mut chart = counted_chart(method, &rpm.values(), deepest_mm, depth_mm.steps_from_zero())?;
     if refine && rpm.count() > 1 {
         let teeth = case.tool.as_ref().map_or(1, |tool| tool.teeth);
         chart = chart.with_lines_between(method, deepest_mm, depth_mm.steps_from_zero(), teeth)?;

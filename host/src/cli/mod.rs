@@ -6,6 +6,7 @@
 
 mod assumed;
 mod channels;
+mod counted;
 pub mod demo;
 pub mod diagnose;
 mod error;

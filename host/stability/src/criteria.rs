@@ -244,11 +244,61 @@ pub(crate) const SHALLOWEST_SEARCH: f64 = 0.25;
 /// is searched at once. Unfounded.
 pub(crate) const WORTH_SEARCHING_NEAR: f64 = 0.7;
 
+/// Values of a single uncertain variable, in standard deviations, between which machines are computed and their limits
+/// interpolated: 0.3 % of the machines lie beyond; they count as the last ones.
+pub(crate) const ALONG_END: f64 = 3.0;
+
+/// Distance of the machines that are computed first along a single uncertain variable, standard deviations; each gap is
+/// halved at least once. An island of stability or chatter that exists only within half this distance may be missed: at
+/// most 20 % of the machines. Unfounded.
+pub(crate) const ALONG_STEP: f64 = 1.0;
+
+/// Largest difference of a limit in the middle of a gap between two machines from the interpolated one, relative to the
+/// limit, at which the gap is not divided further. It is the accuracy of percentiles,
+/// [`PERCENTILE_SETTLED`], less their interpolation. Unfounded.
+pub(crate) const ALONG_MISS: f64 = 5e-3;
+
+/// Width of a gap between two machines along a single uncertain variable, standard deviations, that is not divided
+/// further: 0.8 % of the machines at most.
+pub(crate) const ALONG_GAP: f64 = 0.02;
+
 /// Least number of batches of 64 machines for the probability that a cell is stable: 256 machines, whose share has a
 /// standard error of √(0.25/256) = 3 % at most.
 pub(crate) const BATCHES_OF_CELLS: u32 = 4;
 
 // Loops of receptances.
+
+/// Largest deviation of a structure that is fitted to a table of receptances, as a share of the largest entry, at which
+/// limits are those of the fitted structure; else they follow from the table by harmonics. The error of each limit
+/// contains the deviation to first order; at 5 % of a peak the second order is a few thousandths. Unfounded.
+pub(crate) const FIT_ERROR_MAX: f64 = 0.05;
+
+/// Deviation of a fitted structure, as above, below which no further mode is fitted: below the noise of measurements
+/// and the digits of usual tables. Unfounded.
+pub(crate) const FIT_SETTLED: f64 = 1e-6;
+
+/// Least decrease of the deviation by which a further fitted mode is accepted. Modes that fit noise decrease it by
+/// some percent. Unfounded.
+pub(crate) const FIT_IMPROVEMENT: f64 = 0.3;
+
+/// Largest number of modes that are fitted within the band of a table: a limit on computing time. Unfounded.
+pub(crate) const FIT_MODES_MAX: usize = 12;
+
+/// Largest number of lines from which the poles of a fitted structure are computed, a limit on computing time; the
+/// residues and the deviation use all lines. Unfounded.
+pub(crate) const FIT_LINES_MAX: usize = 1000;
+
+/// Least size of an entry of the receptance matrix, as a share of the largest one, from which on it determines the
+/// poles of a fitted structure. Unfounded.
+pub(crate) const FIT_PART: f64 = 0.02;
+
+/// Least half bandwidth of a fitted pole, as a share of the distance of the lines there: narrower poles are not
+/// resolved. Unfounded.
+pub(crate) const FIT_WIDTH_MIN: f64 = 0.5;
+
+/// Factor in the stated error of a limit on its change, to first order, by the deviation of a fitted structure from the
+/// table. It leaves room for the second order and for the direct solution's own interpolation. Unfounded.
+pub(crate) const FIT_ROOM: f64 = 2.0;
 
 /// Least norm of the receptance matrix at a peak of a table of receptances, as a share of its largest norm in the
 /// table, at which the peak counts as a resonance and the frequency grid is refined about it. A peak of noise costs

@@ -6,6 +6,8 @@
 //! depend on it: an eigenvalue λ(s) of that matrix belongs to a root if κ λ = 1.
 
 pub(crate) mod averaged;
+pub(crate) mod fitted_line;
+pub(crate) mod fitted_structure;
 pub(crate) mod harmonic;
 pub(crate) mod limits;
 pub(crate) mod loci;

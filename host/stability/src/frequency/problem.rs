@@ -1,8 +1,11 @@
 //! The milling problem described by its receptances.
 
+use std::sync::{Arc, OnceLock};
+
 use nalgebra::Matrix3;
 use num_complex::Complex64;
 
+use super::fitted_structure::FittedStructure;
 use crate::criteria::{PEAK_SHARE, UNDAMPED};
 use crate::error::StabilityError;
 use crate::problem::linear::{CubicTerms, Problem, cutting};
@@ -16,6 +19,8 @@ use quietcut_model::structure::FirstOrder;
 #[derive(Clone, Debug)]
 pub struct FrequencyProblem {
     receptance: Receptance,
+    /// Structure fitted to the table of receptances, or `None` if there is none; empty until it is needed.
+    fitted: OnceLock<Option<Arc<FittedStructure>>>,
     /// The cutting process.
     pub process: Process,
     /// Number of teeth.
@@ -60,6 +65,7 @@ impl FrequencyProblem {
         }
         Ok(Self {
             receptance: Receptance::Model(problem.structure.clone(), poles),
+            fitted: OnceLock::new(),
             process: problem.process,
             teeth: problem.teeth,
         })
@@ -75,6 +81,7 @@ impl FrequencyProblem {
         let interpolation = Interpolation::new(table)?.rotated(case.cut()?.feed_direction_deg);
         Ok(Self {
             receptance: Receptance::Table(interpolation),
+            fitted: OnceLock::new(),
             process,
             teeth,
         })
@@ -118,8 +125,32 @@ impl FrequencyProblem {
         };
         Some(Self {
             receptance: Receptance::Table(interpolation.thinned()?),
+            fitted: OnceLock::new(),
             ..self.clone()
         })
+    }
+
+    /// Structure fitted to the table of receptances; `None` for a modelled structure, with axial-depth modulation, or if
+    /// no structure fits the table.
+    pub(crate) fn fitted(&self) -> Option<&FittedStructure> {
+        let Receptance::Table(interpolation) = &self.receptance else {
+            return None;
+        };
+        if self.process.axial_depth_modulation {
+            return None;
+        }
+        let fitted = self
+            .fitted
+            .get_or_init(|| FittedStructure::of_table(interpolation).map(Arc::new));
+        fitted.as_deref()
+    }
+
+    /// Receptance matrix of the table, m/N, at a complex frequency, Hz; zero for a modelled structure.
+    pub(crate) fn table_at(&self, frequency_hz: Complex64) -> Matrix3<Complex64> {
+        match &self.receptance {
+            Receptance::Model(..) => Matrix3::zeros(),
+            Receptance::Table(interpolation) => interpolation.at(frequency_hz),
+        }
     }
 
     /// Frequency range of the measured receptances, Hz; `None` for a modelled structure.

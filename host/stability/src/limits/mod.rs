@@ -1,6 +1,7 @@
 //! Stability limits: one cut, one speed, charts and cells; derivatives and spread of limits. `Method` is the interface
 //! of all methods.
 
+mod along_variable;
 pub(crate) mod between_speeds;
 pub(crate) mod bounds;
 pub(crate) mod cell;

@@ -16,7 +16,6 @@ use super::speed_line::Switch;
 use crate::error::StabilityError;
 use crate::problem::linear::Problem;
 use crate::spectrum::floquet_mode::{FloquetMode, Node};
-use crate::spectrum::stability_loss::StabilityLoss;
 use quietcut_model::milling::{RotatingVector, ToothForce};
 use quietcut_model::structure::{FirstOrder, ModalPart};
 
@@ -144,23 +143,17 @@ impl<'a> Sensitivity<'a> {
     /// The switch is a fold, or a Hopf switch without a chatter frequency, or its Floquet mode cannot be computed. A
     /// switch of another problem is not detected.
     pub fn new(problem: &'a Problem, rpm: f64, switch: &Switch) -> Result<Self, StabilityError> {
-        let broke_down = StabilityError::BrokeDown {
+        let broke_down = || StabilityError::BrokeDown {
             rpm,
             depth_mm: switch.depth_mm,
             what: "no motion belongs to this limit",
         };
-        let multiplier = match (switch.kind, switch.chatter_hz) {
-            (StabilityLoss::Flip, _) => -Complex64::ONE,
-            // The product ωτ of chatter frequency and tooth period is the angle of the multiplier, modulo 2π.
-            (StabilityLoss::Hopf, Some(hz)) => {
-                let angle = std::f64::consts::TAU * (hz * problem.tooth_period_s(rpm)).fract();
-                Complex64::new(angle.cos(), angle.sin().abs())
-            }
-            // A fold has μ = 1 and κ = w (1 − 1/μ) = 0: the depth has no influence, so that no such limit exists. A
-            // Hopf switch without a chatter frequency does not give the multiplier.
-            _ => return Err(broke_down),
-        };
-        Self::of_crossing(problem, rpm, switch.depth_mm * 1e-3, multiplier).ok_or(broke_down)
+        // A fold has μ = 1 and κ = w (1 − 1/μ) = 0: the depth has no influence, so that no such limit exists. A Hopf
+        // switch without a chatter frequency does not give the multiplier.
+        let multiplier = switch
+            .multiplier(problem.tooth_period_s(rpm))
+            .ok_or_else(broke_down)?;
+        Self::of_crossing(problem, rpm, switch.depth_mm * 1e-3, multiplier).ok_or_else(broke_down)
     }
 
     fn of_crossing(problem: &'a Problem, rpm: f64, depth_m: f64, multiplier: Complex64) -> Option<Self> {

@@ -1,5 +1,6 @@
 //! Stability at one spindle speed: limits, crossings of the unit circle, stable depths.
 
+use num_complex::Complex64;
 use serde::Serialize;
 
 use super::spread::LimitSpread;
@@ -112,6 +113,65 @@ impl SpeedLine {
             spread: None,
             largest: Vec::new(),
             without_error: Vec::new(),
+        }
+    }
+}
+
+impl SpeedLine {
+    /// The same limits with larger errors: `further_mm` gives the addition for a switch, mm, or `None` if it cannot be
+    /// computed. The error is then the last depth `depth_mm`.
+    pub(crate) fn with_further_errors(
+        mut self,
+        depth_mm: f64,
+        further_mm: impl Fn(&Switch) -> Option<f64>,
+    ) -> Self {
+        for switch in &mut self.switches {
+            let further_mm = further_mm(switch);
+            if further_mm.is_none() {
+                self.without_error.push(format!(
+                    "the change of the limit at {} rev/min, {} mm with the receptances cannot be computed",
+                    self.rpm, switch.depth_mm
+                ));
+            }
+            let sum_mm = further_mm.and_then(|further_mm| Some(switch.error_mm? + further_mm));
+            switch.error_mm = Some(sum_mm.unwrap_or(depth_mm).min(depth_mm));
+        }
+        let ends = || self.stable_mm.iter().flatten();
+        let bounds = self
+            .switches
+            .iter()
+            .filter(|switch| ends().any(|end| *end == switch.depth_mm));
+        let around = bounds.filter_map(|switch| {
+            let error_mm = switch.error_mm?;
+            Some([
+                (switch.depth_mm - error_mm).max(0.0),
+                (switch.depth_mm + error_mm).min(depth_mm),
+            ])
+        });
+        self.undecided_mm = union(around.collect());
+        if let Some(first) = &mut self.first_limit {
+            let same = self
+                .switches
+                .iter()
+                .find(|switch| switch.depth_mm == first.depth_mm && !switch.gain);
+            first.error_mm = same.and_then(|switch| switch.error_mm);
+        }
+        self
+    }
+}
+
+impl Switch {
+    /// Floquet multiplier on the unit circle at this switch, above the real axis, from its kind and chatter frequency;
+    /// `None` for a fold, or for a Hopf switch without a chatter frequency.
+    pub(crate) fn multiplier(&self, tooth_period_s: f64) -> Option<Complex64> {
+        match (self.kind, self.chatter_hz) {
+            (StabilityLoss::Flip, _) => Some(-Complex64::ONE),
+            // The product ωτ of chatter frequency and tooth period is the angle of the multiplier, modulo 2π.
+            (StabilityLoss::Hopf, Some(hz)) => {
+                let angle = std::f64::consts::TAU * (hz * tooth_period_s).fract();
+                Some(Complex64::new(angle.cos(), angle.sin().abs()))
+            }
+            _ => None,
         }
     }
 }

@@ -59,7 +59,8 @@ pub struct LimitSpread {
     pub limit_percentiles_mm: Percentiles,
     /// Confidence intervals (90 %) of the percentiles of the first limit, mm.
     pub limit_percentiles_ci90_mm: PercentileIntervals,
-    /// Number of machines drawn, those that are not physical included.
+    /// Number of machines drawn, those that are not physical included. With a single uncertain variable their limits are
+    /// interpolated between fewer machines.
     pub machines: usize,
     /// Share of stable machines at each requested depth, among the drawn machines that are physical; empty if no depth
     /// was requested.

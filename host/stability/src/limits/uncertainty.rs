@@ -11,6 +11,9 @@
 //! lies below a percentile points along the mean gradient of the share of such machines, and later batches are
 //! stratified along it.
 //!
+//! With a single uncertain variable, machines are computed where limits bend along it, and those of the drawn machines are
+//! interpolated.
+//!
 //! Confidence intervals of percentiles follow Woodruff's method: the scatter between batches of the share below gives
 //! the ranks between which the percentile lies. This also holds if the distribution has a gap, in which no percentile
 //! is well defined; the interval is as wide as the gap there. Batches are drawn until the intervals are narrow, up to a
@@ -19,6 +22,7 @@
 use nalgebra::DVector;
 use rayon::prelude::*;
 
+use super::along_variable::{LinesAlong, MachineLine};
 use super::method::Method;
 use super::percentiles::{Limits, Sorted, is_stable, limit_of};
 use super::plane::{Linearized, Plane};
@@ -148,6 +152,7 @@ impl<'a> Uncertainty<'a> {
         let planes: Vec<Plane> = planes.into_iter().filter_map(Result::ok).collect();
         let gradients: Vec<DVector<f64>> = planes.iter().map(|plane| plane.gradient.clone()).collect();
         let mut basis = Basis::new(self.variables.len(), &gradients);
+        let along = self.along(nominal.rpm, depth_mm)?;
         let mut batches = Batches(Vec::new());
         for batch in 0..*BATCHES.end() {
             // The random stream depends on the spindle speed, so that neighbouring speeds draw different machines.
@@ -156,7 +161,10 @@ impl<'a> Uncertainty<'a> {
             let lines: Vec<Result<Drawn, StabilityError>> = machines
                 .into_par_iter()
                 .map(|machine| {
-                    let line = self.line(&machine, nominal.rpm, depth_mm, &planes, whole)?;
+                    let line = match &along {
+                        Some(along) => along.at(machine[0]),
+                        None => self.line(&machine, nominal.rpm, depth_mm, &planes, whole)?,
+                    };
                     Ok(Drawn { machine, line })
                 })
                 .collect();
@@ -175,6 +183,16 @@ impl<'a> Uncertainty<'a> {
             }
         }
         Ok(batches)
+    }
+
+    /// Stability at a spindle speed along the uncertain variable, if there is a single one: between machines that are
+    /// computed, limits are interpolated. `None` for several variables.
+    fn along(&self, rpm: f64, depth_mm: f64) -> Result<Option<LinesAlong>, StabilityError> {
+        if self.variables.len() != 1 {
+            return Ok(None);
+        }
+        let line = |value: f64| self.line(&DVector::from_element(1, value), rpm, depth_mm, &[], true);
+        LinesAlong::new(line).map(Some)
     }
 
     fn check_possible(&self, batches: &Batches) -> Result<(), StabilityError> {
@@ -199,7 +217,7 @@ impl<'a> Uncertainty<'a> {
         depth_mm: f64,
         planes: &[Plane],
         whole: bool,
-    ) -> Result<Result<SpeedLine, String>, StabilityError> {
+    ) -> Result<MachineLine, StabilityError> {
         let mut case = self.case.clone();
         if !Variable::shift_all(&self.variables, machine, &mut case) {
             return Ok(Err("a parameter lies outside of its bounds".into()));
@@ -232,7 +250,7 @@ impl<'a> Uncertainty<'a> {
 /// machine is not valid.
 struct Drawn {
     machine: DVector<f64>,
-    line: Result<SpeedLine, String>,
+    line: MachineLine,
 }
 
 /// Batches of machines, each stratified.

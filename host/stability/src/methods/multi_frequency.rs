@@ -6,6 +6,8 @@ use num_complex::Complex64;
 use crate::criteria::{HARMONICS_SETTLED_LIMIT, HARMONICS_SETTLED_MULTIPLIER, SAME_WITH_TWICE_HARMONICS};
 use crate::error::{NOT_FINITE, StabilityError};
 use crate::frequency::averaged::AveragedLoop;
+use crate::frequency::fitted_line::fitted_line;
+use crate::frequency::fitted_structure::FittedStructure;
 use crate::frequency::harmonic::HarmonicLoop;
 use crate::frequency::limits::{AxisCrossing, limits, speed_line};
 use crate::frequency::problem::FrequencyProblem;
@@ -109,8 +111,21 @@ impl Method for MultiFrequency {
         "multi-frequency"
     }
 
+    fn settings(&self) -> Option<String> {
+        let fitted = self.fitted()?;
+        let deviation = if fitted.error < 1e-4 {
+            "less than 0.01 %".into()
+        } else {
+            format!("{:.2} %", 100.0 * fitted.error)
+        };
+        Some(format!(
+            "limits of {} fitted modes, which deviate from the table by {deviation} of its largest receptance",
+            fitted.count(),
+        ))
+    }
+
     fn takes_seconds(&self) -> bool {
-        true
+        self.fitted().is_none()
     }
 
     /// Computes the dominant multiplier with 2K + 1 harmonics. If K is not set, it starts from the least number and is
@@ -143,10 +158,31 @@ impl Method for MultiFrequency {
         }
     }
 
-    fn line(&self, rpm: f64, depth_mm: f64, _samples: usize) -> Result<SpeedLine, StabilityError> {
+    /// Without a set number of harmonics, limits from a table of receptances are those of a structure that is fitted to
+    /// it, if one fits to `FIT_ERROR_MAX`; their error contains the deviation from the table.
+    fn line(&self, rpm: f64, depth_mm: f64, samples: usize) -> Result<SpeedLine, StabilityError> {
         check_speed(rpm)?;
         check_depth(depth_mm)?;
         AveragedLoop::check_reach(&self.problem, rpm, depth_mm)?;
+        match self.fitted() {
+            Some(fitted) => fitted_line(&self.problem, fitted, rpm, depth_mm, samples),
+            None => self.harmonic_line(rpm, depth_mm),
+        }
+    }
+}
+
+impl MultiFrequency {
+    /// Structure fitted to the table of receptances, whose limits are used; `None` if the harmonics are set or no
+    /// structure fits.
+    fn fitted(&self) -> Option<&FittedStructure> {
+        match self.harmonics {
+            Some(_) => None,
+            None => self.problem.fitted(),
+        }
+    }
+
+    /// Limits at one spindle speed from the harmonic transfer matrix.
+    pub(crate) fn harmonic_line(&self, rpm: f64, depth_mm: f64) -> Result<SpeedLine, StabilityError> {
         let (open_loop, limits, other) = self.settled(rpm, depth_mm)?;
         let mut others = vec![other];
         others.extend(open_loop.thinned_limits(depth_mm * 1e-3));
@@ -154,9 +190,7 @@ impl Method for MultiFrequency {
             open_loop.chatter_hz(limit)
         })
     }
-}
 
-impl MultiFrequency {
     /// Stability of a cut from a root s, with the error due to the truncated harmonics and to the table of receptances.
     fn stability_of_root(
         &self,

@@ -61,6 +61,7 @@ fn element(
             ports.push(Port {
                 time_s: phase * seconds_per_radian,
                 weight_s: gauss.weights[j] * subinterval.duration,
+                normal: process.force.normal.at(angle),
                 force,
             });
         }

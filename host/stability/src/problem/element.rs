@@ -47,6 +47,8 @@ pub(crate) struct Port {
     pub(crate) time_s: f64,
     /// Quadrature weight of the node in integrals over time, s.
     pub(crate) weight_s: f64,
+    /// Unit vector along which this port observes the displacement of the tool: the chip normal.
+    pub(crate) normal: Vector3<f64>,
     /// Force on the tool, Pa, per axial depth and per displacement along the chip normal. In [`Axial`]: force per axial
     /// displacement, N/m.
     pub(crate) force: Vector3<f64>,
@@ -160,6 +162,7 @@ impl<'a> Step<'a> {
                 .map(|port| Port {
                     time_s: phase * seconds_per_radian + self.gauss.nodes[port / count] * self.duration,
                     weight_s: self.gauss.weights[port / count] * self.duration,
+                    normal: ports.seen[port],
                     force: ports.force[port],
                 })
                 .collect(),

@@ -2,21 +2,13 @@
 
 use std::f64::consts::TAU;
 
-use nalgebra::{DMatrix, DVector, Vector3};
+use nalgebra::{DVector, Vector3};
 use num_complex::Complex64;
 
+use super::period_parts::PeriodParts;
 use crate::problem::element::Port;
 use crate::problem::linear::Problem;
 use crate::problem::period::{Period, Rates};
-use quietcut_numerics::eigenvalues::eigenvector;
-
-/// Growth of a motion over a part of the period, as a factor on the growth of the Floquet mode over that part, beyond
-/// which the next part begins. The linear system of all parts then loses about three digits.
-const GROWTH: f64 = 1e3;
-
-/// Largest number of unknowns (parts of a period times states) in the linear system for the states at the start of all
-/// parts: a limit on computing time. A choice.
-const CYCLIC_MAX: usize = 256;
 
 /// Vibration frequency, Hz, of the motion u(t) = e^{st} v(t), with v periodic in the tooth period τ and e^{sτ} = μ;
 /// `None` if it cannot be computed.
@@ -89,44 +81,18 @@ pub(crate) fn dominant_frequency_hz(
 }
 
 /// Forces along the Floquet mode times quadrature weight, each with the time of its node. The forces of teeth that cut
-/// at the same node are added. `None` if an element is singular, or if [`cyclic_vector`] finds no states.
+/// at the same node are added. `None` if an element is singular, or if [`PeriodParts`] finds no states.
 fn eigenfunction_forces(
     period: &Period,
     multiplier: Complex64,
     depth_m: f64,
 ) -> Option<Vec<(f64, Vector3<Complex64>)>> {
     let kappa = (Complex64::ONE - multiplier.inv()) * depth_m;
-    let complex = |matrix: &DMatrix<f64>| matrix.map(Complex64::from);
-    // Divides the period into parts, each starting from its own state, and expresses the displacements in each element
-    // by the state at the start of its part.
-    let identity = DMatrix::<Complex64>::identity(period.order(), period.order());
-    let mut parts = Vec::new();
-    let mut part = identity.clone();
-    let mut seen_from = Vec::with_capacity(period.elements.len());
-    let (mut length, share) = (0.0, 1.0 / period.elements.len().max(1) as f64);
-    for element in &period.elements {
-        // Ends the part of the period once some motion has grown by the factor `GROWTH` more than the Floquet mode.
-        // Over a much longer part the share of the mode would be rounding.
-        if part.norm() > GROWTH * multiplier.norm().powf(length) {
-            parts.push(std::mem::replace(&mut part, identity.clone()));
-            length = 0.0;
-        }
-        let ports = element.kernel.nrows();
-        let implicit = DMatrix::identity(ports, ports) - complex(&element.kernel) * kappa;
-        let chips = implicit.lu().solve(&(complex(&element.observe) * &part))?;
-        let axial = element
-            .axial
-            .as_ref()
-            .map(|axial| complex(&axial.observe) * &part + complex(&axial.kernel) * &chips * kappa);
-        part = complex(&element.flow) * &part + complex(&element.drive) * &chips * kappa;
-        seen_from.push((parts.len(), chips, axial));
-        length += share;
-    }
-    parts.push(complex(&period.flight) * part);
-    let starts = cyclic_vector(&parts, multiplier)?;
+    let parts = PeriodParts::new(period, multiplier, depth_m)?;
+    let starts = parts.starts(multiplier)?;
     let mut forces: Vec<(f64, Vector3<Complex64>)> = Vec::new();
-    for (element, (part, chips, axial)) in period.elements.iter().zip(seen_from) {
-        let start = &starts[part];
+    for (element, of_part) in period.elements.iter().zip(parts.elements) {
+        let start = &starts[of_part.part];
         let mut push = |ports: &[Port], seen: DVector<Complex64>, factor: Complex64| {
             for (port, seen) in ports.iter().zip(seen.iter()) {
                 let force = port.force.map(Complex64::from) * (seen * factor * port.weight_s);
@@ -137,46 +103,10 @@ fn eigenfunction_forces(
                 }
             }
         };
-        push(&element.ports, chips * start, kappa);
-        if let (Some(ports), Some(seen)) = (&element.axial, axial) {
+        push(&element.ports, of_part.chips * start, kappa);
+        if let (Some(ports), Some(seen)) = (&element.axial, of_part.axial) {
             push(&ports.ports, seen * start, Complex64::ONE);
         }
     }
     Some(forces)
-}
-
-/// Solves for the states x_g of a Floquet mode at the start of each part of the period: T_g x_g = x_{g+1}, and μ x_0
-/// after the last part, with the transition matrices T_g of the parts. `None` if there are more unknowns than
-/// [`CYCLIC_MAX`], or if the matrix is not finite or singular after the shift.
-///
-/// All states are solved for at once. Integration from a start that is exact to rounding would fail if the parts
-/// together grow by far more than μ.
-fn cyclic_vector(parts: &[DMatrix<Complex64>], multiplier: Complex64) -> Option<Vec<DVector<Complex64>>> {
-    let [single] = parts else {
-        let (order, count) = (parts.first()?.nrows(), parts.len());
-        if order * count > CYCLIC_MAX {
-            return None;
-        }
-        let mut whole = DMatrix::zeros(order * count, order * count);
-        for (g, part) in parts.iter().enumerate() {
-            whole
-                .view_mut((g * order, g * order), (order, order))
-                .copy_from(part);
-            let (to, factor) = if g + 1 < count {
-                ((g + 1) * order, Complex64::ONE)
-            } else {
-                (0, multiplier)
-            };
-            for i in 0..order {
-                whole[(g * order + i, to + i)] -= factor;
-            }
-        }
-        let vector = eigenvector(&whole, Complex64::ZERO)?;
-        return Some(
-            (0..count)
-                .map(|g| vector.rows(g * order, order).into_owned())
-                .collect(),
-        );
-    };
-    Some(vec![eigenvector(single, multiplier)?])
 }

@@ -11,6 +11,8 @@ pub(crate) mod hessenberg;
 pub(crate) mod krylov;
 pub(crate) mod map_spectrum;
 pub(crate) mod period_map;
+mod period_parts;
+pub(crate) mod port_mode;
 pub(crate) mod revolution_map;
 pub(crate) mod root;
 pub(crate) mod stability_loss;

@@ -4,6 +4,7 @@ mod agreement;
 mod between_speeds;
 mod cells;
 mod extensions;
+mod fitted;
 mod frequency;
 mod line;
 mod multipliers;

@@ -1,6 +1,6 @@
 //! Percentiles of limits against plain Monte Carlo sampling, and against a distribution in closed form.
 
-use rand::SeedableRng;
+use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
@@ -545,4 +545,82 @@ fn percentiles_of_correlated_parameters_are_those_of_plain_draws_from_their_cova
     let below = drawn.limits.iter().filter(|limit| **limit < low).count();
     println!("5 % percentile without correlation: {low:.4} mm, {below} of {count} below");
     assert!((below as f64 / count as f64 - 0.05).abs() > 0.02);
+}
+
+/// Share of stable machines at `cells_mm` and one speed, among `count` machines at the middles of slices of equal
+/// probability of a single variable, each computed on its own.
+fn drawn_shares(case: &Case, rpm: f64, depth_mm: f64, cells_mm: &[f64], count: usize) -> Vec<f64> {
+    let [variable] = &Variable::of_case(case)[..] else {
+        panic!("one variable")
+    };
+    let lines: Vec<SpeedLine> = (0..count)
+        .into_par_iter()
+        .map(|index| {
+            let share = (index as f64 + 0.5) / count as f64;
+            let mut moved = case.clone();
+            assert!(variable.shift(&mut moved, quietcut_numerics::statistics::normal_quantile(share)));
+            nominal(&moved, rpm, depth_mm)
+        })
+        .collect();
+    let is_stable = |line: &SpeedLine, cell_mm: f64| {
+        line.stable_mm
+            .iter()
+            .any(|[from, to]| *from <= cell_mm && cell_mm <= *to)
+    };
+    let share =
+        |cell_mm: &f64| lines.iter().filter(|line| is_stable(line, *cell_mm)).count() as f64 / count as f64;
+    cells_mm.iter().map(share).collect()
+}
+
+/// Largest difference of the shares of a probability chart from those of machines computed one by one, over these
+/// speeds and 100 depths up to 10 mm, for a deviation of K_tc of 10 %.
+fn largest_difference(speeds_rpm: &[f64], count: usize) -> f64 {
+    let mut case = case("insperger-2dof-ad0.5");
+    let std = 0.1 * case.material.as_ref().unwrap().ktc_mpa;
+    case.deviations = vec![Deviation {
+        parameter: Parameter::Ktc,
+        std,
+    }];
+    let cells_mm: Vec<f64> = (1..=100).map(|step| 0.1 * f64::from(step)).collect();
+    let uncertainty = Uncertainty::new(&case, &method_of, 1).unwrap();
+    let differences = speeds_rpm.iter().map(|&rpm| {
+        let spread = uncertainty
+            .spread(&nominal(&case, rpm, 10.0), 10.0, &cells_mm)
+            .unwrap();
+        let drawn = drawn_shares(&case, rpm, 10.0, &cells_mm, count);
+        let pairs = spread.stable_share.iter().zip(&drawn);
+        let largest = pairs
+            .map(|(found, drawn)| (found - drawn).abs())
+            .fold(0.0, f64::max);
+        println!("{rpm:.1} rev/min: {largest:.4}");
+        largest
+    });
+    differences.fold(0.0, f64::max)
+}
+
+#[test]
+fn shares_of_stable_machines_along_one_variable_are_those_of_machines_one_by_one() {
+    // Tolerance: 0.02 as the campaign below states, and half a slice of the 250 machines.
+    assert!(largest_difference(&[6100.0, 12_300.0], 250) < 0.022);
+}
+
+#[test]
+#[ignore = "campaign: 40 speeds with 2 000 machines each, some minutes"]
+fn shares_of_a_probability_chart_are_those_of_2000_machines() {
+    let seed = SEED;
+    println!("seed {seed}");
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let speeds: Vec<f64> = (0..40).map(|_| rng.random_range(5000.0..25_000.0)).collect();
+    let largest = largest_difference(&speeds, 2000);
+    Campaign {
+        name: "probability-chart",
+        title: "Shares of stable machines in a probability chart",
+        command: "cargo test --release -p quietcut-stability --lib shares_of_a_probability -- --ignored --nocapture",
+        seeds: "20261121; 40 speeds, 2000 machines each",
+    }
+    .record(&[(
+        "largest difference of 4000 shares from those of machines computed one by one".to_owned(),
+        format!("{largest:.4}"),
+    )]);
+    assert!(largest < 0.02, "{largest}");
 }

@@ -1,0 +1,62 @@
+//! Limits at one spindle speed of a structure that is fitted to a table of receptances, with the error of the fit.
+
+use std::f64::consts::TAU;
+
+use num_complex::Complex64;
+
+use super::fitted_structure::FittedStructure;
+use super::problem::FrequencyProblem;
+use crate::criteria::FIT_ROOM;
+use crate::error::StabilityError;
+use crate::limits::line::line;
+use crate::limits::speed_line::{SpeedLine, Switch};
+use crate::problem::linear::Problem;
+use crate::problem::period::{Period, Resolution};
+use crate::spectrum::crossing::Crossing;
+use crate::spectrum::port_mode::PortMode;
+
+/// Limits at a spindle speed (rev/min) up to an axial depth (mm) of the structure that is fitted to the table of a
+/// problem. Their errors are those of collocation, plus [`FIT_ROOM`] times the change of each limit with the deviation
+/// of the fit from the table, to first order.
+///
+/// # Errors
+/// As [`line`], or a vibration lies outside the measured frequencies.
+pub(crate) fn fitted_line(
+    problem: &FrequencyProblem,
+    fitted: &FittedStructure,
+    rpm: f64,
+    depth_mm: f64,
+    samples: usize,
+) -> Result<SpeedLine, StabilityError> {
+    let model = Problem {
+        structure: fitted.structure.clone(),
+        process: problem.process,
+        teeth: problem.teeth,
+    };
+    let found = line(&model, rpm, depth_mm, samples)?;
+    let deepest_mm = found
+        .switches
+        .iter()
+        .map(|switch| switch.depth_mm)
+        .fold(0.0, f64::max);
+    let period = Period::new(&model, rpm, 2e-3 * deepest_mm, Resolution::WORKING);
+    let change = |s: Complex64| {
+        // Receptances at the imaginary axis; a table holds real frequencies.
+        let s = Complex64::new(0.0, s.im);
+        problem.table_at(s / Complex64::new(0.0, TAU)) - fitted.transfer(s)
+    };
+    let shift_mm = |switch: &Switch| {
+        let crossing = Crossing {
+            multiplier: switch.multiplier(model.tooth_period_s(rpm))?,
+            depth_m: 1e-3 * switch.depth_mm,
+        };
+        let shift_m = PortMode::new(&model, rpm, &period, crossing)?.largest_shift_m(change)?;
+        Some(1e3 * shift_m)
+    };
+    for switch in &found.switches {
+        problem.check_band(switch.chatter_hz, rpm, switch.depth_mm)?;
+    }
+    Ok(found.with_further_errors(depth_mm, |switch| {
+        shift_mm(switch).map(|shift_mm| FIT_ROOM * shift_mm)
+    }))
+}
