@@ -46,6 +46,28 @@ fn a_plan_lists_tests_and_the_widths_after_each() {
 }
 
 #[test]
+fn a_plan_depends_on_the_range_alone_and_proposes_no_test_twice() {
+    let folder = folder();
+    let plan = |rpm: &str| {
+        let options = format!("--rpm {rpm} --depth-mm 0:6:60 --width-percent 12 --json");
+        run(&folder, "plan", "kuka-kr90-acetal", &options).json()
+    };
+    let (coarse, fine) = (plan("700:2000:9"), plan("700:2000:53"));
+    let tests = coarse["tests"].as_array().expect("tests");
+    assert!(!tests.is_empty());
+    assert_eq!(coarse["tests"], fine["tests"]);
+    assert_eq!(coarse["after"], fine["after"]);
+    for (index, test) in tests.iter().enumerate() {
+        let same = |other: &serde_json::Value| {
+            ["kind", "direction", "rpm"]
+                .iter()
+                .all(|key| other[*key] == test[*key])
+        };
+        assert!(!tests[..index].iter().any(same), "{test} is proposed twice");
+    }
+}
+
+#[test]
 fn a_width_that_no_set_of_tests_reaches_is_stated_with_the_reason() {
     let folder = folder();
     let options = "--rpm 800:1600:5 --depth-mm 0:6:60 --width-percent 0.01 --json";

@@ -9,7 +9,7 @@ use serde::Serialize;
 use super::{Endings, Error, Output, Range, assumed, positive, progress, speed_question};
 use crate::case::Case;
 use crate::file;
-use crate::plan::{Means, Plan, Prior, Request, Step, Test, WithoutDerivative, plan};
+use crate::plan::{Means, Plan, Prior, Request, Step, Test, WithoutDerivative, plan, speeds_of_range};
 use crate::report::page::{figure, page};
 use crate::report::plan_chart::plan_chart;
 
@@ -25,7 +25,8 @@ pub struct Args {
     /// The case file: structure, tool, material, cut.
     #[arg(value_name = "CASE")]
     case: PathBuf,
-    /// Spindle speeds in rev/min, first:last:count or first:last (61 speeds).
+    /// Spindle speeds in rev/min, first:last; a count (first:last:count) is read, but the plan chooses its own speeds,
+    /// at most 2.5 % apart, so that it does not depend on the count.
     #[arg(long, value_name = "R", value_parser = Range::positive)]
     rpm: Range,
     /// Axial depths in mm, first:last:count or first:last (61 depths). Limits are searched from depth 0 to the last, in
@@ -122,7 +123,7 @@ pub fn run(args: Args) -> Result<(), Error> {
     let mut case = Case::read(&args.case)?;
     speed_question::ask(&mut case, args.output)?;
     let mut request = request(&args);
-    let outside_limits_rpm = leave_out_impossible(&case, &mut request)?;
+    let outside_limits_rpm = leave_out_impossible(&case, args.rpm, &mut request)?;
     let bar = progress::bar(
         Some(request.speeds_rpm.len() as u64),
         "{spinner} limits {bar:40} {pos}/{len} {elapsed}",
@@ -151,18 +152,24 @@ pub fn run(args: Args) -> Result<(), Error> {
     args.output.answer(&answer, output_text)
 }
 
-/// Removes the speeds outside the limits of the spindle from the request, and returns them, rev/min.
+/// Narrows the speeds of the request to the limits of the spindle, and returns the speeds of `--rpm` outside of them,
+/// rev/min.
 ///
 /// # Errors
 /// No speed lies within the limits.
-fn leave_out_impossible(case: &Case, request: &mut Request) -> Result<Vec<f64>, Error> {
+fn leave_out_impossible(case: &Case, rpm: Range, request: &mut Request) -> Result<Vec<f64>, Error> {
     let Some(limits) = &case.limits else {
         return Ok(Vec::new());
     };
-    let (possible, impossible) = request
-        .speeds_rpm
-        .iter()
-        .partition::<Vec<f64>, _>(|rpm| limits.allows(**rpm));
+    let (first, last) = (rpm.first().min(rpm.last()), rpm.first().max(rpm.last()));
+    let possible = limits.allowed_rpm().into_iter().filter_map(|[from, to]| {
+        let (from, to) = (
+            from.max(first).max(limits.rpm_min),
+            to.min(last).min(limits.rpm_max),
+        );
+        (from <= to).then(|| speeds_of_range([from, to]))
+    });
+    let possible: Vec<f64> = possible.flatten().collect();
     if possible.is_empty() {
         return Err(Error::input(format!(
             "--rpm: no speed lies within the limits of the spindle in {}, {} to {} rev/min",
@@ -172,7 +179,9 @@ fn leave_out_impossible(case: &Case, request: &mut Request) -> Result<Vec<f64>, 
         )));
     }
     request.speeds_rpm = possible;
-    Ok(impossible)
+    let mut outside = rpm.values();
+    outside.retain(|rpm| !limits.allows(*rpm));
+    Ok(outside)
 }
 
 /// Text about the speeds outside the limits of the spindle, or about limits that the case does not state; empty if
@@ -232,7 +241,7 @@ fn request(args: &Args) -> Request {
     let share = |percent: f64| 0.01 * percent;
     let (assumed, tests) = (&args.assumed, &args.tests);
     Request {
-        speeds_rpm: args.rpm.values(),
+        speeds_rpm: speeds_of_range([args.rpm.first(), args.rpm.last()]),
         depth_mm: args.depth_mm.first().max(args.depth_mm.last()),
         samples: args.depth_mm.steps_from_zero(),
         width: share(args.width_percent),

@@ -11,6 +11,7 @@ mod candidate;
 mod chart;
 mod means;
 mod selection;
+mod speeds;
 mod unknowns;
 
 #[cfg(test)]
@@ -23,6 +24,7 @@ use serde::Serialize;
 pub use candidate::Test;
 pub use chart::WithoutDerivative;
 pub use means::Means;
+pub use speeds::speeds_of_range;
 pub use unknowns::Prior;
 
 use candidate::{Candidate, candidates};
@@ -36,7 +38,7 @@ use unknowns::Unknowns;
 /// tests.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Request {
-    /// Spindle speeds of the chart, rev/min.
+    /// Spindle speeds of the chart, rev/min; [`speeds_of_range`] gives those of a range.
     pub speeds_rpm: Vec<f64>,
     /// Largest axial depth up to which stability limits are searched, mm.
     pub depth_mm: f64,

@@ -124,6 +124,10 @@ impl<'a> Selection<'a> {
             let gains: Vec<(f64, f64)> = (0..self.candidates.len())
                 .into_par_iter()
                 .map(|candidate| {
+                    // No test is made twice.
+                    if order.contains(&candidate) {
+                        return (f64::NEG_INFINITY, excess);
+                    }
                     let after = self.excess(&(&information + &self.candidates[candidate].information));
                     let cost = self.cost(candidate, &information) as f64;
                     // Candidate tests that reach the required width reduce the excess equally and are compared by cost
@@ -178,6 +182,7 @@ impl<'a> Selection<'a> {
             .par_iter()
             .filter_map(|&(a, b)| {
                 (0..self.candidates.len())
+                    .filter(|other| chosen.iter().all(|one| one.candidate != *other))
                     .filter_map(|other| {
                         let kept = (0..count)
                             .filter(|&index| index != a && index != b)

@@ -339,20 +339,23 @@ fn planned_intervals_cover_the_limits_of_many_machines() {
     check(&errors, found, &speeds, 400);
 }
 
-/// Cost of the cheapest of all sets of up to three tests that reach the width.
+/// Cost of the cheapest of all sets of up to three different tests that reach the width.
 fn cheapest_of_all(selection: &Selection<'_>, count: usize) -> Option<usize> {
     let none = count;
     let sets = (0..=count).flat_map(|a| (a..=count).flat_map(move |b| (b..=count).map(move |c| [a, b, c])));
-    sets.filter_map(|set| {
-        // Tests that inform about all limits come first: then brackets cost least.
-        let mut order: Vec<usize> = set.into_iter().filter(|&index| index != none).collect();
-        order.sort_by_key(|&index| selection.is_bracket(index));
-        let priced = selection.priced(order);
-        selection
-            .is_reached(&selection.information(&priced))
-            .then(|| priced.iter().map(|one| one.cost).sum())
-    })
-    .min()
+    let is_different =
+        |set: &[usize; 3]| (0..3).all(|index| set[index] == none || !set[index + 1..].contains(&set[index]));
+    sets.filter(is_different)
+        .filter_map(|set| {
+            // Tests that inform about all limits come first: then brackets cost least.
+            let mut order: Vec<usize> = set.into_iter().filter(|&index| index != none).collect();
+            order.sort_by_key(|&index| selection.is_bracket(index));
+            let priced = selection.priced(order);
+            selection
+                .is_reached(&selection.information(&priced))
+                .then(|| priced.iter().map(|one| one.cost).sum())
+        })
+        .min()
 }
 
 #[test]
@@ -368,6 +371,10 @@ fn no_set_of_up_to_three_tests_is_cheaper() {
         let reached = selection.is_reached(&selection.information(&found));
         let best = cheapest_of_all(&selection, basis.candidates.len());
         println!("{width}: {total} {reached}, best of all sets of three {best:?}");
+        let mut tests: Vec<usize> = found.iter().map(|one| one.candidate).collect();
+        tests.sort_unstable();
+        tests.dedup();
+        assert_eq!(tests.len(), found.len(), "a test is planned twice: {found:?}");
         if let Some(best) = best {
             assert!(reached && total <= best, "{width}: {total} {best}");
         }
