@@ -57,6 +57,18 @@ fn a_plan_depends_on_the_range_alone_and_proposes_no_test_twice() {
     assert!(!tests.is_empty());
     assert_eq!(coarse["tests"], fine["tests"]);
     assert_eq!(coarse["after"], fine["after"]);
+    // Listed are the speeds that were asked for, all of which have a limit.
+    for (answer, count) in [(&coarse, 9), (&fine, 53)] {
+        let listed = answer["chart"].as_array().expect("a chart");
+        assert_eq!(listed.len(), count);
+        for (index, speed) in listed.iter().enumerate() {
+            let asked = 700.0 + 1300.0 * index as f64 / (count - 1) as f64;
+            assert!(
+                (speed["rpm"].as_f64().expect("a speed") - asked).abs() < 1e-9,
+                "{speed}"
+            );
+        }
+    }
     for (index, test) in tests.iter().enumerate() {
         let same = |other: &serde_json::Value| {
             ["kind", "direction", "rpm"]

@@ -25,8 +25,8 @@ pub struct Args {
     /// The case file: structure, tool, material, cut.
     #[arg(value_name = "CASE")]
     case: PathBuf,
-    /// Spindle speeds in rev/min, first:last; a count (first:last:count) is read, but the plan chooses its own speeds,
-    /// at most 2.5 % apart, so that it does not depend on the count.
+    /// Spindle speeds in rev/min, first:last:count or first:last (61 speeds), whose intervals are listed. The tests follow
+    /// from speeds of the plan's own over this range, at most 2.5 % apart, and do not depend on the count.
     #[arg(long, value_name = "R", value_parser = Range::positive)]
     rpm: Range,
     /// Axial depths in mm, first:last:count or first:last (61 depths). Limits are searched from depth 0 to the last, in
@@ -125,7 +125,7 @@ pub fn run(args: Args) -> Result<(), Error> {
     let mut request = request(&args);
     let outside_limits_rpm = leave_out_impossible(&case, args.rpm, &mut request)?;
     let bar = progress::bar(
-        Some(request.speeds_rpm.len() as u64),
+        Some((request.speeds_rpm.len() + request.listed_rpm.len()) as u64),
         "{spinner} limits {bar:40} {pos}/{len} {elapsed}",
     );
     let found = plan(&case, &request, || bar.inc(1))?;
@@ -179,8 +179,9 @@ fn leave_out_impossible(case: &Case, rpm: Range, request: &mut Request) -> Resul
         )));
     }
     request.speeds_rpm = possible;
-    let mut outside = rpm.values();
-    outside.retain(|rpm| !limits.allows(*rpm));
+    let listed = std::mem::take(&mut request.listed_rpm);
+    let (listed, outside) = listed.into_iter().partition(|rpm| limits.allows(*rpm));
+    request.listed_rpm = listed;
     Ok(outside)
 }
 
@@ -242,6 +243,7 @@ fn request(args: &Args) -> Request {
     let (assumed, tests) = (&args.assumed, &args.tests);
     Request {
         speeds_rpm: speeds_of_range([args.rpm.first(), args.rpm.last()]),
+        listed_rpm: args.rpm.values(),
         depth_mm: args.depth_mm.first().max(args.depth_mm.last()),
         samples: args.depth_mm.steps_from_zero(),
         width: share(args.width_percent),

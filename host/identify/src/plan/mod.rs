@@ -40,6 +40,8 @@ use unknowns::Unknowns;
 pub struct Request {
     /// Spindle speeds of the chart, rev/min; [`speeds_of_range`] gives those of a range.
     pub speeds_rpm: Vec<f64>,
+    /// Spindle speeds whose intervals the plan lists, rev/min; empty: those of the chart. They influence no test.
+    pub listed_rpm: Vec<f64>,
     /// Largest axial depth up to which stability limits are searched, mm.
     pub depth_mm: f64,
     /// Number of equal steps in axial depth over which Floquet multipliers are followed, before refinement.
@@ -166,14 +168,14 @@ pub struct Plan {
     /// Reason why the required width is not reached; `None` if it is.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub obstacle: Option<Obstacle>,
-    /// Spindle speeds that the plan leaves out, rev/min: without a stability limit up to the largest depth, or with a
+    /// Spindle speeds that the plan does not list, rev/min: without a stability limit up to the largest depth, or with a
     /// first limit without derivatives.
     pub without_limit_rpm: Vec<f64>,
-    /// First limits and deeper lobes without derivatives with respect to the unknown parameters, with the reasons. The
-    /// speeds of the first limits among them are in [`Plan::without_limit_rpm`].
+    /// First limits and deeper lobes without derivatives with respect to the unknown parameters at the speeds of the
+    /// chart, with the reasons.
     #[serde(skip)]
     pub without_derivative: Vec<WithoutDerivative>,
-    /// All spindle speeds of the chart whose stability limit counts in the plan.
+    /// The listed spindle speeds that have a stability limit with derivatives.
     pub chart: Vec<Speed>,
 }
 
@@ -216,9 +218,34 @@ fn no_known_limit(case: &Case, request: &Request, without_derivative: &[WithoutD
 struct Basis {
     unknowns: Unknowns,
     chart: KnownChart,
+    /// Limits at the speeds that the plan lists; `None` if they are those of `chart`.
+    listed: Option<KnownChart>,
     candidates: Vec<Candidate>,
     without_limit_rpm: Vec<f64>,
     without_derivative: Vec<WithoutDerivative>,
+}
+
+/// Linearized limits at some spindle speeds.
+struct Limits {
+    chart: KnownChart,
+    /// Speeds without a first limit that has derivatives, rev/min.
+    without_limit_rpm: Vec<f64>,
+    without_derivative: Vec<WithoutDerivative>,
+}
+
+impl Limits {
+    fn new(lines: &[SpeedLine], linearized: &Linearized, unknowns: usize) -> Self {
+        let (limits, without_derivative): (Vec<Option<KnownLimit>>, Vec<Vec<WithoutDerivative>>) = lines
+            .par_iter()
+            .map(|line| KnownLimit::new(line, linearized, unknowns))
+            .unzip();
+        let without = lines.iter().zip(&limits).filter(|(_, limit)| limit.is_none());
+        Self {
+            without_limit_rpm: without.map(|(line, _)| line.rpm).collect(),
+            without_derivative: without_derivative.into_iter().flatten().collect(),
+            chart: KnownChart::new(limits.into_iter().flatten().collect()),
+        }
+    }
 }
 
 impl Basis {
@@ -235,28 +262,29 @@ impl Basis {
         };
         let unknowns = Unknowns::new(case, &request.prior, &request.means).map_err(no_derivatives)?;
         let linearized = Linearized::new(case, &unknowns.variables)?;
-        let lines: Vec<Result<SpeedLine, StabilityError>> = request
-            .speeds_rpm
-            .par_iter()
-            .map(|&rpm| {
-                let found = line(&problem, rpm, request.depth_mm, request.samples);
-                progress();
-                found
-            })
-            .collect();
-        let lines = lines.into_iter().collect::<Result<Vec<_>, _>>()?;
-        let (limits, without_derivative): (Vec<Option<KnownLimit>>, Vec<Vec<WithoutDerivative>>) = lines
-            .par_iter()
-            .map(|line| KnownLimit::new(line, &linearized, unknowns.len()))
-            .unzip();
-        let without_limit_rpm = lines
-            .iter()
-            .zip(&limits)
-            .filter(|(_, limit)| limit.is_none())
-            .map(|(line, _)| line.rpm)
-            .collect();
-        let without_derivative: Vec<WithoutDerivative> = without_derivative.into_iter().flatten().collect();
-        let chart = KnownChart::new(limits.into_iter().flatten().collect());
+        let at = |speeds_rpm: &[f64]| {
+            let lines: Vec<Result<SpeedLine, StabilityError>> = speeds_rpm
+                .par_iter()
+                .map(|&rpm| {
+                    let found = line(&problem, rpm, request.depth_mm, request.samples);
+                    progress();
+                    found
+                })
+                .collect();
+            let lines = lines.into_iter().collect::<Result<Vec<_>, _>>()?;
+            Ok::<_, PlanError>(Limits::new(&lines, &linearized, unknowns.len()))
+        };
+        let Limits {
+            chart,
+            mut without_limit_rpm,
+            without_derivative,
+        } = at(&request.speeds_rpm)?;
+        let mut listed = None;
+        if !request.listed_rpm.is_empty() {
+            let limits = at(&request.listed_rpm)?;
+            without_limit_rpm = limits.without_limit_rpm;
+            listed = Some(limits.chart);
+        }
         if chart.limits.is_empty() {
             return Err(no_known_limit(case, request, &without_derivative));
         }
@@ -265,6 +293,7 @@ impl Basis {
         Ok(Self {
             unknowns,
             chart,
+            listed,
             candidates,
             without_limit_rpm,
             without_derivative,
@@ -286,8 +315,9 @@ impl Basis {
         let after = self.width(&everything);
         let reached = selection.is_reached(&everything);
         let obstacle = (!reached).then(|| self.obstacle(selection));
-        let (before_mm, after_mm) = (self.chart.intervals(&nothing), self.chart.intervals(&everything));
-        let speeds = self.chart.limits.iter().zip(before_mm).zip(after_mm);
+        let listed = self.listed.as_ref().unwrap_or(&self.chart);
+        let (before_mm, after_mm) = (listed.intervals(&nothing), listed.intervals(&everything));
+        let speeds = listed.limits.iter().zip(before_mm).zip(after_mm);
         Plan {
             wanted_percent: 100.0 * request.width,
             reached,

@@ -20,6 +20,7 @@ use quietcut_testkit::rates::assert_share;
 fn request(speeds_rpm: &[f64], depth_mm: f64, width: f64) -> Request {
     Request {
         speeds_rpm: speeds_rpm.to_vec(),
+        listed_rpm: Vec::new(),
         depth_mm,
         samples: 40,
         width,
