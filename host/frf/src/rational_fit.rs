@@ -85,16 +85,33 @@ pub fn fit(
     functions: &[&[Complex64]],
     modes: usize,
 ) -> Result<RationalFit, RationalFitError> {
-    let (&[first, .., last], false) = (frequency_hz, frequency_hz.len() < 2 * modes + 4 || modes == 0) else {
+    let [first, .., last] = frequency_hz else {
         return Err(undetermined(frequency_hz, functions, modes));
     };
     // Start values of the poles: damping ratio about 1 %, equally spaced over the band.
-    let mut poles: Vec<Complex64> = (0..modes)
+    let start = (0..modes)
         .map(|mode| {
             let omega = TAU * (first + (last - first) * (mode as f64 + 0.5) / modes as f64);
             Complex64::new(-0.01 * omega, omega)
         })
         .collect();
+    fit_from(frequency_hz, functions, start)
+}
+
+/// Fits as many modes with common poles as there are start values `poles`, rad/s with positive imaginary part, to the
+/// receptances `functions`, each with one value per frequency.
+///
+/// # Errors
+/// As [`fit`].
+pub fn fit_from(
+    frequency_hz: &[f64],
+    functions: &[&[Complex64]],
+    mut poles: Vec<Complex64>,
+) -> Result<RationalFit, RationalFitError> {
+    let modes = poles.len();
+    if frequency_hz.len() < 2 * modes + 4 || modes == 0 {
+        return Err(undetermined(frequency_hz, functions, modes));
+    }
     for _ in 0..ROUNDS {
         poles = relocated(frequency_hz, functions, &poles)?;
     }

@@ -14,7 +14,7 @@ use crate::criteria::{
     UNDAMPED,
 };
 use quietcut_frf::Interpolation;
-use quietcut_frf::rational_fit::{fit, residues_of_modes_alone};
+use quietcut_frf::rational_fit::{RationalFit, fit, fit_from, residues_of_modes_alone};
 use quietcut_model::structure::FirstOrder;
 
 /// Poles that stand for the modes outside of the band of a table, rad/s per rad/s of its last or first frequency: a
@@ -44,7 +44,7 @@ impl FittedStructure {
         let mut best: Option<Self> = None;
         let mut without_improvement = 0;
         for count in 1..=FIT_MODES_MAX {
-            let next = functions.fitted(count);
+            let next = functions.fitted(count, best.as_ref());
             let error = best.as_ref().map_or(f64::INFINITY, |best| best.error);
             match next.filter(|next| next.error < (1.0 - FIT_IMPROVEMENT) * error) {
                 Some(next) => {
@@ -106,7 +106,10 @@ impl<'a> Functions<'a> {
 
     /// Structure of `count` modes within the band of the table, with further ones outside if these halve the deviation;
     /// `None` if there is none.
-    fn fitted(&self, count: usize) -> Option<FittedStructure> {
+    ///
+    /// Vector fitting converges to other poles from other start values. It begins once from equally spaced poles, and
+    /// once from those of a fit of `fewer` modes and the line where this deviates most; the better fit counts.
+    fn fitted(&self, count: usize, fewer: Option<&FittedStructure>) -> Option<FittedStructure> {
         let all_hz = self.table.frequency_hz();
         // A vector fit has a term of 1/s², which is infinite at 0 Hz.
         let from = all_hz.partition_point(|hz| *hz <= 0.0);
@@ -129,7 +132,11 @@ impl<'a> Functions<'a> {
             .map(|(_, values)| kept(values))
             .collect();
         let decisive: Vec<&[Complex64]> = decisive.iter().map(Vec::as_slice).collect();
-        let poles = fit(&frequency_hz, &decisive, count).ok()?.poles;
+        let equally_spaced = fit(&frequency_hz, &decisive, count).ok();
+        let from_peaks = fit_from(&frequency_hz, &decisive, self.start(count, fewer)).ok();
+        let both = [equally_spaced, from_peaks].into_iter().flatten();
+        let best = both.min_by(|a, b| a.residual.total_cmp(&b.residual));
+        let RationalFit { poles, .. } = best?;
         let (first, last) = (TAU * all_hz.first()?, TAU * all_hz.last()?);
         let further: [&[Complex64]; 3] = [&[], &[ABOVE * last], &[ABOVE * last, BELOW * first]];
         let mut best: Option<FittedStructure> = None;
@@ -142,6 +149,43 @@ impl<'a> Functions<'a> {
             }
         }
         best
+    }
+
+    /// Start values of `count` poles within the band, rad/s: those of `fewer` modes, and poles with a damping ratio of 1 %
+    /// at the lines where the table deviates most from it. A line next to a chosen pole is left out.
+    fn start(&self, count: usize, fewer: Option<&FittedStructure>) -> Vec<Complex64> {
+        let (first_hz, last_hz) = self.table.band_hz();
+        let in_band = |pole: &Complex64| (TAU * first_hz..=TAU * last_hz).contains(&pole.im);
+        let known = fewer.into_iter().flat_map(|fewer| &fewer.modes);
+        let mut poles: Vec<Complex64> = known.map(|(pole, _)| *pole).filter(in_band).take(count).collect();
+        let deviation = |hz: f64, line: &Matrix3<Complex64>| {
+            let fitted = fewer.map_or_else(Matrix3::zeros, |fewer| {
+                fewer.transfer(Complex64::new(0.0, TAU * hz))
+            });
+            (fitted - line)
+                .iter()
+                .map(|entry| entry.norm())
+                .fold(0.0, f64::max)
+        };
+        let mut lines: Vec<(f64, f64)> = self
+            .table
+            .frequency_hz()
+            .iter()
+            .zip(self.table.lines())
+            .filter(|(hz, _)| **hz > 0.0)
+            .map(|(hz, line)| (*hz, deviation(*hz, line)))
+            .collect();
+        lines.sort_by(|a, b| b.1.total_cmp(&a.1));
+        for (hz, _) in lines {
+            if poles.len() == count {
+                break;
+            }
+            let omega = TAU * hz;
+            if poles.iter().all(|pole| (pole.im - omega).abs() > 0.02 * omega) {
+                poles.push(Complex64::new(-0.01 * omega, omega));
+            }
+        }
+        poles
     }
 
     /// Structure with these poles; `None` if one of them is undamped, or narrower than the lines resolve.
