@@ -414,6 +414,44 @@ fn without_a_chatter_frequency_or_a_speed_there_is_no_advice() {
 }
 
 #[test]
+fn the_rule_leads_into_no_gap_between_the_gears() {
+    // The spindle must not run from 1 100 to 1 300 rev/min: no depth is stable there. Elsewhere 5 mm are.
+    let open = || vec![interval(5.0, 6.0, IntervalKind::Hopf, 30.0)];
+    let shut = || vec![interval(0.0, 6.0, IntervalKind::Undecided, 0.0)];
+    let bytes = table_of(&[
+        (600.0, open()),
+        (1099.0, open()),
+        (1100.0, shut()),
+        (1300.0, shut()),
+        (1301.0, open()),
+        (2000.0, open()),
+    ]);
+    let table = LobeTable::parse(&bytes).unwrap();
+    // The table calls the present speed stable, so that the rule advises: 40 Hz and two teeth give 1 200 rev/min, lobe 1, and
+    // 600 rev/min, lobe 2, the nearest that is allowed.
+    let of_cut = advise(
+        &hopf(40.0),
+        Rpm(1000.0),
+        Some(&table),
+        Some(&at_depth(2.0)),
+        None,
+        &TOOL,
+    );
+    assert_eq!(
+        (of_cut.source, of_cut.action),
+        (Source::ToothPassingRule, Action::Speed)
+    );
+    assert_near(of_cut.speed.0, 600.0, 1e-5);
+    // A cut that the table does not cover: the speeds of the spindle are the same.
+    let mut other = at_depth(2.0);
+    other.feed_per_tooth = Millimeters(0.4);
+    let of_other = advise(&hopf(40.0), Rpm(1000.0), Some(&table), Some(&other), None, &TOOL);
+    assert_near(of_other.speed.0, 600.0, 1e-5);
+    let without = advise(&hopf(40.0), Rpm(1000.0), None, Some(&other), None, &TOOL);
+    assert_near(without.speed.0, 1200.0, 1e-5);
+}
+
+#[test]
 fn speed_limits_without_a_speed_of_the_table_lead_to_a_smaller_depth() {
     // The speed limits in the table are 600 to 2 400 rev/min.
     let bytes = acetal().encode().unwrap();

@@ -11,7 +11,8 @@ use crate::working_point::{Limits, Tool, WorkingPoint};
 /// Returns the advice for the present verdict and spindle speed.
 ///
 /// `limits` are intersected with the limits of the table, if it has any. Without chatter the result is
-/// [`Action::Keep`]. A point that is unstable in the table is never advised.
+/// [`Action::Keep`]. A point that is unstable in the table is never advised, nor a speed
+/// at which it has no stable depth.
 ///
 /// Cost: the search for a quiet speed passes over the entries of the table for this cut at most once, apart from the
 /// speed band around the present speed, which it passes twice. It begins at this band. If it finds no quiet speed,
@@ -56,7 +57,7 @@ pub fn advise(
             return by_rule(
                 judgement,
                 tool,
-                range,
+                (range, table),
                 None,
                 Advice {
                     obstacle: Some(obstacle),
@@ -74,7 +75,7 @@ pub fn advise(
         Err(obstacle) => by_rule(
             judgement,
             tool,
-            range,
+            (range, table),
             Some(&cut),
             Advice {
                 obstacle: Some(obstacle),
@@ -178,12 +179,30 @@ fn by_table(cut: &Cut<'_>, speed: Rpm, range: (f32, f32), keep: Advice) -> Resul
     })
 }
 
-/// Advice from the tooth-passing rule. Speeds outside the speed range, and speeds that the lobe table calls unstable
-/// for the cut, are skipped.
+/// True if the table has no stable depth at a speed, in no layer: so a table states the speeds at which the spindle must
+/// not run, whatever the tool and the cut.
+fn is_excluded(table: &LobeTable<'_>, speed: Rpm) -> bool {
+    let mut layers = table.layers();
+    layers.len() > 0
+        && layers.all(|layer| {
+            let at = WorkingPoint {
+                axial_depth: table.depths().0,
+                start: layer.start,
+                exit: layer.exit,
+                feed_per_tooth: layer.feed_from,
+                posture: layer.posture,
+            };
+            let column = table.column(speed, &at);
+            column.is_ok_and(|column| column.stable().next().is_none())
+        })
+}
+
+/// Advice from the tooth-passing rule. Speeds outside the speed range, speeds at which the lobe table has no stable depth at all,
+/// and speeds that it calls unstable or undecided for the cut, are skipped.
 fn by_rule(
     judgement: &Judgement,
     tool: &Tool,
-    (from_rpm, to_rpm): (f32, f32),
+    ((from_rpm, to_rpm), table): ((f32, f32), Option<&LobeTable<'_>>),
     cut: Option<&Cut<'_>>,
     keep: Advice,
 ) -> Advice {
@@ -202,13 +221,15 @@ fn by_rule(
         };
     };
     let is_admissible = |candidate: Rpm| {
-        let is_unstable = |cut: &Cut<'_>| {
+        let is_refused = |cut: &Cut<'_>| {
             matches!(
                 cut.table.lookup(candidate, &cut.at),
-                TabulatedStability::Unstable { .. }
+                TabulatedStability::Unstable { .. } | TabulatedStability::NotKnown(NotKnown::Undecided)
             )
         };
-        (from_rpm..=to_rpm).contains(&candidate.0) && !cut.is_some_and(is_unstable)
+        (from_rpm..=to_rpm).contains(&candidate.0)
+            && !cut.is_some_and(is_refused)
+            && !table.is_some_and(|table| is_excluded(table, candidate))
     };
     match tooth_passing_speed(keep.speed, chatter, tool, is_admissible) {
         Some(speed) => Advice {
