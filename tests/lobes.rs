@@ -113,7 +113,7 @@ fn charts_are_written_in_every_format_and_no_other() {
         let text = std::fs::read_to_string(folder.path().join(out)).expect("the file");
         assert!(text.starts_with(start), "{out}: {}", &text[..60]);
     }
-    run("a.png").refused(&["a.png", ".svg, .html, .csv or .json"]);
+    run("a.png").refused(&["a.png", ".svg, .html, .csv, .json or .toml"]);
 }
 
 #[test]
