@@ -5,7 +5,7 @@ use std::path::Path;
 use super::bench::Bench;
 use super::experiment::{Excitation, experiments};
 use super::separation::least;
-use crate::conclusion::answer::{Diagnosis, Outcome};
+use crate::conclusion::answer::{Diagnosis, NextTest, Outcome};
 use crate::{Options, diagnose};
 use quietcut_model::case::Case;
 use quietcut_model::structure::Direction;
@@ -106,18 +106,31 @@ fn the_distance_is_a_minimum_over_parameters_within_their_uncertainty() {
     assert_eq!(least(&apart, &[], &[]).1, apart.norm_squared());
 }
 
-#[test]
-fn the_proposed_impact_separates_a_gain_from_the_cutting_force() {
-    let case = case("kuka-kr90-half");
-    let gains = Effects::parse(["sensor-gain=1.2"]).unwrap();
-    let mut records = cuts(&case, &gains);
-    let answer = diagnose(&case, &records, &Options::default()).unwrap();
+/// Cuts in which a gain and the cutting force are confounded, and the impact that the diagnosis proposes.
+fn confounded(case: &Case, gains: &Effects) -> (Vec<Recording>, NextTest) {
+    let records = cuts(case, gains);
+    let answer = diagnose(case, &records, &Options::default()).unwrap();
     assert_eq!(answer.outcome, Outcome::Confounded, "{:?}", names(&answer));
     let test = answer.next_test.unwrap();
     println!("{}: it {}", test.what(), test.why);
     assert_eq!((test.kind, test.measure), ("hammer", None), "{test:?}");
+    assert_eq!(test.direction, Some(Direction::X.name()));
+    (records, test)
+}
+
+#[test]
+fn an_impact_is_proposed_where_a_gain_and_the_cutting_force_are_confounded() {
+    let gains = Effects::parse(["sensor-gain=1.2"]).unwrap();
+    confounded(&case("kuka-kr90-half"), &gains);
+}
+
+#[test]
+#[ignore = "campaign: two diagnoses, half a minute"]
+fn the_proposed_impact_separates_a_gain_from_the_cutting_force() {
+    let case = case("kuka-kr90-half");
+    let gains = Effects::parse(["sensor-gain=1.2"]).unwrap();
+    let (mut records, test) = confounded(&case, &gains);
     let direction = Direction::X;
-    assert_eq!(test.direction, Some(direction.name()));
     let impacts = vec![Impact {
         start_s: 0.05 * test.seconds,
         peak_n: test.force_n[0],

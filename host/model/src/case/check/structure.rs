@@ -10,6 +10,9 @@ use crate::case::file::{ModeFile, Number, Rows, StructureFile};
 use crate::case::{CaseError, Parameter};
 use crate::structure::{Direction, Form, Matrices, Mode, Structure};
 
+/// Mode shape as a case gives it: real and imaginary part of each entry.
+type ShapeFile = Spanned<Vec<[f64; 2]>>;
+
 impl Check<'_> {
     pub(super) fn structure(
         &mut self,
@@ -238,7 +241,7 @@ impl Check<'_> {
     pub(super) fn poles_and_shapes(
         &self,
         (frequency_hz, damping_ratio): (&Number, &Number),
-        (left, right): (&Spanned<Vec<[f64; 2]>>, &Spanned<Vec<[f64; 2]>>),
+        (left, right): (&ShapeFile, &ShapeFile),
         size: usize,
         key: impl Fn(&str) -> String,
     ) -> Result<Mode, CaseError> {
