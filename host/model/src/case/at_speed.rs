@@ -57,18 +57,18 @@ impl Case {
     }
 
     /// The case whose structure is interpolated over the spindle speed between its own and those of `others`, cases of the
-    /// same machine at other speeds. Of the others only the structure is used.
+    /// same machine at other speeds. Of the others only the structure is used. Each case brings the structures of all its
+    /// speeds.
     ///
     /// # Errors
     /// See [`AtSpeedError`].
     pub fn with_structures_of(mut self, others: &[Self]) -> Result<Self, AtSpeedError> {
-        let base = modes_at_speed(&self)?;
+        let (base, mut further) = modes_at_speeds(&self)?;
         let directions = |case: &Self| {
             let structure = case.structure.as_ref();
             let names = structure.iter().flat_map(|structure| &structure.directions);
             names.map(ToString::to_string).collect::<Vec<_>>().join(", ")
         };
-        let mut further = Vec::new();
         for other in others {
             let (found, expected) = (directions(other), directions(&self));
             if found != expected {
@@ -78,7 +78,9 @@ impl Case {
                     expected,
                 });
             }
-            further.push(modes_at_speed(other)?);
+            let (first, rest) = modes_at_speeds(other)?;
+            further.push(first);
+            further.extend(rest);
         }
         let dependence = SpeedDependence::new(base, further).map_err(|cause| AtSpeedError::Pairing {
             path: self.path.display().to_string(),
@@ -89,7 +91,8 @@ impl Case {
     }
 }
 
-fn modes_at_speed(case: &Case) -> Result<ModesAtSpeed, AtSpeedError> {
+/// Modes of the first structure of a case, and those of its further speeds.
+fn modes_at_speeds(case: &Case) -> Result<(ModesAtSpeed, Vec<ModesAtSpeed>), AtSpeedError> {
     let path = || case.path.display().to_string();
     let Some(Form::Modes(modes)) = case.structure.as_ref().map(|structure| &structure.form) else {
         return Err(AtSpeedError::NoModes { path: path() });
@@ -97,8 +100,11 @@ fn modes_at_speed(case: &Case) -> Result<ModesAtSpeed, AtSpeedError> {
     let rpm = case
         .structure_rpm
         .ok_or_else(|| AtSpeedError::NoSpeed { path: path() })?;
-    Ok(ModesAtSpeed {
+    let first = ModesAtSpeed {
         rpm,
         modes: modes.clone(),
-    })
+    };
+    let dependence = case.speed_dependence.as_ref();
+    let further = dependence.map_or_else(Vec::new, |dependence| dependence.further().cloned().collect());
+    Ok((first, further))
 }

@@ -99,6 +99,14 @@ impl SpeedDependence {
         self.nodes.iter().map(|node| node.rpm).collect()
     }
 
+    /// Structures at the speeds other than that of the first one, by ascending speed.
+    pub(crate) fn further(&self) -> impl Iterator<Item = &ModesAtSpeed> {
+        let nodes = self.nodes.iter().enumerate();
+        nodes
+            .filter(|(index, _)| *index != self.base)
+            .map(|(_, node)| node)
+    }
+
     /// Modes at the spindle speed `rpm`, rev/min, of a machine whose modes at the speed of the first structure are `now`:
     /// frequencies and damping ratios change by the same factor as those of the first structure, shapes by the same
     /// difference. With the modes of the first structure itself they are the interpolated ones. Errors of the first

@@ -62,8 +62,8 @@ impl Check<'_> {
             Err(error) => Err(self.wrong(
                 first,
                 key,
-                error,
-                "a structure whose modes can be followed over the speed",
+                format!("structures that cannot be followed over the speed: {error}"),
+                "a structure with the same modes at each speed",
             )),
         }
     }

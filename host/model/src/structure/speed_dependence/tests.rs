@@ -142,6 +142,25 @@ fn a_case_states_its_structure_at_each_speed() {
         .with_structures_of(&[parse("c.toml", &fast)])
         .unwrap();
     assert_eq!(joined.speed_dependence, case.speed_dependence);
+    // A case that has further speeds of its own keeps them, whether it is the first or another one.
+    let slow = parse("g.toml", &text("rpm = 2000.0", 790.0, ""));
+    let (a, b) = (
+        case.clone()
+            .with_structures_of(std::slice::from_ref(&slow))
+            .unwrap(),
+        slow.with_structures_of(std::slice::from_ref(&case)).unwrap(),
+    );
+    for joined in [a, b] {
+        let dependence = joined.speed_dependence.as_ref().unwrap();
+        assert_eq!(dependence.speeds_rpm(), [0.0, 2000.0, 10_000.0]);
+        for (rpm, expected_hz) in [(1000.0, 795.0), (6000.0, 745.0)] {
+            let Form::Modes(modes) = joined.at_speed(rpm).structure.unwrap().form else {
+                panic!("no modes")
+            };
+            // Rounding.
+            assert!((modes[0].frequency_hz - expected_hz).abs() < 1e-9, "{modes:?}");
+        }
+    }
     let without_speed = parse("d.toml", &text("", 800.0, ""));
     let error = without_speed
         .clone()
