@@ -12,7 +12,7 @@
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::method::{Label, Method};
+use super::method::{Label, Method, each_line};
 use super::resolution::Resolution;
 use super::speed_line::SpeedLine;
 use super::spread::LimitSpread;
@@ -55,13 +55,25 @@ pub fn chart<M: Method + ?Sized>(
     depth_mm: f64,
     samples: usize,
 ) -> Result<Chart, StabilityError> {
-    Ok(Chart {
-        label: Label::of(method),
-        speeds: method.lines(speeds_rpm, depth_mm, samples.max(CHART_SAMPLES_MIN))?,
-        refined: Vec::new(),
-        resolution: None,
-        cells_mm: Vec::new(),
-    })
+    let lines = method.lines(speeds_rpm, depth_mm, samples.max(CHART_SAMPLES_MIN))?;
+    Ok(Chart::of_lines(method, lines))
+}
+
+/// Computes a stability chart as [`chart()`] with the limits of each speed on their own, and calls `after_each` after each
+/// speed: for a method that needs seconds a speed.
+///
+/// # Errors
+/// As [`chart()`].
+pub fn counted_chart<M: Method + ?Sized>(
+    method: &M,
+    speeds_rpm: &[f64],
+    depth_mm: f64,
+    samples: usize,
+    after_each: impl Fn() + Sync,
+) -> Result<Chart, StabilityError> {
+    let samples = samples.max(CHART_SAMPLES_MIN);
+    let lines = each_line(method, speeds_rpm, depth_mm, samples, after_each)?;
+    Ok(Chart::of_lines(method, lines))
 }
 
 /// Refinement of a chart in spindle speed.
@@ -78,6 +90,16 @@ pub struct Refinement {
 }
 
 impl Chart {
+    fn of_lines<M: Method + ?Sized>(method: &M, speeds: Vec<SpeedLine>) -> Self {
+        Self {
+            label: Label::of(method),
+            speeds,
+            refined: Vec::new(),
+            resolution: None,
+            cells_mm: Vec::new(),
+        }
+    }
+
     /// Adds the spread of the limit over drawn machines at every requested speed: see [`Uncertainty::spread`].
     ///
     /// The result does not depend on the number of threads.

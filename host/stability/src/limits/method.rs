@@ -77,13 +77,32 @@ pub trait Method: Sync {
         depth_mm: f64,
         samples: usize,
     ) -> Result<Vec<SpeedLine>, StabilityError> {
-        let lines: Vec<Result<SpeedLine, StabilityError>> = speeds_rpm
-            .par_iter()
-            .map(|&rpm| self.line(rpm, depth_mm, samples))
-            .collect();
-        lines.into_iter().collect()
+        each_line(self, speeds_rpm, depth_mm, samples, || ())
     }
 }
+
+/// Limits of a method at each spindle speed (rev/min) on its own, in the given order; calls `after_each` after each speed.
+///
+/// # Errors
+/// As [`Method::line`], for the first speed that fails.
+pub(super) fn each_line<M: Method + ?Sized>(
+    method: &M,
+    speeds_rpm: &[f64],
+    depth_mm: f64,
+    samples: usize,
+    after_each: impl Fn() + Sync,
+) -> Result<Vec<SpeedLine>, StabilityError> {
+    let lines: Vec<Result<SpeedLine, StabilityError>> = speeds_rpm
+        .par_iter()
+        .map(|&rpm| {
+            let line = method.line(rpm, depth_mm, samples);
+            after_each();
+            line
+        })
+        .collect();
+    lines.into_iter().collect()
+}
+
 /// Label of a stability result: method, its settings and the effects that it neglects.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Label {
