@@ -335,12 +335,12 @@ fn text(plan: &Plan) -> String {
             );
         }
     }
-    let left_out = plan
-        .without_derivative
-        .iter()
-        .filter(|limit| limit.is_first)
-        .count();
-    let stable = plan.without_limit_rpm.len() - left_out;
+    let has_limit = |rpm: &&f64| {
+        let mut firsts = plan.without_derivative.iter().filter(|limit| limit.is_first);
+        firsts.any(|limit| limit.rpm == **rpm)
+    };
+    let without = plan.without_limit_rpm.iter();
+    let stable = without.filter(|rpm| !has_limit(rpm)).count();
     if stable > 0 {
         let _ = write!(
             text,
@@ -379,6 +379,44 @@ fn write(case: &Case, plan: &Plan, depth_mm: f64, path: &Path) -> Result<(), Err
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::plan::Width;
+
+    #[test]
+    fn listed_speeds_that_are_stable_are_counted_apart_from_those_without_derivatives() {
+        let width = Width {
+            widest_percent: 10.0,
+            at_rpm: 900.0,
+            median_percent: 10.0,
+        };
+        let without = |rpm| WithoutDerivative {
+            rpm,
+            depth_mm: 2.0,
+            is_first: true,
+            reason: "at the tip of an island".into(),
+        };
+        let mut plan = Plan {
+            wanted_percent: 20.0,
+            reached: true,
+            cuts_and_tests: 0,
+            unknowns: Vec::new(),
+            stated: true,
+            before: width,
+            tests: Vec::new(),
+            after: width,
+            obstacle: None,
+            without_limit_rpm: Vec::new(),
+            // Two speeds of the plan's own, which it does not list.
+            without_derivative: vec![without(910.0), without(930.0)],
+            chart: Vec::new(),
+        };
+        assert!(!text(&plan).contains("stable up to"), "{}", text(&plan));
+        plan.without_limit_rpm = vec![930.0, 1000.0];
+        assert!(
+            text(&plan).contains("\n1 speeds are stable up to"),
+            "{}",
+            text(&plan)
+        );
+    }
 
     #[test]
     fn every_limit_without_derivatives_is_listed_with_its_reason() {

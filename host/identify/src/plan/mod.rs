@@ -172,7 +172,7 @@ pub struct Plan {
     /// first limit without derivatives.
     pub without_limit_rpm: Vec<f64>,
     /// First limits and deeper lobes without derivatives with respect to the unknown parameters at the speeds of the
-    /// chart, with the reasons.
+    /// chart and at the listed ones, with the reasons.
     #[serde(skip)]
     pub without_derivative: Vec<WithoutDerivative>,
     /// The listed spindle speeds that have a stability limit with derivatives.
@@ -277,16 +277,19 @@ impl Basis {
         let Limits {
             chart,
             mut without_limit_rpm,
-            without_derivative,
+            mut without_derivative,
         } = at(&request.speeds_rpm)?;
+        if chart.limits.is_empty() {
+            return Err(no_known_limit(case, request, &without_derivative));
+        }
         let mut listed = None;
         if !request.listed_rpm.is_empty() {
             let limits = at(&request.listed_rpm)?;
             without_limit_rpm = limits.without_limit_rpm;
+            let further = limits.without_derivative.into_iter();
+            let is_known = |limit: &WithoutDerivative| request.speeds_rpm.contains(&limit.rpm);
+            without_derivative.extend(further.filter(|limit| !is_known(limit)));
             listed = Some(limits.chart);
-        }
-        if chart.limits.is_empty() {
-            return Err(no_known_limit(case, request, &without_derivative));
         }
         let candidates = candidates(case, &problem, &unknowns, &chart, &request.means)
             .map_err(|error| no_derivatives(error.to_string()))?;
