@@ -53,7 +53,7 @@ pub(crate) const FEED_PER_TOOTH_MAX_MM: f64 = 20.0;
 pub(crate) const COEFFICIENT_MAX_MPA: f64 = 1e6;
 
 /// Largest spindle speed in the limits of a case, rev/min. Air-bearing spindles reach 300 000. A choice above them.
-pub(crate) const SPEED_MAX_RPM: f64 = 1e6;
+pub const SPEED_MAX_RPM: f64 = 1e6;
 
 /// Largest error of a correlation in `[uncertainty]` of a case that counts as rounding: difference of the entries
 /// (i, j) and (j, i), excess of a magnitude over 1 and, times the number of parameters, an eigenvalue below 0.

@@ -13,7 +13,6 @@ mod mode_options;
 mod modes;
 mod modes_comparison;
 mod records;
-mod spindle_speed;
 mod stabilization_diagram;
 mod without_force;
 mod written;
@@ -24,6 +23,8 @@ use super::Error;
 use super::output::keep_inputs;
 use super::segment::Recorded;
 use crate::case::Case;
+use crate::criteria::SAME_SPINDLE_SPEED;
+use crate::machine::spindle_rpm;
 use crate::report::digits::significant;
 use answer::IdentifyOutput;
 pub use args::Args;
@@ -74,10 +75,11 @@ pub fn run(args: Args) -> Result<(), Error> {
         Method::ForceCoefficients => cutting::force_coefficients(&args, &recordings)?,
         Method::Modes => modes::modes(&args, &mut understood)?,
     };
-    answer.structure_rpm = args
-        .rpm
-        .or(answer.structure_rpm)
-        .or_else(|| spindle_speed::spindle_rpm(&recordings));
+    let recorded_rpm = answer.structure_rpm.or_else(|| spindle_rpm(&recordings));
+    answer
+        .warnings
+        .extend(args.rpm.zip(recorded_rpm).and_then(other_speed));
+    answer.structure_rpm = args.rpm.or(recorded_rpm);
     if args.method == Method::ForceCoefficients {
         answer.structure_rpm = None;
     }
@@ -87,6 +89,15 @@ pub fn run(args: Args) -> Result<(), Error> {
         tracing::warn!("{warning}");
     }
     args.output.answer_with(&understood, &answer, text(&answer))
+}
+
+/// Warning about a speed of `--rpm`, rev/min, that is not the one of the tachometer in the recordings; `None` if they agree.
+fn other_speed((given_rpm, recorded_rpm): (f64, f64)) -> Option<String> {
+    let is_same = (given_rpm - recorded_rpm).abs() <= SAME_SPINDLE_SPEED * given_rpm.max(recorded_rpm);
+    (!is_same).then(|| {
+        let recorded = significant(recorded_rpm, DIGITS);
+        format!("--rpm {given_rpm}: the tachometer in the recordings says {recorded} rev/min; leave --rpm out to keep that speed")
+    })
 }
 
 /// Content of the case file at `path` as a TOML table, after a check that it is a valid case.

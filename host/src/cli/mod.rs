@@ -55,7 +55,7 @@ use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{ArgAction, Parser, Subcommand};
 
 pub use error::Error;
-pub use number::{angle, count, finite, non_negative, positive};
+pub use number::{angle, count, finite, non_negative, positive, spindle_speed};
 pub use output::{Endings, Output, StreamedOutput};
 pub use range::Range;
 

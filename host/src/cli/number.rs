@@ -2,6 +2,8 @@
 
 use std::num::NonZeroU8;
 
+use crate::case::SPEED_MAX_RPM;
+
 /// Parses a finite number.
 pub fn finite(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
@@ -27,6 +29,18 @@ pub fn non_negative(text: &str) -> Result<f64, String> {
         Ok(value)
     } else {
         Err(format!("{value} is not possible: it must be 0 or greater"))
+    }
+}
+
+/// Parses a spindle speed that a case can state, rev/min; 0 is standstill.
+pub fn spindle_speed(text: &str) -> Result<f64, String> {
+    let value = non_negative(text)?;
+    if value <= SPEED_MAX_RPM {
+        Ok(value)
+    } else {
+        Err(format!(
+            "{value} is not possible: it must be from 0 to {SPEED_MAX_RPM} rev/min"
+        ))
     }
 }
 

@@ -7,7 +7,8 @@ use serde::Serialize;
 
 use super::contradiction::contradiction;
 use super::folder::{BrokenFile, DatedFile, FileKind, MachineFolder};
-use crate::recording::{Sidecar, cut_table};
+use super::spindle_speed::has_turned;
+use crate::recording::{Import, Recording, Sidecar, cut_table};
 
 /// Next useful command for a machine, with its reason.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -78,11 +79,8 @@ pub fn next_step(folder: &MachineFolder) -> NextStep {
     if content.structure.is_none() {
         return match folder.receptances.last() {
             Some(_) => step(
-                format!(
-                    "quietcut identify {} --method modes --rpm 0 --case {case} --out {case}",
-                    list(measured(folder))
-                ),
-                "the case has no structure; the command fits modes to the frequency response functions of the taps, or to those in frf/, and writes them into the case, with --rpm 0 as measured at standstill",
+                identify(folder, &case),
+                "the case has no structure; the command fits modes to the frequency response functions of the taps, or to those in frf/, and writes them into the case, with the speed of the tachometer or, without its pulses, --rpm 0 as measured at standstill",
             ),
             None => step(
                 format!(
@@ -96,10 +94,7 @@ pub fn next_step(folder: &MachineFolder) -> NextStep {
     }
     if receptances > Some(case_file.changed) {
         return step(
-            format!(
-                "quietcut identify {} --method modes --rpm 0 --case {case} --out {case}",
-                list(measured(folder))
-            ),
+            identify(folder, &case),
             "the frequency response functions are newer than the case; the command fits its modes again",
         );
     }
@@ -213,6 +208,21 @@ fn after_the_chart(folder: &MachineFolder, step: &dyn Fn(String, &str) -> NextSt
     step(
         format!("quietcut upload PORT {}", at("table.qct")),
         "everything is up to date; the command sends the table to the device, PORT is its serial port",
+    )
+}
+
+/// The command that identifies modes. Taps are made at standstill, unless a tachometer in them has pulses: the command then
+/// takes its speed.
+fn identify(folder: &MachineFolder, case: &str) -> String {
+    let has_turned = folder.taps.iter().any(|file| {
+        let read = Recording::import_all(&file.path, &Import::default()).unwrap_or_default();
+        let recordings: Vec<Recording> = read.into_iter().map(|imported| imported.recording).collect();
+        has_turned(&recordings)
+    });
+    format!(
+        "quietcut identify {} --method modes {}--case {case} --out {case}",
+        list(measured(folder)),
+        if has_turned { "" } else { "--rpm 0 " }
     )
 }
 

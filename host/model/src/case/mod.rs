@@ -29,6 +29,8 @@ pub use parameter_covariance::ParameterCovariance;
 pub use posture::Posture;
 pub use provenance::AT_STANDSTILL;
 
+pub use crate::criteria::SPEED_MAX_RPM;
+
 use crate::effects::{EffectName, EffectSpec};
 use crate::milling::{Cut, Material, Tool};
 use crate::structure::{SpeedDependence, Structure};

@@ -7,7 +7,7 @@ use clap::ValueEnum;
 use super::mode_options::ModeOptions;
 use crate::cli::range::{ends, non_negative_ends};
 use crate::cli::segment::RecordedSegment;
-use crate::cli::{Endings, Output, finite, non_negative, positive};
+use crate::cli::{Endings, Output, finite, non_negative, positive, spindle_speed};
 use crate::identify::law::NonlinearTerm;
 
 /// Identifies structural or cutting parameters with 90 % intervals from recordings, and reports the misfit.
@@ -99,7 +99,7 @@ pub struct Args {
     pub(super) case: Option<PathBuf>,
     /// Spindle speed in rev/min at which the structure was measured, 0 for taps at standstill; the written case states it, and charts from it
     /// say so. Default: what the recordings state (the tachometer); tables of receptances state none.
-    #[arg(long, value_name = "N", value_parser = non_negative, allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", value_parser = spindle_speed, allow_negative_numbers = true)]
     pub(super) rpm: Option<f64>,
     #[command(flatten)]
     pub(super) modes: ModeOptions,

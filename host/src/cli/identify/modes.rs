@@ -9,7 +9,6 @@ use super::args::Args;
 use super::figure::Figure;
 use super::mode_lines::lines;
 use super::modes_comparison::ModesComparison;
-use super::spindle_speed;
 use super::stabilization_diagram::{CAPTION, TITLE, ending, write_diagram};
 use super::written;
 use crate::case::Case;
@@ -17,6 +16,7 @@ use crate::frf::{
     Estimator, FrfError, FrfTable, ImportedTable, MeasurementSettings, RecordSpectra, measure, record_spectra,
 };
 use crate::identify::modes::{self, ChannelNoise, ComparedMode, ModalModel, Receptances};
+use crate::machine::spindle_rpm;
 use crate::recording::{Import, Understood};
 use crate::report::stabilization_chart::stabilization_chart;
 use crate::structure::Direction;
@@ -209,7 +209,7 @@ fn source(args: &Args, understood: &mut Vec<Understood>, recordings: &[PathBuf])
             .all(|has| *has)
             .then_some(measurement.deviation),
         warnings: measurement.warnings,
-        structure_rpm: spindle_speed::spindle_rpm(&recordings),
+        structure_rpm: spindle_rpm(&recordings),
         records: record_spectra(&recordings, &settings)?,
     })
 }

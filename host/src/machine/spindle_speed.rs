@@ -5,12 +5,18 @@ use crate::recording::{Recording, TachometerEdges, TestKind};
 
 /// Spindle speed that all recordings state, rev/min, 0 at standstill; `None` if one of them states none, if they differ, or if one is a
 /// cut, whose modes hold in process.
-pub(super) fn spindle_rpm(recordings: &[Recording]) -> Option<f64> {
+pub fn spindle_rpm(recordings: &[Recording]) -> Option<f64> {
     let speeds: Option<Vec<f64>> = recordings.iter().map(stated).collect();
     let speeds = speeds.filter(|speeds| !speeds.is_empty())?;
     let mean = speeds.iter().sum::<f64>() / speeds.len() as f64;
     let is_same = |rpm: &f64| (rpm - mean).abs() <= SAME_SPINDLE_SPEED * mean;
     speeds.iter().all(is_same).then_some(mean)
+}
+
+/// True if the tachometer in one of the recordings has a pulse, so that the spindle was not at standstill.
+pub(super) fn has_turned(recordings: &[Recording]) -> bool {
+    let mut edges = recordings.iter().filter_map(TachometerEdges::new);
+    edges.any(|edges| !edges.times_s.is_empty())
 }
 
 /// Spindle speed of one recording: that of its tachometer, which without pulses means standstill.
@@ -62,11 +68,13 @@ mod tests {
         let found = spindle_rpm(std::slice::from_ref(&running)).unwrap();
         // Edges lie between samples of 1 ms, over 1.9 s.
         assert!((found / 600.0 - 1.0).abs() < 2e-3, "{found}");
+        assert!(has_turned(&[still.clone(), running.clone()]));
         assert_eq!(spindle_rpm(&[still.clone(), running]), None);
         let without = Recording {
             channels: Vec::new(),
             ..still.clone()
         };
+        assert!(!has_turned(&[still.clone(), without.clone()]));
         assert_eq!(spindle_rpm(&[still, without]), None);
         assert_eq!(spindle_rpm(&[]), None);
     }
