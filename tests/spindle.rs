@@ -138,6 +138,11 @@ fn no_cut_beyond_the_spindle_is_proposed() {
         folder.path(),
         "lobes case.toml --at 1200,1 --at 1380,2 --at 1380,1 --json",
     );
+    // Speeds in the gap alone, and no power.
+    let said = |line: &str| quietcut(folder.path(), &words(line)).stdout;
+    let chart = "--depth-mm 0:6:60 --no-refine --nominal";
+    let gap = said(&format!("lobes case.toml --rpm 1160:1240:3 {chart}"));
+    assert!(gap.contains("lies no speed of the chart"), "{gap}");
     let beyond: Vec<_> = points["beyond_spindle"]
         .as_array()
         .expect("points")
@@ -381,6 +386,7 @@ fn a_cut_that_tells_no_frequency_rescales_nothing() {
     let rows = [
         ("10500,1,,chatter", "was not measured"),
         ("10500,1,,stable", "did not chatter"),
+        ("10500,1,840,marginal", "marginal"),
         ("10500,1,525,chatter", "period doubling"),
     ];
     for (row, reason) in rows {
@@ -389,6 +395,9 @@ fn a_cut_that_tells_no_frequency_rescales_nothing() {
         let line = "lobes still.toml --cuts cuts.csv --rescale --rpm 9500:12000:6 --depth-mm 0:8:60";
         quietcut(at, &words(line)).refused(&["still.toml", "10500 rev/min, 1 mm", reason]);
     }
+    let line =
+        "lobes still.toml --cuts cuts.csv --chatter-error-percent 1 --rpm 9500:12000:6 --depth-mm 0:8:60";
+    quietcut(at, &words(line)).refused(&["--rescale"]);
     let line = "lobes still.toml --rpm 9500:12000:6 --depth-mm 0:8:60 --out other.toml";
     quietcut(at, &words(line)).refused(&["other.toml", "--rescale"]);
 }
@@ -481,6 +490,76 @@ fn taps_at_standstill_are_said_in_the_chart() {
     assert!(!identified("--rpm 9000").contains("standstill"));
     let refused = quietcut(at, &words("identify tap.csv --method force-coefficients --rpm 0"));
     refused.refused(&["--rpm", "force-coefficients"]);
+    // A speed that no case can state.
+    let refused = quietcut(
+        at,
+        &words("identify tap.csv --method modes --rpm 1e9 --out found.toml"),
+    );
+    refused.refused(&["--rpm", "1000000 rev/min"]);
+}
+
+#[test]
+fn taps_with_a_tachometer_keep_its_speed() {
+    let folder = folder();
+    let at = folder.path();
+    write_tool(at, "tool.toml", "", 900.0, residue(900.0));
+    done(
+        at,
+        "simulate tool.toml --experiment hammer --direction x --force-n 50 --pulse-ms 0.2 --impacts 3 --spacing-s 0.5 --sample-rate-hz 8192 --noise-percent 0.1 --out tap.csv",
+    );
+    let text = std::fs::read_to_string(at.join("tap.csv")).expect("a recording");
+    // A pulse of 10 % of the revolution at 9 000 rev/min, or none.
+    let with_tachometer = |rpm: f64| -> String {
+        let rows = text.lines().enumerate().map(|(index, line)| {
+            let time_s = line.split(',').next().and_then(|cell| cell.parse::<f64>().ok());
+            let is_pulse = time_s.is_some_and(|time_s| rpm > 0.0 && (rpm / 60.0 * time_s) % 1.0 < 0.1);
+            let cell = match (index, is_pulse) {
+                (0, _) => "tacho [V]",
+                (_, true) => "5",
+                (_, false) => "0",
+            };
+            format!("{line},{cell}\n")
+        });
+        rows.collect()
+    };
+    done(
+        at,
+        "setup mill --teeth 2 --diameter-mm 12.7 --ktc-mpa 119 --krc-mpa 20.2 --kac-mpa 39.3 --down-milling-mm 6.35 --feed-per-tooth-mm 0.15 --rpm 600:2400",
+    );
+    for part in ["taps", "frf"] {
+        std::fs::create_dir_all(at.join("mill").join(part)).expect("a folder");
+    }
+    for (rpm, proposed, warned) in [(0.0, "--rpm 0 ", "--rpm 9000"), (9000.0, "--case", "--rpm 0")] {
+        std::fs::write(at.join("mill/taps/x.csv"), with_tachometer(rpm)).expect("written");
+        let table = "frequency_hz,hxx_re [m/N],hxx_im [m/N]\n890,1e-7,-1e-6\n900,0,-2e-6\n910,-1e-7,-1e-6\n";
+        std::fs::write(at.join("mill/frf/tool-tip.csv"), table).expect("written");
+        let step = json(at, "next mill --json");
+        let command = step["command"].as_str().expect("a command");
+        assert!(
+            command.starts_with(&format!(
+                "quietcut identify mill/taps/x.csv --method modes {proposed}"
+            )),
+            "{step}"
+        );
+        let identified = |options: &str| {
+            quietcut(
+                at,
+                &words(&format!(
+                    "identify mill/taps/x.csv --method modes --json {options}"
+                )),
+            )
+        };
+        let answer = identified("").json();
+        let found = answer["structure_rpm"].as_f64().expect("a speed");
+        // The tachometer's edges lie between samples, over 1.5 s.
+        assert!((found - rpm).abs() <= 1e-3 * rpm, "{found}");
+        let says = |options: &str| {
+            identified(options).json()["warnings"]
+                .to_string()
+                .contains("tachometer in the recordings says")
+        };
+        assert!(says(warned) && !says(&format!("--rpm {}", 1.005 * rpm)), "{rpm}");
+    }
 }
 
 #[test]

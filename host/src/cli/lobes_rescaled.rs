@@ -25,7 +25,7 @@ pub(super) struct RescaleOptions {
     #[arg(long, requires = "cuts", conflicts_with_all = ["frf", "at_speed"])]
     rescale: bool,
     /// For --rescale: standard deviation of each measured chatter frequency, in percent of the frequency.
-    #[arg(long, value_name = "P", default_value_t = CHATTER_ERROR_PERCENT, value_parser = positive, allow_negative_numbers = true)]
+    #[arg(long, value_name = "P", default_value_t = CHATTER_ERROR_PERCENT, requires = "rescale", value_parser = positive, allow_negative_numbers = true)]
     chatter_error_percent: f64,
 }
 

@@ -58,6 +58,9 @@ impl<'a> Reach<'a> {
 pub(super) struct Spindle {
     /// Ranges of spindle speed in which the spindle may run, rev/min.
     allowed_rpm: Vec<[f64; 2]>,
+    /// True if the spindle may run at a speed of the chart.
+    #[serde(skip)]
+    is_reached: bool,
     /// Depth that the spindle can drive at each requested speed, with the quantity that limits it; empty if power and
     /// torque are not limited.
     driven: Vec<DrivenDepth>,
@@ -103,6 +106,7 @@ impl Spindle {
         }
         Ok(Some(Self {
             allowed_rpm: limits.allowed_rpm(),
+            is_reached: chart.lines().iter().any(|line| limits.allows(line.rpm)),
             driven,
             proposal: proposal(&reach, limits, &chart.lines())?,
             drawn,
@@ -155,9 +159,15 @@ impl Spindle {
                     _ => "the last depth of the chart",
                 }
             ),
+            None if !self.is_reached => format!("{within} lies no speed of the chart"),
             None => format!(
-                "{within} no cut of the chart is stable over ±{} % of its speed",
-                100.0 * SPEED_BAND
+                "{within} no cut of the chart is stable over ±{} % of its speed{}",
+                100.0 * SPEED_BAND,
+                if self.driven.is_empty() {
+                    ""
+                } else {
+                    " and can be driven"
+                }
             ),
         }
     }

@@ -31,6 +31,12 @@ impl SpindleArea {
             .filter(|[from, to]| from < to)
             .collect()
     }
+
+    /// Lines along the greatest depth that the spindle can drive, without their parts above the picture.
+    fn visible(&self, depth_max_mm: f64) -> impl Iterator<Item = &[(f64, f64)]> {
+        let lines = self.driven.split(move |(_, depth)| *depth > depth_max_mm);
+        lines.filter(|line| line.len() > 1)
+    }
 }
 
 /// Shades the speeds at which the spindle must not run and the depths that it cannot drive, with a line along the
@@ -61,17 +67,15 @@ pub(super) fn draw_spindle(
             .label("beyond the spindle")
             .legend(move |(x, y)| Rectangle::new([(x, y - 4), (x + 18, y + 4)], fill));
     }
-    let visible = area
-        .driven
-        .iter()
-        .copied()
-        .filter(|(_, depth)| *depth <= depth_max_mm);
-    let visible: Vec<(f64, f64)> = visible.collect();
-    if visible.len() > 1 {
-        chart
-            .draw_series(LineSeries::new(visible, INK.stroke_width(2)))?
-            .label("power or torque of the spindle")
-            .legend(|(x, y)| PathElement::new([(x, y), (x + 18, y)], INK.stroke_width(2)));
+    let mut is_labelled = false;
+    for line in area.visible(depth_max_mm) {
+        let drawn = chart.draw_series(LineSeries::new(line.iter().copied(), INK.stroke_width(2)))?;
+        if !is_labelled {
+            drawn
+                .label("power or torque of the spindle")
+                .legend(|(x, y)| PathElement::new([(x, y), (x + 18, y)], INK.stroke_width(2)));
+            is_labelled = true;
+        }
     }
     Ok(())
 }
@@ -79,6 +83,23 @@ pub(super) fn draw_spindle(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_depth_above_the_picture_divides_the_line() {
+        let area = SpindleArea {
+            allowed_rpm: Vec::new(),
+            driven: [1.0, 2.0, 5.0, 7.0, 2.0, 1.0, 6.0, 1.0]
+                .into_iter()
+                .zip(1..)
+                .map(|(depth_mm, index)| (100.0 * f64::from(index), depth_mm))
+                .collect(),
+        };
+        let lines: Vec<Vec<f64>> = area
+            .visible(4.0)
+            .map(|line| line.iter().map(|(rpm, _)| *rpm).collect())
+            .collect();
+        assert_eq!(lines, [[100.0, 200.0], [500.0, 600.0]]);
+    }
 
     #[test]
     fn gaps_are_the_speeds_outside_the_ranges() {

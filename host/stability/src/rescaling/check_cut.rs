@@ -103,16 +103,20 @@ fn identified(
     cut: &TrialCut,
     error: f64,
 ) -> Result<Candidate, String> {
-    if cut.outcome != Outcome::Chatter {
-        return Err("it did not chatter".into());
+    match cut.outcome {
+        Outcome::Chatter => (),
+        Outcome::Stable => return Err("it did not chatter".into()),
+        Outcome::Marginal => return Err("its outcome is marginal, not chatter".into()),
     }
     let Some(chatter_hz) = cut.chatter_hz else {
         return Err("its chatter frequency was not measured (column chatter_hz)".into());
     };
     if is_period_doubling(case, cut.rpm, chatter_hz, error) {
         return Err(format!(
-            "{chatter_hz} Hz is an odd multiple of half the tooth-passing frequency: period doubling, whose frequency \
-             does not depend on the structure"
+            "{chatter_hz} Hz is, within its error of {} %, an odd multiple of half the tooth-passing frequency: period doubling, whose \
+             frequency does not depend on the structure, or not to be told from it; cut at another speed, or measure the frequency more \
+             exactly (--chatter-error-percent)",
+            100.0 * error
         ));
     }
     let modes = match case.structure.as_ref().map(|structure| &structure.form) {
