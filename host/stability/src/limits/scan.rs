@@ -236,11 +236,14 @@ impl<S: Spectrum> Scan<S> {
         if self.step_m <= 0.0 {
             return;
         }
-        let is_large = |sample: &Sample| {
-            let dominant = |exponent: &&Exponent| exponent.value.re.exp() >= CELL_FOLLOWED * sample.largest;
-            sample.exponents.iter().filter(dominant).count()
+        // Each dominant multiplier at either depth must lie on a path.
+        let are_followed = |sample: &Sample, share: f64| {
+            let is_dominant = |size: &f64| *size >= CELL_FOLLOWED * sample.largest;
+            let sizes = sample.exponents.iter().map(|exponent| exponent.value.re.exp());
+            let on_paths = paths.iter().map(|path| path.at(share).re.exp());
+            on_paths.filter(is_dominant).count() >= sizes.filter(is_dominant).count()
         };
-        let are_complete = paths.len() >= is_large(low).max(is_large(high)) && !paths.is_empty();
+        let are_complete = !paths.is_empty() && are_followed(low, 0.0) && are_followed(high, 1.0);
         loop {
             let depth_m = self.largest.len() as f64 * self.step_m;
             let share = ((depth_m - low.depth_m) / (high.depth_m - low.depth_m)).max(0.0);

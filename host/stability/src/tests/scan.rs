@@ -6,7 +6,8 @@ use rayon::prelude::*;
 
 use crate::problem::period::{Period, Resolution};
 use crate::spectrum::period_map;
-use crate::tests::{random_case, taylor};
+use crate::tests::taylor::{self, Series, largest_abs};
+use crate::tests::{problem as problem_of, random_case};
 use crate::*;
 
 /// Depth range of each line, mm.
@@ -202,4 +203,24 @@ fn switches_of_many_random_machines_are_those_of_counted_multipliers() {
     };
     let first = number("QUIETCUT_RANDOM_FIRST", 0);
     check(20_261_125, first, number("QUIETCUT_RANDOM_CASES", 3000));
+}
+
+#[test]
+fn the_largest_multiplier_over_the_depth_is_that_of_single_depths() {
+    // At these speeds a real multiplier far outside the unit circle meets another and turns complex between two samples of the scan.
+    let problem = problem_of("insperger-2dof-ad0.5");
+    let mut farthest = 0.0_f64;
+    for rpm in [
+        5200.0, 7000.0, 9500.0, 13_845.0, 14_000.0, 14_840.0, 15_700.0, 15_860.0, 23_070.0,
+    ] {
+        let found = line(&problem, rpm, 10.0, 50).unwrap();
+        for (step, stated) in found.largest.iter().enumerate().skip(1) {
+            let depth_m = 0.2e-3 * step as f64;
+            let (truth, _) = largest_abs(&problem, rpm, depth_m, Series::COARSE).unwrap();
+            let off = (stated / truth).ln().abs();
+            assert!(off < 0.25, "{rpm} rev/min, {depth_m} m: {stated}, not {truth}");
+            farthest = farthest.max(off);
+        }
+    }
+    println!("at most {farthest} of ln|μ|");
 }
