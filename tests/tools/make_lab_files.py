@@ -136,31 +136,59 @@ def csv_files():
     expect("constant_channel.csv", {"fx": force, "ax": np.full(COUNT, 0.5 * G)}, constant=["ax"])
 
 
+def save_level_7_3(path, variables, do_compression=False):
+    """Writes a MAT-file of level 7.3, which is an HDF5 file, as MATLAB does: small arrays plain, large ones compressed."""
+    threshold = 0 if do_compression else 1 << 20
+    path.unlink(missing_ok=True)
+    options = hdf5storage.Options(matlab_compatible=True, store_python_metadata=False, oned_as="column", compress_size_threshold=threshold)
+    hdf5storage.writes(variables, filename=str(path), options=options)
+
+
 def mat_files():
-    savemat(FOLDER / "flat.mat", {"t": t, "fx": force, "ax": acc})
-    expect("flat.mat", both, ["--map", "fx=fx:N,ax=ax:m/s^2"], digits=12)
-    savemat(FOLDER / "flat_fs.mat", {"F": force, "A": acc, "Fs": RATE}, do_compression=True)
-    expect("flat_fs.mat", both, ["--map", "F=fx:N,A=ax:m/s^2"], ["F=fx:N,A=ax:m/s^2"], digits=12)
-    savemat(FOLDER / "matrix_columns.mat", {"data": np.column_stack([force, acc, acc_y]), "Fs": RATE})
-    expect("matrix_columns.mat", three, ["--map", "data1=fx:N,data2=ax:m/s^2,data3=ay:m/s^2"], ["data1=fx:N"], digits=12)
-    savemat(FOLDER / "matrix_rows.mat", {"data": np.vstack([force, acc, acc_y]), "dt": 1 / RATE})
-    expect("matrix_rows.mat", three, ["--map", "data1=fx:N,data2=ax:m/s^2,data3=ay:m/s^2"], ["data1=fx:N"], digits=12)
-    savemat(FOLDER / "matrix_with_time.mat", {"data": np.column_stack([t, force, acc])})
-    expect("matrix_with_time.mat", both, ["--map", "data1=t:s,data2=fx:N,data3=ax:m/s^2"], ["data1=t:s,data2=fx:N"], digits=12)
-    savemat(FOLDER / "struct.mat", {"data": {"time": t, "force": force, "acc": acc, "Fs": RATE}})
-    expect("struct.mat", both, ["--map", "force=fx:N,acc=ax:m/s^2"], ["force=fx:N,acc=ax:m/s^2"], digits=12)
-    savemat(FOLDER / "struct_units.mat", {"data": {"force_x": force, "acc_x": acc / G, "Fs": RATE, "units": {"force_x": "N", "acc_x": "g"}}})
-    expect("struct_units.mat", both, digits=12)
+    for prefix, save in {"": savemat, "hdf5_": save_level_7_3}.items():
+        mat_files_of_level(prefix, save)
+    # Chunks of rows and columns that do not divide the matrix, as matfile and h5py write them.
+    with h5py.File(FOLDER / "hdf5_chunks.mat", "w", userblock_size=512) as file:
+        data = np.vstack([force, acc / G, acc_y / G])
+        for name, values, chunks in [("data", data, (2, 50)), ("Fs", np.array([[RATE]]), None)]:
+            file.create_dataset(name, data=values, chunks=chunks, compression=chunks and "gzip", shuffle=chunks is not None)
+            file[name].attrs["MATLAB_class"] = np.bytes_("double")
+    head = b"MATLAB 7.3 MAT-file, Platform: GLNXA64, Created by h5py".ljust(116) + bytes(8) + b"\0\2IM"
+    with open(FOLDER / "hdf5_chunks.mat", "r+b") as file:
+        file.write(head)
+    expect("hdf5_chunks.mat", three, ["--map", "data1=fx:N,data2=ax:g,data3=ay:g"], ["data1=fx:N"], digits=12)
+
+
+def mat_files_of_level(prefix, save_file):
+    def save(name, variables, **options):
+        save_file(FOLDER / (prefix + name), variables, **options)
+
+    def expects(name, *arguments, **options):
+        expect(prefix + name, *arguments, digits=12, **options)
+
+    save("flat.mat", {"t": t, "fx": force, "ax": acc})
+    expects("flat.mat", both, ["--map", "fx=fx:N,ax=ax:m/s^2"])
+    save("flat_fs.mat", {"F": force, "A": acc, "Fs": RATE}, do_compression=True)
+    names = "F=fx:N,A=ax:m/s^2" if prefix == "" else "A=ax:m/s^2,F=fx:N"
+    expects("flat_fs.mat", both, ["--map", "F=fx:N,A=ax:m/s^2"], [names])
+    save("matrix_columns.mat", {"data": np.column_stack([force, acc, acc_y]), "Fs": RATE})
+    expects("matrix_columns.mat", three, ["--map", "data1=fx:N,data2=ax:m/s^2,data3=ay:m/s^2"], ["data1=fx:N"])
+    save("matrix_rows.mat", {"data": np.vstack([force, acc, acc_y]), "dt": 1 / RATE})
+    expects("matrix_rows.mat", three, ["--map", "data1=fx:N,data2=ax:m/s^2,data3=ay:m/s^2"], ["data1=fx:N"])
+    save("matrix_with_time.mat", {"data": np.column_stack([t, force, acc])})
+    expects("matrix_with_time.mat", both, ["--map", "data1=t:s,data2=fx:N,data3=ax:m/s^2"], ["data1=t:s,data2=fx:N"])
+    save("struct.mat", {"data": {"time": t, "force": force, "acc": acc, "Fs": RATE}})
+    expects("struct.mat", both, ["--map", "force=fx:N,acc=ax:m/s^2"], ["force=fx:N,acc=ax:m/s^2"])
+    save("struct_units.mat", {"data": {"force_x": force, "acc_x": acc / G, "Fs": RATE, "units": {"force_x": "N", "acc_x": "g"}}})
+    expects("struct_units.mat", both)
     nested = {"test": {"force_x": {"values": force, "unit": "N"}, "acc_x": {"values": acc, "unit": "m/s^2"}, "Fs": RATE}}
-    savemat(FOLDER / "struct_nested.mat", {"data": nested})
-    expect("struct_nested.mat", both, digits=12)
+    save("struct_nested.mat", {"data": nested})
+    expects("struct_nested.mat", both)
     impacts = np.zeros((3,), dtype=[("time", object), ("force_x_N", object), ("acc_x_g", object)])
     for index in range(3):
         impacts[index] = (t, (index + 1) * force, (index + 1) * acc / G)
-    savemat(FOLDER / "struct_array.mat", {"impacts": impacts})
-    expect("struct_array.mat", both, records=3, digits=12)
-    hdf5storage.savemat(str(FOLDER / "hdf5.mat"), {"t": t, "fx": force, "ax": acc}, format="7.3")
-    expect("hdf5.mat", {}, asks=["-v7"], kind="refused")
+    save("struct_array.mat", {"impacts": impacts})
+    expects("struct_array.mat", both, records=3)
 
 
 def logger_files():
@@ -316,6 +344,12 @@ def bad_files():
     refused("bad_utf16.csv", "UTF-16", "UTF-8")
     savemat(FOLDER / "bad_text_only.mat", {"note": "nothing measured"})
     refused("bad_text_only.mat", "no numeric vector")
+    save_level_7_3(FOLDER / "bad_hdf5_text_only.mat", {"note": "nothing measured"})
+    refused("bad_hdf5_text_only.mat", "no numeric vector")
+    save_level_7_3(FOLDER / "bad_hdf5_not_a_number.mat", {"t": t, "ch": np.where(t == t[2], np.nan, t)})
+    refused("bad_hdf5_not_a_number.mat", '"ch": sample 3', "NaN")
+    (FOLDER / "bad_hdf5_cut_off.mat").write_bytes((FOLDER / "hdf5_struct.mat").read_bytes()[:-3000])
+    refused("bad_hdf5_cut_off.mat", "cut off")
 
 
 def main():

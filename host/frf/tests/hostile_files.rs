@@ -224,6 +224,14 @@ fn samples(folder: &Path) -> Vec<Sample> {
             bytes: mat(&[matrix([3, 200], 9, 600 * 8, &numbers(600))]),
         },
         Sample {
+            name: "level-7.3.mat",
+            bytes: include_bytes!("../../../tests/data/lab_files/hdf5_flat.mat").to_vec(),
+        },
+        Sample {
+            name: "chunks.mat",
+            bytes: include_bytes!("../../../tests/data/lab_files/hdf5_chunks.mat").to_vec(),
+        },
+        Sample {
             name: "record.lvm",
             bytes: lvm(),
         },

@@ -69,3 +69,7 @@ pub(crate) const LOWEST_RATE: f64 = 50.0;
 /// at which the base line of the tachometer is steady. Noise of some percent moves these medians by less; a base line
 /// that wanders by a tenth of the range moves them by more. Unfounded.
 pub(crate) const STEADY_MIDDLE: f64 = 0.1;
+
+/// Largest compression factor that the deflate format allows (1032:1): two bits for a match of 258 bytes. Compressed data
+/// that state more are damaged. Source: the technical notes of zlib.
+pub(crate) const INFLATION_MAX: u64 = 1032;

@@ -5,8 +5,9 @@
 //!
 //! Main types: [`Recording`] with its [`Channel`]s, [`Sidecar`] (kind of test, cut, posture, names and units of
 //! channels), [`Unit`] and [`Quantity`], [`SpindleAngle`] (spindle angle from the tachometer). Formats: CSV and other
-//! text tables, WAV, MAT, LabVIEW measurement files, TDMS and UFF 58 ([`uff`]). [`Recording::import`] also reads files
-//! in the words of other programs, and says how it understood them ([`Understood`]).
+//! text tables, WAV, MAT of levels 5 and 7.3, LabVIEW measurement files, TDMS and UFF 58 ([`uff`]).
+//! [`Recording::import`] also reads files in the words of other programs, and says how it understood them
+//! ([`Understood`]).
 //!
 //! ```
 //! use quietcut_recording::{Channel, Quantity, Recording, Sidecar};
@@ -37,6 +38,7 @@
 //! This crate knows no structure, tool or cut beyond what the sidecar or the user states, and computes no spectra.
 
 mod assemble;
+mod binary_number;
 mod blocks;
 mod criteria;
 mod csv;
@@ -47,6 +49,7 @@ mod doubt;
 mod error;
 pub mod file;
 mod formats;
+mod hdf5;
 mod import;
 mod lvm;
 mod mat;

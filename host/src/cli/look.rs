@@ -16,7 +16,7 @@ use crate::report::digits::significant;
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Example:\n  quietcut simulate tests/cases/kuka-kr90-acetal.toml --experiment hammer --direction y --force-n 300 --sample-rate-hz 512 --noise-percent 0.1 --out tap.csv\n  quietcut look tap.csv\n\n\
-                  Recordings: CSV and other text tables, MAT, UFF 58, WAV. Tables of frequency response functions: text tables, UFF 58.\n\
+                  Recordings: CSV and other text tables, MAT (also v7.3), LVM, TDMS, UFF 58, WAV. Tables of frequency response functions: text tables, UFF 58.\n\
                   --map and --rate state what a file does not; --write-sidecar keeps it in NAME.toml beside the file, where every verb reads it."
 )]
 pub struct Args {

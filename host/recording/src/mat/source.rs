@@ -2,6 +2,9 @@
 
 use std::io::{BufRead, ErrorKind, Read, copy, sink};
 
+use super::value::text_of_codes;
+use crate::binary_number::NumberType;
+
 /// Number of bytes of a MAT-file that are read at once; a choice. It is a multiple of the size of every number type.
 pub(super) const CHUNK: usize = 1 << 16;
 
@@ -9,47 +12,21 @@ pub(super) const CHUNK: usize = 1 << 16;
 /// choice; it holds 64 field names of 64 bytes.
 pub(super) const SMALL_MAX: u64 = 4096;
 
-/// Size of one number of MAT data type `kind`, bytes; `None` if the data type is not numeric.
-pub(super) fn size_of_kind(kind: u32) -> Option<usize> {
+/// Type of the numbers of MAT data type `kind`; `None` if the data type is not numeric.
+pub(super) fn number_type(kind: u32) -> Option<NumberType> {
     Some(match kind {
-        1 | 2 => 1,
-        3 | 4 => 2,
-        5..=7 => 4,
-        9 | 12 | 13 => 8,
+        1 => NumberType::I8,
+        2 => NumberType::U8,
+        3 => NumberType::I16,
+        4 => NumberType::U16,
+        5 => NumberType::I32,
+        6 => NumberType::U32,
+        7 => NumberType::F32,
+        9 => NumberType::F64,
+        12 => NumberType::I64,
+        13 => NumberType::U64,
         _ => return None,
     })
-}
-
-/// Decodes numbers of MAT data type `kind` and passes each to `take`. A matrix of doubles may be stored in a smaller
-/// integer type without loss.
-fn decode(kind: u32, data: &[u8], big_endian: bool, mut take: impl FnMut(f64)) {
-    macro_rules! decode {
-        ($type:ty) => {
-            for bytes in data.chunks_exact(size_of::<$type>()) {
-                let mut array = [0; size_of::<$type>()];
-                array.copy_from_slice(bytes);
-                take(if big_endian {
-                    <$type>::from_be_bytes(array) as f64
-                } else {
-                    <$type>::from_le_bytes(array) as f64
-                });
-            }
-        };
-    }
-    match kind {
-        1 => decode!(i8),
-        // Texts in UTF-8 (data type 16) are read byte by byte.
-        2 | 16 => decode!(u8),
-        3 => decode!(i16),
-        4 | 17 => decode!(u16),
-        5 => decode!(i32),
-        6 => decode!(u32),
-        7 => decode!(f32),
-        9 => decode!(f64),
-        12 => decode!(i64),
-        13 => decode!(u64),
-        _ => {}
-    }
 }
 
 /// Decodes a 32-bit unsigned integer from the first four bytes.
@@ -157,20 +134,28 @@ impl Source<'_> {
     /// Reads the text in an element of a MAT-file: UTF-8, UTF-16 or bytes.
     pub(super) fn text(&mut self, tag: &Tag) -> Result<String, String> {
         let mut codes = Vec::new();
-        self.numbers(tag, |code| codes.push(code as u32))?;
-        // MAT data types 16, 1 and 2 hold the bytes of UTF-8; the others are read as one code for each letter.
-        // Letters that UTF-16 stores as two codes are dropped.
-        if matches!(tag.kind, 1 | 2 | 16) {
-            let bytes: Vec<u8> = codes.iter().map(|&code| code as u8).collect();
-            return Ok(String::from_utf8_lossy(&bytes).into_owned());
-        }
-        Ok(codes.into_iter().filter_map(char::from_u32).collect())
+        // Texts in UTF-8 (data type 16) are read byte by byte, texts in UTF-16 (data type 17) code by code.
+        let number = match tag.kind {
+            16 => NumberType::U8,
+            17 => NumberType::U16,
+            kind => match number_type(kind) {
+                Some(number) => number,
+                None => return Ok(String::new()),
+            },
+        };
+        self.numbers(tag, number, |code| codes.push(code as u32))?;
+        Ok(text_of_codes(&codes, number.size() == 1))
     }
 
     /// Reads the numbers of an element with tag `tag` and passes each to `take`.
-    pub(super) fn numbers(&mut self, tag: &Tag, mut take: impl FnMut(f64)) -> Result<(), String> {
+    pub(super) fn numbers(
+        &mut self,
+        tag: &Tag,
+        number: NumberType,
+        mut take: impl FnMut(f64),
+    ) -> Result<(), String> {
         let big_endian = self.big_endian;
-        self.chunks(tag, |chunk| decode(tag.kind, chunk, big_endian, &mut take))
+        self.chunks(tag, |chunk| number.decode(chunk, big_endian, &mut take))
     }
 
     /// Reads the data of an element in chunks, passes each chunk to `take`, and skips the padding to a multiple of 8

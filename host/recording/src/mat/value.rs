@@ -49,6 +49,85 @@ impl Variable {
     }
 }
 
+/// Samples of a matrix in column-major order on their way into channels: the longer dimension is time.
+pub(super) struct Channels {
+    values: Vec<Vec<f64>>,
+    /// True if rows are channels.
+    in_rows: bool,
+    /// Number of rows of the matrix.
+    rows: usize,
+    /// Number of samples for which a channel reserves memory at first.
+    reserved: usize,
+    /// Number of values so far.
+    count: usize,
+}
+
+impl Channels {
+    /// Channels of a matrix without values so far; at most `trusted` samples per channel are believed before they are
+    /// read.
+    pub(super) fn new(rows: usize, columns: usize, trusted: usize) -> Self {
+        Self {
+            values: Vec::new(),
+            in_rows: rows < columns,
+            rows,
+            reserved: rows.max(columns).min(trusted),
+            count: 0,
+        }
+    }
+
+    /// Channels of a matrix of zeros.
+    pub(super) fn zeros(rows: usize, columns: usize) -> Self {
+        let (samples, channels) = (rows.max(columns), rows.min(columns));
+        Self {
+            values: vec![vec![0.0; samples]; channels],
+            count: rows * columns,
+            ..Self::new(rows, columns, samples)
+        }
+    }
+
+    /// Channel and sample of the value with number `index` in column-major order.
+    fn place(&self, index: usize) -> (usize, usize) {
+        match self.in_rows {
+            true => (index % self.rows, index / self.rows),
+            false => (index / self.rows, index % self.rows),
+        }
+    }
+
+    /// Adds the next value.
+    pub(super) fn push(&mut self, value: f64) {
+        let (channel, _) = self.place(self.count);
+        self.count += 1;
+        match self.values.get_mut(channel) {
+            Some(samples) => samples.push(value),
+            None => {
+                let mut samples = Vec::with_capacity(self.reserved);
+                samples.push(value);
+                self.values.push(samples);
+            }
+        }
+    }
+
+    /// Replaces the value with number `index`; there is none beyond the matrix.
+    pub(super) fn set(&mut self, index: usize, value: f64) {
+        let (channel, sample) = self.place(index);
+        if let Some(place) = self
+            .values
+            .get_mut(channel)
+            .and_then(|samples| samples.get_mut(sample))
+        {
+            *place = value;
+        }
+    }
+
+    /// The variable with these channels.
+    pub(super) fn named(self, name: String) -> Variable {
+        Variable {
+            name,
+            values: self.values,
+        }
+    }
+}
+
 impl Item {
     /// This value with the name of the structure field that holds it: a MAT-file stores elements of structures without
     /// names of their own.
@@ -59,4 +138,14 @@ impl Item {
         }
         self
     }
+}
+
+/// The text of letters by their codes: bytes of UTF-8, or one code for each letter. Letters that UTF-16 stores as two
+/// codes are dropped.
+pub(super) fn text_of_codes(codes: &[u32], are_bytes: bool) -> String {
+    if are_bytes {
+        let bytes: Vec<u8> = codes.iter().map(|&code| code as u8).collect();
+        return String::from_utf8_lossy(&bytes).into_owned();
+    }
+    codes.iter().filter_map(|&code| char::from_u32(code)).collect()
 }
