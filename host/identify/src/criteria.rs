@@ -18,23 +18,17 @@ pub(crate) const LEAST_RELATIVE_DEVIATION: f64 = 1e-5;
 /// Unfounded between 0.3 and 0.7.
 pub(crate) const OVERDAMPED: f64 = 0.5;
 
-/// Norm of the residue matrix of a fitted mode, in standard deviations of the norm, below which the mode is rejected. A
-/// normal variable exceeds three standard deviations in magnitude with a probability of 0.3 %.
-pub(crate) const LEAST_RESIDUE_SIGNIFICANCE: f64 = 3.0;
-
-/// Residual of a modal fit to receptances of known variance, as χ² per degree of freedom, below which no further mode
-/// is searched. The variance is estimated from at least three impacts and nine lines, which raises χ² by up to 6 %; the
-/// rest is margin.
-pub(crate) const FURTHER_MISFIT: f64 = 1.1;
+/// Probability that the residues of a pole that stays the same over the model orders have their χ² by chance, above
+/// which the pole is rejected as a mode: that of three standard deviations of one number.
+pub(crate) const CHANCE_OF_RESIDUES: f64 = 0.003;
 
 /// NRMSE of the fitted receptances below which no further mode is searched: a mode of this size moves no stability
 /// limit by a percent. Unfounded.
 pub(crate) const FURTHER_ERROR: f64 = 1e-3;
 
-/// Norm of the residue matrix of a further mode, in standard deviations of the norm, from which it is accepted. A pole
-/// that is fitted freely to noise explains some 10 of χ² with the ten parameters of a mode in two directions, and the
-/// best of a thousand places some 4 ln 1000 = 28 more: √38, six standard deviations. The two above are margin.
-pub(crate) const FURTHER_SIGNIFICANCE: f64 = 8.0;
+/// Probability that noise has a further mode at one of the poles that are tried in the residual of a modal fit: one
+/// identification in a thousand.
+pub(crate) const CHANCE_OF_FURTHER_MODE: f64 = 1e-3;
 
 /// NRMSE of the fitted receptances above which a warning says that the modal model does not fit. Unfounded.
 pub(crate) const LARGEST_FIT_ERROR: f64 = 0.1;

@@ -1,50 +1,54 @@
 //! Modes that the stabilization diagram misses: poles that stay the same over too few model orders, since noise in
 //! small receptances changes their shapes, although the residual of the fit shows them clearly.
 
-use num_complex::Complex64;
+use quietcut_numerics::statistics::chi_squared_quantile;
 
 use super::pole_residue::PoleResidue;
 use super::receptances::Receptances;
-use super::refinement::{Refined, refine};
-use super::stabilization::Stabilization;
-use crate::criteria::{FURTHER_ERROR, FURTHER_MISFIT, FURTHER_SIGNIFICANCE};
+use super::refinement::{Refined, refine, residue_freedom};
+use super::residual_search::{self, GRID_SHARE};
+use super::weights::root_mean_square;
+use crate::criteria::{CHANCE_OF_FURTHER_MODE, FURTHER_ERROR};
 
-/// Largest number of known poles at which a second mode is tried, those with the highest peaks of the second part of the residues first. A choice.
-const SPLIT: usize = 4;
+/// Largest number of poles that are tried as a further mode. A choice: a wrong one among the best is rare.
+const TRIED: usize = 4;
 
-/// Largest number of poles of the stabilization diagram that are tried as a further mode. A choice.
-const TRIED: usize = 8;
-
-/// The fit with one more mode, with the first of the poles of [`Stabilization::further`] that gives a smaller NRMSE, a
-/// significant mode and no spurious one. `None` if there is no such pole, or if the residual of `refined` is noise or
-/// small already.
+/// The fit with one more mode, with the first of the poles of [`residual_search::further`] that gives a more likely fit, a mode that noise does
+/// not explain and no spurious one. `None` if there is no such pole, or if the residual of
+/// `refined` is small already.
 ///
 /// `is_spurious` is true for a fit with a spurious mode.
 pub(super) fn with_further_mode(
     data: &Receptances,
     refined: &Refined,
-    stabilization: &Stabilization,
     is_spurious: impl Fn(&Refined) -> bool,
 ) -> Option<Refined> {
-    let is_noise = data.has_deviation && refined.misfit < FURTHER_MISFIT;
-    if is_noise || refined.relative_error < FURTHER_ERROR {
+    if refined.relative_error < FURTHER_ERROR {
         return None;
     }
-    let known: Vec<Complex64> = refined.fit.modes.iter().map(|mode| mode.pole).collect();
-    let of_diagram = stabilization
-        .further(&known, TRIED)
+    let search = residual_search::further(data, &refined.fit, TRIED);
+    let last = refined.fit.modes.len();
+    // Noise explains as much at each of the poles that are tried: χ² of the numbers of a matrix of rank one and of the pole.
+    let freedom = residue_freedom(data.responses.len(), data.forces.len()) + 2;
+    let chance = CHANCE_OF_FURTHER_MODE / search.tried.max(1) as f64;
+    let needed = chi_squared_quantile(1.0 - chance, freedom as f64);
+    search
+        .starts
         .into_iter()
-        .filter_map(|pole| {
-            let mut poles = known.clone();
-            poles.push(pole);
-            PoleResidue::start(data, &poles).ok()
-        });
-    let starts = of_diagram.chain(refined.fit.split(data, SPLIT));
-    starts.into_iter().find_map(|start| {
-        let larger = refine(data, start)?;
-        let is_mode = larger.significance(known.len()) >= FURTHER_SIGNIFICANCE
-            && larger.relative_error < refined.relative_error
-            && !is_spurious(&larger);
-        is_mode.then_some(larger)
-    })
+        .filter(|(gain, _)| *gain >= GRID_SHARE * needed)
+        .find_map(|(_, start)| {
+            let larger = refine(data, start)?;
+            let is_mode = larger.evidence(last) >= needed
+                && log_power(data, &larger.fit) < log_power(data, &refined.fit)
+                && !is_spurious(&larger);
+            is_mode.then_some(larger)
+        })
+}
+
+/// Sum over the receptances of the logarithm of their weighted RMS residual: up to a constant the negative logarithmic likelihood for
+/// each value if the size of the noise of each receptance is not known.
+fn log_power(data: &Receptances, fit: &PoleResidue) -> f64 {
+    (0..data.values.len())
+        .map(|k| root_mean_square(&fit.left_of(data, &data.deviation, k)).ln())
+        .sum()
 }

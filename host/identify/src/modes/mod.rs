@@ -25,6 +25,7 @@ mod receptances;
 mod record_fit;
 mod refinement;
 mod rejected;
+mod residual_search;
 pub(super) mod shape;
 pub mod stabilization;
 mod uncoupled;
@@ -48,10 +49,12 @@ use num_complex::Complex64;
 use further_mode::with_further_mode;
 use model::warnings;
 use pole_residue::PoleResidue;
-use refinement::Refined;
+use refinement::{Refined, residue_freedom};
 use rejected::reject;
 
-use crate::criteria::{LEAST_RESIDUE_SIGNIFICANCE, OVERDAMPED};
+use quietcut_numerics::statistics::chi_squared_quantile;
+
+use crate::criteria::{CHANCE_OF_RESIDUES, OVERDAMPED};
 
 /// Options of the modal identification.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -138,7 +141,7 @@ fn identify_coupled(data: &Receptances, options: &Options) -> Result<ModalModel,
         let Some((mode, why)) = spurious(&refined, [from_hz, to_hz]) else {
             let is_spurious = |fit: &Refined| spurious(fit, [from_hz, to_hz]).is_some();
             while options.modes.is_none()
-                && let Some(larger) = with_further_mode(data, &refined, &stabilization, is_spurious)
+                && let Some(larger) = with_further_mode(data, &refined, is_spurious)
             {
                 refined = larger;
             }
@@ -155,15 +158,17 @@ fn spurious(refined: &Refined, [from_hz, to_hz]: [f64; 2]) -> Option<(usize, Str
     refined.fit.modes.iter().enumerate().find_map(|(index, mode)| {
         let (pole, hertz) = (mode.pole, mode.pole.norm() / std::f64::consts::TAU);
         let damping = -pole.re / pole.norm();
-        let significance = refined.significance(index);
+        let evidence = refined.evidence(index);
+        let freedom = residue_freedom(mode.right.len(), mode.left.len()) as f64;
+        let needed = chi_squared_quantile(1.0 - CHANCE_OF_RESIDUES, freedom);
         let why = if damping <= 0.0 {
             "negative damping after refinement".into()
         } else if damping >= OVERDAMPED {
             format!("damping ratio {damping:.2} after refinement: no resonance")
         } else if !(from_hz..=to_hz).contains(&hertz) {
             format!("outside the band from {from_hz:.2} to {to_hz:.2} Hz after refinement")
-        } else if significance < LEAST_RESIDUE_SIGNIFICANCE {
-            format!("its residue is {significance:.1} standard deviations; {LEAST_RESIDUE_SIGNIFICANCE} are needed")
+        } else if evidence < needed {
+            format!("its residues differ from noise by χ² = {evidence:.1}; {needed:.1} is needed")
         } else {
             return None;
         };

@@ -3,7 +3,7 @@
 //! H_pq(s) = Σ_r Ψᴿ_pr Ψᴸ_qr/(s − λ_r) + conjugates + U_pq + L_pq/s², with real U (compliance of the modes above the
 //! band) and real L (inertia of the modes below it). All residue matrices have rank one.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 use num_complex::Complex64;
 use std::f64::consts::TAU;
 
@@ -61,42 +61,6 @@ impl PoleResidue {
         };
         start.fit_outside(data);
         Ok(start)
-    }
-
-    /// Starts with one more mode each, at the pole of a known one: the second part of the residue matrix there, which two modes with one pole give
-    /// rank two. The parts with the highest peaks first, at most `count`; none with one response or one force.
-    pub(super) fn split(&self, data: &Receptances, count: usize) -> Vec<Self> {
-        let functions: Vec<&[Complex64]> = data.values.iter().map(Vec::as_slice).collect();
-        let poles = self.modes.iter().map(|mode| mode.pole).collect();
-        let Ok(fit) = residues(&data.frequency_hz, &functions, poles) else {
-            return Vec::new();
-        };
-        let mut parts: Vec<(f64, ShapedPole)> = Vec::new();
-        for (r, mode) in self.modes.iter().enumerate() {
-            let matrix = matrix_of(data, &fit.residues, r);
-            if matrix.nrows().min(matrix.ncols()) < 2 {
-                continue;
-            }
-            let Some((right, left, _)) = shape::rank_one(&matrix) else {
-                continue;
-            };
-            let rest = DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |p, q| {
-                matrix[(p, q)] - right[p] * left[q]
-            });
-            let Some((mut right, mut left, _)) = shape::rank_one(&rest) else {
-                continue;
-            };
-            shape::normalize(&mut right, &mut left, &shared(data));
-            let pole = mode.pole;
-            parts.push((rest.norm() / -pole.re, ShapedPole { pole, right, left }));
-        }
-        parts.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let with = |(_, part): (f64, ShapedPole)| {
-            let mut start = self.clone();
-            start.modes.push(part);
-            start
-        };
-        parts.into_iter().take(count).map(with).collect()
     }
 
     /// Fits the terms U and L of the modes outside the band to the real part of the receptances minus the modes in the

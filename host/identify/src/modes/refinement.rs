@@ -1,9 +1,10 @@
 //! Refines modes in pole–residue form by weighted nonlinear least squares (Levenberg–Marquardt with exact derivatives).
 
 use nalgebra::{DMatrix, DVector};
-use num_complex::Complex64;
 use quietcut_numerics::Stop;
-use quietcut_numerics::least_squares::{Damping, Idle, LevenbergMarquardt, NormalSums, Objective};
+use quietcut_numerics::least_squares::{
+    Damping, Idle, LevenbergMarquardt, MinimumNorm, NormalSums, Objective, Tolerance,
+};
 use std::f64::consts::TAU;
 
 use super::covariance::covariance;
@@ -35,6 +36,15 @@ const SETTLED: f64 = 1e-10;
 
 /// Number of times that the weights of the receptances are updated from the residual of the modal fit. A choice.
 const ROUNDS: usize = 3;
+
+/// Singular value of the correlation matrix of residues, relative to the largest, up to which it counts as zero. A choice between the
+/// rounding error and the correlations of data.
+const DEPENDENT: f64 = 1e-9;
+
+/// Number of real numbers in a complex matrix of rank one with so many rows and columns.
+pub(super) fn residue_freedom(rights: usize, lefts: usize) -> usize {
+    2 * (rights + lefts - 1)
+}
 
 /// Weighted least-squares fit of modes to receptances from `start`, with weights updated from the residual; `None` if
 /// it does not converge or the data do not determine the parameters.
@@ -139,29 +149,47 @@ pub(super) fn search(iterations_max: usize) -> LevenbergMarquardt {
 }
 
 impl Refined {
-    /// Norm of the residue matrix of a mode divided by the standard deviation of the matrix (root of the sum of the
-    /// variances of its entries).
-    pub(super) fn significance(&self, index: usize) -> f64 {
+    /// χ² of the hypothesis that the residue matrix R of a mode is zero: Rᵀ C⁺ R over the real and imaginary parts of its
+    /// entries, with their covariance C. C has the rank of [`residue_freedom`], the number of real numbers that a matrix
+    /// of rank one has.
+    pub(super) fn evidence(&self, index: usize) -> f64 {
         let mode = &self.fit.modes[index];
-        let width = 2 + 2 * (mode.right.len() + mode.left.len());
-        let at = index * width + 2;
-        let variance = |from: usize, count: usize| -> f64 {
-            (from..from + 2 * count)
-                .map(|i| self.covariance[(i, i)].max(0.0))
-                .sum()
-        };
-        let norm = |shape: &[Complex64]| shape.iter().map(|entry| entry.norm_sqr()).sum::<f64>();
-        let (right, left) = (norm(&mode.right), norm(&mode.left));
-        let of_right = variance(at, mode.right.len());
-        let of_left = variance(at + 2 * mode.right.len(), mode.left.len());
-        // Standard deviation of the residue matrix right·leftᵀ; its variance is |right|²·var(left) +
-        // |left|²·var(right), without the correlation of the two shapes.
-        let deviation = (right * of_left + left * of_right).sqrt();
-        if deviation > 0.0 {
-            (right * left).sqrt() / deviation
-        } else {
-            f64::INFINITY
+        let (rights, lefts) = (mode.right.len(), mode.left.len());
+        let shapes = 2 * (rights + lefts);
+        let at = index * mode.width() + 2;
+        let mut residues = DVector::<f64>::zeros(2 * rights * lefts);
+        let mut by_shapes = DMatrix::<f64>::zeros(2 * rights * lefts, shapes);
+        for p in 0..rights {
+            for q in 0..lefts {
+                let row = 2 * (p * lefts + q);
+                let (right, left) = (mode.right[p], mode.left[q]);
+                let residue = right * left;
+                residues[row] = residue.re;
+                residues[row + 1] = residue.im;
+                for (column, factor) in [(2 * p, left), (2 * (rights + q), right)] {
+                    by_shapes[(row, column)] = factor.re;
+                    by_shapes[(row, column + 1)] = -factor.im;
+                    by_shapes[(row + 1, column)] = factor.im;
+                    by_shapes[(row + 1, column + 1)] = factor.re;
+                }
+            }
         }
+        let covariance =
+            &by_shapes * self.covariance.view((at, at), (shapes, shapes)) * by_shapes.transpose();
+        // In standard deviations, since receptances of different directions have noise of different size.
+        let scale = covariance.diagonal().map(|variance| {
+            if variance > 0.0 {
+                variance.sqrt().recip()
+            } else {
+                0.0
+            }
+        });
+        let correlation = DMatrix::from_fn(residues.len(), residues.len(), |i, j| {
+            covariance[(i, j)] * scale[i] * scale[j]
+        });
+        let scaled = residues.component_mul(&scale);
+        MinimumNorm::new(correlation, Tolerance::Relative(DEPENDENT))
+            .map_or(f64::INFINITY, |inverse| scaled.dot(&inverse.solve(&scaled)))
     }
 
     /// A mode of the fit with its standard deviations.

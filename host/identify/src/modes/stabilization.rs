@@ -15,10 +15,6 @@ use crate::criteria::{
 };
 use quietcut_frf::rational_fit::{RationalFitError, residues};
 
-/// Distance of a pole from another one, relative to the decay rate −Re λ of the former, below which both are taken to
-/// lead a modal fit to the same mode. A choice.
-const SAME_START: f64 = 0.3;
-
 /// A pole of the model of one order in the stabilization diagram.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Candidate {
@@ -83,28 +79,6 @@ impl Stabilization {
         }
         all.candidates.sort_by_key(|candidate| candidate.order);
         all
-    }
-
-    /// Stable poles of the upper half of the model orders that are not among the poles `known`, those with the highest
-    /// peaks first, at most `count`.
-    ///
-    /// Of poles that count as the same by [`SAME_START`], only the one with the highest peak is taken.
-    pub(super) fn further(&self, known: &[Complex64], count: usize) -> Vec<Complex64> {
-        let mut stable: Vec<&Candidate> = self
-            .candidates
-            .iter()
-            .filter(|candidate| candidate.is_stable && 2 * candidate.order > self.highest_order)
-            .collect();
-        stable.sort_by(|a, b| b.height.total_cmp(&a.height));
-        let mut found: Vec<Complex64> = Vec::new();
-        for candidate in stable {
-            let pole = candidate.pole;
-            let is_known = |other: &&Complex64| (pole - **other).norm() < SAME_START * -pole.re;
-            if found.len() < count && known.iter().chain(&found).find(is_known).is_none() {
-                found.push(pole);
-            }
-        }
-        found
     }
 
     /// Poles of the stabilization diagram that are rejected as modes, with the reasons.

@@ -305,6 +305,12 @@ fn figures(outcomes: &[Outcome]) -> Vec<(String, String)> {
     let whole = outcomes.iter().filter(|outcome| outcome.limit.is_ok());
     let missed = Count::of(whole.map(|outcome| outcome.missed > 0));
     figures.push(("machines with a mode that was not found".into(), missed.words()));
+    let whole = outcomes.iter().filter(|outcome| outcome.limit.is_ok());
+    let spurious = Count::of(whole.map(|outcome| outcome.spurious > 0));
+    figures.push((
+        "machines with a found mode that they do not have".into(),
+        spurious.words(),
+    ));
     let all = Count::of(limits(outcomes).map(|(_, limit)| limit.holds()));
     figures.push(("90 % intervals of the limit hold".into(), all.words()));
     for bin in NOISES.windows(2) {
@@ -442,12 +448,14 @@ fn limits_of_tapped_machines_hold_the_truth_as_often_as_they_say() {
         });
     println!("{found} modes found, {missed} not");
     // A limit misses the truth mainly where a mode is not found. Poles that are stable over many model orders are 87 % of
-    // these modes.
+    // these modes, with those that the residual shows 2008 of 2010.
     assert!(
-        25 * missed <= 2 * (found + missed),
+        50 * missed <= found + missed,
         "{missed} of {} modes are not found",
         found + missed
     );
+    let spurious: usize = outcomes.iter().map(|outcome| outcome.spurious).sum();
+    assert!(spurious <= 1, "{spurious} modes are none of the machines'");
     for (name, of) in OF_MODE {
         let modes = outcomes.iter().flat_map(|outcome| &outcome.modes);
         let count = Count::of(modes.map(|mode| of(mode).holds));
