@@ -80,6 +80,9 @@ struct Proposal {
     depth_mm: f64,
     /// What limits the depth: `stability`, `power`, `torque`, or `chart` where the last depth of the chart does.
     by: &'static str,
+    /// True if the chart has no further speed in the speed band on at least one side, so that the band was not computed there.
+    #[serde(skip)]
+    is_alone: bool,
 }
 
 impl Spindle {
@@ -149,7 +152,7 @@ impl Spindle {
         let within = format!("within the limits of the spindle ({} rev/min)", ranges.join(", "));
         match &self.proposal {
             Some(proposal) => format!(
-                "{within} speed times depth is largest at {:.0} rev/min: up to {:.3} mm, limited by {}",
+                "{within} speed times depth is largest at {:.0} rev/min: up to {:.3} mm, limited by {}{}",
                 proposal.rpm,
                 proposal.depth_mm,
                 match proposal.by {
@@ -157,6 +160,14 @@ impl Spindle {
                     "power" => "the power of the spindle",
                     "torque" => "the torque of the spindle",
                     _ => "the last depth of the chart",
+                },
+                if proposal.is_alone {
+                    format!(
+                        "; not all speeds within ±{} % of it were computed: ask for more speeds, or leave --no-refine out",
+                        100.0 * SPEED_BAND
+                    )
+                } else {
+                    String::new()
                 }
             ),
             None if !self.is_reached => format!("{within} lies no speed of the chart"),
@@ -211,12 +222,17 @@ fn proposal(
     let band = f64::from(SPEED_BAND);
     let mut best: Option<Proposal> = None;
     for line in lines.iter().filter(|line| limits.allows(line.rpm)) {
-        let near = lines
+        let near: Vec<&SpeedLine> = lines
             .iter()
-            .filter(|other| (other.rpm / line.rpm - 1.0).abs() <= band);
+            .filter(|other| (other.rpm / line.rpm - 1.0).abs() <= band)
+            .copied()
+            .collect();
         let stable_mm = near
+            .iter()
             .map(|other| stable_to_mm(other))
             .fold(f64::INFINITY, f64::min);
+        let has = |beside: fn(f64, f64) -> bool| near.iter().any(|other| beside(other.rpm, line.rpm));
+        let is_alone = !(has(|other, own| other < own) && has(|other, own| other > own));
         let by = if line.first_limit.is_some() || stable_mm < last_mm(line) {
             "stability"
         } else {
@@ -231,6 +247,7 @@ fn proposal(
             rpm: line.rpm,
             depth_mm,
             by,
+            is_alone,
         };
         if removal(&found) > best.as_ref().map_or(0.0, removal) {
             best = Some(found);

@@ -137,7 +137,12 @@ fn meant(text: &str) -> Option<String> {
 
 /// Parses both ends of a band, `first:last` in ascending order; `first,last` is read too.
 pub(super) fn ends(text: &str) -> Result<[f64; 2], String> {
-    let example = "two numbers first:last in ascending order are needed, such as 10:30";
+    ends_such_as(text, "10:30")
+}
+
+/// As [`ends`], with an example of what is asked for, which stands in the errors.
+fn ends_such_as(text: &str, example: &str) -> Result<[f64; 2], String> {
+    let example = format!("two numbers first:last in ascending order are needed, such as {example}");
     match parts(text).map_err(|_| {
         let meant = meant(text).map_or_else(String::new, |meant| format!("; write {meant}"));
         format!("`{text}`: {example}{meant}")
@@ -150,7 +155,15 @@ pub(super) fn ends(text: &str) -> Result<[f64; 2], String> {
 
 /// Parses both ends of a band of numbers of 0 or more.
 pub(super) fn non_negative_ends(text: &str) -> Result<[f64; 2], String> {
-    let [first, last] = ends(text)?;
+    not_below_zero(text, ends(text)?)
+}
+
+/// Parses the lowest and the highest of a range of spindle speeds in rev/min.
+pub(super) fn lowest_and_highest_rpm(text: &str) -> Result<[f64; 2], String> {
+    not_below_zero(text, ends_such_as(text, "600:12000")?)
+}
+
+fn not_below_zero(text: &str, [first, last]: [f64; 2]) -> Result<[f64; 2], String> {
     if first >= 0.0 {
         Ok([first, last])
     } else {

@@ -3,7 +3,7 @@
 use std::io::{self, BufRead, IsTerminal, Write};
 use std::path::Path;
 
-use super::range::non_negative_ends;
+use super::range::lowest_and_highest_rpm;
 use super::{Error, Output, progress};
 use crate::case::{Case, CaseError};
 use crate::file;
@@ -63,7 +63,7 @@ fn asked(
 }
 
 fn with_limits(path: &Path, before: &str, answer: &str) -> Result<(String, Case), String> {
-    let [low, high] = non_negative_ends(answer)?;
+    let [low, high] = lowest_and_highest_rpm(answer)?;
     let text = format!(
         "{}\n\n[limits]\nrpm_min = {low:?}\nrpm_max = {high:?}\n",
         before.trim_end()
@@ -94,6 +94,7 @@ mod tests {
         // Both wrong answers are named, and asked for again.
         assert_eq!(said.matches("FIRST:LAST").count(), 3, "{said}");
         assert!(said.contains("`fast`") && said.contains("12000"), "{said}");
+        assert!(said.contains("such as 600:12000"), "{said}");
     }
 
     #[test]

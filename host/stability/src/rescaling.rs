@@ -8,9 +8,11 @@ use std::path::PathBuf;
 
 use quietcut_model::case::Case;
 use quietcut_model::structure::Form;
+use quietcut_numerics::statistics::{NINETY_PERCENT, chi_squared_probability, student_ninety_percent};
 use rayon::prelude::*;
 use serde::Serialize;
 
+use crate::criteria::EXPECTED_SCATTER;
 use crate::limits::uncertainty::MethodOfCase;
 use crate::trial_cuts::TrialCut;
 
@@ -35,8 +37,9 @@ pub struct RescaledMode {
     /// Factor of the natural frequency: the mean over the check cuts in which the mode chattered, of the logarithms of their
     /// factors with weights 1/σ².
     pub factor: f64,
-    /// Standard deviation of the factor from the errors of the measured chatter frequencies alone; multiplied by √(χ²/(n − 1)) if n
-    /// cuts scatter more than these errors let expect.
+    /// Standard deviation of the factor from the errors of the measured chatter frequencies alone. If n cuts scatter more than these
+    /// errors let expect (χ² exceeds its 95 % quantile), the deviation follows from the scatter: it is multiplied by √(χ²/(n − 1)), and
+    /// by the ratio of Student's 90 % quantile to the normal one, so that 1.645 deviations are a 90 % interval.
     pub factor_std: f64,
     /// Spindle speeds of these cuts, rev/min.
     pub speeds_rpm: Vec<f64>,
@@ -118,7 +121,7 @@ pub fn rescaling(
     if cuts.is_empty() {
         return Err(RescalingError::NoCut);
     }
-    let cuts: Vec<CheckCut> = cuts
+    let mut cuts: Vec<CheckCut> = cuts
         .par_iter()
         .map(|cut| CheckCut::new(case, method_of, cut, error))
         .collect();
@@ -129,7 +132,29 @@ pub fn rescaling(
     if found.is_empty() {
         return Err(RescalingError::Unidentified { path: path(), cuts });
     }
+    let rescaled = with_factors(case, &found);
+    cuts.par_iter_mut()
+        .filter(|cut| cut.mode.is_some())
+        .for_each(|cut| {
+            let point = method_of(&rescaled)
+                .ok()
+                .and_then(|method| method.point(cut.rpm, cut.depth_mm).ok());
+            cut.multiplier_abs = point.map(|point| point.multiplier_abs);
+        });
     Ok(Rescaling { modes: found, cuts })
+}
+
+/// The case with the natural frequencies of its modes multiplied.
+fn with_factors(case: &Case, found: &[RescaledMode]) -> Case {
+    let mut case = case.clone();
+    if let Some(Form::Modes(modes)) = case.structure.as_mut().map(|structure| &mut structure.form) {
+        for rescaled in found {
+            if let Some(mode) = modes.get_mut(rescaled.mode - 1) {
+                *mode = mode.with_frequency_scaled(rescaled.factor);
+            }
+        }
+    }
+    case
 }
 
 fn mean(number: usize, frequency_hz: f64, cuts: &[CheckCut]) -> Option<RescaledMode> {
@@ -151,15 +176,26 @@ fn mean(number: usize, frequency_hz: f64, cuts: &[CheckCut]) -> Option<RescaledM
         .iter()
         .map(|(_, one, std)| ((one - log) / std).powi(2))
         .sum();
-    let freedom = (of_mode.len() - 1).max(1) as f64;
     let factor = log.exp();
     Some(RescaledMode {
         mode: number,
         frequency_hz,
         factor,
-        factor_std: factor * (chi2 / freedom).max(1.0).sqrt() / weight.sqrt(),
+        factor_std: factor * excess_scatter(chi2, of_mode.len() - 1) / weight.sqrt(),
         speeds_rpm: of_mode.iter().map(|(cut, ..)| cut.rpm).collect(),
     })
+}
+
+/// Factor on a standard deviation by the scatter χ² with so many degrees of freedom; 1 if the stated errors let expect it.
+fn excess_scatter(chi2: f64, freedom: usize) -> f64 {
+    if freedom == 0 || chi2_is_expected(chi2, freedom) {
+        return 1.0;
+    }
+    (chi2 / freedom as f64).sqrt() * student_ninety_percent(freedom) / NINETY_PERCENT
+}
+
+fn chi2_is_expected(chi2: f64, freedom: usize) -> bool {
+    chi_squared_probability(chi2, freedom as f64) < EXPECTED_SCATTER
 }
 
 #[cfg(test)]

@@ -30,6 +30,18 @@ pub enum AtSpeedError {
         /// Those of the first case.
         expected: String,
     },
+    /// Two structures hold at the same speed.
+    #[error(
+        "{path}: its structure holds at {rpm} rev/min, as one of {other} does; one structure for each speed is needed"
+    )]
+    SameSpeed {
+        /// Path of the later case file.
+        path: String,
+        /// The speed, rev/min.
+        rpm: f64,
+        /// Path of the earlier case file.
+        other: String,
+    },
     /// The modes cannot be paired.
     #[error("{path}: {cause}")]
     Pairing {
@@ -64,6 +76,8 @@ impl Case {
     /// See [`AtSpeedError`].
     pub fn with_structures_of(mut self, others: &[Self]) -> Result<Self, AtSpeedError> {
         let (base, mut further) = modes_at_speeds(&self)?;
+        let own = std::iter::once(&base).chain(&further);
+        let mut known: Vec<(f64, String)> = own.map(|at| (at.rpm, self.path.display().to_string())).collect();
         let directions = |case: &Self| {
             let structure = case.structure.as_ref();
             let names = structure.iter().flat_map(|structure| &structure.directions);
@@ -79,8 +93,17 @@ impl Case {
                 });
             }
             let (first, rest) = modes_at_speeds(other)?;
-            further.push(first);
-            further.extend(rest);
+            for at in std::iter::once(first).chain(rest) {
+                if let Some((_, earlier)) = known.iter().find(|(rpm, _)| *rpm == at.rpm) {
+                    return Err(AtSpeedError::SameSpeed {
+                        path: other.path.display().to_string(),
+                        rpm: at.rpm,
+                        other: earlier.clone(),
+                    });
+                }
+                known.push((at.rpm, other.path.display().to_string()));
+                further.push(at);
+            }
         }
         let dependence = SpeedDependence::new(base, further).map_err(|cause| AtSpeedError::Pairing {
             path: self.path.display().to_string(),

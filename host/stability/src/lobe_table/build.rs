@@ -32,8 +32,8 @@ const GUARDED: usize = 3;
 pub struct BuiltTable {
     /// Bytes of the lobe table, header and CRC included.
     pub bytes: Vec<u8>,
-    /// Warnings: about limits without derivatives, one for each layer with such limits, and about cases whose power or
-    /// torque of the spindle cannot be considered.
+    /// Warnings: about limits without derivatives, one for each layer with such limits, about cases whose power or torque
+    /// of the spindle cannot be considered, and about cases whose spindle may run at no speed of the table.
     pub warnings: Vec<String>,
 }
 
@@ -129,6 +129,27 @@ pub fn build_table(cases: &[Case], request: &TableRequest) -> Result<BuiltTable,
             .iter()
             .filter_map(|layer| layer.warning.clone())
             .chain(cases.iter().filter_map(|case| SpindleLimit::of_case(case).1))
+            .chain(cases.iter().filter_map(|case| no_speed_allowed(case, &speeds)))
             .collect(),
     })
+}
+
+/// A warning if the spindle of a case may run at none of the speeds of a table, rev/min.
+fn no_speed_allowed(case: &Case, speeds: &[f64]) -> Option<String> {
+    let limits = case.limits.as_ref()?;
+    if speeds.iter().any(|&rpm| limits.allows(rpm)) {
+        return None;
+    }
+    let [first, last] = [speeds.first()?, speeds.last()?];
+    let allowed: Vec<String> = limits
+        .allowed_rpm()
+        .iter()
+        .map(|[from, to]| format!("{from} to {to}"))
+        .collect();
+    Some(format!(
+        "{}: no speed of the table, {first:.1} to {last:.1} rev/min, is allowed by [limits] ({} rev/min): no advice will follow from it; give \
+         other speeds with --rpm",
+        case.path.display(),
+        allowed.join(", ")
+    ))
 }

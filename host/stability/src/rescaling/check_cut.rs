@@ -40,7 +40,8 @@ pub struct CheckCut {
     pub factor: Option<f64>,
     /// Standard deviation of the factor from the error of the measured frequency; `None` likewise.
     pub factor_std: Option<f64>,
-    /// |μ| of the dominant multiplier with this factor: below 1 the cut is predicted stable although it chattered; `None` likewise.
+    /// |μ| of the dominant multiplier with the factors that all cuts give together: below 1 the cut is predicted stable although it
+    /// chattered; `None` likewise.
     pub multiplier_abs: Option<f64>,
     /// Reason why the cut identifies no factor; `None` if it does.
     pub reason: Option<String>,
@@ -59,6 +60,14 @@ impl Candidate {
     fn distance(&self) -> f64 {
         self.factor.ln().abs()
     }
+}
+
+/// What the prediction says over the natural frequency of one mode.
+struct Scan {
+    /// The factor that explains the measured frequency.
+    candidate: Option<Candidate>,
+    /// True if with some factor the cut is predicted to lose stability by period doubling.
+    doubles_its_period: bool,
 }
 
 /// The prediction for one cut, with other natural frequencies of the case.
@@ -111,14 +120,6 @@ fn identified(
     let Some(chatter_hz) = cut.chatter_hz else {
         return Err("its chatter frequency was not measured (column chatter_hz)".into());
     };
-    if is_period_doubling(case, cut.rpm, chatter_hz, error) {
-        return Err(format!(
-            "{chatter_hz} Hz is, within its error of {} %, an odd multiple of half the tooth-passing frequency: period doubling, whose \
-             frequency does not depend on the structure, or not to be told from it; cut at another speed, or measure the frequency more \
-             exactly (--chatter-error-percent)",
-            100.0 * error
-        ));
-    }
     let modes = match case.structure.as_ref().map(|structure| &structure.form) {
         Some(Form::Modes(modes)) => modes.len(),
         _ => 0,
@@ -133,10 +134,19 @@ fn identified(
         modes,
         error,
     };
-    let mut found: Vec<Candidate> = (0..modes)
+    let scans: Vec<Scan> = (0..modes)
         .into_par_iter()
-        .filter_map(|mode| prediction.candidate(mode))
+        .map(|mode| prediction.scan(mode))
         .collect();
+    if is_half_order(case, cut.rpm, chatter_hz, error) && scans.iter().any(|scan| scan.doubles_its_period) {
+        return Err(format!(
+            "{chatter_hz} Hz is, within its error of {} %, an odd multiple of half the tooth-passing frequency, and with other natural \
+             frequencies the cut is predicted to double its period, whose frequency does not depend on the structure; cut at another \
+             speed, or measure the frequency more exactly (--chatter-error-percent)",
+            100.0 * error
+        ));
+    }
+    let mut found: Vec<Candidate> = scans.into_iter().filter_map(|scan| scan.candidate).collect();
     if found
         .iter()
         .any(|candidate| candidate.point.verdict == Verdict::Unstable)
@@ -174,7 +184,7 @@ fn identified(
 }
 
 /// True if a frequency is, within 90 % of its error, an odd multiple of half the tooth-passing frequency.
-fn is_period_doubling(case: &Case, rpm: f64, chatter_hz: f64, error: f64) -> bool {
+fn is_half_order(case: &Case, rpm: f64, chatter_hz: f64, error: f64) -> bool {
     let Some(tool) = &case.tool else { return false };
     let half_hz = 0.5 * tool.teeth as f64 * rpm / 60.0;
     let order = 2.0 * ((0.5 * (chatter_hz / half_hz - 1.0)).round()) + 1.0;
@@ -197,27 +207,44 @@ impl Prediction<'_> {
             .ok()
     }
 
-    /// ln of predicted over measured chatter frequency.
+    /// ln of the predicted over the measured chatter frequency.
+    fn excess_of(&self, point: &CutStability) -> Option<f64> {
+        Some((point.chatter_hz? / self.chatter_hz).ln())
+    }
+
     fn excess(&self, mode: usize, factor: f64) -> Option<f64> {
-        let predicted_hz = self.point(mode, factor, None)?.chatter_hz?;
-        Some((predicted_hz / self.chatter_hz).ln())
+        self.excess_of(&self.point(mode, factor, None)?)
+    }
+
+    /// The prediction over the natural frequency of a mode.
+    fn scan(&self, mode: usize) -> Scan {
+        let steps = (LARGEST_RESCALING.ln() / RESCALING_STEP).ceil() as i32;
+        let scanned: Vec<(f64, Option<CutStability>)> = (-steps..=steps)
+            .into_par_iter()
+            .map(|step| {
+                let factor = (RESCALING_STEP * f64::from(step)).exp();
+                (factor, self.point(mode, factor, None))
+            })
+            .collect();
+        let doubles =
+            |point: &CutStability| point.kind == StabilityLoss::Flip && point.verdict == Verdict::Unstable;
+        Scan {
+            doubles_its_period: scanned
+                .iter()
+                .any(|(_, point)| point.as_ref().is_some_and(doubles)),
+            candidate: self.candidate(mode, &scanned),
+        }
     }
 
     /// Factor of the mode nearest to 1 that explains the measured frequency by a Hopf multiplier on which this mode has more
     /// effect than any other; one that is predicted unstable goes before one that is not. `None` if there is none.
-    fn candidate(&self, mode: usize) -> Option<Candidate> {
-        let steps = (LARGEST_RESCALING.ln() / RESCALING_STEP).ceil() as i32;
-        let scanned: Vec<(f64, Option<f64>)> = (-steps..=steps)
-            .into_par_iter()
-            .map(|step| {
-                let factor = (RESCALING_STEP * f64::from(step)).exp();
-                (factor, self.excess(mode, factor))
-            })
-            .collect();
+    fn candidate(&self, mode: usize, scanned: &[(f64, Option<CutStability>)]) -> Option<Candidate> {
+        let excess = |point: &Option<CutStability>| self.excess_of(point.as_ref()?);
         let mut found: Vec<Candidate> = scanned
             .windows(2)
             .filter_map(|pair| {
-                let factor = self.root(mode, [pair[0].0, pair[1].0], [pair[0].1?, pair[1].1?])?;
+                let ends = [excess(&pair[0].1)?, excess(&pair[1].1)?];
+                let factor = self.root(mode, [pair[0].0, pair[1].0], ends)?;
                 self.at_root(mode, factor)
             })
             .collect();

@@ -5,6 +5,8 @@ use quietcut_model::case::Case;
 use super::*;
 use crate::limits::method::Method;
 use crate::orbit::collocation_of;
+use crate::spectrum::stability_loss::StabilityLoss;
+use crate::spectrum::verdict::Verdict;
 use crate::trial_cuts::Outcome;
 
 /// A tool with modes of 0.04 kg and a damping ratio of 0.02: direction and frequency, Hz.
@@ -97,12 +99,89 @@ fn cuts_of_one_mode_are_averaged_and_their_scatter_counts() {
     }
     let apart = rescaling(&case, &method_of, &cuts, 0.003).unwrap();
     let factors: Vec<f64> = apart.cuts.iter().filter_map(|cut| cut.factor).collect();
-    // Two values have the deviation |a − b|/2 of their mean; weights differ by the slope of the lobe.
-    let expected = 0.5 * (factors[0] - factors[1]).abs();
+    // They are (0.008/0.003)²/2 = 3.6 of χ²: less than the 3.84 that stated errors let expect.
+    let expected = both.factor_std;
     assert!(
         (apart.modes[0].factor_std / expected - 1.0).abs() < 0.1,
         "{apart:?} {expected}"
     );
+    // With half the stated error they are four times as much, and the interval is that of two values: Student's quantile for one degree
+    // of freedom, 6.314, times the deviation |a − b|/2 of their mean.
+    let apart = rescaling(&case, &method_of, &cuts, 0.0015).unwrap();
+    let expected = 6.314 * 0.5 * (factors[0] - factors[1]).abs();
+    // Weights differ by the slope of the lobe.
+    assert!(
+        (1.645 * apart.modes[0].factor_std / expected - 1.0).abs() < 0.1,
+        "{apart:?} {expected}"
+    );
+}
+
+/// Whether a cut that chattered is predicted to chatter is asked with the factors of all cuts together.
+#[test]
+fn predictions_of_the_cuts_have_the_factors_of_the_result() {
+    let case = tool(&[('x', 900.0)]);
+    let running = tool(&[('x', 837.0)]);
+    let mut cuts = [check_cut(&running, 10_500.0), check_cut(&running, 11_500.0)];
+    cuts[1].chatter_hz = cuts[1].chatter_hz.map(|hertz| 1.02 * hertz);
+    let found = rescaling(&case, &method_of, &cuts, 0.003).unwrap();
+    let together = tool(&[('x', 900.0 * found.modes[0].factor)]);
+    let method = collocation_of(&together).unwrap();
+    for cut in &found.cuts {
+        let expected = method.point(cut.rpm, cut.depth_mm).unwrap().multiplier_abs;
+        assert!(
+            (cut.multiplier_abs.unwrap() / expected - 1.0).abs() < 1e-3,
+            "{cut:?} {expected}"
+        );
+        assert!(
+            (cut.factor.unwrap() / found.modes[0].factor - 1.0).abs() > 1e-3,
+            "{found:?}"
+        );
+    }
+}
+
+/// At low speed half orders of the tooth-passing frequency lie as close as the error of a frequency, but nothing doubles its period there.
+#[test]
+fn a_cut_near_half_an_order_is_no_period_doubling_where_none_is_predicted() {
+    const ERROR: f64 = 0.01;
+    let case = tool(&[('x', 900.0)]);
+    let running = collocation_of(&tool(&[('x', 890.0)])).unwrap();
+    let depth_mm = 3.0;
+    let near = (3000..3600).step_by(10).map(f64::from).find_map(|rpm| {
+        let chatter_hz = running.point(rpm, depth_mm).unwrap().chatter_hz?;
+        let half_hz = rpm / 60.0;
+        let order = (chatter_hz / half_hz - 1.0) / 2.0;
+        let off_hz = 2.0 * (order - order.round()).abs() * half_hz;
+        (off_hz < ERROR * chatter_hz).then_some(TrialCut {
+            rpm,
+            depth_mm,
+            outcome: Outcome::Chatter,
+            chatter_hz: Some(chatter_hz),
+        })
+    });
+    let found = rescaling(&case, &method_of, &[near.unwrap()], ERROR).unwrap();
+    assert!(
+        (found.modes[0].factor / (890.0 / 900.0) - 1.0).abs() < 1e-6,
+        "{found:?}"
+    );
+}
+
+/// A cut that is predicted to double its period.
+fn doubled_cut(case: &Case) -> TrialCut {
+    let method = collocation_of(case).unwrap();
+    for rpm in (20_000..40_000).step_by(500).map(f64::from) {
+        for depth_mm in [1.0, 2.0, 3.0, 4.0, 6.0] {
+            let point = method.point(rpm, depth_mm).unwrap();
+            if point.kind == StabilityLoss::Flip && point.verdict == Verdict::Unstable {
+                return TrialCut {
+                    rpm,
+                    depth_mm,
+                    outcome: Outcome::Chatter,
+                    chatter_hz: point.chatter_hz,
+                };
+            }
+        }
+    }
+    panic!("no cut doubles its period")
 }
 
 #[test]
@@ -130,15 +209,8 @@ fn a_cut_that_identifies_no_mode_is_refused_with_the_reason() {
         },
     );
     assert!(said.contains("was not measured"), "{said}");
-    // Three halves of the tooth-passing frequency of 300 Hz.
-    let said = refused(
-        &case,
-        TrialCut {
-            chatter_hz: Some(450.2),
-            ..cut
-        },
-    );
-    assert!(said.contains("period doubling"), "{said}");
+    let said = refused(&case, doubled_cut(&case));
+    assert!(said.contains("double its period"), "{said}");
     let said = refused(
         &case,
         TrialCut {
