@@ -207,6 +207,23 @@ fn the_device_advises_no_cut_beyond_the_spindle() {
 }
 
 #[test]
+fn a_table_of_speeds_that_the_spindle_may_not_run_at_is_said_to_advise_nothing() {
+    let folder = folder();
+    let limits = "[limits]\nrpm_min = 5000.0\nrpm_max = 20000.0\nranges_rpm = [[5000.0, 9000.0], [12000.0, 20000.0]]\n";
+    write(folder.path(), "insperger-1dof-ad1.toml", &[], limits);
+    let said = |range: &str| {
+        let line = format!("table case.toml --rpm {range} --speeds 5 --depth-mm 1 --out table.qct");
+        quietcut(folder.path(), &words(&line)).stderr
+    };
+    let gap = said("10000:11000");
+    assert!(
+        gap.contains("no advice") && gap.contains("12000 to 20000"),
+        "{gap}"
+    );
+    assert!(!said("8000:11000").contains("no advice"));
+}
+
+#[test]
 fn power_of_a_tool_without_diameter_is_not_considered_and_the_key_is_named() {
     let folder = folder();
     write(
@@ -286,6 +303,10 @@ fn limits_follow_the_structure_of_each_speed() {
     refused(
         "lobes still.toml --at-speed fast.toml --method zoa --at 9000,1",
         &["at_speed", "collocation"],
+    );
+    refused(
+        "lobes still.toml --at-speed fast.toml --at-speed fast.toml --at 9000,1",
+        &["fast.toml: its structure holds at 20000 rev/min"],
     );
 }
 
@@ -384,16 +405,18 @@ fn a_cut_that_tells_no_frequency_rescales_nothing() {
     let at = folder.path();
     write_tool(at, "still.toml", "rpm = 0", 900.0, residue(900.0));
     let rows = [
-        ("10500,1,,chatter", "was not measured"),
-        ("10500,1,,stable", "did not chatter"),
-        ("10500,1,840,marginal", "marginal"),
-        ("10500,1,525,chatter", "period doubling"),
+        ("10500,1,,chatter", "10500 rev/min, 1 mm", "was not measured"),
+        ("10500,1,,stable", "10500 rev/min, 1 mm", "did not chatter"),
+        ("10500,1,840,marginal", "10500 rev/min, 1 mm", "marginal"),
+        // Three halves of the tooth-passing frequency, where no cut is predicted to double its period, and one half where one is.
+        ("10500,1,525,chatter", "10500 rev/min, 1 mm", "20 % lower"),
+        ("44000,3,733,chatter", "44000 rev/min, 3 mm", "double its period"),
     ];
-    for (row, reason) in rows {
+    for (row, cut, reason) in rows {
         let table = format!("rpm,depth_mm,chatter_hz,verdict\n{row}\n");
         std::fs::write(at.join("cuts.csv"), table).expect("written");
         let line = "lobes still.toml --cuts cuts.csv --rescale --rpm 9500:12000:6 --depth-mm 0:8:60";
-        quietcut(at, &words(line)).refused(&["still.toml", "10500 rev/min, 1 mm", reason]);
+        quietcut(at, &words(line)).refused(&["still.toml", cut, reason]);
     }
     let line =
         "lobes still.toml --cuts cuts.csv --chatter-error-percent 1 --rpm 9500:12000:6 --depth-mm 0:8:60";
