@@ -30,6 +30,10 @@ pub(crate) const FURTHER_ERROR: f64 = 1e-3;
 /// identification in a thousand.
 pub(crate) const CHANCE_OF_FURTHER_MODE: f64 = 1e-3;
 
+/// Damping ratio of a further mode, in standard deviations, below which it is none: its damping could be 0. A normal
+/// variable falls below −3 with a probability of 0.1 %.
+pub(crate) const LEAST_DAMPING_DEVIATIONS: f64 = 3.0;
+
 /// NRMSE of the fitted receptances above which a warning says that the modal model does not fit. Unfounded.
 pub(crate) const LARGEST_FIT_ERROR: f64 = 0.1;
 

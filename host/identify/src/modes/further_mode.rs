@@ -3,12 +3,12 @@
 
 use quietcut_numerics::statistics::chi_squared_quantile;
 
-use super::pole_residue::PoleResidue;
+use super::pole_residue::{PoleResidue, ShapedPole};
 use super::receptances::Receptances;
 use super::refinement::{Refined, refine, residue_freedom};
 use super::residual_search::{self, GRID_SHARE};
 use super::weights::root_mean_square;
-use crate::criteria::{CHANCE_OF_FURTHER_MODE, FURTHER_ERROR};
+use crate::criteria::{CHANCE_OF_FURTHER_MODE, FURTHER_ERROR, LEAST_DAMPING_DEVIATIONS, LEAST_HEIGHT};
 
 /// Largest number of poles that are tried as a further mode. A choice: a wrong one among the best is rare.
 const TRIED: usize = 4;
@@ -35,10 +35,15 @@ pub(super) fn with_further_mode(
     search
         .starts
         .into_iter()
-        .filter(|(gain, _)| *gain >= GRID_SHARE * needed)
+        .filter(|(gain, start)| *gain >= GRID_SHARE * needed && is_high(data, start))
         .find_map(|(_, start)| {
             let larger = refine(data, start)?;
-            let is_mode = larger.evidence(last) >= needed
+            let mode = larger.mode(last);
+            let (hertz, damping) = (mode.mode.frequency_hz, mode.mode.damping_ratio);
+            let is_mode = larger.evidence(data, last) >= needed
+                && residual_search::is_resolved(data, hertz, damping)
+                && damping >= LEAST_DAMPING_DEVIATIONS * mode.damping_ratio_std
+                && is_high(data, &larger.fit)
                 && log_power(data, &larger.fit) < log_power(data, &refined.fit)
                 && !is_spurious(&larger);
             is_mode.then_some(larger)
@@ -51,4 +56,22 @@ fn log_power(data: &Receptances, fit: &PoleResidue) -> f64 {
     (0..data.values.len())
         .map(|k| root_mean_square(&fit.left_of(data, &data.deviation, k)).ln())
         .sum()
+}
+
+/// True if the resonance peak of the last mode of a fit has the height that a stable pole needs to be a mode.
+fn is_high(data: &Receptances, fit: &PoleResidue) -> bool {
+    let sizes: Vec<f64> = data
+        .values
+        .iter()
+        .map(|values| root_mean_square(values))
+        .collect();
+    let height = |mode: &ShapedPole| -> f64 {
+        let residues = data.places.iter().zip(&sizes);
+        let squares = residues.map(|(&(p, q), size)| (mode.right[p] * mode.left[q] / *size).norm_sqr());
+        squares.sum::<f64>().sqrt() / -mode.pole.re
+    };
+    let highest = fit.modes.iter().map(height).fold(0.0, f64::max);
+    fit.modes
+        .last()
+        .is_some_and(|mode| height(mode) > LEAST_HEIGHT * highest)
 }

@@ -138,8 +138,8 @@ fn identify_coupled(data: &Receptances, options: &Options) -> Result<ModalModel,
                 _ => return Err(ModesError::NotConverged(count)),
             }
         };
-        let Some((mode, why)) = spurious(&refined, [from_hz, to_hz]) else {
-            let is_spurious = |fit: &Refined| spurious(fit, [from_hz, to_hz]).is_some();
+        let Some((mode, why)) = spurious(data, &refined, [from_hz, to_hz]) else {
+            let is_spurious = |fit: &Refined| spurious(data, fit, [from_hz, to_hz]).is_some();
             while options.modes.is_none()
                 && let Some(larger) = with_further_mode(data, &refined, is_spurious)
             {
@@ -154,11 +154,11 @@ fn identify_coupled(data: &Receptances, options: &Options) -> Result<ModalModel,
 }
 
 /// Index of the first spurious mode of the refined fit, and the reason; `None` if no mode is spurious.
-fn spurious(refined: &Refined, [from_hz, to_hz]: [f64; 2]) -> Option<(usize, String)> {
+fn spurious(data: &Receptances, refined: &Refined, [from_hz, to_hz]: [f64; 2]) -> Option<(usize, String)> {
     refined.fit.modes.iter().enumerate().find_map(|(index, mode)| {
         let (pole, hertz) = (mode.pole, mode.pole.norm() / std::f64::consts::TAU);
         let damping = -pole.re / pole.norm();
-        let evidence = refined.evidence(index);
+        let evidence = refined.evidence(data, index);
         let freedom = residue_freedom(mode.right.len(), mode.left.len()) as f64;
         let needed = chi_squared_quantile(1.0 - CHANCE_OF_RESIDUES, freedom);
         let why = if damping <= 0.0 {

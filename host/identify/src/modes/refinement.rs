@@ -1,6 +1,7 @@
 //! Refines modes in pole–residue form by weighted nonlinear least squares (Levenberg–Marquardt with exact derivatives).
 
 use nalgebra::{DMatrix, DVector};
+use num_complex::Complex64;
 use quietcut_numerics::Stop;
 use quietcut_numerics::least_squares::{
     Damping, Idle, LevenbergMarquardt, MinimumNorm, NormalSums, Objective, Tolerance,
@@ -152,8 +153,11 @@ impl Refined {
     /// χ² of the hypothesis that the residue matrix R of a mode is zero: Rᵀ C⁺ R over the real and imaginary parts of its
     /// entries, with their covariance C. C has the rank of [`residue_freedom`], the number of real numbers that a matrix
     /// of rank one has.
-    pub(super) fn evidence(&self, index: usize) -> f64 {
+    ///
+    /// Where the residual around the mode is larger than elsewhere, by [`Self::local_misfit`], so are the deviations.
+    pub(super) fn evidence(&self, data: &Receptances, index: usize) -> f64 {
         let mode = &self.fit.modes[index];
+        let misfit = self.local_misfit(data, index);
         let (rights, lefts) = (mode.right.len(), mode.left.len());
         let shapes = 2 * (rights + lefts);
         let at = index * mode.width() + 2;
@@ -177,7 +181,7 @@ impl Refined {
         let covariance =
             &by_shapes * self.covariance.view((at, at), (shapes, shapes)) * by_shapes.transpose();
         // In standard deviations, since receptances of different directions have noise of different size.
-        let scale = covariance.diagonal().map(|variance| {
+        let mut scale = covariance.diagonal().map(|variance| {
             if variance > 0.0 {
                 variance.sqrt().recip()
             } else {
@@ -187,9 +191,40 @@ impl Refined {
         let correlation = DMatrix::from_fn(residues.len(), residues.len(), |i, j| {
             covariance[(i, j)] * scale[i] * scale[j]
         });
+        for (&(p, q), misfit) in data.places.iter().zip(&misfit) {
+            let row = 2 * (p * lefts + q);
+            for entry in [row, row + 1] {
+                scale[entry] /= misfit.max(1.0).sqrt();
+            }
+        }
         let scaled = residues.component_mul(&scale);
         MinimumNorm::new(correlation, Tolerance::Relative(DEPENDENT))
             .map_or(f64::INFINITY, |inverse| scaled.dot(&inverse.solve(&scaled)))
+    }
+
+    /// Mean square of the weighted residual of each receptance around a mode, relative to that over the whole band: with weights
+    /// |s − λ|⁻²/σ², by which a line determines the residue. The noise of a receptance is larger than its deviation says, for
+    /// example, where a force has almost no power.
+    fn local_misfit(&self, data: &Receptances, index: usize) -> Vec<f64> {
+        let pole = self.fit.modes[index].pole;
+        let mut weights = Weights::of(&data.deviation);
+        weights.update(data, &self.fit);
+        (0..data.values.len())
+            .map(|k| {
+                let left = self.fit.left_of(data, &weights.deviation, k);
+                let (mut sum, mut all) = (0.0, 0.0);
+                for ((left, deviation), hertz) in
+                    left.iter().zip(&weights.deviation[k]).zip(&data.frequency_hz)
+                {
+                    let s = Complex64::new(0.0, TAU * hertz);
+                    let weight = ((s - pole).norm() * deviation).powi(-2);
+                    // Real and imaginary part have unit variance each.
+                    sum += 0.5 * weight * left.norm_sqr();
+                    all += weight;
+                }
+                sum / all
+            })
+            .collect()
     }
 
     /// A mode of the fit with its standard deviations.

@@ -160,16 +160,16 @@ impl<'a> Residual<'a> {
     }
 }
 
-/// Poles of the grid over the band of the data: damping ratios from that of one line spacing up, and frequencies as
-/// dense as half-power bandwidths.
+/// Poles of the grid over the band of the data: half-power bandwidths from one line spacing up, and frequencies as dense as
+/// half-power bandwidths.
 fn grid(data: &Receptances) -> Vec<Complex64> {
     let [from_hz, to_hz] = data.band_hz();
     let mut poles = Vec::new();
     let mut damping = LARGEST_DAMPING;
-    while damping * to_hz > 0.5 * data.spacing_hz() {
+    while is_resolved(data, to_hz, damping) {
         let mut hertz = from_hz;
         while hertz < to_hz {
-            if damping * hertz > 0.25 * data.spacing_hz() {
+            if is_resolved(data, hertz, damping) {
                 let omega = TAU * hertz;
                 poles.push(Complex64::new(
                     -damping * omega,
@@ -181,6 +181,11 @@ fn grid(data: &Receptances) -> Vec<Complex64> {
         damping /= DAMPING_STEP;
     }
     poles
+}
+
+/// True if the half-power bandwidth 2ζf is at least the distance of the lines. A narrower pole is the value of one line.
+pub(super) fn is_resolved(data: &Receptances, hertz: f64, damping_ratio: f64) -> bool {
+    2.0 * damping_ratio * hertz >= data.spacing_hz()
 }
 
 /// Fits with one more mode each, and how many poles were tried.
