@@ -143,6 +143,12 @@ fn no_cut_beyond_the_spindle_is_proposed() {
     let chart = "--depth-mm 0:6:60 --no-refine --nominal";
     let gap = said(&format!("lobes case.toml --rpm 1160:1240:3 {chart}"));
     assert!(gap.contains("lies no speed of the chart"), "{gap}");
+    // Speeds 10 % apart leave out those near the proposed one, speeds 0.5 % apart do not.
+    let alone = "not all speeds within ±1 % of it were computed";
+    let far = said(&format!("lobes case.toml --rpm 1000:1100:2 {chart}"));
+    assert!(far.contains(alone), "{far}");
+    let near = said(&format!("lobes case.toml --rpm 1000:1100:21 {chart}"));
+    assert!(near.contains("speed times depth is largest"), "{near}");
     let beyond: Vec<_> = points["beyond_spindle"]
         .as_array()
         .expect("points")
