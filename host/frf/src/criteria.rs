@@ -120,6 +120,10 @@ pub(crate) const SAME_LEVEL: f64 = 1.05;
 /// force amplitudes of the frequency steps of a level and the levels of averaged shaker recordings. Unfounded.
 pub(crate) const SAME_FORCE: f64 = 1.2;
 
+/// Probability with which the peak of a linear structure at several force levels stays below the χ² from which its
+/// frequency, and likewise its damping, count as dependent on the level.
+pub(crate) const HOMOGENEOUS_PROBABILITY: f64 = 0.99;
+
 /// Smallest length of a repeated frequency step with which it replaces an earlier step of about the same frequency, as a
 /// fraction of the length of the longest of these steps. Unfounded.
 pub(crate) const REPEATED_STEP: f64 = 0.9;

@@ -20,6 +20,8 @@ pub struct LevelMeasurement {
     /// True for a step-sine test: the level is the amplitude of a sine, and |H| times the level is that of the
     /// response.
     pub is_amplitude: bool,
+    /// Indices of the recordings of this level among those that were measured.
+    pub recordings: Vec<usize>,
     /// The receptances at this level.
     pub measurement: Measurement,
 }
@@ -35,14 +37,14 @@ pub fn measure_levels(
     settings: &MeasurementSettings,
 ) -> Result<Vec<LevelMeasurement>, FrfError> {
     let mut found = Vec::new();
-    let mut others: Vec<(f64, &Recording)> = Vec::new();
-    for recording in recordings {
+    let mut others: Vec<(f64, usize)> = Vec::new();
+    for (at, recording) in recordings.iter().enumerate() {
         let channels = TestChannels::of(recording, &settings.channels)?;
         let excitation = settings
             .excitation
             .unwrap_or_else(|| Excitation::of_recording(recording));
         if excitation != Excitation::StepSine {
-            others.push((force_level(&channels, excitation), recording));
+            others.push((force_level(&channels, excitation), at));
             continue;
         }
         for level in step_sine(&channels)?.levels {
@@ -53,6 +55,7 @@ pub fn measure_levels(
             found.push(LevelMeasurement {
                 force_n: level.force_n,
                 is_amplitude: true,
+                recordings: vec![at],
                 measurement: measure(std::slice::from_ref(recording), &one)?,
             });
         }
@@ -62,10 +65,11 @@ pub fn measure_levels(
     while let Some(&(lowest, _)) = rest.first() {
         let count = rest.partition_point(|(level, _)| *level <= SAME_FORCE * lowest);
         let (same, higher) = rest.split_at(count.max(1));
-        let together: Vec<Recording> = same.iter().map(|(_, recording)| (*recording).clone()).collect();
+        let together: Vec<Recording> = same.iter().map(|(_, at)| recordings[*at].clone()).collect();
         found.push(LevelMeasurement {
             force_n: same.iter().map(|(level, _)| level).sum::<f64>() / same.len() as f64,
             is_amplitude: false,
+            recordings: same.iter().map(|(_, at)| *at).collect(),
             measurement: measure(&together, settings)?,
         });
         rest = higher;

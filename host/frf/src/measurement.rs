@@ -35,7 +35,7 @@ use super::measurement_settings::MeasurementSettings;
 use super::table::{Frf, FrfTable};
 use super::test_channels::TestChannels;
 use super::test_plausibility;
-use periodic::{periodic, recognized};
+use periodic::{periodic, recognized, too_few_periods};
 use quietcut_model::structure::Direction;
 use quietcut_recording::Recording;
 use recording_group::{MeasuredEntry, MeasuredGroup, receptances};
@@ -60,8 +60,16 @@ pub fn measure(recordings: &[Recording], settings: &MeasurementSettings) -> Resu
         .iter()
         .map(|recording| TestChannels::of(recording, &settings.channels))
         .collect::<Result<Vec<_>, _>>()?;
-    let (accelerated, roving) = (accelerated(&channels), roving(&channels));
+    let accelerated = if settings.has_drive_points {
+        accelerated(&channels)
+    } else {
+        Vec::new()
+    };
+    let roving = roving(&channels);
     let groups = grouped(channels, settings)?;
+    for (_, members) in &groups {
+        one_point(members)?;
+    }
     for recording in recordings {
         check_band(recording, settings)?;
     }
@@ -106,7 +114,10 @@ pub fn measure(recordings: &[Recording], settings: &MeasurementSettings) -> Resu
     let mut measurement = merged(path, measured)?;
     // What is wrong with the recording comes before what follows from it.
     measurement.warnings.splice(0..0, doubts);
-    let of_table = test_plausibility::of_table(&measurement.table, has_periodic_force);
+    let of_table = test_plausibility::of_table(
+        &measurement.table,
+        settings.has_drive_points && !has_periodic_force,
+    );
     measurement.warnings.extend(of_table);
     let slowest_hz = recordings
         .iter()
@@ -139,7 +150,7 @@ fn grouped<'a>(
     settings: &MeasurementSettings,
 ) -> Result<Vec<(Excitation, Vec<TestChannels<'a>>)>, FrfError> {
     let mut groups: Vec<(Excitation, Vec<TestChannels<'a>>)> = Vec::new();
-    for channels in channels {
+    for mut channels in channels {
         let stated = settings
             .excitation
             .unwrap_or_else(|| Excitation::of_recording(channels.recording));
@@ -151,13 +162,15 @@ fn grouped<'a>(
                 what,
             });
         }
-        let is_multisine =
-            settings.excitation.is_none() && stated == Excitation::Random && recognized(&channels, settings);
-        let excitation = if is_multisine {
+        let is_open = settings.excitation.is_none() && stated == Excitation::Random;
+        let excitation = if is_open && recognized(&channels, settings) {
             Excitation::Multisine
         } else {
             stated
         };
+        if is_open && excitation == Excitation::Random {
+            channels.warnings.extend(too_few_periods(&channels, settings));
+        }
         let same = groups.iter_mut().find(|(other, members)| {
             members[0].force_directions() == channels.force_directions()
                 && members[0].response_kinds() == channels.response_kinds()
@@ -169,6 +182,44 @@ fn grouped<'a>(
         }
     }
     Ok(groups)
+}
+
+/// Refuses recordings that would be averaged although a force, or a sensor, of one direction was at different points by
+/// the keys `at` of its channels.
+fn one_point(members: &[TestChannels<'_>]) -> Result<(), FrfError> {
+    let Some(first) = members.first() else {
+        return Ok(());
+    };
+    let count = first.forces.len() + first.responses.len();
+    for index in 0..count {
+        let mut points: Vec<&str> = members
+            .iter()
+            .filter_map(|channels| {
+                let forces = channels.forces.iter().map(|(_, channel)| *channel);
+                let responses = channels.responses.iter().map(|response| response.channel);
+                let channel = forces.chain(responses).nth(index)?;
+                channels.recording.sidecar.channel(&channel.name)?.at.as_deref()
+            })
+            .collect();
+        points.sort_unstable();
+        points.dedup();
+        if points.len() > 1 {
+            return Err(FrfError::Content {
+                path: first.recording.path.clone(),
+                what: format!(
+                    "it would be averaged with other recordings, but the {} was at {}: receptances of different points are not averaged; identify \
+                     --method mode-shapes takes a hammer or a sensor that moves over points",
+                    if index < first.forces.len() {
+                        "force"
+                    } else {
+                        "sensor"
+                    },
+                    points.join(", ")
+                ),
+            });
+        }
+    }
+    Ok(())
 }
 
 /// Refuses a frequency band to evaluate that begins at or above half the sample rate of a recording.

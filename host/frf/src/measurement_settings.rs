@@ -34,6 +34,9 @@ pub struct MeasurementSettings {
     pub accelerometer_mass_kg: Option<f64>,
     /// Period of periodic excitation, s; `None` finds it from the force.
     pub period_s: Option<f64>,
+    /// True if force and sensor of one direction are at one point, so that its receptance is that of a drive point: its sign
+    /// is checked, and the mass of the accelerometer is estimated from it.
+    pub has_drive_points: bool,
     /// Force level of a step-sine test to evaluate, N; `None` takes the only level, and a test with several is refused.
     pub force_n: Option<f64>,
 }
@@ -51,6 +54,7 @@ impl Default for MeasurementSettings {
             hammer: HammerWindows::default(),
             accelerometer_mass_kg: None,
             period_s: None,
+            has_drive_points: true,
             force_n: None,
         }
     }

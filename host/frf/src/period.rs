@@ -101,7 +101,7 @@ pub(super) fn period(force: &[f64], stated: Option<usize>) -> Result<usize, NoPe
             check_stated(force, samples)?;
             samples.max(1)
         }
-        None => repetition(force)?,
+        None => repetition(force, force.len() / PERIODS_RECORDED_MIN)?,
     };
     let mut samples = samples;
     let mut shift = period_shift(force, samples);
@@ -130,7 +130,7 @@ fn check_stated(force: &[f64], samples: usize) -> Result<(), NoPeriod> {
     if unrepeated(samples) <= 1.0 - SHARE_OF_LINES {
         return Ok(());
     }
-    match repetition(force) {
+    match repetition(force, force.len() / PERIODS_RECORDED_MIN) {
         Ok(found) if unrepeated(samples) > AS_WELL * unrepeated(found) + ROUNDING => Err(NoPeriod::Differs {
             samples,
             unrepeated: unrepeated(samples),
@@ -140,11 +140,19 @@ fn check_stated(force: &[f64], samples: usize) -> Result<(), NoPeriod> {
     }
 }
 
+/// Period, samples, of a force of which the record holds at least two periods, but fewer than [`PERIODS_RECORDED_MIN`];
+/// `None` if there is none.
+pub(super) fn long_period(force: &[f64]) -> Option<usize> {
+    let shortest = force.len() / PERIODS_RECORDED_MIN;
+    repetition(force, force.len() / 2)
+        .ok()
+        .filter(|lag| *lag > shortest)
+}
+
 /// Lag at which `force` repeats, samples: the first local maximum of the normalized autocorrelation of at least 1.5 r −
 /// 0.5 − [`ROUNDING`], where r is the largest value. The search begins at the first lag without positive correlation
-/// and ends at a quarter of the record. An error if there is no such lag, or if r is below [`SHARE_OF_LINES`].
-fn repetition(force: &[f64]) -> Result<usize, NoPeriod> {
-    let longest = force.len() / PERIODS_RECORDED_MIN;
+/// and ends at `longest`. An error if there is no such lag, or if r is below [`SHARE_OF_LINES`].
+fn repetition(force: &[f64], longest: usize) -> Result<usize, NoPeriod> {
     let correlation = normalized_autocorrelation(force, longest);
     let nowhere = NoPeriod::DoesNotRepeat {
         best: None,
@@ -339,6 +347,18 @@ mod tests {
     }
 
     #[test]
+    fn a_period_that_the_record_holds_two_or_three_times_is_found() {
+        for periods in [2.0, 2.6, 3.0, 3.9] {
+            let count = (1000.0 * periods) as usize;
+            let force = multisine(21..91, 1, 1000.0, count, 0.1);
+            assert_eq!(long_period(&force), Some(1000), "{periods}");
+            assert!(period(&force, None).is_err(), "{periods}");
+        }
+        assert_eq!(long_period(&multisine(21..91, 1, 1000.0, 4200, 0.1)), None);
+        assert_eq!(long_period(&multisine(21..91, 1, 1000.0, 1800, 0.1)), None);
+    }
+
+    #[test]
     fn periods_of_no_whole_samples_and_noise_are_refused() {
         let force = multisine(21..91, 1, 1000.3, 8300, 0.1);
         let Err(NoPeriod::NotWhole { samples }) = period(&force, Some(1000)) else {
@@ -363,6 +383,7 @@ mod tests {
             period(&noise, None),
             Err(NoPeriod::DoesNotRepeat { .. })
         ));
+        assert_eq!(long_period(&noise), None);
         assert_eq!(
             period(&noise, Some(3000)),
             Err(NoPeriod::TooShort {

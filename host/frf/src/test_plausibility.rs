@@ -350,9 +350,9 @@ fn spike(samples: &[f64]) -> Option<usize> {
 }
 
 /// Warnings about measured receptances: a drive point that feeds energy in, a response that the force hardly causes,
-/// and a peak outside the plausible range. With `has_periodic_force` the drive points are not checked: between the
-/// lines of a periodic force the receptance is noise.
-pub(super) fn of_table(table: &FrfTable, has_periodic_force: bool) -> Vec<String> {
+/// and a peak outside the plausible range. Drive points are checked only on demand: between
+/// the lines of a periodic force the receptance is noise, and a force and a sensor at two points are no drive point.
+pub(super) fn of_table(table: &FrfTable, checks_drive_points: bool) -> Vec<String> {
     let frequency_hz = table.frequency_hz();
     let mut warnings = Vec::new();
     for entry in table.entries() {
@@ -381,7 +381,7 @@ pub(super) fn of_table(table: &FrfTable, has_periodic_force: bool) -> Vec<String
                  sensor in {} (dead, loose, wrong channel), the cable, and the length of the record",
                 entry.response
             ));
-        } else if !has_periodic_force && entry.response == entry.force && phase > INVERTED_PHASE {
+        } else if checks_drive_points && entry.response == entry.force && phase > INVERTED_PHASE {
             warnings.push(format!(
                 "H{name} has the sign of an inverted sensor: its imaginary part is positive at {:.3} Hz, where a drive point takes up energy \
                  and has a negative one; if force and sensor sit at one point, one of them points against its axis: add --map \

@@ -9,8 +9,8 @@
 /// (n−1)/3; with fewer than 16 lines it does not exceed `LEAST_ORDERS`.
 pub(crate) const LEAST_LINES: usize = 16;
 
-/// Smallest standard deviation of a receptance value that a modal fit assumes, relative to the RMS of the receptance:
-/// −100 dB. No sensor measures better.
+/// Smallest standard deviation of a receptance value that a modal fit assumes, relative to the RMS of the receptance, and
+/// of a sample of a decay, relative to the largest one: −100 dB. No sensor measures better.
 pub(crate) const LEAST_RELATIVE_DEVIATION: f64 = 1e-5;
 
 /// Damping ratio from which a fitted pole does not count as a mode. Beyond 1/√2 its receptance has no peak above the
@@ -48,6 +48,10 @@ pub(crate) const LARGEST_DAMPING_DEVIATION: f64 = 0.1;
 /// Difference of the natural frequencies of two neighbouring modes, in standard deviations of the difference, below
 /// which the modes are not separable. Equal frequencies differ by more with a probability of 0.3 %.
 pub(crate) const SEPARABLE_DEVIATIONS: f64 = 3.0;
+
+/// Probability with which a natural frequency stays below the χ² from which it counts as different between the recordings
+/// of a roving test, if it is the same.
+pub(crate) const SHIFT_PROBABILITY: f64 = 0.99;
 
 /// Relative change of the natural frequency of a pole from one model order to the next up to which the pole is stable
 /// in the stabilization diagram: 1 %, the usual value.
@@ -272,6 +276,37 @@ pub(crate) const DECAY_BLOCKS: usize = 40;
 /// scatter belongs into the interval. The two bands differ in width by a factor of two; a user may choose them as well
 /// as the first.
 pub(crate) const DECAY_SUPPORTS: [f64; 2] = [0.7, 1.4];
+
+/// Smallest ratio of the amplitude of a free decay in a window to its standard deviation. The noise of a window's transform
+/// is circular, so that the pole Z′/Z has no bias of second order in it; its variance grows by the part 1/8² = 1.6 %. The
+/// amplitude |Z| is too large by 1/16 of its deviation, with which a 90 % interval holds the truth in 89.9 %.
+pub(crate) const LEAST_DECAY_TO_NOISE: f64 = 8.0;
+
+/// Factor by which the amplitude of a decay rises from one window to the next if the structure is excited again. Two
+/// beating modes raise it by less over a third of a window, except close to a node of the beat. Unfounded.
+pub(crate) const DECAY_AGAIN: f64 = 2.0;
+
+/// Factor by which the rate of a decay has grown since its beginning if it ends within a window. A viscous decay keeps its
+/// rate, with noise of at most an eighth. Unfounded.
+pub(crate) const DECAY_ENDS: f64 = 1.5;
+
+/// Fewest windows of a curve of frequency and damping over the amplitude: a smooth law of two terms leaves two degrees
+/// of freedom.
+pub(crate) const LEAST_CURVE_POINTS: usize = 4;
+
+/// Standard deviation of the correction of a window's bias, as a part of the correction. The correction is that of a
+/// smooth law with four terms; in decays with cubic stiffness or friction it is right to a few percent. Unfounded for
+/// other laws.
+pub(crate) const CURVE_BIAS_SHARE: f64 = 0.1;
+
+/// Probability with which a linear decay stays below the F ratio from which frequency, and likewise damping, count as
+/// dependent on the amplitude: of 200 linear decays, one is said to be nonlinear.
+pub(crate) const FLAT_PROBABILITY: f64 = 0.9975;
+
+/// Probability with which a decay whose frequency and damping are smooth functions of the amplitude stays below the F
+/// ratio from which they count as no such function. Neighbouring windows are correlated, which the ratio leaves out;
+/// the small error probability is margin for it.
+pub(crate) const SMOOTH_PROBABILITY: f64 = 0.9999;
 
 // Cutting tests
 

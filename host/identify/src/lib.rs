@@ -62,8 +62,8 @@ pub use ambient::subspace;
 pub use cutting::{chip, force_coefficients, force_test, inverse_stability, observed_cut};
 pub use dwells::{dwell, steady};
 pub use nonlinear::{
-    describing, harmonic_balance, hfrf, homogeneity, law, linearity, ncma, periodic_fit, reciprocity,
-    response, restoring_force, spectrum, steady_fit, sweep,
+    decay_curve, describing, harmonic_balance, hfrf, homogeneity, law, linearity, ncma, periodic_fit,
+    reciprocity, response, restoring_force, spectrum, steady_fit, sweep,
 };
 pub use robot::{cubic_joints, joints};
 

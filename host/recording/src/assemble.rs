@@ -25,7 +25,7 @@ pub struct Imported {
 pub(super) fn recording(
     path: &Path,
     raw: Raw,
-    sidecar: Sidecar,
+    mut sidecar: Sidecar,
     import: &Import,
     known: &[String],
 ) -> Result<Imported, RecordingError> {
@@ -50,7 +50,20 @@ pub(super) fn recording(
     let mut time = None;
     let mut channels: Vec<Channel> = Vec::with_capacity(raw.columns.len());
     let mut columns = Vec::with_capacity(raw.columns.len());
-    for (column, meaning) in raw.columns.into_iter().zip(meanings) {
+    let names: Vec<String> = raw.columns.iter().map(|column| column.name.clone()).collect();
+    for (index, (column, meaning)) in raw.columns.into_iter().zip(meanings).enumerate() {
+        let mapped = import
+            .map
+            .iter()
+            .find(|map| map.is_about(&names[index], index + 1, &names));
+        if let Some(point) = mapped.and_then(|map| map.point.as_ref()) {
+            let described = sidecar.channels.entry(column.name.clone()).or_default();
+            described.at = Some(point.clone());
+            if column.name != meaning.name {
+                let sign = if meaning.is_negative { "-" } else { "" };
+                described.name = Some(format!("{sign}{}", meaning.name));
+            }
+        }
         columns.push(UnderstoodColumn {
             column: column.name,
             channel: meaning.name.clone(),

@@ -18,7 +18,7 @@ pub struct Import {
     pub record: Option<usize>,
 }
 
-/// Channel name and unit that the user states for one column, as in `acc=ax:g`.
+/// Channel name, point and unit that the user states for one column, as in `acc=ax:g` or `acc=ax@3:g`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ColumnMap {
     /// Name of the column in the file, or its number in the file from 1.
@@ -26,6 +26,8 @@ pub struct ColumnMap {
     /// Name of the channel that the column becomes; any other name than those of force, motion, time and tachometer
     /// makes it an auxiliary channel.
     pub name: String,
+    /// Name of the point of the sensor (`acc=ax@3`); `None` if the user states none.
+    pub point: Option<String>,
     /// True if the channel points against its axis (`acc=-ax`): samples change their sign.
     pub is_negative: bool,
     /// Unit of the samples in the column, or sensitivity of its sensor; `None` if the user states nothing about them.
@@ -44,8 +46,8 @@ pub enum Scale {
 }
 
 impl ColumnMap {
-    /// Parses the text of the option `--map` for one column, `COLUMN=NAME` or `COLUMN=NAME:UNIT`, such as `acc=ax:g`,
-    /// `2=fx:N`, `acc=-az`, `ch1=ax:10.2 mV/g`.
+    /// Parses the text of the option `--map` for one column, `COLUMN=NAME` or `COLUMN=NAME:UNIT`, with `@POINT` after the
+    /// name for a sensor at a named point, such as `acc=ax:g`, `2=fx@5:N`, `acc=-az`, `ch1=ax:10.2 mV/g`.
     ///
     /// # Errors
     /// The text has another form, or the unit is unknown; the message states what is needed.
@@ -65,7 +67,11 @@ impl ColumnMap {
             Some(name) => (true, name),
             None => (false, name),
         };
-        if column.trim().is_empty() || name.is_empty() {
+        let (name, point) = match name.split_once('@') {
+            Some((name, point)) => (name.trim(), Some(point.trim().to_owned())),
+            None => (name, None),
+        };
+        if column.trim().is_empty() || name.is_empty() || point.as_deref() == Some("") {
             return Err(format!("`{text}`: {forms}"));
         }
         let scale = match unit {
@@ -84,6 +90,7 @@ impl ColumnMap {
         Ok(Self {
             column: column.trim().into(),
             name: name.into(),
+            point,
             is_negative,
             scale,
         })
@@ -124,12 +131,19 @@ mod tests {
             ("Acc X", "ax", true)
         );
         assert!(matches!(map.scale, Some(Scale::Unit(_))));
+        assert_eq!(map.point, None);
+        let at_point = ColumnMap::parse("acc=-ax@left rib:g").unwrap();
+        assert_eq!(
+            (at_point.name.as_str(), at_point.point.as_deref()),
+            ("ax", Some("left rib"))
+        );
+        assert!(at_point.is_negative && matches!(at_point.scale, Some(Scale::Unit(_))));
         assert!(matches!(
             ColumnMap::parse("ch1=ax:10.2mV/g").unwrap().scale,
             Some(Scale::Sensitivity(_))
         ));
         assert_eq!(ColumnMap::parse("2=fx").unwrap().scale, None);
-        for wrong in ["acc", "=ax", "acc=", "acc=ax:furlong"] {
+        for wrong in ["acc", "=ax", "acc=", "acc=ax:furlong", "acc=ax@", "acc=@3"] {
             assert!(ColumnMap::parse(wrong).is_err(), "{wrong}");
         }
         let names = ["acc".to_owned(), "2".to_owned()];

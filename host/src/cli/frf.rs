@@ -24,6 +24,7 @@ use crate::report::page::{figure, page};
 use answer::FrfOutput;
 pub use args::Args;
 use args::{FileFormat, OutputFile};
+pub(super) use by_level::levels_without_peak;
 
 /// Runs the verb.
 pub fn run(args: Args) -> Result<(), Error> {

@@ -2,16 +2,22 @@
 
 mod answer;
 mod args;
+mod backbone;
+mod backbone_answer;
 mod checks;
 mod comments;
 mod cutting;
 mod figure;
+mod force_and_motion;
 mod joints;
 mod methods;
 mod mode_lines;
 mod mode_options;
+mod mode_shapes;
+mod mode_shapes_answer;
 mod modes;
 mod modes_comparison;
+mod point_options;
 mod records;
 mod stabilization_diagram;
 mod without_force;
@@ -19,8 +25,10 @@ mod written;
 
 use std::path::{Path, PathBuf};
 
+use clap::ValueEnum;
+
 use super::Error;
-use super::output::keep_inputs;
+use super::output::{Endings, keep_inputs};
 use super::segment::Recorded;
 use crate::case::Case;
 use crate::criteria::SAME_SPINDLE_SPEED;
@@ -30,8 +38,36 @@ use answer::IdentifyOutput;
 pub use args::Args;
 use args::Method;
 
+/// Refuses, before anything is read, a file of `--out` whose format the method does not write.
+fn check_endings(args: &Args) -> Result<(), Error> {
+    for path in &args.out {
+        let Err(right) = Endings(args.method.endings()).checked(&path.to_string_lossy()) else {
+            continue;
+        };
+        let ending = crate::file::ending(path);
+        let others: Vec<String> = Method::value_variants()
+            .iter()
+            .filter(|method| method.endings().contains(&ending.as_str()))
+            .map(|method| method.name())
+            .collect();
+        let what = match ending.as_str() {
+            "csv" => "table",
+            "svg" => "picture",
+            _ => "case",
+        };
+        return Err(Error::input(format!(
+            "--out {}: --method {} writes no {what}; methods that do: {}; {right}",
+            path.display(),
+            args.method.name(),
+            others.join(", ")
+        )));
+    }
+    Ok(())
+}
+
 /// Runs the verb.
 pub fn run(args: Args) -> Result<(), Error> {
+    check_endings(&args)?;
     for out in &args.out {
         keep_inputs(args.recordings.iter().map(PathBuf::as_path), out)?;
     }
@@ -44,6 +80,12 @@ pub fn run(args: Args) -> Result<(), Error> {
         return Err(Error::input(format!(
             "--compare {}: it compares modes; --method modes is needed",
             other.display()
+        )));
+    }
+    let mut points = args.points.force_at.iter().chain(&args.points.sensor_at);
+    if let Some(point) = points.next().filter(|_| args.method != Method::ModeShapes) {
+        return Err(Error::input(format!(
+            "--force-at and --sensor-at ({point}): they name points of a roving test; --method mode-shapes is needed"
         )));
     }
     if let Some(rpm) = args.rpm.filter(|_| args.method == Method::ForceCoefficients) {
@@ -68,6 +110,8 @@ pub fn run(args: Args) -> Result<(), Error> {
         Method::Hfrf => methods::hfrf(&args, &recordings)?,
         Method::RestoringForce => records::restoring_force(&args, &recordings)?,
         Method::Ncma => methods::ncma(&args, &recordings)?,
+        Method::Backbone => backbone::backbone(&args, &recordings)?,
+        Method::ModeShapes => mode_shapes::mode_shapes(&args, &recordings)?,
         Method::Linearity => checks::linearity(&args, &recordings)?,
         Method::OutputOnly => without_force::output_only(&args, &recordings)?,
         Method::InverseStability => without_force::inverse_stability(&args)?,

@@ -94,6 +94,12 @@ pub fn run(args: Args) -> Result<(), Error> {
         let mut sidecar = before.clone();
         for imported in Recording::import_all(path, &import)? {
             sidecar = imported.understood.sidecar(&sidecar);
+            // The points that --map states stand in the sidecar of the recording.
+            for (name, stated) in &imported.recording.sidecar.channels {
+                if let (Some(at), Some(channel)) = (&stated.at, sidecar.channels.get_mut(name)) {
+                    channel.at = Some(at.clone());
+                }
+            }
             let record = RecordOutput::new(&imported, sidecar.text(path)?);
             text += &record.text(&imported.recording);
             answer.records.push(record);

@@ -24,8 +24,8 @@ pub(super) struct RecordedSegment {
 #[derive(Clone, Debug, Default, clap::Args)]
 #[command(next_help_heading = "Import of the recordings")]
 pub(super) struct StatedColumns {
-    /// Channel and unit of a column, such as acc=ax:g, 2=fx:N (by number), "ch1=ax:10.2 mV/g" (sensitivity) or acc=-az
-    /// (against the axis). Several with commas between; may be repeated.
+    /// Channel and unit of a column, such as acc=ax:g, 2=fx:N (by number), "ch1=ax:10.2 mV/g" (sensitivity), acc=-az
+    /// (against the axis) or acc=ax@3:g (sensor at the point 3). Several with commas between; may be repeated.
     #[arg(long, value_name = "COLUMN=NAME[:UNIT],…", value_delimiter = ',', value_parser = ColumnMap::parse)]
     map: Vec<ColumnMap>,
     /// Sample rate in samples per second; it replaces the time column of the file.

@@ -1,6 +1,7 @@
 //! Reports: texts of verdicts and advice, charts as SVG, HTML pages.
 
 pub mod answer;
+pub mod backbone_chart;
 pub mod cell_map;
 pub mod comparison;
 pub mod diagnosis;
@@ -14,6 +15,7 @@ pub mod page;
 mod picture;
 pub mod plan_chart;
 mod residual_pictures;
+pub mod shape_chart;
 pub mod spectrum;
 pub mod spindle_area;
 pub mod stabilization_chart;

@@ -9,11 +9,11 @@ use num_complex::Complex64;
 use super::distortion::distortion;
 use super::recording_group::{MeasuredGroup, RecordingGroup, receptances};
 use crate::clipping::Clipping;
-use crate::criteria::{MULTISINE_LINES_MIN, SAME_PHASES};
+use crate::criteria::{MULTISINE_LINES_MIN, PERIODS_RECORDED_MIN, SAME_PHASES};
 use crate::error::FrfError;
 use crate::estimate::{Estimator, FrfLine};
 use crate::measurement_settings::{MeasurementSettings, band};
-use crate::period::period;
+use crate::period::{long_period, period};
 use crate::period_average::{PeriodAverage, period_average};
 use crate::periodic_test::PeriodicTest;
 use crate::small_matrix::ZERO;
@@ -21,24 +21,51 @@ use crate::test_channels::TestChannels;
 use crate::test_plausibility::is_cut;
 use quietcut_recording::TestKind;
 
-/// True if a recording can be evaluated by averages over periods instead of windows: it has one force, is of a shaker
-/// or of no stated kind and is not [of a cut](is_cut), and either the settings state a period, or the force has one and
-/// at least [`MULTISINE_LINES_MIN`] excited lines in the band to evaluate.
+/// True if a recording can be evaluated by averages over periods instead of windows: it [may have a periodic
+/// force](may_be_periodic), and either the settings state a period, or the force has one and at least
+/// [`MULTISINE_LINES_MIN`] excited lines in the band to evaluate.
 pub(super) fn recognized(channels: &TestChannels<'_>, settings: &MeasurementSettings) -> bool {
+    let Some(force) = may_be_periodic(channels) else {
+        return false;
+    };
+    settings.period_s.is_some()
+        || period(force, None).is_ok_and(|samples| is_multisine(channels, force, samples, settings))
+}
+
+/// Warning that a force repeats like a multisine, but that the record holds too few periods for averages over them;
+/// `None` if it does not repeat, or if the settings state a period.
+pub(super) fn too_few_periods(channels: &TestChannels<'_>, settings: &MeasurementSettings) -> Option<String> {
+    let force = may_be_periodic(channels).filter(|_| settings.period_s.is_none())?;
+    let samples = long_period(force).filter(|samples| is_multisine(channels, force, *samples, settings))?;
+    Some(format!(
+        "{}: the force repeats after {samples} samples ({:.4} s), and the record holds {:.1} periods: fewer than {PERIODS_RECORDED_MIN}, so that it is \
+         evaluated as random excitation, whose windows leak from line to line; record {PERIODS_RECORDED_MIN} periods or more",
+        channels.recording.path.display(),
+        samples as f64 / channels.recording.sample_rate_hz,
+        force.len() as f64 / samples as f64
+    ))
+}
+
+/// The force of a recording of a shaker or of no stated kind that is not [of a cut](is_cut); `None` for any other
+/// recording, and for one with several forces.
+fn may_be_periodic<'a>(channels: &TestChannels<'a>) -> Option<&'a [f64]> {
     let ([(_, force)], recording) = (&channels.forces[..], channels.recording) else {
-        return false;
+        return None;
     };
-    if !matches!(recording.sidecar.kind, Some(TestKind::Shaker) | None) || is_cut(recording) {
-        return false;
-    }
-    if settings.period_s.is_some() {
-        return true;
-    }
-    let Ok(samples) = period(&force.samples, None) else {
-        return false;
-    };
-    let lines = band(settings, recording.sample_rate_hz, samples);
-    period_average(&force.samples, &[], samples, lines, &[])
+    let is_of_shaker = matches!(recording.sidecar.kind, Some(TestKind::Shaker) | None);
+    (is_of_shaker && !is_cut(recording)).then_some(&force.samples[..])
+}
+
+/// True if a force with a period of `samples` samples has at least [`MULTISINE_LINES_MIN`] excited lines in the band to
+/// evaluate.
+fn is_multisine(
+    channels: &TestChannels<'_>,
+    force: &[f64],
+    samples: usize,
+    settings: &MeasurementSettings,
+) -> bool {
+    let lines = band(settings, channels.recording.sample_rate_hz, samples);
+    period_average(force, &[], samples, lines, &[])
         .is_some_and(|average| average.is_excited.iter().filter(|is| **is).count() >= MULTISINE_LINES_MIN)
 }
 

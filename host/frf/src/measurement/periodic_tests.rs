@@ -79,6 +79,31 @@ fn a_multisine_is_recognized_and_gives_receptances_without_its_transient() {
     );
 }
 
+/// With fewer than four periods a multisine is evaluated in windows, whose leakage lowers the coherence: this is said.
+#[test]
+fn too_few_periods_of_a_multisine_are_said() {
+    let mut random = random(69);
+    let tones = tones(40..121, &mut random);
+    let mut said = |force: Vec<f64>| {
+        let recording = record(TestKind::Shaker, along_y(force), 1e-4, &mut random);
+        let measurement = measure(std::slice::from_ref(&recording), &MeasurementSettings::default()).unwrap();
+        let of_periods = |warning: &&String| warning.contains("record 4 periods or more");
+        let warning = measurement.warnings.iter().find(of_periods).cloned();
+        (measurement.groups[0].excitation, warning)
+    };
+    let (excitation, warning) = said(multisine(&tones, 2.0, 3.2));
+    assert_eq!(excitation, Excitation::Random);
+    let warning = warning.unwrap();
+    assert!(
+        warning.contains("after 2048 samples (4.0000 s), and the record holds 3.2 periods"),
+        "{warning}"
+    );
+    assert_eq!(said(multisine(&tones, 2.0, 4.1)), (Excitation::Multisine, None));
+    // Three tones are no multisine.
+    let few = [(40.0, 0.3), (61.0, 1.0), (83.0, 2.0)];
+    assert_eq!(said(multisine(&few, 2.0, 3.2)), (Excitation::Random, None));
+}
+
 #[test]
 fn a_band_above_half_the_sample_rate_ends_there() {
     let mut random = random(68);

@@ -19,6 +19,8 @@ mod leakage;
 mod modal_parameters;
 mod mode;
 mod model;
+pub mod point_direction;
+pub mod points;
 mod pole_derivatives;
 mod pole_residue;
 mod receptances;

@@ -176,8 +176,11 @@ impl PoleResidue {
     }
 }
 
-/// Directions that are both excited and measured, as pairs of indices in the right and in the left shape.
+/// Degrees of freedom (directions at points) that are both excited and measured, as pairs of indices in the right and in
+/// the left shape.
 pub(super) fn shared(data: &Receptances) -> Vec<(usize, usize)> {
-    let of = |(p, direction)| Some((p, data.forces.iter().position(|force| force == direction)?));
-    data.responses.iter().enumerate().filter_map(of).collect()
+    let response = |p: usize| (data.responses[p], data.response_points[p]);
+    let force = |q: usize| (data.forces[q], data.force_points[q]);
+    let of = |p: usize| Some((p, (0..data.forces.len()).find(|&q| force(q) == response(p))?));
+    (0..data.responses.len()).filter_map(of).collect()
 }

@@ -3,6 +3,7 @@
 use num_complex::Complex64;
 
 use super::error::ModesError;
+use super::point_direction::PointDirection;
 use crate::criteria::{LEAST_LINES, LEAST_RELATIVE_DEVIATION};
 use quietcut_frf::FrfTable;
 use quietcut_model::structure::Direction;
@@ -16,6 +17,11 @@ pub struct Receptances {
     pub responses: Vec<Direction>,
     /// Directions of the forces.
     pub forces: Vec<Direction>,
+    /// Points of the responses, as numbers of names; all 0 where every response is at the tool tip. A response and a force
+    /// are one degree of freedom if their directions and points are.
+    pub response_points: Vec<usize>,
+    /// Points of the forces, likewise.
+    pub force_points: Vec<usize>,
     /// For each receptance, the index of its response direction and the index of its force direction.
     pub places: Vec<(usize, usize)>,
     /// The receptances, m/N, in the order of `places`, each at the frequencies of `frequency_hz`.
@@ -68,6 +74,8 @@ impl Receptances {
             frequency_hz: lines.iter().map(|&line| table.frequency_hz()[line]).collect(),
             responses: Vec::new(),
             forces: Vec::new(),
+            response_points: Vec::new(),
+            force_points: Vec::new(),
             places: Vec::new(),
             values: Vec::new(),
             deviation: Vec::new(),
@@ -91,12 +99,77 @@ impl Receptances {
             data.values.push(values);
         }
         data.sort_directions();
+        data.response_points = vec![0; data.responses.len()];
+        data.force_points = vec![0; data.forces.len()];
         data.is_whole()?;
         for (index, entry) in table.entries().iter().enumerate() {
             let stated: Vec<f64> = match (deviation, &entry.coherence) {
                 (Some(deviation), _) => lines.iter().map(|&line| deviation[index][line]).collect(),
                 (None, Some(coherence)) => data.by_coherence(index, &lines, coherence),
                 (None, None) => vec![0.0; lines.len()],
+            };
+            let smooth = data.smoothed(index, &stated);
+            data.deviation.push(smooth);
+        }
+        Ok(data)
+    }
+
+    /// Receptances between directions at points: `values[k]` at the frequencies `frequency_hz` is that of the response and
+    /// the force with the indices `places[k]`. Each response has one for each force.
+    ///
+    /// # Errors
+    /// Too few lines, or a receptance that is zero throughout.
+    pub(super) fn between_places<'a>(
+        frequency_hz: Vec<f64>,
+        [responses, forces]: [&'a [PointDirection]; 2],
+        places: Vec<(usize, usize)>,
+        values: Vec<Vec<Complex64>>,
+        deviation: Option<Vec<Vec<f64>>>,
+    ) -> Result<Self, ModesError> {
+        if frequency_hz.len() < LEAST_LINES {
+            return Err(ModesError::Data(format!(
+                "{} frequencies lie in the band; at least {LEAST_LINES} are needed",
+                frequency_hz.len()
+            )));
+        }
+        for (&(p, q), values) in places.iter().zip(&values) {
+            if values.iter().all(|value| value.norm() == 0.0) {
+                return Err(ModesError::Data(format!(
+                    "the receptance of {} by a force at {} is zero in the whole band; leave it out",
+                    responses[p], forces[q]
+                )));
+            }
+        }
+        let mut names: Vec<&'a str> = Vec::new();
+        let mut numbers = |all: &'a [PointDirection]| -> Vec<usize> {
+            let mut found = Vec::new();
+            for place in all {
+                let known = names.iter().position(|name| **name == *place.point);
+                found.push(known.unwrap_or(names.len()));
+                if known.is_none() {
+                    names.push(&place.point);
+                }
+            }
+            found
+        };
+        let (response_points, force_points) = (numbers(responses), numbers(forces));
+        let directions = |all: &[PointDirection]| all.iter().map(|place| place.direction).collect();
+        let mut data = Self {
+            responses: directions(responses),
+            forces: directions(forces),
+            response_points,
+            force_points,
+            places,
+            has_deviation: deviation.is_some(),
+            has_coherence: false,
+            deviation: Vec::new(),
+            values,
+            frequency_hz,
+        };
+        for index in 0..data.values.len() {
+            let stated = match &deviation {
+                Some(deviation) => deviation[index].clone(),
+                None => vec![0.0; data.frequency_hz.len()],
             };
             let smooth = data.smoothed(index, &stated);
             data.deviation.push(smooth);
@@ -166,6 +239,8 @@ impl Receptances {
                 .iter()
                 .map(|&index| (place(&responses, response(index)), place(&forces, force(index))))
                 .collect(),
+            response_points: vec![0; responses.len()],
+            force_points: vec![0; forces.len()],
             responses,
             forces,
             values: part.iter().map(|&index| self.values[index].clone()).collect(),

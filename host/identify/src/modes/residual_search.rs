@@ -290,6 +290,8 @@ mod tests {
             frequency_hz,
             responses: vec![Direction::X, Direction::Y],
             forces: vec![Direction::X, Direction::Y],
+            response_points: vec![0; 2],
+            force_points: vec![0; 2],
             places,
             values,
             deviation,

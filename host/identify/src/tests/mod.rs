@@ -5,6 +5,7 @@ mod coupling;
 mod cubic_joints;
 mod cutting;
 mod decay;
+mod decay_curves;
 mod inverse_stability;
 mod joints;
 mod linearity;

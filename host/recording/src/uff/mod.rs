@@ -288,6 +288,17 @@ pub(super) fn read(path: &Path, finite: bool) -> Result<Raw, RecordingError> {
     })
 }
 
+/// Channel names of the records over time of a UFF file, as [`read`] gives them, each with the number of its node.
+///
+/// # Errors
+/// The file cannot be read, or a data set has a fault.
+pub fn nodes(path: &Path) -> Result<Vec<(String, i64)>, RecordingError> {
+    let mut sets = data_sets(path)?;
+    sets.retain(DataSet::is_over_time);
+    let of_sets = sets.iter().map(|set| set.header.response.node);
+    Ok(names(&sets).into_iter().zip(of_sets).collect())
+}
+
 /// Sample rate, Hz, from a time step that UFF rounds to six digits: the integer rate with the same rounded step, if
 /// there is one, else 1/step.
 fn rate_hz(step_s: f64) -> f64 {

@@ -400,6 +400,18 @@ fn damaged_files_are_refused_with_file_and_line() {
 }
 
 #[test]
+fn nodes_of_channels_are_those_of_the_headers() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.uff");
+    let second = TEXT.replacen("NONE               1   3", "NONE              12  -1", 1);
+    std::fs::write(&path, [TEXT, &second].concat()).unwrap();
+    assert_eq!(
+        nodes(&path).unwrap(),
+        [("az".to_owned(), 1), ("ax".to_owned(), 12)]
+    );
+}
+
+#[test]
 fn single_precision_and_complex_uneven_values_are_sorted() {
     let head = "    1         0    0         0 NONE               1   3 NONE               0   0";
     let text = TEXT.replace(

@@ -176,6 +176,7 @@ impl Args {
             },
             accelerometer_mass_kg: self.accelerometer_mass_g.map(|grams| 1e-3 * grams),
             period_s: self.period_s,
+            has_drive_points: true,
             force_n: self.force_n,
         }
     }

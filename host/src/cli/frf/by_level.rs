@@ -8,7 +8,7 @@ use super::args::Args;
 use super::figure::{Figure, PeakFigures, PeakText};
 use crate::cli::Error;
 use crate::cli::segment::Recorded;
-use crate::frf::{FittedPeak, LevelMeasurement, fitted_peaks, measure_levels};
+use crate::frf::{FittedPeak, LevelMeasurement, PeaksOverLevel, level_peaks, measure_levels};
 use crate::report::digits::significant;
 
 /// Output of `quietcut frf --by-level --json`.
@@ -24,15 +24,15 @@ struct LevelsOutput {
 struct LevelAnswer {
     /// Force level, N: see [`LevelMeasurement::force_n`].
     force_n: f64,
-    peaks: Vec<LevelPeak>,
+    peaks: Vec<Peak>,
 }
 
 #[derive(Serialize)]
-struct LevelPeak {
+struct Peak {
     name: String,
     #[serde(flatten)]
     figures: PeakFigures,
-    /// Amplitude of the displacement at the peak, m; `null` unless the force is a stepped sine.
+    /// Amplitude of the displacement at the peak, m: see [`crate::frf::LevelPeak::amplitude_m`]; `null` for a hammer.
     amplitude_m: Option<f64>,
 }
 
@@ -46,7 +46,7 @@ struct Dependence {
     frequency: Figure,
     /// Change of the damping ratio, relative to that at the lowest of these levels.
     damping_ratio: Figure,
-    /// True if the 90 % interval of one of the two changes does not contain 0.
+    /// True if the structure is nonlinear: see [`PeaksOverLevel::is_nonlinear`].
     is_nonlinear: bool,
 }
 
@@ -62,7 +62,8 @@ pub(super) fn run(args: &Args) -> Result<(), Error> {
         recordings,
         understood,
     } = args.segment.read(&args.recordings)?;
-    let levels = measure_levels(&recordings, &args.settings())?;
+    let settings = args.settings();
+    let levels = measure_levels(&recordings, &settings)?;
     if levels.len() < 2 {
         return Err(Error::input(format!(
             "{}: one force level, {} N; --by-level needs recordings at two or more, or a stepped sine at several",
@@ -72,8 +73,8 @@ pub(super) fn run(args: &Args) -> Result<(), Error> {
                 .map_or_else(String::new, |level| significant(level.force_n, 4))
         )));
     }
-    let peaks: Vec<Vec<(String, FittedPeak)>> = levels.iter().map(largest_peaks).collect();
-    if peaks.iter().all(Vec::is_empty) {
+    let peaks = level_peaks(&recordings, &settings, &levels)?;
+    if peaks.is_empty() {
         return Err(Error::input(format!(
             "{}: at no force level does a receptance have a peak with eight settled lines that falls to half its power on both sides; take finer \
              steps over a wider band and longer dwells, or test a stepped sine by identify --method linearity",
@@ -81,26 +82,18 @@ pub(super) fn run(args: &Args) -> Result<(), Error> {
         )));
     }
     let mut warnings: Vec<String> = Vec::new();
-    for (level, peaks) in levels.iter().zip(&peaks) {
-        for warning in &level.measurement.warnings {
-            if !warnings.contains(warning) {
-                warnings.push(warning.clone());
-            }
-        }
-        if peaks.is_empty() {
-            warnings.push(format!(
-                "at {} N no receptance has a peak with eight lines that falls to half its power on both sides: take a finer resolution or a wider \
-                 band",
-                significant(level.force_n, 4)
-            ));
+    for warning in levels.iter().flat_map(|level| &level.measurement.warnings) {
+        if !warnings.contains(warning) {
+            warnings.push(warning.clone());
         }
     }
+    warnings.extend(levels_without_peak(&levels, &peaks));
     let answer = LevelsOutput {
-        dependences: dependences(&levels, &peaks),
+        dependences: peaks.iter().filter_map(|of| dependence(&levels, of)).collect(),
         levels: levels
             .iter()
-            .zip(&peaks)
-            .map(|(level, peaks)| LevelAnswer::new(level, peaks))
+            .enumerate()
+            .map(|(index, level)| LevelAnswer::new(index, level, &peaks))
             .collect(),
         warnings,
     };
@@ -111,70 +104,60 @@ pub(super) fn run(args: &Args) -> Result<(), Error> {
     args.output.answer_with(&understood, &answer, text)
 }
 
-/// The largest fitted peak of each receptance of a level that has one, with the name of the receptance; in the order of
-/// the table.
-fn largest_peaks(level: &LevelMeasurement) -> Vec<(String, FittedPeak)> {
-    let table = &level.measurement.table;
-    let largest = |entry| {
-        fitted_peaks(table, entry)
-            .into_iter()
-            .max_by(|a, b| a.receptance.total_cmp(&b.receptance))
+/// Warnings of the force levels at which no receptance has a peak.
+pub(crate) fn levels_without_peak(levels: &[LevelMeasurement], peaks: &[PeaksOverLevel]) -> Vec<String> {
+    let has_peak = |index: usize| {
+        peaks
+            .iter()
+            .flat_map(|of| &of.peaks)
+            .any(|one| one.level == index)
     };
-    table
-        .entries()
+    levels
         .iter()
-        .filter_map(|entry| Some((entry.name(), largest(entry)?)))
+        .enumerate()
+        .filter(|(index, _)| !has_peak(*index))
+        .map(|(_, level)| {
+            format!(
+                "at {} N no receptance has a peak with eight lines that falls to half its power on both sides: take a finer resolution or a wider \
+                 band",
+                significant(level.force_n, 4)
+            )
+        })
         .collect()
 }
 
-fn dependences(levels: &[LevelMeasurement], peaks: &[Vec<(String, FittedPeak)>]) -> Vec<Dependence> {
-    let names = peaks.iter().flatten().map(|(name, _)| name.clone());
-    let mut different: Vec<String> = Vec::new();
-    for name in names {
-        if !different.contains(&name) {
-            different.push(name);
-        }
-    }
-    let dependence = |name: String| {
-        let of = |at: usize| {
-            peaks[at]
-                .iter()
-                .find(|(other, _)| *other == name)
-                .map(|(_, peak)| *peak)
-        };
-        let present: Vec<usize> = (0..levels.len()).filter(|&at| of(at).is_some()).collect();
-        let (&first, &last) = (present.first()?, present.last()?);
-        let (low, high) = (of(first)?, of(last)?);
-        let relative = |quantity: fn(&FittedPeak) -> [f64; 2]| {
-            let ([old, old_std], [new, new_std]) = (quantity(&low), quantity(&high));
-            let half = (low.ninety_percent() * old_std).hypot(high.ninety_percent() * new_std);
-            Figure::new((new - old) / old, half / old.abs())
-        };
-        let frequency = relative(|peak| [peak.frequency_hz, peak.frequency_std_hz]);
-        let damping_ratio = relative(|peak| [peak.damping_ratio, peak.damping_ratio_std]);
-        (first != last).then(|| Dependence {
-            is_nonlinear: frequency.excludes_zero() || damping_ratio.excludes_zero(),
-            force_n: [levels[first].force_n, levels[last].force_n],
-            frequency,
-            damping_ratio,
-            name,
-        })
+/// The change of the largest peak of a receptance from the lowest to the highest level; `None` with one level.
+fn dependence(levels: &[LevelMeasurement], of: &PeaksOverLevel) -> Option<Dependence> {
+    let [low, .., high] = of.peaks.as_slice() else {
+        return None;
     };
-    different.into_iter().filter_map(dependence).collect()
+    let relative = |quantity: fn(&FittedPeak) -> [f64; 2]| {
+        let ([old, old_std], [new, new_std]) = (quantity(&low.peak), quantity(&high.peak));
+        let half = (low.peak.ninety_percent() * old_std).hypot(high.peak.ninety_percent() * new_std);
+        Figure::new((new - old) / old, half / old.abs())
+    };
+    Some(Dependence {
+        name: of.name.clone(),
+        force_n: [levels[low.level].force_n, levels[high.level].force_n],
+        frequency: relative(|peak| [peak.frequency_hz, peak.frequency_std_hz]),
+        damping_ratio: relative(|peak| [peak.damping_ratio, peak.damping_ratio_std]),
+        is_nonlinear: of.is_nonlinear,
+    })
 }
 
 impl LevelAnswer {
-    fn new(level: &LevelMeasurement, peaks: &[(String, FittedPeak)]) -> Self {
+    fn new(index: usize, level: &LevelMeasurement, peaks: &[PeaksOverLevel]) -> Self {
+        let of_level = |of: &PeaksOverLevel| {
+            let one = of.peaks.iter().find(|one| one.level == index)?;
+            Some(Peak {
+                name: of.name.clone(),
+                figures: PeakFigures::new(&one.peak),
+                amplitude_m: one.amplitude_m,
+            })
+        };
         Self {
             force_n: level.force_n,
-            peaks: peaks
-                .iter()
-                .map(|(name, peak)| LevelPeak {
-                    name: name.clone(),
-                    figures: PeakFigures::new(peak),
-                    amplitude_m: level.is_amplitude.then_some(level.force_n * peak.receptance),
-                })
-                .collect(),
+            peaks: peaks.iter().filter_map(of_level).collect(),
         }
     }
 }

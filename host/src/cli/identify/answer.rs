@@ -6,7 +6,9 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 
 use super::Error;
+use super::backbone_answer::Backbone;
 use super::figure::Figure;
+use super::mode_shapes_answer::ModeShapes;
 use super::modes_comparison::ModesComparison;
 use crate::identify::case_file::{self, Estimate};
 use crate::identify::homogeneity::Region;
@@ -57,6 +59,12 @@ pub(super) struct IdentifyOutput {
     pub(super) dwells: Option<usize>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) linearity: Option<Linearity>,
+    /// Frequency and damping over the amplitude, of `--method backbone`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) backbone: Option<Backbone>,
+    /// Modes with shapes over points, of `--method mode-shapes`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) mode_shapes: Option<ModeShapes>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) maps: Option<Maps>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -296,6 +304,12 @@ impl IdentifyOutput {
             directions,
             ..Self::default()
         }
+    }
+
+    /// Table of a method with one, as CSV.
+    pub(super) fn csv(&self) -> Option<String> {
+        let of_shapes = || self.mode_shapes.as_ref().map(ModeShapes::csv);
+        self.backbone.as_ref().map(Backbone::csv).or_else(of_shapes)
     }
 
     /// TOML text of the case file with the identified model. A case `other` is combined with identified cutting

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::ValueEnum;
 
 use super::mode_options::ModeOptions;
+use super::point_options::PointOptions;
 use crate::cli::range::{ends, non_negative_ends};
 use crate::cli::segment::RecordedSegment;
 use crate::cli::{Endings, Output, finite, non_negative, positive, spindle_speed};
@@ -13,7 +14,7 @@ use crate::identify::law::NonlinearTerm;
 /// Identifies structural or cutting parameters with 90 % intervals from recordings, and reports the misfit.
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Example:\n  quietcut simulate tests/cases/kuka-kr90-y17-low.toml --experiment step-sine --frequency-hz 16.6:17.9:14 --force-n 1.8,5.8,9.5 --dwell-s 30 --sample-rate-hz 128 --noise-percent 1 --out measured.csv\n  quietcut identify measured.csv --method harmonic-balance --out found.toml\n  quietcut identify measured.csv --method hfrf\n  quietcut identify measured.csv --method linearity\n  quietcut simulate tests/cases/kuka-kr90-acetal.toml --rpm 900 --depth-mm 1 --seconds 3 --out cut.csv\n  quietcut identify cut.csv --method force-coefficients --out material.toml\n  quietcut simulate tests/cases/six-joint-robot.toml --experiment hammer --direction x --force-n 800 --impacts 3 --spacing-s 6 --noise-percent 1 --out blows-x.csv\n  quietcut simulate tests/cases/six-joint-robot.toml --experiment hammer --direction y --force-n 800 --impacts 3 --spacing-s 6 --noise-percent 1 --out blows-y.csv\n  quietcut identify blows-x.csv blows-y.csv --method joints --start tests/cases/six-joint-robot.toml --band-hz 2:60 --out robot.toml\n  quietcut simulate tests/cases/kuka-kr90-acetal.toml --experiment hammer --direction x --force-n 300 --sample-rate-hz 512 --noise-percent 0.1 --out tap-x.csv\n  quietcut simulate tests/cases/kuka-kr90-acetal.toml --experiment hammer --direction y --force-n 300 --sample-rate-hz 512 --noise-percent 0.1 --out tap-y.csv\n  quietcut frf tap-x.csv tap-y.csv --band-hz 10:30 --out frf.csv\n  quietcut identify frf.csv --method modes --stabilization poles.svg --case tests/cases/kuka-kr90-acetal.toml --out modes.toml"
+    after_help = "Example:\n  quietcut simulate tests/cases/kuka-kr90-y17-low.toml --experiment step-sine --frequency-hz 16.6:17.9:14 --force-n 1.8,5.8,9.5 --dwell-s 30 --sample-rate-hz 128 --noise-percent 1 --out measured.csv\n  quietcut identify measured.csv --method harmonic-balance --out found.toml\n  quietcut identify measured.csv --method hfrf\n  quietcut identify measured.csv --method linearity\n  quietcut identify measured.csv --method backbone --out backbone.svg\n  quietcut simulate tests/cases/kuka-kr90-acetal.toml --rpm 900 --depth-mm 1 --seconds 3 --out cut.csv\n  quietcut identify cut.csv --method force-coefficients --out material.toml\n  quietcut simulate tests/cases/six-joint-robot.toml --experiment hammer --direction x --force-n 800 --impacts 3 --spacing-s 6 --noise-percent 1 --out blows-x.csv\n  quietcut simulate tests/cases/six-joint-robot.toml --experiment hammer --direction y --force-n 800 --impacts 3 --spacing-s 6 --noise-percent 1 --out blows-y.csv\n  quietcut identify blows-x.csv blows-y.csv --method joints --start tests/cases/six-joint-robot.toml --band-hz 2:60 --out robot.toml\n  quietcut simulate tests/cases/kuka-kr90-acetal.toml --experiment hammer --direction x --force-n 300 --sample-rate-hz 512 --noise-percent 0.1 --out tap-x.csv\n  quietcut simulate tests/cases/kuka-kr90-acetal.toml --experiment hammer --direction y --force-n 300 --sample-rate-hz 512 --noise-percent 0.1 --out tap-y.csv\n  quietcut frf tap-x.csv tap-y.csv --band-hz 10:30 --out frf.csv\n  quietcut identify frf.csv --method modes --stabilization poles.svg --case tests/cases/kuka-kr90-acetal.toml --out modes.toml"
 )]
 pub struct Args {
     /// Recordings; for modes also a table of receptances; for inverse-stability a table of cuts with the columns
@@ -24,8 +25,9 @@ pub struct Args {
     /// Identification method.
     #[arg(long, value_name = "NAME")]
     pub(super) method: Method,
-    /// Case, report or picture to write; the ending sets the format: toml, html or svg. May be repeated.
-    #[arg(long, value_name = "FILE", value_parser = Endings(&["toml", "html", "svg"]).parser())]
+    /// Case, report or picture to write, or the table of backbone and mode-shapes; the ending sets the format: toml, html, svg or csv. May be
+    /// repeated.
+    #[arg(long, value_name = "FILE", value_parser = Endings(&["toml", "html", "svg", "csv"]).parser())]
     pub(super) out: Vec<PathBuf>,
     /// Nonlinear terms of the restoring force that harmonic-balance and joints identify.
     #[arg(
@@ -56,8 +58,9 @@ pub struct Args {
     /// Mass that restoring-force uses instead of estimating it; required for a free decay, where no force acts.
     #[arg(long, value_name = "M", value_parser = positive, allow_negative_numbers = true)]
     pub(super) mass_kg: Option<f64>,
-    /// Frequency band in Hz of restoring-force, joints, modes and output-only. output-only requires it; the default of
-    /// restoring-force is the band where the motion exceeds its noise, and for a free decay a third to five thirds of its frequency.
+    /// Frequency band in Hz of restoring-force, joints, modes, mode-shapes, backbone and output-only. output-only requires it; the default of
+    /// restoring-force is the band where the motion exceeds its noise, and for a free decay a third to five thirds of its frequency;
+    /// that of backbone is the largest peak.
     #[arg(long, value_name = "FIRST:LAST", value_parser = non_negative_ends)]
     pub(super) band_hz: Option<[f64; 2]>,
     /// Width of the slices of the restoring-force surface, as a fraction of the largest velocity or displacement.
@@ -104,6 +107,8 @@ pub struct Args {
     #[command(flatten)]
     pub(super) modes: ModeOptions,
     #[command(flatten)]
+    pub(super) points: PointOptions,
+    #[command(flatten)]
     pub(super) segment: RecordedSegment,
     #[command(flatten)]
     pub(super) output: Output,
@@ -114,6 +119,8 @@ pub struct Args {
 pub(super) enum Method {
     /// Complex modes with left and right mode shapes, from receptances or from recordings of force and response.
     Modes,
+    /// Modes with mode shapes over named points, from a roving hammer (force at several points) or a roving sensor.
+    ModeShapes,
     /// Mass, damping, stiffness and nonlinear terms from step-sine tests by harmonic balance, without the bias of hfrf.
     HarmonicBalance,
     /// Higher-order frequency response functions: the receptance as a polynomial of the force; exact for vanishing
@@ -124,6 +131,9 @@ pub(super) enum Method {
     RestoringForce,
     /// Nonlinear complex mode: natural frequency and loss factor as functions of force and receptance.
     Ncma,
+    /// Natural frequency and damping ratio over the amplitude, with intervals: from free decays, and from force tests at
+    /// several levels.
+    Backbone,
     /// Tests whether the structure is linear, and names the kind of nonlinearity if it is not.
     Linearity,
     /// Stiffness and damping of robot joints from hammer or shaker tests at several postures; with --terms from
@@ -135,6 +145,29 @@ pub(super) enum Method {
     InverseStability,
     /// Cutting coefficients, edge coefficients and runout from cuts with measured forces.
     ForceCoefficients,
+}
+
+impl Method {
+    /// Endings of the files that this method writes by `--out`, the most usual first: a case, a table, a picture, a report.
+    pub(super) fn endings(self) -> &'static [&'static str] {
+        match self {
+            Self::Modes => &["toml", "html", "svg"],
+            Self::ModeShapes | Self::Backbone => &["csv", "html", "svg"],
+            Self::HarmonicBalance
+            | Self::Hfrf
+            | Self::RestoringForce
+            | Self::Joints
+            | Self::InverseStability
+            | Self::ForceCoefficients => &["toml", "html"],
+            Self::Ncma | Self::Linearity | Self::OutputOnly => &["html"],
+        }
+    }
+
+    /// Name of the method on the command line.
+    pub(super) fn name(self) -> String {
+        self.to_possible_value()
+            .map_or_else(String::new, |value| value.get_name().to_owned())
+    }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]

@@ -77,7 +77,7 @@ fn modal_line(modal: &ModalParameters) -> String {
 }
 
 /// One line for each mode but a single one, which has no other to compare with.
-fn mac_lines(mac: &[Vec<f64>]) -> Vec<String> {
+pub(super) fn mac_lines(mac: &[Vec<f64>]) -> Vec<String> {
     if mac.len() < 2 {
         return Vec::new();
     }

@@ -3,6 +3,7 @@
 use super::Error;
 use super::answer::{EstimatedMode, IdentifyOutput};
 use super::args::Args;
+use super::backbone_answer::average_warning;
 use super::figure::Figure;
 use super::written;
 use crate::case::Case;
@@ -52,6 +53,9 @@ pub(super) fn output_only(args: &Args, recordings: &[Recording]) -> Result<Ident
                 None => "no speed is configured, so the motion still contains the spindle harmonics".into(),
             }
         ));
+    }
+    if recording.sidecar.kind == Some(TestKind::FreeDecay) {
+        warnings.extend(average_warning(recording, Some(band_hz)));
     }
     if ambient.harmonics_remain {
         warnings.push(

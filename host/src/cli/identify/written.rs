@@ -11,7 +11,8 @@ use crate::report::page::{figure, page};
 
 /// True if one of the files to write is a report or a picture.
 pub(super) fn wants_picture(out: &[PathBuf]) -> bool {
-    out.iter().any(|path| crate::file::ending(path) != "toml")
+    out.iter()
+        .any(|path| matches!(crate::file::ending(path).as_str(), "html" | "svg"))
 }
 
 /// First case file among the files to write.
@@ -52,6 +53,13 @@ fn content(
 ) -> Result<String, Error> {
     match crate::file::ending(path).as_str() {
         "html" => Ok(report(answer, text)),
+        "csv" => answer.csv().ok_or_else(|| {
+            Error::input(format!(
+                "--out {}: --method {} has no table; toml or html is needed",
+                path.display(),
+                answer.method
+            ))
+        }),
         "svg" => answer.picture.clone().map(|(svg, _)| svg).ok_or_else(|| {
             Error::input(format!(
                 "--out {}: --method {} has no picture; toml or html is needed",
