@@ -25,6 +25,9 @@ const DAMPING_STEP: f64 = 4.0;
 /// from each other have the squared correlation 1/(1 + 1/4) = 0.8.
 const FREQUENCY_STEP: f64 = 2.0;
 
+/// Distance of the lines from a pole up to which they are used, in decay rates: 2/(50π) = 1.3 % of the squared receptance of a mode lies beyond.
+const WINDOW: f64 = 50.0;
+
 /// Part of the decrease of the squared residual by the best pole that the nearest pole of the grid gives at least: 0.89·0.8.
 pub(super) const GRID_SHARE: f64 = 0.7;
 
@@ -106,17 +109,25 @@ impl<'a> Residual<'a> {
         })
     }
 
+    /// Range of the lines within [`WINDOW`] decay rates of a pole.
+    fn lines_about(&self, pole: Complex64) -> (usize, usize) {
+        let (hertz, width_hz) = (pole.im / TAU, WINDOW * -pole.re / TAU);
+        let below = |limit_hz: f64| self.data.frequency_hz.partition_point(|line| *line < limit_hz);
+        (below(hertz - width_hz), below(hertz + width_hz))
+    }
+
     /// Score test of a mode with this pole; `None` where the fit can represent it already.
     fn place(&self, pole: Complex64) -> Option<Place> {
         let count = self.jacobian.len();
-        let lines = self.data.frequency_hz.len();
+        let (first, last) = self.lines_about(pole);
+        let lines = last - first;
         let mut shared = DMatrix::<f64>::zeros(self.inverse.nrows(), 2 * count);
         let mut normal = DMatrix::<f64>::zeros(2 * count, 2 * count);
         let mut gradient = DVector::<f64>::zeros(2 * count);
         let mut basis = DMatrix::<f64>::zeros(2 * lines, 2);
         for k in 0..count {
-            let deviation = &self.weights.deviation[k];
-            for (line, hertz) in self.data.frequency_hz.iter().enumerate() {
+            let deviation = &self.weights.deviation[k][first..last];
+            for (line, hertz) in self.data.frequency_hz[first..last].iter().enumerate() {
                 let s = Complex64::new(0.0, TAU * hertz);
                 let (up, down) = ((s - pole).inv(), (s - pole.conj()).inv());
                 let of_real = (up + down) / deviation[line];
@@ -126,9 +137,10 @@ impl<'a> Residual<'a> {
                 basis[(2 * line, 1)] = of_imaginary.re;
                 basis[(2 * line + 1, 1)] = of_imaginary.im;
             }
-            let with_fit = &self.jacobian[k] * &basis;
+            let with_fit = self.jacobian[k].columns(2 * first, 2 * lines) * &basis;
             let own = basis.transpose() * &basis;
-            let of_left = basis.transpose() * &self.left[k] - with_fit.transpose() * &self.adjusted;
+            let left = self.left[k].rows(2 * first, 2 * lines);
+            let of_left = basis.transpose() * left - with_fit.transpose() * &self.adjusted;
             shared.columns_mut(2 * k, 2).copy_from(&with_fit);
             normal.view_mut((2 * k, 2 * k), (2, 2)).copy_from(&own);
             gradient.rows_mut(2 * k, 2).copy_from(&of_left);

@@ -288,7 +288,7 @@ pub(super) fn read(path: &Path, finite: bool) -> Result<Raw, RecordingError> {
     })
 }
 
-/// Channel names of the records over time of a UFF file, as [`read`] gives them, each with the number of its node.
+/// Channel names of the records over time of a UFF file, as `read` gives them, each with the number of its node.
 ///
 /// # Errors
 /// The file cannot be read, or a data set has a fault.
