@@ -13,9 +13,9 @@ use crate::criteria::{CHANCE_OF_FURTHER_MODE, FURTHER_ERROR, LEAST_DAMPING_DEVIA
 /// Largest number of poles that are tried as a further mode. A choice: a wrong one among the best is rare.
 const TRIED: usize = 4;
 
-/// The fit with one more mode, with the first of the poles of [`residual_search::further`] that gives a more likely fit, a mode that noise does
-/// not explain and no spurious one. `None` if there is no such pole, or if the residual of
-/// `refined` is small already.
+/// The fit with one more mode, with the first of the poles of [`residual_search::further`] that gives a more likely fit, a
+/// mode that noise does not explain and no spurious one. `None` if there is no such pole, or if the residual of `refined`
+/// is small already.
 ///
 /// `is_spurious` is true for a fit with a spurious mode.
 pub(super) fn with_further_mode(
@@ -29,13 +29,17 @@ pub(super) fn with_further_mode(
     let search = residual_search::further(data, &refined.fit, TRIED);
     let last = refined.fit.modes.len();
     // Noise explains as much at each of the poles that are tried: χ² of the numbers of a matrix of rank one and of the pole.
-    let freedom = residue_freedom(data.responses.len(), data.forces.len()) + 2;
+    let of_rank_one = residue_freedom(data.responses.len(), data.forces.len());
+    let freedom = of_rank_one + 2;
     let chance = CHANCE_OF_FURTHER_MODE / search.tried.max(1) as f64;
     let needed = chi_squared_quantile(1.0 - chance, freedom as f64);
+    // The search has residue matrices of full rank: noise explains as much by each of their further numbers, one in the mean.
+    let of_further_ranks = (2 * data.places.len()).saturating_sub(of_rank_one) as f64;
+    let least_gain = GRID_SHARE * needed + of_further_ranks;
     search
         .starts
         .into_iter()
-        .filter(|(gain, start)| *gain >= GRID_SHARE * needed && is_high(data, start))
+        .filter(|(gain, start)| *gain >= least_gain && is_high(data, start))
         .find_map(|(_, start)| {
             let larger = refine(data, start)?;
             let mode = larger.mode(last);
