@@ -188,30 +188,20 @@ fn a_roving_sensor_gives_mode_shapes_and_its_mass_is_said() {
     let folder = folder();
     let here = folder.path();
     let points = ["--force-at", "2", "--sensor-at", "1,2,3,4,5"];
-    for point in 0..5 {
-        write_taps(
-            &here.join(format!("tap-{}.csv", point + 1)),
-            1,
-            point,
-            0.0,
-            20 + point as u64,
-        );
-    }
+    let write_all = |sensor_kg: f64, seed: u64| {
+        for point in 0..5 {
+            let file = here.join(format!("tap-{}.csv", point + 1));
+            write_taps(&file, 1, point, sensor_kg, seed + point as u64);
+        }
+    };
+    write_all(0.0, 20);
     let light = identify(here, &points);
     assert_modes(&light, true);
     assert!(
         light["mode_shapes"]["shifts"].as_array().unwrap().is_empty(),
         "{light}"
     );
-    for point in 0..5 {
-        write_taps(
-            &here.join(format!("tap-{}.csv", point + 1)),
-            1,
-            point,
-            0.02,
-            30 + point as u64,
-        );
-    }
+    write_all(0.02, 30);
     let heavy = identify(here, &points);
     let shifts = heavy["mode_shapes"]["shifts"].as_array().unwrap();
     // 20 g at the fifth point lower 61 Hz by the factor √(1 + 0.02·1.1²), 1.2 %, at the first by 0.04 %.

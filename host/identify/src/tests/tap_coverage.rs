@@ -448,7 +448,7 @@ fn limits_of_tapped_machines_hold_the_truth_as_often_as_they_say() {
         });
     println!("{found} modes found, {missed} not");
     // A limit misses the truth mainly where a mode is not found. Poles that are stable over many model orders are 87 % of
-    // these modes, with those that the residual shows 2008 of 2010.
+    // these modes; the residual shows the others.
     assert!(
         50 * missed <= found + missed,
         "{missed} of {} modes are not found",

@@ -60,16 +60,11 @@ impl Hdf5<'_> {
     /// The attribute of an object with this name.
     fn attribute<'o>(&self, object: &'o Object, name: &str) -> Result<Option<Attribute<'o>>, Fault> {
         if let Some(info) = object.message(ATTRIBUTE_INFO)? {
-            let mut cursor = self.storage.cursor(info, "the information about attributes");
-            cursor.skip(1)?;
-            if cursor.byte()? & 1 != 0 {
-                cursor.skip(2)?;
-            }
-            if cursor.address()?.is_some() {
-                return Err(Fault::Unsupported {
-                    what: "an object with more than 8 attributes in the form of HDF5 1.8 and later".into(),
-                });
-            }
+            let cursor = self.storage.cursor(info, "the information about attributes");
+            cursor.refuse_heap(
+                2,
+                "an object with more than 8 attributes in the form of HDF5 1.8 and later",
+            )?;
         }
         for message in object.messages(ATTRIBUTE) {
             if let Some(found) = Attribute::read(&self.storage, message?)?

@@ -79,4 +79,17 @@ impl<'a> Cursor<'a> {
         let length = self.at - start;
         self.skip(length.next_multiple_of(size) - length)
     }
+
+    /// Refuses members or attributes that stand in a heap, `what` in words: the information about them, with `further` bytes
+    /// before the address if its flag says so, has the address of a heap.
+    pub(super) fn refuse_heap(mut self, further: usize, what: &str) -> Result<(), Fault> {
+        self.skip(1)?;
+        if self.byte()? & 1 != 0 {
+            self.skip(further)?;
+        }
+        match self.address()? {
+            Some(_) => Err(Fault::Unsupported { what: what.into() }),
+            None => Ok(()),
+        }
+    }
 }

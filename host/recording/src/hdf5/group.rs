@@ -40,16 +40,11 @@ pub(super) fn links(storage: &mut Storage<'_>, object: &Object) -> Result<Vec<Li
         };
     }
     if let Some(info) = object.message(LINK_INFO)? {
-        let mut cursor = storage.cursor(info, "the information about links");
-        cursor.skip(1)?;
-        if cursor.byte()? & 1 != 0 {
-            cursor.skip(8)?;
-        }
-        if cursor.address()?.is_some() {
-            return Err(Fault::Unsupported {
-                what: "a group with more than 8 members in the form of HDF5 1.8 and later".into(),
-            });
-        }
+        let cursor = storage.cursor(info, "the information about links");
+        cursor.refuse_heap(
+            8,
+            "a group with more than 8 members in the form of HDF5 1.8 and later",
+        )?;
     }
     let mut links = Vec::new();
     for message in object.messages(LINK) {
