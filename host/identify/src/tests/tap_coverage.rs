@@ -41,6 +41,9 @@ const SEGMENTS: HammerWindows = HammerWindows {
     exponential_s: None,
 };
 
+/// Time above which a machine is named as it ends, s: ten times the median.
+const SLOW_S: f64 = 30.0;
+
 /// Two-sided quantile of the standard normal distribution for 90 % confidence.
 const Z_90: f64 = 1.644_853_627;
 
@@ -166,6 +169,16 @@ fn found_limit(machine: &Machine, model: &ModalModel, rpm: f64) -> Result<(f64, 
 }
 
 fn chain(index: u64) -> Outcome {
+    let began = Instant::now();
+    let outcome = chain_of(index);
+    let seconds = began.elapsed().as_secs_f64();
+    if seconds > SLOW_S {
+        eprintln!("machine {index}: {seconds:.1} s");
+    }
+    outcome
+}
+
+fn chain_of(index: u64) -> Outcome {
     let (machine, _, rpm, truth_mm, mut rng) = machine(index);
     let errors = errors(&mut rng);
     let mut outcome = Outcome {
