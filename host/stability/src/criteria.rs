@@ -178,6 +178,15 @@ pub(crate) const CHART_SPEED: f64 = 1e-3;
 /// `tests/between_speeds.rs` checks nearly three thousand random points of random machines.
 pub(crate) const LINES_OF_LOBE: f64 = 12.0;
 
+/// Least change of the chatter frequency between two speeds of a chart, in vibrations in a tooth period, that shows that
+/// their limits lie on different lobes. Where two lobes of a mode meet, it changes by a sizeable part of one; between two of
+/// [`LINES_OF_LOBE`] lines on a lobe by less than 1/[`LINES_OF_LOBE`], usually far less. A choice: half of that.
+pub(crate) const ONE_LOBE: f64 = 0.5 / LINES_OF_LOBE;
+
+/// Estimated error of a straight line over a smooth curve, divided by that of the parabola through three speeds: room for a
+/// bend that changes within the gap. A choice; `tests/between_speeds.rs` tries it.
+pub(crate) const PARABOLA_MARGIN: f64 = 1.25;
+
 /// Largest gap between two speeds of a refined chart, relative to the speed. A region of stability or of chatter that
 /// is wider appears in some line; a narrower one may not. Unfounded: a region of 2 % in speed and 5 % in depth is a
 /// thousandth of a chart over a factor of 2.7 in speed, hence contains one of a thousand random points.

@@ -9,8 +9,10 @@
 //!
 //!   e_r e_l/(e_r + e_l)
 //!
-//! off the straight line, wherever in the gap it is; a parabola over equal gaps lies off by a quarter of that. If the
-//! stable intervals of two neighbouring speeds differ in number, the gap is halved, down to the width [`CHART_SPEED`].
+//! off the straight line, wherever in the gap it is; a parabola over equal gaps lies off by a quarter of that. Limits whose
+//! chatter frequencies do not jump by [`ONE_LOBE`] of a vibration in a tooth period lie on one lobe, which has no kink:
+//! for them [`PARABOLA_MARGIN`] times the error of the parabola is taken. If the stable intervals of two neighbouring
+//! speeds differ in number, the gap is halved, down to the width [`CHART_SPEED`].
 //!
 //! A region of stability or of chatter that lies within one gap changes no limit at either end. It is found from the
 //! largest Floquet multiplier (characteristic multiplier) |μ|: at each step in depth, the same extrapolations of ln|μ|
@@ -27,9 +29,10 @@ use super::chart::{Chart, chart};
 use super::islands::narrowest_island_rpm;
 use super::method::Method;
 use super::resolution::Resolution;
-use super::speed_line::SpeedLine;
+use super::speed_line::{SpeedLine, Switch};
 use crate::criteria::{
-    CHART_DEPTH, CHART_GAP, CHART_LINES_MAX, CHART_SAMPLES_MIN, CHART_SPEED, LINES_OF_LOBE, TONGUE_GAP,
+    CHART_DEPTH, CHART_GAP, CHART_LINES_MAX, CHART_SAMPLES_MIN, CHART_SPEED, LINES_OF_LOBE, ONE_LOBE,
+    PARABOLA_MARGIN, TONGUE_GAP,
 };
 use crate::error::StabilityError;
 use crate::spectrum::verdict::Verdict;
@@ -79,7 +82,7 @@ impl Chart {
             speed_share: CHART_SPEED,
             narrowest_island_rpm: narrowest_island_rpm(&lines, depth_mm),
             unresolved_rpm: (1..lines.len())
-                .filter(|&right| !is_drawn(&lines, right))
+                .filter(|&right| !is_drawn(&lines, right, teeth))
                 .map(|right| [lines[right - 1].rpm, lines[right].rpm])
                 .collect(),
         });
@@ -160,7 +163,7 @@ fn speeds_within(lines: &[SpeedLine], right: usize, teeth: usize) -> Vec<f64> {
     let parts = (width / coarsest(left, right_line, teeth)).ceil();
     let parts = if parts > 1.0 {
         parts
-    } else if is_drawn(lines, right) {
+    } else if is_drawn(lines, right, teeth) {
         return Vec::new();
     } else {
         2.0
@@ -176,25 +179,22 @@ fn speeds_within(lines: &[SpeedLine], right: usize, teeth: usize) -> Vec<f64> {
 /// stable interval at either speed sets k.
 fn coarsest(left: &SpeedLine, right: &SpeedLine, teeth: usize) -> f64 {
     let vibrations = |line: &SpeedLine| {
-        let ends = line.switches.iter().filter(|switch| {
-            let is_end = |[from, to]: &[f64; 2]| *from == switch.depth_mm || *to == switch.depth_mm;
-            line.stable_mm.iter().any(is_end)
-        });
-        let fastest_hz = ends.filter_map(|switch| switch.chatter_hz).fold(0.0, f64::max);
-        fastest_hz * 60.0 / (line.rpm * teeth.max(1) as f64)
+        let ends = line.stable_mm.iter().flatten();
+        let counts = ends.filter_map(|end_mm| vibrations(line, line.switch_at(*end_mm)?, teeth));
+        counts.fold(0.0, f64::max)
     };
     (1.0 / (LINES_OF_LOBE * vibrations(left).max(vibrations(right)))).min(CHART_GAP)
 }
 
+/// Number of vibrations in a tooth period at a limit; `None` if the chatter frequency is not known.
+fn vibrations(line: &SpeedLine, switch: &Switch, teeth: usize) -> Option<f64> {
+    Some(switch.chatter_hz? * 60.0 / (line.rpm * teeth.max(1) as f64))
+}
+
 /// True if straight lines over the gap below the speed with index `right` draw every stable depth interval, and if no
 /// sign shows of a region of stability or of chatter within the gap.
-fn is_drawn(lines: &[SpeedLine], right: usize) -> bool {
-    let gap = Gap {
-        before: right.checked_sub(2).map(|index| &lines[index]),
-        left: &lines[right - 1],
-        right: &lines[right],
-        after: lines.get(right + 1),
-    };
+fn is_drawn(lines: &[SpeedLine], right: usize, teeth: usize) -> bool {
+    let gap = Gap::below(lines, right, teeth);
     gap.is_straight() && !gap.may_hide_a_region() && !gap.may_hide_a_tongue()
 }
 
@@ -205,31 +205,115 @@ struct Gap<'a> {
     left: &'a SpeedLine,
     right: &'a SpeedLine,
     after: Option<&'a SpeedLine>,
+    teeth: usize,
 }
 
-impl Gap<'_> {
+impl<'a> Gap<'a> {
+    /// Gap below the speed with index `right`, at least 1.
+    fn below(lines: &'a [SpeedLine], right: usize, teeth: usize) -> Self {
+        Self {
+            before: right.checked_sub(2).map(|index| &lines[index]),
+            left: &lines[right - 1],
+            right: &lines[right],
+            after: lines.get(right + 1),
+            teeth,
+        }
+    }
+
     /// True if both speeds have the same number of stable depth intervals, and if the straight line over the gap
     /// between the ends of each interval is right to [`CHART_DEPTH`] of the depth or to [`CHART_SPEED`] of the speed by
     /// the estimated error. Without an estimate both ends must be equal.
     fn is_straight(&self) -> bool {
+        self.has_equal_counts() && self.ends_of_intervals().all(|end| self.excess(end) <= 1.0)
+    }
+
+    fn has_equal_counts(&self) -> bool {
+        self.left.stable_mm.len() == self.right.stable_mm.len()
+    }
+
+    /// Ends of the stable depth intervals, [interval, end].
+    fn ends_of_intervals(&self) -> impl Iterator<Item = [usize; 2]> {
+        (0..self.left.stable_mm.len()).flat_map(|interval| [[interval, 0], [interval, 1]])
+    }
+
+    /// Prediction errors of a quantity of the limit that ends a stable interval; see [`misses`](Self::misses). A
+    /// neighbouring speed with another number of intervals gives none.
+    fn misses_of(
+        &self,
+        [interval, end]: [usize; 2],
+        quantity: impl Fn(&SpeedLine, f64) -> Option<f64>,
+    ) -> [Option<f64>; 2] {
         let count = self.left.stable_mm.len();
-        if self.right.stable_mm.len() != count {
-            return false;
+        let of = |line: &SpeedLine| quantity(line, line.stable_mm.get(interval)?[end]);
+        let beyond =
+            |line: Option<&SpeedLine>| line.filter(|line| line.stable_mm.len() == count).and_then(of);
+        match (of(self.left), of(self.right)) {
+            (Some(left), Some(right)) => self.misses(beyond(self.before), left, right, beyond(self.after)),
+            _ => [None, None],
         }
-        let alike = |line: &&SpeedLine| line.stable_mm.len() == count;
-        let (before, after) = (self.before.filter(alike), self.after.filter(alike));
-        (0..count).all(|interval| {
-            (0..2).all(|end| {
-                let at = |line: &SpeedLine| line.stable_mm[interval][end];
-                let (a, b) = (at(self.left), at(self.right));
-                let misses = self.misses(before.map(at), a, b, after.map(at));
-                let Some(error_mm) = kink_between(misses).map(f64::abs) else {
-                    return a == b;
-                };
-                let steep_mm = CHART_SPEED * self.left.rpm * (b - a).abs() / (self.right.rpm - self.left.rpm);
-                error_mm <= (CHART_DEPTH * a.min(b)).max(steep_mm)
-            })
-        })
+    }
+
+    /// Estimated error of the straight line over the gap for the limit that ends a stable interval, as a share of what
+    /// is accepted. Without an estimate it is 0 if the limit is the same at both speeds, infinite otherwise.
+    fn excess(&self, interval_end: [usize; 2]) -> f64 {
+        let [interval, end] = interval_end;
+        let [a, b] = [self.left, self.right].map(|line| line.stable_mm[interval][end]);
+        let misses = self.misses_of(interval_end, |_, depth_mm| Some(depth_mm));
+        let Some(kink_mm) = kink_between(misses) else {
+            return if a == b { 0.0 } else { f64::INFINITY };
+        };
+        let on_lobe = self.misses_on_lobe(interval_end, misses);
+        let parabola_mm = on_lobe.and_then(|misses| self.parabola(misses));
+        let error_mm = parabola_mm.map_or(kink_mm, |parabola_mm| kink_mm.min(PARABOLA_MARGIN * parabola_mm));
+        let steep_mm = CHART_SPEED * self.left.rpm * (b - a).abs() / (self.right.rpm - self.left.rpm);
+        let accepted_mm = (CHART_DEPTH * a.min(b)).max(steep_mm);
+        if error_mm > 0.0 {
+            error_mm / accepted_mm
+        } else {
+            0.0
+        }
+    }
+
+    /// True if the limits that end this stable interval at two neighbouring speeds lie on one lobe: they are of one kind,
+    /// and the change of the chatter frequency is less than [`ONE_LOBE`] of a vibration in a tooth period.
+    fn are_of_one_lobe(&self, [interval, end]: [usize; 2], lower: &SpeedLine, upper: &SpeedLine) -> bool {
+        let switch = |line: &SpeedLine| {
+            let switch = line.switch_at(line.stable_mm.get(interval)?[end])?;
+            Some((switch.kind, vibrations(line, switch, self.teeth)?))
+        };
+        let (Some((kind, low)), Some((other_kind, high))) = (switch(lower), switch(upper)) else {
+            return false;
+        };
+        kind == other_kind && (high * upper.rpm / lower.rpm - low).abs() < ONE_LOBE
+    }
+
+    /// Prediction errors of a limit from the speeds on the same lobe; `None` if the limits at both ends of the gap lie on
+    /// different lobes.
+    fn misses_on_lobe(&self, interval_end: [usize; 2], misses: [Option<f64>; 2]) -> Option<[Option<f64>; 2]> {
+        let is_linked = |lower, upper| self.are_of_one_lobe(interval_end, lower, upper);
+        let before = self.before.is_some_and(|before| is_linked(before, self.left));
+        let after = self.after.is_some_and(|after| is_linked(self.right, after));
+        is_linked(self.left, self.right)
+            .then_some([misses[0].filter(|_| before), misses[1].filter(|_| after)])
+    }
+
+    /// Largest distance of a smooth curve from its chord over the gap, from its prediction errors: that of the parabola
+    /// through the gap and the next speed on one side, of the more bent one if both errors are known. `None` if neither
+    /// is.
+    fn parabola(&self, [right, left]: [Option<f64>; 2]) -> Option<f64> {
+        let width = self.right.rpm - self.left.rpm;
+        // The parabola c x² misses by c h (h + h′), with the widths h of the gap and h′ of the next one, and lies c h²/4
+        // off its chord.
+        let by = |miss: f64, next: f64| 0.25 * miss.abs() * width / (width + next);
+        let before = self
+            .before
+            .zip(right)
+            .map(|(line, miss)| by(miss, self.left.rpm - line.rpm));
+        let after = self
+            .after
+            .zip(left)
+            .map(|(line, miss)| by(miss, line.rpm - self.right.rpm));
+        before.into_iter().chain(after).reduce(f64::max)
     }
 
     /// Prediction errors of linear extrapolation at both ends of the gap: (right end, left end). Each is the value of a
@@ -262,12 +346,17 @@ impl Gap<'_> {
                 return false;
             }
             let side = if a > 0.0 { 1.0 } else { -1.0 };
-            let misses = self.misses(self.before.and_then(log), a, b, self.after.and_then(log));
             // If |μ| bends towards the unit circle within the gap, |μ| at each end lies farther from the circle than
             // the extrapolation predicts.
-            let Some(bulge) = kink_between(misses.map(|miss| miss.map(|miss| (side * miss).max(0.0)))) else {
+            let misses = self.misses(self.before.and_then(log), a, b, self.after.and_then(log));
+            let misses = misses.map(|miss| miss.map(|miss| (side * miss).max(0.0)));
+            let Some(kink) = kink_between(misses) else {
                 return false;
             };
+            // Where two multipliers exchange the first place, the largest has a kink downwards. It rises to a maximum
+            // along one multiplier, without a kink.
+            let smooth = self.parabola(misses).filter(|_| side < 0.0);
+            let bulge = smooth.map_or(kink, |parabola| kink.min(PARABOLA_MARGIN * parabola));
             let along = [left, right].map(|sizes| bend(sizes, step, side));
             let nearest = (side * a).min(side * b) - bulge - along[0].max(along[1]);
             bulge > 0.0 && nearest < 0.0

@@ -118,6 +118,11 @@ impl SpeedLine {
 }
 
 impl SpeedLine {
+    /// The switch at exactly this depth, mm, as the ends of the stable intervals have it.
+    pub(crate) fn switch_at(&self, depth_mm: f64) -> Option<&Switch> {
+        self.switches.iter().find(|switch| switch.depth_mm == depth_mm)
+    }
+
     /// The same limits with larger errors: `further_mm` gives the addition for a switch, mm, or `None` if it cannot be
     /// computed. The error is then the last depth `depth_mm`.
     pub(crate) fn with_further_errors(

@@ -3,6 +3,7 @@
 use rand::{RngExt, SeedableRng};
 use rayon::prelude::*;
 
+use quietcut_model::structure::Form;
 use quietcut_testkit::results::Campaign;
 
 use crate::tests::{problem, random_case};
@@ -78,8 +79,35 @@ fn charts_of_the_literature_draw_the_verdict_of_every_point() {
             begun.elapsed(),
             chart.resolution
         );
-        assert!(drawn.wrong.is_empty(), "{name}: {drawn:?}");
-        assert!(drawn.undecided * 100 <= drawn.points, "{name}: {drawn:?}");
+        drawn.check();
+    }
+}
+
+/// Where the lobes of two modes of nearly equal frequency meet, the limit has a kink, but the chatter frequency hardly jumps.
+#[test]
+fn charts_of_close_modes_draw_the_verdict_of_every_point() {
+    for (name, apart, count) in [
+        ("insperger-2dof-ad0.5", 1.02, 15),
+        ("insperger-2dof-ad0.5", 1.05, 25),
+        ("insperger-2dof-ad0.5", 1.1, 40),
+        ("insperger-2dof-ad0.1", 1.05, 60),
+        ("insperger-2dof-ad1", 1.03, 20),
+    ] {
+        let mut case = quietcut_testkit::case(name);
+        let Form::Matrices(matrices) = &mut case.structure.as_mut().unwrap().form else {
+            panic!("{name} has matrices");
+        };
+        matrices.stiffness[(1, 1)] *= apart;
+        let problem = Problem::new(&case, CubicTerms::Refuse).unwrap();
+        let method = Collocation { problem };
+        let chart = chart(&method, &spaced(5000.0, 25_000.0, count), 10.0, 40).unwrap();
+        let chart = chart.with_lines_between(&method, 10.0, 40, 2).unwrap();
+        let drawn = compare(&chart, &method, 10.0, 400, 11);
+        println!(
+            "{name}, {apart}: {count} + {} lines, {drawn:?}",
+            chart.refined.len()
+        );
+        drawn.check();
     }
 }
 
