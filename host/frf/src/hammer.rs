@@ -182,12 +182,14 @@ pub(super) fn segments(
 pub(super) fn is_struck(force: &[f64], rate: f64) -> bool {
     let rest = Rest::of(force);
     let impacts = impacts(force, rest, rate);
+    // A strike soon after another counts as its bounce, but is a pulse of the hammer too.
+    let pulses = pulses(force, rest, rate);
     let middle = rest.middle;
     let energy = |samples: &[f64]| -> f64 { samples.iter().map(|f| (f - middle).powi(2)).sum() };
-    let samples: usize = impacts.iter().map(|impact| impact.last - impact.first + 1).sum();
-    let struck: f64 = impacts
+    let samples: usize = pulses.iter().map(|pulse| pulse.last - pulse.first + 1).sum();
+    let struck: f64 = pulses
         .iter()
-        .map(|impact| energy(&force[impact.first..=impact.last]))
+        .map(|pulse| energy(&force[pulse.first..=pulse.last]))
         .sum();
     let has_one_sign = impacts
         .windows(2)
@@ -244,12 +246,26 @@ fn longest_segment(impacts: &[MeasuredImpact], samples: usize) -> usize {
 
 /// Detects the impacts of a hammer in a force signal, in the order of time. Pulses that start within [`BOUNCE_S`] after
 /// the start of an impact are its bounces and do not count.
-fn impacts(force: &[f64], Rest { middle, noise }: Rest, rate: f64) -> Vec<MeasuredImpact> {
+fn impacts(force: &[f64], rest: Rest, rate: f64) -> Vec<MeasuredImpact> {
+    let mut impacts: Vec<MeasuredImpact> = Vec::new();
+    for pulse in pulses(force, rest, rate) {
+        let follows = impacts
+            .last()
+            .is_some_and(|before| ((pulse.first - before.first) as f64) < BOUNCE_S * rate);
+        if !follows {
+            impacts.push(pulse);
+        }
+    }
+    impacts
+}
+
+/// Detects all pulses in a force signal, bounces included, in the order of time.
+fn pulses(force: &[f64], Rest { middle, noise }: Rest, rate: f64) -> Vec<MeasuredImpact> {
     let largest = force
         .iter()
         .fold(0.0_f64, |largest, f| largest.max((f - middle).abs()));
     let threshold = (LEAST_IMPACT * largest).max(PULSE_ABOVE_NOISE * noise);
-    let mut impacts: Vec<MeasuredImpact> = Vec::new();
+    let mut pulses: Vec<MeasuredImpact> = Vec::new();
     let mut k = 0;
     while k < force.len() {
         if (force[k] - middle).abs() <= threshold {
@@ -269,21 +285,16 @@ fn impacts(force: &[f64], Rest { middle, noise }: Rest, rate: f64) -> Vec<Measur
         let peak = (first..=last)
             .max_by(|&a, &b| (force[a] - middle).abs().total_cmp(&(force[b] - middle).abs()))
             .unwrap_or(k);
-        let follows = impacts
-            .last()
-            .is_some_and(|before| ((first - before.first) as f64) < BOUNCE_S * rate);
-        if !follows {
-            impacts.push(MeasuredImpact {
-                time_s: peak as f64 / rate,
-                peak_n: force[peak] - middle,
-                second: None,
-                first,
-                last,
-            });
-        }
+        pulses.push(MeasuredImpact {
+            time_s: peak as f64 / rate,
+            peak_n: force[peak] - middle,
+            second: None,
+            first,
+            last,
+        });
         k = last + 1;
     }
-    impacts
+    pulses
 }
 
 /// Magnitudes of the peaks of the impacts in a force signal, N, in the order of time.

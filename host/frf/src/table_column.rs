@@ -118,7 +118,10 @@ pub(super) fn meaning(
     });
     match stated {
         Some(name) if name == "frequency_hz" => stated_frequency(column, unit),
-        Some(name) => by_name(&name, unit.as_deref(), in_degrees),
+        Some(name) => {
+            let unit = unit.or_else(|| name_and_ratio(&column.name).1);
+            by_name(&name, unit.as_deref(), in_degrees)
+        }
         None => by_words(&column.name, unit.as_deref()),
     }
 }

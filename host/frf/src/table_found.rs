@@ -118,6 +118,7 @@ fn assemble(
             force,
             receptance,
             coherence,
+            folding: None,
         });
     }
     // Mobility and accelerance cannot be integrated at 0 Hz: with one of them, the table has no line there.
@@ -264,10 +265,15 @@ fn require_statements(path: &Path, pairs: &[Pair<'_>]) -> Result<(), FrfError> {
         } else {
             String::new()
         };
+        let phase = match (pair.second.1.content, phase_unit(&second.values)) {
+            (Content::Value(Part::Phase(PhaseUnit::Degrees | PhaseUnit::Radians)), _) => "",
+            (_, Some(1.0)) => ":rad",
+            _ => ":deg",
+        };
         let (one, two) = match pair.first.1.content {
             Content::Value(Part::Real) => (format!("h{name}_re{unit}"), format!("h{name}_im{unit}")),
-            Content::Value(Part::Decibel) => (format!("h{name}_db{unit}"), format!("h{name}_phase:deg")),
-            _ => (format!("h{name}_mag{unit}"), format!("h{name}_phase:deg")),
+            Content::Value(Part::Decibel) => (format!("h{name}_db{unit}"), format!("h{name}_phase{phase}")),
+            _ => (format!("h{name}_mag{unit}"), format!("h{name}_phase{phase}")),
         };
         map.push(format!("{}={one},{}={two}", first.name, second.name));
     }

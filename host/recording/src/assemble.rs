@@ -7,7 +7,7 @@ use super::import::Import;
 use super::plausibility;
 use super::raw::Raw;
 use super::understand::understand;
-use super::understood::{Understood, UnderstoodColumn};
+use super::understood::{Basis, Understood, UnderstoodColumn};
 use super::{Channel, Quantity, Recording, RecordingError, Sidecar};
 
 /// A recording in SI units, and the report of how its file was understood.
@@ -63,6 +63,11 @@ pub(super) fn recording(
                 let sign = if meaning.is_negative { "-" } else { "" };
                 described.name = Some(format!("{sign}{}", meaning.name));
             }
+        }
+        // What the sidecar says of a column holds for its channel, whatever that is called; messages name the column.
+        if column.name != meaning.name && meaning.from != Basis::Auxiliary && meaning.name != "t" {
+            let described = sidecar.channels.entry(column.name.clone()).or_default();
+            described.name.get_or_insert_with(|| meaning.name.clone());
         }
         columns.push(UnderstoodColumn {
             column: column.name,

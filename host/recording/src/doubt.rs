@@ -1,5 +1,7 @@
 //! A column of a recorded file whose meaning is in doubt, and the message that names what the user can state about it.
 
+use super::channel_section::channel_section;
+
 /// A column of a recorded file whose meaning is not certain, and a proposal of what the user can state about it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Doubt {
@@ -46,16 +48,7 @@ pub(super) fn doubts_text(doubts: &[Doubt], lacks_rate: bool, sidecar: &std::pat
     let lines: Vec<String> = doubts
         .iter()
         .map(|doubt| {
-            let is_bare = doubt
-                .column
-                .chars()
-                .all(|letter| letter.is_ascii_alphanumeric() || letter == '_' || letter == '-');
-            let key = if is_bare {
-                doubt.column.clone()
-            } else {
-                format!("\"{}\"", doubt.column)
-            };
-            let mut line = format!("[channels.{key}] name = \"{}\"", doubt.name);
+            let mut line = format!("{} name = \"{}\"", channel_section(&doubt.column), doubt.name);
             if doubt.sensitivity.is_none()
                 && let Some(unit) = doubt.unit
             {

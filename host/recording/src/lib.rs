@@ -40,6 +40,7 @@
 mod assemble;
 mod binary_number;
 mod blocks;
+mod channel_section;
 mod criteria;
 mod csv;
 mod csv_number;
@@ -77,6 +78,7 @@ mod words;
 
 pub use assemble::Imported;
 pub use blocks::{Sensed, SpindleSettings};
+pub use channel_section::channel_section;
 pub use doubt::Doubt;
 pub use error::RecordingError;
 pub use formats::WRITTEN;

@@ -341,3 +341,25 @@ fn a_sidecar_that_cannot_be_replaced_leaves_the_old_recording() {
     assert_eq!(std::fs::read(&path).unwrap(), before);
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 2);
 }
+
+#[test]
+fn what_the_sidecar_says_of_a_column_holds_for_its_channel() {
+    let folder = Folder::new();
+    let path = folder.file(
+        "a.csv",
+        "Time (s),Hammer X (N),Acc X (g)\n0,1,2\n0.1,2,3\n0.2,3,4\n",
+    );
+    folder.file("a.toml", "[channels.\"Hammer X\"]\nanti_aliasing = true\n");
+    let recording = Recording::read(path).unwrap();
+    let said = |name| {
+        assert!(recording.channel(name).is_some());
+        recording
+            .sidecar
+            .channel(name)
+            .and_then(|channel| channel.anti_aliasing)
+    };
+    assert_eq!([said("fx"), said("ax")], [Some(true), None]);
+    // Messages about a channel name the column of the file.
+    let column = recording.sidecar.section_of("ax").unwrap();
+    assert_eq!(channel_section(column), "[channels.\"Acc X\"]");
+}

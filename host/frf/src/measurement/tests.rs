@@ -533,6 +533,17 @@ fn impacts_become_segments_and_double_impacts_are_left_out() {
     assert!(error < 0.02, "{error}");
 }
 
+/// A strike within the time of bounces after another is a pulse of the hammer nevertheless.
+#[test]
+fn strikes_in_quick_succession_are_those_of_a_hammer() {
+    let mut force = vec![0.0; (8.0 * RATE) as usize];
+    for (at_s, newtons) in [(0.4, 470.0), (1.0, 370.0), (1.2, 380.0)] {
+        impact(&mut force, at_s, newtons);
+    }
+    let force = with_noise(&force, 0.0005, &mut random(32));
+    assert!(crate::hammer::is_struck(&force, RATE));
+}
+
 #[test]
 fn an_impact_without_a_whole_segment_is_left_out_with_a_warning() {
     let mut random = random(31);

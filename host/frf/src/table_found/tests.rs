@@ -148,3 +148,52 @@ fn a_stated_frequency_column_keeps_its_unit() {
     let refused = import("w [mm],a,b\n10,1,2\n20,1,1\n", &map).unwrap_err();
     assert!(refused.contains("frequency_hz in \"mm\""), "{refused}");
 }
+
+/// The option that a message names, taken as it stands, gives the right receptance: units that the titles state stay.
+#[test]
+fn the_option_that_a_message_names_keeps_the_stated_units() {
+    let omega = TAU * 10.0;
+    let h = Complex64::new(3e-6, -4e-6);
+    let (mag, phase) = h.to_polar();
+    let a = -h * omega * omega;
+    for text in [
+        format!(
+            "Frequency (Hz),Real (mm/N),Imag (mm/N)\n10,{},{}\n20,1,1\n",
+            1e3 * h.re,
+            1e3 * h.im
+        ),
+        format!(
+            "Frequency (Hz),Real (µm/kN),Imag (µm/kN)\n10,{},{}\n20,1,1\n",
+            1e9 * h.re,
+            1e9 * h.im
+        ),
+        format!(
+            "Frequency (Hz),Real (g/N),Imaginary (g/N)\n10,{},{}\n20,1,1\n",
+            a.re / 9.806_65,
+            a.im / 9.806_65
+        ),
+        format!(
+            "Frequency (kHz),Real ((m/s²)/N),Imag ((m/s²)/N)\n0.01,{},{}\n0.02,1,1\n",
+            a.re, a.im
+        ),
+        format!("Frequency (Hz),Magnitude (m/N),Phase (rad)\n10,{mag},{phase}\n20,1e-6,1\n"),
+        format!("Frequency (Hz),Magnitude (m/N),Phase\n10,{mag},{phase}\n20,1e-6,1.1\n30,1e-6,-1.4\n"),
+        format!(
+            "Frequency (Hz),Magnitude (m/N),Phase (deg)\n10,{mag},{}\n20,1e-6,1\n",
+            phase.to_degrees()
+        ),
+    ] {
+        let said = import(&text, &[]).unwrap_err();
+        let map = said
+            .split("--map \"")
+            .nth(1)
+            .and_then(|rest| rest.split('"').next());
+        let map: Vec<&str> = map.unwrap_or_else(|| panic!("{said}")).split(',').collect();
+        let found = import(&text, &map).unwrap_or_else(|error| panic!("{map:?}: {error}"));
+        assert!(
+            (value(&found) - h).norm() < 1e-9 * h.norm(),
+            "{map:?}: {}",
+            value(&found)
+        );
+    }
+}
