@@ -74,6 +74,13 @@ impl Afternoon {
             let raw = fs::read_to_string(self.path("raw.csv")).expect("a recording");
             let file = style.file(axis, &analyzer(&raw, clipped));
             fs::write(self.path(&format!("mill/taps/{axis}.csv")), file).expect("written");
+            // Without a word about the filter, content above half the sample rate might have folded: wider intervals.
+            let sections: Vec<String> = style
+                .columns(axis)
+                .iter()
+                .map(|column| format!("[channels.\"{column}\"]\nanti_aliasing = true\n"))
+                .collect();
+            fs::write(self.path(&format!("mill/taps/{axis}.toml")), sections.concat()).expect("written");
         }
     }
 
@@ -186,16 +193,30 @@ enum Style {
 }
 
 impl Style {
-    fn file(self, axis: &str, rows: &[[f64; 4]]) -> String {
+    /// Names of force and accelerations in the file.
+    fn columns(self, axis: &str) -> [String; 3] {
         let upper = axis.to_uppercase();
+        match self {
+            Self::German => [format!("Hammer {upper}"), "Acc X".into(), "Acc Y".into()],
+            Self::Tabs => [
+                format!("Force {axis}"),
+                "Acceleration x".into(),
+                "Acceleration y".into(),
+            ],
+            Self::UnitRow => [
+                format!("Hammer {axis}+"),
+                "Accelerometer x+".into(),
+                "Accelerometer y+".into(),
+            ],
+        }
+    }
+
+    fn file(self, axis: &str, rows: &[[f64; 4]]) -> String {
+        let [hammer, x, y] = self.columns(axis);
         let mut text = match self {
-            Self::German => format!("Zeit [s];Hammer {upper} [N];Acc X [g];Acc Y [g]\n"),
-            Self::Tabs => {
-                format!("Time (s)\tForce {axis} (kN)\tAcceleration x (m/s²)\tAcceleration y (m/s²)\n")
-            }
-            Self::UnitRow => {
-                format!("# Modal test\nt,Hammer {axis}+,Accelerometer x+,Accelerometer y+\ns,N,m/s^2,m/s^2\n")
-            }
+            Self::German => format!("Zeit [s];{hammer} [N];{x} [g];{y} [g]\n"),
+            Self::Tabs => format!("Time (s)\t{hammer} (kN)\t{x} (m/s²)\t{y} (m/s²)\n"),
+            Self::UnitRow => format!("# Modal test\nt,{hammer},{x},{y}\ns,N,m/s^2,m/s^2\n"),
         };
         for [t, force, ax, ay] in rows {
             let _ = match self {

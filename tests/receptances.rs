@@ -43,6 +43,7 @@ fn write_table(path: &Path, axes: &[Direction], (first_hz, last_hz, step_hz): (f
                 force,
                 receptance: frequency_hz.iter().map(at).collect(),
                 coherence: None,
+                folding: None,
             });
         }
     }

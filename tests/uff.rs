@@ -153,6 +153,7 @@ fn frequency_response_functions_are_read_by_pyuff() {
             force: Direction::Y,
             receptance,
             coherence: Some(frequency_hz.iter().map(|f| 5.0 / f).collect()),
+            folding: None,
         };
         let table = FrfTable::new(Path::new("a.uff"), frequency_hz.clone(), vec![entry]).expect("a table");
         for form in [UffForm::Text, UffForm::Binary] {

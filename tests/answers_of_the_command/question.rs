@@ -203,8 +203,10 @@ fn recordings(tests: &Path) -> Result<Vec<Question>, String> {
         format!("identify {steps} --method restoring-force --json"),
         format!("identify {decay} --method restoring-force --mass-kg 50 --json"),
         format!("identify {decay} --method output-only --band-hz 10,30 --json"),
+        format!("identify {decay} --method backbone --json"),
         format!("identify {} --method output-only --band-hz 10,30 --json", recording("motion-only")),
         format!("identify {forces} --method force-coefficients --out material.toml --json"),
+        format!("identify {} {} --method mode-shapes --force-at tip,flange --sensor-at tip --json", recording("hammer-x"), recording("hammer-y")),
         "identify tests/data/answers/recordings/tried-cuts.csv --method inverse-stability --start tests/cases/kuka-kr90-acetal.toml --json".to_owned(),
     ];
     for line in identified {

@@ -191,6 +191,7 @@ mod tests {
                 .map(|&hertz| closed_form(hertz, added)[response.axis().unwrap()][force.axis().unwrap()])
                 .collect(),
             coherence: None,
+            folding: None,
         };
         let entries = entries.iter().map(of).collect();
         FrfTable::new(Path::new("closed form"), frequency_hz.clone(), entries).unwrap()

@@ -24,6 +24,8 @@ const LINES_MIN: usize = 4;
 pub struct Interpolation {
     frequency_hz: Vec<f64>,
     lines: Vec<Matrix3<Complex64>>,
+    /// Errors |ΔH| by aliasing at the lines, m/N; empty where the table states none.
+    folding: Vec<Matrix3<f64>>,
 }
 
 impl Interpolation {
@@ -45,7 +47,13 @@ impl Interpolation {
                 ),
             });
         }
-        Ok(Self { frequency_hz, lines })
+        let is_stated = table.entries().iter().any(|entry| entry.folding.is_some());
+        let all = 0..if is_stated { frequency_hz.len() } else { 0 };
+        Ok(Self {
+            folding: all.filter_map(|index| table.folding(index)).collect(),
+            frequency_hz,
+            lines,
+        })
     }
 
     /// Interpolation through every second line of this table, from the first, and its last line; `None` if fewer than
@@ -56,6 +64,9 @@ impl Interpolation {
         (kept().count() >= LINES_MIN).then(|| Self {
             frequency_hz: kept().map(|index| self.frequency_hz[index]).collect(),
             lines: kept().map(|index| self.lines[index]).collect(),
+            folding: kept()
+                .filter_map(|index| self.folding.get(index).copied())
+                .collect(),
         })
     }
 
@@ -76,7 +87,8 @@ impl Interpolation {
     /// The receptances in feed, normal and axial direction, Rᵀ H R with the columns of R from [`feed_axes`], for a feed
     /// at `angle_deg` degrees from x towards y.
     pub fn rotated(&self, angle_deg: f64) -> Self {
-        let machine_from_feed = feed_axes(angle_deg).map(Complex64::from);
+        let axes = feed_axes(angle_deg);
+        let (machine_from_feed, sizes) = (axes.map(Complex64::from), axes.abs());
         Self {
             frequency_hz: self.frequency_hz.clone(),
             lines: self
@@ -84,12 +96,32 @@ impl Interpolation {
                 .iter()
                 .map(|line| machine_from_feed.transpose() * line * machine_from_feed)
                 .collect(),
+            // Errors of unknown phase add up by their absolute values.
+            folding: self
+                .folding
+                .iter()
+                .map(|line| sizes.transpose() * line * sizes)
+                .collect(),
         }
     }
 
     /// Receptance matrices H at the lines of the table, m/N.
     pub fn lines(&self) -> &[Matrix3<Complex64>] {
         &self.lines
+    }
+
+    /// Errors |ΔH| of the receptance matrix by aliasing at the line nearest to a frequency, m/N: the half width of a 90 %
+    /// interval of real and imaginary part; 0 where the table states none.
+    pub fn folding(&self, frequency_hz: f64) -> Matrix3<f64> {
+        let above = self
+            .frequency_hz
+            .partition_point(|line| *line < frequency_hz.abs());
+        let near = [above.saturating_sub(1), above].into_iter();
+        let off = |index: &usize| (self.frequency_hz[*index] - frequency_hz.abs()).abs();
+        let nearest = near
+            .filter(|index| *index < self.folding.len())
+            .min_by(|a, b| off(a).total_cmp(&off(b)));
+        nearest.map_or_else(Matrix3::zeros, |index| self.folding[index])
     }
 
     /// Receptance matrix H, m/N, at the complex frequency f = s/(2πi), Hz.
@@ -183,6 +215,7 @@ mod tests {
             force,
             receptance: frequency_hz.iter().map(|&f| mode(f) * factor).collect(),
             coherence: None,
+            folding: None,
         };
         let entries = vec![
             entry(Direction::X, Direction::X, 1.0),

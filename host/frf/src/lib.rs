@@ -29,6 +29,7 @@
 //!     force: Direction::X,
 //!     receptance: frequency_hz.iter().map(|&hertz| receptance(hertz)).collect(),
 //!     coherence: None,
+//!     folding: None,
 //! };
 //! let table = FrfTable::new(Path::new("one-mode"), frequency_hz, vec![entry])?;
 //!

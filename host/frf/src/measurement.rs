@@ -275,7 +275,6 @@ fn merged(path: &Path, measured: Vec<MeasuredGroup>) -> Result<Measurement, FrfE
         deviation: Vec::new(),
         has_deviation: Vec::new(),
         freedoms: Vec::new(),
-        folding: Vec::new(),
         groups: Vec::new(),
         warnings: Vec::new(),
     };
@@ -286,12 +285,7 @@ fn merged(path: &Path, measured: Vec<MeasuredGroup>) -> Result<Measurement, FrfE
             .filter_map(|&hertz| near(&group.frequency_hz, hertz))
             .collect();
         let has_deviation = group.group.has_scatter();
-        for MeasuredEntry {
-            frf,
-            deviation,
-            folding,
-        } in group.entries
-        {
+        for MeasuredEntry { frf, deviation } in group.entries {
             if let Some(twice) = entries.iter().find(|other| other.name() == frf.name()) {
                 return Err(refused(format!(
                     "h{} comes from two kinds of recordings; measure them one by one",
@@ -302,10 +296,10 @@ fn merged(path: &Path, measured: Vec<MeasuredGroup>) -> Result<Measurement, FrfE
             entries.push(Frf {
                 receptance: lines.iter().map(|&line| frf.receptance[line]).collect(),
                 coherence: frf.coherence.as_deref().map(common),
+                folding: frf.folding.as_deref().map(common),
                 ..frf
             });
             measurement.deviation.push(common(&deviation));
-            measurement.folding.push(common(&folding));
             measurement.has_deviation.push(has_deviation);
             measurement.freedoms.push(group.group.freedoms);
         }
@@ -323,6 +317,7 @@ fn placeholder() -> Frf {
         force: Direction::X,
         receptance: vec![Complex64::ZERO],
         coherence: None,
+        folding: None,
     }
 }
 

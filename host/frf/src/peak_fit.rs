@@ -251,6 +251,7 @@ mod tests {
             force: Direction::X,
             receptance,
             coherence: None,
+            folding: None,
         };
         FrfTable::new(Path::new("fit"), frequency_hz, vec![entry]).unwrap()
     }

@@ -20,6 +20,9 @@ pub struct Frf {
     pub receptance: Vec<Complex64>,
     /// Coherence γ² at each line of the table, from 0 to 1; `None` if it is not known.
     pub coherence: Option<Vec<f64>>,
+    /// Estimate of the largest relative error |ΔH|/|H| at each line by aliasing, content above half the sample rate that
+    /// folds into the record; `None` if it is not known, or negligible.
+    pub folding: Option<Vec<f64>>,
 }
 
 /// Table of receptances at common frequencies.
@@ -66,7 +69,7 @@ impl FrfTable {
     /// # Errors
     /// There is no frequency or no receptance; frequencies are negative, not finite or do not ascend; a receptance is
     /// not finite, has another length than the frequencies, is of a rotation or is given twice; a coherence has another
-    /// length or lies outside 0 to 1.
+    /// length or lies outside 0 to 1; an error by aliasing has another length or is negative.
     pub fn new(path: &Path, frequency_hz: Vec<f64>, entries: Vec<Frf>) -> Result<Self, FrfError> {
         let table = Self {
             path: path.into(),
@@ -110,7 +113,9 @@ impl FrfTable {
             }
             let lines = self.frequency_hz.len();
             let coherence = entry.coherence.as_deref().unwrap_or_default();
-            let is_whole = entry.coherence.is_none() || coherence.len() == lines;
+            let folding = entry.folding.as_deref().unwrap_or_default();
+            let is_whole = (entry.coherence.is_none() || coherence.len() == lines)
+                && (entry.folding.is_none() || folding.len() == lines);
             if entry.receptance.len() != lines || !is_whole {
                 return Some(format!(
                     "h{name} does not have one value for each of {lines} frequencies"
@@ -122,6 +127,14 @@ impl FrfTable {
                     self.frequency_hz[line],
                     line + 1,
                     entry.receptance[line]
+                ));
+            }
+            if let Some(wrong) = folding
+                .iter()
+                .find(|share| !(share.is_finite() && **share >= 0.0))
+            {
+                return Some(format!(
+                    "folding_{name} is {wrong}; a share of the receptance, 0 or more, is needed"
                 ));
             }
             if let Some(wrong) = coherence.iter().find(|c| !(0.0..=1.0).contains(*c)) {
@@ -166,6 +179,20 @@ impl FrfTable {
             .collect()
     }
 
+    /// Errors |ΔH| by aliasing at one line, m/N, rows displacement, columns force in x, y, z; 0 where none is stated.
+    ///
+    /// `None` beyond the last line.
+    pub fn folding(&self, index: usize) -> Option<Matrix3<f64>> {
+        let mut matrix = Matrix3::zeros();
+        for entry in &self.entries {
+            if let (Some(i), Some(j)) = (entry.response.axis(), entry.force.axis()) {
+                let share = entry.folding.as_ref().and_then(|folding| folding.get(index));
+                matrix[(i, j)] = share.copied().unwrap_or(0.0) * entry.receptance.get(index)?.norm();
+            }
+        }
+        (index < self.frequency_hz.len()).then_some(matrix)
+    }
+
     /// Receptance matrix H at one line, m/N, rows displacement, columns force in x, y, z; entries that the table lacks
     /// are zero.
     ///
@@ -191,6 +218,7 @@ mod tests {
             force,
             receptance: values.iter().map(|&value| Complex64::from(value)).collect(),
             coherence: None,
+            folding: None,
         }
     }
 
@@ -202,6 +230,7 @@ mod tests {
             force: Direction::X,
             receptance: vec![value(9.0), value(1.0), value(3.0), value(2.0)],
             coherence: Some(vec![0.2, 0.9, 0.98, 0.9]),
+            folding: None,
         };
         assert_eq!(entry.peak_line(), 2);
         entry.coherence = Some(vec![0.2; 4]);

@@ -1,4 +1,5 @@
-//! FRF tables in CSV files: `frequency_hz,hxx_re [m/N],hxx_im [m/N],hxy_re [m/N],…`, optional `coherence_xx`.
+//! FRF tables in CSV files: `frequency_hz,hxx_re [m/N],hxx_im [m/N],hxy_re [m/N],…`, optional `coherence_xx` and
+//! `folding_xx`, the relative error by aliasing.
 
 use std::path::Path;
 
@@ -18,6 +19,7 @@ enum ColumnContent {
         unit: FrfUnit,
     },
     Coherence(DirectionPair),
+    Folding(DirectionPair),
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -127,7 +129,8 @@ impl FrfTable {
 
     /// Writes the table to `path` as CSV, atomically: on an error the previous file stays unchanged.
     ///
-    /// Numbers are written with all digits, so that the file gives the same frequencies, receptances and coherences.
+    /// Numbers are written with all digits, so that the file gives the same frequencies, receptances, coherences and errors by
+    /// aliasing.
     ///
     /// # Errors
     /// The file cannot be written.
@@ -142,6 +145,9 @@ impl FrfTable {
                 if entry.coherence.is_some() {
                     titles.push(format!("coherence_{name}"));
                 }
+                if entry.folding.is_some() {
+                    titles.push(format!("folding_{name}"));
+                }
             }
             writer.write_record(&titles)?;
             for (index, frequency_hz) in self.frequency_hz().iter().enumerate() {
@@ -150,12 +156,8 @@ impl FrfTable {
                     let value = entry.receptance[index];
                     row.push(format!("{:e}", value.re));
                     row.push(format!("{:e}", value.im));
-                    row.extend(
-                        entry
-                            .coherence
-                            .iter()
-                            .map(|coherence| coherence[index].to_string()),
-                    );
+                    let further = entry.coherence.iter().chain(&entry.folding);
+                    row.extend(further.map(|values| values[index].to_string()));
                 }
                 writer.write_record(&row)?;
             }
@@ -204,6 +206,10 @@ fn column(path: &Path, title: &str) -> Result<Column, FrfError> {
         && unit.is_none_or(|unit| unit == "1")
     {
         ColumnContent::Coherence(pair)
+    } else if let Some(pair) = name.strip_prefix("folding_").and_then(pair_of)
+        && unit.is_none_or(|unit| unit == "1")
+    {
+        ColumnContent::Folding(pair)
     } else {
         return Err(wrong(
             "no column of a table of frequency response functions; frequency_hz, hxy_re [m/N], hxy_im [m/N] and \
@@ -326,11 +332,12 @@ fn assemble(path: &Path, columns: Vec<Column>) -> Result<FrfTable, FrfError> {
             response: pair.0,
             force: pair.1,
             receptance,
-            coherence: coherence_of(&columns, pair),
+            coherence: values_of(&columns, ColumnContent::Coherence(pair)),
+            folding: values_of(&columns, ColumnContent::Folding(pair)),
         });
     }
     if let Some(orphan) = columns.iter().find(
-        |column| matches!(column.content, ColumnContent::Coherence(pair) if !entries.iter().any(|e| (e.response, e.force) == pair)),
+        |column| matches!(column.content, ColumnContent::Coherence(pair) | ColumnContent::Folding(pair) if !entries.iter().any(|e| (e.response, e.force) == pair)),
     ) {
         return Err(lacks(format!(
             "column \"{}\" has no receptance it belongs to",
@@ -340,10 +347,10 @@ fn assemble(path: &Path, columns: Vec<Column>) -> Result<FrfTable, FrfError> {
     FrfTable::new(path, frequency_hz, entries)
 }
 
-fn coherence_of(columns: &[Column], pair: DirectionPair) -> Option<Vec<f64>> {
+fn values_of(columns: &[Column], content: ColumnContent) -> Option<Vec<f64>> {
     columns
         .iter()
-        .find(|column| column.content == ColumnContent::Coherence(pair))
+        .find(|column| column.content == content)
         .map(|column| column.values.clone())
 }
 

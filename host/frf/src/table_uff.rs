@@ -121,6 +121,7 @@ fn receptance(set: &DataSet, frequency_hz: &[f64]) -> Result<Frf, String> {
         force,
         receptance,
         coherence: None,
+        folding: None,
     })
 }
 
@@ -303,6 +304,7 @@ mod tests {
                 .map(|f| Complex64::new(scale * 1e-6 / (1.0 + f), -1e-7 * f))
                 .collect(),
             coherence: (scale > 1.0).then(|| frequency_hz.iter().map(|f| 1.0 / (1.0 + f)).collect()),
+            folding: None,
         };
         let entries = vec![
             entry(Direction::X, Direction::X, 2.0),

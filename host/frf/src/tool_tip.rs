@@ -262,6 +262,7 @@ mod tests {
                     force,
                     receptance,
                     coherence: None,
+                    folding: None,
                 });
             }
         }

@@ -186,6 +186,7 @@ fn samples(folder: &Path) -> Vec<Sample> {
             force: Direction::X,
             receptance,
             coherence: Some(frequency_hz.iter().map(|_| 0.9).collect()),
+            folding: None,
         }],
     )
     .expect("a table");

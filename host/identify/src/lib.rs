@@ -34,6 +34,7 @@
 //!     force: Direction::X,
 //!     receptance: receptance.collect(),
 //!     coherence: None,
+//!     folding: None,
 //! };
 //! let table = FrfTable::new(Path::new("one-mode"), frequency_hz, vec![entry])?;
 //!

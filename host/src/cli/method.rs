@@ -6,8 +6,8 @@ use quietcut_model::effects::EffectName;
 
 use super::{Error, non_negative, progress};
 use crate::case::Case;
-use crate::criteria::COARSE_TABLE;
-use crate::frf::{FrfTable, ImportedTable, Interpolation};
+use crate::criteria::{COARSE_TABLE, SMALL_FOLDING};
+use crate::frf::{Frf, FrfTable, ImportedTable, Interpolation};
 use crate::orbit::collocation_of;
 use crate::recording::{ColumnMap, Import};
 use crate::report::digits::significant;
@@ -285,6 +285,19 @@ fn warn_of_table(table: &FrfTable) -> Result<(), Error> {
                 significant(1e6 * first.im, 3),
             );
         }
+    }
+    let at_peak = |entry: &Frf| {
+        let size = |line: &usize| entry.receptance[*line].norm();
+        let peak = (0..entry.receptance.len()).max_by(|a, b| size(a).total_cmp(&size(b)))?;
+        Some(entry.folding.as_ref()?[peak])
+    };
+    let folding = table.entries().iter().filter_map(at_peak).fold(0.0, f64::max);
+    if folding > SMALL_FOLDING {
+        tracing::warn!(
+            "{file}: content above half the sample rate may change the peaks of the receptances by up to {:.1} %; the errors of limits of fitted modes \
+             contain it, those of other methods do not",
+            100.0 * folding
+        );
     }
     let error = Interpolation::new(table).map_err(Error::input)?.error();
     if error > COARSE_TABLE {

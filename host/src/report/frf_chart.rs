@@ -100,6 +100,7 @@ mod tests {
             force: Direction::X,
             receptance: vec![Complex64::new(1e-6, 0.0), Complex64::new(0.0, -2e-6)],
             coherence,
+            folding: None,
         };
         let table = |coherence: Option<Vec<f64>>| {
             let entries = vec![entry(Direction::X, coherence), entry(Direction::Y, None)];

@@ -75,6 +75,7 @@ mod tests {
                 force,
                 receptance: vec![Complex64::new(1e-6, 0.0), Complex64::new(0.0, -2e-6)],
                 coherence: None,
+                folding: None,
             };
             FrfTable::new(Path::new("a.csv"), vec![10.0, 20.0], vec![entry]).unwrap()
         };

@@ -113,14 +113,12 @@ pub(crate) const WINDING_ERRORS: [f64; 3] = [0.02, 0.1, 0.4];
 
 // Limits along the depth.
 
-/// Least number of steps in axial depth at which a line of a chart, that is one spindle speed, is sampled. With 40
-/// steps the limits of random machines agree with verdicts at single depths (`tests/multipliers.rs`, eight depths of
-/// each line).
+/// Least number of steps in axial depth at which a line of a chart, one spindle speed, is sampled: limits of random machines
+/// then agree with verdicts at eight depths of each line (`tests/multipliers.rs`).
 pub(crate) const CHART_SAMPLES_MIN: usize = 40;
 
-/// Largest number of halvings of a depth interval in which multipliers cannot be followed. With 10 intervals the
-/// shortest half is 6e-6 of the depth range; if multipliers cannot be followed there either, a crossing is found by
-/// bisection on the number of multipliers outside the unit circle. Unfounded.
+/// Largest number of halvings of a depth interval in which multipliers cannot be followed: 6e-6 of the depth range. A crossing
+/// is then found by bisection on the number of multipliers outside the unit circle. Unfounded.
 pub(crate) const LINE_LEVELS: u32 = 14;
 
 /// Least |μ|, at an end of a depth interval, of a multiplier that must not be lost between the ends: if it has no
@@ -178,13 +176,11 @@ pub(crate) const CHART_SPEED: f64 = 1e-3;
 /// `tests/between_speeds.rs` checks nearly three thousand random points of random machines.
 pub(crate) const LINES_OF_LOBE: f64 = 12.0;
 
-/// Least change of the chatter frequency between two speeds of a chart, in vibrations in a tooth period, that shows that
-/// their limits lie on different lobes. Where two lobes of a mode meet, it changes by a sizeable part of one; between two of
-/// [`LINES_OF_LOBE`] lines on a lobe by less than 1/[`LINES_OF_LOBE`], usually far less. A choice: half of that.
+/// Least change of the chatter frequency between two lines, in vibrations in a tooth period, from one lobe to another. A
+/// choice: half of that between two of [`LINES_OF_LOBE`] lines.
 pub(crate) const ONE_LOBE: f64 = 0.5 / LINES_OF_LOBE;
 
-/// Estimated error of a straight line over a smooth curve, divided by that of the parabola through three speeds: room for a
-/// bend that changes within the gap. A choice; `tests/between_speeds.rs` tries it.
+/// Estimated error of a line over a curve by that of a parabola. A choice; `tests/between_speeds.rs` tries it.
 pub(crate) const PARABOLA_MARGIN: f64 = 1.25;
 
 /// Largest gap between two speeds of a refined chart, relative to the speed. A region of stability or of chatter that
@@ -492,14 +488,13 @@ pub(crate) const TABLE_ROOM: f64 = 1.5;
 /// spindle. Frequencies of spindles fall by some 10 to 20 % up to their highest speed. Unfounded.
 pub(crate) const LARGEST_RESCALING: f64 = 1.25;
 
-/// Step of the logarithm of a natural frequency at which the predicted chatter frequency is first compared with the measured one. Two
-/// lobes beside each other on the way would have to be narrower than 1 % of the frequency to be missed. Unfounded.
+/// Step of the logarithm of a natural frequency at which predicted and measured chatter frequency are first compared: lobes
+/// narrower than 1 % of the frequency may be missed. Unfounded.
 pub(crate) const RESCALING_STEP: f64 = 0.01;
 
-/// Factor by which a second mode must move further than the first, in the logarithm of its natural frequency, beyond the 90 %
-/// intervals of both, for a measured chatter frequency to identify the first. Unfounded.
+/// Factor by which a second mode must move further than the first, in ln of its frequency beyond the 90 % intervals of both,
+/// for a measured chatter frequency to identify the first. Unfounded.
 pub(crate) const RIVAL_RESCALING: f64 = 2.0;
 
-/// Probability of a smaller scatter of the factors of several check cuts up to which the stated errors of their frequencies explain it:
-/// one of twenty sets of cuts with right errors scatters more.
+/// Probability of a smaller scatter of check cuts up to which the errors of their frequencies explain it: one set of 20 has more.
 pub(crate) const EXPECTED_SCATTER: f64 = 0.95;

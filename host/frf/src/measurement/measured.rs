@@ -19,9 +19,6 @@ pub struct Measurement {
     /// One value per entry of the table: degrees of freedom of its standard deviations from periodic excitation; `None`
     /// for other excitation, with normal quantiles.
     pub freedoms: Vec<Option<usize>>,
-    /// Estimate of the largest relative error by aliasing of content above half the sample rate, by entry of the table,
-    /// then by frequency: for hammer tests only, and 0 for all other excitation.
-    pub folding: Vec<Vec<f64>>,
     /// Groups of recordings that were evaluated together.
     pub groups: Vec<RecordingGroup>,
     /// Warnings for the user, such as of double impacts or of responses that had not settled.

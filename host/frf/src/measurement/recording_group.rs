@@ -53,14 +53,11 @@ impl RecordingGroup {
     }
 }
 
-/// One receptance of a group of recordings, with its random error and its error by aliasing at each frequency of the
-/// group.
+/// One receptance of a group of recordings, with its random error at each frequency of the group.
 pub(super) struct MeasuredEntry {
     pub(super) frf: Frf,
     /// Standard deviation of the magnitude of the receptance at each frequency of the group, m/N.
     pub(super) deviation: Vec<f64>,
-    /// Largest relative error by aliasing at each frequency of the group; 0 except for hammer tests.
-    pub(super) folding: Vec<f64>,
 }
 
 /// Receptances of one group, with their standard deviations, at the frequencies of the group.
@@ -100,16 +97,16 @@ pub(super) fn receptances(
                 coherence: group
                     .has_scatter()
                     .then(|| lines.iter().map(|line| line.coherence[p]).collect()),
+                folding: lines
+                    .iter()
+                    .any(|line| line.folding[p] > 0.0)
+                    .then(|| lines.iter().map(|line| line.folding[p]).collect()),
             };
             let deviation = lines
                 .iter()
                 .map(|line| line.deviation[p][q] * integrated(line).norm())
                 .collect();
-            entries.push(MeasuredEntry {
-                frf,
-                deviation,
-                folding: lines.iter().map(|line| line.folding[p]).collect(),
-            });
+            entries.push(MeasuredEntry { frf, deviation });
         }
     }
     MeasuredGroup {

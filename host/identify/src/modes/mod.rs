@@ -11,6 +11,7 @@ mod comparison;
 mod covariance;
 mod denominator;
 mod error;
+mod folding_errors;
 mod further_mode;
 mod gain_errors;
 mod jacobian;
@@ -38,6 +39,7 @@ mod tests;
 
 pub use comparison::{ComparedMode, ModePair, pairs};
 pub use error::ModesError;
+pub use folding_errors::MadeApart;
 pub use modal_parameters::ModalParameters;
 pub use mode::IdentifiedMode;
 pub use model::ModalModel;

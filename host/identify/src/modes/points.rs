@@ -5,6 +5,7 @@ use quietcut_frf::{FrfTable, PointGroup};
 use quietcut_model::structure::Direction;
 use quietcut_numerics::statistics::chi_squared_quantile;
 
+use super::folding_errors::MadeApart;
 use super::model::ModalModel;
 use super::point_direction::PointDirection;
 use super::receptances::Receptances;
@@ -83,8 +84,14 @@ pub fn identify_points(
         responses,
         forces,
     } = PlacedReceptances::of(groups, band_hz)?;
-    let model = identify_coupled(&data, options)?;
+    let mut model = identify_coupled(&data, options)?;
     let is_of_forces = forces.len() > responses.len();
+    let apart = if is_of_forces {
+        MadeApart::Forces
+    } else {
+        MadeApart::Responses
+    };
+    model.add_folding_errors(&data, apart);
     let places = if is_of_forces {
         forces.clone()
     } else {
@@ -164,7 +171,8 @@ impl PlacedReceptances {
         let lines = common_lines(groups, band_hz);
         let (mut responses, mut forces): (Vec<PointDirection>, Vec<PointDirection>) =
             (Vec::new(), Vec::new());
-        let (mut places, mut values, mut deviation) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut places, mut values) = (Vec::new(), Vec::new());
+        let (mut deviation, mut folding) = (Vec::new(), Vec::new());
         for group in groups {
             let table = &group.measurement.table;
             let at = lines_of(table, &lines);
@@ -181,6 +189,8 @@ impl PlacedReceptances {
                 }
                 places.push(place);
                 values.push(at.iter().map(|&line| entry.receptance[line]).collect::<Vec<_>>());
+                let of_entry = |all: &Vec<f64>| at.iter().map(|&line| all[line]).collect();
+                folding.push(entry.folding.as_ref().map_or_else(Vec::new, of_entry));
                 deviation.push(
                     at.iter()
                         .map(|&line| group.measurement.deviation[index][line])
@@ -201,13 +211,14 @@ impl PlacedReceptances {
         let has_deviation = groups
             .iter()
             .all(|group| group.measurement.has_deviation.iter().all(|has| *has));
-        let data = Receptances::between_places(
+        let mut data = Receptances::between_places(
             lines,
             [&responses, &forces],
             places,
             values,
             has_deviation.then_some(deviation),
         )?;
+        data.folding = folding;
         Ok(Self {
             data,
             responses,

@@ -31,6 +31,8 @@ pub struct Receptances {
     /// least a fixed fraction of the RMS of the receptance. If only coherence is measured, the standard deviation is
     /// correct up to a common factor; if neither is known, it is that fraction.
     pub deviation: Vec<Vec<f64>>,
+    /// For each receptance its relative error by aliasing at every frequency; empty where none is stated.
+    pub folding: Vec<Vec<f64>>,
     /// True if standard deviations of the receptances were measured; false if they follow from coherence up to a
     /// factor, or are not known.
     pub has_deviation: bool,
@@ -79,6 +81,7 @@ impl Receptances {
             places: Vec::new(),
             values: Vec::new(),
             deviation: Vec::new(),
+            folding: Vec::new(),
             has_deviation: deviation.is_some(),
             has_coherence: deviation.is_none()
                 && table.entries().iter().all(|entry| entry.coherence.is_some()),
@@ -97,6 +100,11 @@ impl Receptances {
             }
             data.places.push(place);
             data.values.push(values);
+            let folding = entry
+                .folding
+                .iter()
+                .flat_map(|folding| lines.iter().map(|&line| folding[line]));
+            data.folding.push(folding.collect());
         }
         data.sort_directions();
         data.response_points = vec![0; data.responses.len()];
@@ -163,6 +171,7 @@ impl Receptances {
             has_deviation: deviation.is_some(),
             has_coherence: false,
             deviation: Vec::new(),
+            folding: Vec::new(),
             values,
             frequency_hz,
         };
@@ -245,6 +254,10 @@ impl Receptances {
             forces,
             values: part.iter().map(|&index| self.values[index].clone()).collect(),
             deviation: part.iter().map(|&index| self.deviation[index].clone()).collect(),
+            folding: part
+                .iter()
+                .map(|&index| self.folding.get(index).cloned().unwrap_or_default())
+                .collect(),
             ..*self
         }
     }

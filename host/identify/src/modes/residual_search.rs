@@ -307,6 +307,7 @@ mod tests {
             places,
             values,
             deviation,
+            folding: Vec::new(),
             has_deviation: true,
             has_coherence: false,
         };

@@ -49,6 +49,7 @@ fn table(
                 force,
                 receptance,
                 coherence: None,
+                folding: None,
             });
         }
     }

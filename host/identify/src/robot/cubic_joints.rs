@@ -231,6 +231,7 @@ fn lowest(posture: &PostureDwells, force: Direction) -> Option<PostureFrf> {
                 force,
                 receptance,
                 coherence: None,
+                folding: None,
             });
             deviation.push(noise);
         }

@@ -65,6 +65,7 @@ fn identified(truth: &Case) -> ModalModel {
                 .map(|h| h + Complex64::new(normal(), normal()))
                 .collect(),
             coherence: None,
+            folding: None,
         });
     }
     let table = FrfTable::new(Path::new("frf.csv"), frequency_hz, entries).unwrap();

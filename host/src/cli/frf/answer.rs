@@ -200,10 +200,11 @@ impl ReceptanceAnswer {
         } else {
             0.0
         };
+        let folding = &measurement.table.entries()[index].folding;
+        let folding = folding.as_ref().map_or(0.0, |folding| folding[at]);
         // Half-width of the 90 % interval of the peak magnitude: the peak magnitude times the root of the sum of the
         // squares of two relative errors, the half-width by the random error and the largest error by aliasing.
-        let half =
-            (measurement.ninety_percent(index) * relative).hypot(measurement.folding[index][at]) * size(at);
+        let half = (measurement.ninety_percent(index) * relative).hypot(folding) * size(at);
         Self {
             name: entry.name(),
             peak_hz: table.frequency_hz()[at],

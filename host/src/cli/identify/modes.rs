@@ -12,10 +12,11 @@ use super::modes_comparison::ModesComparison;
 use super::stabilization_diagram::{CAPTION, TITLE, ending, write_diagram};
 use super::written;
 use crate::case::Case;
+use crate::cli::frf::check_folding;
 use crate::frf::{
     Estimator, FrfError, FrfTable, ImportedTable, MeasurementSettings, RecordSpectra, measure, record_spectra,
 };
-use crate::identify::modes::{self, ChannelNoise, ComparedMode, ModalModel, Receptances};
+use crate::identify::modes::{self, ChannelNoise, ComparedMode, MadeApart, ModalModel, Receptances};
 use crate::machine::spindle_rpm;
 use crate::recording::{Import, Understood};
 use crate::report::stabilization_chart::stabilization_chart;
@@ -87,6 +88,7 @@ fn model_of(args: &Args, understood: &mut Vec<Understood>, recordings: &[PathBuf
     if let Some(records) = records.filter(|_| model.not_measured().is_empty()) {
         (model, noise) = modes::refine_by_records(&model, records).map_err(refused)?;
     }
+    model.add_folding_errors(&data, MadeApart::Forces);
     if let Some(percent) = options.calibration_percent {
         model.add_gain_errors(0.01 * percent);
     }
@@ -200,7 +202,8 @@ fn source(args: &Args, understood: &mut Vec<Understood>, recordings: &[PathBuf])
         band_hz: args.band_hz.map(|[low, high]| (low, high)),
         ..MeasurementSettings::default()
     };
-    let measurement = measure(&recordings, &settings)?;
+    let mut measurement = measure(&recordings, &settings)?;
+    check_folding(&mut measurement, &recordings, &[])?;
     Ok(Source {
         table: measurement.table,
         deviation: measurement

@@ -17,7 +17,7 @@ use crate::spectrum::port_mode::PortMode;
 
 /// Limits at a spindle speed (rev/min) up to an axial depth (mm) of the structure that is fitted to the table of a
 /// problem. Their errors are those of collocation, plus [`FIT_ROOM`] times the change of each limit with the deviation
-/// of the fit from the table, to first order.
+/// of the fit from the table, plus the largest change with the errors of the table by aliasing, both to first order.
 ///
 /// # Errors
 /// As [`line`], or a vibration lies outside the measured frequencies.
@@ -50,13 +50,12 @@ pub(crate) fn fitted_line(
             multiplier: switch.multiplier(model.tooth_period_s(rpm))?,
             depth_m: 1e-3 * switch.depth_mm,
         };
-        let shift_m = PortMode::new(&model, rpm, &period, crossing)?.largest_shift_m(change)?;
-        Some(1e3 * shift_m)
+        let mode = PortMode::new(&model, rpm, &period, crossing)?;
+        let by_folding_m = mode.largest_shift_by_sizes_m(|s| problem.folding_at(s.im / TAU))?;
+        Some(1e3 * (FIT_ROOM * mode.largest_shift_m(change)? + by_folding_m))
     };
     for switch in &found.switches {
         problem.check_band(switch.chatter_hz, rpm, switch.depth_mm)?;
     }
-    Ok(found.with_further_errors(depth_mm, |switch| {
-        shift_mm(switch).map(|shift_mm| FIT_ROOM * shift_mm)
-    }))
+    Ok(found.with_further_errors(depth_mm, shift_mm))
 }

@@ -153,6 +153,14 @@ impl FrequencyProblem {
         }
     }
 
+    /// Errors |ΔH| of the table by aliasing, m/N, at a frequency, Hz; zero for a modelled structure.
+    pub(crate) fn folding_at(&self, frequency_hz: f64) -> Matrix3<f64> {
+        match &self.receptance {
+            Receptance::Model(..) => Matrix3::zeros(),
+            Receptance::Table(interpolation) => interpolation.folding(frequency_hz),
+        }
+    }
+
     /// Frequency range of the measured receptances, Hz; `None` for a modelled structure.
     pub(crate) fn band_hz(&self) -> Option<(f64, f64)> {
         match &self.receptance {

@@ -104,9 +104,32 @@ impl PortMode {
         sum.is_finite().then_some(sum)
     }
 
+    /// Largest change of the depth of the crossing, m, to first order in changes of the receptances of which only the
+    /// sizes |ΔH(s)| are known, m/N: the sum over all harmonics of the mode and all entries, with the phases that add up.
+    /// `None` at the tip of an island.
+    pub(crate) fn largest_shift_by_sizes_m(&self, sizes: impl Fn(Complex64) -> Matrix3<f64>) -> Option<f64> {
+        // The shift is linear in lᵀΦr over the real numbers: that of any phase is at most the root of the squares of those of
+        // a real and of an imaginary change.
+        let largest = self.shift_m(Complex64::ONE).hypot(self.shift_m(Complex64::I));
+        let by_harmonic = self.harmonics().map(|(s, force, adjoint)| {
+            let sizes = sizes(s);
+            let entries = (0..9).map(|index| (index / 3, index % 3));
+            let parts = entries.map(|(i, j)| adjoint[i].norm() * sizes[(i, j)] * force[j].norm());
+            parts.sum::<f64>()
+        });
+        let sum = largest * by_harmonic.sum::<f64>();
+        sum.is_finite().then_some(sum)
+    }
+
     /// Change of the depth of the crossing, m, to first order in a change ΔH(s) of the receptances at each harmonic of
     /// the mode.
     fn shifts_m(&self, change: impl Fn(Complex64) -> Matrix3<Complex64>) -> impl Iterator<Item = f64> {
+        self.harmonics()
+            .map(move |(s, force, adjoint)| self.shift_m((adjoint.transpose() * change(s) * force)[(0, 0)]))
+    }
+
+    /// For each harmonic of the mode its s, rad/s, and the amplitudes of force and adjoint.
+    fn harmonics(&self) -> impl Iterator<Item = (Complex64, Vector3<Complex64>, Vector3<Complex64>)> {
         let growth = self.crossing.multiplier.ln();
         (-self.highest..=self.highest).map(move |k| {
             let s = (growth + Complex64::new(0.0, TAU * f64::from(k))) / self.period_s;
@@ -116,7 +139,7 @@ impl PortMode {
                 force += port.force * (factor.conj() / self.period_s);
                 adjoint += port.adjoint * factor;
             }
-            self.shift_m((adjoint.transpose() * change(s) * force)[(0, 0)])
+            (s, force, adjoint)
         })
     }
 

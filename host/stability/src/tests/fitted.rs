@@ -92,6 +92,7 @@ fn table_of(modes: &Modes, lines: u32, noise: f64, rng: &mut impl Rng) -> FrfTab
                     .map(|value| value + Complex64::new(random(), random()))
                     .collect(),
                 coherence: None,
+                folding: None,
             }
         });
     let entries = entries.collect();

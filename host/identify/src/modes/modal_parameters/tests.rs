@@ -43,6 +43,7 @@ fn model(seed: u64) -> ModalModel {
                 force,
                 receptance: receptance.collect(),
                 coherence: None,
+                folding: None,
             });
             deviation.push(vec![noise; exact.len()]);
         }
