@@ -217,7 +217,7 @@ pub(crate) const UNRELATED: f64 = 0.5;
 /// exceeds it with a probability of 0.2⁴ per line.
 pub(crate) const UNRELATED_PEAK: f64 = 0.8;
 
-/// Mean of the sine of the phase of a drive-point receptance, weighted with |H|², above which the sign of the
+/// Mean of the sine of the phase of a drive-point receptance, weighted with |ωH|², above which the sign of the
 /// receptance counts as that of an inverted sensor. The sine of a passive drive point is never above 0; it is about −1
 /// at a resonance. A choice.
 pub(crate) const INVERTED_PHASE: f64 = 0.2;

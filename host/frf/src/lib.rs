@@ -92,5 +92,6 @@ pub use points::{PointGroup, TestPoints, measure_points, points_of};
 pub use record_spectra::{ChannelLines, RecordSpectra, record_spectra};
 pub use table::{Frf, FrfTable};
 pub use table_found::ImportedTable;
+pub use test_plausibility::table_doubts;
 pub use tool_tip::{ModeRatio, calibrate};
 pub use window::Window;

@@ -34,7 +34,7 @@ use super::force_level::averaged_levels;
 use super::measurement_settings::MeasurementSettings;
 use super::table::{Frf, FrfTable};
 use super::test_channels::TestChannels;
-use super::test_plausibility;
+use super::test_plausibility::{self, Origin};
 use periodic::{periodic, recognized, too_few_periods};
 use quietcut_model::structure::Direction;
 use quietcut_recording::Recording;
@@ -116,6 +116,7 @@ pub fn measure(recordings: &[Recording], settings: &MeasurementSettings) -> Resu
     measurement.warnings.splice(0..0, doubts);
     let of_table = test_plausibility::of_table(
         &measurement.table,
+        Origin::Recordings,
         settings.has_drive_points && !has_periodic_force,
     );
     measurement.warnings.extend(of_table);

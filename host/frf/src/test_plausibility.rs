@@ -4,6 +4,7 @@ use std::f64::consts::TAU;
 
 use realfft::RealFftPlanner;
 
+use quietcut_model::structure::Direction;
 use quietcut_recording::{Channel, ChannelSummary, Quantity, RecordedCut, Recording, TestKind};
 
 use super::criteria::{
@@ -349,25 +350,55 @@ fn spike(samples: &[f64]) -> Option<usize> {
         .then_some(at)
 }
 
+/// Doubts about a table of receptances at the tool tip that another program wrote, each in words: a drive point that feeds
+/// energy in, a response that the force hardly causes, a peak that no structure has.
+pub fn table_doubts(table: &FrfTable) -> Vec<String> {
+    of_table(table, Origin::Table, true)
+}
+
+/// Where receptances come from, which decides how a wrong sign is mended.
+#[derive(Clone, Copy)]
+pub(super) enum Origin {
+    Recordings,
+    Table,
+}
+
+impl Origin {
+    fn remedy(self, axis: Direction) -> String {
+        match self {
+            Self::Recordings => format!(
+                "one of them points against its axis: add --map a{axis}=-a{axis} if it is the sensor, or --map f{axis}=-f{axis} if the hammer strikes \
+                 against the axis (with the names of your columns)"
+            ),
+            Self::Table => "one of them pointed against its axis, or the phase is that of e^(−iωt): change the sign of the imaginary part, and of the \
+                            real part too if that is negative below the first resonance, in the program that wrote the table"
+                .into(),
+        }
+    }
+}
+
 /// Warnings about measured receptances: a drive point that feeds energy in, a response that the force hardly causes,
 /// and a peak outside the plausible range. Drive points are checked only on demand: between
 /// the lines of a periodic force the receptance is noise, and a force and a sensor at two points are no drive point.
-pub(super) fn of_table(table: &FrfTable, checks_drive_points: bool) -> Vec<String> {
+pub(super) fn of_table(table: &FrfTable, origin: Origin, checks_drive_points: bool) -> Vec<String> {
     let frequency_hz = table.frequency_hz();
     let mut warnings = Vec::new();
     for entry in table.entries() {
         let name = entry.name();
         let size = |line: usize| entry.receptance[line].norm();
         let peak = entry.peak_line();
-        // The mean of the sine of the phase over the related lines, weighted with |H|². At a resonance of a passive
-        // drive point the sine is −1. Lines whose response is mostly noise have any phase, and may have the largest
-        // |H|.
-        let related = (0..entry.receptance.len()).filter(|line| entry.is_related(*line));
-        let (imaginary, power) = related.fold((0.0, 0.0), |(sum, all), line| {
+        // The mean of the sine of the phase over the related lines, weighted with the square of the mobility |ωH|. At a
+        // resonance of a passive drive point the sine is −1. Lines whose response is mostly noise have any phase, and may
+        // have the largest |H|: the noise of an accelerometer, divided by ω², at the first lines.
+        let related = || (0..entry.receptance.len()).filter(|line| entry.is_related(*line));
+        let mobility = |line: usize| frequency_hz[line] * entry.receptance[line].norm();
+        let (imaginary, power) = related().fold((0.0, 0.0), |(sum, all), line| {
             let h = entry.receptance[line];
-            (sum + h.im * h.norm(), all + h.norm_sqr())
+            let weight = frequency_hz[line] * frequency_hz[line];
+            (sum + weight * h.im * h.norm(), all + weight * h.norm_sqr())
         });
         let phase = if power > 0.0 { imaginary / power } else { 0.0 };
+        let resonance = related().max_by(|&a, &b| mobility(a).total_cmp(&mobility(b)));
         let coherence = entry.coherence.as_ref().map(|coherence| {
             let mut sorted = coherence.clone();
             sorted.sort_by(f64::total_cmp);
@@ -384,10 +415,9 @@ pub(super) fn of_table(table: &FrfTable, checks_drive_points: bool) -> Vec<Strin
         } else if checks_drive_points && entry.response == entry.force && phase > INVERTED_PHASE {
             warnings.push(format!(
                 "H{name} has the sign of an inverted sensor: its imaginary part is positive at {:.3} Hz, where a drive point takes up energy \
-                 and has a negative one; if force and sensor sit at one point, one of them points against its axis: add --map \
-                 a{axis}=-a{axis} if it is the sensor, or --map f{axis}=-f{axis} if the hammer strikes against the axis (with the names of your columns)",
-                frequency_hz[peak],
-                axis = entry.response
+                 and has a negative one; if force and sensor sit at one point, {}",
+                frequency_hz[resonance.unwrap_or(peak)],
+                origin.remedy(entry.response)
             ));
         }
         let [low, high] = PLAUSIBLE_RECEPTANCE;

@@ -363,3 +363,20 @@ fn what_the_sidecar_says_of_a_column_holds_for_its_channel() {
     let column = recording.sidecar.section_of("ax").unwrap();
     assert_eq!(channel_section(column), "[channels.\"Acc X\"]");
 }
+
+/// The unit at the end of a title holds with the option that gives the column its name.
+#[test]
+fn a_unit_at_the_end_of_a_title_is_kept_by_map() {
+    let folder = Folder::new();
+    let path = folder.file("a.csv", "t,force_N,acc_g\n0,1,2\n0.1,2,3\n0.2,3,4\n");
+    let import = Import {
+        map: ["force_N=fx", "acc_g=ax"]
+            .map(|map| ColumnMap::parse(map).unwrap())
+            .to_vec(),
+        ..Import::default()
+    };
+    let read = Recording::import(path, &import).unwrap();
+    let recording = &read.recording;
+    assert_eq!(recording.channel("fx").unwrap().quantity, Quantity::Force);
+    assert_eq!(recording.channel("ax").unwrap().samples[0], 2.0 * 9.806_65);
+}

@@ -162,8 +162,7 @@ fn stated(
                 stated.unit_text = Some(unit_text(unit));
             }
             Some(Scale::Sensitivity(sensitivity)) => {
-                // A column without a stated unit is taken in volts, because a sensitivity (voltage per measured unit)
-                // is given for it.
+                // A column with a sensitivity, voltage per measured unit, is in volts if no unit is stated.
                 let volts = stated.unit.unwrap_or(Unit {
                     quantity: Quantity::Voltage,
                     factor: 1.0,
@@ -186,6 +185,12 @@ fn stated(
             }
             None => {}
         }
+    }
+    // The unit at the end of a title, as in `force_N`, holds whatever the column is called.
+    if let (Some(name), None) = (&stated.name, &stated.unit_text) {
+        let of_title = NameMeaning::of(&column.name).unit;
+        stated.unit = of_title.filter(|unit| Quantity::of_name(name) == Some(unit.quantity));
+        stated.unit_text = stated.unit.map(unit_text);
     }
     Ok(stated)
 }

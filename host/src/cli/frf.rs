@@ -25,7 +25,8 @@ use answer::FrfOutput;
 pub use args::Args;
 use args::{FileFormat, OutputFile};
 pub(super) use by_level::levels_without_peak;
-pub(super) use folding::check_folding;
+use folding::check_folding;
+pub(super) use folding::warn_of_folding;
 
 /// Runs the verb.
 pub fn run(args: Args) -> Result<(), Error> {

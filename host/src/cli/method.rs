@@ -7,7 +7,7 @@ use quietcut_model::effects::EffectName;
 use super::{Error, non_negative, progress};
 use crate::case::Case;
 use crate::criteria::{COARSE_TABLE, SMALL_FOLDING};
-use crate::frf::{Frf, FrfTable, ImportedTable, Interpolation};
+use crate::frf::{Frf, FrfTable, ImportedTable, Interpolation, table_doubts};
 use crate::orbit::collocation_of;
 use crate::recording::{ColumnMap, Import};
 use crate::report::digits::significant;
@@ -262,6 +262,9 @@ impl MethodChoice {
 /// about frequency lines that are too far apart.
 fn warn_of_table(table: &FrfTable) -> Result<(), Error> {
     let file = table.path().display();
+    for doubt in table_doubts(table) {
+        tracing::warn!("{file}: {doubt}");
+    }
     let missing = table.missing();
     if !missing.is_empty() {
         let names: Vec<String> = missing.iter().map(|name| format!("h{name}")).collect();

@@ -1,11 +1,16 @@
 //! Tests of a mode that is tapped, with the faults that laboratories make.
 
 use std::f64::consts::TAU;
+use std::path::Path;
 
+use num_complex::Complex64;
+use quietcut_model::structure::Direction;
 use quietcut_recording::{Channel, Quantity, Recording, Sidecar, TestKind};
 
 use crate::measurement::measure;
 use crate::measurement_settings::MeasurementSettings;
+use crate::table::{Frf, FrfTable};
+use crate::test_plausibility::table_doubts;
 
 const RATE: f64 = 512.0;
 const SAMPLES: usize = 8192;
@@ -218,4 +223,32 @@ fn an_ordinary_cut_is_no_test_of_a_structure() {
     let (impacts, _) = tap();
     let found = said(impacts.clone(), rate_of(&impacts), Some(TestKind::Hammer)).unwrap();
     assert!(found.contains("inverted"), "{found}");
+}
+
+/// A single mode with noise of an accelerometer at the first lines, and the same with its sign or its phase turned.
+#[test]
+fn the_sign_of_a_table_is_judged_at_its_resonance() {
+    let frequency_hz: Vec<f64> = (1..400).map(f64::from).collect();
+    let of = |turned: &dyn Fn(Complex64) -> Complex64| {
+        let value = |&hertz: &f64| {
+            let mode = 1e-6 / Complex64::new(1.0 - (hertz / 200.0).powi(2), 0.04 * hertz / 200.0);
+            turned(mode) + Complex64::new(0.0, 1e-3 / (hertz * hertz))
+        };
+        let entry = Frf {
+            response: Direction::X,
+            force: Direction::X,
+            receptance: frequency_hz.iter().map(value).collect(),
+            coherence: None,
+            folding: None,
+        };
+        let table = FrfTable::new(Path::new("a.csv"), frequency_hz.clone(), vec![entry]).unwrap();
+        table_doubts(&table).join("; ")
+    };
+    assert_eq!(of(&|h| h), "");
+    for turned in [of(&|h| -h), of(&|h| h.conj())] {
+        assert!(
+            turned.contains("inverted sensor") && turned.contains("at 200.000 Hz"),
+            "{turned}"
+        );
+    }
 }

@@ -5,7 +5,7 @@ use super::answer::IdentifyOutput;
 use super::args::Args;
 use super::mode_shapes_answer::ModeShapes;
 use super::written::wants_picture;
-use crate::cli::frf::check_folding;
+use crate::cli::frf::warn_of_folding;
 use crate::frf::{MeasurementSettings, TestPoints, measure_points, points_of};
 use crate::identify::modes::Options;
 use crate::identify::modes::points::identify_points;
@@ -22,7 +22,7 @@ pub(super) fn mode_shapes(args: &Args, recordings: &[Recording]) -> Result<Ident
     };
     let mut groups = measure_points(recordings, &points, &settings)?;
     for group in &mut groups {
-        check_folding(&mut group.measurement, recordings, &[])?;
+        warn_of_folding(&mut group.measurement, recordings);
     }
     let options = Options {
         highest_order: usize::from(args.modes.order),

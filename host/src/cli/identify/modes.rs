@@ -12,9 +12,10 @@ use super::modes_comparison::ModesComparison;
 use super::stabilization_diagram::{CAPTION, TITLE, ending, write_diagram};
 use super::written;
 use crate::case::Case;
-use crate::cli::frf::check_folding;
+use crate::cli::frf::warn_of_folding;
 use crate::frf::{
-    Estimator, FrfError, FrfTable, ImportedTable, MeasurementSettings, RecordSpectra, measure, record_spectra,
+    Estimator, FrfError, FrfTable, ImportedTable, MeasurementSettings, RecordSpectra, measure,
+    record_spectra, table_doubts,
 };
 use crate::identify::modes::{self, ChannelNoise, ComparedMode, MadeApart, ModalModel, Receptances};
 use crate::machine::spindle_rpm;
@@ -176,9 +177,9 @@ fn source(args: &Args, understood: &mut Vec<Understood>, recordings: &[PathBuf])
                     eprintln!("understood: {understood}");
                 }
                 return Ok(Source {
+                    warnings: table_doubts(&imported.table),
                     table: imported.table,
                     deviation: None,
-                    warnings: Vec::new(),
                     structure_rpm: None,
                     records: None,
                 });
@@ -203,7 +204,7 @@ fn source(args: &Args, understood: &mut Vec<Understood>, recordings: &[PathBuf])
         ..MeasurementSettings::default()
     };
     let mut measurement = measure(&recordings, &settings)?;
-    check_folding(&mut measurement, &recordings, &[])?;
+    warn_of_folding(&mut measurement, &recordings);
     Ok(Source {
         table: measurement.table,
         deviation: measurement
