@@ -71,8 +71,7 @@ fn import(options: &[String]) -> Import {
     Import {
         map: value("--map")
             .iter()
-            .flat_map(|map| map.split(','))
-            .map(|map| ColumnMap::parse(map).expect("a map"))
+            .flat_map(|map| ColumnMap::parse_list(map).expect("a map").0)
             .collect(),
         rate_hz: value("--rate").map(|rate| rate.parse().expect("a rate")),
         ..Import::default()

@@ -126,6 +126,7 @@ def csv_files():
     expect("two_sensors.csv", both | {"ax_2": acc_y}, ["--map", "Acc2 X=ax_2"], ["several sensors", "Acc2 X=ax_2"])
 
 
+def csv_files_with_doubts():
     x = 1e-5 * np.sin(2 * np.pi * 80 * t)
     a = -((2 * np.pi * 80) ** 2) * x
     text("unit_wrong_by_gravity.csv", "Time [s],Force X [N],Disp X [mm],Acc X [g]\n" + rows([t, force, 1e3 * x, a]))
@@ -134,6 +135,45 @@ def csv_files():
     expect("unit_wrong_by_1000.csv", {"fx": force, "x": 1e3 * x, "ax": a}, warns=["1000"])
     text("constant_channel.csv", "Time [s],Force X [N],Acc X [g]\n" + rows([t, force, np.full(COUNT, 0.5)]))
     expect("constant_channel.csv", {"fx": force, "ax": np.full(COUNT, 0.5 * G)}, constant=["ax"])
+
+
+def csv_files_of_loggers():
+    table = [t, force, acc / G]
+    head = "Time [s],Force X [N],Acc X [g]\n"
+    text("utf16.csv", head + rows(table), "utf-16", "\r\n")
+    expect("utf16.csv", both)
+    text("old_line_ends.csv", head + rows(table), newline="\r")
+    expect("old_line_ends.csv", both)
+    text("name_twice.csv", "Time [s],Force X [N],Acc X [g],Acc X [g]\n" + rows(table + [acc_y / G]))
+    expect("name_twice.csv", both | {"ax_2": acc_y}, ["--map", "4=ax_2"], ["several sensors", "Acc X (2)=ax_2"])
+    text("comma_in_name.csv", 'Time [s],"Input 1, Hammer [N]",Acc X [g]\n' + rows(table))
+    expect("comma_in_name.csv", both, ["--map", "Input 1, Hammer=fx"], ["Input 1, Hammer=fx"])
+    text("speed_column.csv", "Time [s],Force X [N],Acc X [g],Tacho [rpm]\n" + rows(table + [np.full(COUNT, 6000.0)]))
+    expect("speed_column.csv", both)
+    text("axis_of_time.csv", "X [s],Force X [N],Acc X [g]\n" + rows(table))
+    expect("axis_of_time.csv", both)
+
+    def stamped(name, stamp):
+        lines = [f"{stamp(second)},{one:.8g},{other:.8g}" for second, one, other in zip(t, force, acc / G)]
+        text(name, "Time,Force X [N],Acc X [g]\n" + "\n".join(lines) + "\n")
+        expect(name, both)
+
+    stamped("clock_times.csv", lambda second: f"14:03:{20 + second:09.6f}")
+    stamped("date_times.csv", lambda second: f"2024-05-03T23:59:{59.95 + second:09.6f}Z" if second < 0.05 else f"2024-05-04T00:00:{second - 0.05:09.6f}Z")
+    quoted = "".join(f'{second:.8g},"{1e3 * one:,.6f}",{other:.8g}\n' for second, one, other in zip(t, force, acc / G))
+    text("thousands.csv", "Time [s],Force X [mN],Acc X [g]\n" + quoted)
+    expect("thousands.csv", both)
+    fortran = "".join(f" {second:.9E} {one:.9E} {other:.9E}\n".replace("E", "D") for second, one, other in zip(t, force, acc / G))
+    text("fortran_exponents.dat", " TIME(s) FORCE_X(N) ACC_X(G)\n" + fortran)
+    expect("fortran_exponents.dat", both)
+    text("statistics_after.csv", head + rows(table) + "Mean,1.5,0.2\nRMS,3.5,1.2\n\nend of record\n")
+    expect("statistics_after.csv", both)
+    text("cut_off_line.csv", head + rows(table) + "0.0625,1")
+    expect("cut_off_line.csv", both)
+    text("no_header.lvm", rows([t, force, acc], "\t"))
+    expect("no_header.lvm", both, ["--map", "1=t:s,2=fx:N,3=ax:m/s^2"], ["1=t:s,2=fx:N,3=ax:m/s^2"])
+    text("without_ending", head + rows(table))
+    expect("without_ending", both)
 
 
 def save_level_7_3(path, variables, do_compression=False):
@@ -168,6 +208,8 @@ def mat_files_of_level(prefix, save_file):
 
     save("flat.mat", {"t": t, "fx": force, "ax": acc})
     expects("flat.mat", both, ["--map", "fx=fx:N,ax=ax:m/s^2"])
+    save("oscilloscope.mat", {"A": force * 2.2e-3, "B": acc / G * 10e-3, "Tinterval": 1 / RATE})
+    expects("oscilloscope.mat", both, ["--map", "A=fx:2.2 mV/N,B=ax:10 mV/g"])
     save("flat_fs.mat", {"F": force, "A": acc, "Fs": RATE}, do_compression=True)
     names = "F=fx:N,A=ax:m/s^2" if prefix == "" else "A=ax:m/s^2,F=fx:N"
     expects("flat_fs.mat", both, ["--map", "F=fx:N,A=ax:m/s^2"], [names])
@@ -270,6 +312,25 @@ def uff_files():
     pyuff.UFF(str(path)).write_sets([frf], "overwrite")
     expect_frf("accelerance.uff", {"xx": h}, digits=4)
 
+    def frf_file(name, sets):
+        path = FOLDER / name
+        path.write_bytes(b"")
+        pyuff.UFF(str(path)).write_sets(sets, "add")
+
+    # pyuff states the bytes of complex functions as if they were real.
+    frf_file("binary_accelerance.uff", [dict(frf, binary=1)])
+    expect_frf("binary_accelerance.uff", {"xx": h}, digits=4)
+    roving = [dict(frf, ref_node=node, data=-h * omega**2 / node) for node in (1, 2, 3)]
+    frf_file("roving_hammer.uff", roving)
+    expect_frf("roving_hammer.uff", {"xx": h}, digits=4)
+    frf_file("two_drive_points.uff", roving + [dict(frf, rsp_node=2, ref_node=2, data=-h * omega**2 / 4)])
+    expect_frf("two_drive_points.uff", {"xx": h}, ["--map", "1=hxx"], ["twice", "node 2", "--map 1=hxx"], digits=4)
+    frf_file("frf_without_direction.uff", [dict(frf, rsp_dir=0, ref_dir=0)])
+    expect_frf("frf_without_direction.uff", {"yy": h}, ["--map", "1=hyy"], ["direction 0", "--map 1=hxx"], digits=4)
+    ratio = dict(frf, data=-h * omega**2 / G, ordinate_axis_units_lab="g/N")
+    frf_file("ratio_in_label.uff", [ratio])
+    expect_frf("ratio_in_label.uff", {"xx": h}, digits=4)
+
 
 def wav_files():
     full = 200.0
@@ -324,6 +385,26 @@ def frf_tables():
     text("frf_side_by_side.csv", "Frequency (Hz),Hxx Real (m/N),Hxx Imag (m/N),Hyx Real (m/N),Hyx Imag (m/N),Coherence xx\n"
          + rows([f, h.real, h.imag, 0.1 * h.real, 0.1 * h.imag, np.full(len(f), 0.99)]))
     expect_frf("frf_side_by_side.csv", {"xx": h, "yx": 0.1 * h})
+    text("frf_row_of_units.txt", "Linear\tReal\tImaginary\nHz\tg/N\tg/N\n" + rows([f, a.real / G, a.imag / G], "\t"))
+    expect_frf("frf_row_of_units.txt", {"xx": h}, ["--map", "Real=hxx_re,Imaginary=hxx_im"], ["Real=hxx_re,Imaginary=hxx_im"])
+    text("frf_units_of_ratio.txt", "X-axis\tFRF TIP:+X/HAMM:+X (Real)\tFRF TIP:+X/HAMM:+X (Imag)\nHz\t(m/s^2)/N\t(m/s^2)/N\n" + rows([f, a.real, a.imag], "\t"))
+    expect_frf("frf_units_of_ratio.txt", {"xx": h})
+    text("frf_level_and_phase.csv", "Frequency [Hz];Level [dB re 1 g/N];Phase [deg]\n" + rows([f, 20 * np.log10(abs(a) / G), np.degrees(np.angle(a))], ";"))
+    expect_frf("frf_level_and_phase.csv", {"xx": h}, ["--map", "Level=hxx_db,Phase=hxx_phase"], ["Level=hxx_db,Phase=hxx_phase"])
+    text("frf_modulus.csv", "f [Hz];|Y| [m/(N·s)];arg Y [°]\n" + rows([f, abs(v), np.degrees(np.angle(v))], ";"))
+    expect_frf("frf_modulus.csv", {"zz": h}, ["--map", "|Y|=hzz_mag,arg Y=hzz_phase"], ["|Y|=hxx_mag,arg Y=hxx_phase"])
+    text("frf_all_forms.csv", "Frequency (Hz),Hyy Real (m/N),Hyy Imag (m/N),Hyy Mag (m/N),Hyy Phase (deg)\n" + rows([f, h.real, h.imag, abs(h), phase]))
+    expect_frf("frf_all_forms.csv", {"yy": h})
+    text("frf_all_forms_without_direction.csv", "Frequency (Hz),Real (m/N),Imag (m/N),Mag (m/N),Phase (deg)\n" + rows([f, h.real, h.imag, abs(h), phase]))
+    expect_frf("frf_all_forms_without_direction.csv", {"yy": h}, ["--map", "Real (m/N)=hyy_re,Imag (m/N)=hyy_im"], ["Real (m/N)=hxx_re,Imag (m/N)=hxx_im"])
+    text("frf_complex.csv", "freq_hz,H\n" + "".join(f"{hertz:.6g},{value.real:.9e}{value.imag:+.9e}i\n" for hertz, value in zip(f, h)))
+    expect_frf("frf_complex.csv", {"xx": h}, ["--map", "H real=hxx_re:m/N,H imag=hxx_im:m/N"], ["H real=hxx_re:m/N,H imag=hxx_im:m/N"])
+    np.savetxt(FOLDER / "frf_complex.txt", np.column_stack([f, h]))
+    expect_frf("frf_complex.txt", {"xx": h}, ["--map", "1=frequency_hz,3=hxx_re:m/N,4=hxx_im:m/N"])
+    text("frf_no_head.frf", rows([f, h.real, h.imag], " "))
+    expect_frf("frf_no_head.frf", {"xx": h}, ["--map", "1=frequency_hz,2=hxx_re:m/N,3=hxx_im:m/N"], ["1=frequency_hz,2=hxx_re:m/N,3=hxx_im:m/N"])
+    savemat(FOLDER / "frf_complex.mat", {"f": f, "H": h})
+    expect_frf("frf_complex.mat", {"xx": h}, ["--map", "H real=hxx_re:m/N,H imag=hxx_im:m/N"], ["H real=hxx_re:m/N,H imag=hxx_im:m/N"])
 
 
 def bad_files():
@@ -340,8 +421,12 @@ def bad_files():
     refused("bad_gap_in_time.csv", "not even")
     text("bad_not_a_number.csv", "Time [s],Force X [N]\n0,1\n0.1,nan\n0.2,3\n")
     refused("bad_not_a_number.csv", "line 3", "nan")
-    text("bad_utf16.csv", "Time [s],Force X [N]\n0,1\n0.1,2\n", "utf-16")
-    refused("bad_utf16.csv", "UTF-16", "UTF-8")
+    text("bad_missing_value.csv", "Time [s],Force X [N]\n0,1\n0.1,OVR\n0.2,3\n")
+    refused("bad_missing_value.csv", "line 3", "OVR", "--until-s")
+    text("bad_dynamic_stiffness.csv", "Frequency (Hz),Real (N/um),Imag (N/um)\n1,2,3\n2,3,4\n")
+    refused("bad_dynamic_stiffness.csv", "force per motion", "m/N")
+    (FOLDER / "bad_spreadsheet.xlsx").write_bytes(b"PK\x03\x04" + bytes(60))
+    refused("bad_spreadsheet.xlsx", "xlsx", "csv")
     savemat(FOLDER / "bad_text_only.mat", {"note": "nothing measured"})
     refused("bad_text_only.mat", "no numeric vector")
     save_level_7_3(FOLDER / "bad_hdf5_text_only.mat", {"note": "nothing measured"})
@@ -356,7 +441,7 @@ def main():
     FOLDER.mkdir(parents=True, exist_ok=True)
     for old in FOLDER.iterdir():
         old.unlink()
-    for make in (csv_files, mat_files, logger_files, uff_files, wav_files, frf_tables, bad_files):
+    for make in (csv_files, csv_files_with_doubts, csv_files_of_loggers, mat_files, logger_files, uff_files, wav_files, frf_tables, bad_files):
         make()
     (FOLDER / "truth.json").write_text(json.dumps(truth, indent=1, sort_keys=True) + "\n")
     size = sum(path.stat().st_size for path in FOLDER.iterdir())

@@ -52,6 +52,35 @@ impl FrfUnit {
     }
 }
 
+/// True for a unit of force per motion, such as `N/um`, `N·s/m` or `kg`.
+pub(super) fn is_force_per_motion(text: &str) -> bool {
+    let text = text.trim();
+    let is = |text: &str, of: &[Quantity]| text.parse::<Unit>().is_ok_and(|unit| of.contains(&unit.quantity));
+    let motions = [Quantity::Displacement, Quantity::Velocity, Quantity::Acceleration];
+    let over_motion = text.split_once('/').is_some_and(|(force, motion)| {
+        let force = force
+            .trim_start_matches('(')
+            .trim_end_matches(['s', 'S', ')', '·', '*', ' ']);
+        is(force, &[Quantity::Force]) && is(motion, &motions)
+    });
+    over_motion || text == "kg" || text == "kg/s"
+}
+
+/// Usual spelling of the unit of an FRF: `(m/s^2)/N` for `1/kg`, `(m/s)/N` for `s/kg`, `m/(N·s)`, `m/Ns` and `m/N/s`.
+fn respelled(text: &str) -> String {
+    let text = text.trim();
+    match text {
+        "1/kg" => return "(m/s^2)/N".into(),
+        "s/kg" => return "(m/s)/N".into(),
+        _ => {}
+    }
+    let endings = ["/(N·s)", "/(N⋅s)", "/(N*s)", "/(N s)", "/(Ns)", "/Ns", "/N/s"];
+    endings
+        .iter()
+        .find_map(|ending| text.strip_suffix(ending))
+        .map_or_else(|| text.to_owned(), |length| format!("({length}/s)/N"))
+}
+
 /// Parses the unit of an FRF, such as `um/N`, `m/s^2/N`, `g/N` or `1/kg`. An error if the text is no unit of a
 /// displacement, velocity or acceleration per unit of force.
 pub(super) fn frf_unit(text: &str) -> Result<FrfUnit, String> {
@@ -61,8 +90,13 @@ pub(super) fn frf_unit(text: &str) -> Result<FrfUnit, String> {
              (m/s^2)/N is needed"
         )
     };
-    // kg⁻¹ is (m/s²)/N.
-    let text = if text.trim() == "1/kg" { "m/s^2/N" } else { text };
+    if is_force_per_motion(text) {
+        return Err(format!(
+            "\"{text}\" is force per motion: dynamic stiffness, mechanical impedance or apparent mass, whose matrix is the inverse of that of receptance, \
+             mobility or accelerance; export one of these, in a unit such as m/N"
+        ));
+    }
+    let text = &respelled(text);
     let (response, force) = text.rsplit_once('/').ok_or_else(wrong)?;
     let response = response
         .strip_prefix('(')

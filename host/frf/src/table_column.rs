@@ -4,7 +4,7 @@
 use quietcut_model::structure::Direction;
 use quietcut_recording::{ColumnMap, RecordedChannel, Scale, TextColumn};
 
-use super::frf_unit::{FrfUnit, frf_unit, pair_of};
+use super::frf_unit::{FrfUnit, frf_unit, is_force_per_motion, pair_of};
 
 /// Content of a column.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -249,6 +249,7 @@ fn by_words(name: &str, unit: Option<&str>) -> Result<Meaning, String> {
         found.content = Content::Frequency(hertz.unwrap_or(1.0));
         return Ok(found);
     }
+    let is_modulus = name.trim().starts_with('|') && name.trim().ends_with('|');
     let is_level = plain_unit.to_lowercase().starts_with("db") || words.contains(&"db");
     let mut part = None;
     let mut label = Vec::new();
@@ -268,6 +269,7 @@ fn by_words(name: &str, unit: Option<&str>) -> Result<Meaning, String> {
     if found.content == Content::Coherence {
         return Ok(found);
     }
+    let part = part.or(is_modulus.then_some(Part::Magnitude));
     let part = match part {
         Some(Part::Phase(_)) => Part::Phase(phase(unit.as_deref())),
         Some(Part::Magnitude) | None if is_level => Part::Decibel,
@@ -294,7 +296,8 @@ fn name_and_ratio(title: &str) -> (String, Option<String>) {
             let is_phase = phase(Some(unit)) != PhaseUnit::Unstated;
             let lower = unit.trim().to_lowercase();
             let is_frequency = ["hz", "khz", "hertz", "rad/s"].contains(&lower.as_str());
-            if is_phase || is_frequency || lower.starts_with("db") || frf_unit(unit).is_ok() {
+            let is_ratio = frf_unit(unit).is_ok() || is_force_per_motion(unit);
+            if is_phase || is_frequency || lower.starts_with("db") || is_ratio {
                 return (title[..at].trim().into(), Some(unit.trim().into()));
             }
         }

@@ -7,7 +7,7 @@ use num_complex::Complex64;
 
 use super::frf_unit::{DirectionPair, FrfUnit, frf_unit, pair_of};
 use super::{Frf, FrfError, FrfTable, ImportedTable};
-use quietcut_recording::{Import, TextTable};
+use quietcut_recording::{Format, Import, TextTable};
 
 /// Content of a column of an FRF table, from its header.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -58,19 +58,17 @@ impl FrfTable {
     /// states them; and if `import` names columns of a file that states them itself, or a column that is not there.
     pub fn import(path: impl AsRef<Path>, import: &Import) -> Result<ImportedTable, FrfError> {
         let path = path.as_ref();
-        let ending = quietcut_recording::file::ending(path);
-        let table = match ending.as_str() {
-            "uff" | "unv" | "bunv" => super::table_uff::read(path)?,
-            _ => {
-                let is_own = TextTable::titles(path)?
-                    .iter()
-                    .any(|title| title == "frequency_hz" || title == "frequency_hz [Hz]");
-                if !is_own {
-                    return super::table_found::read(path, import);
-                }
-                Self::parse(path, &quietcut_recording::file::read_text(path)?)?
-            }
-        };
+        if Format::of(path)? == Format::Uff {
+            return super::table_uff::read(path, import);
+        }
+        let is_own = Format::of(path)? == Format::Text
+            && TextTable::titles(path)?
+                .iter()
+                .any(|title| title == "frequency_hz" || title == "frequency_hz [Hz]");
+        if !is_own {
+            return super::table_found::read(path, import);
+        }
+        let table = Self::parse(path, &quietcut_recording::file::read_text(path)?)?;
         if let Some(map) = import.map.first() {
             return Err(FrfError::Content {
                 path: path.into(),
@@ -87,16 +85,20 @@ impl FrfTable {
     }
 
     /// True if a file is an FRF table and not a recording over time: a text file by its column titles, a UFF file if it
-    /// can be read as an FRF table. Files with other extensions than those of text and UFF count as none.
+    /// has a frequency response function, a MAT-file by the names of its variables; any if `import` names
+    /// a column `frequency_hz`. Other files count as none.
     ///
     /// # Errors
     /// A text file cannot be read; a UFF file that cannot be read counts as no table.
-    pub fn is_table(path: &Path) -> Result<bool, FrfError> {
-        let ending = quietcut_recording::file::ending(path);
-        match ending.as_str() {
-            "uff" | "unv" | "bunv" => Ok(super::table_uff::read(path).is_ok()),
-            "csv" | "txt" | "dat" | "tsv" | "asc" => {
-                Ok(super::table_column::is_head(&TextTable::titles(path)?))
+    pub fn is_table(path: &Path, import: &Import) -> Result<bool, FrfError> {
+        if import.map.iter().any(|map| map.name == "frequency_hz") {
+            return Ok(true);
+        }
+        match Format::of(path) {
+            Ok(Format::Uff) => Ok(super::table_uff::has_frf(path)),
+            Ok(Format::Text) => Ok(super::table_column::is_head(&TextTable::titles(path)?)),
+            Ok(Format::Mat) => {
+                Ok(TextTable::titles(path).is_ok_and(|titles| super::table_column::is_head(&titles)))
             }
             _ => Ok(false),
         }

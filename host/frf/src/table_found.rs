@@ -22,8 +22,8 @@ use quietcut_recording::{Import, Sidecar, TextColumn, TextTable};
 pub struct ImportedTable {
     /// The table, receptances in m/N.
     pub table: FrfTable,
-    /// One line with the columns of each receptance, what they mean, and notes on the reading; `None` for a CSV table
-    /// in the format of this program and for UFF.
+    /// One line with the columns or functions of each receptance, what they mean, and notes on the reading; `None` for
+    /// a CSV table in the format of this program.
     pub understood: Option<String>,
 }
 
@@ -47,6 +47,7 @@ pub(super) fn read(path: &Path, import: &Import) -> Result<ImportedTable, FrfErr
         });
     }
     let mut columns = Vec::with_capacity(text.columns.len());
+    let mut is_named = Vec::with_capacity(text.columns.len());
     for (index, column) in text.columns.iter().enumerate() {
         let map = import
             .map
@@ -59,8 +60,37 @@ pub(super) fn read(path: &Path, import: &Import) -> Result<ImportedTable, FrfErr
             what,
         })?;
         columns.push((column, meaning));
+        is_named.push(map.is_some() || said.is_some_and(|said| said.name.is_some()));
     }
-    assemble(path, &columns, text.notes)
+    let notes = leave_out_unnamed(&mut columns, &is_named, text.notes);
+    assemble(path, &columns, notes)
+}
+
+/// If the user names a receptance, takes those out that neither the user nor the file names: the user chooses.
+fn leave_out_unnamed(
+    columns: &mut [(&TextColumn, Meaning)],
+    is_named: &[bool],
+    mut notes: Vec<String>,
+) -> Vec<String> {
+    let is_value = |meaning: &Meaning| matches!(meaning.content, Content::Value(_));
+    let chooses = columns
+        .iter()
+        .zip(is_named)
+        .any(|((_, meaning), is_named)| *is_named && is_value(meaning));
+    if !chooses {
+        return notes;
+    }
+    let mut left_out = Vec::new();
+    for ((column, meaning), is_named) in columns.iter_mut().zip(is_named) {
+        if !is_named && is_value(meaning) && meaning.directions.is_none() {
+            meaning.content = Content::Other;
+            left_out.push(column.name.as_str());
+        }
+    }
+    if !left_out.is_empty() {
+        notes.push(format!("{} left out", left_out.join(", ")));
+    }
+    notes
 }
 
 /// The two columns of one receptance: real and imaginary part, or magnitude and phase.
@@ -86,7 +116,12 @@ fn assemble(
             _ => None,
         })
         .ok_or_else(|| {
-            wrong("there is no column of frequencies, such as frequency_hz or Frequency (Hz)".into())
+            let names: Vec<&str> = columns.iter().map(|(column, _)| column.name.as_str()).collect();
+            wrong(format!(
+                "there is no column of frequencies, such as frequency_hz or Frequency (Hz), but {}; state the columns with --map {}",
+                names.join(", "),
+                proposed(&names, &["frequency_hz", "hxx_re:m/N", "hxx_im:m/N"])
+            ))
         })?;
     let mut frequency_hz: Vec<f64> = frequency.values.iter().map(|value| value * factor).collect();
     let pairs = pairs(path, columns)?;
@@ -121,7 +156,8 @@ fn assemble(
             folding: None,
         });
     }
-    // Mobility and accelerance cannot be integrated at 0 Hz: with one of them, the table has no line there.
+    // Mobility and accelerance cannot be integrated at 0 Hz, and many programs write no number there: then the table has
+    // no line there.
     if frequency_hz.first() == Some(&0.0)
         && entries
             .iter()
@@ -144,8 +180,43 @@ fn assemble(
     })
 }
 
-/// Pairs the two columns of each receptance: real and imaginary part, or magnitude and phase. An error if there is no
-/// pair, or if one of these columns stands alone.
+/// Text of the option `--map` for the first columns.
+fn proposed(names: &[&str], meanings: &[&str]) -> String {
+    let map: Vec<String> = names
+        .iter()
+        .zip(meanings)
+        .map(|(name, meaning)| format!("{name}={meaning}"))
+        .collect();
+    format!("\"{}\"", map.join(","))
+}
+
+/// True for a column of a real part, or a magnitude, of which `other` may hold the imaginary part, or the phase.
+fn is_partner(first: Part, other: Content) -> bool {
+    matches!(
+        (first, other),
+        (Part::Real, Content::Value(Part::Imaginary))
+            | (Part::Magnitude | Part::Decibel, Content::Value(Part::Phase(_)))
+    )
+}
+
+/// True if the receptance of a magnitude or phase is there as real and imaginary part too.
+fn is_given_as_parts(columns: &[(&TextColumn, Meaning)], meaning: &Meaning) -> bool {
+    let is_same = |other: &Meaning| other.label == meaning.label && other.directions == meaning.directions;
+    let has = |part: Part| {
+        columns
+            .iter()
+            .any(|(_, other)| other.content == Content::Value(part) && is_same(other))
+    };
+    let is_polar = matches!(
+        meaning.content,
+        Content::Value(Part::Magnitude | Part::Decibel | Part::Phase(_))
+    );
+    is_polar && has(Part::Real) && has(Part::Imaginary)
+}
+
+/// Pairs the two columns of each receptance: real and imaginary part, or magnitude and phase; a magnitude and a phase of
+/// which the real and imaginary part are there too are left out. An error if there is no pair, or if one of these
+/// columns stands alone.
 fn pairs<'a>(path: &Path, columns: &'a [(&'a TextColumn, Meaning)]) -> Result<Vec<Pair<'a>>, FrfError> {
     let mut pairs: Vec<Pair<'a>> = Vec::new();
     for (column, meaning) in columns {
@@ -153,21 +224,27 @@ fn pairs<'a>(path: &Path, columns: &'a [(&'a TextColumn, Meaning)]) -> Result<Ve
             continue;
         };
         // Each pair of columns is formed once, at the column of the real part or magnitude.
-        if matches!(part, Part::Imaginary | Part::Phase(_)) {
+        if matches!(part, Part::Imaginary | Part::Phase(_)) || is_given_as_parts(columns, meaning) {
             continue;
         }
         let is_other = |other: &&(&TextColumn, Meaning)| {
             let belongs = other.1.label == meaning.label && other.1.directions == meaning.directions;
-            belongs
-                && matches!(
-                    (part, other.1.content),
-                    (Part::Real, Content::Value(Part::Imaginary))
-                        | (Part::Magnitude | Part::Decibel, Content::Value(Part::Phase(_)))
-                )
+            belongs && is_partner(part, other.1.content)
+        };
+        // A table of one receptance may call its columns by words that have nothing in common: `Level`, `Phase`.
+        let only = || {
+            let firsts = columns.iter().filter(|(_, first)| match first.content {
+                Content::Value(first) => !matches!(first, Part::Imaginary | Part::Phase(_)),
+                _ => false,
+            });
+            let mut others = columns.iter().filter(|other| is_partner(part, other.1.content));
+            let other = others.next();
+            other.filter(|_| firsts.count() == 1 && others.next().is_none())
         };
         let Some((other, of_other)) = columns
             .iter()
             .find(is_other)
+            .or_else(only)
             .map(|(column, meaning)| (*column, meaning))
         else {
             return Err(alone(path, column));
@@ -182,7 +259,8 @@ fn pairs<'a>(path: &Path, columns: &'a [(&'a TextColumn, Meaning)]) -> Result<Ve
         return Err(FrfError::Content {
             path: path.into(),
             what: format!(
-                "no frequency response function in it; its columns are {}; real and imaginary part, or magnitude and phase, are needed",
+                "no frequency response function in it; its columns are {}; real and imaginary part, or magnitude and phase, are needed: state them \
+                 with --map COLUMN=hxx_re:m/N,COLUMN=hxx_im:m/N or with hxx_mag and hxx_phase",
                 columns
                     .iter()
                     .map(|(column, _)| column.name.clone())
@@ -194,7 +272,7 @@ fn pairs<'a>(path: &Path, columns: &'a [(&'a TextColumn, Meaning)]) -> Result<Ve
     let is_paired = |column: &TextColumn| pairs.iter().any(|pair| std::ptr::eq(pair.second.0, column));
     match columns.iter().find(|(column, meaning)| {
         let second = matches!(meaning.content, Content::Value(Part::Imaginary | Part::Phase(_)));
-        second && !is_paired(column)
+        second && !is_paired(column) && !is_given_as_parts(columns, meaning)
     }) {
         Some((column, _)) => Err(alone(path, column)),
         None => Ok(pairs),

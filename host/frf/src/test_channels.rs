@@ -60,12 +60,16 @@ impl<'a> TestChannels<'a> {
             warnings,
         };
         if channels.forces.is_empty() {
-            return Err(refused(recording.lacks("force fx, fy or fz that drives it")));
+            let asked = asked(recording, channels.responses.is_empty());
+            return Err(refused(
+                recording.lacks(format!("force fx, fy or fz that drives it{asked}")),
+            ));
         }
         if channels.responses.is_empty() {
-            return Err(refused(recording.lacks(
-                "response: a displacement x, y, z, a velocity vx … or an acceleration ax …",
-            )));
+            let asked = asked(recording, true);
+            return Err(refused(recording.lacks(format!(
+                "response: a displacement x, y, z, a velocity vx … or an acceleration ax …{asked}"
+            ))));
         }
         Ok(channels)
     }
@@ -112,6 +116,44 @@ impl<'a> TestChannels<'a> {
                 })
             }
         }
+    }
+}
+
+/// The option that would state what the channels without a meaning are; empty without such channels.
+fn asked(recording: &Recording, needs_response: bool) -> String {
+    let is_open = |channel: &&Channel| {
+        let is_unstated = matches!(
+            channel.quantity,
+            Quantity::Unknown | Quantity::Voltage | Quantity::Level
+        );
+        is_unstated
+            && !["tacho", "time", "rpm"].contains(&channel.name.as_str())
+            && Quantity::of_name(&channel.name).is_none()
+    };
+    let has_force = recording
+        .channels
+        .iter()
+        .any(|channel| channel.quantity == Quantity::Force);
+    let force = (!has_force).then_some(("fx", "N", "2.2 mV/N"));
+    let response = needs_response.then_some(("ax", "m/s^2", "10 mV/g"));
+    let wanted = force.into_iter().chain(response);
+    let map: Vec<String> = recording
+        .channels
+        .iter()
+        .filter(is_open)
+        .zip(wanted)
+        .map(|(channel, (name, unit, sensitivity))| match channel.quantity {
+            Quantity::Voltage => format!("{}={name}:{sensitivity}", channel.name),
+            _ => format!("{}={name}:{unit}", channel.name),
+        })
+        .collect();
+    if map.is_empty() {
+        String::new()
+    } else {
+        format!(
+            " (--map \"{}\" with the columns, names and units that hold states it)",
+            map.join(",")
+        )
     }
 }
 

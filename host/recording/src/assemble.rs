@@ -100,6 +100,7 @@ pub(super) fn recording(
         }
     }
     let mut notes = raw.notes;
+    let mut since_s = 0.0;
     let (sample_rate_hz, start_s, rate_from) =
         match (import.rate_hz, &time, raw.sample_rate_hz, sidecar.sample_rate_hz) {
             (Some(rate), time, ..) => {
@@ -109,7 +110,18 @@ pub(super) fn recording(
                 (rate, raw.start_s, "option")
             }
             (None, Some(time), ..) => {
-                let (rate, start) = even_rate(path, time)?;
+                let range = import.segment.of_stamps(time);
+                since_s = time[range.start.min(time.len().saturating_sub(1))..]
+                    .first()
+                    .zip(time.first())
+                    .map_or(0.0, |(start, first)| start - first);
+                for channel in &mut channels {
+                    channel.samples = channel
+                        .samples
+                        .get(range.clone())
+                        .map_or_else(|| channel.samples.clone(), <[f64]>::to_vec);
+                }
+                let (rate, start) = even_rate(path, &time[range])?;
                 (rate, start, "time column")
             }
             (None, None, Some(rate), _) => (rate, raw.start_s, "file"),
@@ -140,7 +152,7 @@ pub(super) fn recording(
         path: path.into(),
         sample_rate_hz,
         start_s,
-        since_s: 0.0,
+        since_s,
         channels,
         sidecar,
     };
@@ -212,8 +224,13 @@ fn require_names(path: &Path, raw: &Raw, sidecar: &Sidecar, import: &Import) -> 
             path: path.into(),
             line,
             what: format!(
-                "numbers without a row of names before them, in {} columns; add {map}, or a row of names such as t [s],fx [N],ax [m/s^2]",
-                names.len()
+                "numbers without a row of names before them, in {} columns; add {map}, or a row of names such as t [s],fx [N],ax [m/s^2]{}",
+                names.len(),
+                if grows && names.len() > 2 {
+                    "; for receptances --map 1=frequency_hz,2=hxx_re:m/N,3=hxx_im:m/N"
+                } else {
+                    ""
+                }
             ),
         },
         None => RecordingError::Content {
@@ -273,10 +290,25 @@ fn uneven(time: &[f64]) -> String {
     let gap = steps.get(largest).copied().unwrap_or(0.0);
     steps.sort_by(f64::total_cmp);
     let usual = steps.get(steps.len() / 2).copied().unwrap_or(0.0);
+    let (after, at) = (largest + 1, time.get(largest).copied().unwrap_or(0.0));
+    if usual <= 0.0 {
+        return format!(
+            "stamps repeat, so that they are rounded: the usual step is {usual} s, and the largest {gap:.6e} s after sample {after} at {at} s; \
+             state the rate with --rate"
+        );
+    }
+    // Each other step may be rounded, as the stamps of an even record are.
+    let missing = (gap / usual).round() - 1.0;
+    let others = steps.iter().rev().skip(1);
+    if missing >= 1.0 && others.clone().all(|step| (step - usual).abs() <= UNEVEN * usual) {
+        let next = time.get(largest + 1).copied().unwrap_or(at);
+        return format!(
+            "time is not even: about {missing} samples are missing after sample {after} at {at} s; use the part before it with --until-s {next}, or \
+             that after it with --from-s {next}"
+        );
+    }
     format!(
-        "time is not even: the largest step is {gap:.6e} s after sample {} at {} s, and the usual one {usual:.6e} s; resample it first, or state \
-         the rate with --rate if the stamps are only rounded",
-        largest + 1,
-        time.get(largest).copied().unwrap_or(0.0)
+        "time is not even: the largest step is {gap:.6e} s after sample {after} at {at} s, and the usual one {usual:.6e} s; resample it first, or state \
+         the rate with --rate if the stamps are only rounded"
     )
 }

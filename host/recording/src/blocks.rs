@@ -7,6 +7,7 @@ use quietcut_core::tachometer::{Edge, LevelDetector, LevelDetectorState, Wheel};
 use quietcut_core::units::{Degrees, Hertz, Millimeters, Nanoseconds, Rpm};
 use quietcut_core::working_point::{Tool, WorkingPoint};
 
+use super::channel_section::channel_section;
 use super::criteria::LEAST_SWING;
 use super::{Channel, Quantity, Recording, RecordingError};
 
@@ -149,10 +150,18 @@ fn axes(recording: &Recording) -> Result<([Option<&Channel>; 3], bool), Recordin
     match unknown.as_slice() {
         [only] => Ok(([Some(*only), None, None], false)),
         [] => Err(recording.lacks("acceleration channel ax, ay or az")),
-        _ => Err(recording.lacks(
-            "acceleration channel ax, ay or az, and it has several of unknown quantity; \
-             [channels.NAME] name = \"ax\" beside the recording says which",
-        )),
+        [first, ..] => {
+            let unit = match first.quantity {
+                Quantity::Voltage => "10 mV/g",
+                _ => "g",
+            };
+            Err(recording.lacks(format!(
+                "acceleration channel ax, ay or az, and it has several of unknown quantity; --map \"{name}=ax:{unit}\", or name = \"ax\" under {} \
+                 in the sidecar, says which",
+                channel_section(&first.name),
+                name = first.name,
+            )))
+        }
     }
 }
 

@@ -60,6 +60,10 @@ pub(crate) fn plausible_peak(quantity: Quantity) -> Option<(f64, f64)> {
     }
 }
 
+/// Spindle speed, rev/min, above which the pulses of a tachometer are probably those of a wheel with more marks than
+/// stated. Fast milling spindles reach 60 000 rev/min, and few, of micro milling, more than this. Unfounded.
+pub(crate) const FASTEST_SPINDLE_RPM: f64 = 100_000.0;
+
 /// Lowest sample rate, samples per second, at which a time column without unit is taken for seconds without a warning.
 /// Milliseconds read as seconds give a rate that is a thousandth: below 50 for loggers of up to 50 kHz. Tests of
 /// machine tools are sampled faster than that. Unfounded.

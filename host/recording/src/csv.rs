@@ -1,19 +1,16 @@
 //! Reader of text tables: a row of names, then rows of numbers. [`super::text_head`] finds separator, decimal mark and
 //! names.
 //!
-//! The file is read in chunks, so that its whole text is never in memory. Lines that start with `#`, `%` or `//` are
-//! comments. Empty lines are skipped. Numbers may be quoted. Columns without any value are left out, as are, in a table
-//! of several columns, unnamed ones that count the rows.
+//! The file is read in chunks, so that its whole text is never in memory. [`super::text_rows`] reads the rows.
 
-use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
 use super::RecordingError;
-use super::csv_number::{End, number};
-use super::raw::{FoundUnit, Raw, RawColumn};
-use super::text_dialect::{Dialect, Separator};
-use super::text_head::{Head, HeadColumn, head, is_comment};
+use super::raw::{FoundUnit, Raw};
+use super::text_file;
+use super::text_head::head;
+use super::text_rows::Table;
 use crate::file::FileError;
 
 /// Number of bytes of a text table that are read at once; a choice.
@@ -30,15 +27,15 @@ pub(super) fn read(path: &Path, finite: bool) -> Result<Raw, RecordingError> {
         path: path.into(),
         cause,
     };
-    let file = File::open(path).map_err(unreadable)?;
-    let length = file.metadata().map_err(unreadable)?.len();
+    let text_file::TextFile { text, length, note } = text_file::open(path).map_err(unreadable)?;
     if length == 0 {
         return Err(RecordingError::Content {
             path: path.into(),
             what: "the file is empty; a row of names and then rows of numbers are needed".into(),
         });
     }
-    let raw = table(path, file, length, CHUNK, finite)?;
+    let mut raw = table(path, text, length, CHUNK, finite)?;
+    raw.notes.extend(note);
     if raw.columns.iter().all(|column| column.samples.is_empty()) {
         return Err(RecordingError::Content {
             path: path.into(),
@@ -56,8 +53,8 @@ pub(super) fn titles(path: &Path) -> Result<Vec<String>, RecordingError> {
         cause,
     };
     let mut start = vec![0; HEAD_MAX];
-    let mut file = File::open(path).map_err(unreadable)?;
-    let filled = fill(&mut file, &mut start).map_err(unreadable)?;
+    let mut file = text_file::open(path).map_err(unreadable)?;
+    let filled = fill(&mut file.text, &mut start).map_err(unreadable)?;
     let columns = head(&start[..filled]).ok().and_then(|head| head.columns);
     Ok(columns
         .into_iter()
@@ -118,290 +115,19 @@ fn table(
             Err(cause) => return Err(unreadable(cause).into()),
         };
         let filled = &buffer[..kept + read];
-        let whole = if read == 0 {
-            filled.len()
-        } else {
-            filled
-                .iter()
-                .rposition(|&byte| byte == b'\n')
-                .map_or(0, |at| at + 1)
-        };
+        let whole = filled
+            .iter()
+            .rposition(|&byte| byte == b'\n')
+            .map_or(0, |at| at + 1);
         table.lines(&filled[..whole])?;
         if read == 0 {
+            table.last_line(&filled[whole..])?;
             return table.raw(head);
         }
         let end = kept + read;
         buffer.copy_within(whole..end, 0);
         kept = end - whole;
     }
-}
-
-/// Columns of a text table, filled while its lines are read.
-struct Table<'a> {
-    path: &'a Path,
-    /// Number of lines of the text table that are read so far, those of the head included.
-    line: u64,
-    columns: Vec<RawColumn>,
-    /// Empty fields of each column, in the order of `columns`.
-    gaps: Vec<Gaps>,
-    dialect: Dialect,
-    /// Length of the whole file of the text table, bytes.
-    bytes: u64,
-    /// True if a NaN or infinite value, or an empty field in a column with values, is an error.
-    finite: bool,
-}
-
-/// Empty fields of a column.
-#[derive(Clone, Copy, Default)]
-struct Gaps {
-    count: usize,
-    /// Number of the line with the first empty field of a column, from 1; 0 without empty fields.
-    line: u64,
-}
-
-/// End of an error message about a row of a text table with NaN or infinity: what the user can do.
-const LEAVE_OUT: &str = "a number is needed; repair the row, or leave it out with --from-s or --until-s";
-
-impl<'a> Table<'a> {
-    /// A table without samples yet, with the columns that the head of the text file names; unnamed columns are called
-    /// by their number.
-    fn new(path: &'a Path, head: &Head, bytes: u64, finite: bool) -> Self {
-        let unnamed = || {
-            vec![
-                HeadColumn {
-                    name: String::new(),
-                    unit: FoundUnit::None
-                };
-                head.width
-            ]
-        };
-        let columns = head.columns.clone().unwrap_or_else(unnamed);
-        Self {
-            path,
-            line: head.lines,
-            gaps: vec![Gaps::default(); columns.len()],
-            columns: columns
-                .into_iter()
-                .enumerate()
-                .map(|(index, column)| RawColumn {
-                    name: if column.name.is_empty() {
-                        (index + 1).to_string()
-                    } else {
-                        column.name
-                    },
-                    unit: column.unit,
-                    samples: Vec::new(),
-                })
-                .collect(),
-            dialect: head.dialect,
-            bytes,
-            finite,
-        }
-    }
-
-    /// Parses the complete lines of a text table in `text`; only the last line of a file may lack its line end.
-    fn lines(&mut self, text: &[u8]) -> Result<(), RecordingError> {
-        let is_plain = self.dialect == Dialect::PLAIN && !self.columns.is_empty();
-        let mut rest = text;
-        while !rest.is_empty() {
-            self.line += 1;
-            if !is_plain || matches!(rest[0], b'#' | b'%' | b'/' | b'\n' | b'\r' | b' ' | b'\t') {
-                let end = rest.iter().position(|&byte| byte == b'\n');
-                let (line, after) = rest.split_at(end.map_or(rest.len(), |at| at + 1));
-                rest = after;
-                match line.trim_ascii().first() {
-                    None => {}
-                    Some(b'#' | b'%' | b'/') if is_comment(&String::from_utf8_lossy(line)) => {}
-                    Some(_) if is_plain => {
-                        self.row(line.trim_ascii())?;
-                    }
-                    Some(_) => self.general_row(line)?,
-                }
-            } else {
-                rest = self.row(rest)?;
-            }
-        }
-        Ok(())
-    }
-
-    /// Parses the numbers in the first line of `text` into the columns and returns the text after this line.
-    fn row<'t>(&mut self, text: &'t [u8]) -> Result<&'t [u8], RecordingError> {
-        let mut rest = text;
-        for index in 0..self.columns.len() {
-            let is_last = index + 1 == self.columns.len();
-            let parsed = number(rest).filter(|&(value, _, end)| {
-                (value.is_finite() || !self.finite) && end == if is_last { End::Line } else { End::Field }
-            });
-            let Some((value, length, _)) = parsed else {
-                // The line may have empty fields, which this fast path does not parse: the values that it has already
-                // stored are removed, and the general parser reads the line.
-                for column in &mut self.columns[..index] {
-                    column.samples.pop();
-                }
-                let end = text
-                    .iter()
-                    .position(|&byte| byte == b'\n')
-                    .map_or(text.len(), |at| at + 1);
-                let (line, after) = text.split_at(end);
-                self.general_row(line)?;
-                return Ok(after);
-            };
-            self.columns[index].samples.push(value);
-            rest = &rest[length..];
-        }
-        self.make_room_after_first(text.len() - rest.len());
-        Ok(rest)
-    }
-
-    /// Parses a line of numbers with the separator and decimal mark of the file; an empty field becomes NaN and is
-    /// counted in the gaps of its column. A line of empty fields only is skipped.
-    fn general_row(&mut self, line: &[u8]) -> Result<(), RecordingError> {
-        let text = String::from_utf8_lossy(line);
-        let fields = self.dialect.fields(text.trim_matches(['\n', '\r']));
-        let extra = fields.get(self.columns.len()..).unwrap_or_default();
-        if fields.len() < self.columns.len() || extra.iter().any(|field| !field.is_empty()) {
-            return Err(self.row_error(&fields));
-        }
-        if fields.iter().all(|field| field.is_empty()) {
-            return Ok(());
-        }
-        for index in 0..self.columns.len() {
-            let field = fields[index];
-            let value = if field.is_empty() {
-                let gaps = &mut self.gaps[index];
-                if gaps.count == 0 {
-                    gaps.line = self.line;
-                }
-                gaps.count += 1;
-                f64::NAN
-            } else {
-                match self.dialect.number(field) {
-                    Some(value) if value.is_finite() || !self.finite => value,
-                    _ => return Err(self.row_error(&fields)),
-                }
-            };
-            self.columns[index].samples.push(value);
-        }
-        self.make_room_after_first(line.len());
-        Ok(())
-    }
-
-    /// After the first row, of `line` bytes, reserves memory for the samples of the whole file; after other rows does
-    /// nothing. Growth by doubling could take twice the memory.
-    fn make_room_after_first(&mut self, line: usize) {
-        if self
-            .columns
-            .first()
-            .is_none_or(|column| column.samples.len() != 1)
-        {
-            return;
-        }
-        let lines = usize::try_from(self.bytes).unwrap_or(0) / line.max(1);
-        // The estimate of the number of rows is mostly too high, since later rows are longer (time gets more digits).
-        // The surplus is small, and unused memory is not committed.
-        for column in &mut self.columns {
-            column.samples.reserve_exact(lines);
-        }
-    }
-
-    /// The columns of the text table that have values, without unnamed ones that count the rows. If values must be
-    /// finite, a column with values in some rows and empty fields in others is an error.
-    fn raw(self, head: Head) -> Result<Raw, RecordingError> {
-        let mut notes = head.notes;
-        let is_unnamed = |name: &str, index: usize| {
-            head.columns
-                .as_ref()
-                .is_some_and(|columns| columns[index].name.is_empty())
-                && name.parse() == Ok(index + 1)
-        };
-        let mut columns = Vec::with_capacity(self.columns.len());
-        let several = self.columns.len() > 1;
-        for (index, (mut column, gaps)) in self.columns.into_iter().zip(&self.gaps).enumerate() {
-            if gaps.count > 0 && gaps.count == column.samples.len() {
-                if !is_unnamed(&column.name, index) {
-                    notes.push(format!("column \"{}\" is empty", column.name));
-                }
-                continue;
-            }
-            if gaps.count > 0 && self.finite {
-                return Err(RecordingError::Line {
-                    path: self.path.into(),
-                    line: gaps.line,
-                    what: format!("\"\" in column \"{}\": a number is needed", column.name),
-                });
-            }
-            if several && is_unnamed(&column.name, index) && is_counting(&column.samples) {
-                notes.push(format!("column {} counts the rows", index + 1));
-                continue;
-            }
-            column.samples.shrink_to_fit();
-            columns.push(column);
-        }
-        Ok(Raw {
-            columns,
-            worded_rate_hz: head.rate_hz,
-            unnamed_line: head.columns.is_none().then_some(head.lines + 1),
-            notes,
-            ..Raw::default()
-        })
-    }
-
-    /// Error that names the fault in a row of a text table whose fields are `fields`.
-    fn row_error(&self, fields: &[&str]) -> RecordingError {
-        if fields.len() != self.columns.len() {
-            let commas = if self.dialect == Dialect::PLAIN && fields.len() > self.columns.len() {
-                "; if numbers have decimal commas, save the file with semicolons between the columns, or with decimal points"
-            } else {
-                ""
-            };
-            return self.wrong(format!(
-                "{} values, but the header has {} columns{commas}",
-                fields.len(),
-                self.columns.len()
-            ));
-        }
-        let parsed = |field: &str| self.dialect.number(field);
-        let is_number = |field: &str| parsed(field).is_some_and(|value| value.is_finite() || !self.finite);
-        let wrong = fields
-            .iter()
-            .zip(&self.columns)
-            .find(|(field, _)| !field.is_empty() && !is_number(field));
-        self.wrong(match wrong {
-            Some((field, column)) => {
-                // The message shows at most 40 characters of the field, because a damaged file may have a very long
-                // one.
-                let shown: String = field.chars().take(40).collect();
-                let needed = if parsed(field).is_some() {
-                    LEAVE_OUT
-                } else {
-                    "a number is needed"
-                };
-                format!("\"{shown}\" in column \"{}\": {needed}", column.name)
-            }
-            None => match self.dialect.separator {
-                Separator::Comma => "a number for each column is needed, with commas between".into(),
-                _ => "a number for each column is needed".into(),
-            },
-        })
-    }
-
-    fn wrong(&self, what: String) -> RecordingError {
-        RecordingError::Line {
-            path: self.path.into(),
-            line: self.line,
-            what,
-        }
-    }
-}
-
-/// True if the samples count the rows of the table from 0 or 1, as the index column of a data frame does.
-fn is_counting(samples: &[f64]) -> bool {
-    let first = samples.first().copied().unwrap_or(f64::NAN);
-    (first == 0.0 || first == 1.0)
-        && samples
-            .iter()
-            .enumerate()
-            .all(|(index, sample)| *sample == first + index as f64)
 }
 
 #[cfg(test)]
@@ -444,8 +170,6 @@ mod tests {
             let said = parse(format!("a,b\n1,2\n{row}\n3,4\n").as_bytes(), 4).unwrap_err();
             assert!(said.contains("line 3") && said.contains(words), "{row}: {said}");
         }
-        let said = parse(b"\xff\xfea\0,\0", 64).unwrap_err();
-        assert!(said.contains("line 1") && said.contains("UTF-16"), "{said}");
     }
 
     #[test]
@@ -470,6 +194,26 @@ mod tests {
             said.contains("line 3") && said.contains("\"x\" in column \"b\""),
             "{said}"
         );
+    }
+
+    #[test]
+    fn a_cut_off_last_line_and_text_after_the_numbers_are_left_out() {
+        let kept = Ok(vec![vec![1.0, 3.0], vec![2.0, 4.0]]);
+        for text in [
+            "a,b\n1,2\n3,4\n5",
+            "a,b\n1,2\n3,4\n5,-",
+            "a,b\n1,2\n3,4\n5,1e",
+            "a,b\n1,2\n3,4\nend of data\n",
+            "a,b\n1,2\n3,4\n\nend,of,data\nsaved by Huber",
+        ] {
+            for chunk in [1, 64] {
+                assert_eq!(parse(text.as_bytes(), chunk), kept, "{text}");
+            }
+        }
+        for text in ["a,b\n1,2\n5,x", "a,b\n1,2\n5\n", "a,b\n1,2\nstop\n3,4\n"] {
+            let said = parse(text.as_bytes(), 3).unwrap_err();
+            assert!(said.contains("line 3"), "{text}: {said}");
+        }
     }
 
     proptest! {

@@ -1,9 +1,11 @@
-//! Reads and writes recordings; the file extension selects the format.
+//! Reads and writes recordings; [`Format`] finds the format of a file that is read, the file extension selects that of
+//! one that is written.
 
 use std::path::Path;
 
 use super::assemble::{self, Imported};
 use super::error::RecordingError;
+use super::format::Format;
 use super::import::Import;
 use super::recording::Recording;
 use super::segment::Segment;
@@ -65,23 +67,14 @@ impl Recording {
     /// and the file does not have.
     pub fn import_all(path: impl AsRef<Path>, import: &Import) -> Result<Vec<Imported>, RecordingError> {
         let path = path.as_ref();
-        let ending = crate::file::ending(path);
         let finite = import.segment.is_whole();
-        let records = match ending.as_str() {
-            "csv" | "txt" | "dat" | "tsv" | "asc" => vec![csv::read(path, finite)?],
-            "wav" => vec![wav::read(path)?],
-            "mat" => mat::read(path)?,
-            "lvm" => lvm::read(path)?,
-            "tdms" => tdms::read(path)?,
-            "uff" | "unv" | "bunv" => vec![uff::read(path, finite)?],
-            _ => {
-                // A missing file is reported before an unknown extension.
-                crate::file::read(path)?;
-                return Err(RecordingError::Format {
-                    path: path.into(),
-                    found: ending,
-                });
-            }
+        let records = match Format::of(path)? {
+            Format::Text => vec![csv::read(path, finite)?],
+            Format::Wav => vec![wav::read(path)?],
+            Format::Mat => mat::read(path)?,
+            Format::Lvm => lvm::read(path)?,
+            Format::Tdms => tdms::read(path)?,
+            Format::Uff => vec![uff::read(path, finite)?],
         };
         let count = records.len();
         let first = match import.record {

@@ -1,5 +1,6 @@
 //! Options of an import: what the user states about a file on the command line.
 
+use super::Quantity;
 use super::segment::Segment;
 use super::unit::{Sensitivity, Unit};
 
@@ -34,6 +35,10 @@ pub struct ColumnMap {
     pub scale: Option<Scale>,
 }
 
+/// The facts about columns that one option `--map` states.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ColumnMaps(pub Vec<ColumnMap>);
+
 /// Unit of the samples of a column, sensitivity of the sensor that gave them, or unit of a frequency response function.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Scale {
@@ -46,6 +51,32 @@ pub enum Scale {
 }
 
 impl ColumnMap {
+    /// Parses the text of the option `--map` for one or more columns, with commas between, each as for
+    /// [`ColumnMap::parse`]. A comma before which no channel is stated belongs to the name of a column: `Input 1,
+    /// Hammer=fx`.
+    ///
+    /// # Errors
+    /// As [`ColumnMap::parse`].
+    pub fn parse_list(text: &str) -> Result<ColumnMaps, String> {
+        let mut maps = Vec::new();
+        let mut begun = String::new();
+        for part in text.split(',') {
+            begun = if begun.is_empty() {
+                part.to_owned()
+            } else {
+                format!("{begun},{part}")
+            };
+            if part.contains('=') {
+                maps.push(Self::parse(&begun)?);
+                begun.clear();
+            }
+        }
+        if !begun.is_empty() || maps.is_empty() {
+            maps.push(Self::parse(&begun)?);
+        }
+        Ok(ColumnMaps(maps))
+    }
+
     /// Parses the text of the option `--map` for one column, `COLUMN=NAME` or `COLUMN=NAME:UNIT`, with `@POINT` after the
     /// name for a sensor at a named point, such as `acc=ax:g`, `2=fx@5:N`, `acc=-az`, `ch1=ax:10.2 mV/g`.
     ///
@@ -111,12 +142,18 @@ impl ColumnMap {
 }
 
 /// True if the text is a unit of a frequency response function: a ratio of two units such as `um/N`, or `1/kg` or `dB`.
-fn is_ratio(text: &str) -> bool {
+pub(super) fn is_ratio(text: &str) -> bool {
     let of_force = text.rsplit_once('/').is_some_and(|(response, force)| {
-        let is_unit = |text: &str| text.parse::<Unit>().is_ok();
+        let is_unit = |text: &str| {
+            text.parse::<Unit>()
+                .is_ok_and(|unit| unit.quantity != Quantity::Level)
+        };
         is_unit(response) && is_unit(force)
     });
-    of_force || text == "1/kg" || text.eq_ignore_ascii_case("db")
+    let of_force_and_time = ["(N·s)", "(N*s)", "(N s)", "(Ns)", "Ns", "N/s"]
+        .iter()
+        .any(|ending| text.ends_with(ending) && text.contains('/'));
+    of_force || of_force_and_time || ["1/kg", "s/kg"].contains(&text) || text.eq_ignore_ascii_case("db")
 }
 
 #[cfg(test)]
@@ -146,6 +183,10 @@ mod tests {
         for wrong in ["acc", "=ax", "acc=", "acc=ax:furlong", "acc=ax@", "acc=@3"] {
             assert!(ColumnMap::parse(wrong).is_err(), "{wrong}");
         }
+        let list = ColumnMap::parse_list("Input 1, Hammer=fx:N,3=ax:m/s^2").unwrap();
+        let columns: Vec<&str> = list.0.iter().map(|map| map.column.as_str()).collect();
+        assert_eq!(columns, ["Input 1, Hammer", "3"]);
+        assert!(ColumnMap::parse_list("3=ax,acc").is_err() && ColumnMap::parse_list("").is_err());
         let names = ["acc".to_owned(), "2".to_owned()];
         let two = ColumnMap::parse("2=fx").unwrap();
         assert!(two.is_about("2", 2, &names) && !two.is_about("acc", 2, &names));

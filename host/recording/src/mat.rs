@@ -4,7 +4,7 @@
 //! matrix. The columns of a square matrix are channels. [`records`] finds the records in the variables, whichever level
 //! the file has.
 //!
-//! Objects, complex, logical and sparse arrays, and arrays of more than two dimensions are skipped.
+//! Objects, logical and sparse arrays, arrays of more than two dimensions, and in level 7.3 complex ones are skipped.
 //!
 //! The length of the file bounds the allocated memory, whatever sizes its headers state; 64 MiB of values are allowed
 //! for any file.

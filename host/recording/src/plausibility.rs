@@ -1,7 +1,8 @@
 //! Plausibility of units: peak values that no sensor measures, and displacement, velocity and acceleration of one
 //! direction that contradict each other by a unit factor such as 1000.
 
-use super::criteria::{SAME_MOTION, UNIT_FACTOR, plausible_peak};
+use super::blocks::{rises, wheel};
+use super::criteria::{FASTEST_SPINDLE_RPM, SAME_MOTION, UNIT_FACTOR, plausible_peak};
 use super::{Channel, Quantity, Recording};
 
 /// Factors by which the unit of a channel is often wrong: g instead of m/s², milli, micro.
@@ -10,6 +11,7 @@ const FACTORS: [(f64, &str); 3] = [(9.806_65, "9.81 (g and m/s²)"), (1e3, "1000
 /// Warnings about channels whose unit is probably wrong; empty if there is none.
 pub(super) fn warnings(recording: &Recording) -> Vec<String> {
     let mut warnings: Vec<String> = recording.channels.iter().filter_map(peak).collect();
+    warnings.extend(fast_tachometer(recording));
     for axis in ["x", "y", "z"] {
         let of = |prefix: &str, quantity: Quantity| {
             recording
@@ -30,6 +32,25 @@ pub(super) fn warnings(recording: &Recording) -> Vec<String> {
         }
     }
     warnings
+}
+
+/// Warning for a tachometer whose pulses, by the marks that the sidecar states, give a spindle speed that few spindles
+/// reach: the wheel has probably more marks. `None` for slower or missing ones.
+fn fast_tachometer(recording: &Recording) -> Option<String> {
+    let wheel = wheel(recording)?;
+    let level = recording.channel("tacho")?.samples.as_slice();
+    let samples: Vec<usize> = rises(level).map(|rise| rise.sample).collect();
+    let mut steps: Vec<usize> = samples.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    steps.sort_unstable();
+    let usual = *steps.get(steps.len() / 2).filter(|step| **step > 0)?;
+    let rpm = 60.0 * recording.sample_rate_hz / (usual as f64 * f64::from(wheel.positions.max(1)));
+    (rpm > FASTEST_SPINDLE_RPM).then(|| {
+        format!(
+            "the pulses of tacho are those of {rpm:.0} rev/min at {} marks per revolution: if the wheel has more, state pulses_per_rev under \
+             [channels.tacho] in the sidecar",
+            wheel.positions
+        )
+    })
 }
 
 /// Warning for a channel whose peak value lies outside the range that sensors measure; `None` for other channels.

@@ -1,5 +1,7 @@
 //! A segment of a recording, which the options `--from-s` and `--until-s` select by start and end time.
 
+use std::ops::Range;
+
 use super::criteria::SAME_SAMPLE;
 use super::{Recording, RecordingError};
 
@@ -16,6 +18,22 @@ impl Segment {
     /// True if neither start nor end is given.
     pub fn is_whole(self) -> bool {
         self.from_s.is_none() && self.until_s.is_none()
+    }
+
+    /// Range of the samples with these time stamps, s, that lie in the segment: from the first in it to the last. All of
+    /// them if fewer than two do, for which [`Segment::of`] has the message.
+    pub(super) fn of_stamps(self, time_s: &[f64]) -> Range<usize> {
+        let whole = 0..time_s.len();
+        // A time that is stated with the digits of the stamp may be rounded apart from it.
+        let same = |stamp: f64| SAME_SAMPLE * (1e-6 + stamp.abs()) * 1e-6;
+        let is_in = |stamp: &f64| {
+            self.from_s.is_none_or(|from| *stamp >= from - same(from))
+                && self.until_s.is_none_or(|until| *stamp < until - same(until))
+        };
+        match (time_s.iter().position(is_in), time_s.iter().rposition(is_in)) {
+            (Some(first), Some(last)) if last > first => first..last + 1,
+            _ => whole,
+        }
     }
 
     /// Cuts the segment out of `recording`.

@@ -1,5 +1,7 @@
 //! Notation of the lines of a text table: separator between fields and decimal mark.
 
+use super::text_number::{complex, is_no_value};
+
 /// Separator between the fields of a line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Separator {
@@ -53,21 +55,16 @@ impl Dialect {
 
     /// Number in a field of a text table; `None` if the field is no number in this notation.
     pub(super) fn number(self, field: &str) -> Option<f64> {
-        if self.decimal_comma && field.contains(',') {
-            if field.contains('.') {
-                return None;
-            }
-            return fast_float2::parse(field.replace(',', ".")).ok();
-        }
-        fast_float2::parse(field).ok()
+        super::text_number::number(field, self.decimal_comma)
     }
 
-    /// Number of fields in a line of a text table if all are numbers or empty; `None` if a field is text, or no field
+    /// Number of fields in a line of a text table if all are numbers, complex ones included, or without value; `None` if a field is text, or no field
     /// is a number.
     pub(super) fn count_of_numbers(self, line: &str) -> Option<usize> {
         let fields = self.fields(line);
-        let numbers = fields.iter().filter(|field| self.number(field).is_some()).count();
-        let empty = fields.iter().filter(|field| field.is_empty()).count();
+        let is_number = |field: &&&str| self.number(field).is_some() || complex(field).is_some();
+        let numbers = fields.iter().filter(is_number).count();
+        let empty = fields.iter().filter(|field| is_no_value(field)).count();
         (numbers > 0 && numbers + empty == fields.len()).then_some(fields.len())
     }
 

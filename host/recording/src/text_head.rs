@@ -4,8 +4,10 @@
 //! The head ends before the first line of numbers that is the last line, is followed by one with as many fields, or, in
 //! a table of several columns, is preceded by a row of as many fields. Comments and empty lines do not count.
 
+use super::import::is_ratio;
 use super::raw::FoundUnit;
 use super::text_dialect::{Dialect, Separator, bare, blank_fields};
+use super::text_number::complex;
 use super::text_rate::rate;
 use super::unit::Unit;
 use super::words::name_and_unit;
@@ -24,6 +26,9 @@ pub(super) struct Head {
     pub(super) dialect: Dialect,
     /// Columns of the text table with names and units; `None` if the file has no row of names.
     pub(super) columns: Option<Vec<HeadColumn>>,
+    /// For each field of a row of the text table, true if its numbers are complex: they are two columns. Empty if none
+    /// are.
+    pub(super) complex: Vec<bool>,
     /// Number of columns in the first line of numbers of the text table; without such a line, number of fields in the
     /// first line that is no comment, or 0.
     pub(super) width: usize,
@@ -67,11 +72,8 @@ fn without_marks(line: &str) -> &str {
 ///
 /// # Errors
 /// Number of the line and description of the fault: text among numbers, a line with another count of numbers before the
-/// first row, commas as both separator and decimal mark, or a text in UTF-16.
+/// first row, or commas as both separator and decimal mark.
 pub(super) fn head(bytes: &[u8]) -> Result<Head, (u64, String)> {
-    if bytes.starts_with(b"\xff\xfe") || bytes.starts_with(b"\xfe\xff") {
-        return Err((1, "the text is UTF-16; save it as UTF-8".into()));
-    }
     let (text, is_latin) = decoded(bytes);
     let lines = lines(&text, bytes);
     let filled: Vec<&Line> = lines.iter().filter(|line| !line.text.trim().is_empty()).collect();
@@ -107,6 +109,7 @@ pub(super) fn head(bytes: &[u8]) -> Result<Head, (u64, String)> {
                 .filter(|_| data.len() > 1)
                 .map_or(lines.len() as u64, |line| line.number - 1),
             rate_hz: None,
+            complex: Vec::new(),
             notes,
         });
     };
@@ -119,10 +122,21 @@ pub(super) fn head(bytes: &[u8]) -> Result<Head, (u64, String)> {
         .take_while(|line| line.number < first.number)
         .filter(|line| !used.contains(&line.number))
         .find_map(|line| rate(without_marks(line.text), dialect.decimal_comma));
+    let complex: Vec<bool> = dialect
+        .fields(first.text)
+        .iter()
+        .map(|field| complex(field).is_some())
+        .collect();
+    let complex = if complex.contains(&true) {
+        complex
+    } else {
+        Vec::new()
+    };
     Ok(Head {
         dialect,
-        columns,
-        width,
+        columns: columns.map(|columns| parts(columns, &complex)),
+        width: width + complex.iter().filter(|is_complex| **is_complex).count(),
+        complex,
         offset: first.offset,
         lines: first.number - 1,
         rate_hz,
@@ -347,39 +361,36 @@ fn names(dialect: Dialect, line: &str, width: usize) -> Option<Vec<&str>> {
     (joined.len() == width).then_some(joined)
 }
 
-/// True if a line of the head is a row of units: every field is empty, in brackets, or a known unit, and not all are
-/// empty.
+/// True if a line of the head is a row of units: every field is empty, in brackets, a known unit, that of a frequency
+/// response function or of a phase, and not all are empty.
 fn is_units(fields: &[&str]) -> bool {
     let is_bracketed = |field: &str| {
         (field.starts_with('(') && field.ends_with(')')) || (field.starts_with('[') && field.ends_with(']'))
     };
-    let is_unit = |field: &&str| field.is_empty() || is_bracketed(field) || field.parse::<Unit>().is_ok();
+    let is_of_frf = |field: &str| {
+        ["hz", "khz", "rad/s", "deg", "°", "degrees", "rad"].contains(&field.to_lowercase().as_str())
+            || is_ratio(field)
+    };
+    let is_unit = |field: &&str| {
+        field.is_empty() || is_bracketed(field) || is_of_frf(field) || field.parse::<Unit>().is_ok()
+    };
     fields.iter().all(is_unit) && fields.iter().any(|field| !field.is_empty())
 }
 
 /// Names and units of columns from their titles, with the units from a row of units if the head has one.
 fn head_columns(titles: &[&str], units: Option<&[&str]>) -> Vec<HeadColumn> {
-    titles
+    let columns = titles
         .iter()
         .enumerate()
         .map(|(index, title)| {
             if let Some(unit) = units.and_then(|units| units.get(index)) {
-                let unit = unit
-                    .trim_start_matches(['(', '['])
-                    .trim_end_matches([')', ']'])
-                    .trim();
-                let balanced = unit.matches('(').count() == unit.matches(')').count();
-                let unit = if balanced {
-                    unit.to_owned()
-                } else {
-                    format!("{unit})")
-                };
+                let unit = unbracketed(unit);
                 return HeadColumn {
                     name: (*title).into(),
                     unit: if unit.is_empty() {
                         FoundUnit::None
                     } else {
-                        FoundUnit::Text(unit)
+                        FoundUnit::Text(unit.into())
                     },
                 };
             }
@@ -389,85 +400,59 @@ fn head_columns(titles: &[&str], units: Option<&[&str]>) -> Vec<HeadColumn> {
                 unit: unit.map_or(FoundUnit::None, |unit| FoundUnit::Text(unit.into())),
             }
         })
+        .collect();
+    told_apart(columns)
+}
+
+/// Columns with two for each that holds complex numbers: `H real` and `H imag`.
+fn parts(columns: Vec<HeadColumn>, complex: &[bool]) -> Vec<HeadColumn> {
+    let is_complex = complex.iter().copied().chain(std::iter::repeat(false));
+    let two = |column: HeadColumn, is_complex| {
+        let part = |part: &str| HeadColumn {
+            name: format!("{} {part}", column.name).trim_start().into(),
+            unit: column.unit.clone(),
+        };
+        if is_complex {
+            vec![part("real"), part("imag")]
+        } else {
+            vec![column]
+        }
+    };
+    columns
+        .into_iter()
+        .zip(is_complex)
+        .flat_map(|(column, is_complex)| two(column, is_complex))
         .collect()
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn found(text: &str) -> Head {
-        head(text.as_bytes()).unwrap()
-    }
-
-    fn titles(head: &Head) -> Vec<String> {
-        let columns = head.columns.iter().flatten();
-        columns
-            .map(|column| match &column.unit {
-                FoundUnit::Text(unit) => format!("{} [{unit}]", column.name),
-                _ => column.name.clone(),
-            })
-            .collect()
-    }
-
-    #[test]
-    fn heads_are_found_behind_prose_units_and_comments() {
-        for (text, expected, lines) in [
-            ("Time (s),Force (N)\n0,1\n1,2\n", vec!["Time [s]", "Force [N]"], 1),
-            (
-                "Time,Force,Accel X\n(s),(N),(m/s^2)\n0,1,2\n1,2,3\n",
-                vec!["Time [s]", "Force [N]", "Accel X [m/s^2]"],
-                2,
-            ),
-            (
-                "Messung vom 3.4.2024\nBearbeiter;Huber\n\nZeit [s];Kraft [N]\n0,0;1,5\n0,1;2,5\n",
-                vec!["Zeit [s]", "Kraft [N]"],
-                4,
-            ),
-            ("# t fx ax\n0 1 2\n1 2 3\n", vec!["t", "fx", "ax"], 1),
-            ("% made\nt\tfx\n0\t1\n1\t2\n", vec!["t", "fx"], 2),
-            ("Time (s) Force (N)\n0 1\n1 2\n", vec!["Time [s]", "Force [N]"], 1),
-            ("0 1\n1 2\n", vec![], 0),
-            ("t,fx\n0,1\n", vec!["t", "fx"], 1),
-        ] {
-            let head = found(text);
-            assert_eq!(
-                (titles(&head), head.lines),
-                (expected.iter().map(ToString::to_string).collect(), lines),
-                "{text}"
-            );
+/// Text without the brackets around all of it: `m/s^2` of `(m/s^2)`, but `(m/s^2)/N` stays.
+fn unbracketed(text: &str) -> &str {
+    let text = text.trim();
+    for (open, close) in [('(', ')'), ('[', ']')] {
+        let inner = text
+            .strip_prefix(open)
+            .and_then(|inner| inner.strip_suffix(close));
+        if let Some(inner) = inner
+            && inner.matches(open).count() == inner.matches(close).count()
+            && !inner.find(close).is_some_and(|at| !inner[..at].contains(open))
+        {
+            return inner.trim();
         }
-        let german = found("Zeit [s];Kraft [N]\n0,0;1,5\n0,1;2,5\n");
-        assert_eq!(
-            german.dialect,
-            Dialect {
-                separator: Separator::Semicolon,
-                decimal_comma: true
-            }
-        );
-        let latin = head(b"Zeit [s];a [m/s\xb2]\n0;1\n1;2\n").unwrap();
-        assert_eq!(titles(&latin), ["Zeit [s]", "a [m/s²]"]);
-        assert_eq!(latin.offset, 18);
     }
-
-    #[test]
-    fn text_among_the_first_numbers_is_no_name() {
-        let (line, what) = head(b"t,fx\n0,abc\n1,2\n2,3\n").unwrap_err();
-        assert!(line == 2 && what.contains("abc"), "{what}");
-    }
-
-    #[test]
-    fn decimal_commas_between_commas_are_named() {
-        for text in [
-            "t [s],fx [N],ax [g]\n0,-0,5,1\n0,1,1,5,2,5\n0,2,2,5,3,5\n",
-            "t [s],fx [N],ax [g]\n0,0,0,5,1,5\n0,1,1,5,2,5\n0,2,2,5,3,5\n",
-        ] {
-            let (line, what) = head(text.as_bytes()).unwrap_err();
-            for word in ["decimal mark", "semicolons", "3 columns"] {
-                assert!(line == 2 && what.contains(word), "{text}: {line}, {what}");
-            }
-        }
-        // Trailing commas are no decimal commas.
-        assert!(head(b"t,fx\n0,1,\n1,2,\n").is_ok());
-    }
+    text
 }
+
+/// Columns with a number behind each name that an earlier column has: `ay`, `ay (2)`.
+fn told_apart(mut columns: Vec<HeadColumn>) -> Vec<HeadColumn> {
+    let names: Vec<String> = columns.iter().map(|column| column.name.clone()).collect();
+    for (index, column) in columns.iter_mut().enumerate() {
+        let earlier = names[..index].iter().filter(|name| **name == column.name).count();
+        if earlier > 0 && !column.name.is_empty() {
+            column.name = format!("{} ({})", column.name, earlier + 1);
+        }
+    }
+    columns
+}
+
+#[cfg(test)]
+mod tests;

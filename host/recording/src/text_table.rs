@@ -1,9 +1,9 @@
-//! Text tables as other programs write them: columns of numbers with name and unit.
+//! Tables as other programs write them, as text or in a MAT-file: columns of numbers with name and unit.
 
 use std::path::Path;
 
 use super::raw::FoundUnit;
-use super::{RecordingError, csv};
+use super::{Format, RecordingError, csv, mat};
 
 /// Columns of a text table.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -29,10 +29,21 @@ impl TextTable {
     /// Reads a text table with comma, semicolon, tab or blanks between the columns, and decimal point or comma.
     ///
     /// # Errors
-    /// The file cannot be read, has no values, or is in UTF-16; a line has text among its numbers, or another number of
+    /// The file cannot be read or has no values; a line has text among its numbers, or another number of
     /// values than the head; commas are both separator and decimal mark; a value is NaN, infinite or missing.
     pub fn read(path: &Path) -> Result<Self, RecordingError> {
-        let raw = csv::read(path, true)?;
+        let raw = match Format::of(path)? {
+            Format::Mat => match mat::read(path)?.as_mut_slice() {
+                [record] => std::mem::take(record),
+                records => {
+                    return Err(RecordingError::Content {
+                        path: path.into(),
+                        what: format!("{} records in it; a table is one", records.len()),
+                    });
+                }
+            },
+            _ => csv::read(path, false)?,
+        };
         let columns = raw.columns.into_iter().map(|column| TextColumn {
             name: column.name,
             unit: match column.unit {
@@ -53,6 +64,13 @@ impl TextTable {
     /// # Errors
     /// The file cannot be read.
     pub fn titles(path: &Path) -> Result<Vec<String>, RecordingError> {
-        csv::titles(path)
+        match Format::of(path)? {
+            Format::Mat => Ok(mat::read(path)?
+                .into_iter()
+                .flat_map(|record| record.columns)
+                .map(|column| column.name)
+                .collect()),
+            _ => csv::titles(path),
+        }
     }
 }

@@ -27,6 +27,8 @@ struct Stated {
     unit_text: Option<String>,
     sensitivity: Option<Sensitivity>,
     from: Option<Basis>,
+    /// True for one of several columns whose names are letters without a meaning.
+    is_letter: bool,
 }
 
 /// Meaning of every column of a file, that is the channel that it becomes, in the order of `columns`.
@@ -67,12 +69,16 @@ pub(super) fn understand(
             ),
         });
     }
+    // Oscilloscopes call their channels A, B, C …: beside a B the letter A is no acceleration.
+    let has = |letter: &str| names.iter().any(|name| name.eq_ignore_ascii_case(letter));
+    let are_letters = has("a") && has("b");
     let mut doubts = Doubts::default();
     let mut meanings = Vec::with_capacity(columns.len());
     for (index, column) in columns.iter().enumerate() {
         let map = import.map.iter().find(|map| is_about(map, index));
         let said = sidecar.channels.get(&column.name);
-        let stated = stated(path, column, said, map)?;
+        let mut stated = stated(path, column, said, map)?;
+        stated.is_letter = are_letters && names[index].len() == 1;
         meanings.push(meaning(path, column, stated, &mut doubts)?);
     }
     prefer_exact_time(&mut meanings);
@@ -238,7 +244,10 @@ fn meaning(
         }),
     };
     let lower = column.name.to_lowercase();
+    let is_speed = stated.name.is_none() && stated.unit_text.as_deref().is_some_and(is_spindle_speed);
     let found = match stated.name {
+        None if stated.is_letter => return Ok(of(lower, Basis::Auxiliary)),
+        None if is_speed => return Ok(of("rpm".into(), Basis::Auxiliary)),
         Some(name) => of(name, stated.from.unwrap_or(Basis::Sidecar)),
         None if is_channel_name(&lower) => match motion_of_axis(&lower, quantity) {
             Some(name) => of(name, Basis::Words),
@@ -248,6 +257,12 @@ fn meaning(
         None => return by_words(path, column, of(lower, Basis::Auxiliary), doubts),
     };
     checked(path, column, found)
+}
+
+/// True for a unit of the spindle speed: such a column of a tachometer has values, not pulses.
+fn is_spindle_speed(unit: &str) -> bool {
+    let unit = unit.trim().to_lowercase().replace(' ', "");
+    ["rpm", "1/min", "min-1", "min^-1", "u/min", "r/min", "rev/min"].contains(&unit.as_str())
 }
 
 /// True if the name is a standard channel name: `t`, `fx`, `x`, `vx`, `ax` …, `tacho`, or one of these with a number as
@@ -269,9 +284,12 @@ fn is_channel_name(name: &str) -> bool {
 }
 
 /// Channel name of a column of force, velocity or acceleration that is called by its axis alone, such as `X [g]`: the
-/// unit states the quantity. `None` for other columns.
+/// unit states the quantity; `X [s]`, the abscissa, is time. `None` for other columns.
 fn motion_of_axis(name: &str, quantity: Quantity) -> Option<String> {
     let is_axis = matches!(name, "x" | "y" | "z");
+    if name == "x" && quantity == Quantity::Time {
+        return Some("t".into());
+    }
     let prefix = match quantity {
         Quantity::Force => "f",
         Quantity::Velocity => "v",
@@ -412,88 +430,4 @@ fn prefer_exact_time(meanings: &mut [Meaning]) {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::super::import::Import;
-    use super::super::{ColumnMap, Recording};
-
-    fn import(text: &str, sidecar: &str, map: &[&str]) -> Result<Recording, String> {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("a.csv");
-        std::fs::write(&path, text).unwrap();
-        std::fs::write(folder.path().join("a.toml"), sidecar).unwrap();
-        let import = Import {
-            map: map.iter().map(|map| ColumnMap::parse(map).unwrap()).collect(),
-            ..Import::default()
-        };
-        Recording::import(&path, &import)
-            .map(|imported| imported.recording)
-            .map_err(|error| error.to_string())
-    }
-
-    fn names(recording: &Recording) -> Vec<&str> {
-        recording
-            .channels
-            .iter()
-            .map(|channel| channel.name.as_str())
-            .collect()
-    }
-
-    const TWO: &str = "Time (s),Force (N),Acc (g)\n0,1,2\n0.1,2,3\n0.2,3,4\n";
-
-    #[test]
-    fn a_direction_is_asked_for_and_given_by_map_or_sidecar() {
-        let said = import(TWO, "", &[]).unwrap_err();
-        for words in [
-            "\"Force\"",
-            "direction",
-            "--map Force=fx,Acc=ax",
-            "a.toml",
-            "[channels.Acc] name = \"ax\"",
-        ] {
-            assert!(said.contains(words), "{words}: {said}");
-        }
-        assert_eq!(
-            names(&import(TWO, "", &["Force=fy", "3=-ay"]).unwrap()),
-            ["fy", "ay"]
-        );
-        let sidecar = "[channels.Force]\nname = \"fx\"\n[channels.Acc]\nname = \"-ax\"\n";
-        let recording = import(TWO, sidecar, &[]).unwrap();
-        assert_eq!(names(&recording), ["fx", "ax"]);
-        assert_eq!(recording.channels[1].samples[0], -2.0 * 9.806_65);
-        // The map takes precedence over the sidecar.
-        assert_eq!(names(&import(TWO, sidecar, &["force=fz"]).unwrap()), ["fz", "ax"]);
-    }
-
-    #[test]
-    fn a_bare_axis_takes_its_quantity_from_the_unit() {
-        let text = "t [s],X [g],Y [m/s^2],Z [um],temp [degC]\n0,1,2,3,20\n0.1,2,3,4,21\n";
-        assert_eq!(names(&import(text, "", &[]).unwrap()), ["ax", "ay", "z", "temp"]);
-    }
-
-    #[test]
-    fn what_map_states_is_checked() {
-        for (map, words) in [
-            ("Foo=fx", "no such column"),
-            ("Force=ax", "acceleration"),
-            ("Force=fx:2 mV/N", "only a voltage has a sensitivity"),
-            ("Force=hxx_re:m/N", "recording over time"),
-        ] {
-            let said = import(TWO, "", &[map, "Acc=ay"]).unwrap_err();
-            assert!(said.contains(words), "{map}: {said}");
-        }
-        // A name of its own makes a column auxiliary.
-        assert_eq!(
-            names(&import(TWO, "", &["Force=load", "Acc=ax"]).unwrap()),
-            ["load", "ax"]
-        );
-    }
-
-    #[test]
-    fn names_of_channels_read_as_before() {
-        let text = "t,fx,ax_2,Data [V],tacho [1]\n0,1,2,3,0\n0.1,2,3,4,1\n";
-        assert_eq!(
-            names(&import(text, "", &[]).unwrap()),
-            ["fx", "ax_2", "data", "tacho"]
-        );
-    }
-}
+mod tests;

@@ -222,7 +222,7 @@ fn respelled(text: &str) -> Option<String> {
         "inch" | "inches" => "in",
         "mils" => "mil",
         "lbs" | "pound-force" => "lbf",
-        "gn" | "g_n" | "g's" | "gs" | "gravity" => "g",
+        "g" | "gn" | "g_n" | "g's" | "gs" | "gravity" => "g",
         "ips" => "in/s",
         "-" | "none" | "unitless" => "1",
         "degrees" | "°" => "deg",

@@ -84,7 +84,7 @@ pub fn run(args: Args) -> Result<(), Error> {
     let mut text = String::new();
     for path in &args.files {
         refuse_other_kinds(path)?;
-        if FrfTable::is_table(path)? {
+        if FrfTable::is_table(path, &import)? {
             let table = table(path, &import)?;
             text += &table.text();
             answer.tables.push(table);

@@ -9,7 +9,7 @@ use crate::case::Case;
 use crate::criteria::{COARSE_TABLE, SMALL_FOLDING};
 use crate::frf::{Frf, FrfTable, ImportedTable, Interpolation, table_doubts};
 use crate::orbit::collocation_of;
-use crate::recording::{ColumnMap, Import};
+use crate::recording::{ColumnMap, ColumnMaps, Import};
 use crate::report::digits::significant;
 use crate::stability::{
     Collocation, CubicTerms, Fdm, FrequencyProblem, FullDiscretization, Method, ModeCoupling, MultiFrequency,
@@ -55,8 +55,8 @@ pub(super) struct MethodChoice {
     frf: Option<PathBuf>,
     /// Meaning and unit of a column of --frf, such as Real=hxx_re:m/N,Imag=hxx_im:m/N, or hxx_mag, hxx_db,
     /// hxx_phase:deg, coherence_xx. Several with commas between; may be repeated.
-    #[arg(long, value_name = "COLUMN=NAME[:UNIT],…", value_delimiter = ',', value_parser = ColumnMap::parse, requires = "frf")]
-    map: Vec<ColumnMap>,
+    #[arg(long, value_name = "COLUMN=NAME[:UNIT],…", value_parser = ColumnMap::parse_list, requires = "frf")]
+    map: Vec<ColumnMaps>,
     /// Highest harmonic of the directional coefficients in the stability computation. Default: multi-frequency adds
     /// harmonics until the limits converge; nyquist uses 0, the averaged coefficients.
     #[arg(long, value_name = "N", value_parser = harmonics)]
@@ -154,7 +154,7 @@ impl MethodChoice {
     /// Reads the table of receptances in the file of `--frf`, with the meanings of its columns from `--map`.
     fn table(&self, path: &Path) -> Result<ImportedTable, Error> {
         let import = Import {
-            map: self.map.clone(),
+            map: self.map.iter().flat_map(|maps| maps.0.clone()).collect(),
             ..Import::default()
         };
         FrfTable::import(path, &import).map_err(Error::input)

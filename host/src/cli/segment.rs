@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use super::{Error, finite, positive, progress};
-use crate::recording::{ColumnMap, Import, Recording, Segment, Understood};
+use crate::recording::{ColumnMap, ColumnMaps, Import, Recording, Segment, Understood};
 
 /// Start and end of the segment of the recordings to use; names, units and rate that their files do not state.
 #[derive(Clone, Debug, clap::Args)]
@@ -26,8 +26,8 @@ pub(super) struct RecordedSegment {
 pub(super) struct StatedColumns {
     /// Channel and unit of a column, such as acc=ax:g, 2=fx:N (by number), "ch1=ax:10.2 mV/g" (sensitivity), acc=-az
     /// (against the axis) or acc=ax@3:g (sensor at the point 3). Several with commas between; may be repeated.
-    #[arg(long, value_name = "COLUMN=NAME[:UNIT],…", value_delimiter = ',', value_parser = ColumnMap::parse)]
-    map: Vec<ColumnMap>,
+    #[arg(long, value_name = "COLUMN=NAME[:UNIT],…", value_parser = ColumnMap::parse_list)]
+    map: Vec<ColumnMaps>,
     /// Sample rate in samples per second; it replaces the time column of the file.
     #[arg(long, value_name = "HZ", value_parser = positive, allow_negative_numbers = true)]
     rate: Option<f64>,
@@ -48,7 +48,7 @@ impl StatedColumns {
     pub(super) fn import(&self, segment: Segment) -> Import {
         Import {
             segment,
-            map: self.map.clone(),
+            map: self.map.iter().flat_map(|maps| maps.0.clone()).collect(),
             rate_hz: self.rate,
             record: self.record.map(|record| record as usize),
         }

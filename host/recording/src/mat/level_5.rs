@@ -11,7 +11,7 @@ use flate2::bufread::ZlibDecoder;
 
 use super::memory::{DEPTH_MAX, ValueMemory};
 use super::source::{CHUNK, SMALL_MAX, Source, number_type, word};
-use super::value::{Channels, Item, Value};
+use super::value::{Channels, Item, Value, Variable};
 use crate::criteria::INFLATION_MAX;
 
 /// Length of the file header of a MAT-file of level 5, bytes.
@@ -48,7 +48,7 @@ pub(super) fn items(
         b"MI" => true,
         other => {
             return Err(format!(
-                "bytes 126 and 127 are {other:?}; a MAT-file of level 5 has IM or MI there"
+                "bytes 126 and 127 are {other:?}; a MAT-file of level 5 has IM or MI there; if MATLAB wrote this one with -v4, save it with -v7"
             ));
         }
     };
@@ -113,7 +113,7 @@ fn matrix(source: &mut Source<'_>, memory: &mut ValueMemory, depth: usize) -> Re
     let flags = word(flags, source.big_endian);
     let (class, complex, logical) = (flags & 0xff, flags & 0x800 != 0, flags & 0x200 != 0);
     // Codes of array classes in a MAT-file: 1 cell, 2 structure, 4 text, 6 to 15 double, single and the integer types.
-    if !matches!(class, 1 | 2 | 4 | 6..=15) || complex || logical {
+    if !matches!(class, 1 | 2 | 4 | 6..=15) || logical {
         return Ok(None);
     }
     let dimensions: Vec<usize> = source
@@ -169,10 +169,41 @@ fn matrix(source: &mut Source<'_>, memory: &mut ValueMemory, depth: usize) -> Re
     memory.take(&name, count as u64)?;
     let mut channels = Channels::new(rows, columns, memory.trusted(rows.min(columns)));
     source.numbers(&tag, number, |value| channels.push(value))?;
+    let mut variable = channels.named(name.clone());
+    if complex {
+        variable = imaginary(source, memory, variable, [rows, columns])?;
+    }
     Ok(Some(Item {
-        name: name.clone(),
-        value: Value::Numbers(channels.named(name)),
+        name,
+        value: Value::Numbers(variable),
     }))
+}
+
+/// Reads the imaginary parts of a matrix behind its real parts.
+fn imaginary(
+    source: &mut Source<'_>,
+    memory: &mut ValueMemory,
+    real: Variable,
+    [rows, columns]: [usize; 2],
+) -> Result<Variable, String> {
+    let tag = source.tag()?;
+    let number = number_type(tag.kind).ok_or_else(|| {
+        format!(
+            "variable \"{}\" has imaginary parts of type {}",
+            real.name, tag.kind
+        )
+    })?;
+    let count = tag.length / number.size() as u64;
+    if rows.checked_mul(columns) != Some(count as usize) || tag.length > source.available {
+        return Err(format!(
+            "variable \"{}\" is {rows} by {columns}, but has {count} imaginary parts",
+            real.name
+        ));
+    }
+    memory.take(&real.name, count)?;
+    let mut channels = Channels::new(rows, columns, memory.trusted(rows.min(columns)));
+    source.numbers(&tag, number, |value| channels.push(value))?;
+    Ok(real.with_imaginary(channels.named(String::new())))
 }
 
 /// Reads the elements of a MAT structure array or cell array of `count` elements. Index: element, then its fields,

@@ -35,6 +35,7 @@ const INTERVALS: &[&str] = &[
     "sample_time",
     "x_increment",
     "wf_increment",
+    "tinterval",
 ];
 
 /// Names of the time vector in a MAT structure that holds one channel, in lower case.
@@ -47,7 +48,7 @@ pub(super) fn records(items: Vec<Item>) -> Result<Vec<Raw>, String> {
     collect(items, None, rate, &mut found);
     if found.is_empty() {
         return Err(
-            "it has no numeric vector that could be a channel (objects, complex and sparse arrays are skipped)".into(),
+            "it has no numeric vector that could be a channel (objects and sparse arrays are skipped, and complex ones in level 7.3)".into(),
         );
     }
     Ok(found)

@@ -19,12 +19,15 @@ pub(super) enum Value {
     Elements(Vec<Vec<Item>>),
 }
 
-/// A real numeric variable, split into channels; a row vector and a column vector are one channel.
+/// A numeric variable, split into channels; a row vector and a column vector are one channel, of complex numbers two:
+/// real part and imaginary part.
 #[derive(Debug)]
 pub(super) struct Variable {
     pub(super) name: String,
     /// Samples of the variable, all channels equally long. Index: channel, then sample.
     pub(super) values: Vec<Vec<f64>>,
+    /// True if every second channel is the imaginary part of that before it.
+    pub(super) is_complex: bool,
 }
 
 impl Variable {
@@ -33,13 +36,35 @@ impl Variable {
         self.values.first().map_or(0, Vec::len)
     }
 
+    /// The variable whose channels alternate with those of its imaginary parts.
+    pub(super) fn with_imaginary(self, imaginary: Self) -> Self {
+        Self {
+            values: self
+                .values
+                .into_iter()
+                .zip(imaginary.values)
+                .flat_map(|(real, imaginary)| [real, imaginary])
+                .collect(),
+            is_complex: true,
+            ..self
+        }
+    }
+
     /// Channels of a variable with their names: the name of the variable, with a number from 1 if it has several
     /// channels.
     pub(super) fn into_columns(self) -> Vec<RawColumn> {
-        let is_one = self.values.len() == 1;
-        let name = |index: usize| match is_one {
-            true => self.name.clone(),
-            false => format!("{}{}", self.name, index + 1),
+        let parts = 1 + usize::from(self.is_complex);
+        let is_one = self.values.len() == parts;
+        let name = |index: usize| {
+            let name = match is_one {
+                true => self.name.clone(),
+                false => format!("{}{}", self.name, index / parts + 1),
+            };
+            match (self.is_complex, index % parts) {
+                (false, _) => name,
+                (true, 0) => format!("{name} real"),
+                (true, _) => format!("{name} imag"),
+            }
         };
         self.values
             .into_iter()
@@ -124,6 +149,7 @@ impl Channels {
         Variable {
             name,
             values: self.values,
+            is_complex: false,
         }
     }
 }

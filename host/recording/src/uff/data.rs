@@ -186,7 +186,7 @@ pub(super) fn read_binary<R: BufRead>(
     binary: Binary,
 ) -> Result<Data, Fault> {
     let line = source.line();
-    let widths = widths(header, binary).map_err(|what| fault(line, what))?;
+    let widths = widths(header, binary);
     let stride: usize = widths.iter().sum();
     let mut sorter = Sorter::new(header);
     let mut buffer = vec![0; stride * CHUNK.min(header.count.max(1))];
@@ -216,7 +216,17 @@ pub(super) fn read_binary<R: BufRead>(
     }
     let needed = stride as u64 * header.count as u64;
     source.skip(binary.bytes.saturating_sub(needed))?;
-    end_of_binary(source)?;
+    let end = end_of_binary(source);
+    if binary.bytes != 0 && binary.bytes < needed && matches!(end, Err(Fault::Line { .. })) {
+        return Err(fault(
+            line,
+            format!(
+                "{} bytes of data, but {} values of this type need {needed}, and no line -1 stands after as many",
+                binary.bytes, header.count
+            ),
+        ));
+    }
+    end?;
     Ok(sorter.data)
 }
 
@@ -225,22 +235,17 @@ pub(super) fn read_binary<R: BufRead>(
 ///
 /// The standard stores the abscissa of double-precision ordinates in single precision. Some writers store it in double
 /// precision; the byte count in the header distinguishes the two.
-fn widths(header: &Header, binary: Binary) -> Result<Vec<usize>, String> {
+///
+/// More bytes than the values need are padding. Some writers state the bytes of a complex function as if it were real:
+/// where fewer are stated than needed, the line `-1` after the values decides.
+fn widths(header: &Header, binary: Binary) -> Vec<usize> {
     let width = if header.ordinate_type.is_double { 8 } else { 4 };
     let mut widths = vec![width; per_value(header)];
     let bytes = |widths: &[usize]| widths.iter().sum::<usize>() as u64 * header.count as u64;
     if header.even.is_none() && header.ordinate_type.is_double && binary.bytes != bytes(&widths) {
         widths[0] = 4;
     }
-    let needed = bytes(&widths);
-    // More bytes than the values need are padding. Fewer bytes than that contradict the number of values in the header.
-    if binary.bytes != 0 && binary.bytes < needed {
-        return Err(format!(
-            "{} bytes of data, but {} values of this type need {needed}",
-            binary.bytes, header.count
-        ));
-    }
-    Ok(widths)
+    widths
 }
 
 /// Decodes an IEEE 754 number of 4 or 8 bytes.

@@ -334,7 +334,13 @@ fn damaged() -> Vec<(&'static str, Vec<u8>, Outcome)> {
         ),
         (
             "binary, bytes too few",
-            binary(1, 2, 11, 12, &joined(&[&little(), b"\n    -1\n"])),
+            binary(
+                1,
+                2,
+                11,
+                12,
+                &joined(&[&little()[..12], b"\n    -1\nabcdefghijklmnop\n"]),
+            ),
             Refused(13, "need 24"),
         ),
         (

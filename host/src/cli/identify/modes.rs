@@ -19,7 +19,7 @@ use crate::frf::{
 };
 use crate::identify::modes::{self, ChannelNoise, ComparedMode, MadeApart, ModalModel, Receptances};
 use crate::machine::spindle_rpm;
-use crate::recording::{Import, Understood};
+use crate::recording::{Format, Import, Understood};
 use crate::report::stabilization_chart::stabilization_chart;
 use crate::structure::Direction;
 
@@ -82,7 +82,11 @@ fn model_of(args: &Args, understood: &mut Vec<Understood>, recordings: &[PathBuf
         highest_order: usize::from(options.order),
         modes: options.modes.map(usize::from),
     };
-    let mut model = modes::identify(&data, &wanted).map_err(refused)?;
+    let mut model = modes::identify(&data, &wanted).map_err(|error| {
+        // What is doubtful about the receptances may be the reason.
+        let doubts = source.warnings.iter().map(|doubt| format!("; {doubt}"));
+        Error::input(format!("{}{}", refused(error), doubts.collect::<String>()))
+    })?;
     let mut noise = Vec::new();
     // A fit to whole records needs every response to every force in each record.
     let records = source.records.as_ref();
@@ -224,9 +228,9 @@ fn source(args: &Args, understood: &mut Vec<Understood>, recordings: &[PathBuf])
 /// # Errors
 /// A text file cannot be read, or has the head of a table of receptances but wrong content.
 fn table(path: &Path, import: &Import) -> Result<Result<ImportedTable, Option<FrfError>>, Error> {
-    match crate::file::ending(path).as_str() {
-        "uff" | "unv" | "bunv" => Ok(FrfTable::import(path, import).map_err(Some)),
-        _ if FrfTable::is_table(path)? => Ok(Ok(FrfTable::import(path, import)?)),
+    match Format::of(path) {
+        Ok(Format::Uff) => Ok(FrfTable::import(path, import).map_err(Some)),
+        _ if FrfTable::is_table(path, import)? => Ok(Ok(FrfTable::import(path, import)?)),
         _ => Ok(Err(None)),
     }
 }
