@@ -2,15 +2,12 @@
 
 use std::f64::consts::TAU;
 
-use num_complex::Complex64;
-
 use super::fitted_structure::FittedStructure;
 use super::problem::FrequencyProblem;
 use crate::criteria::FIT_ROOM;
 use crate::error::StabilityError;
 use crate::limits::line::line;
 use crate::limits::speed_line::{SpeedLine, Switch};
-use crate::problem::linear::Problem;
 use crate::problem::period::{Period, Resolution};
 use crate::spectrum::crossing::Crossing;
 use crate::spectrum::port_mode::PortMode;
@@ -28,11 +25,7 @@ pub(crate) fn fitted_line(
     depth_mm: f64,
     samples: usize,
 ) -> Result<SpeedLine, StabilityError> {
-    let model = Problem {
-        structure: fitted.structure.clone(),
-        process: problem.process,
-        teeth: problem.teeth,
-    };
+    let model = fitted.in_cut(problem);
     let found = line(&model, rpm, depth_mm, samples)?;
     let deepest_mm = found
         .switches
@@ -40,11 +33,6 @@ pub(crate) fn fitted_line(
         .map(|switch| switch.depth_mm)
         .fold(0.0, f64::max);
     let period = Period::new(&model, rpm, 2e-3 * deepest_mm, Resolution::WORKING);
-    let change = |s: Complex64| {
-        // Receptances at the imaginary axis; a table holds real frequencies.
-        let s = Complex64::new(0.0, s.im);
-        problem.table_at(s / Complex64::new(0.0, TAU)) - fitted.transfer(s)
-    };
     let shift_mm = |switch: &Switch| {
         let crossing = Crossing {
             multiplier: switch.multiplier(model.tooth_period_s(rpm))?,
@@ -52,7 +40,7 @@ pub(crate) fn fitted_line(
         };
         let mode = PortMode::new(&model, rpm, &period, crossing)?;
         let by_folding_m = mode.largest_shift_by_sizes_m(|s| problem.folding_at(s.im / TAU))?;
-        Some(1e3 * (FIT_ROOM * mode.largest_shift_m(change)? + by_folding_m))
+        Some(1e3 * (FIT_ROOM * mode.largest_shift_m(|s| fitted.deviation(problem, s))? + by_folding_m))
     };
     for switch in &found.switches {
         problem.check_band(switch.chatter_hz, rpm, switch.depth_mm)?;

@@ -5,14 +5,16 @@
 
 use std::f64::consts::TAU;
 
-use nalgebra::{DMatrix, Matrix3, Matrix3xX, MatrixXx3};
+use nalgebra::{DMatrix, Matrix3, Matrix3xX, MatrixXx3, Vector3};
 use num_complex::Complex64;
 use quietcut_numerics::singular_values::{Vectors, decompose};
 
+use super::problem::FrequencyProblem;
 use crate::criteria::{
     FIT_ERROR_MAX, FIT_IMPROVEMENT, FIT_LINES_MAX, FIT_MODES_MAX, FIT_PART, FIT_SETTLED, FIT_WIDTH_MIN,
     UNDAMPED,
 };
+use crate::problem::linear::Problem;
 use quietcut_frf::Interpolation;
 use quietcut_frf::rational_fit::{RationalFit, fit, fit_from, residues_of_modes_alone};
 use quietcut_model::structure::FirstOrder;
@@ -64,6 +66,56 @@ impl FittedStructure {
     /// Number of modes.
     pub(crate) fn count(&self) -> usize {
         self.modes.len()
+    }
+
+    /// The fitted structure with the cut of a problem.
+    pub(crate) fn in_cut(&self, problem: &FrequencyProblem) -> Problem {
+        Problem {
+            structure: self.structure.clone(),
+            process: problem.process,
+            teeth: problem.teeth,
+        }
+    }
+
+    /// Deviation of the table of a problem from the fitted receptances, m/N, at the imaginary part of s: a table holds
+    /// real frequencies.
+    pub(crate) fn deviation(&self, problem: &FrequencyProblem, s: Complex64) -> Matrix3<Complex64> {
+        let s = Complex64::new(0.0, s.im);
+        problem.table_at(s / Complex64::new(0.0, TAU)) - self.transfer(s)
+    }
+
+    /// For each mode the largest deviation of the table of a problem from the fitted receptances within half a bandwidth
+    /// of its frequency, as a share of its own receptance R/(s − p) there: as far as the table tells, its residue may be off
+    /// by this share, and its pole by this share of its distance from the imaginary axis.
+    pub(crate) fn shares_of_modes(&self, problem: &FrequencyProblem) -> Vec<f64> {
+        let share_at = |(pole, residue): &(Complex64, Matrix3<Complex64>), step: i32| {
+            let s = Complex64::new(0.0, pole.im + 0.25 * pole.re.abs() * f64::from(step));
+            self.deviation(problem, s).norm() * (s - pole).norm() / residue.norm()
+        };
+        self.modes
+            .iter()
+            .map(|mode| (-4..=4).map(|step| share_at(mode, step)).fold(0.0, f64::max))
+            .collect()
+    }
+
+    /// Largest |gᵀ δH(s) f| if the modes are off by the shares of [`Self::shares_of_modes`]: |gᵀR f| of each times its
+    /// share of 1/|s − p| for the residue and of |Re p|/|s − p|² for the pole.
+    pub(crate) fn change_by_modes(
+        &self,
+        shares: &[f64],
+        s: Complex64,
+        force: &Vector3<Complex64>,
+        adjoint: &Vector3<Complex64>,
+    ) -> f64 {
+        let part = |pole: Complex64, residue: &Matrix3<Complex64>| {
+            let size = (adjoint.transpose() * residue * force)[(0, 0)].norm();
+            let distance = (s - pole).norm();
+            size * (1.0 + pole.re.abs() / distance) / distance
+        };
+        let parts = self.modes.iter().zip(shares).map(|((pole, residue), share)| {
+            share * (part(*pole, residue) + part(pole.conj(), &residue.conjugate()))
+        });
+        parts.sum()
     }
 
     /// Receptance matrix H(s), m/N.
@@ -192,12 +244,7 @@ impl<'a> Functions<'a> {
     fn with_poles(&self, poles: Vec<Complex64>) -> Option<FittedStructure> {
         let frequency_hz = self.table.frequency_hz();
         let is_resolved = |pole: &Complex64| {
-            let above = frequency_hz.partition_point(|hz| TAU * hz < pole.im);
-            let below = above.checked_sub(1).and_then(|index| frequency_hz.get(index));
-            let spacing_hz = match (below, frequency_hz.get(above)) {
-                (Some(below), Some(above)) => above - below,
-                _ => 0.0,
-            };
+            let spacing_hz = self.line_spacing_hz(pole.im / TAU);
             -pole.re > (UNDAMPED * pole.norm()).max(FIT_WIDTH_MIN * TAU * spacing_hz)
         };
         if !poles.iter().all(is_resolved) {
@@ -218,14 +265,36 @@ impl<'a> Functions<'a> {
             .enumerate()
             .map(|(mode, pole)| (*pole, residue(mode)))
             .collect();
-        let whole = self.of_modes(modes, 0.0)?;
-        // Parts of the residues whose peaks lie below the deviation would add states, but no accuracy.
-        let least = 0.1 * whole.error * self.largest;
-        self.of_modes(whole.modes, least.max(1e-12 * self.largest))
+        let whole = self.of_modes(modes, |_| 0.0)?;
+        // Noise gives residues to directions in which a mode does not act: states of their own, whose free decay may be
+        // the slowest of the cut. With n lines within the bandwidth |Re λ|/π Hz a residue averages πn/2 of them; at four
+        // deviations, of which the largest of all lines is three at least, its peak is that largest one over √n.
+        let least = |pole: Complex64| {
+            let count = -pole.re / (std::f64::consts::PI * self.line_spacing_hz(pole.im / TAU));
+            let share = whole.error / count.max(1.0).sqrt();
+            self.largest * share.max(1e-12)
+        };
+        self.of_modes(whole.modes, least)
     }
 
-    /// Structure of modes, without the parts of their residues whose peak |σ/Re λ| is at most `least`, m/N.
-    fn of_modes(&self, modes: Vec<(Complex64, Matrix3<Complex64>)>, least: f64) -> Option<FittedStructure> {
+    /// Distance of the lines of the table on both sides of a frequency, Hz; 0 outside of the table.
+    fn line_spacing_hz(&self, hertz: f64) -> f64 {
+        let frequency_hz = self.table.frequency_hz();
+        let above = frequency_hz.partition_point(|hz| *hz < hertz);
+        let below = above.checked_sub(1).and_then(|index| frequency_hz.get(index));
+        match (below, frequency_hz.get(above)) {
+            (Some(below), Some(above)) => above - below,
+            _ => 0.0,
+        }
+    }
+
+    /// Structure of modes, without the parts of their residues whose peak |σ/Re λ| is at most `least` of the pole λ,
+    /// m/N.
+    fn of_modes(
+        &self,
+        modes: Vec<(Complex64, Matrix3<Complex64>)>,
+        least: impl Fn(Complex64) -> f64,
+    ) -> Option<FittedStructure> {
         let mut kept = Vec::with_capacity(modes.len());
         let mut shapes = Vec::new();
         for (pole, residue) in modes {
@@ -234,7 +303,7 @@ impl<'a> Functions<'a> {
             let (left, right) = (parts.u?, parts.v_t?);
             let mut sum = Matrix3::zeros();
             for (part, &size) in parts.singular_values.iter().enumerate() {
-                if size > least * -pole.re {
+                if size > least(pole) * -pole.re {
                     let shape = left.column(part) * Complex64::from(size.sqrt());
                     let force = right.row(part) * Complex64::from(size.sqrt());
                     sum += Matrix3::from_fn(|row, column| shape[row] * force[column]);

@@ -7,6 +7,7 @@
 
 pub(crate) mod averaged;
 pub(crate) mod fitted_line;
+pub(crate) mod fitted_point;
 pub(crate) mod fitted_structure;
 pub(crate) mod harmonic;
 pub(crate) mod limits;

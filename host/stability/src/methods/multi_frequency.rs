@@ -7,6 +7,7 @@ use crate::criteria::{HARMONICS_SETTLED_LIMIT, HARMONICS_SETTLED_MULTIPLIER, SAM
 use crate::error::{NOT_FINITE, StabilityError};
 use crate::frequency::averaged::AveragedLoop;
 use crate::frequency::fitted_line::fitted_line;
+use crate::frequency::fitted_point::fitted_point;
 use crate::frequency::fitted_structure::FittedStructure;
 use crate::frequency::harmonic::HarmonicLoop;
 use crate::frequency::limits::{AxisCrossing, limits, speed_line};
@@ -130,11 +131,15 @@ impl Method for MultiFrequency {
 
     /// Computes the dominant multiplier with 2K + 1 harmonics. If K is not set, it starts from the least number and is
     /// doubled further until the multiplier settles or `HARMONICS_MAX` is reached. The error contains the change by the
-    /// last doubling.
+    /// last doubling. Of a table of receptances that a structure fits, it is that of the structure, with the deviation of
+    /// the table in the error.
     fn point(&self, rpm: f64, depth_mm: f64) -> Result<CutStability, StabilityError> {
         check_speed(rpm)?;
         check_depth(depth_mm)?;
         AveragedLoop::check_reach(&self.problem, rpm, depth_mm)?;
+        if let Some(fitted) = self.fitted() {
+            return fitted_point(&self.problem, fitted, rpm, depth_mm);
+        }
         let broke_down = |what| StabilityError::BrokeDown { rpm, depth_mm, what };
         let depth_m = depth_mm * 1e-3;
         let delay_s = self.problem.tooth_period_s(rpm);

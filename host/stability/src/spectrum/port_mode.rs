@@ -1,4 +1,4 @@
-//! Change of a stability limit with the receptances, from the Floquet mode and its adjoint at the ports of a period.
+//! Change of a stability limit or of a multiplier with the receptances, from the Floquet mode and its adjoint at the ports of a period.
 //!
 //! At a crossing of the unit circle by a multiplier μ = e^{iθ}, with s = ln μ/τ, the cutting forces of the Floquet mode
 //! are F(t) = Σ_k F_k e^{s_k t}, s_k = s + 2πik/τ. A change ΔH of the receptances moves the tool by
@@ -112,13 +112,28 @@ impl PortMode {
         // a real and of an imaginary change.
         let largest = self.shift_m(Complex64::ONE).hypot(self.shift_m(Complex64::I));
         let by_harmonic = self.harmonics().map(|(s, force, adjoint)| {
-            let sizes = sizes(s);
-            let entries = (0..9).map(|index| (index / 3, index % 3));
-            let parts = entries.map(|(i, j)| adjoint[i].norm() * sizes[(i, j)] * force[j].norm());
-            parts.sum::<f64>()
+            let force = force.map(Complex64::norm);
+            adjoint.map(Complex64::norm).dot(&(sizes(s) * force))
         });
         let sum = largest * by_harmonic.sum::<f64>();
         sum.is_finite().then_some(sum)
+    }
+
+    /// Largest change |δμ| of the multiplier at constant depth, to first order in changes ΔH of the receptances, for which
+    /// `change` gives the largest |gᵀΔH(s) f| at s with force f and adjoint g. `None` if the multiplier is not single.
+    ///
+    /// From Φ_κ r = μ r with κ = (1 − 1/μ) w: δμ = lᵀδΦ r/(lᵀr − w/μ² lᵀΦ_κ' r).
+    pub(crate) fn largest_change_of_multiplier(
+        &self,
+        change: impl Fn(Complex64, &Vector3<Complex64>, &Vector3<Complex64>) -> f64,
+    ) -> Option<f64> {
+        let Crossing { multiplier, depth_m } = self.crossing;
+        let sum: f64 = self
+            .harmonics()
+            .map(|(s, force, adjoint)| change(s, &force, &adjoint))
+            .sum();
+        let change = sum / (self.overlap - self.by_kappa * depth_m / (multiplier * multiplier)).norm();
+        change.is_finite().then_some(change)
     }
 
     /// Change of the depth of the crossing, m, to first order in a change ΔH(s) of the receptances at each harmonic of
@@ -135,8 +150,8 @@ impl PortMode {
             let s = (growth + Complex64::new(0.0, TAU * f64::from(k))) / self.period_s;
             let (mut force, mut adjoint) = (Vector3::zeros(), Vector3::zeros());
             for port in &self.ports {
-                let factor = Complex64::cis(s.im * port.time_s);
-                force += port.force * (factor.conj() / self.period_s);
+                let factor = (s * port.time_s).exp();
+                force += port.force * (factor.inv() / self.period_s);
                 adjoint += port.adjoint * factor;
             }
             (s, force, adjoint)

@@ -164,6 +164,41 @@ fn limits_of_a_table_without_noise_are_those_of_its_structure() {
 }
 
 #[test]
+fn the_error_of_a_noisy_table_holds_the_multipliers_of_its_structure() {
+    let seed = 20_261_128;
+    println!("seed {seed}");
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let modes = three_modes();
+    let (mut count, mut tight) = (0, 0);
+    for is_slot in [false, true] {
+        let case = case_of(&modes, is_slot);
+        let exact = Problem::new(&case, CubicTerms::Refuse).unwrap();
+        for noise in [0.0, 1e-3, 1e-2] {
+            let method = method_of(&case, &table_of(&modes, 2500, noise, &mut rng));
+            for _ in 0..12 {
+                let rpm = rng.random_range(4000.0..14_000.0);
+                let depth_mm = rng.random_range(0.02..4.0);
+                let (found, exact) = (
+                    method.point(rpm, depth_mm).unwrap(),
+                    point(&exact, rpm, depth_mm).unwrap(),
+                );
+                println!("{noise} {rpm:.1} {depth_mm:.4} {found:?} {}", exact.multiplier);
+                let off = (found.multiplier - exact.multiplier).norm();
+                // Near a change of the dominant multiplier another one may be larger in the table: absolute values count.
+                let off = off.min((found.multiplier_abs - exact.multiplier_abs).abs());
+                assert!(
+                    off <= found.error + exact.error,
+                    "{rpm} {depth_mm} {found:?} {exact:?}"
+                );
+                count += 1;
+                tight += u32::from(found.error <= 20.0 * noise + 1e-4);
+            }
+        }
+    }
+    assert!(tight * 10 >= count * 9, "{tight} of {count} errors are narrow");
+}
+
+#[test]
 fn the_error_of_a_noisy_table_holds_the_limits_of_its_structure() {
     let seed = 20_261_125;
     println!("seed {seed}");
