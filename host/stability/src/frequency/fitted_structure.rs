@@ -267,11 +267,11 @@ impl<'a> Functions<'a> {
             .collect();
         let whole = self.of_modes(modes, |_| 0.0)?;
         // Noise gives residues to directions in which a mode does not act: states of their own, whose free decay may be
-        // the slowest of the cut. With n lines within the bandwidth |Re λ|/π Hz a residue averages πn/2 of them; at four
-        // deviations, of which the largest of all lines is three at least, its peak is that largest one over √n.
+        // the slowest of the cut. With n lines within the bandwidth |Re λ|/π Hz a residue averages πn/2 of them, so that four
+        // of its deviations are 3.2/√n of those of a line, of which the largest on all lines is 1.6 at least.
         let least = |pole: Complex64| {
             let count = -pole.re / (std::f64::consts::PI * self.line_spacing_hz(pole.im / TAU));
-            let share = whole.error / count.max(1.0).sqrt();
+            let share = whole.error * (2.0 / count.sqrt()).min(1.0);
             self.largest * share.max(1e-12)
         };
         self.of_modes(whole.modes, least)
