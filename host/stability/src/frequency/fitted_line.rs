@@ -2,6 +2,7 @@
 
 use std::f64::consts::TAU;
 
+use super::fitted_cut::FittedCut;
 use super::fitted_structure::FittedStructure;
 use super::problem::FrequencyProblem;
 use crate::criteria::FIT_ROOM;
@@ -25,7 +26,8 @@ pub(crate) fn fitted_line(
     depth_mm: f64,
     samples: usize,
 ) -> Result<SpeedLine, StabilityError> {
-    let model = fitted.in_cut(problem);
+    let cut = FittedCut { problem, fitted };
+    let model = cut.model();
     let found = line(&model, rpm, depth_mm, samples)?;
     let deepest_mm = found
         .switches
@@ -40,7 +42,7 @@ pub(crate) fn fitted_line(
         };
         let mode = PortMode::new(&model, rpm, &period, crossing)?;
         let by_folding_m = mode.largest_shift_by_sizes_m(|s| problem.folding_at(s.im / TAU))?;
-        Some(1e3 * (FIT_ROOM * mode.largest_shift_m(|s| fitted.deviation(problem, s))? + by_folding_m))
+        Some(1e3 * (FIT_ROOM * mode.largest_shift_m(|s| cut.deviation(s))? + by_folding_m))
     };
     for switch in &found.switches {
         problem.check_band(switch.chatter_hz, rpm, switch.depth_mm)?;

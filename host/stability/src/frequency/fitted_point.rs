@@ -5,6 +5,7 @@ use std::f64::consts::TAU;
 
 use num_complex::Complex64;
 
+use super::fitted_cut::FittedCut;
 use super::fitted_structure::FittedStructure;
 use super::problem::FrequencyProblem;
 use crate::criteria::FIT_ROOM;
@@ -28,7 +29,8 @@ pub(crate) fn fitted_point(
     rpm: f64,
     depth_mm: f64,
 ) -> Result<CutStability, StabilityError> {
-    let model = fitted.in_cut(problem);
+    let cut = FittedCut { problem, fitted };
+    let model = cut.model();
     let found = point(&model, rpm, depth_mm)?;
     problem.check_band(found.chatter_hz, rpm, depth_mm)?;
     let depth_m = 1e-3 * depth_mm;
@@ -39,14 +41,14 @@ pub(crate) fn fitted_point(
         };
         let period = Period::new(&model, rpm, depth_m, Resolution::WORKING);
         let mode = PortMode::new(&model, rpm, &period, crossing)?;
-        let shares = fitted.shares_of_modes(problem);
+        let shares = cut.shares_of_modes();
         mode.largest_change_of_multiplier(|s, force, adjoint| {
-            let deviation = fitted.deviation(problem, s).map(Complex64::norm);
+            let deviation = cut.deviation(s).map(Complex64::norm);
             let sizes = deviation * FIT_ROOM + problem.folding_at(s.im / TAU);
             adjoint
                 .map(Complex64::norm)
                 .dot(&(sizes * force.map(Complex64::norm)))
-                + FIT_ROOM * fitted.change_by_modes(&shares, s, force, adjoint)
+                + FIT_ROOM * cut.change_by_modes(&shares, s, force, adjoint)
         })
     };
     // Without a cut the multiplier is that of a pole, on which the deviation acts in no port.

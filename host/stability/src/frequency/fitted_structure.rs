@@ -5,16 +5,14 @@
 
 use std::f64::consts::TAU;
 
-use nalgebra::{DMatrix, Matrix3, Matrix3xX, MatrixXx3, Vector3};
+use nalgebra::{DMatrix, Matrix3, Matrix3xX, MatrixXx3};
 use num_complex::Complex64;
 use quietcut_numerics::singular_values::{Vectors, decompose};
 
-use super::problem::FrequencyProblem;
 use crate::criteria::{
     FIT_ERROR_MAX, FIT_IMPROVEMENT, FIT_LINES_MAX, FIT_MODES_MAX, FIT_PART, FIT_SETTLED, FIT_WIDTH_MIN,
     UNDAMPED,
 };
-use crate::problem::linear::Problem;
 use quietcut_frf::Interpolation;
 use quietcut_frf::rational_fit::{RationalFit, fit, fit_from, residues_of_modes_alone};
 use quietcut_model::structure::FirstOrder;
@@ -30,7 +28,7 @@ pub(crate) struct FittedStructure {
     /// Fitted structure in the axes of the table.
     pub(crate) structure: FirstOrder,
     /// Poles with positive imaginary part, rad/s, with their residues, m/(N s).
-    modes: Vec<(Complex64, Matrix3<Complex64>)>,
+    pub(crate) modes: Vec<(Complex64, Matrix3<Complex64>)>,
     /// Largest deviation of an entry of the receptance matrix from the table on its lines, as a share of the largest
     /// entry.
     pub(crate) error: f64,
@@ -66,56 +64,6 @@ impl FittedStructure {
     /// Number of modes.
     pub(crate) fn count(&self) -> usize {
         self.modes.len()
-    }
-
-    /// The fitted structure with the cut of a problem.
-    pub(crate) fn in_cut(&self, problem: &FrequencyProblem) -> Problem {
-        Problem {
-            structure: self.structure.clone(),
-            process: problem.process,
-            teeth: problem.teeth,
-        }
-    }
-
-    /// Deviation of the table of a problem from the fitted receptances, m/N, at the imaginary part of s: a table holds
-    /// real frequencies.
-    pub(crate) fn deviation(&self, problem: &FrequencyProblem, s: Complex64) -> Matrix3<Complex64> {
-        let s = Complex64::new(0.0, s.im);
-        problem.table_at(s / Complex64::new(0.0, TAU)) - self.transfer(s)
-    }
-
-    /// For each mode the largest deviation of the table of a problem from the fitted receptances within half a bandwidth
-    /// of its frequency, as a share of its own receptance R/(s − p) there: as far as the table tells, its residue may be off
-    /// by this share, and its pole by this share of its distance from the imaginary axis.
-    pub(crate) fn shares_of_modes(&self, problem: &FrequencyProblem) -> Vec<f64> {
-        let share_at = |(pole, residue): &(Complex64, Matrix3<Complex64>), step: i32| {
-            let s = Complex64::new(0.0, pole.im + 0.25 * pole.re.abs() * f64::from(step));
-            self.deviation(problem, s).norm() * (s - pole).norm() / residue.norm()
-        };
-        self.modes
-            .iter()
-            .map(|mode| (-4..=4).map(|step| share_at(mode, step)).fold(0.0, f64::max))
-            .collect()
-    }
-
-    /// Largest |gᵀ δH(s) f| if the modes are off by the shares of [`Self::shares_of_modes`]: |gᵀR f| of each times its
-    /// share of 1/|s − p| for the residue and of |Re p|/|s − p|² for the pole.
-    pub(crate) fn change_by_modes(
-        &self,
-        shares: &[f64],
-        s: Complex64,
-        force: &Vector3<Complex64>,
-        adjoint: &Vector3<Complex64>,
-    ) -> f64 {
-        let part = |pole: Complex64, residue: &Matrix3<Complex64>| {
-            let size = (adjoint.transpose() * residue * force)[(0, 0)].norm();
-            let distance = (s - pole).norm();
-            size * (1.0 + pole.re.abs() / distance) / distance
-        };
-        let parts = self.modes.iter().zip(shares).map(|((pole, residue), share)| {
-            share * (part(*pole, residue) + part(pole.conj(), &residue.conjugate()))
-        });
-        parts.sum()
     }
 
     /// Receptance matrix H(s), m/N.
@@ -310,7 +258,9 @@ impl<'a> Functions<'a> {
                     shapes.push((pole, shape, force));
                 }
             }
-            kept.push((pole, sum));
+            if sum != Matrix3::zeros() {
+                kept.push((pole, sum));
+            }
         }
         let order = 2 * shapes.len();
         let mut structure = FirstOrder {

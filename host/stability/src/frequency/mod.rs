@@ -6,6 +6,7 @@
 //! depend on it: an eigenvalue λ(s) of that matrix belongs to a root if κ λ = 1.
 
 pub(crate) mod averaged;
+pub(crate) mod fitted_cut;
 pub(crate) mod fitted_line;
 pub(crate) mod fitted_point;
 pub(crate) mod fitted_structure;
