@@ -434,7 +434,7 @@ fn unbracketed(text: &str) -> &str {
             .and_then(|inner| inner.strip_suffix(close));
         if let Some(inner) = inner
             && inner.matches(open).count() == inner.matches(close).count()
-            && !inner.find(close).is_some_and(|at| !inner[..at].contains(open))
+            && inner.find(close).is_none_or(|at| inner[..at].contains(open))
         {
             return inner.trim();
         }

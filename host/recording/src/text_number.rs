@@ -48,7 +48,7 @@ pub(super) fn number(field: &str, decimal_comma: bool) -> Option<f64> {
     let (group, mark) = if decimal_comma { ('.', ',') } else { (',', '.') };
     let text = match ungrouped(field, group, mark) {
         Some(text) => text,
-        None if has_comma && !decimal_comma || decimal_comma && has_comma && field.contains('.') => {
+        None if has_comma && (!decimal_comma || field.contains('.')) => {
             return seconds(field, decimal_comma);
         }
         None => field.to_owned(),

@@ -23,9 +23,9 @@ fn without_zone(time: &str) -> &str {
 /// Seconds of `hours:minutes:seconds` or `minutes:seconds`, the seconds with or without fraction.
 fn clock(time: &str, decimal_comma: bool) -> Option<f64> {
     let parts: Vec<&str> = time.split(':').collect();
-    let (hours, minutes, seconds) = match parts.as_slice() {
-        &[hours, minutes, seconds] => (hours, minutes, seconds),
-        &[minutes, seconds] if seconds.contains(['.', ',']) => ("0", minutes, seconds),
+    let (hours, minutes, seconds) = match *parts.as_slice() {
+        [hours, minutes, seconds] => (hours, minutes, seconds),
+        [minutes, seconds] if seconds.contains(['.', ',']) => ("0", minutes, seconds),
         _ => return None,
     };
     let seconds = if decimal_comma {

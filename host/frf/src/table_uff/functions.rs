@@ -85,9 +85,8 @@ pub(super) fn chosen<'a>(
     if !is_stated && is_ambiguous(&functions) {
         let nodes: BTreeSet<i64> = functions.iter().filter_map(FrfFunction::drive_node).collect();
         let mut nodes = nodes.into_iter();
-        match (nodes.next(), nodes.next()) {
-            (Some(node), None) => functions.retain(|function| function.drive_node() == Some(node)),
-            _ => {}
+        if let (Some(node), None) = (nodes.next(), nodes.next()) {
+            functions.retain(|function| function.drive_node() == Some(node));
         }
     }
     if is_ambiguous(&functions) {
