@@ -32,11 +32,10 @@ pub(super) fn read(path: &Path, import: &Import) -> Result<ImportedTable, FrfErr
     let text = TextTable::read(path)?;
     let sidecar = Sidecar::beside(path)?;
     let names: Vec<String> = text.columns.iter().map(|column| column.name.clone()).collect();
-    if let Some(stranger) = import
-        .map
-        .iter()
-        .find(|map| !(0..names.len()).any(|index| map.is_about(&names[index], index + 1, &names)))
-    {
+    if let Some(stranger) = import.map.iter().find(|map| {
+        let is_about = |column: &TextColumn| map.is_about(&column.name, column.number, &names);
+        !text.columns.iter().any(is_about)
+    }) {
         return Err(FrfError::Content {
             path: path.into(),
             what: format!(
@@ -48,11 +47,11 @@ pub(super) fn read(path: &Path, import: &Import) -> Result<ImportedTable, FrfErr
     }
     let mut columns = Vec::with_capacity(text.columns.len());
     let mut is_named = Vec::with_capacity(text.columns.len());
-    for (index, column) in text.columns.iter().enumerate() {
+    for column in &text.columns {
         let map = import
             .map
             .iter()
-            .find(|map| map.is_about(&column.name, index + 1, &names));
+            .find(|map| map.is_about(&column.name, column.number, &names));
         let said = sidecar.channels.get(&column.name);
         let meaning = meaning(column, map, said).map_err(|what| FrfError::Column {
             path: path.into(),

@@ -33,7 +33,7 @@ pub(super) fn recording(
         require_names(path, &raw, &sidecar, import)?;
     }
     let has_rate = raw.sample_rate_hz.or(raw.worded_rate_hz).is_some();
-    let meanings = understand(path, &raw.columns, &sidecar, import, known).map_err(|error| match error {
+    let meanings = understand(path, &raw, &sidecar, import, known).map_err(|error| match error {
         RecordingError::Doubt {
             path,
             sidecar,
@@ -51,11 +51,12 @@ pub(super) fn recording(
     let mut channels: Vec<Channel> = Vec::with_capacity(raw.columns.len());
     let mut columns = Vec::with_capacity(raw.columns.len());
     let names: Vec<String> = raw.columns.iter().map(|column| column.name.clone()).collect();
+    let numbers: Vec<usize> = (0..names.len()).map(|index| raw.number(index)).collect();
     for (index, (column, meaning)) in raw.columns.into_iter().zip(meanings).enumerate() {
         let mapped = import
             .map
             .iter()
-            .find(|map| map.is_about(&names[index], index + 1, &names));
+            .find(|map| map.is_about(&names[index], numbers[index], &names));
         if let Some(point) = mapped.and_then(|map| map.point.as_ref()) {
             let described = sidecar.channels.entry(column.name.clone()).or_default();
             described.at = Some(point.clone());
@@ -111,9 +112,10 @@ pub(super) fn recording(
             }
             (None, Some(time), ..) => {
                 let range = import.segment.of_stamps(time);
-                since_s = time[range.start.min(time.len().saturating_sub(1))..]
-                    .first()
-                    .zip(time.first())
+                let first = time.iter().find(|stamp| stamp.is_finite());
+                since_s = time
+                    .get(range.start)
+                    .zip(first)
                     .map_or(0.0, |(start, first)| start - first);
                 for channel in &mut channels {
                     channel.samples = channel
@@ -121,7 +123,7 @@ pub(super) fn recording(
                         .get(range.clone())
                         .map_or_else(|| channel.samples.clone(), <[f64]>::to_vec);
                 }
-                let (rate, start) = even_rate(path, &time[range])?;
+                let (rate, start) = even_rate(path, &time[range.clone()], range.start)?;
                 (rate, start, "time column")
             }
             (None, None, Some(rate), _) => (rate, raw.start_s, "file"),
@@ -192,7 +194,7 @@ fn require_names(path: &Path, raw: &Raw, sidecar: &Sidecar, import: &Import) -> 
         import
             .map
             .iter()
-            .any(|map| map.is_about(&names[index], index + 1, &names))
+            .any(|map| map.is_about(&names[index], raw.number(index), &names))
             || sidecar
                 .channels
                 .get(&names[index])
@@ -202,7 +204,7 @@ fn require_names(path: &Path, raw: &Raw, sidecar: &Sidecar, import: &Import) -> 
         return Ok(());
     }
     let first = raw.columns.first().map_or(&[][..], |column| &column.samples);
-    let grows = names.len() > 1 && first.len() > 1 && even_rate(path, first).is_ok();
+    let grows = names.len() > 1 && first.len() > 1 && even_rate(path, first, 0).is_ok();
     let words: &[&str] = if grows {
         &["t:s", "fx:N", "ax:m/s^2", "ay:m/s^2", "az:m/s^2"]
     } else {
@@ -245,10 +247,11 @@ fn require_names(path: &Path, raw: &Raw, sidecar: &Sidecar, import: &Import) -> 
     })
 }
 
-/// Sample rate (samples per second) and first time (s) of evenly spaced time stamps. An error if there are fewer than
+/// Sample rate (samples per second) and first time (s) of evenly spaced time stamps, before which the file has `from`
+/// others. An error if there are fewer than
 /// two stamps, if one is not finite, if the last is not above the first, or if one deviates from even spacing by more
 /// than [`UNEVEN`] steps.
-fn even_rate(path: &Path, time: &[f64]) -> Result<(f64, f64), RecordingError> {
+fn even_rate(path: &Path, time: &[f64], from: usize) -> Result<(f64, f64), RecordingError> {
     let wrong = |what: String| RecordingError::Content {
         path: path.into(),
         what,
@@ -259,7 +262,7 @@ fn even_rate(path: &Path, time: &[f64]) -> Result<(f64, f64), RecordingError> {
     if let Some(index) = time.iter().position(|stamp| !stamp.is_finite()) {
         return Err(wrong(format!(
             "time of sample {} is {}; a number is needed",
-            index + 1,
+            from + index + 1,
             time[index]
         )));
     }
@@ -275,14 +278,14 @@ fn even_rate(path: &Path, time: &[f64]) -> Result<(f64, f64), RecordingError> {
         (stamp - expected).abs() > UNEVEN * step
     };
     if time.iter().enumerate().any(is_off) {
-        return Err(wrong(uneven(time)));
+        return Err(wrong(uneven(time, from)));
     }
     Ok((1.0 / step, *first))
 }
 
 /// Error text for time stamps that are not evenly spaced: the step of largest absolute value, with its place, and the
 /// median step.
-fn uneven(time: &[f64]) -> String {
+fn uneven(time: &[f64], from: usize) -> String {
     let mut steps: Vec<f64> = time.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let largest = (0..steps.len())
         .max_by(|&a, &b| steps[a].abs().total_cmp(&steps[b].abs()))
@@ -290,7 +293,7 @@ fn uneven(time: &[f64]) -> String {
     let gap = steps.get(largest).copied().unwrap_or(0.0);
     steps.sort_by(f64::total_cmp);
     let usual = steps.get(steps.len() / 2).copied().unwrap_or(0.0);
-    let (after, at) = (largest + 1, time.get(largest).copied().unwrap_or(0.0));
+    let (after, at) = (from + largest + 1, time.get(largest).copied().unwrap_or(0.0));
     if usual <= 0.0 {
         return format!(
             "stamps repeat, so that they are rounded: the usual step is {usual} s, and the largest {gap:.6e} s after sample {after} at {at} s; \

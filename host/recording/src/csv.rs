@@ -210,7 +210,12 @@ mod tests {
                 assert_eq!(parse(text.as_bytes(), chunk), kept, "{text}");
             }
         }
-        for text in ["a,b\n1,2\n5,x", "a,b\n1,2\n5\n", "a,b\n1,2\nstop\n3,4\n"] {
+        for text in [
+            "a,b\n1,2\n5,x",
+            "a,b\n1,2\n5\n",
+            "a,b\n1,2\nstop\n3,4\n",
+            "a,b\n1,2\n0.0O3,4\n",
+        ] {
             let said = parse(text.as_bytes(), 3).unwrap_err();
             assert!(said.contains("line 3"), "{text}: {said}");
         }

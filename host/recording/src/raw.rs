@@ -23,8 +23,17 @@ pub(super) struct Raw {
     /// True if there are several columns and all come from one matrix of a MAT-file, which has no names for them, so
     /// that the user must give them.
     pub(super) asks_names: bool,
+    /// Number of each column in the file, from 1, if some of its columns were left out; empty otherwise.
+    pub(super) numbers: Vec<usize>,
     /// Facts about the reading of the file that the user should see: separator, encoding, omitted columns.
     pub(super) notes: Vec<String>,
+}
+
+impl Raw {
+    /// Number in the file, from 1, of the column with this index.
+    pub(super) fn number(&self, index: usize) -> usize {
+        self.numbers.get(index).copied().unwrap_or(index + 1)
+    }
 }
 
 /// One column of a file: name, unit and samples in that unit.

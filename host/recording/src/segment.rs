@@ -24,8 +24,14 @@ impl Segment {
     /// them if fewer than two do, for which [`Segment::of`] has the message.
     pub(super) fn of_stamps(self, time_s: &[f64]) -> Range<usize> {
         let whole = 0..time_s.len();
-        // A time that is stated with the digits of the stamp may be rounded apart from it.
-        let same = |stamp: f64| SAME_SAMPLE * (1e-6 + stamp.abs()) * 1e-6;
+        let mut steps: Vec<f64> = time_s
+            .windows(2)
+            .map(|pair| pair[1] - pair[0])
+            .filter(|step| *step > 0.0)
+            .collect();
+        steps.sort_by(f64::total_cmp);
+        let usual = steps.get(steps.len() / 2).copied().unwrap_or(0.0);
+        let same = |stamp: f64| SAME_SAMPLE * usual + 4.0 * f64::EPSILON * stamp.abs();
         let is_in = |stamp: &f64| {
             self.from_s.is_none_or(|from| *stamp >= from - same(from))
                 && self.until_s.is_none_or(|until| *stamp < until - same(until))

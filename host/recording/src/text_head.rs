@@ -408,8 +408,13 @@ fn head_columns(titles: &[&str], units: Option<&[&str]>) -> Vec<HeadColumn> {
 fn parts(columns: Vec<HeadColumn>, complex: &[bool]) -> Vec<HeadColumn> {
     let is_complex = complex.iter().copied().chain(std::iter::repeat(false));
     let two = |column: HeadColumn, is_complex| {
+        // The unit of a receptance stands in brackets at the end of its title.
+        let (name, unit) = match column.name.rfind(" (") {
+            Some(at) if column.name.ends_with(')') => column.name.split_at(at),
+            _ => (column.name.as_str(), ""),
+        };
         let part = |part: &str| HeadColumn {
-            name: format!("{} {part}", column.name).trim_start().into(),
+            name: format!("{name} {part}{unit}").trim_start().into(),
             unit: column.unit.clone(),
         };
         if is_complex {

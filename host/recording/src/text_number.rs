@@ -109,9 +109,10 @@ fn ungrouped(field: &str, group: char, mark: char) -> Option<String> {
         }
         count += 1;
     }
-    let is_grouped = count > 0 && (1..=3).contains(&first.len()) && is_digits(first);
+    let is_grouped =
+        count > 0 && (1..=3).contains(&first.len()) && is_digits(first) && !first.starts_with('0');
     // A single group without fraction may as well be a decimal number in the other notation.
-    let is_certain = count > 1 || !rest.is_empty() || group == ',';
+    let is_certain = count > 1 || !rest.is_empty();
     (is_grouped && is_certain).then(|| whole.replace(group, "") + rest)
 }
 
@@ -125,6 +126,9 @@ mod tests {
             ("1,234.5", false, Some(1234.5)),
             ("-1,234,567", false, Some(-1_234_567.0)),
             ("12,34.5", false, None),
+            ("0,125", false, None),
+            ("0,125.5", false, None),
+            ("1,234", false, None),
             ("1.234,5", true, Some(1234.5)),
             ("1.234.567,25", true, Some(1_234_567.25)),
             ("1.2345,5", true, None),

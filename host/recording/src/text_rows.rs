@@ -6,12 +6,13 @@
 
 use std::path::Path;
 
-use super::RecordingError;
 use super::csv_number::{End, number};
 use super::raw::{FoundUnit, Raw, RawColumn};
 use super::text_dialect::{Dialect, Separator};
 use super::text_head::{Head, HeadColumn, is_comment};
 use super::text_number::{complex, is_no_value};
+use super::unit::Unit;
+use super::{Quantity, RecordingError};
 
 /// Columns of a text table, filled while its lines are read.
 pub(super) struct Table<'a> {
@@ -33,8 +34,16 @@ pub(super) struct Table<'a> {
     after: Option<(RecordingError, usize)>,
     /// True while the last line of the file is read and lacks its line end: it may be cut off.
     is_open: bool,
+    /// Number of clock times in each column, in the order of `columns`.
+    clocks: Vec<usize>,
     notes: Vec<String>,
 }
+
+/// Unit of clock times.
+const SECONDS: Unit = Unit {
+    quantity: Quantity::Time,
+    factor: 1.0,
+};
 
 /// Fields of a column without a value: empty, or a word such as `OVR`.
 #[derive(Clone, Default)]
@@ -67,6 +76,7 @@ impl<'a> Table<'a> {
             path,
             line: head.lines,
             gaps: vec![Gaps::default(); columns.len()],
+            clocks: vec![0; columns.len()],
             columns: columns
                 .into_iter()
                 .enumerate()
@@ -184,6 +194,7 @@ impl<'a> Table<'a> {
                 gaps.count += 1;
                 f64::NAN
             } else {
+                self.clocks[index] += usize::from(field.contains(':'));
                 match self.dialect.number(field) {
                     Some(value) if value.is_finite() || !self.finite => value,
                     _ => return Err(self.row_error(&fields)),
@@ -219,14 +230,17 @@ impl<'a> Table<'a> {
         }
     }
 
-    /// True if the first field is text, and rows of numbers came before: the line is no row, as it seems, but one of
-    /// statistics or prose. Keeps the error that it is if another row follows.
+    /// True if the first field is text, not a damaged number, and rows of numbers came before: the line is no row, as it
+    /// seems, but one of statistics or prose. Keeps the error that it is if another row follows.
     fn is_after_rows(&mut self, fields: &[&str]) -> bool {
         let has_rows = self
             .columns
             .first()
             .is_some_and(|column| !column.samples.is_empty());
-        let is_text = |field: &&str| !is_no_value(field) && self.dialect.number(field).is_none();
+        let is_text = |field: &&str| {
+            let is_begun = field.starts_with(|first: char| first.is_ascii_digit() || "+-.,".contains(first));
+            !is_begun && !is_no_value(field) && self.dialect.number(field).is_none()
+        };
         if !has_rows || !fields.first().is_some_and(is_text) {
             return false;
         }
@@ -299,10 +313,16 @@ impl<'a> Table<'a> {
                 && name.parse() == Ok(index + 1)
         };
         let mut columns = Vec::with_capacity(self.columns.len());
+        let mut numbers = Vec::with_capacity(self.columns.len());
         let several = self.columns.len() > 1;
         for (index, (mut column, gaps)) in self.columns.into_iter().zip(&self.gaps).enumerate() {
             if gaps.count > 0 && gaps.count == column.samples.len() {
-                if !is_unnamed(&column.name, index) {
+                if !gaps.text.is_empty() {
+                    notes.push(format!(
+                        "column \"{}\" has no value: \"{}\" and the like in every row",
+                        column.name, gaps.text
+                    ));
+                } else if !is_unnamed(&column.name, index) {
                     notes.push(format!("column \"{}\" is empty", column.name));
                 }
                 continue;
@@ -327,11 +347,26 @@ impl<'a> Table<'a> {
                 notes.push(format!("column {} counts the rows", index + 1));
                 continue;
             }
+            if self.clocks[index] > 0 {
+                if self.clocks[index] + gaps.count < column.samples.len() {
+                    return Err(RecordingError::Content {
+                        path: self.path.into(),
+                        what: format!(
+                            "column \"{}\" has clock times and other numbers; one of both is needed in every row",
+                            column.name
+                        ),
+                    });
+                }
+                column.unit = FoundUnit::Known(SECONDS);
+                notes.push(format!("column \"{}\" holds clock times", column.name));
+            }
             column.samples.shrink_to_fit();
             columns.push(column);
+            numbers.push(index + 1);
         }
         Ok(Raw {
             columns,
+            numbers,
             worded_rate_hz: head.rate_hz,
             unnamed_line: head.columns.is_none().then_some(head.lines + 1),
             notes,

@@ -21,6 +21,8 @@ pub struct TextColumn {
     pub name: String,
     /// Unit of the column as the file states it; `None` if it states none.
     pub unit: Option<String>,
+    /// Number of the column in the file, from 1.
+    pub number: usize,
     /// Values, without conversion.
     pub values: Vec<f64>,
 }
@@ -44,14 +46,20 @@ impl TextTable {
             },
             _ => csv::read(path, false)?,
         };
-        let columns = raw.columns.into_iter().map(|column| TextColumn {
-            name: column.name,
-            unit: match column.unit {
-                FoundUnit::Text(unit) => Some(unit),
-                _ => None,
-            },
-            values: column.samples,
-        });
+        let numbers: Vec<usize> = (0..raw.columns.len()).map(|index| raw.number(index)).collect();
+        let columns = raw
+            .columns
+            .into_iter()
+            .zip(numbers)
+            .map(|(column, number)| TextColumn {
+                number,
+                name: column.name,
+                unit: match column.unit {
+                    FoundUnit::Text(unit) => Some(unit),
+                    _ => None,
+                },
+                values: column.samples,
+            });
         Ok(Self {
             columns: columns.collect(),
             notes: raw.notes,

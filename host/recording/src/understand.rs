@@ -12,7 +12,7 @@ use std::path::Path;
 use super::import::{ColumnMap, Import, Scale};
 use super::meaning::Meaning;
 use super::open_doubts::{Doubts, Open, prefix};
-use super::raw::{FoundUnit, RawColumn};
+use super::raw::{FoundUnit, Raw, RawColumn};
 use super::sidecar::RecordedChannel;
 use super::understood::Basis;
 use super::words::NameMeaning;
@@ -31,7 +31,7 @@ struct Stated {
     is_letter: bool,
 }
 
-/// Meaning of every column of a file, that is the channel that it becomes, in the order of `columns`.
+/// Meaning of every column of a file, that is the channel that it becomes, in the order of the columns of `raw`.
 ///
 /// # Errors
 /// A unit is unknown (unless the file states it for an auxiliary channel) or contradicts the name or the words of its
@@ -39,11 +39,12 @@ struct Stated {
 /// that does not exist; the map states a unit of frequency response functions; a meaning is in doubt.
 pub(super) fn understand(
     path: &Path,
-    columns: &[RawColumn],
+    raw: &Raw,
     sidecar: &Sidecar,
     import: &Import,
     known: &[String],
 ) -> Result<Vec<Meaning>, RecordingError> {
+    let columns = raw.columns.as_slice();
     let names: Vec<String> = columns.iter().map(|column| column.name.clone()).collect();
     if let Some(stranger) = sidecar.channels.keys().find(|name| !known.contains(name)) {
         return Err(RecordingError::Content {
@@ -54,12 +55,11 @@ pub(super) fn understand(
             ),
         });
     }
-    let is_about = |map: &ColumnMap, index: usize| map.is_about(&names[index], index + 1, &names);
-    if let Some(stranger) = import
-        .map
-        .iter()
-        .find(|map| !(0..known.len()).any(|index| map.is_about(&known[index], index + 1, known)))
-    {
+    let is_about = |map: &ColumnMap, index: usize| map.is_about(&names[index], raw.number(index), &names);
+    if let Some(stranger) = import.map.iter().find(|map| {
+        let is_known = (0..known.len()).any(|index| map.is_about(&known[index], index + 1, known));
+        !is_known && !(0..columns.len()).any(|index| is_about(map, index))
+    }) {
         return Err(RecordingError::Content {
             path: path.into(),
             what: format!(
@@ -78,7 +78,8 @@ pub(super) fn understand(
         let map = import.map.iter().find(|map| is_about(map, index));
         let said = sidecar.channels.get(&column.name);
         let mut stated = stated(path, column, said, map)?;
-        stated.is_letter = are_letters && names[index].len() == 1;
+        let is_letter = matches!(names[index].to_lowercase().as_str(), "a" | "b" | "c" | "d");
+        stated.is_letter = are_letters && is_letter;
         meanings.push(meaning(path, column, stated, &mut doubts)?);
     }
     prefer_exact_time(&mut meanings);
@@ -244,9 +245,19 @@ fn meaning(
         }),
     };
     let lower = column.name.to_lowercase();
-    let is_speed = stated.name.is_none() && stated.unit_text.as_deref().is_some_and(is_spindle_speed);
+    let is_speed =
+        NameMeaning::of(&column.name).is_tacho && stated.unit_text.as_deref().is_some_and(is_spindle_speed);
+    let is_measured = matches!(
+        quantity,
+        Quantity::Time
+            | Quantity::Force
+            | Quantity::Displacement
+            | Quantity::Velocity
+            | Quantity::Acceleration
+    );
+    let is_letter = stated.is_letter && !is_measured;
     let found = match stated.name {
-        None if stated.is_letter => return Ok(of(lower, Basis::Auxiliary)),
+        None if is_letter => return Ok(of(lower, Basis::Auxiliary)),
         None if is_speed => return Ok(of("rpm".into(), Basis::Auxiliary)),
         Some(name) => of(name, stated.from.unwrap_or(Basis::Sidecar)),
         None if is_channel_name(&lower) => match motion_of_axis(&lower, quantity) {

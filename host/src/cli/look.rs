@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
-use super::segment::StatedColumns;
+use super::segment::RecordedSegment;
 use super::{Error, Output};
 use crate::frf::FrfTable;
-use crate::recording::{ChannelSummary, Import, Imported, Recording, Segment, Sidecar, Understood, envelope};
+use crate::recording::{ChannelSummary, Import, Imported, Recording, Sidecar, Understood, envelope};
 use crate::report::digits::significant;
 
 /// Shows how a file is understood: channels, units, sample rate, peaks, clipping, dropouts, and the sidecar that states
@@ -24,7 +24,7 @@ pub struct Args {
     #[arg(value_name = "FILE", required = true)]
     files: Vec<PathBuf>,
     #[command(flatten)]
-    stated: StatedColumns,
+    segment: RecordedSegment,
     /// Write the sidecar NAME.toml beside each recording. An existing file is not overwritten.
     #[arg(long)]
     write_sidecar: bool,
@@ -75,7 +75,7 @@ struct ReceptanceSummary {
 
 /// Runs the verb.
 pub fn run(args: Args) -> Result<(), Error> {
-    let import = args.stated.import(Segment::default());
+    let import = args.segment.import();
     let mut answer = LookOutput {
         records: Vec::new(),
         tables: Vec::new(),
