@@ -111,19 +111,24 @@ pub(super) fn recording(
                 (rate, raw.start_s, "option")
             }
             (None, Some(time), ..) => {
-                let range = import.segment.of_stamps(time);
-                let first = time.iter().find(|stamp| stamp.is_finite());
-                since_s = time
-                    .get(range.start)
-                    .zip(first)
-                    .map_or(0.0, |(start, first)| start - first);
-                for channel in &mut channels {
-                    channel.samples = channel
-                        .samples
-                        .get(range.clone())
-                        .map_or_else(|| channel.samples.clone(), <[f64]>::to_vec);
-                }
-                let (rate, start) = even_rate(path, &time[range.clone()], range.start)?;
+                let (rate, start) = match even_rate(path, time, 0) {
+                    // A gap outside of the segment does not matter.
+                    Err(_) if !import.segment.is_whole() => {
+                        let range = import.segment.of_stamps(time);
+                        let first = time.iter().find(|stamp| stamp.is_finite());
+                        since_s = time
+                            .get(range.start)
+                            .zip(first)
+                            .map_or(0.0, |(start, first)| start - first);
+                        for channel in &mut channels {
+                            if let Some(samples) = channel.samples.get(range.clone()) {
+                                channel.samples = samples.to_vec();
+                            }
+                        }
+                        even_rate(path, &time[range.clone()], range.start)?
+                    }
+                    found => found?,
+                };
                 (rate, start, "time column")
             }
             (None, None, Some(rate), _) => (rate, raw.start_s, "file"),
