@@ -119,6 +119,17 @@ impl ForceLaw {
         .at(at)
     }
 
+    /// Derivative of [`Self::force_n`] with respect to the chip thickness, N/m.
+    pub fn slope_n_per_m(&self, at: Immersion, thickness_m: f64, depth_m: f64) -> [f64; 3] {
+        let slope = depth_m * self.chip.map_or(1.0, |chip| chip.slope(thickness_m));
+        EdgeForce {
+            tangential: slope * self.cutting.tangential,
+            inward: slope * self.cutting.inward,
+            axial: slope * self.cutting.axial,
+        }
+        .at(at)
+    }
+
     /// Matrix D of process damping, N s/m, in the force F = −D v at the axial depth, m, and cutting speed, m/s; without
     /// wear. Zero without process damping.
     pub fn damping_ns_per_m(&self, at: Immersion, depth_m: f64, cutting_speed_m_per_s: f64) -> [[f64; 3]; 3] {

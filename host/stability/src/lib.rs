@@ -70,6 +70,7 @@
 //! | `frequency` | loops of receptances: characteristic loci, Nyquist counts |
 //! | `methods` | one file per method |
 //! | [`orbit`] | forced periodic orbits and their branches |
+//! | [`cut_orbit`] | forced periodic orbits with loss of contact, and their derivatives |
 //! | [`lobe_table`] | the table of the device |
 //! | [`trial_cuts`] | predictions against tried cuts |
 //! | [`rescaling`] | natural frequencies from the chatter frequencies of check cuts |
@@ -81,6 +82,7 @@
 //! file that it reads is a table of trial cuts.
 
 mod criteria;
+pub mod cut_orbit;
 mod error;
 mod frequency;
 mod limits;

@@ -1,0 +1,143 @@
+//! Fourier coefficients of the forces of an orbit.
+
+use std::collections::HashMap;
+use std::f64::consts::TAU;
+
+use nalgebra::DMatrix;
+use num_complex::Complex64;
+
+use super::mesh::{Mesh, SAME_TIME};
+use super::orbit::CutOrbit;
+use super::sensitivity::Sensitivity;
+use quietcut_numerics::quadrature::Gauss;
+
+/// Fourier coefficients F_k of forces along x, y, z, N, at the multiples k = 0, 1, … of the spindle frequency:
+/// F(t) = Σ_k F_k e^{ikΩt} over positive and negative k, F_{−k} the conjugate of F_k.
+#[derive(Clone, Debug)]
+pub struct ForceOrders {
+    /// Cutting force on the tool, (orders) × 3.
+    pub cutting_n: DMatrix<Complex64>,
+    /// Force on the structure, cutting force minus restoring forces, (orders) × 3; 0 along axes in which the tool does
+    /// not move.
+    pub structure_n: DMatrix<Complex64>,
+}
+
+/// Weights of the nodes of a mesh in Fourier coefficients up to an order.
+pub struct OrderWeights {
+    /// By subinterval: nodes × orders.
+    weights: Vec<DMatrix<Complex64>>,
+    orders: usize,
+    revolution_s: f64,
+}
+
+impl OrderWeights {
+    fn new(mesh: &Mesh, orders: usize) -> Self {
+        let mut known: HashMap<u64, DMatrix<Complex64>> = HashMap::new();
+        let unit_s = SAME_TIME * mesh.revolution_s;
+        let of = |subinterval: &super::mesh::Subinterval| {
+            let key = (subinterval.duration_s / unit_s).round() as u64;
+            let share = subinterval.duration_s / mesh.revolution_s;
+            let base = known.entry(key).or_insert_with(|| integrals(mesh.gauss, share, orders));
+            let mut weights = base.clone();
+            let phase = -TAU * subinterval.start_s / mesh.revolution_s;
+            for (order, mut column) in weights.column_iter_mut().enumerate() {
+                column *= Complex64::cis(phase * order as f64);
+            }
+            weights
+        };
+        Self {
+            weights: mesh.subintervals.iter().map(of).collect(),
+            orders,
+            revolution_s: mesh.revolution_s,
+        }
+    }
+
+    /// Coefficients of a force with `count` components at the nodes, node by node.
+    fn sum(&self, count: usize, of: impl Fn(usize, usize) -> f64) -> DMatrix<Complex64> {
+        let mut orders = DMatrix::zeros(self.orders, count);
+        let mut node = 0;
+        for weights in &self.weights {
+            for row in weights.row_iter() {
+                for component in 0..count {
+                    let force = of(node, component);
+                    if force != 0.0 {
+                        for (sum, weight) in orders.column_mut(component).iter_mut().zip(row.iter()) {
+                            *sum += weight * force;
+                        }
+                    }
+                }
+                node += 1;
+            }
+        }
+        orders
+    }
+}
+
+/// ∫ ℓ_j e^{−ikΩt} dt/T over a subinterval that takes `share` of a revolution and begins at t = 0; nodes × orders.
+fn integrals(gauss: &Gauss, share: f64, orders: usize) -> DMatrix<Complex64> {
+    let turns = share * orders as f64;
+    // A Gauss rule of n nodes integrates e^{iωt} over a length L to rounding if n exceeds ωL/2 + 10; longer
+    // subintervals are cut.
+    let pieces = (TAU * turns / 30.0).ceil().max(1.0);
+    let fine = Gauss::shared(gauss.nodes.len() + 25);
+    let mut sum = DMatrix::zeros(gauss.nodes.len(), orders);
+    for piece in 0..pieces as usize {
+        for (node, weight) in fine.nodes.iter().zip(&fine.weights) {
+            let place = (piece as f64 + node) / pieces;
+            let lagrange = gauss.lagrange(place);
+            let turn = Complex64::cis(-TAU * share * place);
+            let mut factor = Complex64::from(weight * share / pieces);
+            for order in 0..orders {
+                for (sum, lagrange) in sum.column_mut(order).iter_mut().zip(&lagrange) {
+                    *sum += factor * lagrange;
+                }
+                factor *= turn;
+            }
+        }
+    }
+    sum
+}
+
+impl CutOrbit {
+    /// Weights for Fourier coefficients of the orders 0 to `highest`.
+    pub fn order_weights(&self, highest: usize) -> OrderWeights {
+        OrderWeights::new(&self.mesh, highest + 1)
+    }
+
+    /// Fourier coefficients of the forces.
+    pub fn force_orders(&self, weights: &OrderWeights) -> ForceOrders {
+        self.orders_of(weights, &self.forces.cutting_n, &self.forces.inputs)
+    }
+
+    /// Derivatives of the Fourier coefficients of the forces with respect to a parameter.
+    pub fn force_order_slopes(&self, weights: &OrderWeights, sensitivity: &Sensitivity) -> ForceOrders {
+        let mut orders = self.orders_of(weights, &sensitivity.cutting_n, &sensitivity.inputs);
+        for (time_s, cutting_n, inputs) in &sensitivity.impulses {
+            let turn = Complex64::cis(-TAU * time_s / weights.revolution_s);
+            let mut factor = Complex64::from(1.0 / weights.revolution_s);
+            for order in 0..weights.orders {
+                for (axis, force) in cutting_n.iter().enumerate() {
+                    orders.cutting_n[(order, axis)] += factor * force;
+                }
+                for (axis, force) in self.ports.axes.iter().zip(inputs) {
+                    orders.structure_n[(order, *axis)] += factor * force;
+                }
+                factor *= turn;
+            }
+        }
+        orders
+    }
+
+    fn orders_of(&self, weights: &OrderWeights, cutting_n: &[[f64; 3]], inputs: &[f64]) -> ForceOrders {
+        let count = self.ports.inputs();
+        let along = weights.sum(self.ports.axes.len(), |node, axis| inputs[node * count + axis]);
+        let mut structure_n = DMatrix::zeros(weights.orders, 3);
+        for (index, axis) in self.ports.axes.iter().enumerate() {
+            structure_n.set_column(*axis, &along.column(index));
+        }
+        ForceOrders {
+            cutting_n: weights.sum(3, |node, axis| cutting_n[node][axis]),
+            structure_n,
+        }
+    }
+}

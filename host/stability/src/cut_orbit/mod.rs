@@ -1,0 +1,34 @@
+//! Forced periodic orbits of a cut over one revolution, exact for teeth that enter, leave and lose contact, with
+//! derivatives with respect to parameters.
+//!
+//! | file | content |
+//! |---|---|
+//! | `model` | structure, restoring forces and tool at one speed |
+//! | `mesh` | subintervals of a revolution |
+//! | `propagator`, `response` | motion of the linear structure under given forces |
+//! | `motion` | outputs over a revolution |
+//! | `law` | forces at one instant |
+//! | `events` | loss of contact, surfaces, stick |
+//! | `newton` | the equations |
+//! | `orbit` | the orbit |
+//! | `sensitivity` | derivatives with respect to parameters |
+//! | `harmonics` | Fourier coefficients of the forces |
+
+mod events;
+mod harmonics;
+mod law;
+mod mesh;
+mod model;
+mod motion;
+mod newton;
+mod orbit;
+mod propagator;
+mod response;
+mod sensitivity;
+#[cfg(test)]
+mod tests;
+
+pub use harmonics::{ForceOrders, OrderWeights};
+pub use model::CutModel;
+pub use orbit::{CutOrbit, CutOrbitError};
+pub use sensitivity::Sensitivity;

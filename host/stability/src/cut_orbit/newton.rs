@@ -1,0 +1,502 @@
+//! The forced orbit by Newton's method.
+//!
+//! Unknowns are the inputs f of the structure at the nodes and the instants of events at which f jumps. With the
+//! response y = G f of the structure and the forces f = Φ(y), a step δy from a motion y solves
+//!
+//!   δf − Φ' (G δf − Σ_e G_e J_e δt_e) = −Φ' r,       r = y − G Φ(y),
+//!   g_e' (G δf − Σ_e' G_e' J_e' δt_e') + ġ_e δt_e = g_e' r − g_e,
+//!
+//! where J_e is the jump of f at the event e, whose delay by δt_e is an impulse −J_e δt_e with the response G_e, and
+//! g_e(t_e, y) = 0 defines its instant.
+
+use nalgebra::linalg::LU;
+use nalgebra::{DMatrix, DVector, Dyn, Matrix3, Vector3};
+
+use super::events::{Events, Revolution};
+use super::law::{Instant, Slopes};
+use super::mesh::{Contact, Mesh, Stretches};
+use super::model::{CutModel, Ports};
+use super::motion::Motion;
+use super::response::Response;
+
+/// Row of a sparse matrix: output of a point, with its weight.
+type SparseRow = Vec<(usize, f64)>;
+
+/// Forces at all nodes of a mesh.
+#[derive(Clone, Debug)]
+pub(super) struct NodeForces {
+    /// Cutting force along x, y, z, N, node by node.
+    pub(super) cutting_n: Vec<[f64; 3]>,
+    /// Inputs of the structure, node by node.
+    pub(super) inputs: Vec<f64>,
+}
+
+/// Forces after an event minus those before it.
+pub(super) struct JumpSize {
+    /// Subinterval that begins with the event.
+    pub(super) subinterval: usize,
+    pub(super) inputs: DVector<f64>,
+    /// Cutting force along x, y, z, N.
+    pub(super) cutting_n: [f64; 3],
+}
+
+/// An event at which the inputs jump.
+struct Jump {
+    size: JumpSize,
+    condition: Condition,
+    /// Derivative of g_e with respect to the outputs, and to time, 1/s.
+    row: SparseRow,
+    rate: f64,
+    /// Derivative of g_e by the outputs at its own point.
+    own: DVector<f64>,
+}
+
+/// The equations of a Newton step, factored.
+pub(super) struct Linearization {
+    /// First column of the inputs of each subinterval; `None` where no force acts.
+    first_column: Vec<Option<usize>>,
+    count: usize,
+    /// Inputs at the nodes by outputs at the points.
+    inputs_by: Vec<SparseRow>,
+    /// Cutting forces at the nodes by outputs at the points.
+    cutting_by: Vec<SparseRow>,
+    jumps: Vec<Jump>,
+    /// Outputs by unknowns.
+    response: DMatrix<f64>,
+    factors: LU<f64, Dyn, Dyn>,
+}
+
+/// A revolution of a model at given contact.
+pub(super) struct Period<'a> {
+    pub(super) model: &'a CutModel,
+    pub(super) ports: &'a Ports,
+    pub(super) mesh: &'a Mesh,
+    pub(super) motion: &'a Motion,
+}
+
+impl Period<'_> {
+    fn path(&self) -> impl Fn(f64) -> [f64; 3] + '_ {
+        |time_s| self.motion.displacement(self.mesh, self.ports, time_s)
+    }
+
+    /// True if a force acts in the subinterval.
+    fn is_driven(&self, subinterval: usize) -> bool {
+        !self.model.restoring_forces.is_empty()
+            || self.mesh.subintervals[subinterval]
+                .contact
+                .teeth
+                .iter()
+                .any(|tooth| tooth.passings.is_some())
+    }
+
+    /// Forces along the motion at all nodes.
+    pub(super) fn forces(&self) -> NodeForces {
+        let path = self.path();
+        let mut all = NodeForces {
+            cutting_n: Vec::new(),
+            inputs: Vec::new(),
+        };
+        for (index, subinterval) in self.mesh.subintervals.iter().enumerate() {
+            for node in 0..self.mesh.nodes() {
+                let forces = self.model.forces(
+                    self.ports,
+                    &Instant {
+                        time_s: self.mesh.time_s(index, node),
+                        contact: &subinterval.contact,
+                        outputs: self.motion.at_point(self.mesh.point(index, node + 1)),
+                        path: &path,
+                    },
+                );
+                all.cutting_n.push(forces.cutting_n);
+                all.inputs.extend(forces.inputs);
+            }
+        }
+        all
+    }
+
+    /// Outputs of a point with index `point`, weighted by `row`.
+    fn own_row(&self, point: usize, row: impl Iterator<Item = f64>) -> SparseRow {
+        let first = point * self.ports.outputs();
+        row.enumerate()
+            .filter(|(_, weight)| *weight != 0.0)
+            .map(|(output, weight)| (first + output, weight))
+            .collect()
+    }
+
+    /// Adds `weights` times the displacement at an earlier instant.
+    fn add_earlier(&self, row: &mut SparseRow, time_s: f64, weights: Vector3<f64>) {
+        for (point, share) in self.mesh.interpolation_at(time_s).points() {
+            let first = point * self.ports.outputs();
+            for (index, axis) in self.ports.axes.iter().enumerate() {
+                if weights[*axis] != 0.0 {
+                    row.push((first + index, share * weights[*axis]));
+                }
+            }
+        }
+    }
+
+    /// Rows of the cutting force (three) and of the inputs at one instant, whose outputs are those of `point`.
+    fn rows(&self, slopes: &Slopes, point: usize) -> (Vec<SparseRow>, Vec<SparseRow>) {
+        let cutting = |axis: usize| {
+            let mut row = self.own_row(point, slopes.cutting.row(axis).iter().copied());
+            for (time_s, by) in &slopes.earlier {
+                self.add_earlier(&mut row, *time_s, by.row(axis).transpose());
+            }
+            row
+        };
+        let by_own = &slopes.inputs + &slopes.by_cutting * &slopes.cutting;
+        let input = |input: usize| {
+            let mut row = self.own_row(point, by_own.row(input).iter().copied());
+            let by_cutting = slopes.by_cutting.row(input);
+            for (time_s, by) in &slopes.earlier {
+                let weights: Matrix3<f64> = *by;
+                let weights = weights.transpose() * Vector3::from_fn(|axis, _| by_cutting[axis]);
+                self.add_earlier(&mut row, *time_s, weights);
+            }
+            row
+        };
+        ((0..3).map(cutting).collect(), (0..self.ports.inputs()).map(input).collect())
+    }
+
+    /// The equations of a Newton step about the motion; `None` if they are singular.
+    pub(super) fn linearized(&self, response: &Response<'_>) -> Option<Linearization> {
+        let (inputs, nodes) = (self.ports.inputs(), self.mesh.nodes());
+        let sizes = self.motion.sizes();
+        let path = self.path();
+        let mut count = 0;
+        let mut first_column = Vec::with_capacity(self.mesh.subintervals.len());
+        let (mut cutting_by, mut inputs_by) = (Vec::new(), Vec::new());
+        for (index, subinterval) in self.mesh.subintervals.iter().enumerate() {
+            let driven = self.is_driven(index);
+            first_column.push(driven.then_some(count));
+            for node in 0..nodes {
+                if !driven {
+                    cutting_by.extend([const { Vec::new() }; 3]);
+                    continue;
+                }
+                let point = self.mesh.point(index, node + 1);
+                let slopes = self.model.slopes(
+                    self.ports,
+                    &Instant {
+                        time_s: self.mesh.time_s(index, node),
+                        contact: &subinterval.contact,
+                        outputs: self.motion.at_point(point),
+                        path: &path,
+                    },
+                    &sizes,
+                );
+                let (of_cutting, of_inputs) = self.rows(&slopes, point);
+                cutting_by.extend(of_cutting);
+                inputs_by.extend(of_inputs);
+            }
+            count += if driven { nodes * inputs } else { 0 };
+        }
+        let jumps = self.jumps(&sizes);
+        let impulses: Vec<_> = jumps.iter().map(|jump| (jump.size.subinterval, -&jump.size.inputs)).collect();
+        let matrix = response.matrix(&first_column, count, &impulses);
+        let factors = self.equations(&inputs_by, &jumps, count, &matrix).lu();
+        let is_regular = factors.u().diagonal().iter().all(|pivot| pivot.is_finite() && *pivot != 0.0);
+        is_regular.then_some(Linearization {
+            first_column,
+            count,
+            inputs_by,
+            cutting_by,
+            jumps,
+            response: matrix,
+            factors,
+        })
+    }
+
+    fn equations(&self, inputs_by: &[SparseRow], jumps: &[Jump], count: usize, matrix: &DMatrix<f64>) -> DMatrix<f64> {
+        let size = count + jumps.len();
+        let mut equations = DMatrix::identity(size, size);
+        let scale = |jump: &Jump| 1.0 / (jump.rate * self.mesh.revolution_s);
+        for (column, of_column) in matrix.column_iter().enumerate() {
+            let of_column = of_column.as_slice();
+            let mut left = equations.column_mut(column);
+            for (row, weights) in inputs_by.iter().enumerate() {
+                left[row] -= weights.iter().map(|(at, weight)| weight * of_column[*at]).sum::<f64>();
+            }
+            for (index, jump) in jumps.iter().enumerate() {
+                let mut moved: f64 = jump.row.iter().map(|(at, weight)| weight * of_column[*at]).sum();
+                if column == count + index {
+                    // The impulse of an event acts after it.
+                    moved += (&self.ports.output * &self.ports.b * &jump.size.inputs).dot(&jump.own);
+                    left[count + index] = 0.0;
+                    moved += jump.rate;
+                }
+                left[count + index] += scale(jump) * moved;
+            }
+        }
+        equations
+    }
+
+    /// The events at which the inputs jump.
+    fn jumps(&self, sizes: &[f64]) -> Vec<Jump> {
+        let path = self.path();
+        let mut jumps = Vec::new();
+        for (index, subinterval) in self.mesh.subintervals.iter().enumerate() {
+            if subinterval.event.is_none() {
+                continue;
+            }
+            let before = &self.mesh.subintervals[(index + self.mesh.subintervals.len() - 1) % self.mesh.subintervals.len()];
+            let point = self.mesh.point(index, 0);
+            let at = |contact| Instant {
+                time_s: subinterval.start_s,
+                contact,
+                outputs: self.motion.at_point(point),
+                path: &path,
+            };
+            let forces = |contact| self.model.forces(self.ports, &at(contact));
+            let (left, right) = (forces(&before.contact), forces(&subinterval.contact));
+            let pairs = right.inputs.iter().zip(&left.inputs);
+            let size = JumpSize {
+                subinterval: index,
+                inputs: DVector::from_iterator(left.inputs.len(), pairs.map(|(right, left)| right - left)),
+                cutting_n: std::array::from_fn(|axis| right.cutting_n[axis] - left.cutting_n[axis]),
+            };
+            let all = left.inputs.iter().chain(&right.inputs);
+            let largest = all.fold(0.0_f64, |most, force| most.max(force.abs()));
+            // Only rounding: the inputs have a kink here, which does not move the orbit to first order.
+            if size.inputs.amax() <= 1e-9 * largest {
+                continue;
+            }
+            jumps.extend(self.jump(size, &before.contact, sizes));
+        }
+        jumps
+    }
+
+    fn jump(&self, size: JumpSize, before: &Contact, sizes: &[f64]) -> Option<Jump> {
+        let index = size.subinterval;
+        let subinterval = &self.mesh.subintervals[index];
+        let (time_s, after) = (subinterval.start_s, &subinterval.contact);
+        let point = self.mesh.point(index, 0);
+        let condition = Condition::between(before, after)?;
+        let path = self.path();
+        let value = |time_s: f64, outputs: &[f64]| {
+            self.condition(&condition, &Instant {
+                time_s,
+                contact: before,
+                outputs,
+                path: &path,
+            })
+        };
+        // One-sided: before the event the motion has no kink.
+        let earlier = (index + self.mesh.subintervals.len() - 1) % self.mesh.subintervals.len();
+        let of_earlier = &self.mesh.subintervals[earlier];
+        let end_s = of_earlier.start_s + of_earlier.duration_s;
+        let step_s = 1e-3 * of_earlier.duration_s;
+        let at = |steps: f64| {
+            let time_s = end_s - steps * step_s;
+            value(time_s, &self.motion.within(self.mesh, earlier, time_s))
+        };
+        let rate = (3.0 * at(0.0) - 4.0 * at(1.0) + at(2.0)) / (2.0 * step_s);
+        let outputs = self.motion.at_point(point);
+        let mut own = DVector::zeros(self.ports.outputs());
+        for output in 0..own.len() {
+            let step = 1e-6 * sizes[output].max(f64::MIN_POSITIVE.sqrt());
+            let moved = |step: f64| {
+                let mut moved = outputs.to_vec();
+                moved[output] += step;
+                value(time_s, &moved)
+            };
+            own[output] = (moved(step) - moved(-step)) / (2.0 * step);
+        }
+        let mut row = self.own_row(point, own.iter().copied());
+        if let Condition::Gap { tooth, surfaces } = &condition {
+            let normal = self.model.normal(*tooth, time_s);
+            for (passings, sign) in surfaces {
+                if let Some(earlier_s) = self.model.earlier_s(*tooth, *passings, time_s) {
+                    self.add_earlier(&mut row, earlier_s, -normal * *sign);
+                }
+            }
+        }
+        (rate != 0.0).then_some(Jump {
+            size,
+            condition,
+            row,
+            rate,
+            own,
+        })
+    }
+
+    fn condition(&self, condition: &Condition, at: &Instant<'_>) -> f64 {
+        match condition {
+            Condition::Gap { tooth, surfaces } => {
+                let x = self.ports.displacement(at.outputs);
+                let gap = |(passings, sign): &(usize, f64)| sign * self.model.gap_m(*tooth, *passings, at.time_s, x, at.path);
+                surfaces.iter().map(gap).sum()
+            }
+            Condition::Regime(index) => self.model.regime_view(self.ports, at, *index).margin,
+        }
+    }
+}
+
+/// What vanishes at an event.
+enum Condition {
+    /// Sum of gaps between a tooth and surfaces, with their signs.
+    Gap { tooth: usize, surfaces: Vec<(usize, f64)> },
+    /// Margin of the regime of a restoring force.
+    Regime(usize),
+}
+
+impl Condition {
+    fn between(before: &Contact, after: &Contact) -> Option<Self> {
+        let teeth = before.teeth.iter().zip(&after.teeth).find(|(before, after)| before != after);
+        if let Some((from, to)) = teeth {
+            let surfaces = match (from.passings, to.passings) {
+                (Some(from), Some(to)) => vec![(from, 1.0), (to, -1.0)],
+                (Some(one), None) | (None, Some(one)) => vec![(one, 1.0)],
+                (None, None) => return None,
+            };
+            return Some(Self::Gap {
+                tooth: from.tooth,
+                surfaces,
+            });
+        }
+        let mut regimes = before.regimes.iter().zip(&after.regimes);
+        regimes.position(|(before, after)| before != after).map(Self::Regime)
+    }
+}
+
+/// First-order change of the forces and the motion of an orbit.
+pub(super) struct Change {
+    /// Outputs at the points.
+    pub(super) outputs: DVector<f64>,
+    /// Inputs at all nodes.
+    pub(super) inputs: Vec<f64>,
+    /// Cutting forces at all nodes, without what changes explicitly, N.
+    pub(super) cutting_n: Vec<[f64; 3]>,
+    /// Delay of each event at which the inputs jump, s.
+    pub(super) delays_s: Vec<f64>,
+}
+
+impl Linearization {
+    /// Solves the equations for right-hand sides: `inputs` at all nodes, and `events` for each jump.
+    pub(super) fn solve(&self, mesh: &Mesh, ports: &Ports, inputs: &[f64], events: &[f64]) -> Option<Change> {
+        let per_subinterval = mesh.nodes() * ports.inputs();
+        let mut right = DVector::zeros(self.count + self.jumps.len());
+        for (index, first) in self.first_column.iter().enumerate() {
+            let Some(first) = first else { continue };
+            let own = &inputs[index * per_subinterval..(index + 1) * per_subinterval];
+            right.rows_mut(*first, per_subinterval).copy_from_slice(own);
+        }
+        for (index, (jump, event)) in self.jumps.iter().zip(events).enumerate() {
+            right[self.count + index] = event / (jump.rate * mesh.revolution_s);
+        }
+        if !self.factors.solve_mut(&mut right) {
+            return None;
+        }
+        let mut all_inputs = vec![0.0; inputs.len()];
+        for (index, first) in self.first_column.iter().enumerate() {
+            let Some(first) = first else { continue };
+            all_inputs[index * per_subinterval..(index + 1) * per_subinterval]
+                .copy_from_slice(right.rows(*first, per_subinterval).as_slice());
+        }
+        let outputs = &self.response * &right;
+        let of_row = |row: &SparseRow| row.iter().map(|(at, weight)| weight * outputs[*at]).sum::<f64>();
+        let cutting_n = self.cutting_by.chunks_exact(3).map(|rows| std::array::from_fn(|axis| of_row(&rows[axis])));
+        Some(Change {
+            cutting_n: cutting_n.collect(),
+            inputs: all_inputs,
+            delays_s: right.rows(self.count, self.jumps.len()).iter().copied().collect(),
+            outputs,
+        })
+    }
+
+    /// Inputs at the driven nodes and event functions by a change of the outputs.
+    pub(super) fn applied(&self, mesh: &Mesh, ports: &Ports, outputs: &[f64]) -> (Vec<f64>, Vec<f64>) {
+        let of_row = |row: &SparseRow| row.iter().map(|(at, weight)| weight * outputs[*at]).sum::<f64>();
+        let per_subinterval = mesh.nodes() * ports.inputs();
+        let mut inputs = vec![0.0; self.first_column.len() * per_subinterval];
+        for (index, first) in self.first_column.iter().enumerate() {
+            let Some(first) = first else { continue };
+            for (offset, row) in self.inputs_by[*first..*first + per_subinterval].iter().enumerate() {
+                inputs[index * per_subinterval + offset] = of_row(row);
+            }
+        }
+        (inputs, self.jumps.iter().map(|jump| of_row(&jump.row)).collect())
+    }
+
+    /// Sizes of the jumps.
+    pub(super) fn jump_sizes(&self) -> impl Iterator<Item = &JumpSize> {
+        self.jumps.iter().map(|jump| &jump.size)
+    }
+
+    /// Functions g_e of the jumps along a motion at constant time.
+    pub(super) fn conditions(&self, period: &Period<'_>) -> Vec<f64> {
+        let path = period.path();
+        let of = |jump: &Jump| {
+            let index = jump.size.subinterval;
+            let count = period.mesh.subintervals.len();
+            let at = Instant {
+                time_s: period.mesh.subintervals[index].start_s,
+                contact: &period.mesh.subintervals[(index + count - 1) % count].contact,
+                outputs: period.motion.at_point(period.mesh.point(index, 0)),
+                path: &path,
+            };
+            period.condition(&jump.condition, &at)
+        };
+        self.jumps.iter().map(of).collect()
+    }
+}
+
+/// Result of a Newton step.
+pub(super) struct Step {
+    pub(super) motion: Motion,
+    /// Largest change of the displacement over the largest displacement.
+    pub(super) moved: f64,
+    /// Instants of the events at which the inputs jump: number of the event, s.
+    pub(super) instants_s: Vec<(usize, f64)>,
+}
+
+/// The share `share` of a Newton step from `motion` on `mesh`.
+pub(super) fn step(model: &CutModel, ports: &Ports, mesh: &Mesh, motion: &Motion, share: f64) -> Option<Step> {
+    let period = Period {
+        model,
+        ports,
+        mesh,
+        motion,
+    };
+    let response = Response::new(mesh, ports)?;
+    let linearized = period.linearized(&response)?;
+    let answered = response.outputs(&period.forces().inputs);
+    let residual: Vec<f64> = motion.values.iter().zip(&answered).map(|(y, answer)| y - answer).collect();
+    let (inputs, events) = linearized.applied(mesh, ports, &residual);
+    let missed = linearized.conditions(&period);
+    let events: Vec<f64> = events.iter().zip(missed).map(|(event, missed)| event - missed).collect();
+    let minus: Vec<f64> = inputs.iter().map(|x| -x).collect();
+    let change = linearized.solve(mesh, ports, &minus, &events)?;
+    let mut next = motion.clone();
+    for ((value, answer), change) in next.values.iter_mut().zip(&answered).zip(change.outputs.iter()) {
+        *value += share * (answer + change - *value);
+    }
+    let count = ports.axes.len();
+    let displacement = |values: &[f64]| -> Vec<f64> {
+        values.chunks_exact(motion.per_point).flat_map(|point| point[..count].to_vec()).collect()
+    };
+    let (new, old) = (displacement(&next.values), displacement(&motion.values));
+    let size = new.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+    let moved = new.iter().zip(&old).fold(0.0_f64, |most, (a, b)| most.max((a - b).abs()));
+    let instants = linearized.jumps.iter().zip(&change.delays_s).filter_map(|(jump, delay_s)| {
+        let of = &mesh.subintervals[jump.size.subinterval];
+        Some((of.event?, of.start_s + share * delay_s))
+    });
+    (size.is_finite() && moved.is_finite()).then(|| Step {
+        motion: next,
+        moved: if size > 0.0 { moved / size } else { 0.0 },
+        instants_s: instants.collect(),
+    })
+}
+
+/// The events along a motion.
+pub(super) fn events(model: &CutModel, ports: &Ports, stretches: &Stretches, mesh: &Mesh, motion: &Motion) -> Events {
+    Revolution {
+        model,
+        ports,
+        stretches,
+        mesh,
+        motion,
+    }
+    .events()
+}
