@@ -97,11 +97,11 @@ pub(crate) fn lines(
         if is_lobe || lines.len() >= LINES_MAX {
             continue;
         }
-        let (place, peak) = vertex([bin - 1, bin, bin + 1].map(|bin| power[bin].max(f64::MIN_POSITIVE).ln()));
+        let place = vertex([bin - 1, bin, bin + 1].map(|bin| power[bin].max(f64::MIN_POSITIVE).ln()));
         let line = SpectralLine {
             channel: 0,
             frequency_hz: (bin as f64 + place) * rate_hz / spectrum.length as f64,
-            amplitude: 2.0 * (0.5 * peak).exp() / taper.sum(),
+            amplitude: 2.0 * power[bin].sqrt() / (taper.sum() * taper::main_lobe(place / bins_per_cell)),
             probability,
         };
         lines.push((bin, line));
@@ -109,14 +109,14 @@ pub(crate) fn lines(
     lines.into_iter().map(|(_, line)| line).collect()
 }
 
-/// Place from −1 to 1 and value of the vertex of the parabola through values at −1, 0 and 1, the middle one the largest.
-fn vertex([left, middle, right]: [f64; 3]) -> (f64, f64) {
+/// Place from −1/2 to 1/2 of the vertex of the parabola through values at −1, 0 and 1, the middle one the largest.
+fn vertex([left, middle, right]: [f64; 3]) -> f64 {
     let bend = left - 2.0 * middle + right;
-    if bend >= 0.0 {
-        return (0.0, middle);
+    if bend < 0.0 {
+        0.5 * (right - left) / -bend
+    } else {
+        0.0
     }
-    let place = 0.5 * (left - right) / bend;
-    (place, middle - 0.25 * (left - right) * place)
 }
 
 /// Level of the noise over the bins.

@@ -70,6 +70,8 @@ pub(crate) struct OrderFit {
     /// Samples without the orders up to P, whose part above half the sample rate is folded below: the aliases of a
     /// force that jumps would be noise between the lines.
     pub residual: Vec<f64>,
+    /// Coefficients of the orders up to P in the residual's fit. Those of aliases that nearly coincide are uncertain.
+    pub with_aliases: Vec<Complex64>,
 }
 
 impl OrderFit {
@@ -91,7 +93,11 @@ impl OrderFit {
             .zip(revolutions)
             .map(|(value, revolutions)| value - series.at(*revolutions))
             .collect();
-        Self { amplitudes, residual }
+        Self {
+            amplitudes,
+            residual,
+            with_aliases,
+        }
     }
 }
 

@@ -1,7 +1,7 @@
 //! The part of the error of the amplitudes that moves all orders together: slow changes of speed or force.
 //!
-//! The record is cut into B blocks of whole revolutions, each longer than the slowest decay, so that the amplitudes of
-//! two blocks are independent but for such changes. The deviations of a block from the record, whitened by the
+//! The record is cut into B blocks of whole revolutions that overlap by half, each longer than the slowest decay, so that
+//! the amplitudes of two blocks are nearly independent but for such changes. The deviations of a block from the record, whitened by the
 //! spectrum between the lines, are vectors u_b of D = 2·K·C real components: independent, with unit variance, if no
 //! change is common to the orders. The eigenvectors of Σ u_b u_bᵀ/(B − 1) with significantly large eigenvalues are
 //! common directions.
@@ -25,12 +25,17 @@ pub(crate) const FALSE_DIRECTION: f64 = 0.01;
 /// Number of draws of the test. The share of the draws is known to 1/200; two of 200 are [`FALSE_DIRECTION`].
 const DRAWS: usize = 199;
 
-/// Largest number of blocks. Sixteen estimate a variance with a relative error of √(2/15) = 37 %; more blocks are
-/// shorter, and slow changes make their means dependent.
-pub(crate) const BLOCKS_MAX: usize = 16;
+/// Largest number of blocks that follow each other; those between, which overlap two of them by half, make it nearly
+/// twice as many. Fifteen blocks estimate a variance with a relative error of √(2/13) = 39 %; more blocks are shorter,
+/// and slow changes make their means dependent.
+pub(crate) const BLOCKS_MAX: f64 = 8.0;
 
-/// Fewest blocks of which a common part is estimated: with four, Student's t has three degrees of freedom.
-pub(crate) const BLOCKS_MIN: usize = 4;
+/// Fewest blocks that follow each other of which a common part is estimated: with those between they are five, and
+/// Student's t has four degrees of freedom.
+pub(crate) const BLOCKS_MIN: f64 = 3.0;
+
+/// Correlation of white noise in two blocks that overlap by half, both with Hann's weights.
+const NEIGHBOURS: f64 = 1.0 / 6.0;
 
 /// Low-rank part of the covariance of the amplitudes.
 #[derive(Clone, Debug, Default)]
@@ -60,9 +65,6 @@ impl Common {
         of_record: f64,
     ) -> Self {
         let count = deviations.len();
-        if count < BLOCKS_MIN {
-            return Self::default();
-        }
         let mut blocks = Blocks::whitened(deviations, factors);
         let mut random = ChaCha8Rng::seed_from_u64(1);
         let mut directions = Vec::new();
@@ -89,7 +91,7 @@ impl Common {
         }
         Self {
             directions,
-            freedoms: (count - 1) as f64,
+            freedoms: count as f64 - 1.0,
         }
     }
 }
@@ -98,6 +100,8 @@ impl Common {
 struct Blocks {
     channels: usize,
     of: Vec<DVector<Complex64>>,
+    /// A change that is the same in all blocks, of unit length.
+    steady: DVector<f64>,
 }
 
 /// A direction in the whitened components, of unit length in the real components.
@@ -125,18 +129,42 @@ impl Blocks {
                 DVector::from_vec(orders.collect())
             })
             .collect();
-        Self { channels, of }.centred()
+        Self {
+            channels,
+            of,
+            steady: DVector::repeat(deviations.len(), 1.0),
+        }
+        .made_independent()
+        .centred()
     }
 
-    fn centred(mut self) -> Self {
-        let count = self.of.len() as f64;
-        let mut mean = DVector::zeros(self.of[0].len());
-        for block in &self.of {
-            mean += block;
+    /// Combines the blocks so that white noise is independent between them: with R = L Lᵀ the correlation of blocks
+    /// that overlap, L⁻¹ u.
+    fn made_independent(mut self) -> Self {
+        let mut before = 1.0;
+        for block in 0..self.of.len() {
+            if block > 0 {
+                let below = NEIGHBOURS / before;
+                before = (1.0_f64 - below * below).sqrt();
+                let last = self.of[block - 1].clone();
+                self.of[block] -= last * Complex64::from(below);
+                self.steady[block] -= below * self.steady[block - 1];
+            }
+            self.of[block] /= Complex64::from(before);
+            self.steady[block] /= before;
         }
-        mean /= Complex64::from(count);
-        for block in &mut self.of {
-            *block -= &mean;
+        self.steady.normalize_mut();
+        self
+    }
+
+    /// Removes the mean over the blocks.
+    fn centred(mut self) -> Self {
+        let mut mean = DVector::zeros(self.of[0].len());
+        for (block, steady) in self.of.iter().zip(self.steady.iter()) {
+            mean += block * Complex64::from(*steady);
+        }
+        for (block, steady) in self.of.iter_mut().zip(self.steady.iter()) {
+            *block -= &mean * Complex64::from(*steady);
         }
         self
     }
@@ -181,6 +209,7 @@ impl Blocks {
         Self {
             channels: self.channels,
             of: of.collect(),
+            steady: self.steady.clone(),
         }
         .centred()
     }

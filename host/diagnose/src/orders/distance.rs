@@ -1,5 +1,7 @@
 //! Squared distance of amplitudes from a prediction, in standard deviations of their errors, and its distribution.
 
+use std::ops::Range;
+
 use nalgebra::{Cholesky, DMatrix, DVector};
 use num_complex::Complex64;
 use quietcut_numerics::statistics::{chi_squared_quantile, f_quantile};
@@ -14,6 +16,18 @@ pub(crate) struct OrderCovariance {
     pub matrix: DMatrix<Complex64>,
     /// Degrees of freedom ν of the estimate: number of independent complex values (order 0: real values).
     pub freedoms: f64,
+    /// Bins of the spectrum of the residual from which it is estimated.
+    pub bins: Range<usize>,
+}
+
+impl OrderCovariance {
+    /// Share of the bins that two estimates have in common.
+    fn overlap(&self, other: &Self) -> f64 {
+        let from = self.bins.start.max(other.bins.start);
+        let to = self.bins.end.min(other.bins.end);
+        let longest = self.bins.len().max(other.bins.len()).max(1);
+        to.saturating_sub(from) as f64 / longest as f64
+    }
 }
 
 /// A squared distance, with the mean and the variance that it has if the prediction is true.
@@ -64,6 +78,13 @@ impl Hotelling {
         self.scale * self.freedoms[1] / (self.freedoms[1] - 2.0)
     }
 
+    /// Variance of T² that its covariance estimate causes, for large ν: T² has the mean 2 tr Σ̂⁻¹Σ for a given Σ̂, and
+    /// tr Σ̂ Σ⁻¹ the variance C/ν; an error of Σ̂ acts with the square of ν/(ν − C).
+    fn variance_of_estimate(&self, freedoms: f64) -> f64 {
+        let channels = 0.5 * self.freedoms[0];
+        4.0 * channels / freedoms * (freedoms / (freedoms - channels)).powi(4)
+    }
+
     fn variance(&self) -> f64 {
         let [a, b] = self.freedoms;
         self.scale * self.scale * 2.0 * b * b * (a + b - 2.0) / (a * (b - 2.0) * (b - 2.0) * (b - 4.0))
@@ -106,6 +127,13 @@ pub(crate) fn of_orders(
         let hotelling = Hotelling::new(order, channels, covariance.freedoms);
         distance.mean += hotelling.mean();
         distance.variance += hotelling.variance();
+        // Estimates from the same bins err alike.
+        distance.variance += orders
+            .iter()
+            .filter(|other| **other != order)
+            .map(|other| covariance.overlap(&covariances[*other]))
+            .sum::<f64>()
+            * hotelling.variance_of_estimate(covariance.freedoms);
         for (i, direction) in common.directions.iter().enumerate() {
             let v = direction.row(order).transpose();
             let Some(solved) = solved(covariance, &v) else {

@@ -20,8 +20,9 @@ use quietcut_recording::Recording;
 /// the tenth that is left keeps them apart at a speed that wanders by up to 5 %.
 const HIGHEST_OF_RATE: f64 = 0.45;
 
-/// Fewest revolutions of a block, so that adjacent orders are apart by three cells of its spectrum.
-const LEAST_BLOCK_REVOLUTIONS: usize = 3;
+/// Fewest revolutions of a block: adjacent orders are then three cells of its spectrum apart, where Hann's weights make
+/// them independent.
+const LEAST_BLOCK_REVOLUTIONS: f64 = 3.0;
 
 /// Limits of a reduction.
 #[derive(Clone, Copy, Debug)]
@@ -38,7 +39,7 @@ pub(crate) struct ReductionSettings {
     pub settled_s: f64,
 }
 
-/// Amplitudes of all channels in a block of whole revolutions.
+/// Amplitudes of all channels in a block of whole revolutions, weighted by Hann's window.
 #[derive(Clone, Debug)]
 pub(crate) struct AmplitudeBlock {
     /// Middle of the block, s after the first sample.
@@ -62,7 +63,7 @@ pub(crate) struct Orders {
     pub covariances: Vec<OrderCovariance>,
     /// Errors common to all orders but 0, beyond `covariances`.
     pub common: Common,
-    /// Amplitudes over time; empty if the record is shorter than four blocks.
+    /// Amplitudes over time; empty if the record is shorter than three blocks.
     pub blocks: Vec<AmplitudeBlock>,
     pub spectrum: Spectrum,
     /// Spectral lines that are no orders, by channel and descending power.
@@ -112,7 +113,7 @@ impl Orders {
         let bands: Vec<Band> = (0..=highest)
             .map(|order| spectrum.band(order, names.len()))
             .collect();
-        let blocks = block_weights(&angle, settings, |time_s| sample(time_s) - range.start);
+        let blocks = block_weights(per_sample, settings.slowest_decay_s * rate_hz, &taper);
         let plan = Plan {
             revolutions: &revolutions,
             taper,
@@ -138,6 +139,7 @@ impl Orders {
                 .map(|(matrix, band)| OrderCovariance {
                     matrix: matrix * Complex64::from(variance),
                     freedoms: band.freedoms,
+                    bins: band.bins.clone(),
                 })
                 .collect(),
             common,
@@ -251,27 +253,23 @@ pub(crate) fn highest_orders(
     Ok((highest, aliases.max(highest)))
 }
 
-/// Equal blocks of whole revolutions, at most sixteen, each longer than the slowest decay; none if there are fewer than
-/// four.
-fn block_weights(
-    angle: &SpindleAngle,
-    settings: &ReductionSettings,
-    sample: impl Fn(f64) -> usize,
-) -> Vec<BlockWeights> {
-    let least =
-        ((settings.slowest_decay_s * angle.frequency_hz).ceil() as usize).max(LEAST_BLOCK_REVOLUTIONS);
-    let count = (angle.count() / least).min(BLOCKS_MAX);
+/// Equal blocks that overlap by half, each of whole revolutions and longer than the slowest decay, `decay` samples; none
+/// if fewer than two blocks follow each other. They lie where the weights of the record are one: beyond, two aliases
+/// that nearly coincide may leave residuals larger than the noise.
+fn block_weights(per_sample: f64, decay: f64, taper: &Taper) -> Vec<BlockWeights> {
+    let flat = taper.flat();
+    let revolutions = flat.len() as f64 * per_sample;
+    let least = (decay * per_sample).ceil().max(LEAST_BLOCK_REVOLUTIONS);
+    let count = (revolutions / least).floor().min(BLOCKS_MAX);
     if count < BLOCKS_MIN {
         return Vec::new();
     }
-    let length = angle.count() / count;
-    (0..count)
-        .map(|block| {
-            let [first, end] = [block, block + 1].map(|edge| sample(angle.edges_s()[edge * length]));
-            BlockWeights {
-                first,
-                taper: Taper::new(end - first),
-            }
+    let length = ((revolutions / count).floor() / per_sample) as usize;
+    let weights = Taper::hann(length);
+    (0..2 * count as usize - 1)
+        .map(|block| BlockWeights {
+            first: flat.start + block * length / 2,
+            taper: weights,
         })
         .collect()
 }

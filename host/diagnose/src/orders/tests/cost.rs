@@ -103,7 +103,7 @@ fn with_tachometer(count: usize) -> Recording {
 
 #[test]
 fn fewer_than_ten_revolutions_are_refused() {
-    let recording = with_tachometer(2300);
+    let recording = with_tachometer(2400);
     let orders = Orders::new(&recording, &NAMES, &settings()).unwrap();
     assert_eq!(orders.angle.count(), 10);
     let later = ReductionSettings {

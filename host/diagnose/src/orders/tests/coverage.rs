@@ -20,7 +20,8 @@ struct Trial {
     orders: Orders,
 }
 
-/// `modulation` is the relative deviation of a slow change of all amplitudes, with a correlation time of a revolution.
+/// `modulation` is the relative deviation of a slow change of all amplitudes, with a correlation time of 1/60 of the
+/// record: less than a sixth of a block.
 fn trial(seed: u64, revolutions: usize, modulation: f64) -> Trial {
     let mut random = Random::new(seed);
     let per_revolution = 33.0 + 8.0 * random.share();
@@ -34,7 +35,7 @@ fn trial(seed: u64, revolutions: usize, modulation: f64) -> Trial {
     let c = pulses(2, 0.15, 60);
     let sizes: Vec<f64> = (0..NAMES.len()).map(|_| 1.0 + random.share()).collect();
     let mut change = vec![0.0; count];
-    let (keep, mut state) = ((-1.0 / per_revolution).exp(), random.normal());
+    let (keep, mut state) = ((-60.0 / count as f64).exp(), random.normal());
     for value in &mut change {
         *value = modulation * state;
         state = keep * state + (1.0 - keep * keep).sqrt() * random.normal();

@@ -13,7 +13,7 @@ const RATE_HZ: f64 = 10_000.0;
 fn settings() -> ReductionSettings {
     ReductionSettings {
         highest_hz: 1e9,
-        alias_factor: 2.0,
+        alias_factor: 3.0,
         slowest_decay_s: 1e9,
         settled_s: 0.0,
     }
@@ -28,7 +28,7 @@ fn speeds_without_tachometer_lie_within_their_deviation() {
                 let mut random = Random::new(first + record);
                 let hertz = 200.0 + 60.0 * random.share();
                 let count = (revolutions * RATE_HZ / hertz) as usize;
-                let c = pulses(2, 0.15, 60);
+                let c = pulses(2, 0.15, 55);
                 let phase = TAU * random.share();
                 let mut channels = noise(&mut random, 3, count, level);
                 for (channel, samples) in channels.iter_mut().enumerate() {
@@ -43,6 +43,9 @@ fn speeds_without_tachometer_lie_within_their_deviation() {
                 (angle.frequency_hz - hertz) / angle.frequency_deviation_hz
             })
             .collect();
+        let mut sorted: Vec<f64> = ratios.iter().map(|ratio| ratio.abs()).collect();
+        sorted.sort_by(f64::total_cmp);
+        println!("{:?}", &sorted[280..]);
         let within = ratios.iter().filter(|ratio| ratio.abs() < 1.645).count() as f64 / 300.0;
         let square = ratios.iter().map(|ratio| ratio * ratio).sum::<f64>() / 300.0;
         println!(
