@@ -26,6 +26,8 @@ pub(crate) struct Plan<'a> {
     pub bands: &'a [Band],
     pub blocks: &'a [BlockWeights],
     pub rate_hz: f64,
+    /// Spindle frequency, revolutions per sample.
+    pub per_sample: f64,
 }
 
 /// One channel, reduced.

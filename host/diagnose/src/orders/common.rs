@@ -3,13 +3,13 @@
 //! The record is cut into B blocks of whole revolutions that overlap by half, each longer than the slowest decay, so that
 //! the amplitudes of two blocks are nearly independent but for such changes. The deviations of a block from the record, whitened by the
 //! spectrum between the lines, are vectors u_b of D = 2·K·C real components: independent, with unit variance, if no
-//! change is common to the orders. The eigenvectors of Σ u_b u_bᵀ/(B − 1) with significantly large eigenvalues are
+//! change is common to the orders. The eigenvectors of Σ u_b u_bᵀ/B with significantly large eigenvalues are
 //! common directions.
 //!
 //! Test: the phases of the u_b are drawn anew, independently for each order and block, which keeps all variances and
 //! destroys what orders have in common. A direction is significant if its eigenvalue exceeds those of the draws but for
 //! a share of [`FALSE_DIRECTION`]. Its eigenvalue and its error are those of a spiked covariance (Paul, Statist. Sinica
-//! 17 (2007) 1617): with γ = D/(B − 1), an eigenvalue λ of the covariance gives one of λ + γλ/(λ − 1) in the sample.
+//! 17 (2007) 1617): with γ = D/B, an eigenvalue λ of the covariance gives one of λ + γλ/(λ − 1) in the sample.
 
 use std::f64::consts::TAU;
 
@@ -34,8 +34,8 @@ pub(crate) const BLOCKS_MAX: f64 = 8.0;
 /// Student's t has four degrees of freedom.
 pub(crate) const BLOCKS_MIN: f64 = 3.0;
 
-/// Correlation of white noise in two blocks that overlap by half, both with Hann's weights.
-const NEIGHBOURS: f64 = 1.0 / 6.0;
+/// Fewest independent combinations of blocks: Student's t with four degrees of freedom.
+const FEWEST_INDEPENDENT: usize = 4;
 
 /// Low-rank part of the covariance of the amplitudes.
 #[derive(Clone, Debug, Default)]
@@ -43,13 +43,14 @@ pub(crate) struct Common {
     /// Directions v, one matrix of orders and channels each. The error of the amplitudes contains Σ s v with independent
     /// real s of unit variance.
     pub directions: Vec<DMatrix<Complex64>>,
-    /// Degrees of freedom of each variance: number of blocks less one.
+    /// Degrees of freedom of each variance: number of independent combinations of
+    /// blocks.
     pub freedoms: f64,
 }
 
 impl Common {
     /// Factor on the covariance between the lines for the errors of the directions: with r directions from B blocks,
-    /// the part of the error that their estimates miss has r/(B − 1) of the covariance's own size.
+    /// the part of the error that their estimates miss has r/B of the covariance's own size.
     pub(crate) fn inflation(&self) -> f64 {
         match self.directions.len() {
             0 => 1.0,
@@ -59,13 +60,18 @@ impl Common {
 
     /// From the deviations of the blocks, (order, channel) each, and the factors L_k of the covariances L_k L_kᴴ of a
     /// block between the lines. `of_record` is the variance of a weighted mean over the record, over that of a block.
+    /// `independent` combines the blocks to ones whose noise is independent: see `block_noise`.
     pub(crate) fn new(
         deviations: &[DMatrix<Complex64>],
         factors: &[DMatrix<Complex64>],
+        independent: &DMatrix<f64>,
         of_record: f64,
     ) -> Self {
-        let count = deviations.len();
-        let mut blocks = Blocks::whitened(deviations, factors);
+        let count = independent.nrows();
+        if count < FEWEST_INDEPENDENT {
+            return Self::default();
+        }
+        let mut blocks = Blocks::whitened(deviations, factors, independent);
         let mut random = ChaCha8Rng::seed_from_u64(1);
         let mut directions = Vec::new();
         while directions.len() + 2 < count {
@@ -91,7 +97,7 @@ impl Common {
         }
         Self {
             directions,
-            freedoms: count as f64 - 1.0,
+            freedoms: count as f64,
         }
     }
 }
@@ -100,8 +106,6 @@ impl Common {
 struct Blocks {
     channels: usize,
     of: Vec<DVector<Complex64>>,
-    /// A change that is the same in all blocks, of unit length.
-    steady: DVector<f64>,
 }
 
 /// A direction in the whitened components, of unit length in the real components.
@@ -116,60 +120,35 @@ fn inner(a: &DVector<Complex64>, b: &DVector<Complex64>) -> f64 {
 }
 
 impl Blocks {
-    fn whitened(deviations: &[DMatrix<Complex64>], factors: &[DMatrix<Complex64>]) -> Self {
+    fn whitened(
+        deviations: &[DMatrix<Complex64>],
+        factors: &[DMatrix<Complex64>],
+        independent: &DMatrix<f64>,
+    ) -> Self {
         let channels = factors.first().map_or(0, DMatrix::nrows);
-        let of = deviations
-            .iter()
-            .map(|deviation| {
-                let orders = (1..factors.len()).flat_map(|order| {
-                    let right = deviation.row(order).transpose();
-                    let white = factors[order].solve_lower_triangular(&right).unwrap_or(right);
-                    white.iter().copied().collect::<Vec<_>>()
-                });
-                DVector::from_vec(orders.collect())
-            })
-            .collect();
+        let white = |deviation: &DMatrix<Complex64>| {
+            let orders = (1..factors.len()).flat_map(|order| {
+                let right = deviation.row(order).transpose();
+                let white = factors[order].solve_lower_triangular(&right).unwrap_or(right);
+                white.iter().copied().collect::<Vec<_>>()
+            });
+            DVector::from_vec(orders.collect())
+        };
+        let blocks: Vec<DVector<Complex64>> = deviations.iter().map(white).collect();
+        let combined = independent.row_iter().map(|row| {
+            let mut sum = DVector::zeros(blocks[0].len());
+            for (block, weight) in blocks.iter().zip(row.iter()) {
+                sum += block * Complex64::from(*weight);
+            }
+            sum
+        });
         Self {
             channels,
-            of,
-            steady: DVector::repeat(deviations.len(), 1.0),
+            of: combined.collect(),
         }
-        .made_independent()
-        .centred()
     }
 
-    /// Combines the blocks so that white noise is independent between them: with R = L Lᵀ the correlation of blocks
-    /// that overlap, L⁻¹ u.
-    fn made_independent(mut self) -> Self {
-        let mut before = 1.0;
-        for block in 0..self.of.len() {
-            if block > 0 {
-                let below = NEIGHBOURS / before;
-                before = (1.0_f64 - below * below).sqrt();
-                let last = self.of[block - 1].clone();
-                self.of[block] -= last * Complex64::from(below);
-                self.steady[block] -= below * self.steady[block - 1];
-            }
-            self.of[block] /= Complex64::from(before);
-            self.steady[block] /= before;
-        }
-        self.steady.normalize_mut();
-        self
-    }
-
-    /// Removes the mean over the blocks.
-    fn centred(mut self) -> Self {
-        let mut mean = DVector::zeros(self.of[0].len());
-        for (block, steady) in self.of.iter().zip(self.steady.iter()) {
-            mean += block * Complex64::from(*steady);
-        }
-        for (block, steady) in self.of.iter_mut().zip(self.steady.iter()) {
-            *block -= &mean * Complex64::from(*steady);
-        }
-        self
-    }
-
-    /// Largest eigenvalue of Σ u uᵀ/(B − 1) and its eigenvector.
+    /// Largest eigenvalue of Σ u uᵀ/B and its eigenvector.
     fn largest(&self) -> Option<(f64, Direction)> {
         let count = self.of.len();
         let products = DMatrix::from_fn(count, count, |i, j| {
@@ -191,17 +170,14 @@ impl Blocks {
         }
         components /= Complex64::from(largest.sqrt());
         let channels = self.channels;
-        Some((largest / (count - 1) as f64, Direction { channels, components }))
+        Some((largest / count as f64, Direction { channels, components }))
     }
 
     fn with_drawn_phases(&self, random: &mut ChaCha8Rng) -> Self {
-        let count = self.of.len() as f64;
-        // Centring takes 1/B of the variance, here for the second time.
-        let scale = (count / (count - 1.0)).sqrt();
         let of = self.of.iter().map(|block| {
             let mut drawn = block.clone();
             for order in drawn.as_mut_slice().chunks_mut(self.channels) {
-                let phase = Complex64::from_polar(scale, TAU * random.random::<f64>());
+                let phase = Complex64::from_polar(1.0, TAU * random.random::<f64>());
                 order.iter_mut().for_each(|value| *value *= phase);
             }
             drawn
@@ -209,9 +185,7 @@ impl Blocks {
         Self {
             channels: self.channels,
             of: of.collect(),
-            steady: self.steady.clone(),
         }
-        .centred()
     }
 
     fn remove(&mut self, direction: &Direction) {
@@ -224,7 +198,7 @@ impl Blocks {
     /// Variance, beyond that between the lines, in a direction with the sample eigenvalue `largest`, after `removed`
     /// directions with this one are removed; `None` if the eigenvalue is not above those of noise.
     fn excess(&self, largest: f64, removed: usize) -> Option<f64> {
-        let free = self.of.len() as f64 - 1.0;
+        let free = self.of.len() as f64;
         let ratio = 2.0 * self.of[0].len() as f64 / free;
         let whole: f64 = self.of.iter().map(|block| inner(block, block)).sum::<f64>() / free;
         // The other eigenvalues of the sample are γ times the noise variance on average.

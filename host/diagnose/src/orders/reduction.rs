@@ -9,6 +9,7 @@ use crate::error::DiagnoseError;
 use crate::orders::alias_kernel::AliasKernel;
 use crate::orders::asynchronous::{SpectralLine, Spectrum};
 use crate::orders::between_lines::{Band, LineSpectrum};
+use crate::orders::block_noise::independent_combinations;
 use crate::orders::channel_reduction::{BlockWeights, ChannelReduction, Plan};
 use crate::orders::common::{BLOCKS_MAX, BLOCKS_MIN, Common};
 use crate::orders::distance::{self, Hotelling, OrderCovariance, SquaredDistance};
@@ -122,6 +123,7 @@ impl Orders {
             bands: &bands,
             blocks: &blocks,
             rate_hz,
+            per_sample,
         };
         let reduced: Vec<ChannelReduction> = samples
             .par_iter()
@@ -321,8 +323,10 @@ fn over_time(
         .map(|matrix| Some(Cholesky::new(matrix * Complex64::from(of_block))?.l()))
         .collect();
     let of_record = plan.taper.variance_of_mean() / of_block;
+    let highest = [plan.kernel.orders(), plan.kernel.aliases()];
+    let independent = independent_combinations(plan.blocks, &plan.taper, plan.per_sample, highest);
     let common = factors.map_or_else(Common::default, |factors| {
-        Common::new(&deviations, &factors, of_record)
+        Common::new(&deviations, &factors, &independent, of_record)
     });
     (common, blocks.collect())
 }

@@ -40,12 +40,20 @@ fn speeds_without_tachometer_lie_within_their_deviation() {
                 let stated = 60.0 * hertz * (1.0 + 0.025 * (2.0 * random.share() - 1.0));
                 let record = recording(RATE_HZ, channels, stated);
                 let angle = angle_from_orders(&record, &NAMES[..3], &settings()).unwrap();
-                (angle.frequency_hz - hertz) / angle.frequency_deviation_hz
+                let ratio = (angle.frequency_hz - hertz) / angle.frequency_deviation_hz;
+                if ratio.abs() > 3.0 {
+                    println!(
+                        "spr {:.2} ratio {ratio:.1} KT {:.3} dev {:.4}",
+                        RATE_HZ / hertz,
+                        (angle.frequency_hz - hertz) * 20.0 * count as f64 / RATE_HZ,
+                        angle.frequency_deviation_hz * 20.0 * count as f64 / RATE_HZ
+                    );
+                }
+                ratio
             })
             .collect();
         let mut sorted: Vec<f64> = ratios.iter().map(|ratio| ratio.abs()).collect();
         sorted.sort_by(f64::total_cmp);
-        println!("{:?}", &sorted[280..]);
         let within = ratios.iter().filter(|ratio| ratio.abs() < 1.645).count() as f64 / 300.0;
         let square = ratios.iter().map(|ratio| ratio * ratio).sum::<f64>() / 300.0;
         println!(
