@@ -28,6 +28,8 @@ pub(crate) struct Plan<'a> {
     pub rate_hz: f64,
     /// Spindle frequency, revolutions per sample.
     pub per_sample: f64,
+    /// Relative root mean square of the wander of the speed.
+    pub speed_wander: f64,
 }
 
 /// One channel, reduced.

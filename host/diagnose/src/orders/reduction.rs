@@ -124,6 +124,7 @@ impl Orders {
             blocks: &blocks,
             rate_hz,
             per_sample,
+            speed_wander: angle.speed_wander,
         };
         let reduced: Vec<ChannelReduction> = samples
             .par_iter()
@@ -323,8 +324,7 @@ fn over_time(
         .map(|matrix| Some(Cholesky::new(matrix * Complex64::from(of_block))?.l()))
         .collect();
     let of_record = plan.taper.variance_of_mean() / of_block;
-    let highest = [plan.kernel.orders(), plan.kernel.aliases()];
-    let independent = independent_combinations(plan.blocks, &plan.taper, plan.per_sample, highest);
+    let independent = independent_combinations(plan);
     let common = factors.map_or_else(Common::default, |factors| {
         Common::new(&deviations, &factors, &independent, of_record)
     });
