@@ -132,6 +132,11 @@ impl SpindleMotion {
         self.spindle.delay_s(self.since_s(t), angle_rad)
     }
 
+    /// Times after the first sample at which tooth 1 passes immersion angle 0, one tachometer edge per revolution, s.
+    pub(crate) fn revolutions_s(&self) -> impl Iterator<Item = f64> {
+        self.edges_s.iter().map(|edge_s| edge_s - self.since_s)
+    }
+
     /// Mean duration of a revolution, s.
     pub(crate) fn revolution_s(&self) -> f64 {
         60.0 / self.rpm

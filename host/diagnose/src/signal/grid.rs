@@ -191,7 +191,7 @@ fn back(plan: &dyn ComplexToReal<f64>, bins: &mut [Complex64], normalize_by: usi
 }
 
 /// The smallest even number ≥ `least` without a prime factor above 5.
-fn smooth_even(least: usize) -> usize {
+pub(crate) fn smooth_even(least: usize) -> usize {
     let mut best = usize::MAX;
     let mut five = 1;
     while five < 2 * least.max(2) {
