@@ -82,6 +82,7 @@ mod baseline;
 mod candidates;
 mod conclusion;
 mod criteria;
+mod cuts;
 mod error;
 mod fit;
 mod motion;

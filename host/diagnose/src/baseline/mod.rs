@@ -1,6 +1,6 @@
 //! The baseline model: the case file with its extensions, in numbers.
 
-mod cubic_term;
+pub(crate) mod cubic_term;
 pub(crate) mod dynamic_stiffness;
 pub(crate) mod receptance;
 
@@ -8,7 +8,7 @@ use self::cubic_term::cubic_term;
 use self::receptance::Receptance;
 use crate::error::DiagnoseError;
 use quietcut_model::case::Case;
-use quietcut_model::structure::{Direction, FirstOrder, Structure};
+use quietcut_model::structure::{Direction, FirstOrder, Form, Structure};
 use quietcut_model::{Effects, ModelError, RestoringForce};
 use quietcut_simulate::effect::Pickup;
 
@@ -83,6 +83,14 @@ impl<'a> Baseline<'a> {
         poles.iter().any(|pole| pole.norm() <= 1e-9 * largest.max(1e-9))
     }
 
+    /// Number of modes of a structure that is given by its modes; 0 for one given otherwise.
+    pub(crate) fn mode_count(&self) -> usize {
+        match &self.structure.form {
+            Form::Modes(modes) => modes.len(),
+            _ => 0,
+        }
+    }
+
     /// The longest time constant of the baseline structure, s: the largest −1/Re λ of its poles λ, with −Re λ taken as
     /// at least 1e-6·|λ| and 1e-9 1/s.
     pub(crate) fn slowest_decay_s(&self) -> f64 {
@@ -126,7 +134,7 @@ pub(crate) fn direction_of(axis: usize) -> Direction {
 }
 
 /// The ideal sensor of a channel name such as fx, x, vx or ax; `None` for a name that is not of this form.
-fn pickup_of(name: &str) -> Option<Pickup> {
+pub(crate) fn pickup_of(name: &str) -> Option<Pickup> {
     use quietcut_recording::Quantity;
     let (quantity, axis) = match name.as_bytes() {
         [axis] => (Quantity::Displacement, axis),

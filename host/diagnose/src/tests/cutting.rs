@@ -13,7 +13,7 @@ use quietcut_recording::{Quantity, Recording};
 use quietcut_simulate::{Effects, Entry, VirtualCut};
 use quietcut_testkit::slice;
 
-fn case(feed_mm: &str, more: &str) -> Case {
+pub(crate) fn case(feed_mm: &str, more: &str) -> Case {
     let path = format!(
         "{}/../../tests/cases/kuka-kr90-half.toml",
         env!("CARGO_MANIFEST_DIR")
@@ -29,7 +29,7 @@ fn case(feed_mm: &str, more: &str) -> Case {
 }
 
 /// Recordings of two cuts of two and a half seconds at different speeds and feeds, with 2 % noise.
-fn records(effects: &[&str], forces: bool, seed: u64) -> Vec<Recording> {
+pub(crate) fn records(effects: &[&str], forces: bool, seed: u64) -> Vec<Recording> {
     records_of(2.5, effects, forces, seed)
 }
 

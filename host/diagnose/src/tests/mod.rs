@@ -1,7 +1,7 @@
 //! Diagnoses virtual records from end to end.
 
 mod chatter;
-mod cutting;
+pub(crate) mod cutting;
 mod hammer;
 mod sensor;
 pub(crate) mod structure;

@@ -108,11 +108,6 @@ impl Stretches {
     pub(super) fn end_s(&self, stretch: usize) -> f64 {
         self.starts_s.get(stretch + 1).copied().unwrap_or(self.revolution_s)
     }
-
-    /// Index of the stretch that contains the instant `time_s`.
-    pub(super) fn at(&self, time_s: f64) -> usize {
-        self.starts_s.partition_point(|start| *start <= time_s).saturating_sub(1)
-    }
 }
 
 /// Subintervals of a revolution, in the order of time, with Gauss nodes in each.

@@ -51,6 +51,11 @@ impl CutModel {
 
     /// Linear system of the tool and the internal states of the restoring forces.
     pub(super) fn ports(&self) -> Ports {
+        self.ports_with(self.may_hold())
+    }
+
+    /// [`Self::ports`], with the accelerations that a hold needs only if `may_hold`.
+    pub(super) fn ports_with(&self, may_hold: bool) -> Ports {
         let axes = self.axes();
         let (order, internal) = (self.structure.order(), self.internal_states());
         let (size, inputs) = (order + internal, axes.len() + internal);
@@ -70,7 +75,6 @@ impl CutModel {
         }
         let ca = &c * &a;
         let count = axes.len();
-        let may_hold = self.may_hold();
         // Rounding of C B of a structure with mass is no jump of the velocity.
         let rounding = VELOCITY_JUMP * c.amax() * b.amax() * size as f64;
         let jumps = (&c * &b).map(|entry| if entry.abs() > rounding { entry } else { 0.0 });

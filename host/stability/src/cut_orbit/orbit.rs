@@ -20,16 +20,16 @@ const EVENT_FOUND: f64 = 1e-9;
 /// further away its prediction is no better than a search along the new motion.
 const NEAR: f64 = 0.05;
 /// Largest number of Newton steps.
-const STEPS: usize = 40;
+const STEPS: usize = 25;
 /// Smallest step of a natural continuation, as a share of its way.
 const LEAST_STEP: f64 = 1e-3;
 /// Largest share of the force in the two highest Legendre polynomials of a subinterval: the error of the orbit is of
 /// this order.
-const TAIL: f64 = 1e-6;
+const TAIL: f64 = 1e-5;
 /// Shortest subinterval, as a share of a revolution: a power law of the chip is not smooth where a chip begins.
 const SHORTEST: f64 = 1e-4;
 /// Largest number of splits of the mesh.
-const SPLITS: usize = 512;
+const SPLITS: usize = 32;
 
 /// Why an orbit is not found.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -151,6 +151,19 @@ impl CutOrbit {
         self.motion.displacement(&self.mesh, &self.ports, time_s)
     }
 
+    /// Half the range of the displacement, m, and of the velocity, m/s, of the tool along x, y, z.
+    pub fn half_ranges(&self) -> [[f64; 3]; 2] {
+        let mut ranges = [[[f64::INFINITY, f64::NEG_INFINITY]; 3]; 2];
+        for point in 0..self.mesh.points() {
+            let outputs = self.motion.at_point(point);
+            let values = [self.ports.displacement(outputs), self.ports.velocity(outputs)];
+            for (range, value) in ranges.as_flattened_mut().iter_mut().zip(values.as_flattened()) {
+                *range = [range[0].min(*value), range[1].max(*value)];
+            }
+        }
+        ranges.map(|kind| kind.map(|[low, high]| 0.5 * (high - low)))
+    }
+
     /// Numbers of subintervals, and of events at which contact or a regime changes.
     pub fn size(&self) -> [usize; 2] {
         [self.mesh.subintervals.len(), self.mesh.events]
@@ -219,7 +232,6 @@ impl Start {
             let events_moved = if alike { events.moved_s(&self.events) / stretches.revolution_s } else { 1.0 };
             let moved = step.moved;
             self.motion = step.motion;
-            if std::env::var("DBG").is_ok() { println!("step {steps} moved {moved:.2e} share {share} alike {alike} em {events_moved:.1e} events {:?}", events.events.iter().map(|e| format!("{:.5}:{:?}", e.time_s / stretches.revolution_s, e.contact.regimes)).collect::<Vec<_>>()); }
             if alike && moved < CONVERGED && events_moved < EVENT_FOUND {
                 return self.orbit(model, ports, *steps).ok_or(not_periodic);
             }

@@ -67,7 +67,7 @@ impl CutOrbit {
 
     /// Forces and motion of `model` where the structure feels the forces of this orbit.
     fn explicit(&self, model: &CutModel) -> Option<Explicit> {
-        let ports = model.ports();
+        let ports = model.ports_with(self.ports.accelerations.is_some());
         let is_alike = ports.axes == self.ports.axes
             && ports.internal == self.ports.internal
             && (model.revolution_s() / self.mesh.revolution_s - 1.0).abs() < 1e-12;

@@ -1,0 +1,107 @@
+//! A further effect in the fit of cuts.
+
+use std::sync::Arc;
+
+use toml::Table;
+
+use crate::candidates::cause::Location;
+use quietcut_model::effects::EffectName;
+
+/// Range of a coordinate.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Coordinate {
+    pub lower: f64,
+    /// Values at which fits begin; the first where the records are compared with the baseline to first order.
+    pub start: f64,
+}
+
+impl Coordinate {
+    /// A coordinate of both signs that begins at zero.
+    pub(crate) const FREE: Self = Self {
+        lower: f64::NEG_INFINITY,
+        start: 0.0,
+    };
+    /// A coordinate that is not negative and begins at zero.
+    pub(crate) const POSITIVE: Self = Self { lower: 0.0, start: 0.0 };
+}
+
+/// Parameters of an effect, by key, at coordinates.
+pub(crate) type Parameters = Arc<dyn Fn(&[f64]) -> Vec<(&'static str, f64)> + Send + Sync>;
+
+/// A form of an effect at a place, with coordinates that are standard normal before the records are seen.
+#[derive(Clone)]
+pub(crate) struct Candidate {
+    pub effect: EffectName,
+    pub location: Location,
+    pub coordinates: Vec<Coordinate>,
+    /// Coordinates from which fits begin, besides the starts of the coordinates.
+    pub grid: Vec<Vec<f64>>,
+    /// True if the effect is absent where the first coordinate is zero.
+    pub vanishes: bool,
+    parameters: Parameters,
+}
+
+impl Candidate {
+    pub(crate) fn new(
+        effect: EffectName,
+        location: Location,
+        coordinates: Vec<Coordinate>,
+        parameters: impl Fn(&[f64]) -> Vec<(&'static str, f64)> + Send + Sync + 'static,
+    ) -> Self {
+        Self {
+            effect,
+            location,
+            coordinates,
+            grid: Vec::new(),
+            vanishes: false,
+            parameters: Arc::new(parameters),
+        }
+    }
+
+    /// This candidate, absent where its first coordinate is zero, below which it cannot go.
+    pub(crate) fn from_zero(mut self) -> Self {
+        self.vanishes = true;
+        self.coordinates[0] = Coordinate::POSITIVE;
+        self
+    }
+
+    /// This candidate with further starts.
+    pub(crate) fn from_each(mut self, grid: Vec<Vec<f64>>) -> Self {
+        self.grid = grid;
+        self
+    }
+
+    /// Parameters of the effect by key.
+    pub(crate) fn parameters(&self, coordinates: &[f64]) -> Vec<(&'static str, f64)> {
+        (self.parameters)(coordinates)
+    }
+
+    /// The table `[extension.NAME]` of the effect; `None` where it is absent.
+    pub(crate) fn table(&self, coordinates: &[f64]) -> Option<Table> {
+        if self.vanishes && coordinates.first().is_some_and(|first| *first <= 0.0) {
+            return None;
+        }
+        let mut table = self.location.table();
+        let mut ratios = Vec::new();
+        for (key, value) in self.parameters(coordinates) {
+            if key.starts_with("ratio_") {
+                ratios.push(toml::Value::from(value));
+            } else {
+                table.insert(key.into(), value.into());
+            }
+        }
+        if !ratios.is_empty() {
+            table.insert("ratio".into(), ratios.into());
+        }
+        if self.effect == EffectName::AxialDepthModulation {
+            table.insert("on".into(), true.into());
+        }
+        Some(table)
+    }
+
+    /// Coordinates at which the records are compared to first order.
+    pub(crate) fn starts(&self) -> Vec<Vec<f64>> {
+        let first = self.coordinates.iter().map(|coordinate| coordinate.start).collect();
+        if self.grid.is_empty() { vec![first] } else { self.grid.clone() }
+    }
+}

@@ -1,0 +1,292 @@
+//! The effects that may act in cuts, at all their places, with their widths before records are seen.
+//!
+//! A width is the size that an effect of this kind commonly has: a coordinate of one. What is proportional to a quantity
+//! of the case is given as a share of it; restoring forces are compared with the linear spring or damper along the motion
+//! of the baseline, so that widths do not depend on units or size of a machine.
+
+use super::candidate::{Candidate, Coordinate};
+use super::fit::Fit;
+use super::record::ReducedCut;
+use crate::baseline::{Baseline, pickup_of};
+use crate::candidates::cause::Location;
+use quietcut_model::effects::EffectName;
+use quietcut_recording::Quantity;
+
+/// Mass, stiffness and damping, and cutting coefficients, relative: a case of another posture, tool or material.
+const PARAMETER: f64 = 0.3;
+/// Force of a nonlinear spring or damper over that of the linear one, at the largest motion of the records.
+const NONLINEAR: f64 = 0.3;
+/// Damping ratio of a damper with which nonlinear dampers are compared.
+const DAMPING_RATIO: f64 = 0.05;
+/// Exponent of the chip thickness, below 1 (Kienzle: 0.65 to 0.9).
+const EXPONENT: f64 = 0.2;
+/// Runout, µm (collets and shrink chucks: 3 to 20 µm).
+const RUNOUT_UM: f64 = 10.0;
+/// Error of the gain of a sensor.
+const GAIN: f64 = 0.1;
+/// Delay of a channel, in samples.
+const DELAY_SAMPLES: f64 = 3.0;
+/// Sensitivity across the axis of a sensor (data sheets: up to 5 %).
+const CROSS_AXIS: f64 = 0.05;
+/// Motion at a sensor over that at the tool tip, in a mode.
+const OFFSET: f64 = 0.3;
+/// Compliance of a missing mode over the static compliance of its direction.
+const COMPLIANCE: f64 = 0.3;
+
+/// Sizes of the motion of the baseline along an axis.
+#[derive(Clone, Copy, Debug)]
+struct Along {
+    axis: usize,
+    /// Static stiffness, N/m.
+    stiffness: f64,
+    /// Damping that gives the lowest mode the ratio [`DAMPING_RATIO`], N s/m.
+    damping: f64,
+    /// Largest half range of the displacement, m, and of the velocity, m/s.
+    moved_m: f64,
+    velocity_m_per_s: f64,
+}
+
+/// All candidates for these records.
+pub(crate) fn all(baseline: &Baseline<'_>, records: &[ReducedCut], fit: &Fit) -> Vec<Candidate> {
+    let along: Vec<Along> = baseline.axes.iter().filter_map(|axis| of_axis(baseline, fit, *axis)).collect();
+    let mut all = Vec::new();
+    of_linear_structure(baseline, &along, &mut all);
+    for along in &along {
+        of_restoring_force(*along, &mut all);
+        of_missing_mode(*along, records, &mut all);
+    }
+    of_coupling(&along, &mut all);
+    of_process(baseline, records, &mut all);
+    of_sensors(baseline, records, &mut all);
+    all
+}
+
+fn of_axis(baseline: &Baseline<'_>, fit: &Fit, axis: usize) -> Option<Along> {
+    let stiffness = baseline.first_order.receptance(0.0)?[(axis, axis)].re.recip();
+    let omega = std::f64::consts::TAU * baseline.lowest_hz()?;
+    let [moved, velocity] = fit.half_ranges();
+    let is_moved = stiffness.is_finite() && moved[axis] > 0.0;
+    is_moved.then(|| Along {
+        axis,
+        stiffness: stiffness.abs(),
+        damping: 2.0 * DAMPING_RATIO * stiffness.abs() / omega,
+        moved_m: moved[axis],
+        velocity_m_per_s: velocity[axis],
+    })
+}
+
+fn of_linear_structure(baseline: &Baseline<'_>, along: &[Along], all: &mut Vec<Candidate>) {
+    let mut places = vec![Location::Everywhere];
+    if baseline.mode_count() == 0 && along.len() > 1 {
+        places.extend(along.iter().map(|along| Location::Axis(along.axis)));
+    }
+    for effect in [EffectName::Mass, EffectName::Stiffness, EffectName::Damping] {
+        for place in &places {
+            let relative = |z: &[f64]| vec![("relative_change", (PARAMETER * z[0]).exp() - 1.0)];
+            all.push(Candidate::new(effect, place.clone(), vec![Coordinate::FREE], relative));
+        }
+    }
+}
+
+fn of_restoring_force(along: Along, all: &mut Vec<Candidate>) {
+    let place = Location::Axis(along.axis);
+    let (x, v) = (along.moved_m, along.velocity_m_per_s);
+    let spring_n = NONLINEAR * along.stiffness * x;
+    let damper_n = NONLINEAR * along.damping * v;
+    let mut one = |effect, key: &'static str, width: f64| {
+        let of = move |z: &[f64]| vec![(key, width * z[0])];
+        all.push(Candidate::new(effect, place.clone(), vec![Coordinate::FREE], of));
+    };
+    one(EffectName::CubicStiffness, "k3_n_per_m3", spring_n / x.powi(3));
+    one(EffectName::QuadraticStiffness, "k2_n_per_m2", spring_n / x.powi(2));
+    one(EffectName::CubicDamping, "c3_ns3_per_m3", damper_n / v.powi(3));
+    one(EffectName::QuadraticDamping, "c2_ns2_per_m2", damper_n / v.powi(2));
+    let regimes = move |z: &[f64]| {
+        vec![
+            ("k3_n_per_m3", -spring_n / x.powi(3) * z[0]),
+            ("k5_n_per_m5", spring_n / x.powi(5) * z[1]),
+        ]
+    };
+    let positive = vec![Coordinate::POSITIVE; 2];
+    all.push(
+        Candidate::new(EffectName::SofteningHardening, place.clone(), positive, regimes).from_each(vec![vec![0.3, 0.3]]),
+    );
+    let friction = move |z: &[f64]| vec![("fc_n", damper_n * z[0])];
+    all.push(Candidate::new(EffectName::CoulombFriction, place.clone(), vec![Coordinate::POSITIVE], friction).from_zero());
+    let gap = move |z: &[f64]| vec![("gap_mm", 2e3 * x * z[0])];
+    all.push(
+        Candidate::new(EffectName::Backlash, place.clone(), vec![Coordinate::POSITIVE], gap)
+            .from_zero()
+            .from_each(vec![vec![0.1], vec![0.5]]),
+    );
+    let hysteresis = move |z: &[f64]| {
+        vec![
+            ("hysteretic_stiffness_n_per_m", NONLINEAR * along.stiffness * z[0]),
+            ("yield_m", 0.3 * x * z[1].exp()),
+        ]
+    };
+    all.push(
+        Candidate::new(EffectName::Hysteresis, place, vec![Coordinate::POSITIVE, Coordinate::FREE], hysteresis)
+            .from_zero()
+            .from_each(vec![vec![0.2, 0.0]]),
+    );
+}
+
+fn of_missing_mode(along: Along, records: &[ReducedCut], all: &mut Vec<Candidate>) {
+    let lowest_hz = records.iter().map(|record| record.conditions.spindle_hz).fold(f64::INFINITY, f64::min);
+    let highest_hz = records
+        .iter()
+        .map(|record| record.conditions.spindle_hz * (record.orders.amplitudes.nrows() - 1) as f64)
+        .fold(0.0, f64::max);
+    let middle_hz = (lowest_hz * highest_hz).sqrt();
+    let half = 0.5 * (highest_hz / lowest_hz).ln();
+    let stiffness = along.stiffness;
+    let mode = move |z: &[f64]| {
+        let hertz = middle_hz * (half * z[1]).exp();
+        let omega = std::f64::consts::TAU * hertz;
+        let compliance = (COMPLIANCE * z[0]).max(f64::MIN_POSITIVE) / stiffness;
+        vec![
+            ("frequency_hz", hertz),
+            ("damping_ratio", (DAMPING_RATIO * z[2].exp()).min(0.9)),
+            ("modal_mass_kg", 1.0 / (compliance * omega * omega)),
+        ]
+    };
+    let coordinates = vec![Coordinate::POSITIVE, Coordinate::FREE, Coordinate::FREE];
+    // Neighbouring starts are a third of an octave apart.
+    let count = (2.0 * half / (2.0_f64.ln() / 3.0)).ceil().max(2.0) as usize;
+    let grid = (0..=count).map(|index| vec![0.0, 2.0 * index as f64 / count as f64 - 1.0, 0.0]);
+    all.push(
+        Candidate::new(EffectName::MissingMode, Location::Axis(along.axis), coordinates, mode)
+            .from_zero()
+            .from_each(grid.collect()),
+    );
+}
+
+fn of_coupling(along: &[Along], all: &mut Vec<Candidate>) {
+    for (index, one) in along.iter().enumerate() {
+        for other in &along[index + 1..] {
+            let place = Location::Axes(one.axis, other.axis);
+            let work = NONLINEAR * (one.stiffness * other.stiffness).sqrt();
+            let quartic = work / (one.moved_m * other.moved_m);
+            let of = move |z: &[f64]| vec![("kxyy_n_per_m3", quartic * z[0])];
+            all.push(Candidate::new(EffectName::ModeCoupling, place.clone(), vec![Coordinate::FREE], of));
+            let cubic = work / one.moved_m.max(other.moved_m);
+            let of = move |z: &[f64]| vec![("kxxy_n_per_m2", cubic * z[0])];
+            all.push(Candidate::new(EffectName::ModeCoupling, place, vec![Coordinate::FREE], of));
+        }
+    }
+}
+
+fn of_process(baseline: &Baseline<'_>, records: &[ReducedCut], all: &mut Vec<Candidate>) {
+    let (Ok(&material), Ok(tool)) = (baseline.case.material(), baseline.case.tool()) else {
+        return;
+    };
+    let feeds: Vec<f64> = records.iter().map(|record| record.conditions.cut.feed_per_tooth_mm).collect();
+    let feed_mm = feeds.iter().sum::<f64>() / feeds.len().max(1) as f64;
+    let factor = move |z: &[f64]| {
+        let factor = (PARAMETER * z[0]).exp();
+        vec![
+            ("ktc_mpa", material.ktc_mpa * factor),
+            ("krc_mpa", material.krc_mpa * factor),
+            ("kac_mpa", material.kac_mpa * factor),
+        ]
+    };
+    all.push(Candidate::new(EffectName::ForceCoefficients, Location::Everywhere, vec![Coordinate::FREE], factor));
+    let sees_axial = tool.edge_angle_deg != 90.0 || material.kac_mpa != 0.0;
+    let components = if sees_axial { 3 } else { 2 };
+    let each = move |z: &[f64]| {
+        let own = |mpa: f64, z: f64| if mpa == 0.0 { PARAMETER * material.ktc_mpa * z } else { mpa * (PARAMETER * z).exp() };
+        let all = [
+            ("ktc_mpa", own(material.ktc_mpa, z[0])),
+            ("krc_mpa", own(material.krc_mpa, z[1])),
+            ("kac_mpa", own(material.kac_mpa, z.get(2).copied().unwrap_or(0.0))),
+        ];
+        all[..components].to_vec()
+    };
+    all.push(Candidate::new(EffectName::ForceCoefficients, Location::Everywhere, vec![Coordinate::FREE; components], each));
+    let width = PARAMETER * material.ktc_mpa * feed_mm;
+    let edge = move |z: &[f64]| {
+        let all = [
+            ("kte_n_per_mm", material.kte_n_per_mm + width * z[0]),
+            ("kre_n_per_mm", material.kre_n_per_mm + width * z[1]),
+            ("kae_n_per_mm", material.kae_n_per_mm + width * z.get(2).copied().unwrap_or(0.0)),
+        ];
+        all[..components].to_vec()
+    };
+    all.push(Candidate::new(EffectName::EdgeForce, Location::Everywhere, vec![Coordinate::FREE; components], edge));
+    let power = move |z: &[f64]| vec![("exponent", (-EXPONENT * z[0]).exp()), ("reference_chip_mm", feed_mm)];
+    all.push(Candidate::new(EffectName::ForceExponent, Location::Everywhere, vec![Coordinate::FREE], power));
+    of_tool(baseline, all);
+    if tool.diameter_mm.is_some() {
+        of_process_damping(baseline, records, all);
+    }
+    if baseline.axes.contains(&2) {
+        let no_parameters = |_: &[f64]| Vec::new();
+        all.push(Candidate::new(EffectName::AxialDepthModulation, Location::Everywhere, Vec::new(), no_parameters));
+    }
+}
+
+/// Runout: cosine and sine of the offset, from that of the case.
+fn of_tool(baseline: &Baseline<'_>, all: &mut Vec<Candidate>) {
+    let Ok(tool) = baseline.case.tool() else { return };
+    if tool.teeth < 2 {
+        return;
+    }
+    let (known_um, known_rad) = tool.runout.map_or((0.0, 0.0), |runout| (runout.offset_um, runout.angle_deg.to_radians()));
+    let offset = move |z: &[f64]| {
+        let x = known_um * known_rad.cos() + RUNOUT_UM * z[0];
+        let y = known_um * known_rad.sin() + RUNOUT_UM * z[1];
+        vec![("runout_um", x.hypot(y)), ("angle_deg", y.atan2(x).to_degrees())]
+    };
+    all.push(Candidate::new(EffectName::Runout, Location::Everywhere, vec![Coordinate::FREE; 2], offset));
+}
+
+/// The width of process damping is that of a force along the chip as large as that of a structural damper of the ratio
+/// [`DAMPING_RATIO`], at the mean cutting speed.
+fn of_process_damping(baseline: &Baseline<'_>, records: &[ReducedCut], all: &mut Vec<Candidate>) {
+    let Ok(tool) = baseline.case.tool() else { return };
+    let Some(diameter_mm) = tool.diameter_mm else { return };
+    let speed = |record: &ReducedCut| std::f64::consts::PI * 1e-3 * diameter_mm * record.conditions.spindle_hz / record.conditions.depth_m;
+    let speed_per_depth = records.iter().map(speed).sum::<f64>() / records.len().max(1) as f64;
+    let Some(hertz) = baseline.lowest_hz() else { return };
+    let stiffest = baseline
+        .axes
+        .iter()
+        .filter_map(|axis| Some(baseline.first_order.receptance(0.0)?[(*axis, *axis)].re.recip().abs()))
+        .fold(f64::INFINITY, f64::min);
+    let damping = 2.0 * DAMPING_RATIO * stiffest / (std::f64::consts::TAU * hertz);
+    let width = damping * speed_per_depth;
+    let of = move |z: &[f64]| vec![("process_damping_n_per_m", width * z[0])];
+    all.push(
+        Candidate::new(EffectName::ProcessDamping, Location::Everywhere, vec![Coordinate::POSITIVE], of).from_zero(),
+    );
+}
+
+fn of_sensors(baseline: &Baseline<'_>, records: &[ReducedCut], all: &mut Vec<Candidate>) {
+    let mut names: Vec<&String> = records.iter().flat_map(|record| &record.orders.channels).collect();
+    names.sort();
+    names.dedup();
+    let sample_s = records.iter().map(|record| 1.0 / record.rate_hz).fold(0.0, f64::max);
+    let modes = baseline.mode_count();
+    for name in names {
+        let Some(pickup) = pickup_of(name) else { continue };
+        let place = Location::Channel(name.clone());
+        let gain = |z: &[f64]| vec![("gain", (GAIN * z[0]).exp())];
+        all.push(Candidate::new(EffectName::SensorGain, place.clone(), vec![Coordinate::FREE], gain));
+        let delay = move |z: &[f64]| vec![("delay_s", DELAY_SAMPLES * sample_s * z[0])];
+        all.push(Candidate::new(EffectName::SensorDelay, place.clone(), vec![Coordinate::FREE], delay));
+        for axis in baseline.axes.iter().filter(|axis| pickup.weights[**axis] == 0.0) {
+            let place = Location::ChannelFrom(name.clone(), *axis);
+            let fraction = |z: &[f64]| vec![("fraction", CROSS_AXIS * z[0])];
+            all.push(Candidate::new(EffectName::CrossAxis, place, vec![Coordinate::FREE], fraction));
+        }
+        if modes > 1 && pickup.quantity != Quantity::Force {
+            let ratio = move |z: &[f64]| z.iter().zip(RATIO_KEYS).map(|(z, key)| (key, 1.0 + OFFSET * z)).collect();
+            let coordinates = vec![Coordinate::FREE; modes.min(RATIO_KEYS.len())];
+            all.push(Candidate::new(EffectName::SensorOffsetFromToolTip, place, coordinates, ratio));
+        }
+    }
+}
+
+/// Keys of the ratio of each mode.
+const RATIO_KEYS: [&str; 6] = ["ratio_1", "ratio_2", "ratio_3", "ratio_4", "ratio_5", "ratio_6"];

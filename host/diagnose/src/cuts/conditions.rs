@@ -1,0 +1,43 @@
+//! A machine in one recorded cut.
+
+use std::f64::consts::TAU;
+
+use crate::baseline::cubic_term::cubic_term;
+use crate::error::DiagnoseError;
+use quietcut_model::case::Case;
+use quietcut_model::milling::Cut;
+use quietcut_model::{Cutter, Effects, ModelError};
+use quietcut_stability::cut_orbit::CutModel;
+
+/// Speed, depth, feed and engagement of a recorded cut.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Conditions {
+    /// Spindle frequency, Hz.
+    pub spindle_hz: f64,
+    /// Axial depth, m.
+    pub depth_m: f64,
+    /// Engagement and feed.
+    pub cut: Cut,
+    /// Time, s from the start of the record, at which wear and drift are evaluated.
+    pub time_s: f64,
+}
+
+/// The machine of `case` with further effects in a cut.
+///
+/// # Errors
+/// The case lacks a section, or an effect does not apply to it.
+pub(crate) fn cut_model(case: &Case, effects: &Effects, conditions: &Conditions) -> Result<CutModel, DiagnoseError> {
+    let wrong = |error: ModelError| DiagnoseError::simulate(&case.path, error);
+    let structure = case.structure()?;
+    let (dynamics, mut restoring_forces) = effects.dynamics(structure).map_err(wrong)?;
+    restoring_forces.extend(cubic_term(structure));
+    let cutter = Cutter::new(case.tool()?, case.material()?, &conditions.cut, conditions.depth_m).map_err(wrong)?;
+    let cutter = effects.cutter(cutter.at_speed(60.0 * conditions.spindle_hz)).map_err(wrong)?;
+    Ok(CutModel {
+        structure: dynamics.first_order(),
+        restoring_forces,
+        cutter,
+        rad_per_s: TAU * conditions.spindle_hz,
+        time_s: conditions.time_s,
+    })
+}

@@ -1,0 +1,350 @@
+//! Fit of a machine to the orders of cuts, by the method of Levenberg and Marquardt.
+
+use nalgebra::{Cholesky, DMatrix, DVector};
+use num_complex::Complex64;
+use rayon::prelude::*;
+
+use super::record::ReducedCut;
+use super::space::{Machine, Space, Variable};
+use quietcut_numerics::statistics::chi_squared_quantile;
+use quietcut_stability::cut_orbit::{CutOrbit, ForceOrders, OrderWeights};
+
+/// Step of a central difference of what a variable changes explicitly, in its standard deviations. The error is its
+/// square times the curvature, and rounding over it.
+const DIFFERENCE: f64 = 1e-3;
+/// Predicted decrease of χ² below which a fit has converged: a hundredth of a standard deviation of any variable.
+const CONVERGED: f64 = 1e-4;
+/// Largest number of steps.
+const STEPS: usize = 30;
+
+/// One cut at a point of the space.
+struct State {
+    machine: Machine,
+    orbit: CutOrbit,
+    weights: OrderWeights,
+    forces: ForceOrders,
+    /// Fourier coefficients of the channels.
+    coefficients: DMatrix<Complex64>,
+    /// Measured minus predicted amplitudes, in standard deviations.
+    residual: Vec<f64>,
+}
+
+/// A machine fitted to cuts.
+pub(crate) struct Fit {
+    /// The variables.
+    pub z: Vec<f64>,
+    /// χ² of the amplitudes.
+    pub left: f64,
+    /// Sum of squares of the variables.
+    pub prior: f64,
+    /// JᵀJ + I: the inverse of the covariance of the variables.
+    pub information: DMatrix<f64>,
+    /// Derivatives of the predicted amplitudes of all records, in standard deviations, by the variables.
+    pub jacobian: DMatrix<f64>,
+    /// Measured minus predicted amplitudes of all records, in standard deviations.
+    pub residual: DVector<f64>,
+    states: Vec<State>,
+}
+
+impl Fit {
+    /// Logarithm of the marginal likelihood by Laplace's method, but for a constant of the records.
+    pub(crate) fn evidence(&self) -> f64 {
+        let determinant = Cholesky::new(self.information.clone())
+            .map_or(f64::INFINITY, |factor| factor.l_dirty().diagonal().iter().map(|x| x.ln()).sum::<f64>());
+        -0.5 * (self.left + self.prior) - determinant
+    }
+
+    /// Covariance of the variables.
+    pub(crate) fn covariance(&self) -> Option<DMatrix<f64>> {
+        Some(Cholesky::new(self.information.clone())?.inverse())
+    }
+
+    /// True if the amplitudes deviate no more than noise does in 999 of 1 000 sets of records.
+    pub(crate) fn is_enough(&self) -> bool {
+        self.left < chi_squared_quantile(0.999, self.residual.len() as f64)
+    }
+
+    /// Sum of χ² and squared variables.
+    pub(crate) fn cost(&self) -> f64 {
+        self.left + self.prior
+    }
+}
+
+/// Derivatives of the residuals of one record by all variables of a space, columns of `None` where they are zero.
+type Columns = Vec<Option<Vec<f64>>>;
+
+impl State {
+    fn new(space: &Space<'_>, z: &[f64], number: usize, record: &ReducedCut, near: Option<&Self>) -> Option<Self> {
+        let machine = space.machine(z, number, record)?;
+        let orbit = match near {
+            Some(near) => CutOrbit::near(&machine.model, &near.orbit).or_else(|_| CutOrbit::new(&machine.model)),
+            None => CutOrbit::new(&machine.model),
+        }
+        .ok()?;
+        let weights = orbit.order_weights(record.highest);
+        let forces = orbit.force_orders(&weights);
+        let mut coefficients = machine.reading.orders(&forces);
+        let mut predicted_more: Vec<(f64, &DMatrix<Complex64>)> = Vec::new();
+        for (variable, z) in space.variables.iter().zip(z) {
+            match variable {
+                Variable::Phase(own) if *own == number => turn(&mut coefficients, z * phase_deviation(record)),
+                Variable::Common(own, direction) if *own == number => {
+                    predicted_more.extend(record.common_directions().nth(*direction).map(|direction| (*z, direction)));
+                }
+                _ => {}
+            }
+        }
+        let mut predicted = record.seen(&coefficients);
+        for (z, direction) in predicted_more {
+            predicted += direction * Complex64::from(z);
+        }
+        let residual = record.whitened(&(&record.orders.amplitudes - predicted));
+        Some(Self {
+            machine,
+            orbit,
+            weights,
+            forces,
+            coefficients,
+            residual,
+        })
+    }
+
+    /// Derivatives of the predicted amplitudes, in standard deviations.
+    fn columns(&self, space: &Space<'_>, z: &[f64], number: usize, record: &ReducedCut) -> Columns {
+        let column = |index: usize| -> Option<Vec<f64>> {
+            if !space.acts_on(index, number) {
+                return None;
+            }
+            match &space.variables[index] {
+                Variable::Common(_, direction) => Some(record.whitened(record.common_directions().nth(*direction)?)),
+                Variable::Phase(_) => {
+                    let mut turned = self.coefficients.clone();
+                    for (order, mut row) in turned.row_iter_mut().enumerate() {
+                        row *= Complex64::new(0.0, order as f64 * phase_deviation(record));
+                    }
+                    Some(record.whitened(&record.seen(&turned)))
+                }
+                _ => self.difference(space, z, index, number, record),
+            }
+        };
+        (0..space.variables.len()).into_par_iter().map(column).collect()
+    }
+
+    fn difference(
+        &self,
+        space: &Space<'_>,
+        z: &[f64],
+        index: usize,
+        number: usize,
+        record: &ReducedCut,
+    ) -> Option<Vec<f64>> {
+        let at = |step: f64| {
+            let mut moved = z.to_vec();
+            moved[index] += step;
+            space.machine(&moved, number, record)
+        };
+        // At the boundary of a variable its derivative is one-sided.
+        let below = if z[index] - DIFFERENCE < space.lower(index) { 0.0 } else { DIFFERENCE };
+        let (plus, minus) = (at(DIFFERENCE)?, at(-below)?);
+        let step = DIFFERENCE + below;
+        let mut slope = (plus.reading.orders(&self.forces) - minus.reading.orders(&self.forces)) / Complex64::from(step);
+        if !space.is_of_reading(index) {
+            let sensitivity = self.orbit.derivative(&plus.model, &minus.model, step)?;
+            let forces = self.orbit.force_order_slopes(&self.weights, &sensitivity);
+            slope += self.machine.reading.orders(&forces);
+        }
+        let phase: f64 = space
+            .variables
+            .iter()
+            .zip(z)
+            .map(|(variable, z)| match variable {
+                Variable::Phase(own) if *own == number => z * phase_deviation(record),
+                _ => 0.0,
+            })
+            .sum();
+        turn(&mut slope, phase);
+        Some(record.whitened(&record.seen(&slope)))
+    }
+}
+
+/// Standard deviation of the phase of the tachometer of a record, rad.
+fn phase_deviation(record: &ReducedCut) -> f64 {
+    record.orders.angle.phase_deviation_rad
+}
+
+/// The same signals at a spindle angle that is larger by `angle_rad`.
+fn turn(coefficients: &mut DMatrix<Complex64>, angle_rad: f64) {
+    if angle_rad != 0.0 {
+        for (order, mut row) in coefficients.row_iter_mut().enumerate() {
+            row *= Complex64::cis(order as f64 * angle_rad);
+        }
+    }
+}
+
+fn states(space: &Space<'_>, z: &[f64], records: &[ReducedCut], near: Option<&[State]>) -> Option<Vec<State>> {
+    records
+        .par_iter()
+        .enumerate()
+        .map(|(number, record)| State::new(space, z, number, record, near.map(|near| &near[number])))
+        .collect()
+}
+
+fn jacobian(space: &Space<'_>, z: &[f64], records: &[ReducedCut], states: &[State]) -> DMatrix<f64> {
+    let all: Vec<Columns> = states
+        .iter()
+        .zip(records)
+        .enumerate()
+        .map(|(number, (state, record))| state.columns(space, z, number, record))
+        .collect();
+    let rows = records.iter().map(ReducedCut::count).sum();
+    let mut jacobian = DMatrix::zeros(rows, space.variables.len());
+    let mut first = 0;
+    for (columns, record) in all.iter().zip(records) {
+        for (index, column) in columns.iter().enumerate() {
+            if let Some(column) = column {
+                jacobian.view_mut((first, index), (column.len(), 1)).copy_from_slice(column);
+            }
+        }
+        first += record.count();
+    }
+    jacobian
+}
+
+fn stacked(states: &[State]) -> DVector<f64> {
+    let all: Vec<f64> = states.iter().flat_map(|state| state.residual.iter().copied()).collect();
+    DVector::from_vec(all)
+}
+
+/// Fits the variables of `space` to the records, from `start`; `near` are the orbits of an earlier fit. `None` if no
+/// orbit exists at the start.
+pub(crate) fn fit(space: &Space<'_>, records: &[ReducedCut], start: Vec<f64>, near: Option<&Fit>) -> Option<Fit> {
+    let mut z = start;
+    let mut current = states(space, &z, records, near.map(|near| near.states.as_slice()))?;
+    let mut damping = 1e-6;
+    let begin = std::time::Instant::now();
+    let mut slopes = jacobian(space, &z, records, &current);
+    for _ in 0..STEPS {
+        let residual = stacked(&current);
+        let position = DVector::from_column_slice(&z);
+        let cost = residual.norm_squared() + position.norm_squared();
+        let normal = slopes.tr_mul(&slopes);
+        let gradient = slopes.tr_mul(&residual) - &position;
+        let Some((moved, predicted)) = step(space, &z, &normal, &gradient, damping) else { break };
+        if predicted < CONVERGED {
+            break;
+        }
+        let next = states(space, &moved, records, Some(&current));
+        let new_cost = next.as_ref().map_or(f64::INFINITY, |next| {
+            stacked(next).norm_squared() + moved.iter().map(|z| z * z).sum::<f64>()
+        });
+        if new_cost < cost {
+            damping = (0.1 * damping).max(1e-9);
+            let Some(next) = next else { break };
+            (z, current) = (moved, next);
+            slopes = jacobian(space, &z, records, &current);
+            if cost - new_cost < CONVERGED {
+                break;
+            }
+        } else if damping > 1e6 {
+            break;
+        } else {
+            damping = (10.0 * damping).max(1e-3);
+        }
+    }
+    eprintln!("  fit {:?} {:?} sizes {:?}", space.candidates.iter().map(|c| c.effect.name()).collect::<Vec<_>>(), begin.elapsed(), current.iter().map(|s| s.orbit.size()).collect::<Vec<_>>());
+    let residual = stacked(&current);
+    let mut information = slopes.tr_mul(&slopes);
+    for index in 0..information.nrows() {
+        information[(index, index)] += 1.0;
+    }
+    Some(Fit {
+        left: residual.norm_squared(),
+        prior: z.iter().map(|z| z * z).sum(),
+        z,
+        information,
+        jacobian: slopes,
+        residual,
+        states: current,
+    })
+}
+
+/// A damped step within the bounds, and the decrease of the cost that it predicts.
+fn step(
+    space: &Space<'_>,
+    z: &[f64],
+    normal: &DMatrix<f64>,
+    gradient: &DVector<f64>,
+    damping: f64,
+) -> Option<(Vec<f64>, f64)> {
+    let size = z.len();
+    let mut held = vec![false; size];
+    loop {
+        let mut matrix = normal.clone();
+        let mut right = gradient.clone();
+        for index in 0..size {
+            matrix[(index, index)] += 1.0 + damping * normal[(index, index)];
+            if held[index] {
+                matrix.row_mut(index).fill(0.0);
+                matrix.column_mut(index).fill(0.0);
+                matrix[(index, index)] = 1.0;
+                right[index] = 0.0;
+            }
+        }
+        let change = Cholesky::new(matrix)?.solve(&right);
+        let mut beyond = false;
+        for index in 0..size {
+            let is_below = z[index] <= space.lower(index) && change[index] < 0.0;
+            if is_below && !held[index] {
+                held[index] = true;
+                beyond = true;
+            }
+        }
+        if beyond {
+            continue;
+        }
+        let moved: Vec<f64> = (0..size).map(|index| (z[index] + change[index]).max(space.lower(index))).collect();
+        let change = DVector::from_iterator(size, moved.iter().zip(z).map(|(moved, z)| moved - z));
+        let predicted = 2.0 * gradient.dot(&change) - change.dot(&(normal * &change)) - change.norm_squared();
+        return Some((moved, predicted));
+    }
+}
+
+impl Fit {
+    /// Largest half ranges of displacement, m, and velocity, m/s, along x, y, z over the cuts.
+    pub(crate) fn half_ranges(&self) -> [[f64; 3]; 2] {
+        let mut largest = [[0.0_f64; 3]; 2];
+        for state in &self.states {
+            let ranges = state.orbit.half_ranges();
+            for (largest, range) in largest.as_flattened_mut().iter_mut().zip(ranges.as_flattened()) {
+                *largest = largest.max(*range);
+            }
+        }
+        largest
+    }
+
+    /// Derivatives of the predicted amplitudes by the coordinates of a further candidate at `coordinates`, added to this
+    /// fit of `space`: records stacked, a column per coordinate; `None` if it has none there.
+    pub(crate) fn columns_of(
+        &self,
+        space: &Space<'_>,
+        candidate: &super::candidate::Candidate,
+        coordinates: &[f64],
+        records: &[ReducedCut],
+    ) -> Option<DMatrix<f64>> {
+        let wider = space.with(candidate);
+        let mut z = self.z.clone();
+        z.extend_from_slice(coordinates);
+        let first = self.z.len();
+        let rows = records.iter().map(ReducedCut::count).sum();
+        let mut columns = DMatrix::zeros(rows, coordinates.len());
+        let mut row = 0;
+        for (number, (state, record)) in self.states.iter().zip(records).enumerate() {
+            for index in 0..coordinates.len() {
+                let column = state.difference(&wider, &z, first + index, number, record)?;
+                columns.view_mut((row, index), (column.len(), 1)).copy_from_slice(&column);
+            }
+            row += record.count();
+        }
+        Some(columns)
+    }
+}

@@ -1,0 +1,22 @@
+//! Diagnosis of stable cuts on their orbit: what a cut knows is reduced once to orders, and every machine is compared by
+//! the orders of its forced periodic orbit.
+//!
+//! | file | content |
+//! |---|---|
+//! | `record` | a recorded cut, reduced |
+//! | `conditions`, `reading` | a machine in a cut; the orders of its channels |
+//! | `candidate`, `candidates` | effects with their widths |
+//! | `space` | variables of a fit |
+//! | `fit` | fit of a machine |
+//! | `selection` | sets of effects by their evidence |
+
+mod candidate;
+mod candidates;
+mod conditions;
+mod fit;
+mod reading;
+mod record;
+mod selection;
+mod space;
+#[cfg(test)]
+mod tests;

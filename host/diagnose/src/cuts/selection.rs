@@ -1,0 +1,167 @@
+//! Which further effects explain the orders of cuts.
+
+use nalgebra::{Cholesky, DMatrix, DVector};
+use rayon::prelude::*;
+
+use super::candidate::Candidate;
+use super::candidates;
+use super::fit::{Fit, fit};
+use super::record::ReducedCut;
+use super::space::Space;
+use crate::baseline::Baseline;
+
+/// Number of candidates that are fitted, of those that the baseline's derivatives rank first.
+const FITTED: usize = 8;
+/// Largest number of effects.
+const EFFECTS: usize = 3;
+/// Least gain of a further effect in the logarithm of its probability: odds of 20.
+const LEAST_GAIN: f64 = 3.0;
+
+/// A set of effects, fitted.
+pub(crate) struct Explanation<'a> {
+    pub space: Space<'a>,
+    pub fit: Fit,
+    /// Logarithm of the marginal likelihood and the probability of the set before the records are seen.
+    pub evidence: f64,
+}
+
+/// The explanations of a study.
+pub(crate) struct Explanations<'a> {
+    /// The baseline within its uncertainty.
+    pub baseline: Explanation<'a>,
+    /// The sets of the last number of effects that gained, by descending evidence.
+    pub ranked: Vec<Explanation<'a>>,
+}
+
+/// Explains the records by ever larger sets of effects, as long as a further one gains.
+pub(crate) fn explain<'a>(baseline: &'a Baseline<'a>, records: &[ReducedCut]) -> Option<Explanations<'a>> {
+    let space = Space::new(baseline, records);
+    let start = vec![0.0; space.variables.len()];
+    let fitted = fit(&space, records, start, None)?;
+    let all = candidates::all(baseline, records, &fitted);
+    let mut first = Explanations {
+        baseline: Explanation {
+            evidence: fitted.evidence(),
+            space,
+            fit: fitted,
+        },
+        ranked: Vec::new(),
+    };
+    for _ in 0..EFFECTS {
+        let best = first.ranked.first().unwrap_or(&first.baseline);
+        let next = extended(best, &all, records);
+        let gained = next.first().map_or(f64::NEG_INFINITY, |next| next.evidence - best.evidence);
+        if gained < LEAST_GAIN {
+            break;
+        }
+        first.ranked = next;
+    }
+    Some(first)
+}
+
+/// Sets with one more effect than `best`, by descending evidence.
+fn extended<'a>(best: &Explanation<'a>, all: &[Candidate], records: &[ReducedCut]) -> Vec<Explanation<'a>> {
+    let prior = priors(all);
+    let unranked = if best.fit.is_enough() { f64::NEG_INFINITY } else { f64::INFINITY };
+    let mut scored: Vec<(f64, usize, Vec<f64>)> = all
+        .par_iter()
+        .enumerate()
+        .filter(|(_, candidate)| !best.space.candidates.iter().any(|known| is_same(known, candidate)))
+        .flat_map_iter(|(index, candidate)| {
+            let prior = prior[index];
+            candidate.starts().into_iter().map(move |start| (index, candidate, start, prior))
+        })
+        .map(|(index, candidate, start, prior)| {
+            // What has no derivative at the baseline is tried where something is left to explain.
+            let (gain, z) = score(best, candidate, &start, records).unwrap_or((unranked, start));
+            (gain + prior, index, z)
+        })
+        .filter(|(gain, ..)| *gain > 0.0)
+        .collect();
+    scored.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+    let mut seen: Vec<usize> = Vec::new();
+    scored.retain(|(_, index, _)| {
+        let is_new = !seen.contains(index);
+        if is_new {
+            seen.push(*index);
+        }
+        is_new
+    });
+    scored.truncate(FITTED);
+    let mut found: Vec<Explanation<'a>> = scored
+        .into_par_iter()
+        .filter_map(|(_, index, z)| {
+            let space = best.space.with(&all[index]);
+            let mut start = best.fit.z.clone();
+            start.extend(z);
+            let fitted = fit(&space, records, start, Some(&best.fit))?;
+            Some(Explanation {
+                evidence: best_prior(best) + fitted.evidence() + prior[index],
+                space,
+                fit: fitted,
+            })
+        })
+        .collect();
+    found.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
+    found
+}
+
+/// What the effects of an explanation cost before the records are seen.
+fn best_prior(best: &Explanation<'_>) -> f64 {
+    best.evidence - best.fit.evidence()
+}
+
+/// True if two candidates are the same effect at the same place.
+fn is_same(one: &Candidate, other: &Candidate) -> bool {
+    one.effect == other.effect && one.location == other.location
+}
+
+/// Logarithm of the probability of each candidate before the records are seen: equal for all names, divided over the
+/// forms and places of a name.
+fn priors(all: &[Candidate]) -> Vec<f64> {
+    let mut names: Vec<&str> = all.iter().map(|candidate| candidate.effect.name()).collect();
+    names.sort_unstable();
+    names.dedup();
+    let of = |candidate: &Candidate| {
+        let places = all.iter().filter(|other| other.effect == candidate.effect).count();
+        -((names.len() * places) as f64).ln()
+    };
+    all.iter().map(of).collect()
+}
+
+/// Gain in evidence of a candidate to first order, and its coordinates; `None` if it has no derivative.
+fn score(
+    best: &Explanation<'_>,
+    candidate: &Candidate,
+    start: &[f64],
+    records: &[ReducedCut],
+) -> Option<(f64, Vec<f64>)> {
+    let columns = best.fit.columns_of(&best.space, candidate, start, records)?;
+    let factor = Cholesky::new(best.fit.information.clone())?;
+    // Of the residual r and the columns c, what the variables of the known explanation cannot take up.
+    let mixed = best.fit.jacobian.tr_mul(&columns);
+    let gradient = columns.tr_mul(&best.fit.residual)
+        - mixed.tr_mul(&factor.solve(&(best.fit.jacobian.tr_mul(&best.fit.residual) - position(best))));
+    let own = columns.tr_mul(&columns) - mixed.tr_mul(&factor.solve(&mixed));
+    let information: DMatrix<f64> = own + DMatrix::identity(start.len(), start.len());
+    let own_factor = Cholesky::new(information)?;
+    let change = own_factor.solve(&gradient);
+    let determinant: f64 = own_factor.l_dirty().diagonal().iter().map(|x| x.ln()).sum();
+    let z: Vec<f64> = start
+        .iter()
+        .zip(change.iter())
+        .zip(&candidate.coordinates)
+        .map(|((start, change), coordinate)| (start + change).clamp(coordinate.lower.max(-REACH), REACH))
+        .collect();
+    let inside = z.iter().zip(&candidate.coordinates).all(|(z, coordinate)| *z > coordinate.lower);
+    let gain = 0.5 * gradient.dot(&change) - determinant;
+    let z = if inside { z } else { start.iter().map(|z| z.max(1e-2)).collect() };
+    Some((if inside { gain } else { gain.min(0.0) - determinant }, z))
+}
+
+/// Farthest start of a fit, in widths: a derivative at the baseline does not reach farther.
+const REACH: f64 = 2.0;
+
+fn position(best: &Explanation<'_>) -> DVector<f64> {
+    DVector::from_column_slice(&best.fit.z)
+}

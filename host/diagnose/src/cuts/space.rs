@@ -1,0 +1,221 @@
+//! Variables of a fit to cuts: what is uncertain of the baseline, the sensors and the cuts, and the coordinates of
+//! further effects.
+//!
+//! Every variable is standard normal before the records are seen. Zero is the baseline.
+
+use super::candidate::Candidate;
+use super::conditions::{Conditions, cut_model};
+use super::reading::Reading;
+use super::record::ReducedCut;
+use crate::baseline::{Baseline, pickup_of};
+use crate::error::DiagnoseError;
+use quietcut_model::case::{Case, Deviation, Parameter};
+use quietcut_model::{Effects, ModelError};
+use quietcut_stability::cut_orbit::CutModel;
+
+/// Standard deviation of a parameter of a case that states none, relative to its value: the case is taken as exact to
+/// the last digit that a case file usually has.
+pub(crate) const ASSUMED_PARAMETER: f64 = 1e-3;
+/// Standard deviation of the axial depth and the feed of a cut, relative.
+pub(crate) const ASSUMED_CUT: f64 = 1e-3;
+/// Standard deviation of the gain of a sensor.
+pub(crate) const ASSUMED_GAIN: f64 = 1e-3;
+
+/// One variable.
+#[derive(Clone, Debug)]
+pub(crate) enum Variable {
+    /// Parameters of the case, which change by these standard deviations per unit.
+    Baseline(Vec<Deviation>),
+    /// Gain of a channel, in all records.
+    Gain(String),
+    /// Phase of the tachometer of a record.
+    Phase(usize),
+    /// Axial depth of a record.
+    Depth(usize),
+    /// Feed of a record.
+    Feed(usize),
+    /// A direction in which all orders of a record err together.
+    Common(usize, usize),
+    /// A coordinate of a candidate.
+    Coordinate(usize, usize),
+}
+
+/// Variables with the baseline and the candidates to which they belong.
+pub(crate) struct Space<'a> {
+    pub baseline: &'a Baseline<'a>,
+    pub candidates: Vec<Candidate>,
+    pub variables: Vec<Variable>,
+}
+
+/// A machine in one cut, with its channels.
+pub(crate) struct Machine {
+    pub model: CutModel,
+    pub reading: Reading,
+}
+
+impl<'a> Space<'a> {
+    /// What is uncertain without any candidate.
+    pub(crate) fn new(baseline: &'a Baseline<'a>, records: &[ReducedCut]) -> Self {
+        let mut variables: Vec<Variable> = uncertain(baseline.case).into_iter().map(Variable::Baseline).collect();
+        let mut channels: Vec<&String> = records.iter().flat_map(|record| &record.orders.channels).collect();
+        channels.sort();
+        channels.dedup();
+        variables.extend(channels.into_iter().map(|name| Variable::Gain(name.clone())));
+        for (index, record) in records.iter().enumerate() {
+            variables.extend([Variable::Phase(index), Variable::Depth(index), Variable::Feed(index)]);
+            variables.extend((0..record.common_directions().count()).map(|direction| Variable::Common(index, direction)));
+        }
+        Self {
+            baseline,
+            candidates: Vec::new(),
+            variables,
+        }
+    }
+
+    /// This space with a further candidate.
+    pub(crate) fn with(&self, candidate: &Candidate) -> Self {
+        let mut candidates = self.candidates.clone();
+        let mut variables = self.variables.clone();
+        let number = candidates.len();
+        variables.extend((0..candidate.coordinates.len()).map(|index| Variable::Coordinate(number, index)));
+        candidates.push(candidate.clone());
+        Self {
+            baseline: self.baseline,
+            candidates,
+            variables,
+        }
+    }
+
+    /// Coordinates of the candidate `number` in `z`.
+    pub(crate) fn coordinates(&self, number: usize, z: &[f64]) -> Vec<f64> {
+        let own = self.variables.iter().zip(z);
+        own.filter(|(variable, _)| matches!(variable, Variable::Coordinate(other, _) if *other == number))
+            .map(|(_, z)| *z)
+            .collect()
+    }
+
+    /// Lowest value of a variable.
+    pub(crate) fn lower(&self, variable: usize) -> f64 {
+        match &self.variables[variable] {
+            Variable::Coordinate(candidate, index) => self.candidates[*candidate].coordinates[*index].lower,
+            _ => f64::NEG_INFINITY,
+        }
+    }
+
+    /// True if a variable may act on a record.
+    pub(crate) fn acts_on(&self, variable: usize, record: usize) -> bool {
+        match self.variables[variable] {
+            Variable::Phase(own) | Variable::Depth(own) | Variable::Feed(own) | Variable::Common(own, _) => own == record,
+            _ => true,
+        }
+    }
+
+    /// True if a variable changes only what sensors read.
+    pub(crate) fn is_of_reading(&self, variable: usize) -> bool {
+        match &self.variables[variable] {
+            Variable::Gain(_) => true,
+            Variable::Coordinate(candidate, _) => {
+                self.candidates[*candidate].effect.spec().class == quietcut_model::effects::Class::Sensor
+            }
+            _ => false,
+        }
+    }
+
+    /// The case at a point of the space.
+    fn case(&self, z: &[f64]) -> Option<Case> {
+        let mut case = self.baseline.case.clone();
+        for (variable, z) in self.variables.iter().zip(z) {
+            if let Variable::Baseline(parts) = variable {
+                if *z != 0.0 {
+                    for part in parts {
+                        if !part.parameter.shift(&mut case, z * part.std) {
+                            return None;
+                        }
+                    }
+                }
+            }
+        }
+        Some(case)
+    }
+
+    /// Effects of the candidates at a point of the space.
+    pub(crate) fn effects(&self, z: &[f64]) -> Result<Effects, DiagnoseError> {
+        let mut effects = Effects::default();
+        for (number, candidate) in self.candidates.iter().enumerate() {
+            if let Some(table) = candidate.table(&self.coordinates(number, z)) {
+                let further = Effects::of_extension(candidate.effect.name(), &table)
+                    .map_err(|error| DiagnoseError::simulate(&self.baseline.case.path, ModelError::from(error)))?;
+                effects = effects.and(&further);
+            }
+        }
+        Ok(effects)
+    }
+
+    /// The machine at a point of the space in the cut `number`; `None` if it is not possible.
+    pub(crate) fn machine(&self, z: &[f64], number: usize, record: &ReducedCut) -> Option<Machine> {
+        let case = self.case(z)?;
+        let effects = self.baseline.effects.clone().and(&self.effects(z).ok()?);
+        let mut conditions: Conditions = record.conditions;
+        if let Some(cut) = case.cut {
+            conditions.cut.feed_direction_deg = cut.feed_direction_deg;
+        }
+        for (variable, z) in self.variables.iter().zip(z) {
+            match variable {
+                Variable::Depth(own) if *own == number => conditions.depth_m *= 1.0 + ASSUMED_CUT * z,
+                Variable::Feed(own) if *own == number => conditions.cut.feed_per_tooth_mm *= 1.0 + ASSUMED_CUT * z,
+                _ => {}
+            }
+        }
+        let model = cut_model(&case, &effects, &conditions).ok()?;
+        let pickups = record
+            .orders
+            .channels
+            .iter()
+            .map(|name| {
+                let mut pickup = effects.pickup(pickup_of(name)?);
+                for (variable, z) in self.variables.iter().zip(z) {
+                    if matches!(variable, Variable::Gain(channel) if channel == name) {
+                        pickup.weights = pickup.weights.map(|weight| weight * (1.0 + ASSUMED_GAIN * z));
+                    }
+                }
+                Some(pickup)
+            })
+            .collect::<Option<Vec<_>>>()?;
+        let reading = Reading::new(&model.structure, pickups, conditions.spindle_hz, record.highest, record.rate_hz)?;
+        Some(Machine { model, reading })
+    }
+}
+
+/// Independent uncertain combinations of the parameters of a case: those that it states, otherwise each parameter of the
+/// structure and the material by [`ASSUMED_PARAMETER`].
+fn uncertain(case: &Case) -> Vec<Vec<Deviation>> {
+    if case.is_uncertain() {
+        let mut all: Vec<Vec<Deviation>> = case.deviations.iter().map(|deviation| vec![*deviation]).collect();
+        all.extend(case.covariance.iter().flat_map(|covariance| covariance.independent_parts()));
+        return all;
+    }
+    let is_assumed = |parameter: &Parameter| {
+        !matches!(
+            parameter,
+            Parameter::Start
+                | Parameter::Exit
+                | Parameter::FeedPerTooth
+                | Parameter::FeedDirection
+                | Parameter::EdgeAngle
+                | Parameter::RunoutAngle
+        )
+    };
+    Parameter::of_case(case)
+        .into_iter()
+        .filter(is_assumed)
+        .filter_map(|parameter| {
+            let value = parameter.value(case)?;
+            (value != 0.0).then(|| {
+                vec![Deviation {
+                    parameter,
+                    std: ASSUMED_PARAMETER * value.abs(),
+                }]
+            })
+        })
+        .collect()
+}
