@@ -9,14 +9,15 @@
 //!
 //! δω = Re Σ Gᴴ S_k⁻¹ R / Σ Gᴴ S_k⁻¹ G, variance n/(2 Σ Gᴴ S_k⁻¹ G) for n samples,
 //!
-//! summed over the bins about each order k. This is the Cramér–Rao bound. Where aliases lie beside orders, their
-//! unknown amplitudes leave less of g, and the variance is larger.
+//! summed over the bins about each order k. This is the Cramér–Rao bound. Aliases have a prior, E |c_k|² ∝ 1/k². Where
+//! they lie beside orders, they leave less of g, and the variance is larger.
 
 use std::f64::consts::TAU;
 use std::ops::Range;
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 use num_complex::Complex64;
+use quietcut_numerics::roots::minimum;
 use rayon::prelude::*;
 use realfft::RealFftPlanner;
 
@@ -72,6 +73,8 @@ pub(crate) fn angle_from_orders(
     let (highest, aliases) = highest_orders(recording, start_hz / rate_hz, settings)?;
     let mut count = ((FIRST_REVOLUTIONS / recorded).min(1.0) * range.len() as f64) as usize;
     let mut per_sample = searched(&samples, count, start_hz / rate_hz, highest);
+    let beginning: Vec<&[f64]> = samples.iter().map(|samples| &samples[..count]).collect();
+    per_sample = searched_with_aliases(&beginning, per_sample, [highest, aliases]);
     loop {
         for _ in 0..REFINEMENTS {
             let beginning: Vec<&[f64]> = samples.iter().map(|samples| &samples[..count]).collect();
@@ -157,9 +160,78 @@ fn searched(channels: &[&[f64]], count: usize, start: f64, highest: usize) -> f6
         .map_or(start, |(_, per_sample)| per_sample)
 }
 
+/// Half width of the search with aliases, in periods of the highest order over the record, and its number of steps to
+/// each side.
+const ALIAS_SEARCH: (f64, i32) = (0.75, 24);
+
+/// Frequency near `start`, in revolutions per sample, of largest likelihood of orders and aliases in white noise: the
+/// least Σ_c yᵀ r/σ_c², r the residual with the prior of the aliases. Aliases that nearly coincide with orders bend this
+/// function, so that Gauss–Newton steps from afar may fail.
+fn searched_with_aliases(channels: &[&[f64]], start: f64, [highest, aliases]: [usize; 2]) -> f64 {
+    let count = channels.first().map_or(0, |samples| samples.len());
+    let taper = Taper::even(count);
+    let angles = |per_sample: f64| {
+        (0..count)
+            .map(|sample| sample as f64 * per_sample)
+            .collect::<Vec<f64>>()
+    };
+    let revolutions = angles(start);
+    let kernel = AliasKernel::new(highest, aliases, &revolutions, &taper);
+    let models: Vec<(Vec<f64>, f64)> = channels
+        .par_iter()
+        .map(|samples| {
+            let (fit, penalties) = fitted_with_prior(samples, &revolutions, &taper, &kernel);
+            (
+                penalties,
+                dot(&fit.residual, &fit.residual).max(f64::MIN_POSITIVE),
+            )
+        })
+        .collect();
+    let misfit = |per_sample: f64| {
+        let revolutions = angles(per_sample);
+        let kernel = AliasKernel::new(highest, aliases, &revolutions, &taper);
+        let of_channels: Vec<f64> = channels
+            .par_iter()
+            .zip(&models)
+            .map(|(samples, (penalties, energy))| {
+                let fit = OrderFit::new(samples, &revolutions, &taper, &kernel, penalties);
+                dot(samples, &fit.residual) / energy
+            })
+            .collect();
+        of_channels.iter().sum::<f64>()
+    };
+    let step = ALIAS_SEARCH.0 / (f64::from(ALIAS_SEARCH.1) * highest as f64 * count as f64);
+    let best = (-ALIAS_SEARCH.1..=ALIAS_SEARCH.1)
+        .map(|index| start + step * f64::from(index))
+        .map(|per_sample| (misfit(per_sample), per_sample))
+        .min_by(|a, b| a.0.total_cmp(&b.0))
+        .map_or(start, |(_, per_sample)| per_sample);
+    minimum([best - step, best + step], 0.01 * step, misfit)
+}
+
+/// Fit of a channel with the prior of its aliases, and their penalties.
+fn fitted_with_prior(
+    samples: &[f64],
+    revolutions: &[f64],
+    taper: &Taper,
+    kernel: &AliasKernel,
+) -> (OrderFit, Vec<f64>) {
+    let mut penalties = vec![0.0; kernel.orders() + 1];
+    penalties.resize(kernel.aliases() + 1, 1.0);
+    let mut fit = OrderFit::new(samples, revolutions, taper, kernel, &penalties);
+    for _ in 0..PRIORS {
+        penalties = fit.penalties(taper, kernel);
+        fit = OrderFit::new(samples, revolutions, taper, kernel, &penalties);
+    }
+    (fit, penalties)
+}
+
 /// Largest distance from an order, in cells of width 1/T, of the bins that a step uses. The transform of g falls with
 /// the distance x as 1/x; 97 % of its energy lie within 32 cells.
 const CELLS: f64 = 32.0;
+
+/// Updates of the noise from which the prior of the aliases follows; the first removes half of each alias.
+const PRIORS: usize = 2;
 
 /// Residuals r of all channels and their derivatives g with respect to the frequency in revolutions per sample.
 struct Derivatives {
@@ -174,7 +246,8 @@ impl Derivatives {
         let kernel = AliasKernel::new(highest, aliases, &revolutions, &taper);
         let circle = Circle::new(aliases);
         let of_channel = |samples: &&[f64]| {
-            let fit = OrderFit::new(samples, &revolutions, &taper, &kernel);
+            // Aliases that nearly coincide with orders would take the derivative of these too; the prior keeps them small.
+            let (fit, penalties) = fitted_with_prior(samples, &revolutions, &taper, &kernel);
             let turned: Vec<Complex64> = fit
                 .with_aliases
                 .iter()
@@ -187,7 +260,7 @@ impl Derivatives {
                 .enumerate()
                 .map(|(sample, at)| (sample as f64 - 0.5 * (count - 1) as f64) * series.at(*at))
                 .collect();
-            let derivative = OrderFit::new(&derivative, &revolutions, &taper, &kernel).residual;
+            let derivative = OrderFit::new(&derivative, &revolutions, &taper, &kernel, &penalties).residual;
             [fit.residual, derivative]
         };
         Self {
@@ -231,11 +304,15 @@ impl Derivatives {
             .par_iter()
             .map(|[residual, derivative]| [bins_of(residual), bins_of(derivative)])
             .collect();
-        let (mut above, mut below) = (0.0, 0.0);
+        let (mut above, mut below, mut spread) = (0.0, 0.0, 0.0);
         for (index, range) in ranges.iter().enumerate() {
-            let Some(factor) = Cholesky::new(orders.covariances[index + 1].matrix.clone()) else {
+            let covariance = &orders.covariances[index + 1];
+            let Some(factor) = Cholesky::new(covariance.matrix.clone()) else {
                 continue;
             };
+            // With S estimated from ν values (complex Wishart, q = ν − C), the variance is larger by ν²/(q² − 1).
+            let rest = covariance.freedoms - bins.len() as f64;
+            let estimated = covariance.freedoms.powi(2) / (rest * rest - 1.0);
             for bin in 0..range.len() {
                 let column = |part: usize| {
                     let values = bins.iter().map(|channel| channel[part][index][bin]);
@@ -244,14 +321,16 @@ impl Derivatives {
                 let derivative = column(1);
                 let solved = factor.solve(&derivative) * Complex64::from(orders.variance_of_mean());
                 above += solved.dotc(&column(0)).re;
-                below += solved.dotc(&derivative).re;
+                let information = solved.dotc(&derivative).re;
+                below += information;
+                spread += estimated * information;
             }
         }
         if below <= 0.0 {
             return (0.0, f64::INFINITY);
         }
         // Zero padding divides the bins; each counts for fewer independent values.
-        let variance = 0.5 * length as f64 / below;
+        let variance = 0.5 * length as f64 * spread / (below * below);
         (above / below, variance.sqrt())
     }
 }
