@@ -9,10 +9,10 @@ use crate::orders::reduction::{Orders, ReductionSettings};
 use crate::orders::spindle_angle::SpindleAngle;
 
 const RATE_HZ: f64 = 10_000.0;
-/// Numbers of revolutions of a record, and of records: the short ones cost little.
-const TRIALS: [(usize, u64); 3] = [(20, 1200), (50, 1200), (500, 300)];
+/// Numbers of revolutions of a record.
+const REVOLUTIONS: [usize; 3] = [20, 50, 500];
 
-/// Bounds of a rate of 0.9: in 300 records 0.9 ± 0.04 is 2.3 standard deviations √(0.09/300), in 1200 records 4.6.
+/// Bounds of a rate of 0.9: in 300 records 0.9 ± 0.04 is 2.3 standard deviations √(0.09/300), in 600 records 3.3.
 const NINETY: std::ops::RangeInclusive<f64> = 0.86..=0.94;
 
 /// One record of seven channels: their true amplitudes, K orders and more, and its reduction.
@@ -68,7 +68,7 @@ fn trial(seed: u64, revolutions: usize, modulation: f64) -> Trial {
 /// Shares of the records whose distance lies in its central 90 % interval, and below its 90 % quantile; the same of all
 /// orders alone, below; the mean number of common directions; the mean of the distance over its stated mean, of its
 /// squared deviation over its stated variance, and the degrees of freedom of order 5.
-fn rates((revolutions, records): (usize, u64), modulation: f64) -> [f64; 7] {
+fn rates(revolutions: usize, records: u64, modulation: f64) -> [f64; 7] {
     let first = 10_000 * revolutions as u64 + if modulation > 0.0 { 5000 } else { 0 };
     let of_records: Vec<[f64; 7]> = (0..records)
         .into_par_iter()
@@ -105,7 +105,8 @@ fn rates((revolutions, records): (usize, u64), modulation: f64) -> [f64; 7] {
 
 #[test]
 fn ninety_percent_intervals_hold_in_coloured_noise() {
-    let all = TRIALS.map(|trial| rates(trial, 0.0));
+    let all =
+        REVOLUTIONS.map(|revolutions| rates(revolutions, if revolutions < 100 { 600 } else { 300 }, 0.0));
     for [within, below, single, directions, ..] in all {
         assert!(NINETY.contains(&within) && NINETY.contains(&below), "{all:?}");
         // Thousands of orders: the spectrum that changes within a band may shift the rate by a percent or two.
@@ -117,7 +118,7 @@ fn ninety_percent_intervals_hold_in_coloured_noise() {
 
 #[test]
 fn ninety_percent_intervals_hold_if_all_orders_change_together() {
-    let all = TRIALS.map(|trial| rates(trial, 0.2));
+    let all = REVOLUTIONS.map(|revolutions| rates(revolutions, 300, 0.2));
     for [_, below, ..] in all {
         // The between-line spectrum holds the side bands of the changes too, so that the covariance is too large by a few
         // percent; too small a distance is more frequent than stated, too large a one less so.

@@ -49,8 +49,8 @@ fn speeds_without_tachometer_lie_within_their_deviation() {
         println!(
             "seeds from {first}, {revolutions} revolutions: within 90 % {within:.3}, mean square {square:.2}"
         );
-        // Four standard deviations √(0.09/200) below, and above what a conservative deviation in the ambiguous records
-        // (one in ten at 25 revolutions) gives.
+        // ±0.07 is 3.3 standard deviations √(0.09/200). Above, the deviation in ambiguous records (one in ten) is cautious;
+        // below, the spectrum of 25 revolutions has 18 values between lines.
         assert!((0.82..=0.97).contains(&within), "{first}: {within}");
     }
 }
