@@ -96,6 +96,12 @@ impl AliasKernel {
     /// Solution Y_k of the normal equations for the right side b_k, k = 0 … highest. Aliases of which two coincide make
     /// them singular; the solution is then one of many that fit equally.
     pub(crate) fn solve(&self, right: &[Complex64]) -> Vec<Complex64> {
+        self.solve_with_prior(right, &[])
+    }
+
+    /// [`Self::solve`] with a prior of the orders: `penalties`, variance of an amplitude by noise over its prior
+    /// variance, are added to the diagonal; none for the orders beyond the list.
+    pub(crate) fn solve_with_prior(&self, right: &[Complex64], penalties: &[f64]) -> Vec<Complex64> {
         let highest = right.len() - 1;
         let mut x = vec![Complex64::ZERO; right.len()];
         let mut residual = right.to_vec();
@@ -106,7 +112,10 @@ impl AliasKernel {
             if square <= SETTLED * SETTLED * whole {
                 break;
             }
-            let product = self.product(&direction, highest);
+            let mut product = self.product(&direction, highest);
+            for ((product, direction), penalty) in product.iter_mut().zip(&direction).zip(penalties) {
+                *product += direction * penalty;
+            }
             let curvature = inner(&direction, &product);
             if curvature <= 0.0 {
                 break;

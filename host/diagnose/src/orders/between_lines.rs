@@ -22,6 +22,10 @@ use crate::signal::grid::smooth_even;
 /// changes within it.
 const VALUES_PER_CHANNEL: f64 = 20.0;
 
+/// Distance, in cells of width 1/T, below which two lines count as one: the difference of their columns, (π `COINCIDENT`)²
+/// of a column in energy, is then below 1e-3.
+const COINCIDENT: f64 = 0.01;
+
 /// Largest half width of a band in spindle frequencies, unless it has too few values.
 const HALF_WIDTH: f64 = 0.5;
 
@@ -35,7 +39,7 @@ fn fewest_values(channels: usize) -> f64 {
 pub(crate) struct LineSpectrum {
     /// Number of samples of the zero-padded transform.
     pub length: usize,
-    /// Cells of width 1/T, ascending, that a removed line occupies.
+    /// Cells of width 1/T of the removed lines, ascending.
     lines: Vec<usize>,
     /// Duration of the record over the mean revolution.
     revolutions: f64,
@@ -55,14 +59,21 @@ impl LineSpectrum {
     /// For orders up to `aliases` of the spindle frequency `per_sample`, in revolutions per sample.
     pub(crate) fn new(per_sample: f64, aliases: usize, taper: Taper) -> Self {
         let count = taper.count() as f64;
-        let mut lines: Vec<usize> = (0..=aliases)
-            .map(|order| {
-                let cycles = order as f64 * per_sample;
-                ((cycles - cycles.round()).abs() * count).round() as usize
-            })
+        let mut places: Vec<f64> = (0..=aliases)
+            .map(|order| order as f64 * per_sample)
+            .map(|cycles| (cycles - cycles.round()).abs() * count)
             .collect();
-        lines.sort_unstable();
-        lines.dedup();
+        places.sort_unstable_by(f64::total_cmp);
+        // Two lines closer than a cell still take two values from the noise.
+        places.dedup_by(|next, place| *next - *place < COINCIDENT);
+        let mut counted: Vec<f64> = Vec::new();
+        for place in places {
+            // The third of a cluster takes values at the ends of the record, where the weights vanish.
+            if counted.len() < 2 || place - counted[counted.len() - 2] > 1.0 {
+                counted.push(place);
+            }
+        }
+        let lines = counted.iter().map(|place| place.round() as usize).collect();
         Self {
             length: smooth_even(taper.count()),
             lines,

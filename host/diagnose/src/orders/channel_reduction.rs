@@ -49,7 +49,7 @@ pub(crate) struct ChannelReduction {
 impl ChannelReduction {
     pub(crate) fn new(samples: &[f64], plan: &Plan) -> Self {
         let taper = &plan.taper;
-        let fit = OrderFit::new(samples, plan.revolutions, taper, plan.kernel);
+        let fit = OrderFit::new(samples, plan.revolutions, taper, plan.kernel, &[]);
         let residual = fit.residual;
         let transform = transform(&residual, taper, plan.spectrum.length);
         Self {
@@ -79,7 +79,14 @@ pub(crate) struct OrderFit {
 }
 
 impl OrderFit {
-    pub(crate) fn new(samples: &[f64], revolutions: &[f64], taper: &Taper, kernel: &AliasKernel) -> Self {
+    /// `penalties` of the orders as in [`AliasKernel::solve_with_prior`].
+    pub(crate) fn new(
+        samples: &[f64],
+        revolutions: &[f64],
+        taper: &Taper,
+        kernel: &AliasKernel,
+        penalties: &[f64],
+    ) -> Self {
         let circle = Circle::new(kernel.aliases());
         let weighted = samples
             .iter()
@@ -90,7 +97,7 @@ impl OrderFit {
             *entry /= taper.sum();
         }
         let amplitudes = kernel.solve(&right[..=kernel.orders()]);
-        let with_aliases = kernel.solve(&right);
+        let with_aliases = kernel.solve_with_prior(&right, penalties);
         let series = circle.series(&with_aliases);
         let residual = samples
             .iter()
@@ -103,7 +110,33 @@ impl OrderFit {
             with_aliases,
         }
     }
+
+    /// Penalties of the aliases in another fit of the same channel: their prior is that of a force that jumps, E |c_k|²
+    /// = A²/k², with A² from the upper half of the orders up to K; the noise is the residual of this fit.
+    pub(crate) fn penalties(&self, taper: &Taper, kernel: &AliasKernel) -> Vec<f64> {
+        let energy: f64 = self.residual.iter().map(|value| value * value).sum();
+        let noise = energy / self.residual.len() as f64 * taper.variance_of_mean();
+        let highest = kernel.orders();
+        let upper = highest / 2 + 1..=highest;
+        let squares = upper
+            .clone()
+            .map(|order| (order * order) as f64 * (self.amplitudes[order].norm_sqr() - noise));
+        let square = (squares.sum::<f64>() / upper.count().max(1) as f64).max(f64::MIN_POSITIVE);
+        (0..=kernel.aliases())
+            .map(|order| {
+                let penalty = noise * (order * order) as f64 / square;
+                if order <= highest {
+                    0.0
+                } else {
+                    penalty.min(LARGEST_PENALTY)
+                }
+            })
+            .collect()
+    }
 }
+
+/// Largest penalty: it leaves 1e-6 of an amplitude.
+const LARGEST_PENALTY: f64 = 1e6;
 
 /// Fourier transform of the weighted residual, padded with zeros.
 fn transform(residual: &[f64], taper: &Taper, length: usize) -> Vec<Complex64> {

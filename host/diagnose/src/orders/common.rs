@@ -1,10 +1,12 @@
 //! The part of the error of the amplitudes that moves all orders together: slow changes of speed or force.
 //!
-//! The record is cut into B blocks of whole revolutions that overlap by half, each longer than the slowest decay, so that
-//! the amplitudes of two blocks are nearly independent but for such changes. The deviations of a block from the record, whitened by the
-//! spectrum between the lines, are vectors u_b of D = 2·K·C real components: independent, with unit variance, if no
-//! change is common to the orders. The eigenvectors of Σ u_b u_bᵀ/B with significantly large eigenvalues are
-//! common directions.
+//! The record is cut into blocks of whole revolutions that overlap by half, each longer than the slowest decay, and
+//! combined to B blocks with independent noise (`block_noise`). Their deviations from the record, whitened by the spectrum
+//! between the lines, are vectors u_b of D = 2·K·C real components: independent, with unit variance, if no change is
+//! common to the orders. The eigenvectors of Σ u_b u_bᵀ/B with significantly large eigenvalues are common directions.
+//!
+//! Changes are taken as independent from block to block: those slower than a block make the stated variance too small,
+//! and are seen in the amplitudes of the blocks.
 //!
 //! Test: the phases of the u_b are drawn anew, independently for each order and block, which keeps all variances and
 //! destroys what orders have in common. A direction is significant if its eigenvalue exceeds those of the draws but for

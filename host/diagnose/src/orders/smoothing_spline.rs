@@ -77,7 +77,7 @@ impl SmoothingSpline {
         }
     }
 
-    /// Values of the function at ascending places, constant curvature zero beyond the knots.
+    /// Values of the function at ascending places within the knots.
     pub(crate) fn at(&self, places: impl Iterator<Item = f64>) -> Vec<f64> {
         let mut interval = 0;
         places
