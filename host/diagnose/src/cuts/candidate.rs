@@ -22,7 +22,10 @@ impl Coordinate {
         start: 0.0,
     };
     /// A coordinate that is not negative and begins at zero.
-    pub(crate) const POSITIVE: Self = Self { lower: 0.0, start: 0.0 };
+    pub(crate) const POSITIVE: Self = Self {
+        lower: 0.0,
+        start: 0.0,
+    };
 }
 
 /// Parameters of an effect, by key, at coordinates.
@@ -101,7 +104,15 @@ impl Candidate {
 
     /// Coordinates at which the records are compared to first order.
     pub(crate) fn starts(&self) -> Vec<Vec<f64>> {
-        let first = self.coordinates.iter().map(|coordinate| coordinate.start).collect();
-        if self.grid.is_empty() { vec![first] } else { self.grid.clone() }
+        let first = self
+            .coordinates
+            .iter()
+            .map(|coordinate| coordinate.start)
+            .collect();
+        if self.grid.is_empty() {
+            vec![first]
+        } else {
+            self.grid.clone()
+        }
     }
 }

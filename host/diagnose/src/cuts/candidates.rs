@@ -3,6 +3,8 @@
 //! A width is the size that an effect of this kind commonly has: a coordinate of one. What is proportional to a quantity
 //! of the case is given as a share of it; restoring forces are compared with the linear spring or damper along the motion
 //! of the baseline, so that widths do not depend on units or size of a machine.
+//!
+//! Hysteresis is not among them: its internal state leaves it without a derivative at the baseline.
 
 use super::candidate::{Candidate, Coordinate};
 use super::fit::Fit;
@@ -10,6 +12,7 @@ use super::record::ReducedCut;
 use crate::baseline::{Baseline, pickup_of};
 use crate::candidates::cause::Location;
 use quietcut_model::effects::EffectName;
+use quietcut_model::structure::Form;
 use quietcut_recording::Quantity;
 
 /// Mass, stiffness and damping, and cutting coefficients, relative: a case of another posture, tool or material.
@@ -20,6 +23,8 @@ const NONLINEAR: f64 = 0.3;
 const DAMPING_RATIO: f64 = 0.05;
 /// Exponent of the chip thickness, below 1 (Kienzle: 0.65 to 0.9).
 const EXPONENT: f64 = 0.2;
+/// Logarithm of the reference chip of an exponent over the feed per tooth.
+const REFERENCE_CHIP: f64 = 0.5;
 /// Runout, µm (collets and shrink chucks: 3 to 20 µm).
 const RUNOUT_UM: f64 = 10.0;
 /// Error of the gain of a sensor.
@@ -48,7 +53,11 @@ struct Along {
 
 /// All candidates for these records.
 pub(crate) fn all(baseline: &Baseline<'_>, records: &[ReducedCut], fit: &Fit) -> Vec<Candidate> {
-    let along: Vec<Along> = baseline.axes.iter().filter_map(|axis| of_axis(baseline, fit, *axis)).collect();
+    let along: Vec<Along> = baseline
+        .axes
+        .iter()
+        .filter_map(|axis| of_axis(baseline, fit, *axis))
+        .collect();
     let mut all = Vec::new();
     of_linear_structure(baseline, &along, &mut all);
     for along in &along {
@@ -80,12 +89,44 @@ fn of_linear_structure(baseline: &Baseline<'_>, along: &[Along], all: &mut Vec<C
     if baseline.mode_count() == 0 && along.len() > 1 {
         places.extend(along.iter().map(|along| Location::Axis(along.axis)));
     }
-    for effect in [EffectName::Mass, EffectName::Stiffness, EffectName::Damping] {
+    let effects = [
+        (EffectName::Mass, "mass_kg"),
+        (EffectName::Stiffness, "stiffness_n_per_m"),
+        (EffectName::Damping, "damping_ns_per_m"),
+    ];
+    for (effect, key) in effects {
         for place in &places {
-            let relative = |z: &[f64]| vec![("relative_change", (PARAMETER * z[0]).exp() - 1.0)];
-            all.push(Candidate::new(effect, place.clone(), vec![Coordinate::FREE], relative));
+            let of = |z: &[f64]| vec![("relative_change", (PARAMETER * z[0]).exp() - 1.0)];
+            let candidate = match entry(baseline, effect, place) {
+                Some(entry) if entry > 0.0 => {
+                    let of = move |z: &[f64]| vec![(key, entry * (PARAMETER * z[0]).exp())];
+                    Candidate::new(effect, place.clone(), vec![Coordinate::FREE], of)
+                }
+                _ => Candidate::new(effect, place.clone(), vec![Coordinate::FREE], of),
+            };
+            all.push(candidate);
         }
     }
+}
+
+/// Diagonal entry of the matrix of an effect along the direction of a place; `None` for the whole structure, or one that
+/// is not given by matrices.
+fn entry(baseline: &Baseline<'_>, effect: EffectName, place: &Location) -> Option<f64> {
+    let Form::Matrices(matrices) = &baseline.structure.form else {
+        return None;
+    };
+    let direction = place.direction()?;
+    let index = baseline
+        .structure
+        .directions
+        .iter()
+        .position(|other| *other == direction)?;
+    let matrix = match effect {
+        EffectName::Mass => &matrices.mass,
+        EffectName::Stiffness => &matrices.stiffness,
+        _ => &matrices.damping,
+    };
+    Some(matrix[(index, index)])
 }
 
 fn of_restoring_force(along: Along, all: &mut Vec<Candidate>) {
@@ -98,9 +139,17 @@ fn of_restoring_force(along: Along, all: &mut Vec<Candidate>) {
         all.push(Candidate::new(effect, place.clone(), vec![Coordinate::FREE], of));
     };
     one(EffectName::CubicStiffness, "k3_n_per_m3", spring_n / x.powi(3));
-    one(EffectName::QuadraticStiffness, "k2_n_per_m2", spring_n / x.powi(2));
+    one(
+        EffectName::QuadraticStiffness,
+        "k2_n_per_m2",
+        spring_n / x.powi(2),
+    );
     one(EffectName::CubicDamping, "c3_ns3_per_m3", damper_n / v.powi(3));
-    one(EffectName::QuadraticDamping, "c2_ns2_per_m2", damper_n / v.powi(2));
+    one(
+        EffectName::QuadraticDamping,
+        "c2_ns2_per_m2",
+        damper_n / v.powi(2),
+    );
     let regimes = move |z: &[f64]| {
         vec![
             ("k3_n_per_m3", -spring_n / x.powi(3) * z[0]),
@@ -109,31 +158,32 @@ fn of_restoring_force(along: Along, all: &mut Vec<Candidate>) {
     };
     let positive = vec![Coordinate::POSITIVE; 2];
     all.push(
-        Candidate::new(EffectName::SofteningHardening, place.clone(), positive, regimes).from_each(vec![vec![0.3, 0.3]]),
+        Candidate::new(EffectName::SofteningHardening, place.clone(), positive, regimes)
+            .from_each(vec![vec![0.3, 0.3]]),
     );
     let friction = move |z: &[f64]| vec![("fc_n", damper_n * z[0])];
-    all.push(Candidate::new(EffectName::CoulombFriction, place.clone(), vec![Coordinate::POSITIVE], friction).from_zero());
+    all.push(
+        Candidate::new(
+            EffectName::CoulombFriction,
+            place.clone(),
+            vec![Coordinate::POSITIVE],
+            friction,
+        )
+        .from_zero(),
+    );
     let gap = move |z: &[f64]| vec![("gap_mm", 2e3 * x * z[0])];
     all.push(
-        Candidate::new(EffectName::Backlash, place.clone(), vec![Coordinate::POSITIVE], gap)
+        Candidate::new(EffectName::Backlash, place, vec![Coordinate::POSITIVE], gap)
             .from_zero()
             .from_each(vec![vec![0.1], vec![0.5]]),
-    );
-    let hysteresis = move |z: &[f64]| {
-        vec![
-            ("hysteretic_stiffness_n_per_m", NONLINEAR * along.stiffness * z[0]),
-            ("yield_m", 0.3 * x * z[1].exp()),
-        ]
-    };
-    all.push(
-        Candidate::new(EffectName::Hysteresis, place, vec![Coordinate::POSITIVE, Coordinate::FREE], hysteresis)
-            .from_zero()
-            .from_each(vec![vec![0.2, 0.0]]),
     );
 }
 
 fn of_missing_mode(along: Along, records: &[ReducedCut], all: &mut Vec<Candidate>) {
-    let lowest_hz = records.iter().map(|record| record.conditions.spindle_hz).fold(f64::INFINITY, f64::min);
+    let lowest_hz = records
+        .iter()
+        .map(|record| record.conditions.spindle_hz)
+        .fold(f64::INFINITY, f64::min);
     let highest_hz = records
         .iter()
         .map(|record| record.conditions.spindle_hz * (record.orders.amplitudes.nrows() - 1) as f64)
@@ -156,9 +206,14 @@ fn of_missing_mode(along: Along, records: &[ReducedCut], all: &mut Vec<Candidate
     let count = (2.0 * half / (2.0_f64.ln() / 3.0)).ceil().max(2.0) as usize;
     let grid = (0..=count).map(|index| vec![0.0, 2.0 * index as f64 / count as f64 - 1.0, 0.0]);
     all.push(
-        Candidate::new(EffectName::MissingMode, Location::Axis(along.axis), coordinates, mode)
-            .from_zero()
-            .from_each(grid.collect()),
+        Candidate::new(
+            EffectName::MissingMode,
+            Location::Axis(along.axis),
+            coordinates,
+            mode,
+        )
+        .from_zero()
+        .from_each(grid.collect()),
     );
 }
 
@@ -169,10 +224,20 @@ fn of_coupling(along: &[Along], all: &mut Vec<Candidate>) {
             let work = NONLINEAR * (one.stiffness * other.stiffness).sqrt();
             let quartic = work / (one.moved_m * other.moved_m);
             let of = move |z: &[f64]| vec![("kxyy_n_per_m3", quartic * z[0])];
-            all.push(Candidate::new(EffectName::ModeCoupling, place.clone(), vec![Coordinate::FREE], of));
+            all.push(Candidate::new(
+                EffectName::ModeCoupling,
+                place.clone(),
+                vec![Coordinate::FREE],
+                of,
+            ));
             let cubic = work / one.moved_m.max(other.moved_m);
             let of = move |z: &[f64]| vec![("kxxy_n_per_m2", cubic * z[0])];
-            all.push(Candidate::new(EffectName::ModeCoupling, place, vec![Coordinate::FREE], of));
+            all.push(Candidate::new(
+                EffectName::ModeCoupling,
+                place,
+                vec![Coordinate::FREE],
+                of,
+            ));
         }
     }
 }
@@ -181,7 +246,10 @@ fn of_process(baseline: &Baseline<'_>, records: &[ReducedCut], all: &mut Vec<Can
     let (Ok(&material), Ok(tool)) = (baseline.case.material(), baseline.case.tool()) else {
         return;
     };
-    let feeds: Vec<f64> = records.iter().map(|record| record.conditions.cut.feed_per_tooth_mm).collect();
+    let feeds: Vec<f64> = records
+        .iter()
+        .map(|record| record.conditions.cut.feed_per_tooth_mm)
+        .collect();
     let feed_mm = feeds.iter().sum::<f64>() / feeds.len().max(1) as f64;
     let factor = move |z: &[f64]| {
         let factor = (PARAMETER * z[0]).exp();
@@ -191,11 +259,22 @@ fn of_process(baseline: &Baseline<'_>, records: &[ReducedCut], all: &mut Vec<Can
             ("kac_mpa", material.kac_mpa * factor),
         ]
     };
-    all.push(Candidate::new(EffectName::ForceCoefficients, Location::Everywhere, vec![Coordinate::FREE], factor));
+    all.push(Candidate::new(
+        EffectName::ForceCoefficients,
+        Location::Everywhere,
+        vec![Coordinate::FREE],
+        factor,
+    ));
     let sees_axial = tool.edge_angle_deg != 90.0 || material.kac_mpa != 0.0;
     let components = if sees_axial { 3 } else { 2 };
     let each = move |z: &[f64]| {
-        let own = |mpa: f64, z: f64| if mpa == 0.0 { PARAMETER * material.ktc_mpa * z } else { mpa * (PARAMETER * z).exp() };
+        let own = |mpa: f64, z: f64| {
+            if mpa == 0.0 {
+                PARAMETER * material.ktc_mpa * z
+            } else {
+                mpa * (PARAMETER * z).exp()
+            }
+        };
         let all = [
             ("ktc_mpa", own(material.ktc_mpa, z[0])),
             ("krc_mpa", own(material.krc_mpa, z[1])),
@@ -203,26 +282,54 @@ fn of_process(baseline: &Baseline<'_>, records: &[ReducedCut], all: &mut Vec<Can
         ];
         all[..components].to_vec()
     };
-    all.push(Candidate::new(EffectName::ForceCoefficients, Location::Everywhere, vec![Coordinate::FREE; components], each));
+    all.push(Candidate::new(
+        EffectName::ForceCoefficients,
+        Location::Everywhere,
+        vec![Coordinate::FREE; components],
+        each,
+    ));
     let width = PARAMETER * material.ktc_mpa * feed_mm;
     let edge = move |z: &[f64]| {
         let all = [
             ("kte_n_per_mm", material.kte_n_per_mm + width * z[0]),
             ("kre_n_per_mm", material.kre_n_per_mm + width * z[1]),
-            ("kae_n_per_mm", material.kae_n_per_mm + width * z.get(2).copied().unwrap_or(0.0)),
+            (
+                "kae_n_per_mm",
+                material.kae_n_per_mm + width * z.get(2).copied().unwrap_or(0.0),
+            ),
         ];
         all[..components].to_vec()
     };
-    all.push(Candidate::new(EffectName::EdgeForce, Location::Everywhere, vec![Coordinate::FREE; components], edge));
-    let power = move |z: &[f64]| vec![("exponent", (-EXPONENT * z[0]).exp()), ("reference_chip_mm", feed_mm)];
-    all.push(Candidate::new(EffectName::ForceExponent, Location::Everywhere, vec![Coordinate::FREE], power));
+    all.push(Candidate::new(
+        EffectName::EdgeForce,
+        Location::Everywhere,
+        vec![Coordinate::FREE; components],
+        edge,
+    ));
+    let power = move |z: &[f64]| {
+        vec![
+            ("exponent", (-EXPONENT * z[0]).exp()),
+            ("reference_chip_mm", feed_mm * (REFERENCE_CHIP * z[1]).exp()),
+        ]
+    };
+    all.push(Candidate::new(
+        EffectName::ForceExponent,
+        Location::Everywhere,
+        vec![Coordinate::FREE; 2],
+        power,
+    ));
     of_tool(baseline, all);
     if tool.diameter_mm.is_some() {
         of_process_damping(baseline, records, all);
     }
     if baseline.axes.contains(&2) {
         let no_parameters = |_: &[f64]| Vec::new();
-        all.push(Candidate::new(EffectName::AxialDepthModulation, Location::Everywhere, Vec::new(), no_parameters));
+        all.push(Candidate::new(
+            EffectName::AxialDepthModulation,
+            Location::Everywhere,
+            Vec::new(),
+            no_parameters,
+        ));
     }
 }
 
@@ -232,58 +339,113 @@ fn of_tool(baseline: &Baseline<'_>, all: &mut Vec<Candidate>) {
     if tool.teeth < 2 {
         return;
     }
-    let (known_um, known_rad) = tool.runout.map_or((0.0, 0.0), |runout| (runout.offset_um, runout.angle_deg.to_radians()));
+    let (known_um, known_rad) = tool.runout.map_or((0.0, 0.0), |runout| {
+        (runout.offset_um, runout.angle_deg.to_radians())
+    });
     let offset = move |z: &[f64]| {
         let x = known_um * known_rad.cos() + RUNOUT_UM * z[0];
         let y = known_um * known_rad.sin() + RUNOUT_UM * z[1];
         vec![("runout_um", x.hypot(y)), ("angle_deg", y.atan2(x).to_degrees())]
     };
-    all.push(Candidate::new(EffectName::Runout, Location::Everywhere, vec![Coordinate::FREE; 2], offset));
+    all.push(Candidate::new(
+        EffectName::Runout,
+        Location::Everywhere,
+        vec![Coordinate::FREE; 2],
+        offset,
+    ));
 }
 
 /// The width of process damping is that of a force along the chip as large as that of a structural damper of the ratio
 /// [`DAMPING_RATIO`], at the mean cutting speed.
 fn of_process_damping(baseline: &Baseline<'_>, records: &[ReducedCut], all: &mut Vec<Candidate>) {
     let Ok(tool) = baseline.case.tool() else { return };
-    let Some(diameter_mm) = tool.diameter_mm else { return };
-    let speed = |record: &ReducedCut| std::f64::consts::PI * 1e-3 * diameter_mm * record.conditions.spindle_hz / record.conditions.depth_m;
+    let Some(diameter_mm) = tool.diameter_mm else {
+        return;
+    };
+    let speed = |record: &ReducedCut| {
+        std::f64::consts::PI * 1e-3 * diameter_mm * record.conditions.spindle_hz / record.conditions.depth_m
+    };
     let speed_per_depth = records.iter().map(speed).sum::<f64>() / records.len().max(1) as f64;
     let Some(hertz) = baseline.lowest_hz() else { return };
     let stiffest = baseline
         .axes
         .iter()
-        .filter_map(|axis| Some(baseline.first_order.receptance(0.0)?[(*axis, *axis)].re.recip().abs()))
+        .filter_map(|axis| {
+            Some(
+                baseline.first_order.receptance(0.0)?[(*axis, *axis)]
+                    .re
+                    .recip()
+                    .abs(),
+            )
+        })
         .fold(f64::INFINITY, f64::min);
     let damping = 2.0 * DAMPING_RATIO * stiffest / (std::f64::consts::TAU * hertz);
     let width = damping * speed_per_depth;
     let of = move |z: &[f64]| vec![("process_damping_n_per_m", width * z[0])];
     all.push(
-        Candidate::new(EffectName::ProcessDamping, Location::Everywhere, vec![Coordinate::POSITIVE], of).from_zero(),
+        Candidate::new(
+            EffectName::ProcessDamping,
+            Location::Everywhere,
+            vec![Coordinate::POSITIVE],
+            of,
+        )
+        .from_zero(),
     );
 }
 
 fn of_sensors(baseline: &Baseline<'_>, records: &[ReducedCut], all: &mut Vec<Candidate>) {
-    let mut names: Vec<&String> = records.iter().flat_map(|record| &record.orders.channels).collect();
+    let mut names: Vec<&String> = records
+        .iter()
+        .flat_map(|record| &record.orders.channels)
+        .collect();
     names.sort();
     names.dedup();
-    let sample_s = records.iter().map(|record| 1.0 / record.rate_hz).fold(0.0, f64::max);
+    let sample_s = records
+        .iter()
+        .map(|record| 1.0 / record.rate_hz)
+        .fold(0.0, f64::max);
     let modes = baseline.mode_count();
     for name in names {
         let Some(pickup) = pickup_of(name) else { continue };
         let place = Location::Channel(name.clone());
         let gain = |z: &[f64]| vec![("gain", (GAIN * z[0]).exp())];
-        all.push(Candidate::new(EffectName::SensorGain, place.clone(), vec![Coordinate::FREE], gain));
+        all.push(Candidate::new(
+            EffectName::SensorGain,
+            place.clone(),
+            vec![Coordinate::FREE],
+            gain,
+        ));
         let delay = move |z: &[f64]| vec![("delay_s", DELAY_SAMPLES * sample_s * z[0])];
-        all.push(Candidate::new(EffectName::SensorDelay, place.clone(), vec![Coordinate::FREE], delay));
+        all.push(Candidate::new(
+            EffectName::SensorDelay,
+            place.clone(),
+            vec![Coordinate::FREE],
+            delay,
+        ));
         for axis in baseline.axes.iter().filter(|axis| pickup.weights[**axis] == 0.0) {
             let place = Location::ChannelFrom(name.clone(), *axis);
             let fraction = |z: &[f64]| vec![("fraction", CROSS_AXIS * z[0])];
-            all.push(Candidate::new(EffectName::CrossAxis, place, vec![Coordinate::FREE], fraction));
+            all.push(Candidate::new(
+                EffectName::CrossAxis,
+                place,
+                vec![Coordinate::FREE],
+                fraction,
+            ));
         }
         if modes > 1 && pickup.quantity != Quantity::Force {
-            let ratio = move |z: &[f64]| z.iter().zip(RATIO_KEYS).map(|(z, key)| (key, 1.0 + OFFSET * z)).collect();
+            let ratio = move |z: &[f64]| {
+                z.iter()
+                    .zip(RATIO_KEYS)
+                    .map(|(z, key)| (key, 1.0 + OFFSET * z))
+                    .collect()
+            };
             let coordinates = vec![Coordinate::FREE; modes.min(RATIO_KEYS.len())];
-            all.push(Candidate::new(EffectName::SensorOffsetFromToolTip, place, coordinates, ratio));
+            all.push(Candidate::new(
+                EffectName::SensorOffsetFromToolTip,
+                place,
+                coordinates,
+                ratio,
+            ));
         }
     }
 }

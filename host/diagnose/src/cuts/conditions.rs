@@ -26,13 +26,25 @@ pub(crate) struct Conditions {
 ///
 /// # Errors
 /// The case lacks a section, or an effect does not apply to it.
-pub(crate) fn cut_model(case: &Case, effects: &Effects, conditions: &Conditions) -> Result<CutModel, DiagnoseError> {
+pub(crate) fn cut_model(
+    case: &Case,
+    effects: &Effects,
+    conditions: &Conditions,
+) -> Result<CutModel, DiagnoseError> {
     let wrong = |error: ModelError| DiagnoseError::simulate(&case.path, error);
     let structure = case.structure()?;
     let (dynamics, mut restoring_forces) = effects.dynamics(structure).map_err(wrong)?;
     restoring_forces.extend(cubic_term(structure));
-    let cutter = Cutter::new(case.tool()?, case.material()?, &conditions.cut, conditions.depth_m).map_err(wrong)?;
-    let cutter = effects.cutter(cutter.at_speed(60.0 * conditions.spindle_hz)).map_err(wrong)?;
+    let cutter = Cutter::new(
+        case.tool()?,
+        case.material()?,
+        &conditions.cut,
+        conditions.depth_m,
+    )
+    .map_err(wrong)?;
+    let cutter = effects
+        .cutter(cutter.at_speed(60.0 * conditions.spindle_hz))
+        .map_err(wrong)?;
     Ok(CutModel {
         structure: dynamics.first_order(),
         restoring_forces,

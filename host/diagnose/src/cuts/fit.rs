@@ -25,7 +25,9 @@ struct State {
     forces: ForceOrders,
     /// Fourier coefficients of the channels.
     coefficients: DMatrix<Complex64>,
-    /// Measured minus predicted amplitudes, in standard deviations.
+    /// Measured minus predicted amplitudes.
+    error: DMatrix<Complex64>,
+    /// The same in standard deviations.
     residual: Vec<f64>,
 }
 
@@ -49,8 +51,9 @@ pub(crate) struct Fit {
 impl Fit {
     /// Logarithm of the marginal likelihood by Laplace's method, but for a constant of the records.
     pub(crate) fn evidence(&self) -> f64 {
-        let determinant = Cholesky::new(self.information.clone())
-            .map_or(f64::INFINITY, |factor| factor.l_dirty().diagonal().iter().map(|x| x.ln()).sum::<f64>());
+        let determinant = Cholesky::new(self.information.clone()).map_or(f64::INFINITY, |factor| {
+            factor.l_dirty().diagonal().iter().map(|x| x.ln()).sum::<f64>()
+        });
         -0.5 * (self.left + self.prior) - determinant
     }
 
@@ -63,21 +66,24 @@ impl Fit {
     pub(crate) fn is_enough(&self) -> bool {
         self.left < chi_squared_quantile(0.999, self.residual.len() as f64)
     }
-
-    /// Sum of χ² and squared variables.
-    pub(crate) fn cost(&self) -> f64 {
-        self.left + self.prior
-    }
 }
 
 /// Derivatives of the residuals of one record by all variables of a space, columns of `None` where they are zero.
 type Columns = Vec<Option<Vec<f64>>>;
 
 impl State {
-    fn new(space: &Space<'_>, z: &[f64], number: usize, record: &ReducedCut, near: Option<&Self>) -> Option<Self> {
+    fn new(
+        space: &Space<'_>,
+        z: &[f64],
+        number: usize,
+        record: &ReducedCut,
+        near: Option<&Self>,
+    ) -> Option<Self> {
         let machine = space.machine(z, number, record)?;
         let orbit = match near {
-            Some(near) => CutOrbit::near(&machine.model, &near.orbit).or_else(|_| CutOrbit::new(&machine.model)),
+            Some(near) => {
+                CutOrbit::near(&machine.model, &near.orbit).or_else(|_| CutOrbit::new(&machine.model))
+            }
             None => CutOrbit::new(&machine.model),
         }
         .ok()?;
@@ -87,9 +93,16 @@ impl State {
         let mut predicted_more: Vec<(f64, &DMatrix<Complex64>)> = Vec::new();
         for (variable, z) in space.variables.iter().zip(z) {
             match variable {
-                Variable::Phase(own) if *own == number => turn(&mut coefficients, z * phase_deviation(record)),
+                Variable::Phase(own) if *own == number => {
+                    turn(&mut coefficients, z * phase_deviation(record))
+                }
                 Variable::Common(own, direction) if *own == number => {
-                    predicted_more.extend(record.common_directions().nth(*direction).map(|direction| (*z, direction)));
+                    predicted_more.extend(
+                        record
+                            .common_directions()
+                            .nth(*direction)
+                            .map(|direction| (*z, direction)),
+                    );
                 }
                 _ => {}
             }
@@ -98,13 +111,15 @@ impl State {
         for (z, direction) in predicted_more {
             predicted += direction * Complex64::from(z);
         }
-        let residual = record.whitened(&(&record.orders.amplitudes - predicted));
+        let error = &record.orders.amplitudes - predicted;
+        let residual = record.whitened(&error);
         Some(Self {
             machine,
             orbit,
             weights,
             forces,
             coefficients,
+            error,
             residual,
         })
     }
@@ -116,7 +131,9 @@ impl State {
                 return None;
             }
             match &space.variables[index] {
-                Variable::Common(_, direction) => Some(record.whitened(record.common_directions().nth(*direction)?)),
+                Variable::Common(_, direction) => {
+                    Some(record.whitened(record.common_directions().nth(*direction)?))
+                }
                 Variable::Phase(_) => {
                     let mut turned = self.coefficients.clone();
                     for (order, mut row) in turned.row_iter_mut().enumerate() {
@@ -144,10 +161,15 @@ impl State {
             space.machine(&moved, number, record)
         };
         // At the boundary of a variable its derivative is one-sided.
-        let below = if z[index] - DIFFERENCE < space.lower(index) { 0.0 } else { DIFFERENCE };
+        let below = if z[index] - DIFFERENCE < space.lower(index) {
+            0.0
+        } else {
+            DIFFERENCE
+        };
         let (plus, minus) = (at(DIFFERENCE)?, at(-below)?);
         let step = DIFFERENCE + below;
-        let mut slope = (plus.reading.orders(&self.forces) - minus.reading.orders(&self.forces)) / Complex64::from(step);
+        let mut slope =
+            (plus.reading.orders(&self.forces) - minus.reading.orders(&self.forces)) / Complex64::from(step);
         if !space.is_of_reading(index) {
             let sensitivity = self.orbit.derivative(&plus.model, &minus.model, step)?;
             let forces = self.orbit.force_order_slopes(&self.weights, &sensitivity);
@@ -181,7 +203,12 @@ fn turn(coefficients: &mut DMatrix<Complex64>, angle_rad: f64) {
     }
 }
 
-fn states(space: &Space<'_>, z: &[f64], records: &[ReducedCut], near: Option<&[State]>) -> Option<Vec<State>> {
+fn states(
+    space: &Space<'_>,
+    z: &[f64],
+    records: &[ReducedCut],
+    near: Option<&[State]>,
+) -> Option<Vec<State>> {
     records
         .par_iter()
         .enumerate()
@@ -202,7 +229,9 @@ fn jacobian(space: &Space<'_>, z: &[f64], records: &[ReducedCut], states: &[Stat
     for (columns, record) in all.iter().zip(records) {
         for (index, column) in columns.iter().enumerate() {
             if let Some(column) = column {
-                jacobian.view_mut((first, index), (column.len(), 1)).copy_from_slice(column);
+                jacobian
+                    .view_mut((first, index), (column.len(), 1))
+                    .copy_from_slice(column);
             }
         }
         first += record.count();
@@ -211,17 +240,24 @@ fn jacobian(space: &Space<'_>, z: &[f64], records: &[ReducedCut], states: &[Stat
 }
 
 fn stacked(states: &[State]) -> DVector<f64> {
-    let all: Vec<f64> = states.iter().flat_map(|state| state.residual.iter().copied()).collect();
+    let all: Vec<f64> = states
+        .iter()
+        .flat_map(|state| state.residual.iter().copied())
+        .collect();
     DVector::from_vec(all)
 }
 
 /// Fits the variables of `space` to the records, from `start`; `near` are the orbits of an earlier fit. `None` if no
 /// orbit exists at the start.
-pub(crate) fn fit(space: &Space<'_>, records: &[ReducedCut], start: Vec<f64>, near: Option<&Fit>) -> Option<Fit> {
+pub(crate) fn fit(
+    space: &Space<'_>,
+    records: &[ReducedCut],
+    start: Vec<f64>,
+    near: Option<&Fit>,
+) -> Option<Fit> {
     let mut z = start;
     let mut current = states(space, &z, records, near.map(|near| near.states.as_slice()))?;
     let mut damping = 1e-6;
-    let begin = std::time::Instant::now();
     let mut slopes = jacobian(space, &z, records, &current);
     for _ in 0..STEPS {
         let residual = stacked(&current);
@@ -229,7 +265,9 @@ pub(crate) fn fit(space: &Space<'_>, records: &[ReducedCut], start: Vec<f64>, ne
         let cost = residual.norm_squared() + position.norm_squared();
         let normal = slopes.tr_mul(&slopes);
         let gradient = slopes.tr_mul(&residual) - &position;
-        let Some((moved, predicted)) = step(space, &z, &normal, &gradient, damping) else { break };
+        let Some((moved, predicted)) = step(space, &z, &normal, &gradient, damping) else {
+            break;
+        };
         if predicted < CONVERGED {
             break;
         }
@@ -251,7 +289,6 @@ pub(crate) fn fit(space: &Space<'_>, records: &[ReducedCut], start: Vec<f64>, ne
             damping = (10.0 * damping).max(1e-3);
         }
     }
-    eprintln!("  fit {:?} {:?} sizes {:?}", space.candidates.iter().map(|c| c.effect.name()).collect::<Vec<_>>(), begin.elapsed(), current.iter().map(|s| s.orbit.size()).collect::<Vec<_>>());
     let residual = stacked(&current);
     let mut information = slopes.tr_mul(&slopes);
     for index in 0..information.nrows() {
@@ -302,7 +339,9 @@ fn step(
         if beyond {
             continue;
         }
-        let moved: Vec<f64> = (0..size).map(|index| (z[index] + change[index]).max(space.lower(index))).collect();
+        let moved: Vec<f64> = (0..size)
+            .map(|index| (z[index] + change[index]).max(space.lower(index)))
+            .collect();
         let change = DVector::from_iterator(size, moved.iter().zip(z).map(|(moved, z)| moved - z));
         let predicted = 2.0 * gradient.dot(&change) - change.dot(&(normal * &change)) - change.norm_squared();
         return Some((moved, predicted));
@@ -310,6 +349,16 @@ fn step(
 }
 
 impl Fit {
+    /// Measured minus predicted amplitudes, by record.
+    pub(crate) fn errors(&self) -> impl Iterator<Item = &DMatrix<Complex64>> {
+        self.states.iter().map(|state| &state.error)
+    }
+
+    /// Fourier coefficients of the channels in a record.
+    pub(crate) fn coefficients(&self, record: usize) -> &DMatrix<Complex64> {
+        &self.states[record].coefficients
+    }
+
     /// Largest half ranges of displacement, m, and velocity, m/s, along x, y, z over the cuts.
     pub(crate) fn half_ranges(&self) -> [[f64; 3]; 2] {
         let mut largest = [[0.0_f64; 3]; 2];
@@ -341,7 +390,9 @@ impl Fit {
         for (number, (state, record)) in self.states.iter().zip(records).enumerate() {
             for index in 0..coordinates.len() {
                 let column = state.difference(&wider, &z, first + index, number, record)?;
-                columns.view_mut((row, index), (column.len(), 1)).copy_from_slice(&column);
+                columns
+                    .view_mut((row, index), (column.len(), 1))
+                    .copy_from_slice(&column);
             }
             row += record.count();
         }

@@ -9,10 +9,14 @@
 //! | `space` | variables of a fit |
 //! | `fit` | fit of a machine |
 //! | `selection` | sets of effects by their evidence |
+//! | `answer`, `views` | the answer, with its pictures |
+//! | `diagnosis` | the entry |
 
+mod answer;
 mod candidate;
 mod candidates;
 mod conditions;
+pub(crate) mod diagnosis;
 mod fit;
 mod reading;
 mod record;
@@ -20,3 +24,4 @@ mod selection;
 mod space;
 #[cfg(test)]
 mod tests;
+mod views;

@@ -33,7 +33,9 @@ impl Reading {
         rate_hz: f64,
     ) -> Option<Self> {
         let receptances = |structure: &FirstOrder| -> Option<Vec<Matrix3<Complex64>>> {
-            (0..=highest).map(|order| structure.receptance(TAU * spindle_hz * order as f64)).collect()
+            (0..=highest)
+                .map(|order| structure.receptance(TAU * spindle_hz * order as f64))
+                .collect()
         };
         let mut places = vec![receptances(structure)?];
         let mut known: Vec<Vec<f64>> = vec![Vec::new()];
@@ -54,7 +56,11 @@ impl Reading {
             places,
             place_of,
             spindle_hz,
-            mean_s: if structure.velocity_jumps() { 1.0 / rate_hz } else { 0.0 },
+            mean_s: if structure.velocity_jumps() {
+                1.0 / rate_hz
+            } else {
+                0.0
+            },
         })
     }
 
@@ -71,7 +77,12 @@ impl Reading {
                 let moved = self.places[self.place_of[channel]][order] * row(&forces.structure_n);
                 moved * s.powi(derivatives(pickup.quantity))
             };
-            let read: Complex64 = pickup.weights.iter().zip(value.iter()).map(|(weight, value)| value * *weight).sum();
+            let read: Complex64 = pickup
+                .weights
+                .iter()
+                .zip(value.iter())
+                .map(|(weight, value)| value * *weight)
+                .sum();
             read * pickup.dynamics(s) * (-s * pickup.delay_s).exp() * self.mean(pickup.quantity, s)
         })
     }

@@ -14,8 +14,10 @@ use crate::baseline::Baseline;
 const FITTED: usize = 8;
 /// Largest number of effects.
 const EFFECTS: usize = 3;
-/// Least gain of a further effect in the logarithm of its probability: odds of 20.
+/// Least gain of a further effect in the logarithm of its probability: odds of 20, and of 20 000 where what is known
+/// explains the records within their noise already.
 const LEAST_GAIN: f64 = 3.0;
+const LEAST_GAIN_BEYOND_NOISE: f64 = 10.0;
 
 /// A set of effects, fitted.
 pub(crate) struct Explanation<'a> {
@@ -50,8 +52,17 @@ pub(crate) fn explain<'a>(baseline: &'a Baseline<'a>, records: &[ReducedCut]) ->
     for _ in 0..EFFECTS {
         let best = first.ranked.first().unwrap_or(&first.baseline);
         let next = extended(best, &all, records);
-        let gained = next.first().map_or(f64::NEG_INFINITY, |next| next.evidence - best.evidence);
-        if gained < LEAST_GAIN {
+        let gained = next
+            .first()
+            .map_or(f64::NEG_INFINITY, |next| next.evidence - best.evidence);
+        let is_further = !best.space.candidates.is_empty() && best.fit.is_enough();
+        if gained
+            < if is_further {
+                LEAST_GAIN_BEYOND_NOISE
+            } else {
+                LEAST_GAIN
+            }
+        {
             break;
         }
         first.ranked = next;
@@ -60,54 +71,62 @@ pub(crate) fn explain<'a>(baseline: &'a Baseline<'a>, records: &[ReducedCut]) ->
 }
 
 /// Sets with one more effect than `best`, by descending evidence.
+///
+/// All candidates are scored from the derivatives of `best`, and the first few are fitted.
 fn extended<'a>(best: &Explanation<'a>, all: &[Candidate], records: &[ReducedCut]) -> Vec<Explanation<'a>> {
     let prior = priors(all);
-    let unranked = if best.fit.is_enough() { f64::NEG_INFINITY } else { f64::INFINITY };
-    let mut scored: Vec<(f64, usize, Vec<f64>)> = all
+    let starts = all
         .par_iter()
         .enumerate()
-        .filter(|(_, candidate)| !best.space.candidates.iter().any(|known| is_same(known, candidate)))
-        .flat_map_iter(|(index, candidate)| {
-            let prior = prior[index];
-            candidate.starts().into_iter().map(move |start| (index, candidate, start, prior))
+        .filter(|(_, candidate)| {
+            !best
+                .space
+                .candidates
+                .iter()
+                .any(|known| is_same(known, candidate))
         })
-        .map(|(index, candidate, start, prior)| {
-            // What has no derivative at the baseline is tried where something is left to explain.
-            let (gain, z) = score(best, candidate, &start, records).unwrap_or((unranked, start));
-            (gain + prior, index, z)
+        .flat_map_iter(|(index, candidate)| candidate.starts().into_iter().map(move |start| (index, start)));
+    let mut scored: Vec<Scored> = starts
+        .filter_map(|(index, start)| {
+            let (gain, start) = score(best, &all[index], &start, records)?;
+            let gain = gain + prior[index];
+            (gain > 0.0).then_some(Scored { index, gain, start })
         })
-        .filter(|(gain, ..)| *gain > 0.0)
         .collect();
-    scored.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+    scored.sort_by(|a, b| b.gain.total_cmp(&a.gain).then(a.index.cmp(&b.index)));
     let mut seen: Vec<usize> = Vec::new();
-    scored.retain(|(_, index, _)| {
-        let is_new = !seen.contains(index);
+    scored.retain(|scored| {
+        let is_new = !seen.contains(&scored.index);
         if is_new {
-            seen.push(*index);
+            seen.push(scored.index);
         }
         is_new
     });
     scored.truncate(FITTED);
-    let mut found: Vec<Explanation<'a>> = scored
-        .into_par_iter()
-        .filter_map(|(_, index, z)| {
-            let space = best.space.with(&all[index]);
-            let mut start = best.fit.z.clone();
-            start.extend(z);
-            let fitted = fit(&space, records, start, Some(&best.fit))?;
-            Some(Explanation {
-                evidence: best_prior(best) + fitted.evidence() + prior[index],
-                space,
-                fit: fitted,
-            })
+    let fitted = |scored: Scored| {
+        let space = best.space.with(&all[scored.index]);
+        let start: Vec<f64> = best.fit.z.iter().copied().chain(scored.start).collect();
+        let fitted = fit(&space, records, start, Some(&best.fit))?;
+        Some(Explanation {
+            evidence: prior_of(best) + fitted.evidence() + prior[scored.index],
+            space,
+            fit: fitted,
         })
-        .collect();
+    };
+    let mut found: Vec<Explanation<'a>> = scored.into_par_iter().filter_map(fitted).collect();
     found.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
     found
 }
 
+/// A candidate with the gain in evidence that the derivatives predict, and the coordinates where its fit begins.
+struct Scored {
+    index: usize,
+    gain: f64,
+    start: Vec<f64>,
+}
+
 /// What the effects of an explanation cost before the records are seen.
-fn best_prior(best: &Explanation<'_>) -> f64 {
+fn prior_of(best: &Explanation<'_>) -> f64 {
     best.evidence - best.fit.evidence()
 }
 
@@ -123,7 +142,10 @@ fn priors(all: &[Candidate]) -> Vec<f64> {
     names.sort_unstable();
     names.dedup();
     let of = |candidate: &Candidate| {
-        let places = all.iter().filter(|other| other.effect == candidate.effect).count();
+        let places = all
+            .iter()
+            .filter(|other| other.effect == candidate.effect)
+            .count();
         -((names.len() * places) as f64).ln()
     };
     all.iter().map(of).collect()
@@ -137,6 +159,10 @@ fn score(
     records: &[ReducedCut],
 ) -> Option<(f64, Vec<f64>)> {
     let columns = best.fit.columns_of(&best.space, candidate, start, records)?;
+    if start.is_empty() {
+        // Present or absent: only its fit can tell.
+        return Some((f64::INFINITY, Vec::new()));
+    }
     let factor = Cholesky::new(best.fit.information.clone())?;
     // Of the residual r and the columns c, what the variables of the known explanation cannot take up.
     let mixed = best.fit.jacobian.tr_mul(&columns);
@@ -153,9 +179,16 @@ fn score(
         .zip(&candidate.coordinates)
         .map(|((start, change), coordinate)| (start + change).clamp(coordinate.lower.max(-REACH), REACH))
         .collect();
-    let inside = z.iter().zip(&candidate.coordinates).all(|(z, coordinate)| *z > coordinate.lower);
+    let inside = z
+        .iter()
+        .zip(&candidate.coordinates)
+        .all(|(z, coordinate)| *z > coordinate.lower);
     let gain = 0.5 * gradient.dot(&change) - determinant;
-    let z = if inside { z } else { start.iter().map(|z| z.max(1e-2)).collect() };
+    let z = if inside {
+        z
+    } else {
+        start.iter().map(|z| z.max(1e-2)).collect()
+    };
     Some((if inside { gain } else { gain.min(0.0) - determinant }, z))
 }
 

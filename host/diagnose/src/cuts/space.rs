@@ -56,14 +56,26 @@ pub(crate) struct Machine {
 impl<'a> Space<'a> {
     /// What is uncertain without any candidate.
     pub(crate) fn new(baseline: &'a Baseline<'a>, records: &[ReducedCut]) -> Self {
-        let mut variables: Vec<Variable> = uncertain(baseline.case).into_iter().map(Variable::Baseline).collect();
-        let mut channels: Vec<&String> = records.iter().flat_map(|record| &record.orders.channels).collect();
+        let mut variables: Vec<Variable> = uncertain(baseline.case)
+            .into_iter()
+            .map(Variable::Baseline)
+            .collect();
+        let mut channels: Vec<&String> = records
+            .iter()
+            .flat_map(|record| &record.orders.channels)
+            .collect();
         channels.sort();
         channels.dedup();
         variables.extend(channels.into_iter().map(|name| Variable::Gain(name.clone())));
         for (index, record) in records.iter().enumerate() {
-            variables.extend([Variable::Phase(index), Variable::Depth(index), Variable::Feed(index)]);
-            variables.extend((0..record.common_directions().count()).map(|direction| Variable::Common(index, direction)));
+            variables.extend([
+                Variable::Phase(index),
+                Variable::Depth(index),
+                Variable::Feed(index),
+            ]);
+            variables.extend(
+                (0..record.common_directions().count()).map(|direction| Variable::Common(index, direction)),
+            );
         }
         Self {
             baseline,
@@ -86,12 +98,18 @@ impl<'a> Space<'a> {
         }
     }
 
+    /// Numbers of the variables that are coordinates of the candidate `number`.
+    pub(crate) fn places_of(&self, number: usize) -> Vec<usize> {
+        let is_own =
+            |variable: &Variable| matches!(variable, Variable::Coordinate(other, _) if *other == number);
+        (0..self.variables.len())
+            .filter(|index| is_own(&self.variables[*index]))
+            .collect()
+    }
+
     /// Coordinates of the candidate `number` in `z`.
     pub(crate) fn coordinates(&self, number: usize, z: &[f64]) -> Vec<f64> {
-        let own = self.variables.iter().zip(z);
-        own.filter(|(variable, _)| matches!(variable, Variable::Coordinate(other, _) if *other == number))
-            .map(|(_, z)| *z)
-            .collect()
+        self.places_of(number).into_iter().map(|place| z[place]).collect()
     }
 
     /// Lowest value of a variable.
@@ -105,7 +123,9 @@ impl<'a> Space<'a> {
     /// True if a variable may act on a record.
     pub(crate) fn acts_on(&self, variable: usize, record: usize) -> bool {
         match self.variables[variable] {
-            Variable::Phase(own) | Variable::Depth(own) | Variable::Feed(own) | Variable::Common(own, _) => own == record,
+            Variable::Phase(own) | Variable::Depth(own) | Variable::Feed(own) | Variable::Common(own, _) => {
+                own == record
+            }
             _ => true,
         }
     }
@@ -143,8 +163,9 @@ impl<'a> Space<'a> {
         let mut effects = Effects::default();
         for (number, candidate) in self.candidates.iter().enumerate() {
             if let Some(table) = candidate.table(&self.coordinates(number, z)) {
-                let further = Effects::of_extension(candidate.effect.name(), &table)
-                    .map_err(|error| DiagnoseError::simulate(&self.baseline.case.path, ModelError::from(error)))?;
+                let further = Effects::of_extension(candidate.effect.name(), &table).map_err(|error| {
+                    DiagnoseError::simulate(&self.baseline.case.path, ModelError::from(error))
+                })?;
                 effects = effects.and(&further);
             }
         }
@@ -162,7 +183,9 @@ impl<'a> Space<'a> {
         for (variable, z) in self.variables.iter().zip(z) {
             match variable {
                 Variable::Depth(own) if *own == number => conditions.depth_m *= 1.0 + ASSUMED_CUT * z,
-                Variable::Feed(own) if *own == number => conditions.cut.feed_per_tooth_mm *= 1.0 + ASSUMED_CUT * z,
+                Variable::Feed(own) if *own == number => {
+                    conditions.cut.feed_per_tooth_mm *= 1.0 + ASSUMED_CUT * z
+                }
                 _ => {}
             }
         }
@@ -181,7 +204,13 @@ impl<'a> Space<'a> {
                 Some(pickup)
             })
             .collect::<Option<Vec<_>>>()?;
-        let reading = Reading::new(&model.structure, pickups, conditions.spindle_hz, record.highest, record.rate_hz)?;
+        let reading = Reading::new(
+            &model.structure,
+            pickups,
+            conditions.spindle_hz,
+            record.highest,
+            record.rate_hz,
+        )?;
         Some(Machine { model, reading })
     }
 }
@@ -191,7 +220,11 @@ impl<'a> Space<'a> {
 fn uncertain(case: &Case) -> Vec<Vec<Deviation>> {
     if case.is_uncertain() {
         let mut all: Vec<Vec<Deviation>> = case.deviations.iter().map(|deviation| vec![*deviation]).collect();
-        all.extend(case.covariance.iter().flat_map(|covariance| covariance.independent_parts()));
+        all.extend(
+            case.covariance
+                .iter()
+                .flat_map(|covariance| covariance.independent_parts()),
+        );
         return all;
     }
     let is_assumed = |parameter: &Parameter| {

@@ -34,12 +34,11 @@ fn effects_are_ranked_first() {
             .collect();
         let count: usize = reduced.iter().map(ReducedCut::count).sum();
         let reduction = start.elapsed();
-        eprintln!("{effects:?} {reduction:?}");
         let explanations = explain(&baseline, &reduced).unwrap();
         let fit = &explanations.baseline.fit;
         println!(
             "{effects:?}: {count} values, baseline {:.3}, {} variables, {reduction:?} + {:?}",
-            fit.cost() / count as f64,
+            fit.left / count as f64,
             fit.z.len(),
             start.elapsed() - reduction
         );
@@ -51,10 +50,19 @@ fn effects_are_ranked_first() {
                 .enumerate()
                 .map(|(number, candidate)| {
                     let z = ranked.space.coordinates(number, &ranked.fit.z);
-                    format!("{} {} {:?}", candidate.effect.name(), candidate.location, candidate.parameters(&z))
+                    format!(
+                        "{} {} {:?}",
+                        candidate.effect.name(),
+                        candidate.location,
+                        candidate.parameters(&z)
+                    )
                 })
                 .collect();
-            println!("    {:.1} {:.3} {names:?}", ranked.evidence - explanations.baseline.evidence, ranked.fit.cost() / count as f64);
+            println!(
+                "    {:.1} {:.3} {names:?}",
+                ranked.evidence - explanations.baseline.evidence,
+                ranked.fit.left / count as f64
+            );
         }
     }
 }

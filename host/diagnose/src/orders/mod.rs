@@ -17,7 +17,7 @@ pub(crate) mod asynchronous;
 mod between_lines;
 mod block_noise;
 mod channel_reduction;
-mod circle;
+pub(crate) mod circle;
 pub(crate) mod common;
 pub(crate) mod distance;
 pub(crate) mod reduction;

@@ -35,7 +35,11 @@ impl Events {
     pub(super) fn are_like(&self, other: &Self) -> bool {
         self.starts == other.starts
             && self.events.len() == other.events.len()
-            && self.events.iter().zip(&other.events).all(|(a, b)| a.contact == b.contact)
+            && self
+                .events
+                .iter()
+                .zip(&other.events)
+                .all(|(a, b)| a.contact == b.contact)
     }
 
     /// Takes the instants of `known` where these would no longer be in the order of time.
@@ -51,7 +55,9 @@ impl Events {
     /// Largest distance between the instants of like events, s.
     pub(super) fn moved_s(&self, other: &Self) -> f64 {
         let pairs = self.events.iter().zip(&other.events);
-        pairs.map(|(a, b)| (a.time_s - b.time_s).abs()).fold(0.0, f64::max)
+        pairs
+            .map(|(a, b)| (a.time_s - b.time_s).abs())
+            .fold(0.0, f64::max)
     }
 }
 
@@ -77,7 +83,11 @@ impl Revolution<'_> {
             for tooth in teeth {
                 let (start, later) = self.tooth_changes(&samples[stretch], *tooth, &path);
                 first.push(start);
-                changes.extend(later.into_iter().map(|(time_s, tooth)| (time_s, Change::Tooth(tooth))));
+                changes.extend(
+                    later
+                        .into_iter()
+                        .map(|(time_s, tooth)| (time_s, Change::Tooth(tooth))),
+                );
             }
             starts.push(Contact {
                 teeth: first,
@@ -85,7 +95,11 @@ impl Revolution<'_> {
             });
         }
         let (regimes, later) = self.regime_changes(&samples, &starts, &path);
-        changes.extend(later.into_iter().map(|(time_s, index, regime)| (time_s, Change::Regime(index, regime))));
+        changes.extend(
+            later
+                .into_iter()
+                .map(|(time_s, index, regime)| (time_s, Change::Regime(index, regime))),
+        );
         changes.sort_by(|a, b| a.0.total_cmp(&b.0));
         self.joined(starts, regimes, changes)
     }
@@ -138,7 +152,9 @@ impl Revolution<'_> {
         let count = SAMPLES_PER_NODE * self.mesh.nodes();
         let mut samples = vec![Vec::new(); self.stretches.starts_s.len()];
         for subinterval in &self.mesh.subintervals {
-            let at = |index: usize| subinterval.start_s + subinterval.duration_s * (index as f64 + 0.5) / count as f64;
+            let at = |index: usize| {
+                subinterval.start_s + subinterval.duration_s * (index as f64 + 0.5) / count as f64
+            };
             samples[subinterval.stretch].extend((0..count).map(at));
         }
         let near_s = 10.0 * SAME_TIME * self.mesh.revolution_s;
@@ -157,11 +173,18 @@ impl Revolution<'_> {
         let nearest = gaps.min_by(|a, b| a.1.total_cmp(&b.1));
         EngagedTooth {
             tooth,
-            passings: nearest.filter(|(_, gap_m)| *gap_m > 0.0).map(|(passings, _)| passings),
+            passings: nearest
+                .filter(|(_, gap_m)| *gap_m > 0.0)
+                .map(|(passings, _)| passings),
         }
     }
 
-    fn tooth_changes(&self, samples: &[f64], tooth: usize, path: &Path<'_>) -> (EngagedTooth, Vec<(f64, EngagedTooth)>) {
+    fn tooth_changes(
+        &self,
+        samples: &[f64],
+        tooth: usize,
+        path: &Path<'_>,
+    ) -> (EngagedTooth, Vec<(f64, EngagedTooth)>) {
         let first = samples.first().map_or(
             EngagedTooth {
                 tooth,
@@ -208,7 +231,8 @@ impl Revolution<'_> {
         let Some(first_s) = all.first().filter(|_| !forces.is_empty()) else {
             return (Vec::new(), Vec::new());
         };
-        let margin = |index: usize, regime: Regime, time_s: f64| self.regime_view(index, regime, time_s, starts, path);
+        let margin =
+            |index: usize, regime: Regime, time_s: f64| self.regime_view(index, regime, time_s, starts, path);
         let mut regimes: Vec<Regime> = (0..forces.len())
             .map(|index| {
                 let view = margin(index, 0, *first_s);
@@ -220,7 +244,11 @@ impl Revolution<'_> {
         for _ in 0..2 {
             changes.clear();
             at_start.clone_from(&regimes);
-            let ends = all.iter().skip(1).copied().chain([first_s + self.mesh.revolution_s]);
+            let ends = all
+                .iter()
+                .skip(1)
+                .copied()
+                .chain([first_s + self.mesh.revolution_s]);
             for (from_s, to_s) in all.iter().zip(ends) {
                 for (index, regime) in regimes.iter_mut().enumerate() {
                     let mut low_s = *from_s;
@@ -238,7 +266,8 @@ impl Revolution<'_> {
                             }
                         }
                         let view = margin(index, *regime, high);
-                        let next = forces[index].next(Some(*regime), &view.state, &view.own, view.would_hold_n);
+                        let next =
+                            forces[index].next(Some(*regime), &view.state, &view.own, view.would_hold_n);
                         if next == *regime {
                             break;
                         }
@@ -250,8 +279,9 @@ impl Revolution<'_> {
             }
         }
         // Changes beyond the end of the revolution are those at its beginning.
-        let (early, late): (Vec<_>, Vec<_>) =
-            changes.into_iter().partition(|(time_s, ..)| *time_s < self.mesh.revolution_s);
+        let (early, late): (Vec<_>, Vec<_>) = changes
+            .into_iter()
+            .partition(|(time_s, ..)| *time_s < self.mesh.revolution_s);
         let mut wrapped: Vec<_> = late
             .into_iter()
             .map(|(time_s, index, regime)| (time_s - self.mesh.revolution_s, index, regime))
@@ -270,13 +300,24 @@ impl Revolution<'_> {
         (at_zero, wrapped)
     }
 
-    fn regime_view(&self, index: usize, regime: Regime, time_s: f64, starts: &[Contact], path: &Path<'_>) -> RegimeView {
+    fn regime_view(
+        &self,
+        index: usize,
+        regime: Regime,
+        time_s: f64,
+        starts: &[Contact],
+        path: &Path<'_>,
+    ) -> RegimeView {
         let time_s = time_s.rem_euclid(self.mesh.revolution_s);
         let subinterval = self.mesh.containing(time_s);
         let outputs = self.motion.within(self.mesh, subinterval, time_s);
         // For the force that holds the tool the teeth are those of the mesh, whose contact is that of the last step.
         let of = &self.mesh.subintervals[subinterval];
-        let teeth = if of.contact.teeth.is_empty() { &starts[of.stretch].teeth } else { &of.contact.teeth };
+        let teeth = if of.contact.teeth.is_empty() {
+            &starts[of.stretch].teeth
+        } else {
+            &of.contact.teeth
+        };
         let mut regimes = of.contact.regimes.clone();
         regimes.resize(self.model.restoring_forces.len(), 0);
         regimes[index] = regime;

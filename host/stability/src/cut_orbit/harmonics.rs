@@ -37,7 +37,9 @@ impl OrderWeights {
         let of = |subinterval: &super::mesh::Subinterval| {
             let key = (subinterval.duration_s / unit_s).round() as u64;
             let share = subinterval.duration_s / mesh.revolution_s;
-            let base = known.entry(key).or_insert_with(|| integrals(mesh.gauss, share, orders));
+            let base = known
+                .entry(key)
+                .or_insert_with(|| integrals(mesh.gauss, share, orders));
             let mut weights = base.clone();
             let phase = -TAU * subinterval.start_s / mesh.revolution_s;
             for (order, mut column) in weights.column_iter_mut().enumerate() {

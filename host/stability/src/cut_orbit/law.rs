@@ -79,11 +79,23 @@ impl CutModel {
     /// Distance of the edge of a tooth from the surface that was cut `passings` tooth passings before, m:
     /// n·(u(t) − u(t − τ)) + (r_j − r_{j+m}) sin γ + f sin φ sin γ, with τ and f the sums of delays and feeds of these
     /// passings.
-    pub(super) fn gap_m(&self, index: usize, passings: usize, time_s: f64, x: [f64; 3], path: &Path<'_>) -> f64 {
+    pub(super) fn gap_m(
+        &self,
+        index: usize,
+        passings: usize,
+        time_s: f64,
+        x: [f64; 3],
+        path: &Path<'_>,
+    ) -> f64 {
         let passing = self.passing(index, passings, time_s);
         // The surface of a whole revolution ago is that of the same motion: see `passing_slope`.
-        let past = if passings == self.cutter.teeth.len() { x } else { path(passing.earlier_s) };
-        self.cutter.reach_m(passing.tooth, passing.at, x) - self.cutter.reach_m(passing.before, passing.at, past)
+        let past = if passings == self.cutter.teeth.len() {
+            x
+        } else {
+            path(passing.earlier_s)
+        };
+        self.cutter.reach_m(passing.tooth, passing.at, x)
+            - self.cutter.reach_m(passing.before, passing.at, past)
             + self.cutter.recession_m(passing.at, passing.feed_m)
     }
 
@@ -113,7 +125,10 @@ impl CutModel {
     fn damping(&self, index: usize, time_s: f64, depth_m: f64) -> Option<Matrix3<f64>> {
         self.cutter.force.process_damping?;
         let at = self.passing(index, 1, time_s).at;
-        let damping = self.cutter.force.damping_ns_per_m(at, depth_m, self.speed_m_per_s());
+        let damping = self
+            .cutter
+            .force
+            .damping_ns_per_m(at, depth_m, self.speed_m_per_s());
         Some(Matrix3::from_fn(|i, j| damping[i][j]))
     }
 
@@ -124,7 +139,9 @@ impl CutModel {
         let depth_m = self.cutter.depth_at_m(self.cutter.depth_m, x[2]);
         let mut sum = Vector3::zeros();
         for engaged in &at.contact.teeth {
-            let Some(passings) = engaged.passings else { continue };
+            let Some(passings) = engaged.passings else {
+                continue;
+            };
             let thickness_m = self.gap_m(engaged.tooth, passings, at.time_s, x, at.path);
             let immersion = self.passing(engaged.tooth, passings, at.time_s).at;
             sum += Vector3::from(self.cutter.force.force_n(immersion, thickness_m, depth_m));
@@ -179,7 +196,11 @@ impl CutModel {
                 continue;
             }
             if force.locked(regime) {
-                held.extend(force.holds().and_then(|axis| ports.axes.iter().position(|other| *other == axis)));
+                held.extend(
+                    force
+                        .holds()
+                        .and_then(|axis| ports.axes.iter().position(|other| *other == axis)),
+                );
                 continue;
             }
             let restoring = force.restoring_n(regime, &state, &own[states]);
@@ -188,7 +209,12 @@ impl CutModel {
             }
         }
         self.hold(ports, at, &held, &mut inputs);
-        inputs.extend(rates.iter().zip(own).map(|(rate, own)| rate + ports.forgetting * own));
+        inputs.extend(
+            rates
+                .iter()
+                .zip(own)
+                .map(|(rate, own)| rate + ports.forgetting * own),
+        );
         inputs
     }
 
@@ -217,7 +243,10 @@ impl CutModel {
     pub(super) fn regime_view(&self, ports: &Ports, at: &Instant<'_>, index: usize) -> RegimeView {
         let force = &self.restoring_forces[index];
         let regime = at.contact.regimes[index];
-        let first: usize = self.restoring_forces[..index].iter().map(|force| force.states()).sum();
+        let first: usize = self.restoring_forces[..index]
+            .iter()
+            .map(|force| force.states())
+            .sum();
         let own = ports.own(at.outputs)[first..first + force.states()].to_vec();
         let state = MotionState {
             t: self.time_s,
@@ -245,7 +274,9 @@ impl CutModel {
             return 0.0;
         };
         let free = self.inputs_of(ports, at, self.cutting_n(ports, at), Some(index));
-        let by_forces: f64 = (0..ports.axes.len()).map(|axis| per_force[(held, axis)] * free[axis]).sum();
+        let by_forces: f64 = (0..ports.axes.len())
+            .map(|axis| per_force[(held, axis)] * free[axis])
+            .sum();
         (at.outputs[first + held] + by_forces) / per_force[(held, held)]
     }
 
@@ -269,7 +300,14 @@ impl CutModel {
                 let moved = |step: f64| {
                     let mut moved = at.outputs.to_vec();
                     moved[output] += step;
-                    self.inputs(ports, &Instant { outputs: &moved, ..*at }, force)
+                    self.inputs(
+                        ports,
+                        &Instant {
+                            outputs: &moved,
+                            ..*at
+                        },
+                        force,
+                    )
                 };
                 of_inputs.set_column(output, &difference(&moved, step));
             }
@@ -302,7 +340,9 @@ impl CutModel {
         let mut by_v = Matrix3::<f64>::zeros();
         let mut earlier = Vec::new();
         for engaged in &at.contact.teeth {
-            let Some(passings) = engaged.passings else { continue };
+            let Some(passings) = engaged.passings else {
+                continue;
+            };
             let immersion = self.passing(engaged.tooth, passings, at.time_s).at;
             let thickness_m = self.gap_m(engaged.tooth, passings, at.time_s, x, at.path);
             let normal = self.normal(engaged.tooth, at.time_s);

@@ -76,7 +76,9 @@ impl Stretches {
         let jumps = angles.clone();
         for tooth in &cutter.teeth {
             // Where a tooth meets what the tool did at a jump of the force, its chip has a kink in its slope.
-            let met = jumps.iter().map(|angle| (angle + tooth.pitch_rad).rem_euclid(TAU));
+            let met = jumps
+                .iter()
+                .map(|angle| (angle + tooth.pitch_rad).rem_euclid(TAU));
             let entry_rad = entry(tooth.angle_rad);
             angles.extend(met.filter(|angle| (angle - entry_rad).rem_euclid(TAU) < arc_rad));
         }
@@ -106,7 +108,10 @@ impl Stretches {
     }
 
     pub(super) fn end_s(&self, stretch: usize) -> f64 {
-        self.starts_s.get(stretch + 1).copied().unwrap_or(self.revolution_s)
+        self.starts_s
+            .get(stretch + 1)
+            .copied()
+            .unwrap_or(self.revolution_s)
     }
 }
 
@@ -141,7 +146,10 @@ impl Mesh {
             let (mut from_s, mut contact, mut event) = (start_s, &starts[stretch], None);
             loop {
                 let next_split = splits.peek().copied().filter(|split| *split < end_s);
-                let next_event = numbered.peek().map(|(_, event)| event.time_s).filter(|time_s| *time_s < end_s);
+                let next_event = numbered
+                    .peek()
+                    .map(|(_, event)| event.time_s)
+                    .filter(|time_s| *time_s < end_s);
                 let to_s = next_split.unwrap_or(end_s).min(next_event.unwrap_or(end_s));
                 subintervals.push(Subinterval {
                     start_s: from_s,
@@ -239,7 +247,16 @@ impl Interpolation {
         self.weights
             .iter()
             .enumerate()
-            .map(move |(place, weight)| (if place == last { self.end } else { self.first + place }, *weight))
+            .map(move |(place, weight)| {
+                (
+                    if place == last {
+                        self.end
+                    } else {
+                        self.first + place
+                    },
+                    *weight,
+                )
+            })
             .filter(|(_, weight)| *weight != 0.0)
     }
 }
@@ -250,7 +267,9 @@ fn barycentric(gauss: &Gauss, with_end: bool, place: f64) -> Vec<f64> {
     let end = with_end.then_some(&1.0);
     let places: Vec<f64> = [0.0].iter().chain(&gauss.nodes).chain(end).copied().collect();
     if let Some(exact) = places.iter().position(|other| *other == place) {
-        return (0..places.len()).map(|index| f64::from(u8::from(index == exact))).collect();
+        return (0..places.len())
+            .map(|index| f64::from(u8::from(index == exact)))
+            .collect();
     }
     let of = |own: usize| -> f64 {
         let others = places.iter().enumerate().filter(|(index, _)| *index != own);

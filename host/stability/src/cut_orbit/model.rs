@@ -64,8 +64,10 @@ impl CutModel {
         let mut b = DMatrix::zeros(size, inputs);
         let mut c = DMatrix::zeros(axes.len(), size);
         for (index, axis) in axes.iter().enumerate() {
-            b.view_mut((0, index), (order, 1)).copy_from(&self.structure.b.column(*axis));
-            c.view_mut((index, 0), (1, order)).copy_from(&self.structure.c.row(*axis));
+            b.view_mut((0, index), (order, 1))
+                .copy_from(&self.structure.b.column(*axis));
+            c.view_mut((index, 0), (1, order))
+                .copy_from(&self.structure.c.row(*axis));
         }
         // ż = g is written as ż = −z/T + (g + z/T): without the first term the periodic response has no inverse.
         let forgetting = 1.0 / self.revolution_s();
@@ -80,7 +82,9 @@ impl CutModel {
         let jumps = (&c * &b).map(|entry| if entry.abs() > rounding { entry } else { 0.0 });
         let acceleration_per_force = may_hold.then(|| &ca * &b);
         let mut of_states = DMatrix::zeros(internal, size);
-        of_states.view_mut((0, order), (internal, internal)).fill_diagonal(1.0);
+        of_states
+            .view_mut((0, order), (internal, internal))
+            .fill_diagonal(1.0);
         let mut parts = vec![(c, DMatrix::zeros(count, inputs))];
         parts.push((ca.clone(), jumps));
         if may_hold {

@@ -155,7 +155,10 @@ impl Period<'_> {
             }
             row
         };
-        ((0..3).map(cutting).collect(), (0..self.ports.inputs()).map(input).collect())
+        (
+            (0..3).map(cutting).collect(),
+            (0..self.ports.inputs()).map(input).collect(),
+        )
     }
 
     /// The equations of a Newton step about the motion; `None` if they are singular.
@@ -192,10 +195,17 @@ impl Period<'_> {
             count += if driven { nodes * inputs } else { 0 };
         }
         let jumps = self.jumps(&sizes);
-        let impulses: Vec<_> = jumps.iter().map(|jump| (jump.size.subinterval, -&jump.size.inputs)).collect();
+        let impulses: Vec<_> = jumps
+            .iter()
+            .map(|jump| (jump.size.subinterval, -&jump.size.inputs))
+            .collect();
         let matrix = response.matrix(&first_column, count, &impulses);
         let factors = self.equations(&inputs_by, &jumps, count, &matrix).lu();
-        let is_regular = factors.u().diagonal().iter().all(|pivot| pivot.is_finite() && *pivot != 0.0);
+        let is_regular = factors
+            .u()
+            .diagonal()
+            .iter()
+            .all(|pivot| pivot.is_finite() && *pivot != 0.0);
         is_regular.then_some(Linearization {
             first_column,
             count,
@@ -207,7 +217,13 @@ impl Period<'_> {
         })
     }
 
-    fn equations(&self, inputs_by: &[SparseRow], jumps: &[Jump], count: usize, matrix: &DMatrix<f64>) -> DMatrix<f64> {
+    fn equations(
+        &self,
+        inputs_by: &[SparseRow],
+        jumps: &[Jump],
+        count: usize,
+        matrix: &DMatrix<f64>,
+    ) -> DMatrix<f64> {
         let size = count + jumps.len();
         let mut equations = DMatrix::identity(size, size);
         let scale = |jump: &Jump| 1.0 / (jump.rate * self.mesh.revolution_s);
@@ -215,7 +231,10 @@ impl Period<'_> {
             let of_column = of_column.as_slice();
             let mut left = equations.column_mut(column);
             for (row, weights) in inputs_by.iter().enumerate() {
-                left[row] -= weights.iter().map(|(at, weight)| weight * of_column[*at]).sum::<f64>();
+                left[row] -= weights
+                    .iter()
+                    .map(|(at, weight)| weight * of_column[*at])
+                    .sum::<f64>();
             }
             for (index, jump) in jumps.iter().enumerate() {
                 let mut moved: f64 = jump.row.iter().map(|(at, weight)| weight * of_column[*at]).sum();
@@ -239,7 +258,8 @@ impl Period<'_> {
             if subinterval.event.is_none() {
                 continue;
             }
-            let before = &self.mesh.subintervals[(index + self.mesh.subintervals.len() - 1) % self.mesh.subintervals.len()];
+            let before = &self.mesh.subintervals
+                [(index + self.mesh.subintervals.len() - 1) % self.mesh.subintervals.len()];
             let point = self.mesh.point(index, 0);
             let at = |contact| Instant {
                 time_s: subinterval.start_s,
@@ -274,12 +294,15 @@ impl Period<'_> {
         let condition = Condition::between(before, after)?;
         let path = self.path();
         let value = |time_s: f64, outputs: &[f64]| {
-            self.condition(&condition, &Instant {
-                time_s,
-                contact: before,
-                outputs,
-                path: &path,
-            })
+            self.condition(
+                &condition,
+                &Instant {
+                    time_s,
+                    contact: before,
+                    outputs,
+                    path: &path,
+                },
+            )
         };
         // One-sided: before the event the motion has no kink.
         let earlier = (index + self.mesh.subintervals.len() - 1) % self.mesh.subintervals.len();
@@ -324,7 +347,9 @@ impl Period<'_> {
         match condition {
             Condition::Gap { tooth, surfaces } => {
                 let x = self.ports.displacement(at.outputs);
-                let gap = |(passings, sign): &(usize, f64)| sign * self.model.gap_m(*tooth, *passings, at.time_s, x, at.path);
+                let gap = |(passings, sign): &(usize, f64)| {
+                    sign * self.model.gap_m(*tooth, *passings, at.time_s, x, at.path)
+                };
                 surfaces.iter().map(gap).sum()
             }
             Condition::Regime(index) => self.model.regime_view(self.ports, at, *index).margin,
@@ -335,14 +360,21 @@ impl Period<'_> {
 /// What vanishes at an event.
 enum Condition {
     /// Sum of gaps between a tooth and surfaces, with their signs.
-    Gap { tooth: usize, surfaces: Vec<(usize, f64)> },
+    Gap {
+        tooth: usize,
+        surfaces: Vec<(usize, f64)>,
+    },
     /// Margin of the regime of a restoring force.
     Regime(usize),
 }
 
 impl Condition {
     fn between(before: &Contact, after: &Contact) -> Option<Self> {
-        let teeth = before.teeth.iter().zip(&after.teeth).find(|(before, after)| before != after);
+        let teeth = before
+            .teeth
+            .iter()
+            .zip(&after.teeth)
+            .find(|(before, after)| before != after);
         if let Some((from, to)) = teeth {
             let surfaces = match (from.passings, to.passings) {
                 (Some(from), Some(to)) => vec![(from, 1.0), (to, -1.0)],
@@ -355,7 +387,9 @@ impl Condition {
             });
         }
         let mut regimes = before.regimes.iter().zip(&after.regimes);
-        regimes.position(|(before, after)| before != after).map(Self::Regime)
+        regimes
+            .position(|(before, after)| before != after)
+            .map(Self::Regime)
     }
 }
 
@@ -395,7 +429,10 @@ impl Linearization {
         }
         let outputs = &self.response * &right;
         let of_row = |row: &SparseRow| row.iter().map(|(at, weight)| weight * outputs[*at]).sum::<f64>();
-        let cutting_n = self.cutting_by.chunks_exact(3).map(|rows| std::array::from_fn(|axis| of_row(&rows[axis])));
+        let cutting_n = self
+            .cutting_by
+            .chunks_exact(3)
+            .map(|rows| std::array::from_fn(|axis| of_row(&rows[axis])));
         Some(Change {
             cutting_n: cutting_n.collect(),
             inputs: all_inputs,
@@ -411,7 +448,10 @@ impl Linearization {
         let mut inputs = vec![0.0; self.first_column.len() * per_subinterval];
         for (index, first) in self.first_column.iter().enumerate() {
             let Some(first) = first else { continue };
-            for (offset, row) in self.inputs_by[*first..*first + per_subinterval].iter().enumerate() {
+            for (offset, row) in self.inputs_by[*first..*first + per_subinterval]
+                .iter()
+                .enumerate()
+            {
                 inputs[index * per_subinterval + offset] = of_row(row);
             }
         }
@@ -451,7 +491,13 @@ pub(super) struct Step {
 }
 
 /// The share `share` of a Newton step from `motion` on `mesh`.
-pub(super) fn step(model: &CutModel, ports: &Ports, mesh: &Mesh, motion: &Motion, share: f64) -> Option<Step> {
+pub(super) fn step(
+    model: &CutModel,
+    ports: &Ports,
+    mesh: &Mesh,
+    motion: &Motion,
+    share: f64,
+) -> Option<Step> {
     let period = Period {
         model,
         ports,
@@ -461,10 +507,19 @@ pub(super) fn step(model: &CutModel, ports: &Ports, mesh: &Mesh, motion: &Motion
     let response = Response::new(mesh, ports)?;
     let linearized = period.linearized(&response)?;
     let answered = response.outputs(&period.forces().inputs);
-    let residual: Vec<f64> = motion.values.iter().zip(&answered).map(|(y, answer)| y - answer).collect();
+    let residual: Vec<f64> = motion
+        .values
+        .iter()
+        .zip(&answered)
+        .map(|(y, answer)| y - answer)
+        .collect();
     let (inputs, events) = linearized.applied(mesh, ports, &residual);
     let missed = linearized.conditions(&period);
-    let events: Vec<f64> = events.iter().zip(missed).map(|(event, missed)| event - missed).collect();
+    let events: Vec<f64> = events
+        .iter()
+        .zip(missed)
+        .map(|(event, missed)| event - missed)
+        .collect();
     let minus: Vec<f64> = inputs.iter().map(|x| -x).collect();
     let change = linearized.solve(mesh, ports, &minus, &events)?;
     let mut next = motion.clone();
@@ -473,15 +528,25 @@ pub(super) fn step(model: &CutModel, ports: &Ports, mesh: &Mesh, motion: &Motion
     }
     let count = ports.axes.len();
     let displacement = |values: &[f64]| -> Vec<f64> {
-        values.chunks_exact(motion.per_point).flat_map(|point| point[..count].to_vec()).collect()
+        values
+            .chunks_exact(motion.per_point)
+            .flat_map(|point| point[..count].to_vec())
+            .collect()
     };
     let (new, old) = (displacement(&next.values), displacement(&motion.values));
     let size = new.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
-    let moved = new.iter().zip(&old).fold(0.0_f64, |most, (a, b)| most.max((a - b).abs()));
-    let instants = linearized.jumps.iter().zip(&change.delays_s).filter_map(|(jump, delay_s)| {
-        let of = &mesh.subintervals[jump.size.subinterval];
-        Some((of.event?, of.start_s + share * delay_s))
-    });
+    let moved = new
+        .iter()
+        .zip(&old)
+        .fold(0.0_f64, |most, (a, b)| most.max((a - b).abs()));
+    let instants = linearized
+        .jumps
+        .iter()
+        .zip(&change.delays_s)
+        .filter_map(|(jump, delay_s)| {
+            let of = &mesh.subintervals[jump.size.subinterval];
+            Some((of.event?, of.start_s + share * delay_s))
+        });
     (size.is_finite() && moved.is_finite()).then(|| Step {
         motion: next,
         moved: if size > 0.0 { moved / size } else { 0.0 },
@@ -490,7 +555,13 @@ pub(super) fn step(model: &CutModel, ports: &Ports, mesh: &Mesh, motion: &Motion
 }
 
 /// The events along a motion.
-pub(super) fn events(model: &CutModel, ports: &Ports, stretches: &Stretches, mesh: &Mesh, motion: &Motion) -> Events {
+pub(super) fn events(
+    model: &CutModel,
+    ports: &Ports,
+    stretches: &Stretches,
+    mesh: &Mesh,
+    motion: &Motion,
+) -> Events {
     Revolution {
         model,
         ports,

@@ -140,7 +140,13 @@ impl CutOrbit {
             if !start.refine(&orbit) {
                 return Ok(orbit);
             }
-            let finer = Mesh::new(&stretches, &start.splits, &start.events.starts, &start.events.events, Gauss::shared(NODES));
+            let finer = Mesh::new(
+                &stretches,
+                &start.splits,
+                &start.events.starts,
+                &start.events.events,
+                Gauss::shared(NODES),
+            );
             start.motion = start.motion.on(&start.mesh, &finer);
             start.mesh = finer;
         }
@@ -192,7 +198,10 @@ impl Start {
             let mesh = Mesh::new(stretches, &splits, &contacts, &[], gauss);
             let rest = Motion::at_rest(&mesh, ports);
             // At rest dry friction would hold the tool: the force of a rigid tool tells where it slips.
-            let moved = model.may_hold().then(|| rigid(model, ports, &mesh, &rest)).flatten();
+            let moved = model
+                .may_hold()
+                .then(|| rigid(model, ports, &mesh, &rest))
+                .flatten();
             (mesh, moved.unwrap_or(rest))
         };
         let events = newton::events(model, ports, stretches, &mesh, &motion);
@@ -218,8 +227,8 @@ impl Start {
         let (mut last, mut share) = (f64::INFINITY, 1.0);
         for _ in 0..STEPS {
             *steps += 1;
-            let step =
-                newton::step(model, ports, &self.mesh, &self.motion, share).ok_or_else(|| not_periodic.clone())?;
+            let step = newton::step(model, ports, &self.mesh, &self.motion, share)
+                .ok_or_else(|| not_periodic.clone())?;
             let mut events = newton::events(model, ports, stretches, &self.mesh, &step.motion);
             let alike = events.are_like(&self.events);
             if alike && step.moved < NEAR {
@@ -229,7 +238,11 @@ impl Start {
                 }
                 events.sort(&self.events);
             }
-            let events_moved = if alike { events.moved_s(&self.events) / stretches.revolution_s } else { 1.0 };
+            let events_moved = if alike {
+                events.moved_s(&self.events) / stretches.revolution_s
+            } else {
+                1.0
+            };
             let moved = step.moved;
             self.motion = step.motion;
             if alike && moved < CONVERGED && events_moved < EVENT_FOUND {
@@ -242,7 +255,11 @@ impl Start {
                 (self.mesh, self.events) = (mesh, events);
             }
             // Where contact comes and goes, full steps may alternate between two contacts.
-            share = if moved < 0.7 * last { (2.0 * share).min(1.0) } else { (0.5 * share).max(0.1) };
+            share = if moved < 0.7 * last {
+                (2.0 * share).min(1.0)
+            } else {
+                (0.5 * share).max(0.1)
+            };
             last = moved;
         }
         Err(CutOrbitError::NotConverged {
@@ -293,7 +310,11 @@ impl CutOrbit {
         let all = &self.forces.inputs;
         let mut most: f64 = 0.0;
         for input in 0..inputs {
-            let size = all.iter().skip(input).step_by(inputs).fold(0.0_f64, |most, x| most.max(x.abs()));
+            let size = all
+                .iter()
+                .skip(input)
+                .step_by(inputs)
+                .fold(0.0_f64, |most, x| most.max(x.abs()));
             if size == 0.0 {
                 continue;
             }

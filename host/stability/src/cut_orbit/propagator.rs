@@ -43,7 +43,9 @@ impl SubintervalResponse {
                 for order in 0..TERMS.max(nodes + 1) {
                     next.gemm(1.0, &rate, &term, 0.0);
                     for (node, expansion) in lagrange.iter().enumerate() {
-                        let Some(coefficient) = expansion.get(order) else { continue };
+                        let Some(coefficient) = expansion.get(order) else {
+                            continue;
+                        };
                         let mut block = next.columns_mut(size + node * inputs, inputs);
                         block.zip_apply(&driven, |sum, value| *sum += coefficient * value);
                     }
@@ -60,13 +62,17 @@ impl SubintervalResponse {
             from = to;
         }
         // The loop runs over the nodes and the end, so that there is a last element.
-        let at_end = at.pop().unwrap_or_else(|| (DMatrix::identity(size, size), DMatrix::zeros(size, 0)));
+        let at_end = at
+            .pop()
+            .unwrap_or_else(|| (DMatrix::identity(size, size), DMatrix::zeros(size, 0)));
         Self { at_nodes: at, at_end }
     }
 }
 
 fn one_norm(matrix: &DMatrix<f64>) -> f64 {
-    let columns = matrix.column_iter().map(|column| column.iter().map(|x| x.abs()).sum());
+    let columns = matrix
+        .column_iter()
+        .map(|column| column.iter().map(|x| x.abs()).sum());
     columns.fold(0.0, f64::max)
 }
 
@@ -106,7 +112,9 @@ mod tests {
         let exact = |t: f64| {
             // q(0) = 0 and q̇(0) = 0.
             let (c, s) = (-mean, (-1.0 / (omega * omega) - delta * mean) / omega_d);
-            t / (omega * omega) + mean + (-delta * t).exp() * (c * (omega_d * t).cos() + s * (omega_d * t).sin())
+            t / (omega * omega)
+                + mean
+                + (-delta * t).exp() * (c * (omega_d * t).cos() + s * (omega_d * t).sin())
         };
         for (node, (_, weights)) in gauss.nodes.iter().zip(&response.at_nodes) {
             let found = (weights * &f)[0];

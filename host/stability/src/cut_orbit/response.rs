@@ -80,7 +80,9 @@ impl<'a> Response<'a> {
     pub(super) fn outputs(&self, inputs: &[f64]) -> Vec<f64> {
         let per_subinterval = self.mesh.nodes() * self.ports.inputs();
         let columns = |subinterval: usize| {
-            DVector::from_column_slice(&inputs[subinterval * per_subinterval..(subinterval + 1) * per_subinterval])
+            DVector::from_column_slice(
+                &inputs[subinterval * per_subinterval..(subinterval + 1) * per_subinterval],
+            )
         };
         let mut state = DVector::zeros(self.ports.a.nrows());
         for (index, part) in self.parts.iter().enumerate() {

@@ -37,19 +37,25 @@ impl CutOrbit {
     /// spring. The derivative is one-sided where a restoring force would change its regimes.
     pub fn derivative(&self, plus: &CutModel, minus: &CutModel, difference: f64) -> Option<Sensitivity> {
         let (plus, minus) = (self.explicit(plus)?, self.explicit(minus)?);
-        let slope = |a: &[f64], b: &[f64]| -> Vec<f64> { a.iter().zip(b).map(|(a, b)| (a - b) / difference).collect() };
+        let slope = |a: &[f64], b: &[f64]| -> Vec<f64> {
+            a.iter().zip(b).map(|(a, b)| (a - b) / difference).collect()
+        };
         let by_outputs = slope(&plus.outputs, &minus.outputs);
         let inputs = slope(&plus.inputs, &minus.inputs);
         let events: Vec<f64> = slope(&plus.events, &minus.events).iter().map(|g| -g).collect();
         let change: Change = self.linearized.solve(&self.mesh, &self.ports, &inputs, &events)?;
         let explicit = plus.cutting_n.iter().zip(&minus.cutting_n);
-        let cutting_n = explicit
-            .zip(&change.cutting_n)
-            .map(|((plus, minus), change)| std::array::from_fn(|axis| (plus[axis] - minus[axis]) / difference + change[axis]));
+        let cutting_n = explicit.zip(&change.cutting_n).map(|((plus, minus), change)| {
+            std::array::from_fn(|axis| (plus[axis] - minus[axis]) / difference + change[axis])
+        });
         Some(Sensitivity {
             cutting_n: cutting_n.collect(),
             inputs: change.inputs,
-            outputs: by_outputs.iter().zip(change.outputs.iter()).map(|(explicit, change)| explicit + change).collect(),
+            outputs: by_outputs
+                .iter()
+                .zip(change.outputs.iter())
+                .map(|(explicit, change)| explicit + change)
+                .collect(),
             impulses: self
                 .linearized
                 .jump_sizes()
@@ -62,7 +68,11 @@ impl CutOrbit {
     fn impulse(&self, jump: &JumpSize, delay_s: f64) -> (f64, [f64; 3], Vec<f64>) {
         let inputs = jump.inputs.iter().map(|size| -delay_s * size);
         let cutting_n = jump.cutting_n.map(|size| -delay_s * size);
-        (self.mesh.subintervals[jump.subinterval].start_s, cutting_n, inputs.collect())
+        (
+            self.mesh.subintervals[jump.subinterval].start_s,
+            cutting_n,
+            inputs.collect(),
+        )
     }
 
     /// Forces and motion of `model` where the structure feels the forces of this orbit.
