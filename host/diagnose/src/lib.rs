@@ -19,6 +19,7 @@
 //! - `orders`: a recorded cut reduced to its orders of the spindle frequency, with covariance. It knows no case.
 //! - `records`: each recording beside what the baseline predicts of it, and the `Study` that holds them. It knows no
 //!   cause.
+//! - `cuts`: steady cuts whose orders are compared with those of the forced orbit; [`diagnose`] does not use it yet.
 //! - `candidates`: the causes that a baseline may lack, as regressors along the measured motion and as simulations. It
 //!   fits nothing.
 //! - `fit`: the parameters of one candidate model. It does not compare candidates.
@@ -82,12 +83,15 @@ mod baseline;
 mod candidates;
 mod conclusion;
 mod criteria;
+// The entry `cuts::diagnosis` is tested and not called yet: a fit far from the baseline may take minutes, and a common gain
+// of all channels is not among its candidates.
+#[allow(dead_code)]
 mod cuts;
 mod error;
 mod fit;
 mod motion;
 mod next_test;
-// No other room uses the orders yet: the fit of cuts on the forced periodic orbit will.
+// The speed without a tachometer, the spectrum between the lines and the distances are not used by `cuts` yet.
 #[allow(dead_code)]
 mod orders;
 mod progress;
@@ -137,11 +141,7 @@ pub fn diagnose_watched(
 ) -> Result<Diagnosis, DiagnoseError> {
     watch(Stage::Records);
     let (recordings, shortened) = full_engagement::in_full_engagement(case, recordings)?;
-    let of_cuts = cuts::diagnosis::diagnosed(case, &recordings, watch)?;
-    let (concluded, remark) = match of_cuts {
-        Some(diagnosis) => (Some(diagnosis), None),
-        None => long_records::concluded(case, &recordings, options, watch),
-    };
+    let (concluded, remark) = long_records::concluded(case, &recordings, options, watch);
     let mut diagnosis = match concluded {
         Some(diagnosis) => diagnosis,
         None => {

@@ -62,14 +62,14 @@ impl Candidate {
     }
 
     /// This candidate, absent where its first coordinate is zero, below which it cannot go.
-    pub(crate) fn from_zero(mut self) -> Self {
+    pub(crate) fn vanishing_at_zero(mut self) -> Self {
         self.vanishes = true;
         self.coordinates[0] = Coordinate::POSITIVE;
         self
     }
 
     /// This candidate with further starts.
-    pub(crate) fn from_each(mut self, grid: Vec<Vec<f64>>) -> Self {
+    pub(crate) fn started_at(mut self, grid: Vec<Vec<f64>>) -> Self {
         self.grid = grid;
         self
     }

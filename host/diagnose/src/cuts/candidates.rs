@@ -159,7 +159,7 @@ fn of_restoring_force(along: Along, all: &mut Vec<Candidate>) {
     let positive = vec![Coordinate::POSITIVE; 2];
     all.push(
         Candidate::new(EffectName::SofteningHardening, place.clone(), positive, regimes)
-            .from_each(vec![vec![0.3, 0.3]]),
+            .started_at(vec![vec![0.3, 0.3]]),
     );
     let friction = move |z: &[f64]| vec![("fc_n", damper_n * z[0])];
     all.push(
@@ -169,13 +169,13 @@ fn of_restoring_force(along: Along, all: &mut Vec<Candidate>) {
             vec![Coordinate::POSITIVE],
             friction,
         )
-        .from_zero(),
+        .vanishing_at_zero(),
     );
     let gap = move |z: &[f64]| vec![("gap_mm", 2e3 * x * z[0])];
     all.push(
         Candidate::new(EffectName::Backlash, place, vec![Coordinate::POSITIVE], gap)
-            .from_zero()
-            .from_each(vec![vec![0.1], vec![0.5]]),
+            .vanishing_at_zero()
+            .started_at(vec![vec![0.1], vec![0.5]]),
     );
 }
 
@@ -212,8 +212,8 @@ fn of_missing_mode(along: Along, records: &[ReducedCut], all: &mut Vec<Candidate
             coordinates,
             mode,
         )
-        .from_zero()
-        .from_each(grid.collect()),
+        .vanishing_at_zero()
+        .started_at(grid.collect()),
     );
 }
 
@@ -389,7 +389,7 @@ fn of_process_damping(baseline: &Baseline<'_>, records: &[ReducedCut], all: &mut
             vec![Coordinate::POSITIVE],
             of,
         )
-        .from_zero(),
+        .vanishing_at_zero(),
     );
 }
 

@@ -14,8 +14,8 @@ use quietcut_stability::cut_orbit::{CutOrbit, ForceOrders, OrderWeights};
 const DIFFERENCE: f64 = 1e-3;
 /// Predicted decrease of χ² below which a fit has converged: a hundredth of a standard deviation of any variable.
 const CONVERGED: f64 = 1e-4;
-/// Largest number of steps.
-const STEPS: usize = 30;
+/// Largest number of steps, those that are too long included.
+const STEPS: usize = 14;
 
 /// One cut at a point of the space.
 struct State {
@@ -81,9 +81,8 @@ impl State {
     ) -> Option<Self> {
         let machine = space.machine(z, number, record)?;
         let orbit = match near {
-            Some(near) => {
-                CutOrbit::near(&machine.model, &near.orbit).or_else(|_| CutOrbit::new(&machine.model))
-            }
+            // A step beyond which Newton's method does not follow is too long.
+            Some(near) => CutOrbit::near(&machine.model, &near.orbit),
             None => CutOrbit::new(&machine.model),
         }
         .ok()?;

@@ -145,14 +145,12 @@ impl<'a> Space<'a> {
     fn case(&self, z: &[f64]) -> Option<Case> {
         let mut case = self.baseline.case.clone();
         for (variable, z) in self.variables.iter().zip(z) {
-            if let Variable::Baseline(parts) = variable {
-                if *z != 0.0 {
-                    for part in parts {
-                        if !part.parameter.shift(&mut case, z * part.std) {
-                            return None;
-                        }
-                    }
-                }
+            let Variable::Baseline(parts) = variable else {
+                continue;
+            };
+            let is_possible = |part: &Deviation| *z == 0.0 || part.parameter.shift(&mut case, z * part.std);
+            if !parts.iter().all(is_possible) {
+                return None;
             }
         }
         Some(case)

@@ -110,10 +110,10 @@ impl Revolution<'_> {
         let mut events: Vec<Event> = Vec::new();
         let mut now = regimes;
         let mut changes = changes.into_iter().peekable();
-        for stretch in 0..starts.len() {
+        for (stretch, start) in starts.iter_mut().enumerate() {
             let (start_s, end_s) = (self.stretches.starts_s[stretch], self.stretches.end_s(stretch));
-            starts[stretch].regimes.clone_from(&now);
-            let mut contact = starts[stretch].clone();
+            start.regimes.clone_from(&now);
+            let mut contact = start.clone();
             while let Some((time_s, change)) = changes.next_if(|(time_s, _)| *time_s < end_s) {
                 match change {
                     Change::Tooth(tooth) => {
@@ -126,7 +126,7 @@ impl Revolution<'_> {
                     Change::Regime(index, regime) => contact.regimes[index] = regime,
                 }
                 if time_s - start_s < near_s {
-                    starts[stretch] = contact.clone();
+                    *start = contact.clone();
                 } else if end_s - time_s < near_s {
                     // The next stretch begins with its own contact.
                 } else if let Some(last) = events

@@ -9,13 +9,14 @@
 //! | `motion` | outputs over a revolution |
 //! | `law` | forces at one instant |
 //! | `events` | loss of contact, surfaces, stick |
-//! | `newton` | the equations |
+//! | `newton`, `jumps` | the equations, with the instants at which forces jump |
 //! | `orbit` | the orbit |
 //! | `sensitivity` | derivatives with respect to parameters |
 //! | `harmonics` | Fourier coefficients of the forces |
 
 mod events;
 mod harmonics;
+mod jumps;
 mod law;
 mod mesh;
 mod model;

@@ -13,14 +13,15 @@ use nalgebra::linalg::LU;
 use nalgebra::{DMatrix, DVector, Dyn, Matrix3, Vector3};
 
 use super::events::{Events, Revolution};
+use super::jumps::{Jump, JumpSize};
 use super::law::{Instant, Slopes};
-use super::mesh::{Contact, Mesh, Stretches};
+use super::mesh::{Mesh, Stretches};
 use super::model::{CutModel, Ports};
 use super::motion::Motion;
 use super::response::Response;
 
 /// Row of a sparse matrix: output of a point, with its weight.
-type SparseRow = Vec<(usize, f64)>;
+pub(super) type SparseRow = Vec<(usize, f64)>;
 
 /// Forces at all nodes of a mesh.
 #[derive(Clone, Debug)]
@@ -29,26 +30,6 @@ pub(super) struct NodeForces {
     pub(super) cutting_n: Vec<[f64; 3]>,
     /// Inputs of the structure, node by node.
     pub(super) inputs: Vec<f64>,
-}
-
-/// Forces after an event minus those before it.
-pub(super) struct JumpSize {
-    /// Subinterval that begins with the event.
-    pub(super) subinterval: usize,
-    pub(super) inputs: DVector<f64>,
-    /// Cutting force along x, y, z, N.
-    pub(super) cutting_n: [f64; 3],
-}
-
-/// An event at which the inputs jump.
-struct Jump {
-    size: JumpSize,
-    condition: Condition,
-    /// Derivative of g_e with respect to the outputs, and to time, 1/s.
-    row: SparseRow,
-    rate: f64,
-    /// Derivative of g_e by the outputs at its own point.
-    own: DVector<f64>,
 }
 
 /// The equations of a Newton step, factored.
@@ -75,7 +56,7 @@ pub(super) struct Period<'a> {
 }
 
 impl Period<'_> {
-    fn path(&self) -> impl Fn(f64) -> [f64; 3] + '_ {
+    pub(super) fn path(&self) -> impl Fn(f64) -> [f64; 3] + '_ {
         |time_s| self.motion.displacement(self.mesh, self.ports, time_s)
     }
 
@@ -115,7 +96,7 @@ impl Period<'_> {
     }
 
     /// Outputs of a point with index `point`, weighted by `row`.
-    fn own_row(&self, point: usize, row: impl Iterator<Item = f64>) -> SparseRow {
+    pub(super) fn own_row(&self, point: usize, row: impl Iterator<Item = f64>) -> SparseRow {
         let first = point * self.ports.outputs();
         row.enumerate()
             .filter(|(_, weight)| *weight != 0.0)
@@ -124,7 +105,7 @@ impl Period<'_> {
     }
 
     /// Adds `weights` times the displacement at an earlier instant.
-    fn add_earlier(&self, row: &mut SparseRow, time_s: f64, weights: Vector3<f64>) {
+    pub(super) fn add_earlier(&self, row: &mut SparseRow, time_s: f64, weights: Vector3<f64>) {
         for (point, share) in self.mesh.interpolation_at(time_s).points() {
             let first = point * self.ports.outputs();
             for (index, axis) in self.ports.axes.iter().enumerate() {
@@ -248,148 +229,6 @@ impl Period<'_> {
             }
         }
         equations
-    }
-
-    /// The events at which the inputs jump.
-    fn jumps(&self, sizes: &[f64]) -> Vec<Jump> {
-        let path = self.path();
-        let mut jumps = Vec::new();
-        for (index, subinterval) in self.mesh.subintervals.iter().enumerate() {
-            if subinterval.event.is_none() {
-                continue;
-            }
-            let before = &self.mesh.subintervals
-                [(index + self.mesh.subintervals.len() - 1) % self.mesh.subintervals.len()];
-            let point = self.mesh.point(index, 0);
-            let at = |contact| Instant {
-                time_s: subinterval.start_s,
-                contact,
-                outputs: self.motion.at_point(point),
-                path: &path,
-            };
-            let forces = |contact| self.model.forces(self.ports, &at(contact));
-            let (left, right) = (forces(&before.contact), forces(&subinterval.contact));
-            let pairs = right.inputs.iter().zip(&left.inputs);
-            let size = JumpSize {
-                subinterval: index,
-                inputs: DVector::from_iterator(left.inputs.len(), pairs.map(|(right, left)| right - left)),
-                cutting_n: std::array::from_fn(|axis| right.cutting_n[axis] - left.cutting_n[axis]),
-            };
-            let all = left.inputs.iter().chain(&right.inputs);
-            let largest = all.fold(0.0_f64, |most, force| most.max(force.abs()));
-            // Only rounding: the inputs have a kink here, which does not move the orbit to first order.
-            if size.inputs.amax() <= 1e-9 * largest {
-                continue;
-            }
-            jumps.extend(self.jump(size, &before.contact, sizes));
-        }
-        jumps
-    }
-
-    fn jump(&self, size: JumpSize, before: &Contact, sizes: &[f64]) -> Option<Jump> {
-        let index = size.subinterval;
-        let subinterval = &self.mesh.subintervals[index];
-        let (time_s, after) = (subinterval.start_s, &subinterval.contact);
-        let point = self.mesh.point(index, 0);
-        let condition = Condition::between(before, after)?;
-        let path = self.path();
-        let value = |time_s: f64, outputs: &[f64]| {
-            self.condition(
-                &condition,
-                &Instant {
-                    time_s,
-                    contact: before,
-                    outputs,
-                    path: &path,
-                },
-            )
-        };
-        // One-sided: before the event the motion has no kink.
-        let earlier = (index + self.mesh.subintervals.len() - 1) % self.mesh.subintervals.len();
-        let of_earlier = &self.mesh.subintervals[earlier];
-        let end_s = of_earlier.start_s + of_earlier.duration_s;
-        let step_s = 1e-3 * of_earlier.duration_s;
-        let at = |steps: f64| {
-            let time_s = end_s - steps * step_s;
-            value(time_s, &self.motion.within(self.mesh, earlier, time_s))
-        };
-        let rate = (3.0 * at(0.0) - 4.0 * at(1.0) + at(2.0)) / (2.0 * step_s);
-        let outputs = self.motion.at_point(point);
-        let mut own = DVector::zeros(self.ports.outputs());
-        for output in 0..own.len() {
-            let step = 1e-6 * sizes[output].max(f64::MIN_POSITIVE.sqrt());
-            let moved = |step: f64| {
-                let mut moved = outputs.to_vec();
-                moved[output] += step;
-                value(time_s, &moved)
-            };
-            own[output] = (moved(step) - moved(-step)) / (2.0 * step);
-        }
-        let mut row = self.own_row(point, own.iter().copied());
-        if let Condition::Gap { tooth, surfaces } = &condition {
-            let normal = self.model.normal(*tooth, time_s);
-            for (passings, sign) in surfaces {
-                if let Some(earlier_s) = self.model.earlier_s(*tooth, *passings, time_s) {
-                    self.add_earlier(&mut row, earlier_s, -normal * *sign);
-                }
-            }
-        }
-        (rate != 0.0).then_some(Jump {
-            size,
-            condition,
-            row,
-            rate,
-            own,
-        })
-    }
-
-    fn condition(&self, condition: &Condition, at: &Instant<'_>) -> f64 {
-        match condition {
-            Condition::Gap { tooth, surfaces } => {
-                let x = self.ports.displacement(at.outputs);
-                let gap = |(passings, sign): &(usize, f64)| {
-                    sign * self.model.gap_m(*tooth, *passings, at.time_s, x, at.path)
-                };
-                surfaces.iter().map(gap).sum()
-            }
-            Condition::Regime(index) => self.model.regime_view(self.ports, at, *index).margin,
-        }
-    }
-}
-
-/// What vanishes at an event.
-enum Condition {
-    /// Sum of gaps between a tooth and surfaces, with their signs.
-    Gap {
-        tooth: usize,
-        surfaces: Vec<(usize, f64)>,
-    },
-    /// Margin of the regime of a restoring force.
-    Regime(usize),
-}
-
-impl Condition {
-    fn between(before: &Contact, after: &Contact) -> Option<Self> {
-        let teeth = before
-            .teeth
-            .iter()
-            .zip(&after.teeth)
-            .find(|(before, after)| before != after);
-        if let Some((from, to)) = teeth {
-            let surfaces = match (from.passings, to.passings) {
-                (Some(from), Some(to)) => vec![(from, 1.0), (to, -1.0)],
-                (Some(one), None) | (None, Some(one)) => vec![(one, 1.0)],
-                (None, None) => return None,
-            };
-            return Some(Self::Gap {
-                tooth: from.tooth,
-                surfaces,
-            });
-        }
-        let mut regimes = before.regimes.iter().zip(&after.regimes);
-        regimes
-            .position(|(before, after)| before != after)
-            .map(Self::Regime)
     }
 }
 

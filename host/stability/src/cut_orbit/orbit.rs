@@ -20,7 +20,7 @@ const EVENT_FOUND: f64 = 1e-9;
 /// further away its prediction is no better than a search along the new motion.
 const NEAR: f64 = 0.05;
 /// Largest number of Newton steps.
-const STEPS: usize = 25;
+const STEPS: usize = 20;
 /// Smallest step of a natural continuation, as a share of its way.
 const LEAST_STEP: f64 = 1e-3;
 /// Largest share of the force in the two highest Legendre polynomials of a subinterval: the error of the orbit is of

@@ -1,8 +1,9 @@
 //! Derivatives of an orbit with respect to parameters of its model.
 
+use super::jumps::JumpSize;
 use super::model::CutModel;
 use super::motion::Motion;
-use super::newton::{Change, JumpSize, Period};
+use super::newton::{Change, Period};
 use super::orbit::CutOrbit;
 use super::response::Response;
 

@@ -38,9 +38,8 @@ fn model(case: &Case, rpm: f64, depth_mm: f64, effects: &Effects) -> CutModel {
 }
 
 /// Largest distance between the orbit and a simulation in time that has run for `seconds`, over the largest
-/// displacement, in its last revolution.
-fn distance(case: &Case, (rpm, depth_mm): (f64, f64), effects: &[&str], seconds: f64) -> f64 {
-    let text = effects;
+/// displacement, in its last revolution; and the number of events of the orbit.
+fn distance(case: &Case, (rpm, depth_mm): (f64, f64), effects: &[&str], seconds: f64) -> (f64, usize) {
     let effects = Effects::parse(effects.iter().copied()).unwrap();
     let cut = VirtualCut {
         effects: effects.clone(),
@@ -61,82 +60,81 @@ fn distance(case: &Case, (rpm, depth_mm): (f64, f64), effects: &[&str], seconds:
     let motions = simulated
         .motions_from(vec![0.0; simulated.order()], settings, [first_s, step_s, end_s])
         .unwrap();
-    let start = Instant::now();
-    let own = model(case, rpm, depth_mm, &effects);
-    let orbit = CutOrbit::new(&own).unwrap_or_else(|_| {
-        let friction_n: f64 = text[0].split('=').nth(1).unwrap().parse().unwrap();
-        CutOrbit::continued(&|share| {
-            let mut changed = vec![format!("coulomb-friction={}", share.max(0.02) * friction_n)];
-            changed.extend(text[1..].iter().map(|text| (*text).to_owned()));
-            model(
-                case,
-                rpm,
-                depth_mm,
-                &Effects::parse(changed.iter().map(String::as_str)).unwrap(),
-            )
-        })
-        .unwrap()
-    });
-    println!("{:?} steps {} {:?}", orbit.size(), orbit.steps, start.elapsed());
+    let orbit = CutOrbit::new(&model(case, rpm, depth_mm, &effects)).unwrap();
+    let events = orbit.size()[1];
     let mut size: f64 = 0.0;
     let mut apart: f64 = 0.0;
     for (index, motion) in motions.iter().enumerate() {
         let found = orbit.displacement_m(step_s * index as f64);
-        for axis in 0..3 {
-            size = size.max(motion.displacement_m[axis].abs());
-            apart = apart.max((found[axis] - motion.displacement_m[axis]).abs());
+        for (found, simulated) in found.iter().zip(motion.displacement_m) {
+            size = size.max(simulated.abs());
+            apart = apart.max((found - simulated).abs());
         }
     }
-    apart / size
+    (apart / size, events)
 }
 
 #[test]
 fn orbits_equal_simulations_in_time() {
-    let four = [("teeth = 2", "teeth = 4")];
-    let robot = case("kuka-kr90-half", &four, "");
+    let equal = case("kuka-kr90-half", &[("teeth = 2", "teeth = 4")], "");
     let unequal = case(
         "kuka-kr90-half",
         &[("teeth = 2", "teeth = 4\npitch_deg = [80.0, 100.0, 85.0, 95.0]")],
         "",
     );
-    let linear: [(&Case, &[&str]); 3] = [
-        (&robot, &[]),
-        (&robot, &["runout=10", "runout.angle_deg=30"]),
-        (&unequal, &["runout=10", "runout.angle_deg=30"]),
-    ];
-    let slow = case("kuka-kr90-half", &four, "");
-    let nonlinear: [(&Case, &[&str]); 6] = [
-        (&slow, &["cubic-stiffness=-5e11", "cubic-stiffness.direction=x"]),
-        (&slow, &["runout=60", "runout.angle_deg=30"]),
+    // Case, effects, and whether contact or a regime changes on the orbit.
+    let cuts: [(&Case, &[&str], bool); 9] = [
+        (&equal, &[], false),
+        (&equal, &["runout=10", "runout.angle_deg=30"], true),
+        (&unequal, &["runout=10", "runout.angle_deg=30"], true),
+        (&equal, &["runout=60", "runout.angle_deg=30"], true),
         (
-            &slow,
+            &equal,
+            &["cubic-stiffness=-5e11", "cubic-stiffness.direction=x"],
+            false,
+        ),
+        (
+            &equal,
             &[
                 "backlash=0.004",
                 "backlash.direction=y",
                 "backlash.stiffness_fraction=0.3",
             ],
+            true,
         ),
         (
-            &slow,
+            &equal,
             &[
                 "hysteresis=2e5",
                 "hysteresis.yield_m=1e-5",
                 "hysteresis.direction=y",
             ],
+            true,
         ),
-        (&slow, &["coulomb-friction=0.3", "coulomb-friction.direction=y"]),
-        (&slow, &["coulomb-friction=0.8", "coulomb-friction.direction=y"]),
+        // The tool slips all the time, and sticks for a part of each tooth passing.
+        (
+            &equal,
+            &["coulomb-friction=0.3", "coulomb-friction.direction=y"],
+            true,
+        ),
+        (
+            &equal,
+            &["coulomb-friction=0.8", "coulomb-friction.direction=y"],
+            true,
+        ),
     ];
-    for (case, effects) in nonlinear {
-        let apart = distance(case, (900.0, 0.5), effects, 20.0);
-        println!("{effects:?}: {apart:.2e}");
-    }
-    for (case, effects) in linear {
-        let apart = distance(case, (900.0, 0.5), effects, 20.0);
-        println!("{effects:?}: {apart:.2e}");
-        assert!(apart < 1e-6, "{effects:?}: {apart}");
+    for (case, effects, changes) in cuts {
+        let (apart, events) = distance(case, (900.0, 0.5), effects, 20.0);
+        println!("{effects:?}: {apart:.2e}, {events} events");
+        // The local tolerance of the simulation is 1e-11, and the slowest mode has decayed to 1e-25 after 20 s.
+        assert!(apart < 1e-8, "{effects:?}: {apart}");
+        assert_eq!(events > 0, changes, "{effects:?}");
     }
 }
+
+/// Largest relative error of a derivative: that of the central differences, with steps of 1e-3 and less of what changes
+/// the orbit by its own size.
+const TOLERANCE: f64 = 1e-5;
 
 #[test]
 fn derivatives_equal_differences_of_orbits() {
@@ -155,7 +153,7 @@ fn derivatives_equal_differences_of_orbits() {
     // Name, value, difference, and effects at a value.
     type Effect<'a> = Box<dyn Fn(f64) -> Vec<String> + 'a>;
     let parameters: Vec<(&str, f64, f64, Effect<'_>)> = vec![
-        ("runout", 60.0, 0.02, Box::new(move |um| runout(um))),
+        ("runout", 60.0, 0.02, Box::new(runout)),
         (
             "force-coefficients",
             0.0,
@@ -188,7 +186,7 @@ fn derivatives_equal_differences_of_orbits() {
         (
             "cubic-stiffness",
             0.0,
-            1e10,
+            1e11,
             Box::new(move |k3| {
                 with(&[
                     format!("cubic-stiffness={k3}"),
@@ -196,7 +194,7 @@ fn derivatives_equal_differences_of_orbits() {
                 ])
             }),
         ),
-        ("coulomb-friction", 0.5, 1e-4, Box::new(move |n| friction(n))),
+        ("coulomb-friction", 0.5, 1e-3, Box::new(friction)),
         (
             "backlash",
             0.004,
@@ -234,9 +232,7 @@ fn derivatives_equal_differences_of_orbits() {
         };
         let orbit = CutOrbit::new(&at(value)).unwrap();
         let (plus, minus) = (at(value + 0.5 * difference), at(value - 0.5 * difference));
-        let start = Instant::now();
         let sensitivity = orbit.derivative(&plus, &minus, difference).unwrap();
-        let elapsed = start.elapsed();
         let (plus, minus) = (
             CutOrbit::near(&plus, &orbit).unwrap(),
             CutOrbit::near(&minus, &orbit).unwrap(),
@@ -255,10 +251,13 @@ fn derivatives_equal_differences_of_orbits() {
                 apart = apart.max((expected - found[axis]).abs());
             }
         }
-        println!("{name}: {:.2e}, {elapsed:?}, {:?}", apart / size, orbit.size());
+        println!("{name}: {:.2e}", apart / size);
+        assert!(apart < TOLERANCE * size, "{name}: {apart} of {size}");
         let weights = orbit.order_weights(40);
         let slopes = orbit.force_order_slopes(&weights, &sensitivity);
         let [of_plus, of_minus] = [&plus, &minus].map(|orbit| orbit.force_orders(&orbit.order_weights(40)));
+        // Forces that hardly change are as exact as those that do.
+        let largest = slopes.structure_n.norm();
         for (kind, slope, plus, minus) in [
             (
                 "cutting",
@@ -274,8 +273,65 @@ fn derivatives_equal_differences_of_orbits() {
             ),
         ] {
             let expected = (plus - minus) / num_complex::Complex64::from(difference);
-            let apart = (slope - &expected).norm() / expected.norm();
+            let apart = (slope - &expected).norm() / expected.norm().max(largest);
             println!("    {kind}: {apart:.2e}");
+            assert!(apart < TOLERANCE, "{name}, {kind}: {apart}");
         }
+    }
+}
+
+#[test]
+#[ignore = "cost: the times of an orbit with forty derivatives, for the release profile"]
+fn cost_of_an_orbit_with_forty_derivatives() {
+    let pitch = [("teeth = 2", "teeth = 4\npitch_deg = [80.0, 100.0, 85.0, 95.0]")];
+    let case = case("kuka-kr90-half", &pitch, "");
+    let cuts: [(&str, Vec<String>); 2] = [
+        ("linear", Vec::new()),
+        (
+            "cubic, with loss of contact",
+            [
+                "runout=60",
+                "cubic-stiffness=-5e11",
+                "cubic-stiffness.direction=x",
+            ]
+            .map(String::from)
+            .to_vec(),
+        ),
+    ];
+    for (name, effects) in cuts {
+        let at = |more: &str| {
+            let all = effects
+                .iter()
+                .map(String::as_str)
+                .chain([more])
+                .filter(|text| !text.is_empty());
+            model(&case, 559.0, 0.5, &Effects::parse(all).unwrap())
+        };
+        let own = at("");
+        let pairs = ["force-coefficients", "stiffness", "mass", "damping"]
+            .map(|effect| [at(&format!("{effect}=1e-4")), at(&format!("{effect}=-1e-4"))]);
+        let known = CutOrbit::new(&at("force-coefficients=0.01")).unwrap();
+        let mut times = [f64::INFINITY; 3];
+        for _ in 0..5 {
+            let start = Instant::now();
+            let orbit = CutOrbit::new(&own).unwrap();
+            times[0] = times[0].min(start.elapsed().as_secs_f64());
+            let start = Instant::now();
+            let near = CutOrbit::near(&own, &known).unwrap();
+            times[1] = times[1].min(start.elapsed().as_secs_f64());
+            let start = Instant::now();
+            // Of the derivatives a quarter is of the process, the rest of the structure.
+            for _ in 0..10 {
+                for [plus, minus] in &pairs {
+                    assert!(near.derivative(plus, minus, 2e-4).is_some());
+                }
+            }
+            times[2] = times[2].min(start.elapsed().as_secs_f64());
+            assert_eq!(orbit.size(), near.size(), "{name}");
+        }
+        let [from_rest, from_near, derivatives] = times.map(|seconds| 1e3 * seconds);
+        println!(
+            "{name}: {from_rest:.1} ms from rest, {from_near:.1} ms from a near orbit, {derivatives:.1} ms for 40 derivatives"
+        );
     }
 }
