@@ -194,7 +194,7 @@ fn derivatives_equal_differences_of_orbits() {
                 ])
             }),
         ),
-        ("coulomb-friction", 0.5, 1e-3, Box::new(friction)),
+        ("coulomb-friction", 0.5, 1e-4, Box::new(friction)),
         (
             "backlash",
             0.004,

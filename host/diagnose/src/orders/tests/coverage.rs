@@ -2,6 +2,7 @@
 
 use nalgebra::DMatrix;
 use num_complex::Complex64;
+use quietcut_testkit::slice;
 use rayon::prelude::*;
 
 use super::generator::{NAMES, Random, Spindle, noise, pulses, recording, series_at};
@@ -105,9 +106,10 @@ fn rates(revolutions: usize, records: u64, modulation: f64) -> [f64; 7] {
 
 #[test]
 fn ninety_percent_intervals_hold_in_coloured_noise() {
-    let all =
-        REVOLUTIONS.map(|revolutions| rates(revolutions, if revolutions < 100 { 600 } else { 300 }, 0.0));
-    for [within, below, single, directions, ..] in all {
+    let some = REVOLUTIONS.into_iter().take(slice(1, 3) as usize);
+    let of = |revolutions| rates(revolutions, if revolutions < 100 { 600 } else { 300 }, 0.0);
+    let all: Vec<[f64; 7]> = some.map(of).collect();
+    for &[within, below, single, directions, ..] in &all {
         assert!(NINETY.contains(&within) && NINETY.contains(&below), "{all:?}");
         // Thousands of orders: the spectrum that changes within a band may shift the rate by a percent or two.
         assert!((single - 0.9).abs() < 0.02, "{all:?}");
@@ -118,13 +120,15 @@ fn ninety_percent_intervals_hold_in_coloured_noise() {
 
 #[test]
 fn ninety_percent_intervals_hold_if_all_orders_change_together() {
-    let all = REVOLUTIONS.map(|revolutions| rates(revolutions, 300, 0.2));
-    for [_, below, ..] in all {
+    // The longest records show most of what is common.
+    let some = REVOLUTIONS.into_iter().skip(slice(2, 0) as usize);
+    let all: Vec<[f64; 7]> = some.map(|revolutions| rates(revolutions, 300, 0.2)).collect();
+    for [_, below, ..] in &all {
         // The between-line spectrum holds the side bands of the changes too, so that the covariance is too large by a few
         // percent; too small a distance is more frequent than stated, too large a one less so.
-        assert!((0.86..=0.97).contains(&below), "{all:?}");
+        assert!((0.86..=0.97).contains(below), "{all:?}");
     }
     // Fifteen blocks are enough for the test of a direction. Without the common part the single orders fail.
-    let [_, _, single, directions, ..] = all[2];
+    let [_, _, single, directions, ..] = all[all.len() - 1];
     assert!(single < 0.8 && directions > 0.9, "{all:?}");
 }

@@ -1,5 +1,6 @@
 //! Speed from the orders alone.
 
+use quietcut_testkit::slice;
 use std::f64::consts::TAU;
 
 use rayon::prelude::*;
@@ -22,7 +23,8 @@ fn settings() -> ReductionSettings {
 
 #[test]
 fn speeds_without_tachometer_lie_within_their_deviation() {
-    for (first, revolutions, level) in [(0, 25.0, 0.1), (1000, 100.0, 0.2), (2000, 300.0, 0.5)] {
+    let sets = [(0, 25.0, 0.1), (1000, 100.0, 0.2), (2000, 300.0, 0.5)];
+    for (first, revolutions, level) in sets.into_iter().take(slice(1, 3) as usize) {
         let ratios: Vec<f64> = (0..RECORDS)
             .into_par_iter()
             .map(|record| {
