@@ -1,10 +1,9 @@
 //! Instants of a revolution at which teeth lose or find contact, meet the surface of another tooth, or a restoring
 //! force changes its regime.
 
-use quietcut_model::MotionState;
 use quietcut_model::restoring_force::Regime;
 
-use super::law::{Instant, Path};
+use super::law::{Instant, Path, RegimeView};
 use super::mesh::{Contact, EngagedTooth, Event, Mesh, SAME_TIME, Stretches};
 use super::model::{CutModel, Ports};
 use super::motion::Motion;
@@ -336,15 +335,4 @@ impl Revolution<'_> {
             index,
         )
     }
-}
-
-/// What a restoring force sees at an instant.
-pub(super) struct RegimeView {
-    pub(super) state: MotionState,
-    /// Internal states of the force.
-    pub(super) own: Vec<f64>,
-    /// Force that holds, or would hold, the axis of the force at rest, N.
-    pub(super) would_hold_n: f64,
-    /// Negative where the regime ends.
-    pub(super) margin: f64,
 }

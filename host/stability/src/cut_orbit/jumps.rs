@@ -4,7 +4,7 @@ use nalgebra::DVector;
 
 use super::law::Instant;
 use super::mesh::Contact;
-use super::newton::{Period, SparseRow};
+use super::period::{Period, SparseRow};
 
 /// Forces after an event minus those before it.
 pub(super) struct JumpSize {

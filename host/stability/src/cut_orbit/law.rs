@@ -5,7 +5,6 @@ use nalgebra::{DMatrix, Matrix3, Vector3};
 use quietcut_model::cutter::Immersion;
 use quietcut_model::{MotionState, Tooth};
 
-use super::events::RegimeView;
 use super::mesh::Contact;
 use super::model::{CutModel, Ports};
 
@@ -45,6 +44,17 @@ pub(super) struct Slopes {
     pub(super) by_cutting: DMatrix<f64>,
     /// Cutting force by the displacement at earlier instants, N/m.
     pub(super) earlier: Vec<(f64, Matrix3<f64>)>,
+}
+
+/// What a restoring force sees at an instant.
+pub(super) struct RegimeView {
+    pub(super) state: MotionState,
+    /// Internal states of the force.
+    pub(super) own: Vec<f64>,
+    /// Force that holds, or would hold, the axis of the force at rest, N.
+    pub(super) would_hold_n: f64,
+    /// Negative where the regime ends.
+    pub(super) margin: f64,
 }
 
 /// A tooth in front of a surface that another tooth has cut.

@@ -9,6 +9,7 @@
 //! | `motion` | outputs over a revolution |
 //! | `law` | forces at one instant |
 //! | `events` | loss of contact, surfaces, stick |
+//! | `period` | forces along the motion |
 //! | `newton`, `jumps` | the equations, with the instants at which forces jump |
 //! | `orbit` | the orbit |
 //! | `sensitivity` | derivatives with respect to parameters |
@@ -23,6 +24,7 @@ mod model;
 mod motion;
 mod newton;
 mod orbit;
+mod period;
 mod propagator;
 mod response;
 mod sensitivity;

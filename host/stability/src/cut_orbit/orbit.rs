@@ -6,7 +6,8 @@ use super::events::Events;
 use super::mesh::{Contact, EngagedTooth, Mesh, Stretches};
 use super::model::{CutModel, Ports};
 use super::motion::Motion;
-use super::newton::{self, Linearization, NodeForces, Period};
+use super::newton::{self, Linearization};
+use super::period::{NodeForces, Period};
 use super::response::Response;
 
 /// Nodes per subinterval.

@@ -3,8 +3,9 @@
 use super::jumps::JumpSize;
 use super::model::CutModel;
 use super::motion::Motion;
-use super::newton::{Change, Period};
+use super::newton::Change;
 use super::orbit::CutOrbit;
+use super::period::Period;
 use super::response::Response;
 
 /// Derivative of an orbit with respect to one parameter.
