@@ -25,7 +25,7 @@ const DAMPING_RATIO: f64 = 0.05;
 const EXPONENT: f64 = 0.2;
 /// Logarithm of the reference chip of an exponent over the feed per tooth.
 const REFERENCE_CHIP: f64 = 0.5;
-/// Runout, µm (collets and shrink chucks: 3 to 20 µm).
+/// Runout, µm (tool holders: 3 to 20 µm).
 const RUNOUT_UM: f64 = 10.0;
 /// Error of the gain of a sensor.
 const GAIN: f64 = 0.1;
