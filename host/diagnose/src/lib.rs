@@ -141,7 +141,11 @@ pub fn diagnose_watched(
 ) -> Result<Diagnosis, DiagnoseError> {
     watch(Stage::Records);
     let (recordings, shortened) = full_engagement::in_full_engagement(case, recordings)?;
-    let (concluded, remark) = long_records::concluded(case, &recordings, options, watch);
+    let of_cuts = cuts::diagnosis::diagnosed(case, &recordings, watch)?;
+    let (concluded, remark) = match of_cuts {
+        Some(diagnosis) => (Some(diagnosis), None),
+        None => long_records::concluded(case, &recordings, options, watch),
+    };
     let mut diagnosis = match concluded {
         Some(diagnosis) => diagnosis,
         None => {

@@ -169,13 +169,15 @@ fn causes(explanation: &Explanation<'_>, confidence: f64) -> Vec<EstimatedCause>
         .candidates
         .iter()
         .enumerate()
-        .map(|(number, candidate)| {
+        .flat_map(|(number, candidate)| {
             let places = space.places_of(number);
             let own = covariance
                 .as_ref()
                 .map(|covariance| covariance.select_rows(&places).select_columns(&places));
             let z: Vec<f64> = places.iter().map(|place| explanation.fit.z[*place]).collect();
-            cause(candidate, number, &z, own.as_ref(), confidence)
+            let each = candidate.by_channel().into_iter();
+            each.map(|candidate| cause(&candidate, number, &z, own.as_ref(), confidence))
+                .collect::<Vec<_>>()
         })
         .collect()
 }

@@ -61,6 +61,18 @@ impl Candidate {
         }
     }
 
+    /// This candidate for each channel of its place by itself, as an answer lists it.
+    pub(crate) fn by_channel(&self) -> Vec<Self> {
+        let Location::Channels(names) = &self.location else {
+            return vec![self.clone()];
+        };
+        let of = |name: &String| Self {
+            location: Location::Channel(name.clone()),
+            ..self.clone()
+        };
+        names.iter().map(of).collect()
+    }
+
     /// This candidate, absent where its first coordinate is zero, below which it cannot go.
     pub(crate) fn vanishing_at_zero(mut self) -> Self {
         self.vanishes = true;
@@ -85,6 +97,10 @@ impl Candidate {
             return None;
         }
         let mut table = self.location.table();
+        if let Location::Channels(names) = &self.location {
+            let names = names.iter().map(|name| toml::Value::from(name.as_str()));
+            table.insert("channel".into(), toml::Value::Array(names.collect()));
+        }
         let mut ratios = Vec::new();
         for (key, value) in self.parameters(coordinates) {
             if key.starts_with("ratio_") {

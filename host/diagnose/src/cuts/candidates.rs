@@ -405,6 +405,22 @@ fn of_sensors(baseline: &Baseline<'_>, records: &[ReducedCut], all: &mut Vec<Can
         .map(|record| 1.0 / record.rate_hz)
         .fold(0.0, f64::max);
     let modes = baseline.mode_count();
+    let of_force = |name: &str| pickup_of(name).is_some_and(|pickup| pickup.quantity == Quantity::Force);
+    let (forces, motions): (Vec<&String>, Vec<&String>) =
+        names.iter().copied().partition(|name| of_force(name));
+    for group in [forces, motions] {
+        // One wrong sensitivity of an amplifier or of a calibration.
+        if group.len() > 1 {
+            let place = Location::Channels(group.into_iter().cloned().collect());
+            let gain = |z: &[f64]| vec![("gain", (GAIN * z[0]).exp())];
+            all.push(Candidate::new(
+                EffectName::SensorGain,
+                place,
+                vec![Coordinate::FREE],
+                gain,
+            ));
+        }
+    }
     for name in names {
         let Some(pickup) = pickup_of(name) else { continue };
         let place = Location::Channel(name.clone());

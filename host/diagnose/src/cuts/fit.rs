@@ -14,6 +14,8 @@ use quietcut_stability::cut_orbit::{CutOrbit, ForceOrders, OrderWeights};
 const DIFFERENCE: f64 = 1e-3;
 /// Predicted decrease of χ² below which a fit has converged: a hundredth of a standard deviation of any variable.
 const CONVERGED: f64 = 1e-4;
+/// Damping from which on a step that does not lower the cost ends a fit.
+const MOST_DAMPING: f64 = 50.0;
 /// Largest number of steps, those that are too long included.
 const STEPS: usize = 14;
 
@@ -282,10 +284,10 @@ pub(crate) fn fit(
             if cost - new_cost < CONVERGED {
                 break;
             }
-        } else if damping > 1e6 {
+        } else if damping > MOST_DAMPING {
             break;
         } else {
-            damping = (10.0 * damping).max(1e-3);
+            damping = (10.0 * damping).max(0.1);
         }
     }
     let residual = stacked(&current);

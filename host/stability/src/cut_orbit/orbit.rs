@@ -22,6 +22,8 @@ const EVENT_FOUND: f64 = 1e-9;
 const NEAR: f64 = 0.05;
 /// Largest number of Newton steps.
 const STEPS: usize = 20;
+/// Number of Newton steps without one of half the size of the smallest before, after which a search ends.
+const STALLED: usize = 7;
 /// Smallest step of a natural continuation, as a share of its way.
 const LEAST_STEP: f64 = 1e-3;
 /// Largest share of the force in the two highest Legendre polynomials of a subinterval: the error of the orbit is of
@@ -226,6 +228,7 @@ impl Start {
         let rpm = model.rad_per_s * 60.0 / std::f64::consts::TAU;
         let not_periodic = CutOrbitError::NoPeriodicResponse { rpm };
         let (mut last, mut share) = (f64::INFINITY, 1.0);
+        let (mut least, mut since) = (f64::INFINITY, 0);
         for _ in 0..STEPS {
             *steps += 1;
             let step = newton::step(model, ports, &self.mesh, &self.motion, share)
@@ -262,6 +265,12 @@ impl Start {
                 (0.5 * share).max(0.1)
             };
             last = moved;
+            // Steps that do not become smaller lead to no orbit.
+            since = if moved < 0.5 * least { 0 } else { since + 1 };
+            least = least.min(moved);
+            if since > STALLED {
+                break;
+            }
         }
         Err(CutOrbitError::NotConverged {
             rpm,
