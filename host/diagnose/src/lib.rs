@@ -83,8 +83,8 @@ mod baseline;
 mod candidates;
 mod conclusion;
 mod criteria;
-// The entry `cuts::diagnosis` is tested and not called yet: a fit far from the baseline may take minutes, and a common gain
-// of all channels is not among its candidates.
+// The entry `cuts::diagnosis` and what words its answer are not called yet: a fit far from the baseline may take minutes,
+// and a common gain of all channels is not among the candidates. The explanations below it are tested.
 #[allow(dead_code)]
 mod cuts;
 mod error;

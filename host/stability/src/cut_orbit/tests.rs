@@ -132,6 +132,35 @@ fn orbits_equal_simulations_in_time() {
     }
 }
 
+#[test]
+fn a_continued_orbit_is_that_from_rest() {
+    let case = case("kuka-kr90-half", &[("teeth = 2", "teeth = 4")], "");
+    // From friction that slips all the time to one that holds the tool for a part of each tooth passing.
+    let at = |share: f64| {
+        let friction = format!("coulomb-friction={}", 0.1 + 0.7 * share);
+        let effects = Effects::parse([friction.as_str(), "coulomb-friction.direction=y"]).unwrap();
+        model(&case, 900.0, 0.5, &effects)
+    };
+    let (continued, from_rest) = (
+        CutOrbit::continued(&at).unwrap(),
+        CutOrbit::new(&at(1.0)).unwrap(),
+    );
+    assert_eq!(continued.size()[1], from_rest.size()[1]);
+    let [ranges_m, _] = from_rest.half_ranges();
+    let size_m = ranges_m.into_iter().fold(0.0, f64::max);
+    for index in 0..50 {
+        let time_s = 60.0 / 900.0 * f64::from(index) / 50.0;
+        let pairs = continued
+            .displacement_m(time_s)
+            .into_iter()
+            .zip(from_rest.displacement_m(time_s));
+        for (one, other) in pairs {
+            // Twice the distance of either from a simulation.
+            assert!((one - other).abs() < 2e-8 * size_m, "{time_s}: {one} {other}");
+        }
+    }
+}
+
 /// Largest relative error of a derivative: that of the central differences, with steps of 1e-3 and less of what changes
 /// the orbit by its own size.
 const TOLERANCE: f64 = 1e-5;
