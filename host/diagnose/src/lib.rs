@@ -19,7 +19,7 @@
 //! - `orders`: a recorded cut reduced to its orders of the spindle frequency, with covariance. It knows no case.
 //! - `records`: each recording beside what the baseline predicts of it, and the `Study` that holds them. It knows no
 //!   cause.
-//! - `cuts`: steady cuts whose orders are compared with those of the forced orbit; [`diagnose`] does not use it yet.
+//! - `cuts`: steady cuts whose orders are compared with those of the forced orbit.
 //! - `candidates`: the causes that a baseline may lack, as regressors along the measured motion and as simulations. It
 //!   fits nothing.
 //! - `fit`: the parameters of one candidate model. It does not compare candidates.
@@ -83,9 +83,6 @@ mod baseline;
 mod candidates;
 mod conclusion;
 mod criteria;
-// The entry `cuts::diagnosis` and what words its answer are not called yet: a fit far from the baseline may take minutes,
-// and a common gain of all channels is not among the candidates. The explanations below it are tested.
-#[allow(dead_code)]
 mod cuts;
 mod error;
 mod fit;

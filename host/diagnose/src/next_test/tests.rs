@@ -114,7 +114,6 @@ fn confounded(case: &Case, gains: &Effects) -> (Vec<Recording>, NextTest) {
     let test = answer.next_test.unwrap();
     println!("{}: it {}", test.what(), test.why);
     assert_eq!((test.kind, test.measure), ("hammer", None), "{test:?}");
-    assert_eq!(test.direction, Some(Direction::X.name()));
     (records, test)
 }
 
@@ -130,7 +129,10 @@ fn the_proposed_impact_separates_a_gain_from_the_cutting_force() {
     let case = case("kuka-kr90-half");
     let gains = Effects::parse(["sensor-gain=1.2"]).unwrap();
     let (mut records, test) = confounded(&case, &gains);
-    let direction = Direction::X;
+    let direction = [Direction::X, Direction::Y]
+        .into_iter()
+        .find(|direction| Some(direction.name()) == test.direction)
+        .unwrap();
     let impacts = vec![Impact {
         start_s: 0.05 * test.seconds,
         peak_n: test.force_n[0],
