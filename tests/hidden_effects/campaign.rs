@@ -41,6 +41,8 @@ pub(crate) struct Finding {
     verdict: Verdict,
     /// Root mean square of each effect over the noise, in the channel where it is largest.
     ratios: Vec<f64>,
+    /// d² of the first effect, in cuts of a workshop.
+    distance: f64,
     redrawn: usize,
     said: GivenAnswer,
     right: bool,
@@ -114,7 +116,9 @@ impl AnsweredCause {
             if self.name.starts_with("sensor-") {
                 let alike = all.iter().filter(|cause| cause.name == self.name);
                 let said: BTreeSet<&String> = alike.flat_map(|cause| &cause.places).collect();
-                return said == hidden.places.iter().collect();
+                // An answer without channel means all channels of motion.
+                let is_of_all = said.is_empty() && hidden.places.len() > 1;
+                return is_of_all || said == hidden.places.iter().collect();
             }
             let placed = self.places.iter().any(|place| hidden.places.contains(place));
             placed || self.places.is_empty() || hidden.places.is_empty()
@@ -136,7 +140,18 @@ impl Finding {
                 .is_some_and(|cause| cause.is_any_of(&puzzle.hidden, &said.causes));
         let right = match (&puzzle.verdict, puzzle.family) {
             (_, Family::NotInLibrary) => said.outcome == "unexplained",
+            (Verdict::Invisible, Family::CuttingInWorkshop | Family::NothingInWorkshop) => {
+                matches!(&said.outcome[..], "none" | "update")
+            }
             (Verdict::Invisible, _) => said.outcome == "none",
+            // A further false cause is a wrong answer.
+            (Verdict::Separable, Family::CuttingInWorkshop) => {
+                first
+                    && said
+                        .causes
+                        .iter()
+                        .all(|cause| cause.is_any_of(&puzzle.hidden, &said.causes))
+            }
             (Verdict::Equivalent(set), _) => said.outcome == "confounded" && said.names() == *set,
             (_, Family::TwoEffects) => {
                 let both = said
@@ -177,6 +192,7 @@ impl Finding {
             hidden,
             verdict: puzzle.verdict.clone(),
             ratios: puzzle.ratios.clone(),
+            distance: puzzle.hidden.first().map_or(0.0, |hidden| hidden.distance),
             redrawn: puzzle.redrawn,
             said,
             right,
@@ -194,6 +210,7 @@ impl Finding {
                 self.hidden.join("+"),
                 set.iter().copied().collect::<Vec<_>>().join(" ")
             ),
+            Verdict::Borderline => format!("{} (grey)", self.hidden.join("+")),
             Verdict::Invisible => format!("{} (invisible)", self.hidden.join("+")),
             _ => self.hidden.join("+"),
         }
@@ -205,7 +222,7 @@ impl Finding {
     }
 
     fn counts(&self) -> bool {
-        self.is_plain() != Some(false)
+        self.verdict != Verdict::Borderline && self.is_plain() != Some(false)
     }
 }
 
@@ -218,7 +235,7 @@ impl fmt::Display for Finding {
             .map_or(f64::NAN, |cause| cause.confidence);
         write!(
             out,
-            "seed {} {}: hidden {} at {}× noise, said {} ({confidence:.3}, left {:.1e}, {:.2} s)",
+            "seed {} {}: hidden {} at {}× noise, d² = {:.1}, said {} ({confidence:.3}, left {:.1e}, {:.2} s)",
             self.seed,
             if self.right { "right" } else { "WRONG" },
             self.hidden_label(),
@@ -227,6 +244,7 @@ impl fmt::Display for Finding {
                 .map(|ratio| format!("{ratio:.2}"))
                 .collect::<Vec<_>>()
                 .join(", "),
+            self.distance,
             self.said.label(),
             self.said.left,
             self.said.seconds

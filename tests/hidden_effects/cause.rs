@@ -74,6 +74,21 @@ pub(crate) const STRUCTURAL: [EffectKind; 17] = [
     EffectKind::SensorOffset,
 ];
 
+/// Effects of the library on the restoring forces of a machine, linear parameters apart.
+pub(crate) const RESTORING: [EffectKind; 11] = [
+    EffectKind::MissingMode,
+    EffectKind::CubicStiffness,
+    EffectKind::QuadraticStiffness,
+    EffectKind::CubicDamping,
+    EffectKind::QuadraticDamping,
+    EffectKind::SofteningHardening,
+    EffectKind::CoulombFriction,
+    EffectKind::Backlash,
+    EffectKind::Hysteresis,
+    EffectKind::ModeCoupling,
+    EffectKind::Drift,
+];
+
 /// Effects of the library that belong to the cutting process.
 pub(crate) const PROCESS: [EffectKind; 8] = [
     EffectKind::ForceCoefficients,

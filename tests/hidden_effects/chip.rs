@@ -3,8 +3,9 @@
 use std::cell::Cell;
 use std::f64::consts::TAU;
 
+use super::disturbance::Disturbance;
 use super::job::Job;
-use super::law::State;
+use super::law::{Branch, State};
 use super::motion::{System, interpolated};
 use super::process::Process;
 
@@ -29,6 +30,7 @@ pub(crate) struct Chips<'a> {
     pub(crate) step_s: f64,
     /// Largest displacement of the tool from its rest position so far, m.
     pub(crate) furthest_m: Cell<f64>,
+    pub(crate) disturbance: Option<&'a Disturbance>,
 }
 
 impl Chips<'_> {
@@ -40,14 +42,17 @@ impl Chips<'_> {
             let rate = TAU * hz;
             delta * omega / rate * (phase.cos() - (rate * recorded + phase).cos())
         });
-        self.run.angle + omega * recorded + modulation
+        let wandered = self
+            .disturbance
+            .map_or(0.0, |disturbance| disturbance.wandered(recorded, omega));
+        self.run.angle + omega * recorded + modulation + wandered
     }
 
     /// Time at which the spindle is at `angle`, near the time `guess`.
     fn time_at(&self, angle: f64, guess: f64) -> f64 {
         let omega = TAU * self.run.rpm / 60.0;
         let mut t = guess;
-        if self.process.fluctuation.is_some() {
+        if self.process.fluctuation.is_some() || self.disturbance.is_some() {
             // The speed modulation is about one percent: every iteration gains two digits.
             for _ in 0..8 {
                 t -= (self.angle(t) - angle) / omega;
@@ -100,6 +105,7 @@ impl Chips<'_> {
         system: &System,
         [mut from, to]: [f64; 2],
         y: &mut State,
+        branches: &mut Vec<Branch>,
         past: &[[f64; 3]],
     ) {
         let engaged = self.engaged(0.5 * (from + to));
@@ -107,34 +113,34 @@ impl Chips<'_> {
         // At most sixteen changes of contact per step are resolved.
         for _ in 0..16 {
             let stepped = |to: f64| {
-                let mut after = *y;
+                let (mut after, mut branched) = (*y, branches.clone());
                 let force = |t: f64, x: [f64; 3], v: [f64; 3]| self.force(t, x, v, cutting, past);
-                system.advance(from, to - from, &mut after, &mut [], &force);
+                system.advance(from, to - from, &mut after, &mut branched, &force);
                 let then = self.cutting(to, system.displacement(&after), engaged, past);
-                (after, then)
+                (after, branched, then)
             };
-            let (after, then) = stepped(to);
+            let (after, branched, then) = stepped(to);
             if then == cutting {
-                *y = after;
+                (*y, *branches) = (after, branched);
                 return;
             }
             let (mut inside, mut outside) = (from, to);
             while outside - inside > 1e-7 * self.step_s {
                 let middle = 0.5 * (inside + outside);
-                if stepped(middle).1 == cutting {
+                if stepped(middle).2 == cutting {
                     inside = middle
                 } else {
                     outside = middle
                 }
             }
-            let (after, then) = stepped(outside);
-            (*y, cutting, from) = (after, then, outside);
+            let (after, branched, then) = stepped(outside);
+            (*y, *branches, cutting, from) = (after, branched, then, outside);
             if to - from < 1e-7 * self.step_s {
                 return;
             }
         }
         let force = |t: f64, x: [f64; 3], v: [f64; 3]| self.force(t, x, v, cutting, past);
-        system.advance(from, to - from, y, &mut [], &force);
+        system.advance(from, to - from, y, branches, &force);
     }
 
     /// Those of the `engaged` teeth that reach the surface.
@@ -216,13 +222,20 @@ impl Chips<'_> {
         for tooth in (0..self.job.teeth).filter(|tooth| cutting & 1 << tooth != 0) {
             let (sin, cos) = self.immersion(t, tooth).sin_cos();
             let chip = self.chip_m(t, x, tooth, past);
+            let scattered = self.disturbance.map_or(1.0, |disturbance| {
+                let teeth = self.job.teeth;
+                disturbance.factor(tooth, teeth, self.angle(t) + TAU * tooth as f64 / teeth as f64)
+            });
             // An intermediate stage of a step may lie slightly beyond the end of contact.
             let power = |power: f64, reference: f64| reference * (chip.max(0.0) / reference).powf(power);
             let chip = process
                 .exponent
                 .map_or(chip, |(exponent, reference)| power(exponent, reference));
             let along = |index: usize, width: f64| {
-                worn * depth * (process.cutting_pa[index] * chip + process.edge_n_per_m[index] / width)
+                scattered
+                    * worn
+                    * depth
+                    * (process.cutting_pa[index] * chip + process.edge_n_per_m[index] / width)
             };
             let (tangential, radial, axial) = (along(0, sin_edge), along(1, sin_edge), along(2, sin_edge));
             let speed = std::f64::consts::PI * 1e-3 * self.job.diameter_mm * self.run.rpm / 60.0;

@@ -10,9 +10,11 @@ use nalgebra::DMatrix;
 use quietcut::recording::{Channel, Quantity, RecordedChannel, RecordedCut, Recording, Sidecar, TestKind};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
 
-use super::cause::{Cause, EffectKind, PROCESS, Scale};
+use super::cause::{Cause, EffectKind, PROCESS, RESTORING, Scale};
 use super::chip::{Chips, Run};
+use super::disturbance::Disturbance;
 use super::job::{CutScale, Job};
 use super::machine::{Machine, between};
 use super::motion::interpolated;
@@ -20,6 +22,7 @@ use super::motion::{Path, System};
 use super::oracle::{Lab, Output};
 use super::process::Process;
 use super::sensor::{Sensor, letter, noisy, read_by};
+use super::uncertainty;
 
 /// Cuts of a machine, with the sensors that record them.
 pub(crate) struct CutBench {
@@ -35,6 +38,10 @@ pub(crate) struct CutBench {
     before: usize,
     steps: usize,
     pub(crate) scale: Scale,
+    /// Machine and job of the case, where they differ from the true ones.
+    stated: Option<(Machine, Job)>,
+    /// By cut: what a workshop adds.
+    disturbances: Vec<Disturbance>,
     /// Motions of the baseline. Sensor errors need no others.
     plain: OnceLock<Vec<Motion>>,
 }
@@ -86,6 +93,7 @@ impl CutBench {
             start_deg,
             exit_deg,
             feed_mm,
+            runout: [0.0; 2],
         };
         let tooth_hz = machine.omega[0] / TAU * random.random_range(0.35..1.6);
         let rpm = 60.0 * tooth_hz / teeth as f64;
@@ -150,8 +158,53 @@ impl CutBench {
             before,
             steps,
             scale,
+            stated: None,
+            disturbances: Vec::new(),
             plain: OnceLock::new(),
         }
+    }
+
+    /// This bench in a workshop: the tool has runout, the case is known from tests only, and cuts and records are disturbed.
+    ///
+    /// Restoring forces are then scaled by the motion of the baseline.
+    pub(crate) fn in_workshop(mut self, random: &mut ChaCha8Rng) -> Self {
+        self.job.runout = [
+            between(random, 5.0, 20.0).min(200.0 * self.job.feed_mm),
+            random.random_range(0.0..360.0),
+        ];
+        let z: Vec<f64> = (0..uncertainty::count(&self.machine))
+            .map(|_| StandardNormal.sample(random))
+            .collect();
+        self.stated = Some(uncertainty::moved(&self.machine, &self.job, &z));
+        self.disturbances = self.runs.iter().map(|_| Disturbance::draw(random)).collect();
+        let motion = self.motion(&self.runs[0], &[], None);
+        self.scale.peak_m = motion.half_range_m();
+        self
+    }
+
+    /// This bench with machine and job that differ by `z` standard deviations.
+    pub(crate) fn moved(&self, z: &[f64]) -> Self {
+        let (machine, job) = uncertainty::moved(&self.machine, &self.job, z);
+        Self {
+            machine,
+            job,
+            runs: self.runs.clone(),
+            motion: self.motion.clone(),
+            scale: self.scale.clone(),
+            stated: self.stated.clone(),
+            disturbances: self.disturbances.clone(),
+            plain: OnceLock::new(),
+            ..*self
+        }
+    }
+
+    /// Output of the disturbed cuts.
+    pub(crate) fn disturbed(&self, causes: &[Cause]) -> Output {
+        self.runs
+            .iter()
+            .zip(&self.disturbances)
+            .map(|(run, disturbance)| self.sensed(&self.motion(run, causes, Some(disturbance)), causes))
+            .collect()
     }
 
     /// Keeps the first cut only and makes it so deep that it chatters; `None` if no tried depth does.
@@ -162,7 +215,7 @@ impl CutBench {
         self.runs[0].jumped = MOST_MISSED;
         for _ in 0..16 {
             self.runs[0].depth_mm *= 1.3;
-            let motion = self.motion(&self.runs[0], &[]);
+            let motion = self.motion(&self.runs[0], &[], None);
             if motion.largest_m() > MOST_FEEDS * 1e-3 * self.runs[0].feed_mm {
                 return None;
             }
@@ -202,6 +255,28 @@ impl CutBench {
         self.channel_names()[..forces].to_vec()
     }
 
+    /// Names of the channels that an error of a sensor concerns.
+    pub(crate) fn channels_of(&self, sensor: usize) -> Vec<String> {
+        match sensor {
+            EVERY_FORCE => self.force_names(),
+            EVERY_SENSOR => self.motion_names(),
+            sensor => self.channel_names().get(sensor).cloned().into_iter().collect(),
+        }
+    }
+
+    /// True if the motion grows over a record: the last third of it is twice as large as the first.
+    pub(crate) fn grows(&self, output: &Output) -> bool {
+        output.iter().any(|sensed| {
+            let motion = &sensed[sensed.len() - 2];
+            let third = motion.len() / 3;
+            let size = |part: &[f64]| {
+                let mean = part.iter().sum::<f64>() / part.len() as f64;
+                part.iter().map(|value| (value - mean).powi(2)).sum::<f64>()
+            };
+            size(&motion[2 * third..]) > 4.0 * size(&motion[..third])
+        })
+    }
+
     /// Names of the channels of motion.
     pub(crate) fn motion_names(&self) -> Vec<String> {
         let forces = self.sensors().len() - self.motion.len();
@@ -210,6 +285,10 @@ impl CutBench {
 
     /// Text of the case file: the baseline.
     pub(crate) fn case_text(&self) -> String {
+        let (machine, job) = self
+            .stated
+            .as_ref()
+            .map_or((&self.machine, &self.job), |(machine, job)| (machine, job));
         let Job {
             teeth,
             edge_angle_deg,
@@ -219,9 +298,18 @@ impl CutBench {
             start_deg,
             exit_deg,
             feed_mm,
-        } = &self.job;
-        let mut text = self.machine.case_text();
-        writeln!(text, "[tool]\nteeth = {teeth}\nedge_angle_deg = {edge_angle_deg:?}\ndiameter_mm = {diameter_mm:e}\n[material]").unwrap();
+            ..
+        } = job;
+        let mut text = machine.case_text();
+        writeln!(
+            text,
+            "[tool]\nteeth = {teeth}\nedge_angle_deg = {edge_angle_deg:?}\ndiameter_mm = {diameter_mm:e}"
+        )
+        .unwrap();
+        if self.stated.is_some() {
+            text += &uncertainty::keys_of_runout(job);
+        }
+        writeln!(text, "[material]").unwrap();
         for (index, letter) in ['t', 'r', 'a'].iter().enumerate() {
             writeln!(
                 text,
@@ -230,28 +318,38 @@ impl CutBench {
             )
             .unwrap();
         }
+        if self.stated.is_some() {
+            text += &uncertainty::keys_of_material(job);
+        }
         writeln!(
             text,
             "[cut]\nstart_deg = {start_deg:?}\nexit_deg = {exit_deg:?}\nfeed_per_tooth_mm = {feed_mm:e}"
         )
         .unwrap();
+        if self.stated.is_some() {
+            text += &uncertainty::section(machine);
+        }
         text
     }
 
     /// Forces, motion and spindle angle of one cut at the samples of its record.
-    fn motion(&self, run: &Run, causes: &[Cause]) -> Motion {
+    fn motion(&self, run: &Run, causes: &[Cause], disturbance: Option<&Disturbance>) -> Motion {
         let step_s = 1.0 / (self.rate_hz * self.steps as f64);
         let mut changed = self.machine.clone();
         causes
             .iter()
             .for_each(|cause| cause.change(&mut changed, &self.scale));
-        let system = System::new(
+        let mut system = System::new(
             &changed.mass,
             &changed.damping,
             &changed.stiffness,
             &changed.tip,
             step_s,
         );
+        causes
+            .iter()
+            .for_each(|cause| cause.add(&self.machine, &self.scale, &mut system));
+        let system = system.beginning_at(self.before as f64 / self.rate_hz);
         let chips = Chips {
             job: &self.job,
             run,
@@ -259,10 +357,12 @@ impl CutBench {
             before_s: self.before as f64 / self.rate_hz,
             step_s,
             furthest_m: Cell::new(0.0),
+            disturbance,
         };
         let count = (self.before + self.samples) * self.steps;
         let mut found = Motion::default();
         let (mut y, mut u) = (system.pulled([0.0; 3]), Vec::with_capacity(count));
+        let mut branches = system.branches(0.0, &mut y, &|_, _, _| [0.0; 3]);
         for k in 0..count {
             let (t, to) = (k as f64 * step_s, (k + 1) as f64 * step_s);
             if k >= self.before * self.steps && k.is_multiple_of(self.steps) {
@@ -270,7 +370,7 @@ impl CutBench {
                 let cutting = chips.cutting(t, x, chips.engaged(t + 1e-6 * step_s), &u);
                 let force = |t: f64, x: [f64; 3], v: [f64; 3]| chips.force(t, x, v, cutting, &u);
                 let mut path = Path::default();
-                system.note(t, &y, &[], &force, &mut path);
+                system.note(t, &y, &branches, &force, &mut path);
                 found.force.push(chips.force(t, x, path.v[0], cutting, &u));
                 found.u.push(x);
                 found.a.push(path.a[0]);
@@ -282,14 +382,14 @@ impl CutBench {
             u.push(x);
             let mut from = t;
             for switch in chips.switches(t, to) {
-                chips.advance(&system, [from, switch], &mut y, &u);
+                chips.advance(&system, [from, switch], &mut y, &mut branches, &u);
                 from = switch;
                 let x = system.displacement(&y);
                 let [before, after] = [-1e-6, 1e-6].map(|beside| {
                     let cutting = chips.cutting(switch, x, chips.engaged(switch + beside * step_s), &u);
                     let force = |t: f64, x: [f64; 3], v: [f64; 3]| chips.force(t, x, v, cutting, &u);
                     let mut path = Path::default();
-                    system.note(switch, &y, &[], &force, &mut path);
+                    system.note(switch, &y, &branches, &force, &mut path);
                     path.a[0]
                 });
                 let jump = std::array::from_fn(|axis| after[axis] - before[axis]);
@@ -297,7 +397,7 @@ impl CutBench {
                     .jumps
                     .push((switch - self.before as f64 / self.rate_hz, jump));
             }
-            chips.advance(&system, [from, to], &mut y, &u);
+            chips.advance(&system, [from, to], &mut y, &mut branches, &u);
         }
         found
     }
@@ -397,13 +497,18 @@ impl CutBench {
                     .map(|((sensor, samples), sigma)| Channel {
                         name: sensor.name(),
                         quantity: sensor.quantity(),
-                        samples: noisy(samples, *sigma, random),
+                        samples: match self.disturbances.get(number) {
+                            None => noisy(samples, *sigma, random),
+                            Some(disturbance) => {
+                                disturbance.recorded(samples, *sigma, self.rate_hz, random.random())
+                            }
+                        },
                     })
                     .collect();
                 channels.push(Channel {
                     name: "tacho".into(),
                     quantity: Quantity::Level,
-                    samples: level(&sensed[sensors.len()]),
+                    samples: level(&self.jittered(number, &sensed[sensors.len()], random)),
                 });
                 let mut sidecar = Sidecar {
                     kind: Some(TestKind::Cutting),
@@ -424,6 +529,25 @@ impl CutBench {
                     sidecar,
                 }
             })
+            .collect()
+    }
+
+    /// Spindle angles with the jitter of the tachometer of a cut: one error for each pulse.
+    fn jittered(&self, number: usize, angle: &[f64], random: &mut ChaCha8Rng) -> Vec<f64> {
+        let Some(disturbance) = self.disturbances.get(number) else {
+            return angle.to_vec();
+        };
+        let per_sample = (angle[angle.len() - 1] - angle[0]) / (angle.len() - 1) as f64;
+        let count = (angle[angle.len() - 1] / TAU) as usize + 2;
+        let errors: Vec<f64> = (0..count)
+            .map(|_| {
+                let deviate: f64 = StandardNormal.sample(random);
+                disturbance.jitter() * per_sample * deviate
+            })
+            .collect();
+        angle
+            .iter()
+            .map(|angle| angle + errors[((angle / TAU).round().max(0.0) as usize).min(count - 1)])
             .collect()
     }
 
@@ -467,6 +591,18 @@ struct Motion {
 }
 
 impl Motion {
+    /// Half the range of the displacement along the axis that moves most, m.
+    fn half_range_m(&self) -> f64 {
+        (0..3)
+            .map(|axis| {
+                let of = |start: f64, choose: fn(f64, f64) -> f64| {
+                    self.u.iter().fold(start, |found, u| choose(found, u[axis]))
+                };
+                0.5 * (of(f64::NEG_INFINITY, f64::max) - of(f64::INFINITY, f64::min))
+            })
+            .fold(0.0, f64::max)
+    }
+
     fn largest_m(&self) -> f64 {
         self.u.iter().flatten().fold(0.0, |most, u| most.max(u.abs()))
     }
@@ -522,7 +658,10 @@ impl Motion {
 impl Lab for CutBench {
     fn output(&self, causes: &[Cause]) -> Output {
         let moved = |causes: &[Cause]| -> Vec<Motion> {
-            self.runs.iter().map(|run| self.motion(run, causes)).collect()
+            self.runs
+                .iter()
+                .map(|run| self.motion(run, causes, None))
+                .collect()
         };
         if causes.iter().all(|cause| cause.kind.of_sensor()) {
             self.plain
@@ -556,12 +695,18 @@ impl Lab for CutBench {
             EffectKind::Mass | EffectKind::Stiffness | EffectKind::Damping | EffectKind::CommonFactor => {
                 self.machine.axes.iter().map(|axis| (*axis, 0)).collect()
             }
+            kind if RESTORING.contains(&kind) && kind.has_direction() => {
+                self.machine.axes.iter().map(|axis| (*axis, 0)).collect()
+            }
             _ => vec![(0, 0)],
         }
     }
 
     fn kinds(&self) -> Vec<EffectKind> {
         let mut kinds = PROCESS.to_vec();
+        if self.stated.is_some() {
+            kinds.extend(RESTORING);
+        }
         kinds.extend([
             EffectKind::SensorGain,
             EffectKind::SensorDelay,

@@ -13,6 +13,8 @@ pub(crate) struct Job {
     pub(crate) start_deg: f64,
     pub(crate) exit_deg: f64,
     pub(crate) feed_mm: f64,
+    /// Runout: offset, µm, and angle, degrees.
+    pub(crate) runout: [f64; 2],
 }
 
 /// Scales of the parameters of causes in the cutting process.

@@ -21,6 +21,8 @@ pub(crate) struct System {
     /// M⁻¹ Bᵀ.
     mobility: Vec<[f64; 3]>,
     laws: Vec<Law>,
+    /// Time from which the laws of time count, s.
+    start_s: f64,
     /// The step h for which `half` holds e^(A·h/2), by rows.
     step_s: f64,
     half: Vec<f64>,
@@ -59,6 +61,7 @@ impl System {
             tip: tip.to_vec(),
             mobility,
             laws: Vec::new(),
+            start_s: 0.0,
             step_s,
             half: rows(&(first_order(&inverse, damping, stiffness) * (0.5 * step_s)).exp()),
         }
@@ -72,6 +75,12 @@ impl System {
             *after = row.iter().zip(y).map(|(a, y)| a * y).sum();
         }
         after
+    }
+
+    /// The system with its laws of time counted from `start_s`.
+    pub(crate) fn beginning_at(mut self, start_s: f64) -> Self {
+        self.start_s = start_s;
+        self
     }
 
     /// Adds a law to the equation of motion.
@@ -152,7 +161,7 @@ impl System {
             match law {
                 Law::Friction { axis, .. } if branch == 0 => stuck = Some(*axis),
                 law => {
-                    let restoring = law.restoring(t, u, v, y, branch);
+                    let restoring = law.restoring(t - self.start_s, u, v, y, branch);
                     for axis in 0..3 {
                         left[axis] -= restoring[axis];
                     }

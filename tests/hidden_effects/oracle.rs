@@ -411,7 +411,7 @@ impl Cause {
     }
 
     /// False if the parameters of a fit are outside the range of real machines.
-    fn sensible(&self) -> bool {
+    pub(crate) fn sensible(&self) -> bool {
         let s = &self.shares;
         match self.kind {
             EffectKind::MissingMode => s[0] > 0.1 && (0.0005..0.3).contains(&s[1]) && s[2] > 0.5,

@@ -26,7 +26,7 @@ impl Process {
         let mut process = Self {
             cutting_pa: job.cutting_mpa.map(|value| 1e6 * value),
             edge_n_per_m: job.edge_n_per_mm.map(|value| 1e3 * value),
-            radial_m: vec![0.0; job.teeth],
+            radial_m: radial_m(job.runout, job.teeth),
             exponent: None,
             damping_n_per_m: 0.0,
             depth_follows: 0.0,
@@ -47,12 +47,7 @@ impl Process {
                     process.edge_n_per_m = process.edge_n_per_m.map(|value| value * values[0]);
                 }
                 EffectKind::ForceExponent => process.exponent = Some((values[0], 1e-3 * values[1])),
-                EffectKind::Runout => {
-                    for (index, radial) in process.radial_m.iter_mut().enumerate() {
-                        let angle = values[1].to_radians() + TAU * index as f64 / job.teeth as f64;
-                        *radial = 1e-6 * values[0] * angle.cos();
-                    }
-                }
+                EffectKind::Runout => process.radial_m = radial_m([values[0], values[1]], job.teeth),
                 EffectKind::ProcessDamping => process.damping_n_per_m = values[0],
                 EffectKind::AxialDepthModulation => process.depth_follows = values[0],
                 EffectKind::SpeedFluctuation => {
@@ -107,6 +102,16 @@ impl Cause {
             _ => return None,
         })
     }
+}
+
+/// Deviations of the radii of the teeth for an offset, µm, at an angle, degrees.
+fn radial_m([offset_um, angle_deg]: [f64; 2], teeth: usize) -> Vec<f64> {
+    (0..teeth)
+        .map(|index| {
+            let angle = angle_deg.to_radians() + TAU * index as f64 / teeth as f64;
+            1e-6 * offset_um * angle.cos()
+        })
+        .collect()
 }
 
 /// Runout as offset and angle. With two teeth only the component along their line changes their radii and is identifiable.

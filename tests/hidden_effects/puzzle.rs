@@ -9,7 +9,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::cause::{Cause, EffectKind, NOT_IN_LIBRARY, Scale};
-use super::cut::{CutBench, EVERY_FORCE, EVERY_SENSOR};
+use super::cut::CutBench;
 use super::machine::{Machine, between};
 use super::oracle::{Lab, Oracle, Output, Verdict};
 use super::rig::{Bench as RigBench, Rig, Test};
@@ -31,10 +31,14 @@ pub(crate) enum Family {
     /// Cuts in chatter. The oracle does not treat them: in a growing motion every trajectory contains more information on the machine than
     /// a fit can extract. Of rates, only that of answers with high confidence is required.
     Chatter,
+    /// Cuts in a workshop: a baseline that is known from tests only, in disturbed cuts.
+    CuttingInWorkshop,
+    /// The same with nothing hidden.
+    NothingInWorkshop,
 }
 
 impl Family {
-    pub(crate) const ALL: [Self; 10] = [
+    pub(crate) const ALL: [Self; 12] = [
         Self::Shaker,
         Self::Sweep,
         Self::FreeDecay,
@@ -45,6 +49,8 @@ impl Family {
         Self::TwoEffects,
         Self::QuadraticDamping,
         Self::Chatter,
+        Self::CuttingInWorkshop,
+        Self::NothingInWorkshop,
     ];
 
     /// Name of the family, as in `QUIETCUT_FAMILY`.
@@ -60,6 +66,8 @@ impl Family {
             Self::TwoEffects => "two-effects",
             Self::QuadraticDamping => "quadratic-damping",
             Self::Chatter => "chatter",
+            Self::CuttingInWorkshop => "workshop-cutting",
+            Self::NothingInWorkshop => "workshop-nothing",
         }
     }
 }
@@ -71,6 +79,8 @@ pub(crate) struct Hidden {
     pub(crate) values: Vec<(&'static str, f64)>,
     /// Direction or channels of the effect; empty if it acts everywhere.
     pub(crate) places: Vec<String>,
+    /// d² of the effect in cuts of a workshop; 0 elsewhere.
+    pub(crate) distance: f64,
 }
 
 /// Significant digits of the samples that [`Puzzle::keep_short`] writes: their rounding is 15 times below the least noise.
@@ -81,7 +91,7 @@ pub(crate) struct Puzzle {
     pub(crate) family: Family,
     pub(crate) seed: u64,
     pub(crate) case: Case,
-    case_text: String,
+    pub(crate) case_text: String,
     pub(crate) recordings: Vec<Recording>,
     pub(crate) hidden: Vec<Hidden>,
     /// By effect: root mean square of the change that it makes in addition to the other effects, over the noise, in the channel where that
@@ -101,6 +111,9 @@ const NOISE_IN_CHATTER: f64 = 0.01;
 impl Puzzle {
     /// Draws the puzzle of a seed: the first draw that is not borderline.
     pub(crate) fn draw(family: Family, seed: u64) -> Self {
+        if matches!(family, Family::CuttingInWorkshop | Family::NothingInWorkshop) {
+            return super::workshop::draw(family, seed);
+        }
         let mut redrawn = 0;
         loop {
             let mut random = ChaCha8Rng::seed_from_u64(seed * 1000 + redrawn as u64);
@@ -249,6 +262,7 @@ impl Puzzle {
             name: cause.kind.name(),
             values: cause.values(machine, scale),
             places: bench.places_of(cause),
+            distance: 0.0,
         };
         let case_text = bench.case_text();
         Some(Self {
@@ -297,18 +311,7 @@ impl Bench {
         }
         match self {
             Self::Rig(bench) => vec![bench.rig.sensors[cause.sensor].name()],
-            Self::Cut(bench) if cause.sensor == EVERY_FORCE => bench.force_names(),
-            // All channels of a single channel are that channel.
-            Self::Cut(bench) if cause.sensor == EVERY_SENSOR => match &bench.motion_names()[..] {
-                [one] => vec![one.clone()],
-                _ => Vec::new(),
-            },
-            Self::Cut(bench) => bench
-                .channel_names()
-                .get(cause.sensor)
-                .cloned()
-                .into_iter()
-                .collect(),
+            Self::Cut(bench) => bench.channels_of(cause.sensor),
         }
     }
 
@@ -325,6 +328,22 @@ impl Bench {
             Self::Rig(_) => None,
             Self::Cut(bench) => Some(bench.angle_sigma()),
         }
+    }
+}
+
+/// A hidden effect in cuts, as the judge reads it.
+pub(crate) fn describe(cause: &Cause, bench: &CutBench) -> Hidden {
+    let places = if cause.kind.of_sensor() {
+        bench.channels_of(cause.sensor)
+    } else {
+        let direction = cause.kind.has_direction().then(|| letter(cause.axis).to_string());
+        direction.into_iter().collect()
+    };
+    Hidden {
+        name: cause.kind.name(),
+        values: cause.values(&bench.machine, &bench.scale),
+        places,
+        distance: 0.0,
     }
 }
 
@@ -384,7 +403,7 @@ fn noise(family: Family, bench: &Bench, hidden: &[Cause], random: &mut ChaCha8Rn
     moves.then(|| size.iter().map(|size| size * share).chain(angle).collect())
 }
 
-fn rms<'a>(runs: impl Iterator<Item = &'a [f64]>) -> f64 {
+pub(crate) fn rms<'a>(runs: impl Iterator<Item = &'a [f64]>) -> f64 {
     let (mut sum, mut count) = (0.0, 0);
     for value in runs.flatten() {
         sum += value * value;
