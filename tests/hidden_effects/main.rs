@@ -274,3 +274,29 @@ fn recordings_of_the_answers() {
         }
     }
 }
+
+/// Writes cases, recordings and hidden effects of puzzles to the folder that `QUIETCUT_KEEP` names, without a diagnosis.
+#[test]
+#[ignore = "writes puzzles for `quietcut diagnose`: QUIETCUT_KEEP, QUIETCUT_FAMILY, QUIETCUT_SEEDS, QUIETCUT_FIRST_SEED"]
+fn puzzles_to_look_at() {
+    let folder = std::env::var_os("QUIETCUT_KEEP").unwrap();
+    let folder = std::path::Path::new(&folder);
+    let text = std::env::var("QUIETCUT_FAMILY").unwrap_or_default();
+    let seeds = std::env::var("QUIETCUT_SEEDS").map_or(8, |text| text.parse().unwrap());
+    let first = std::env::var("QUIETCUT_FIRST_SEED").map_or(0, |text| text.parse().unwrap());
+    for family in Family::ALL
+        .into_iter()
+        .filter(|family| family.name().contains(&text))
+    {
+        (first..first + seeds).into_par_iter().for_each(|seed| {
+            let puzzle = Puzzle::draw(family, seed);
+            puzzle.keep(folder);
+            println!(
+                "{} {seed}: {:?} {:?}",
+                family.name(),
+                puzzle.hidden,
+                puzzle.verdict
+            );
+        });
+    }
+}

@@ -27,6 +27,9 @@ const EXPONENT: f64 = 0.2;
 const REFERENCE_CHIP: f64 = 0.5;
 /// Runout, µm (tool holders: 3 to 20 µm).
 const RUNOUT_UM: f64 = 10.0;
+/// Growth of the forces by wear, and change of the stiffness by heat and posture, over a record.
+const WEAR: f64 = 0.2;
+const DRIFT: f64 = 0.1;
 /// Error of the gain of a sensor.
 const GAIN: f64 = 0.1;
 /// Delay of a channel, in samples.
@@ -65,6 +68,7 @@ pub(crate) fn all(baseline: &Baseline<'_>, records: &[ReducedCut], fit: &Fit) ->
         of_missing_mode(*along, records, &mut all);
     }
     of_coupling(&along, &mut all);
+    of_time(records, &mut all);
     of_process(baseline, records, &mut all);
     of_sensors(baseline, records, &mut all);
     all
@@ -239,6 +243,27 @@ fn of_coupling(along: &[Along], all: &mut Vec<Candidate>) {
                 of,
             ));
         }
+    }
+}
+
+/// Wear and drift, by their change over the longest record.
+fn of_time(records: &[ReducedCut], all: &mut Vec<Candidate>) {
+    let longest_s = records
+        .iter()
+        .filter_map(|record| record.orders.trend.as_ref())
+        .map(|trend| 12.0_f64.sqrt() * trend.scale_s)
+        .fold(0.0, f64::max);
+    if longest_s == 0.0 {
+        return;
+    }
+    for (effect, change) in [(EffectName::Wear, WEAR), (EffectName::Drift, DRIFT)] {
+        let rate = move |z: &[f64]| vec![("relative_rate_per_s", change * z[0] / longest_s)];
+        all.push(Candidate::new(
+            effect,
+            Location::Everywhere,
+            vec![Coordinate::FREE],
+            rate,
+        ));
     }
 }
 

@@ -16,8 +16,7 @@ use quietcut_recording::{Recording, TestKind};
 const CHATTER: f64 = 0.2;
 
 /// The diagnosis of records that are all cuts with a steady forced motion, which its orders explain; `None` for other
-/// records: those in chatter, those whose speed, force or stiffness changes in time, and those whose orders are left
-/// unexplained.
+/// records: those in chatter, those whose speed is modulated, and those whose orders are left unexplained.
 ///
 /// # Errors
 /// The case cannot be simulated.
@@ -46,11 +45,7 @@ pub(crate) fn diagnosed(
         motions.push(motion);
     }
     let is_modulated = speed_modulation(&motions.iter().collect::<Vec<_>>()).is_some();
-    if is_modulated
-        || records
-            .iter()
-            .any(|record| record.changes() || record.chatters(CHATTER))
-    {
+    if is_modulated || records.iter().any(|record| record.chatters(CHATTER)) {
         return Ok(None);
     }
     watch(Stage::Causes(1));

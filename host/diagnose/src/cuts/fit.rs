@@ -4,14 +4,11 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 use num_complex::Complex64;
 use rayon::prelude::*;
 
+use super::moment::{Moment, phase_deviation};
 use super::record::ReducedCut;
-use super::space::{Machine, Space, Variable};
+use super::space::{Space, Variable};
 use quietcut_numerics::statistics::chi_squared_quantile;
-use quietcut_stability::cut_orbit::{CutOrbit, ForceOrders, OrderWeights};
 
-/// Step of a central difference of what a variable changes explicitly, in its standard deviations. The error is its
-/// square times the curvature, and rounding over it.
-const DIFFERENCE: f64 = 1e-3;
 /// Predicted decrease of χ² below which a fit has converged: a hundredth of a standard deviation of any variable.
 const CONVERGED: f64 = 1e-4;
 /// Damping from which on a step that does not lower the cost ends a fit.
@@ -21,15 +18,13 @@ const STEPS: usize = 14;
 
 /// One cut at a point of the space.
 struct State {
-    machine: Machine,
-    orbit: CutOrbit,
-    weights: OrderWeights,
-    forces: ForceOrders,
-    /// Fourier coefficients of the channels.
-    coefficients: DMatrix<Complex64>,
+    middle: Moment,
+    /// Early and late in the record, as far from its middle as times are on average; `None` for a machine that does not
+    /// change.
+    ends: Option<[Moment; 2]>,
     /// Measured minus predicted amplitudes.
     error: DMatrix<Complex64>,
-    /// The same in standard deviations.
+    /// The same and that of the trend, in standard deviations.
     residual: Vec<f64>,
 }
 
@@ -81,45 +76,41 @@ impl State {
         record: &ReducedCut,
         near: Option<&Self>,
     ) -> Option<Self> {
-        let machine = space.machine(z, number, record)?;
-        let orbit = match near {
-            // A step beyond which Newton's method does not follow is too long.
-            Some(near) => CutOrbit::near(&machine.model, &near.orbit),
-            None => CutOrbit::new(&machine.model),
+        let at = |time_s: f64, near: Option<&Moment>| Moment::new(space, z, number, record, time_s, near);
+        let middle = at(record.conditions.time_s, near.map(|near| &near.middle))?;
+        let ends = match &record.orders.trend {
+            Some(trend) if space.depends_on_time() => {
+                let near = |end: usize| {
+                    near.and_then(|near| Some(&near.ends.as_ref()?[end]))
+                        .unwrap_or(&middle)
+                };
+                let [early_s, late_s] = record.ends_s(trend);
+                Some([at(early_s, Some(near(0)))?, at(late_s, Some(near(1)))?])
+            }
+            _ => None,
+        };
+        let mut predicted = middle.seen.clone();
+        let mut trend = record.orders.trend.as_ref().map(|trend| trend.amplitudes.clone());
+        if let (Some(trend), Some(ends)) = (&mut trend, &ends) {
+            *trend -= half_difference(ends.each_ref().map(|end| &end.seen));
         }
-        .ok()?;
-        let weights = orbit.order_weights(record.highest);
-        let forces = orbit.force_orders(&weights);
-        let mut coefficients = machine.reading.orders(&forces);
-        let mut predicted_more: Vec<(f64, &DMatrix<Complex64>)> = Vec::new();
         for (variable, z) in space.variables.iter().zip(z) {
+            let z = Complex64::from(*z);
             match variable {
-                Variable::Phase(own) if *own == number => {
-                    turn(&mut coefficients, z * phase_deviation(record))
-                }
                 Variable::Common(own, direction) if *own == number => {
-                    predicted_more.extend(
-                        record
-                            .common_directions()
-                            .nth(*direction)
-                            .map(|direction| (*z, direction)),
-                    );
+                    predicted += record.common_directions().nth(*direction)? * z;
+                }
+                Variable::Trend(own, direction) if *own == number => {
+                    *trend.as_mut()? -= record.trend_directions().nth(*direction)? * z;
                 }
                 _ => {}
             }
         }
-        let mut predicted = record.seen(&coefficients);
-        for (z, direction) in predicted_more {
-            predicted += direction * Complex64::from(z);
-        }
         let error = &record.orders.amplitudes - predicted;
-        let residual = record.whitened(&error);
+        let residual = record.whitened_over_time(&error, trend.as_ref());
         Some(Self {
-            machine,
-            orbit,
-            weights,
-            forces,
-            coefficients,
+            middle,
+            ends,
             error,
             residual,
         })
@@ -133,14 +124,15 @@ impl State {
             }
             match &space.variables[index] {
                 Variable::Common(_, direction) => {
-                    Some(record.whitened(record.common_directions().nth(*direction)?))
+                    Some(record.whitened_over_time(record.common_directions().nth(*direction)?, None))
+                }
+                Variable::Trend(_, direction) => {
+                    let direction = record.trend_directions().nth(*direction)?;
+                    Some(record.whitened_over_time(&(&direction * Complex64::ZERO), Some(&direction)))
                 }
                 Variable::Phase(_) => {
-                    let mut turned = self.coefficients.clone();
-                    for (order, mut row) in turned.row_iter_mut().enumerate() {
-                        row *= Complex64::new(0.0, order as f64 * phase_deviation(record));
-                    }
-                    Some(record.whitened(&record.seen(&turned)))
+                    let turned = &self.middle.by_phase * Complex64::from(phase_deviation(record));
+                    Some(record.whitened_over_time(&turned, None))
                 }
                 _ => self.difference(space, z, index, number, record),
             }
@@ -156,52 +148,27 @@ impl State {
         number: usize,
         record: &ReducedCut,
     ) -> Option<Vec<f64>> {
-        let at = |step: f64| {
-            let mut moved = z.to_vec();
-            moved[index] += step;
-            space.machine(&moved, number, record)
+        let slope = |moment: &Moment, time_s: f64| moment.slope(space, z, index, number, record, time_s);
+        let middle = slope(&self.middle, record.conditions.time_s)?;
+        let trend = match &record.orders.trend {
+            Some(trend) if space.depends_on_time() => {
+                let [early_s, late_s] = record.ends_s(trend);
+                let [early, late] = self
+                    .ends
+                    .as_ref()
+                    .map_or([&self.middle; 2], |ends| ends.each_ref());
+                let slopes = [slope(early, early_s)?, slope(late, late_s)?];
+                Some(record.seen(&half_difference(slopes.each_ref())))
+            }
+            _ => None,
         };
-        // At the boundary of a variable its derivative is one-sided.
-        let below = if z[index] - DIFFERENCE < space.lower(index) {
-            0.0
-        } else {
-            DIFFERENCE
-        };
-        let (plus, minus) = (at(DIFFERENCE)?, at(-below)?);
-        let step = DIFFERENCE + below;
-        let mut slope =
-            (plus.reading.orders(&self.forces) - minus.reading.orders(&self.forces)) / Complex64::from(step);
-        if !space.is_of_reading(index) {
-            let sensitivity = self.orbit.derivative(&plus.model, &minus.model, step)?;
-            let forces = self.orbit.force_order_slopes(&self.weights, &sensitivity);
-            slope += self.machine.reading.orders(&forces);
-        }
-        let phase: f64 = space
-            .variables
-            .iter()
-            .zip(z)
-            .map(|(variable, z)| match variable {
-                Variable::Phase(own) if *own == number => z * phase_deviation(record),
-                _ => 0.0,
-            })
-            .sum();
-        turn(&mut slope, phase);
-        Some(record.whitened(&record.seen(&slope)))
+        Some(record.whitened_over_time(&record.seen(&middle), trend.as_ref()))
     }
 }
 
-/// Standard deviation of the phase of the tachometer of a record, rad.
-fn phase_deviation(record: &ReducedCut) -> f64 {
-    record.orders.angle.phase_deviation_rad
-}
-
-/// The same signals at a spindle angle that is larger by `angle_rad`.
-fn turn(coefficients: &mut DMatrix<Complex64>, angle_rad: f64) {
-    if angle_rad != 0.0 {
-        for (order, mut row) in coefficients.row_iter_mut().enumerate() {
-            row *= Complex64::cis(order as f64 * angle_rad);
-        }
-    }
+/// Half of the second minus the first.
+fn half_difference([early, late]: [&DMatrix<Complex64>; 2]) -> DMatrix<Complex64> {
+    (late - early) * Complex64::from(0.5)
 }
 
 fn states(
@@ -357,14 +324,14 @@ impl Fit {
 
     /// Fourier coefficients of the channels in a record.
     pub(crate) fn coefficients(&self, record: usize) -> &DMatrix<Complex64> {
-        &self.states[record].coefficients
+        &self.states[record].middle.coefficients
     }
 
     /// Largest half ranges of displacement, m, and velocity, m/s, along x, y, z over the cuts.
     pub(crate) fn half_ranges(&self) -> [[f64; 3]; 2] {
         let mut largest = [[0.0_f64; 3]; 2];
         for state in &self.states {
-            let ranges = state.orbit.half_ranges();
+            let ranges = state.middle.orbit.half_ranges();
             for (largest, range) in largest.as_flattened_mut().iter_mut().zip(ranges.as_flattened()) {
                 *largest = largest.max(*range);
             }

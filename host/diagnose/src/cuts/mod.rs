@@ -3,10 +3,11 @@
 //!
 //! | file | content |
 //! |---|---|
-//! | `record` | a recorded cut, reduced |
+//! | `record`, `jumps`, `wander` | a recorded cut, reduced; what errors of the spindle angle and the speed leave in its orders |
 //! | `conditions`, `reading` | a machine in a cut; the orders of its channels |
 //! | `candidate`, `candidates` | effects with their widths |
 //! | `space` | variables of a fit |
+//! | `moment` | the orbit of a machine, and its derivatives |
 //! | `fit` | fit of a machine |
 //! | `selection` | sets of effects by their evidence |
 //! | `answer`, `views` | the answer, with its pictures |
@@ -18,6 +19,8 @@ mod candidates;
 mod conditions;
 pub(crate) mod diagnosis;
 mod fit;
+mod jumps;
+mod moment;
 mod reading;
 mod record;
 mod selection;
@@ -25,3 +28,4 @@ mod space;
 #[cfg(test)]
 mod tests;
 mod views;
+mod wander;

@@ -87,6 +87,24 @@ impl Reading {
         })
     }
 
+    /// By channel: its jump where the cutting force jumps by `force_n` along x, y, z.
+    pub(crate) fn jump(&self, structure: &FirstOrder, force_n: [f64; 3]) -> Vec<f64> {
+        // Accelerations jump with the force, unless velocities do.
+        let jumped = if self.mean_s == 0.0 {
+            &structure.c * (&structure.a * (&structure.b * Vector3::from(force_n)))
+        } else {
+            Vector3::zeros()
+        };
+        self.pickups
+            .iter()
+            .map(|pickup| match pickup.quantity {
+                Quantity::Force => pickup.read(force_n),
+                Quantity::Acceleration => pickup.read(jumped.into()),
+                _ => 0.0,
+            })
+            .collect()
+    }
+
     fn mean(&self, quantity: Quantity, s: Complex64) -> Complex64 {
         let turn = s * self.mean_s;
         if quantity != Quantity::Acceleration || turn.norm() == 0.0 {

@@ -1,15 +1,19 @@
 //! A recorded cut, reduced.
 
+use std::f64::consts::TAU;
 use std::path::PathBuf;
 
 use nalgebra::{Cholesky, DMatrix};
 use num_complex::Complex64;
 
 use super::conditions::Conditions;
+use super::jumps::OfJumps;
+use super::wander;
 use crate::baseline::{Baseline, derivatives};
 use crate::error::DiagnoseError;
 use crate::motion::recorded_cut::cut_of;
-use crate::orders::reduction::{Orders, ReductionSettings};
+use crate::orders::circle::Circle;
+use crate::orders::reduction::{Orders, ReductionSettings, Trend};
 use crate::orders::spindle_angle::SpindleAngle;
 use crate::signal::noise::rms;
 use quietcut_model::structure::FirstOrder;
@@ -20,13 +24,13 @@ use quietcut_recording::{Quantity, Recording};
 /// above, which fold; each unit takes one cell of the spectrum between two lines, of as many cells as there are
 /// revolutions, from the estimate of the noise.
 const ALIAS_FACTOR: [f64; 2] = [2.0, 8.0];
-/// Slope of the size of the orders over time, in standard deviations, from which on they change: noise exceeds it in one
-/// of 400 records.
-const TREND: f64 = 3.0;
 /// Time after which a record is taken as settled, in slowest decays of the structure, and at most this share of it. What
 /// is left of the free decay is fitted.
 const SETTLED_DECAYS: f64 = 3.0;
 const SETTLED_SHARE: f64 = 0.25;
+/// Standard deviation of the sensitivity of a channel at one order against that at others. Data sheets promise 1 to 5 %
+/// over the whole range of a sensor.
+const FLATNESS: f64 = 1e-3;
 /// Share of the cells between two lines that aliases may take.
 const ALIASED_CELLS: f64 = 0.25;
 
@@ -42,6 +46,10 @@ pub(crate) struct ReducedCut {
     /// What free decays of the modes leave in the orders, real and imaginary part of each mode, as large at the start of
     /// the record as the motion.
     decays: Vec<DMatrix<Complex64>>,
+    /// What errors of the spindle angle leave in the orders: in all of them, and where the force jumps.
+    of_angle: Vec<DMatrix<Complex64>>,
+    /// Where the force jumps.
+    pub(super) jumps: OfJumps,
     /// Sample rate, Hz.
     pub rate_hz: f64,
     /// Highest order of a prediction.
@@ -80,13 +88,28 @@ impl ReducedCut {
             settled_s,
         };
         let orders = Orders::with_angle(recording, &names, angle, &settings)?;
-        let decays = decays(baseline, recording, &orders, &settings);
+        let decays = decays(baseline, recording, &orders);
         let conditions = Conditions {
             spindle_hz: orders.angle.frequency_hz,
             depth_m: 1e-3 * depth_mm,
             cut: cut_of(baseline.case, recording)?,
-            time_s: 0.5 * recording.len() as f64 / recording.sample_rate_hz,
+            time_s: {
+                let edges_s = orders.angle.edges_s();
+                0.5 * (edges_s[0] + edges_s[orders.angle.count()])
+            },
         };
+        let jumps = OfJumps::new(baseline, &conditions, recording, &orders)?;
+        let mut of_angle = jumps.directions.clone();
+        of_angle.push(smeared(&orders));
+        let shifted = shifted(&orders, recording);
+        let highest = orders.kernel().aliases();
+        let of_speed = wander::directions(baseline, &conditions, &orders, recording.sample_rate_hz, highest);
+        let [tilted, bent @ ..] = shifted;
+        of_angle.extend(bent);
+        match of_speed {
+            Some([moved, wandering]) => of_angle.extend([moved + tilted, wandering]),
+            None => of_angle.push(tilted),
+        }
         let whiteners = whiteners(&orders).ok_or_else(|| {
             DiagnoseError::record(
                 &recording.path,
@@ -95,18 +118,45 @@ impl ReducedCut {
         })?;
         Ok(Self {
             path: recording.path.clone(),
-            highest: orders.kernel().aliases(),
+            highest,
             rate_hz: recording.sample_rate_hz,
             orders,
             conditions,
             whiteners,
             decays,
+            of_angle,
+            jumps,
         })
     }
 
-    /// Number of compared values: real and imaginary parts of the amplitudes of all orders but 0, whose offset is free.
+    /// Number of compared values: real and imaginary parts of the amplitudes of all orders but 0, whose offset is free,
+    /// and of their trend.
     pub(crate) fn count(&self) -> usize {
-        2 * self.whiteners.len() * self.orders.channels.len()
+        let of_mean = 2 * self.whiteners.len() * self.orders.channels.len();
+        of_mean * (1 + usize::from(self.orders.trend.is_some()))
+    }
+
+    /// Amplitudes and their trend in standard deviations of their errors, in a common order of values. Without a trend
+    /// of its own the record has no values of it.
+    pub(crate) fn whitened_over_time(
+        &self,
+        amplitudes: &DMatrix<Complex64>,
+        trend: Option<&DMatrix<Complex64>>,
+    ) -> Vec<f64> {
+        let mut values = self.whitened(amplitudes);
+        if let Some(known) = &self.orders.trend {
+            let scale = known.variance.sqrt().recip();
+            match trend {
+                Some(trend) => values.extend(self.whitened(trend).iter().map(|value| scale * value)),
+                None => values.resize(2 * values.len(), 0.0),
+            }
+        }
+        values
+    }
+
+    /// Times of the record, s, whose half difference in the prediction is that of the trend.
+    pub(crate) fn ends_s(&self, trend: &Trend) -> [f64; 2] {
+        [-1.0, 1.0].map(|sign| self.conditions.time_s + sign * trend.scale_s)
     }
 
     /// Amplitudes as the reduction would find them, from Fourier coefficients of the channels.
@@ -128,50 +178,6 @@ impl ReducedCut {
         values
     }
 
-    /// True if the orders change over the record by more than noise: in any way, or all in proportion to each other and
-    /// to time.
-    pub(crate) fn changes(&self) -> bool {
-        !self.orders.common.directions.is_empty() || self.trend() > TREND
-    }
-
-    /// Slope over time of the size of the amplitudes, in standard deviations of its error; 0 if the record is too short
-    /// for one.
-    ///
-    /// The size of block b is a_b = Re⟨Y, Y_b⟩/⟨Y, Y⟩ in the metric of the covariance, with the variance
-    /// q/⟨Y, Y⟩, q the variance of an amplitude of a block over that of the record. Every second block is taken: these do
-    /// not overlap.
-    fn trend(&self) -> f64 {
-        let blocks: Vec<_> = self.orders.blocks.iter().step_by(2).collect();
-        let [first, .., last] = blocks.as_slice() else {
-            return 0.0;
-        };
-        let white = self.whitened(&self.orders.amplitudes);
-        let energy: f64 = white.iter().map(|value| value * value).sum();
-        let sizes: Vec<f64> = blocks
-            .iter()
-            .map(|block| {
-                let of_block = self.whitened(&block.amplitudes);
-                of_block
-                    .iter()
-                    .zip(&white)
-                    .map(|(block, whole)| block * whole)
-                    .sum::<f64>()
-                    / energy
-            })
-            .collect();
-        let length = (last.centre_s - first.centre_s) / (blocks.len() - 1) as f64 * self.rate_hz;
-        // Hann's weights of a block have the variance 3/2 over its length.
-        let of_block = 1.5 / length / self.orders.variance_of_mean();
-        let mean_s = blocks.iter().map(|block| block.centre_s).sum::<f64>() / blocks.len() as f64;
-        let (mut slope, mut squares) = (0.0, 0.0);
-        for (block, size) in blocks.iter().zip(&sizes) {
-            let t = block.centre_s - mean_s;
-            slope += t * size;
-            squares += t * t;
-        }
-        slope.abs() / (squares * of_block / energy).sqrt()
-    }
-
     /// True if a spectral line of a channel of motion that is no order exceeds the share `least` of the largest order.
     pub(crate) fn chatters(&self, least: f64) -> bool {
         self.orders.lines.iter().any(|line| {
@@ -186,10 +192,27 @@ impl ReducedCut {
         })
     }
 
-    /// Directions in which all orders err together, in standard deviations: by slow changes, and by a motion that has
-    /// not settled.
+    /// Directions in which all orders err together, in standard deviations: by slow changes, by a motion that has
+    /// not settled, and where the force jumps.
     pub(crate) fn common_directions(&self) -> impl Iterator<Item = &DMatrix<Complex64>> {
-        self.orders.common.directions.iter().chain(&self.decays)
+        self.orders
+            .common
+            .directions
+            .iter()
+            .chain(&self.decays)
+            .chain(&self.of_angle)
+    }
+
+    /// Directions in which the trend of all orders errs together, in standard deviations.
+    pub(crate) fn trend_directions(&self) -> impl Iterator<Item = DMatrix<Complex64>> {
+        self.orders.trend.iter().flat_map(|trend| {
+            let scale = Complex64::from(trend.variance.sqrt());
+            trend
+                .common
+                .directions
+                .iter()
+                .map(move |direction| direction * scale)
+        })
     }
 }
 
@@ -198,73 +221,147 @@ fn whiteners(orders: &Orders) -> Option<Vec<DMatrix<Complex64>>> {
     let inflation = orders.common.inflation();
     orders.covariances[1..]
         .iter()
-        .map(|covariance| {
+        .enumerate()
+        .map(|(index, covariance)| {
             // The mean of T² exceeds the number of values, since the covariance is estimated (Hotelling).
             let freedoms = covariance.freedoms;
-            let scale = 0.5 * inflation * freedoms / (freedoms - channels).max(1.0);
-            let lower = Cholesky::new(&covariance.matrix * Complex64::from(scale))?.l();
+            let scale = inflation * freedoms / (freedoms - channels).max(1.0);
+            let mut matrix = &covariance.matrix * Complex64::from(scale);
+            for channel in 0..orders.channels.len() {
+                let amplitude = orders.amplitudes[(index + 1, channel)].norm();
+                matrix[(channel, channel)] += (FLATNESS * amplitude).powi(2);
+            }
+            let lower = Cholesky::new(matrix * Complex64::from(0.5))?.l();
             lower.try_inverse()
         })
         .collect()
 }
 
-/// Orders that free decays of the structure leave in a reduction.
-fn decays(
-    baseline: &Baseline<'_>,
-    recording: &Recording,
-    orders: &Orders,
-    settings: &ReductionSettings,
-) -> Vec<DMatrix<Complex64>> {
-    let names: Vec<&str> = orders.channels.iter().map(String::as_str).collect();
+/// What the mean over errors of the spindle angle with the variance σ² takes from the orders: Y_k k² σ²/2.
+fn smeared(orders: &Orders) -> DMatrix<Complex64> {
+    let variance = orders.angle.angle_deviation_rad.powi(2);
+    let mut smeared = orders.amplitudes.clone();
+    for (order, mut row) in smeared.row_iter_mut().enumerate() {
+        row *= Complex64::from(0.5 * variance * (order * order) as f64);
+    }
+    smeared
+}
+
+/// What errors of the spindle angle leave in the orders of a record, if they go over it as the Legendre polynomials of
+/// the degrees 1 to 4: one standard deviation of the mean speed, then of the angle. The signal at the angle θ + ε(t)
+/// differs by ε dy/dθ.
+fn shifted(orders: &Orders, recording: &Recording) -> [DMatrix<Complex64>; 4] {
+    let (times_s, revolutions) = orders.sampled(recording);
+    let circle = Circle::new(orders.amplitudes.nrows() - 1);
+    let slopes: Vec<Vec<f64>> = orders
+        .amplitudes
+        .column_iter()
+        .map(|column| {
+            let by_angle: Vec<Complex64> = column
+                .iter()
+                .enumerate()
+                .map(|(order, amplitude)| amplitude * Complex64::new(0.0, order as f64))
+                .collect();
+            let series = circle.series(&by_angle);
+            revolutions
+                .iter()
+                .map(|revolution| series.at(*revolution))
+                .collect()
+        })
+        .collect();
+    let (first_s, last_s) = (times_s[0], times_s[times_s.len() - 1]);
+    let angle = &orders.angle;
+    let tilt = 0.5 * TAU * angle.frequency_deviation_hz * (last_s - first_s);
+    std::array::from_fn(|index| {
+        let size = if index == 0 {
+            tilt
+        } else {
+            angle.angle_deviation_rad
+        };
+        let columns: Vec<_> = slopes
+            .iter()
+            .map(|slopes| {
+                let samples = slopes.iter().zip(&times_s).map(|(slope, time_s)| {
+                    let x = 2.0 * (time_s - first_s) / (last_s - first_s) - 1.0;
+                    size * legendre(index + 1, x) * slope
+                });
+                nalgebra::DVector::from_vec(orders.of_samples(samples, &revolutions))
+            })
+            .collect();
+        DMatrix::from_columns(&columns)
+    })
+}
+
+fn legendre(degree: usize, x: f64) -> f64 {
+    match degree {
+        0 => 1.0,
+        1 => x,
+        2 => 0.5 * (3.0 * x * x - 1.0),
+        3 => 0.5 * (5.0 * x * x - 3.0) * x,
+        _ => 0.125 * ((35.0 * x * x - 30.0) * x * x + 3.0),
+    }
+}
+
+/// Orders that free decays of the structure leave in a reduction: by mode its real and imaginary part, as large at the
+/// start as the motion.
+fn decays(baseline: &Baseline<'_>, recording: &Recording, orders: &Orders) -> Vec<DMatrix<Complex64>> {
+    let (times_s, revolutions) = orders.sampled(recording);
     let first_s = orders.angle.edges_s()[0];
+    let poles = baseline.first_order.poles().into_iter();
     let mut all = Vec::new();
-    for pole in baseline.first_order.poles() {
-        if pole.im <= 0.0 || pole.re >= 0.0 {
-            continue;
-        }
+    for pole in poles.filter(|pole| pole.im > 0.0 && pole.re < 0.0) {
         let Some(shape) = mode_shape(&baseline.first_order, pole) else {
             continue;
         };
+        // Amplitude of the decay in each channel, over the size of the channel.
+        let amplitudes: Vec<Complex64> = orders
+            .channels
+            .iter()
+            .map(|name| amplitude_of(baseline, name, pole, shape))
+            .collect();
+        let share = orders
+            .channels
+            .iter()
+            .zip(&amplitudes)
+            .filter_map(|(name, amplitude)| {
+                let size = rms(&recording.channel(name)?.samples);
+                Some(amplitude.norm() / size.max(f64::MIN_POSITIVE))
+            })
+            .fold(0.0, f64::max);
+        if share == 0.0 {
+            continue;
+        }
         for part in [Complex64::ONE, Complex64::i()] {
-            let mut decay = recording.clone();
-            let mut share: f64 = 0.0;
-            for channel in &mut decay.channels {
-                let Some(pickup) = baseline
-                    .pickup(&channel.name)
-                    .filter(|_| names.contains(&channel.name.as_str()))
-                else {
-                    continue;
-                };
-                let size = rms(&channel.samples);
-                let moved: Complex64 = pickup
-                    .weights
-                    .iter()
-                    .zip(&shape)
-                    .map(|(weight, shape)| shape * *weight)
-                    .sum();
-                let amplitude = match pickup.quantity {
-                    Quantity::Force => Complex64::ZERO,
-                    quantity => part * moved * pole.powi(derivatives(quantity)),
-                };
-                share = share.max(amplitude.norm() / size.max(f64::MIN_POSITIVE));
-                for (index, sample) in channel.samples.iter_mut().enumerate() {
-                    let t = index as f64 / recording.sample_rate_hz - first_s;
-                    *sample = if t < 0.0 {
-                        0.0
-                    } else {
-                        (amplitude * (pole * t).exp()).re
-                    };
-                }
-            }
-            if share == 0.0 {
-                continue;
-            }
-            if let Ok(reduced) = Orders::with_angle(&decay, &names, orders.angle.clone(), settings) {
-                all.push(reduced.amplitudes / Complex64::from(share));
-            }
+            let columns: Vec<_> = amplitudes
+                .iter()
+                .map(|amplitude| {
+                    let samples = times_s
+                        .iter()
+                        .map(|time_s| (amplitude * part / share * (pole * (time_s - first_s)).exp()).re);
+                    nalgebra::DVector::from_vec(orders.of_samples(samples, &revolutions))
+                })
+                .collect();
+            all.push(DMatrix::from_columns(&columns));
         }
     }
     all
+}
+
+/// Amplitude in a channel of the motion of the tool in the mode of a pole.
+fn amplitude_of(baseline: &Baseline<'_>, name: &str, pole: Complex64, shape: [Complex64; 3]) -> Complex64 {
+    let Some(pickup) = baseline
+        .pickup(name)
+        .filter(|pickup| pickup.quantity != Quantity::Force)
+    else {
+        return Complex64::ZERO;
+    };
+    let moved: Complex64 = pickup
+        .weights
+        .iter()
+        .zip(&shape)
+        .map(|(weight, shape)| shape * *weight)
+        .sum();
+    moved * pole.powi(derivatives(pickup.quantity))
 }
 
 /// Motion of the tool along x, y, z in the mode of a pole.

@@ -10,6 +10,7 @@ use super::record::ReducedCut;
 use crate::baseline::{Baseline, pickup_of};
 use crate::error::DiagnoseError;
 use quietcut_model::case::{Case, Deviation, Parameter};
+use quietcut_model::effects::EffectName;
 use quietcut_model::{Effects, ModelError};
 use quietcut_stability::cut_orbit::CutModel;
 
@@ -36,6 +37,8 @@ pub(crate) enum Variable {
     Feed(usize),
     /// A direction in which all orders of a record err together.
     Common(usize, usize),
+    /// A direction in which the trend of all orders of a record errs.
+    Trend(usize, usize),
     /// A coordinate of a candidate.
     Coordinate(usize, usize),
 }
@@ -75,6 +78,9 @@ impl<'a> Space<'a> {
             ]);
             variables.extend(
                 (0..record.common_directions().count()).map(|direction| Variable::Common(index, direction)),
+            );
+            variables.extend(
+                (0..record.trend_directions().count()).map(|direction| Variable::Trend(index, direction)),
             );
         }
         Self {
@@ -123,9 +129,11 @@ impl<'a> Space<'a> {
     /// True if a variable may act on a record.
     pub(crate) fn acts_on(&self, variable: usize, record: usize) -> bool {
         match self.variables[variable] {
-            Variable::Phase(own) | Variable::Depth(own) | Variable::Feed(own) | Variable::Common(own, _) => {
-                own == record
-            }
+            Variable::Phase(own)
+            | Variable::Depth(own)
+            | Variable::Feed(own)
+            | Variable::Common(own, _)
+            | Variable::Trend(own, _) => own == record,
             _ => true,
         }
     }
@@ -170,11 +178,29 @@ impl<'a> Space<'a> {
         Ok(effects)
     }
 
-    /// The machine at a point of the space in the cut `number`; `None` if it is not possible.
-    pub(crate) fn machine(&self, z: &[f64], number: usize, record: &ReducedCut) -> Option<Machine> {
+    /// True if the machine changes along a record.
+    pub(crate) fn depends_on_time(&self) -> bool {
+        [EffectName::Wear, EffectName::Drift].into_iter().any(|effect| {
+            self.baseline.case.has(effect)
+                || self.candidates.iter().any(|candidate| candidate.effect == effect)
+        })
+    }
+
+    /// The machine at a point of the space in the cut `number`, at a time from the start of its record; `None` if it is
+    /// not possible.
+    pub(crate) fn machine(
+        &self,
+        z: &[f64],
+        number: usize,
+        record: &ReducedCut,
+        time_s: f64,
+    ) -> Option<Machine> {
         let case = self.case(z)?;
         let effects = self.baseline.effects.clone().and(&self.effects(z).ok()?);
-        let mut conditions: Conditions = record.conditions;
+        let mut conditions = Conditions {
+            time_s,
+            ..record.conditions
+        };
         if let Some(cut) = case.cut {
             conditions.cut.feed_direction_deg = cut.feed_direction_deg;
         }

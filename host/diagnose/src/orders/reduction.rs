@@ -11,6 +11,7 @@ use crate::orders::asynchronous::{SpectralLine, Spectrum};
 use crate::orders::between_lines::{Band, LineSpectrum};
 use crate::orders::block_noise::independent_combinations;
 use crate::orders::channel_reduction::{BlockWeights, ChannelReduction, Plan};
+use crate::orders::circle::Circle;
 use crate::orders::common::{BLOCKS_MAX, BLOCKS_MIN, Common};
 use crate::orders::distance::{self, Hotelling, OrderCovariance, SquaredDistance};
 use crate::orders::spindle_angle::{SpindleAngle, check_revolutions};
@@ -49,6 +50,20 @@ pub(crate) struct AmplitudeBlock {
     pub amplitudes: DMatrix<Complex64>,
 }
 
+/// Linear change of the amplitudes over a record.
+#[derive(Clone, Debug)]
+pub(crate) struct Trend {
+    /// Slope of the amplitudes over time, times `scale_s`.
+    pub amplitudes: DMatrix<Complex64>,
+    /// Standard deviation of the time over the reduced revolutions, s.
+    pub scale_s: f64,
+    /// Variance of `amplitudes` over that of the amplitudes of the record.
+    pub variance: f64,
+    /// Errors common to all orders but 0, from the deviations of the blocks from the trend, for the amplitudes of the
+    /// record.
+    pub common: Common,
+}
+
 /// Orders of a recorded cut.
 ///
 /// y(t) = Y_0 + 2 Re Σ_{k=1}^{K} Y_k e^{ikθ(t)} + asynchronous part, so that |Y_k| is half the amplitude (zero to peak),
@@ -66,6 +81,8 @@ pub(crate) struct Orders {
     pub common: Common,
     /// Amplitudes over time; empty if the record is shorter than three blocks.
     pub blocks: Vec<AmplitudeBlock>,
+    /// `None` if the record is shorter than three blocks.
+    pub trend: Option<Trend>,
     pub spectrum: Spectrum,
     /// Spectral lines that are no orders, by channel and descending power.
     pub lines: Vec<SpectralLine>,
@@ -101,9 +118,7 @@ impl Orders {
     ) -> Result<Self, DiagnoseError> {
         check_revolutions(recording, angle.count())?;
         let rate_hz = recording.sample_rate_hz;
-        let edges_s = angle.edges_s();
-        let sample = |time_s: f64| ((time_s * rate_hz).ceil().max(0.0) as usize).min(recording.len());
-        let range = sample(edges_s[0])..sample(edges_s[angle.count()]);
+        let range = reduced_range(recording, &angle);
         let samples = channels(recording, names, &range)?;
         let revolutions = angle.revolutions_at(range.clone().map(|sample| sample as f64 / rate_hz));
         let per_sample = angle.frequency_hz / rate_hz;
@@ -131,7 +146,11 @@ impl Orders {
             .map(|samples| ChannelReduction::new(samples, &plan))
             .collect();
         let spectral = spectral_matrices(&reduced, &plan);
-        let (common, blocks) = over_time(&reduced, &spectral, &plan, range.start);
+        let OverTime {
+            common,
+            blocks,
+            trend,
+        } = over_time(&reduced, &spectral, &plan, range.start);
         let variance = taper.variance_of_mean();
         Ok(Self {
             channels: names.iter().map(ToString::to_string).collect(),
@@ -147,6 +166,7 @@ impl Orders {
                 .collect(),
             common,
             blocks,
+            trend,
             spectrum: Spectrum {
                 first_hz: reduced.first().map_or(0.0, |channel| channel.density.0),
                 step_hz: reduced.first().map_or(0.0, |channel| channel.density.1),
@@ -172,6 +192,34 @@ impl Orders {
     /// channel, including aliasing; see [`AliasKernel::seen`].
     pub(crate) fn seen(&self, c: &[Complex64]) -> Vec<Complex64> {
         self.kernel.seen(c)
+    }
+
+    /// Amplitudes of the orders 0 … K that the reduction finds in samples at these spindle angles, those of the record,
+    /// in revolutions.
+    pub(crate) fn of_samples(
+        &self,
+        samples: impl Iterator<Item = f64>,
+        revolutions: &[f64],
+    ) -> Vec<Complex64> {
+        let taper = Taper::new(revolutions.len());
+        let weighted = samples
+            .zip(revolutions)
+            .enumerate()
+            .map(|(sample, (value, revolution))| (*revolution, taper.weight(sample) * value));
+        let mut right = Circle::new(self.kernel.orders()).sums(weighted);
+        for entry in &mut right {
+            *entry /= taper.sum();
+        }
+        self.kernel.solve(&right)
+    }
+
+    /// Times of the reduced samples of a record, s after the first sample, and their spindle angles, in revolutions.
+    pub(crate) fn sampled(&self, recording: &Recording) -> (Vec<f64>, Vec<f64>) {
+        let times_s: Vec<f64> = reduced_range(recording, &self.angle)
+            .map(|sample| sample as f64 / recording.sample_rate_hz)
+            .collect();
+        let revolutions = self.angle.revolutions_at(times_s.iter().copied());
+        (times_s, revolutions)
     }
 
     /// Variance of an amplitude over that of a sample of white noise, Σw²/(Σw)².
@@ -205,6 +253,14 @@ impl Orders {
             Hotelling::new(order, self.channels.len(), covariance.freedoms),
         )
     }
+}
+
+/// Samples within the whole revolutions.
+fn reduced_range(recording: &Recording, angle: &SpindleAngle) -> std::ops::Range<usize> {
+    let edges_s = angle.edges_s();
+    let sample =
+        |time_s: f64| ((time_s * recording.sample_rate_hz).ceil().max(0.0) as usize).min(recording.len());
+    sample(edges_s[0])..sample(edges_s[angle.count()])
 }
 
 /// Samples of the named channels within the range.
@@ -297,27 +353,36 @@ fn spectral_matrices(reduced: &[ChannelReduction], plan: &Plan) -> Vec<DMatrix<C
         .collect()
 }
 
-/// The common part and the amplitudes by block.
+/// What blocks show of changes over time.
+#[derive(Default)]
+struct OverTime {
+    common: Common,
+    blocks: Vec<AmplitudeBlock>,
+    trend: Option<Trend>,
+}
+
+/// The common part, the amplitudes by block and their trend.
 fn over_time(
     reduced: &[ChannelReduction],
     spectral: &[DMatrix<Complex64>],
     plan: &Plan,
     first: usize,
-) -> (Common, Vec<AmplitudeBlock>) {
+) -> OverTime {
     let amplitudes = by_order(reduced.iter().map(|channel| channel.amplitudes.as_slice()));
-    let deviations: Vec<DMatrix<Complex64>> = (0..plan.blocks.len())
+    let mut deviations: Vec<DMatrix<Complex64>> = (0..plan.blocks.len())
         .map(|block| by_order(reduced.iter().map(|channel| channel.blocks[block].as_slice())))
         .collect();
-    let blocks = plan
+    let blocks: Vec<AmplitudeBlock> = plan
         .blocks
         .iter()
         .zip(&deviations)
         .map(|(block, deviation)| AmplitudeBlock {
             centre_s: ((first + block.first) as f64 + 0.5 * (block.taper.count() - 1) as f64) / plan.rate_hz,
             amplitudes: &amplitudes + deviation,
-        });
+        })
+        .collect();
     let Some(of_block) = plan.blocks.first().map(|block| block.taper.variance_of_mean()) else {
-        return (Common::default(), Vec::new());
+        return OverTime::default();
     };
     let factors: Option<Vec<DMatrix<Complex64>>> = spectral
         .iter()
@@ -325,10 +390,54 @@ fn over_time(
         .collect();
     let of_record = plan.taper.variance_of_mean() / of_block;
     let independent = independent_combinations(plan);
-    let common = factors.map_or_else(Common::default, |factors| {
-        Common::new(&deviations, &factors, &independent, of_record)
-    });
-    (common, blocks.collect())
+    let common = |deviations: &[DMatrix<Complex64>]| {
+        factors.as_ref().map_or_else(Common::default, |factors| {
+            Common::new(deviations, factors, &independent, of_record)
+        })
+    };
+    let found = common(&deviations);
+    let scale_s = plan.revolutions.len() as f64 / plan.rate_hz / 12.0_f64.sqrt();
+    let slope = slope(&blocks, scale_s);
+    for (deviation, block) in deviations.iter_mut().zip(&blocks) {
+        *deviation -= &slope.amplitudes * Complex64::from((block.centre_s - slope.centre_s) / scale_s);
+    }
+    OverTime {
+        common: found,
+        trend: Some(Trend {
+            amplitudes: slope.amplitudes,
+            scale_s,
+            variance: slope.variance / of_record,
+            common: common(&deviations),
+        }),
+        blocks,
+    }
+}
+
+/// Slope of the amplitudes over time.
+struct Slope {
+    amplitudes: DMatrix<Complex64>,
+    /// Variance over that of a block.
+    variance: f64,
+    centre_s: f64,
+}
+
+/// Slope of the amplitudes of every second block, which do not overlap, by `scale_s`.
+fn slope(blocks: &[AmplitudeBlock], scale_s: f64) -> Slope {
+    let apart: Vec<&AmplitudeBlock> = blocks.iter().step_by(2).collect();
+    let centre_s = apart.iter().map(|block| block.centre_s).sum::<f64>() / apart.len() as f64;
+    let squares: f64 = apart
+        .iter()
+        .map(|block| (block.centre_s - centre_s).powi(2))
+        .sum();
+    let mut amplitudes = &apart[0].amplitudes * Complex64::ZERO;
+    for block in &apart {
+        amplitudes += &block.amplitudes * Complex64::from((block.centre_s - centre_s) * scale_s / squares);
+    }
+    Slope {
+        amplitudes,
+        variance: scale_s * scale_s / squares,
+        centre_s,
+    }
 }
 
 /// Amplitudes by order (rows) and channel (columns).

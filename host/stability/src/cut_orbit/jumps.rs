@@ -2,9 +2,15 @@
 
 use nalgebra::DVector;
 
-use super::law::Instant;
+use super::law::{Forces, Instant};
 use super::mesh::Contact;
+use super::model::CutModel;
+use super::orbit::CutOrbit;
 use super::period::{Period, SparseRow};
+
+/// Least jump of an input, over its largest value in the revolution. Where a force only has a kink, an event that is
+/// found less exactly than this leaves a jump in proportion.
+const LEAST_JUMP: f64 = 1e-6;
 
 /// Forces after an event minus those before it.
 pub(super) struct JumpSize {
@@ -26,10 +32,55 @@ pub(super) struct Jump {
     pub(super) own: DVector<f64>,
 }
 
+impl CutOrbit {
+    /// Where teeth enter or leave at the angles of the engagement: time, s from the beginning of the revolution, and the
+    /// cutting force along x, y, z after it minus that before it, N.
+    pub fn jumps_of_engagement(&self, model: &CutModel) -> Vec<(f64, [f64; 3])> {
+        let period = Period {
+            model,
+            ports: &self.ports,
+            mesh: &self.mesh,
+            motion: &self.motion,
+        };
+        let subintervals = &self.mesh.subintervals;
+        let mut jumps = Vec::new();
+        for (index, subinterval) in subintervals.iter().enumerate() {
+            let before = &subintervals[(index + subintervals.len() - 1) % subintervals.len()];
+            if before.stretch != subinterval.stretch {
+                let [before, after] = period.beside(index);
+                let jump_n = std::array::from_fn(|axis| after.cutting_n[axis] - before.cutting_n[axis]);
+                jumps.push((subinterval.start_s, jump_n));
+            }
+        }
+        jumps
+    }
+}
+
 impl Period<'_> {
+    /// Forces just before and at the start of a subinterval.
+    fn beside(&self, index: usize) -> [Forces; 2] {
+        let subintervals = &self.mesh.subintervals;
+        let before = &subintervals[(index + subintervals.len() - 1) % subintervals.len()];
+        let path = self.path();
+        [&before.contact, &subintervals[index].contact].map(|contact| {
+            let at = Instant {
+                time_s: subintervals[index].start_s,
+                contact,
+                outputs: self.motion.at_point(self.mesh.point(index, 0)),
+                path: &path,
+            };
+            self.model.forces(self.ports, &at)
+        })
+    }
+
     /// The events at which the inputs jump.
     pub(super) fn jumps(&self, sizes: &[f64]) -> Vec<Jump> {
-        let path = self.path();
+        let inputs = self.ports.inputs();
+        let mut largest = vec![0.0_f64; inputs];
+        for (index, input) in self.forces().inputs.iter().enumerate() {
+            let most = &mut largest[index % inputs];
+            *most = most.max(input.abs());
+        }
         let mut jumps = Vec::new();
         for (index, subinterval) in self.mesh.subintervals.iter().enumerate() {
             if subinterval.event.is_none() {
@@ -37,25 +88,20 @@ impl Period<'_> {
             }
             let before = &self.mesh.subintervals
                 [(index + self.mesh.subintervals.len() - 1) % self.mesh.subintervals.len()];
-            let point = self.mesh.point(index, 0);
-            let at = |contact| Instant {
-                time_s: subinterval.start_s,
-                contact,
-                outputs: self.motion.at_point(point),
-                path: &path,
-            };
-            let forces = |contact| self.model.forces(self.ports, &at(contact));
-            let (left, right) = (forces(&before.contact), forces(&subinterval.contact));
+            let [left, right] = self.beside(index);
             let pairs = right.inputs.iter().zip(&left.inputs);
             let size = JumpSize {
                 subinterval: index,
                 inputs: DVector::from_iterator(left.inputs.len(), pairs.map(|(right, left)| right - left)),
                 cutting_n: std::array::from_fn(|axis| right.cutting_n[axis] - left.cutting_n[axis]),
             };
-            let all = left.inputs.iter().chain(&right.inputs);
-            let largest = all.fold(0.0_f64, |most, force| most.max(force.abs()));
-            // Only rounding: the inputs have a kink here, which does not move the orbit to first order.
-            if size.inputs.amax() <= 1e-9 * largest {
+            // What is left is a kink of the inputs, which does not move the orbit to first order.
+            let is_kink = size
+                .inputs
+                .iter()
+                .zip(&largest)
+                .all(|(jump, largest)| jump.abs() <= LEAST_JUMP * largest);
+            if is_kink {
                 continue;
             }
             jumps.extend(self.jump(size, &before.contact, sizes));

@@ -22,6 +22,11 @@ const EVENT_FOUND: f64 = 1e-9;
 const NEAR: f64 = 0.05;
 /// Largest number of Newton steps.
 const STEPS: usize = 20;
+/// Largest relative step of the displacement at the end of a search on a mesh that a finer one may resolve: events that
+/// lie in the surface near another event move by as much as the motion between the nodes errs.
+const RESOLVABLE: f64 = 1e-3;
+/// Largest number of events in a revolution: beyond, a motion is far from any orbit.
+const MOST_EVENTS: usize = 256;
 /// Number of Newton steps without one of half the size of the smallest before, after which a search ends.
 const STALLED: usize = 7;
 /// Smallest step of a natural continuation, as a share of its way.
@@ -77,6 +82,24 @@ pub struct CutOrbit {
     splits: Vec<f64>,
     /// Number of Newton steps that were taken.
     pub steps: usize,
+}
+
+/// The end of a search on one mesh.
+struct Settled {
+    orbit: CutOrbit,
+    /// Relative change of the motion in the last full Newton step.
+    change: f64,
+}
+
+impl CutOrbitError {
+    fn not_converged(model: &CutModel, steps: usize, change: f64) -> Self {
+        Self::NotConverged {
+            rpm: model.rad_per_s * 60.0 / std::f64::consts::TAU,
+            depth_mm: 1e3 * model.cutter.depth_m,
+            steps,
+            change,
+        }
+    }
 }
 
 /// A mesh, and a motion to start from.
@@ -139,9 +162,13 @@ impl CutOrbit {
         let mut start = Start::new(model, &ports, &stretches, known);
         let mut steps = 0;
         loop {
-            let orbit = start.converge(model, &ports, &stretches, &mut steps)?;
+            let Settled { orbit, change } = start.converge(model, &ports, &stretches, &mut steps)?;
             if !start.refine(&orbit) {
-                return Ok(orbit);
+                return if change < TAIL {
+                    Ok(orbit)
+                } else {
+                    Err(CutOrbitError::not_converged(model, steps, change))
+                };
             }
             let finer = Mesh::new(
                 &stretches,
@@ -224,7 +251,7 @@ impl Start {
         ports: &Ports,
         stretches: &Stretches,
         steps: &mut usize,
-    ) -> Result<CutOrbit, CutOrbitError> {
+    ) -> Result<Settled, CutOrbitError> {
         let rpm = model.rad_per_s * 60.0 / std::f64::consts::TAU;
         let not_periodic = CutOrbitError::NoPeriodicResponse { rpm };
         let (mut last, mut share) = (f64::INFINITY, 1.0);
@@ -234,6 +261,9 @@ impl Start {
             let step = newton::step(model, ports, &self.mesh, &self.motion, share)
                 .ok_or_else(|| not_periodic.clone())?;
             let mut events = newton::events(model, ports, stretches, &self.mesh, &step.motion);
+            if events.events.len() > MOST_EVENTS {
+                return Err(CutOrbitError::not_converged(model, *steps, step.moved));
+            }
             let alike = events.are_like(&self.events);
             if alike && step.moved < NEAR {
                 // At a jump of the force the velocity has a kink, which is exact only with the instant of the step.
@@ -248,9 +278,11 @@ impl Start {
                 1.0
             };
             let moved = step.moved;
+            let full = moved / share;
             self.motion = step.motion;
             if alike && moved < CONVERGED && events_moved < EVENT_FOUND {
-                return self.orbit(model, ports, *steps).ok_or(not_periodic);
+                last = full;
+                break;
             }
             if !alike || events_moved > 0.0 {
                 let gauss = self.mesh.gauss;
@@ -259,12 +291,12 @@ impl Start {
                 (self.mesh, self.events) = (mesh, events);
             }
             // Where contact comes and goes, full steps may alternate between two contacts.
-            share = if moved < 0.7 * last {
+            share = if full < (1.0 - 0.3 * share) * last {
                 (2.0 * share).min(1.0)
             } else {
                 (0.5 * share).max(0.1)
             };
-            last = moved;
+            last = full;
             // Steps that do not become smaller lead to no orbit.
             since = if moved < 0.5 * least { 0 } else { since + 1 };
             least = least.min(moved);
@@ -272,12 +304,11 @@ impl Start {
                 break;
             }
         }
-        Err(CutOrbitError::NotConverged {
-            rpm,
-            depth_mm: 1e3 * model.cutter.depth_m,
-            steps: *steps,
-            change: last,
-        })
+        if last > RESOLVABLE {
+            return Err(CutOrbitError::not_converged(model, *steps, last));
+        }
+        let orbit = self.orbit(model, ports, *steps).ok_or(not_periodic)?;
+        Ok(Settled { orbit, change: last })
     }
 
     fn orbit(&self, model: &CutModel, ports: &Ports, steps: usize) -> Option<CutOrbit> {

@@ -1,0 +1,248 @@
+//! Orders where the cutting force jumps: at entry and exit of the teeth.
+//!
+//! The orders of a jump fall as slowly as 1/k, and all that lie above half the sample rate fold. Of a jump by F at the
+//! spindle angle θ they are F/(2πik)·e^{−ikθ}, those of a sawtooth. A prediction is therefore folded without the sawteeth
+//! of its jumps, and these are sampled at the angles of the samples, reduced as the record is, and added.
+//!
+//! A sample beside a jump is before or after it as the spindle angle there is, and its angle is known with an error. If a
+//! jump is late by the angle δ, the orders of the force change by
+//!
+//! ```text
+//! ΔF_k = −F δ e^{−ikθ} / 2π.
+//! ```
+//!
+//! Where samples keep their place within the revolution, this error is the same in all revolutions.
+
+use std::f64::consts::TAU;
+
+use nalgebra::{DMatrix, Vector3};
+use num_complex::Complex64;
+use rayon::prelude::*;
+
+use super::conditions::{Conditions, cut_model};
+use crate::baseline::{Baseline, derivatives};
+use crate::error::DiagnoseError;
+use crate::orders::reduction::Orders;
+use quietcut_recording::{Quantity, Recording};
+
+/// Standard deviation of the angles of entry and exit, rad: that of a radial depth that is known to a thousandth of the
+/// radius of the tool, at 90°.
+const ENGAGEMENT: f64 = 1e-3;
+
+/// Range of the phase of the tachometer over which sawteeth are sampled, in its standard deviations, and the number of
+/// phases.
+const RANGE: f64 = 3.0;
+const PHASES: usize = 13;
+/// Largest deviation of the phase for which sawteeth are sampled, rad.
+const LARGEST_PHASE: f64 = 0.1;
+/// Distance of the spindle angles of the same jump, rad.
+const SAME_ANGLE: f64 = 1e-6;
+
+/// A jump of the force on a rigid tool.
+struct Jump {
+    /// Spindle angle, rad.
+    angle_rad: f64,
+    /// Force after it minus that before it, N.
+    force_n: Vector3<f64>,
+}
+
+/// A jump of a channel.
+pub(super) struct ChannelJump {
+    /// Spindle angle, rad.
+    pub angle_rad: f64,
+    /// Value after it minus that before it, in the unit of the channel.
+    pub size: f64,
+}
+
+/// What jumps of the force leave in the orders of a record.
+pub(super) struct OfJumps {
+    sawteeth: Vec<Sawtooth>,
+    /// Largest phase of the tachometer at which sawteeth are known, rad.
+    range_rad: f64,
+    /// By jump: one standard deviation of its angle.
+    pub directions: Vec<DMatrix<Complex64>>,
+}
+
+/// A sawtooth that jumps by 1.
+struct Sawtooth {
+    angle_rad: f64,
+    /// Amplitudes as the record shows them, by phase of the tachometer, equally spaced over its range.
+    seen: Vec<Vec<Complex64>>,
+}
+
+impl OfJumps {
+    /// For the jumps of the force at the given conditions of a recording.
+    ///
+    /// # Errors
+    /// The case lacks a section.
+    pub(super) fn new(
+        baseline: &Baseline<'_>,
+        conditions: &Conditions,
+        recording: &Recording,
+        orders: &Orders,
+    ) -> Result<Self, DiagnoseError> {
+        let jumps = jumps(baseline, conditions)?;
+        let angle = &orders.angle;
+        // Where samples keep their place within the revolution, a jump that is late by δ is seen late by the angle γ
+        // between two samples with the probability δ/γ, and else not.
+        let error = angle.angle_deviation_rad.hypot(ENGAGEMENT);
+        let between = TAU * angle.frequency_hz / recording.sample_rate_hz;
+        let deviation = error.max((error * between).sqrt());
+        let apart = error.hypot(angle.phase_deviation_rad.min(LARGEST_PHASE));
+        let directions = jumps.iter().flat_map(|jump| {
+            let force_n = jump
+                .force_n
+                .map(|force| Complex64::from(-force * deviation / TAU));
+            let first = impulse(baseline, conditions, orders, force_n, jump.angle_rad);
+            // A sample that is on the other side lies beside the jump, not at it.
+            let moment = |times: usize| {
+                let mut moment = first.clone();
+                for (order, mut row) in moment.row_iter_mut().enumerate() {
+                    row *= Complex64::new(0.0, order as f64 * apart).powu(times as u32);
+                }
+                moment
+            };
+            [first.clone(), moment(1), moment(2)]
+        });
+        let range_rad = RANGE * angle.phase_deviation_rad.min(LARGEST_PHASE);
+        Ok(Self {
+            directions: directions.collect(),
+            sawteeth: sawteeth(&jumps, range_rad, recording, orders),
+            range_rad,
+        })
+    }
+
+    /// Amplitudes as the record shows them, of a channel with these Fourier coefficients and jumps at a phase of the
+    /// tachometer, rad, and their derivative by the phase.
+    pub(super) fn seen(
+        &self,
+        orders: &Orders,
+        coefficients: &[Complex64],
+        jumps: &[ChannelJump],
+        phase_rad: f64,
+    ) -> [Vec<Complex64>; 2] {
+        let mut smooth = coefficients.to_vec();
+        let mut sampled = [(); 2].map(|()| vec![Complex64::ZERO; orders.amplitudes.nrows()]);
+        for jump in jumps {
+            let Some(sawtooth) = self.nearest(jump.angle_rad) else {
+                continue;
+            };
+            for (order, coefficient) in smooth.iter_mut().enumerate().skip(1) {
+                *coefficient -= jump.size * of_sawtooth(order, jump.angle_rad - phase_rad);
+            }
+            let step_rad = 2.0 * self.range_rad / (PHASES - 1) as f64;
+            let place = ((phase_rad + self.range_rad) / step_rad).clamp(0.0, (PHASES - 1) as f64);
+            let first = (place as usize).min(PHASES - 2);
+            let pairs = sawtooth.seen[first].iter().zip(&sawtooth.seen[first + 1]);
+            for (order, (one, next)) in pairs.enumerate() {
+                sampled[0][order] += (one + (next - one) * (place - first as f64)) * jump.size;
+                sampled[1][order] += (next - one) * (jump.size / step_rad);
+            }
+        }
+        let turned: Vec<Complex64> = smooth
+            .iter()
+            .enumerate()
+            .map(|(order, coefficient)| coefficient * Complex64::new(0.0, order as f64))
+            .collect();
+        let [mut value, mut slope] = sampled;
+        for (sampled, smooth) in [(&mut value, &smooth), (&mut slope, &turned)] {
+            for (sum, folded) in sampled.iter_mut().zip(orders.seen(smooth)) {
+                *sum += folded;
+            }
+        }
+        [value, slope]
+    }
+
+    fn nearest(&self, angle_rad: f64) -> Option<&Sawtooth> {
+        let apart = |sawtooth: &&Sawtooth| {
+            let turn = (angle_rad - sawtooth.angle_rad).rem_euclid(TAU);
+            turn.min(TAU - turn)
+        };
+        let nearest = self.sawteeth.iter().min_by(|a, b| apart(a).total_cmp(&apart(b)));
+        nearest.filter(|nearest| apart(nearest) < SAME_ANGLE)
+    }
+}
+
+/// Fourier coefficient of a sawtooth that jumps by 1 at an angle.
+fn of_sawtooth(order: usize, angle_rad: f64) -> Complex64 {
+    let order = order as f64;
+    Complex64::cis(-order * angle_rad) / Complex64::new(0.0, TAU * order)
+}
+
+fn jumps(baseline: &Baseline<'_>, conditions: &Conditions) -> Result<Vec<Jump>, DiagnoseError> {
+    let model = cut_model(baseline.case, &baseline.effects, conditions)?;
+    let cutter = &model.cutter;
+    let mut all = Vec::new();
+    let mut largest: f64 = 0.0;
+    for tooth in &cutter.teeth {
+        for (edge_rad, sign) in [(cutter.start_rad, 1.0), (cutter.exit_rad, -1.0)] {
+            let at = cutter.immersion(edge_rad);
+            let thickness_m = cutter.recession_m(at, tooth.feed_m).max(0.0);
+            let force_n = sign * Vector3::from(cutter.force.force_n(at, thickness_m, cutter.depth_m));
+            largest = largest.max(force_n.norm());
+            all.push(Jump {
+                angle_rad: edge_rad - tooth.angle_rad,
+                force_n,
+            });
+        }
+    }
+    // At 0° and 180° a chip begins and ends with thickness 0.
+    all.retain(|jump| jump.force_n.norm() > 1e-9 * largest);
+    Ok(all)
+}
+
+/// The sawteeth of jumps, sampled at the angles of the samples and reduced.
+fn sawteeth(jumps: &[Jump], range_rad: f64, recording: &Recording, orders: &Orders) -> Vec<Sawtooth> {
+    let (_, revolutions) = orders.sampled(recording);
+    let seen = |jump: &Jump, phase: usize| {
+        let share = 2.0 * phase as f64 / (PHASES - 1) as f64 - 1.0;
+        let angle_rad = jump.angle_rad - range_rad * share;
+        let samples = revolutions
+            .iter()
+            .map(|revolution| 0.5 - (revolution - angle_rad / TAU).rem_euclid(1.0));
+        orders.of_samples(samples, &revolutions)
+    };
+    jumps
+        .par_iter()
+        .map(|jump| Sawtooth {
+            angle_rad: jump.angle_rad,
+            seen: (0..PHASES).map(|phase| seen(jump, phase)).collect(),
+        })
+        .collect()
+}
+
+/// Orders of the channels under an impulse of the force at a spindle angle.
+fn impulse(
+    baseline: &Baseline<'_>,
+    conditions: &Conditions,
+    orders: &Orders,
+    force_n: Vector3<Complex64>,
+    angle_rad: f64,
+) -> DMatrix<Complex64> {
+    let pickups: Vec<_> = orders.channels.iter().map(|name| baseline.pickup(name)).collect();
+    let (rows, columns) = orders.amplitudes.shape();
+    let mut direction = DMatrix::zeros(rows, columns);
+    for order in 1..rows {
+        let omega = TAU * conditions.spindle_hz * order as f64;
+        let turned = force_n * Complex64::cis(-(order as f64) * angle_rad);
+        let moved = baseline
+            .first_order
+            .receptance(omega)
+            .map(|receptance| receptance * turned);
+        for (channel, pickup) in pickups.iter().enumerate() {
+            let Some(pickup) = pickup else { continue };
+            let value = match (pickup.quantity, &moved) {
+                (Quantity::Force, _) => turned,
+                (quantity, Some(moved)) => moved * Complex64::new(0.0, omega).powi(derivatives(quantity)),
+                (_, None) => continue,
+            };
+            direction[(order, channel)] = pickup
+                .weights
+                .iter()
+                .zip(value.iter())
+                .map(|(weight, value)| value * *weight)
+                .sum();
+        }
+    }
+    direction
+}

@@ -1,0 +1,159 @@
+//! The orbit of a machine in a cut at one time of its record, and its derivatives.
+
+use nalgebra::DMatrix;
+use num_complex::Complex64;
+
+use super::jumps::ChannelJump;
+use super::record::ReducedCut;
+use super::space::{Machine, Space, Variable};
+use quietcut_stability::cut_orbit::{CutOrbit, ForceOrders, OrderWeights};
+
+/// Step of a central difference of what a variable changes explicitly, in its standard deviations. The error is its
+/// square times the curvature, and rounding over it.
+const DIFFERENCE: f64 = 1e-3;
+
+/// A machine in a cut at one time.
+pub(super) struct Moment {
+    machine: Machine,
+    pub(super) orbit: CutOrbit,
+    weights: OrderWeights,
+    forces: ForceOrders,
+    /// Fourier coefficients of the channels.
+    pub(super) coefficients: DMatrix<Complex64>,
+    /// Amplitudes of the channels as the record would show them.
+    pub(super) seen: DMatrix<Complex64>,
+    /// Their derivative by the phase of the tachometer, 1/rad.
+    pub(super) by_phase: DMatrix<Complex64>,
+}
+
+impl Moment {
+    /// The machine of `space` at `z` in the cut `number`; `None` if it has no orbit, or none that is near.
+    pub(super) fn new(
+        space: &Space<'_>,
+        z: &[f64],
+        number: usize,
+        record: &ReducedCut,
+        time_s: f64,
+        near: Option<&Self>,
+    ) -> Option<Self> {
+        let machine = space.machine(z, number, record, time_s)?;
+        let orbit = match near {
+            // A step beyond which Newton's method does not follow is too long.
+            Some(near) => CutOrbit::near(&machine.model, &near.orbit),
+            None => CutOrbit::new(&machine.model),
+        }
+        .ok()?;
+        let weights = orbit.order_weights(record.highest);
+        let forces = orbit.force_orders(&weights);
+        let mut coefficients = machine.reading.orders(&forces);
+        let phase_rad = phase(space, z, number, record);
+        turn(&mut coefficients, phase_rad);
+        let [seen, by_phase] = seen(&machine, &orbit, &coefficients, record, phase_rad);
+        Some(Self {
+            seen,
+            by_phase,
+            machine,
+            orbit,
+            weights,
+            forces,
+            coefficients,
+        })
+    }
+
+    /// Derivative of the Fourier coefficients of the channels by the variable `index`, for a space whose machine at `z`
+    /// has this orbit. That of the jumps, whose part beyond half the sample rate changes little, is taken as that of the
+    /// other orders.
+    pub(super) fn slope(
+        &self,
+        space: &Space<'_>,
+        z: &[f64],
+        index: usize,
+        number: usize,
+        record: &ReducedCut,
+        time_s: f64,
+    ) -> Option<DMatrix<Complex64>> {
+        let at = |step: f64| {
+            let mut moved = z.to_vec();
+            moved[index] += step;
+            space.machine(&moved, number, record, time_s)
+        };
+        // At the boundary of a variable its derivative is one-sided.
+        let below = if z[index] - DIFFERENCE < space.lower(index) {
+            0.0
+        } else {
+            DIFFERENCE
+        };
+        let (plus, minus) = (at(DIFFERENCE)?, at(-below)?);
+        let step = DIFFERENCE + below;
+        let mut slope =
+            (plus.reading.orders(&self.forces) - minus.reading.orders(&self.forces)) / Complex64::from(step);
+        if !space.is_of_reading(index) {
+            let sensitivity = self.orbit.derivative(&plus.model, &minus.model, step)?;
+            let forces = self.orbit.force_order_slopes(&self.weights, &sensitivity);
+            slope += self.machine.reading.orders(&forces);
+        }
+        turn(&mut slope, phase(space, z, number, record));
+        Some(slope)
+    }
+}
+
+/// Amplitudes of the channels as a record shows them, and their derivative by the phase of its tachometer.
+fn seen(
+    machine: &Machine,
+    orbit: &CutOrbit,
+    coefficients: &DMatrix<Complex64>,
+    record: &ReducedCut,
+    phase_rad: f64,
+) -> [DMatrix<Complex64>; 2] {
+    let jumps: Vec<(f64, Vec<f64>)> = orbit
+        .jumps_of_engagement(&machine.model)
+        .into_iter()
+        .map(|(time_s, force_n)| {
+            let sizes = machine.reading.jump(&machine.model.structure, force_n);
+            (machine.model.rad_per_s * time_s, sizes)
+        })
+        .collect();
+    let (rows, columns) = record.orders.amplitudes.shape();
+    let mut found = [DMatrix::zeros(rows, columns), DMatrix::zeros(rows, columns)];
+    for channel in 0..columns {
+        let of_channel: Vec<ChannelJump> = jumps
+            .iter()
+            .map(|(angle_rad, sizes)| ChannelJump {
+                angle_rad: *angle_rad,
+                size: sizes[channel],
+            })
+            .filter(|jump| jump.size != 0.0)
+            .collect();
+        let coefficients: Vec<Complex64> = coefficients.column(channel).iter().copied().collect();
+        let seen = record
+            .jumps
+            .seen(&record.orders, &coefficients, &of_channel, phase_rad);
+        for (found, seen) in found.iter_mut().zip(seen) {
+            found.column_mut(channel).copy_from_slice(&seen);
+        }
+    }
+    found
+}
+
+/// Standard deviation of the phase of the tachometer of a record, rad.
+pub(super) fn phase_deviation(record: &ReducedCut) -> f64 {
+    record.orders.angle.phase_deviation_rad
+}
+
+/// Phase of the tachometer of a record at a point of the space, rad.
+fn phase(space: &Space<'_>, z: &[f64], number: usize, record: &ReducedCut) -> f64 {
+    let of = |(variable, z): (&Variable, &f64)| match variable {
+        Variable::Phase(own) if *own == number => z * phase_deviation(record),
+        _ => 0.0,
+    };
+    space.variables.iter().zip(z).map(of).sum()
+}
+
+/// The same signals at a spindle angle that is larger by `angle_rad`.
+fn turn(coefficients: &mut DMatrix<Complex64>, angle_rad: f64) {
+    if angle_rad != 0.0 {
+        for (order, mut row) in coefficients.row_iter_mut().enumerate() {
+            row *= Complex64::cis(order as f64 * angle_rad);
+        }
+    }
+}
