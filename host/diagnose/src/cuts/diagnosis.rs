@@ -15,6 +15,10 @@ use quietcut_recording::{Recording, TestKind};
 /// chatters: its motion is then not that of the forced orbit.
 const CHATTER: f64 = 0.2;
 
+/// Root mean square of a modulation of the speed over that of all its wander from which on it is the modulation, and
+/// not one of the frequencies of a wandering speed.
+const MODULATED: f64 = 0.8;
+
 /// The diagnosis of records that are all cuts with a steady forced motion, which its orders explain; `None` for other
 /// records: those in chatter, those whose speed is modulated, and those whose orders are left unexplained.
 ///
@@ -44,7 +48,13 @@ pub(crate) fn diagnosed(
         records.push(record);
         motions.push(motion);
     }
-    let is_modulated = speed_modulation(&motions.iter().collect::<Vec<_>>()).is_some();
+    let is_modulated = speed_modulation(&motions.iter().collect::<Vec<_>>()).is_some_and(|modulation| {
+        let wander = records
+            .iter()
+            .map(|record| record.orders.angle.speed_wander)
+            .fold(0.0, f64::max);
+        modulation.fluctuation.delta / 2.0_f64.sqrt() > MODULATED * wander
+    });
     if is_modulated || records.iter().any(|record| record.chatters(CHATTER)) {
         return Ok(None);
     }

@@ -158,11 +158,11 @@ impl State {
                     .as_ref()
                     .map_or([&self.middle; 2], |ends| ends.each_ref());
                 let slopes = [slope(early, early_s)?, slope(late, late_s)?];
-                Some(record.seen(&half_difference(slopes.each_ref())))
+                Some(half_difference(slopes.each_ref()))
             }
             _ => None,
         };
-        Some(record.whitened_over_time(&record.seen(&middle), trend.as_ref()))
+        Some(record.whitened_over_time(&middle, trend.as_ref()))
     }
 }
 

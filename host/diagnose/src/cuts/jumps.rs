@@ -29,10 +29,11 @@ use quietcut_recording::{Quantity, Recording};
 /// radius of the tool, at 90°.
 const ENGAGEMENT: f64 = 1e-3;
 
-/// Range of the phase of the tachometer over which sawteeth are sampled, in its standard deviations, and the number of
-/// phases.
-const RANGE: f64 = 3.0;
-const PHASES: usize = 13;
+/// Range of the delay of a jump for which sawteeth are sampled, in samples, and the number of delays: four to a sample.
+const RANGE: f64 = 4.0;
+const PHASES: usize = 33;
+/// Number of moments of the samples beside a jump.
+const MOMENTS: u32 = 3;
 /// Largest deviation of the phase for which sawteeth are sampled, rad.
 const LARGEST_PHASE: f64 = 0.1;
 /// Distance of the spindle angles of the same jump, rad.
@@ -44,12 +45,15 @@ struct Jump {
     angle_rad: f64,
     /// Force after it minus that before it, N.
     force_n: Vector3<f64>,
+    is_exit: bool,
 }
 
 /// A jump of a channel.
 pub(super) struct ChannelJump {
     /// Spindle angle, rad.
     pub angle_rad: f64,
+    /// Angle by which the channel shows it early: the phase of the tachometer less the delay of the channel, rad.
+    pub early_rad: f64,
     /// Value after it minus that before it, in the unit of the channel.
     pub size: f64,
 }
@@ -57,16 +61,18 @@ pub(super) struct ChannelJump {
 /// What jumps of the force leave in the orders of a record.
 pub(super) struct OfJumps {
     sawteeth: Vec<Sawtooth>,
-    /// Largest phase of the tachometer at which sawteeth are known, rad.
+    /// Largest phase at which sawteeth are known, rad.
     range_rad: f64,
-    /// By jump: one standard deviation of its angle.
+    /// One standard deviation of each angle of the engagement, and of the samples beside each jump.
     pub directions: Vec<DMatrix<Complex64>>,
+    /// By jump: what its folded orders, which may move slowly against the others, leave in the trend.
+    pub trends: Vec<DMatrix<Complex64>>,
 }
 
 /// A sawtooth that jumps by 1.
 struct Sawtooth {
     angle_rad: f64,
-    /// Amplitudes as the record shows them, by phase of the tachometer, equally spaced over its range.
+    /// Amplitudes as the record shows them, by the angle by which the jump is early, equally spaced over its range.
     seen: Vec<Vec<Complex64>>,
 }
 
@@ -83,43 +89,36 @@ impl OfJumps {
     ) -> Result<Self, DiagnoseError> {
         let jumps = jumps(baseline, conditions)?;
         let angle = &orders.angle;
-        // Where samples keep their place within the revolution, a jump that is late by δ is seen late by the angle γ
-        // between two samples with the probability δ/γ, and else not.
-        let error = angle.angle_deviation_rad.hypot(ENGAGEMENT);
-        let between = TAU * angle.frequency_hz / recording.sample_rate_hz;
-        let deviation = error.max((error * between).sqrt());
-        let apart = error.hypot(angle.phase_deviation_rad.min(LARGEST_PHASE));
-        let directions = jumps.iter().flat_map(|jump| {
-            let force_n = jump
-                .force_n
-                .map(|force| Complex64::from(-force * deviation / TAU));
-            let first = impulse(baseline, conditions, orders, force_n, jump.angle_rad);
-            // A sample that is on the other side lies beside the jump, not at it.
-            let moment = |times: usize| {
-                let mut moment = first.clone();
-                for (order, mut row) in moment.row_iter_mut().enumerate() {
-                    row *= Complex64::new(0.0, order as f64 * apart).powu(times as u32);
-                }
-                moment
-            };
-            [first.clone(), moment(1), moment(2)]
-        });
-        let range_rad = RANGE * angle.phase_deviation_rad.min(LARGEST_PHASE);
+        let mut directions = of_engagement(baseline, conditions, orders, &jumps);
+        directions.extend(
+            jumps
+                .iter()
+                .flat_map(|jump| of_samples(baseline, jump, recording, orders)),
+        );
+        let range_rad = RANGE * TAU * angle.frequency_hz / recording.sample_rate_hz;
+        let trends = if orders.trend.is_some() {
+            jumps
+                .iter()
+                .map(|jump| folded_trend(baseline, jump, recording, orders))
+                .collect()
+        } else {
+            Vec::new()
+        };
         Ok(Self {
-            directions: directions.collect(),
+            trends,
+            directions,
             sawteeth: sawteeth(&jumps, range_rad, recording, orders),
             range_rad,
         })
     }
 
-    /// Amplitudes as the record shows them, of a channel with these Fourier coefficients and jumps at a phase of the
-    /// tachometer, rad, and their derivative by the phase.
+    /// Amplitudes as the record shows them, of a channel with these Fourier coefficients and jumps, and their derivative
+    /// by the phase of the tachometer.
     pub(super) fn seen(
         &self,
         orders: &Orders,
         coefficients: &[Complex64],
         jumps: &[ChannelJump],
-        phase_rad: f64,
     ) -> [Vec<Complex64>; 2] {
         let mut smooth = coefficients.to_vec();
         let mut sampled = [(); 2].map(|()| vec![Complex64::ZERO; orders.amplitudes.nrows()]);
@@ -128,10 +127,10 @@ impl OfJumps {
                 continue;
             };
             for (order, coefficient) in smooth.iter_mut().enumerate().skip(1) {
-                *coefficient -= jump.size * of_sawtooth(order, jump.angle_rad - phase_rad);
+                *coefficient -= jump.size * of_sawtooth(order, jump.angle_rad - jump.early_rad);
             }
             let step_rad = 2.0 * self.range_rad / (PHASES - 1) as f64;
-            let place = ((phase_rad + self.range_rad) / step_rad).clamp(0.0, (PHASES - 1) as f64);
+            let place = ((jump.early_rad + self.range_rad) / step_rad).clamp(0.0, (PHASES - 1) as f64);
             let first = (place as usize).min(PHASES - 2);
             let pairs = sawtooth.seen[first].iter().zip(&sawtooth.seen[first + 1]);
             for (order, (one, next)) in pairs.enumerate() {
@@ -183,6 +182,7 @@ fn jumps(baseline: &Baseline<'_>, conditions: &Conditions) -> Result<Vec<Jump>, 
             all.push(Jump {
                 angle_rad: edge_rad - tooth.angle_rad,
                 force_n,
+                is_exit: sign < 0.0,
             });
         }
     }
@@ -209,6 +209,93 @@ fn sawteeth(jumps: &[Jump], range_rad: f64, recording: &Recording, orders: &Orde
             seen: (0..PHASES).map(|phase| seen(jump, phase)).collect(),
         })
         .collect()
+}
+
+/// The trend of the channels of force and acceleration that a sawtooth of the size of a jump leaves.
+fn folded_trend(
+    baseline: &Baseline<'_>,
+    jump: &Jump,
+    recording: &Recording,
+    orders: &Orders,
+) -> DMatrix<Complex64> {
+    let (_, revolutions) = orders.sampled(recording);
+    let samples: Vec<f64> = revolutions
+        .iter()
+        .map(|revolution| 0.5 - (revolution - jump.angle_rad / TAU).rem_euclid(1.0))
+        .collect();
+    let of_one = orders.trend_of(&samples, &revolutions);
+    let mut trend = DMatrix::zeros(orders.amplitudes.nrows(), orders.channels.len());
+    for (channel, size) in sizes(baseline, orders, jump).into_iter().enumerate() {
+        for (order, one) in of_one.iter().enumerate() {
+            trend[(order, channel)] = one * size;
+        }
+    }
+    trend
+}
+
+/// By edge of the engagement: the orders of one standard deviation of its angle, at which the force of all teeth jumps.
+fn of_engagement(
+    baseline: &Baseline<'_>,
+    conditions: &Conditions,
+    orders: &Orders,
+    jumps: &[Jump],
+) -> Vec<DMatrix<Complex64>> {
+    [false, true]
+        .into_iter()
+        .filter_map(|is_exit| {
+            let of_edge = jumps.iter().filter(|jump| jump.is_exit == is_exit);
+            of_edge
+                .map(|jump| {
+                    let force_n = jump
+                        .force_n
+                        .map(|force| Complex64::from(-force * ENGAGEMENT / TAU));
+                    impulse(baseline, conditions, orders, force_n, jump.angle_rad)
+                })
+                .reduce(|sum, one| sum + one)
+        })
+        .collect()
+}
+
+/// What samples leave that are before a jump of a channel and taken as after it, or the reverse: they lie beside the
+/// jump, not at it, so that their impulse has moments.
+fn of_samples(
+    baseline: &Baseline<'_>,
+    jump: &Jump,
+    recording: &Recording,
+    orders: &Orders,
+) -> Vec<DMatrix<Complex64>> {
+    let angle = &orders.angle;
+    // Where samples keep their place within the revolution, a jump that is late by δ is seen late by the angle γ between
+    // two samples with the probability δ/γ, and else not.
+    let error = angle.angle_deviation_rad.hypot(ENGAGEMENT);
+    let between = TAU * angle.frequency_hz / recording.sample_rate_hz;
+    let deviation = error.max((error * between).sqrt());
+    let apart = error.hypot(angle.phase_deviation_rad.min(LARGEST_PHASE));
+    let sizes = sizes(baseline, orders, jump);
+    if sizes.iter().all(|size| *size == 0.0) {
+        return Vec::new();
+    }
+    let (rows, columns) = orders.amplitudes.shape();
+    let moment = |times: u32| {
+        DMatrix::from_fn(rows, columns, |order, channel| {
+            let order = order as f64;
+            let impulse = Complex64::cis(-order * jump.angle_rad) * (-sizes[channel] * deviation / TAU);
+            impulse * Complex64::new(0.0, order * apart).powu(times)
+        })
+    };
+    (0..MOMENTS).map(moment).collect()
+}
+
+/// Jumps of the channels of force and acceleration.
+fn sizes(baseline: &Baseline<'_>, orders: &Orders, jump: &Jump) -> Vec<f64> {
+    let structure = &baseline.first_order;
+    let accelerated = &structure.c * (&structure.a * (&structure.b * jump.force_n));
+    let of = |name: &String| match baseline.pickup(name) {
+        Some(pickup) if pickup.quantity == Quantity::Force => pickup.read(jump.force_n.into()),
+        Some(pickup) if pickup.quantity == Quantity::Acceleration => pickup.read(accelerated.into()),
+        _ => 0.0,
+    };
+    orders.channels.iter().map(of).collect()
 }
 
 /// Orders of the channels under an impulse of the force at a spindle angle.

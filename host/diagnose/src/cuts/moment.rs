@@ -60,9 +60,9 @@ impl Moment {
         })
     }
 
-    /// Derivative of the Fourier coefficients of the channels by the variable `index`, for a space whose machine at `z`
-    /// has this orbit. That of the jumps, whose part beyond half the sample rate changes little, is taken as that of the
-    /// other orders.
+    /// Derivative of the amplitudes of the channels, as the record shows them, by the variable `index`, for a space whose
+    /// machine at `z` has this orbit. Of a variable that moves the orbit, the part of the jumps beyond half the sample
+    /// rate, which changes little, is taken as that of the other orders.
     pub(super) fn slope(
         &self,
         space: &Space<'_>,
@@ -85,15 +85,23 @@ impl Moment {
         };
         let (plus, minus) = (at(DIFFERENCE)?, at(-below)?);
         let step = DIFFERENCE + below;
+        let phase_rad = phase(space, z, number, record);
+        if space.is_of_reading(index) {
+            let read = |machine: &Machine| {
+                let mut coefficients = machine.reading.orders(&self.forces);
+                turn(&mut coefficients, phase_rad);
+                let [seen, _] = seen(machine, &self.orbit, &coefficients, record, phase_rad);
+                seen
+            };
+            return Some((read(&plus) - read(&minus)) / Complex64::from(step));
+        }
         let mut slope =
             (plus.reading.orders(&self.forces) - minus.reading.orders(&self.forces)) / Complex64::from(step);
-        if !space.is_of_reading(index) {
-            let sensitivity = self.orbit.derivative(&plus.model, &minus.model, step)?;
-            let forces = self.orbit.force_order_slopes(&self.weights, &sensitivity);
-            slope += self.machine.reading.orders(&forces);
-        }
-        turn(&mut slope, phase(space, z, number, record));
-        Some(slope)
+        let sensitivity = self.orbit.derivative(&plus.model, &minus.model, step)?;
+        let forces = self.orbit.force_order_slopes(&self.weights, &sensitivity);
+        slope += self.machine.reading.orders(&forces);
+        turn(&mut slope, phase_rad);
+        Some(record.seen(&slope))
     }
 }
 
@@ -120,14 +128,13 @@ fn seen(
             .iter()
             .map(|(angle_rad, sizes)| ChannelJump {
                 angle_rad: *angle_rad,
+                early_rad: phase_rad - machine.model.rad_per_s * machine.reading.delay_s(channel),
                 size: sizes[channel],
             })
             .filter(|jump| jump.size != 0.0)
             .collect();
         let coefficients: Vec<Complex64> = coefficients.column(channel).iter().copied().collect();
-        let seen = record
-            .jumps
-            .seen(&record.orders, &coefficients, &of_channel, phase_rad);
+        let seen = record.jumps.seen(&record.orders, &coefficients, &of_channel);
         for (found, seen) in found.iter_mut().zip(seen) {
             found.column_mut(channel).copy_from_slice(&seen);
         }

@@ -87,6 +87,11 @@ impl Reading {
         })
     }
 
+    /// Delay of a channel, s.
+    pub(crate) fn delay_s(&self, channel: usize) -> f64 {
+        self.pickups[channel].delay_s
+    }
+
     /// By channel: its jump where the cutting force jumps by `force_n` along x, y, z.
     pub(crate) fn jump(&self, structure: &FirstOrder, force_n: [f64; 3]) -> Vec<f64> {
         // Accelerations jump with the force, unless velocities do.

@@ -31,6 +31,9 @@ const SETTLED_SHARE: f64 = 0.25;
 /// Standard deviation of the sensitivity of a channel at one order against that at others. Data sheets promise 1 to 5 %
 /// over the whole range of a sensor.
 const FLATNESS: f64 = 1e-3;
+/// Mains frequencies, Hz, whose harmonics are no chatter, and their deviation in a grid.
+const MAINS_HZ: [f64; 2] = [50.0, 60.0];
+const MAINS_WANDER: f64 = 1e-3;
 /// Share of the cells between two lines that aliases may take.
 const ALIASED_CELLS: f64 = 0.25;
 
@@ -182,14 +185,26 @@ impl ReducedCut {
     pub(crate) fn chatters(&self, least: f64) -> bool {
         self.orders.lines.iter().any(|line| {
             let is_motion = !self.orders.channels[line.channel].starts_with('f');
+            let is_hum = MAINS_HZ.iter().any(|mains_hz| {
+                let harmonic = (line.frequency_hz / mains_hz).round();
+                let nearest_hz = harmonic * mains_hz;
+                harmonic >= 1.0
+                    && (line.frequency_hz - nearest_hz).abs()
+                        < MAINS_WANDER * nearest_hz + self.resolution_hz()
+            });
             let orders = self.orders.amplitudes.column(line.channel);
             let largest = orders
                 .iter()
                 .skip(1)
                 .map(|amplitude| 2.0 * amplitude.norm())
                 .fold(0.0, f64::max);
-            is_motion && line.amplitude > least * largest
+            is_motion && !is_hum && line.amplitude > least * largest
         })
+    }
+
+    /// Distance of two lines that the reduced part of the record separates, Hz.
+    fn resolution_hz(&self) -> f64 {
+        self.conditions.spindle_hz / self.orders.angle.count() as f64
     }
 
     /// Directions in which all orders err together, in standard deviations: by slow changes, by a motion that has
@@ -205,14 +220,15 @@ impl ReducedCut {
 
     /// Directions in which the trend of all orders errs together, in standard deviations.
     pub(crate) fn trend_directions(&self) -> impl Iterator<Item = DMatrix<Complex64>> {
-        self.orders.trend.iter().flat_map(|trend| {
+        let of_blocks = self.orders.trend.iter().flat_map(|trend| {
             let scale = Complex64::from(trend.variance.sqrt());
             trend
                 .common
                 .directions
                 .iter()
                 .map(move |direction| direction * scale)
-        })
+        });
+        of_blocks.chain(self.jumps.trends.iter().cloned())
     }
 }
 

@@ -22,6 +22,9 @@ pub(crate) const ASSUMED_CUT: f64 = 1e-3;
 /// Standard deviation of the gain of a sensor.
 pub(crate) const ASSUMED_GAIN: f64 = 1e-3;
 
+/// Standard deviation of the delay of a channel against the others, in samples: 0.7° at a tenth of the sample rate.
+pub(crate) const ASSUMED_DELAY: f64 = 0.02;
+
 /// One variable.
 #[derive(Clone, Debug)]
 pub(crate) enum Variable {
@@ -29,6 +32,8 @@ pub(crate) enum Variable {
     Baseline(Vec<Deviation>),
     /// Gain of a channel, in all records.
     Gain(String),
+    /// Delay of a channel, in all records.
+    Delay(String),
     /// Phase of the tachometer of a record.
     Phase(usize),
     /// Axial depth of a record.
@@ -69,7 +74,11 @@ impl<'a> Space<'a> {
             .collect();
         channels.sort();
         channels.dedup();
-        variables.extend(channels.into_iter().map(|name| Variable::Gain(name.clone())));
+        variables.extend(
+            channels
+                .into_iter()
+                .flat_map(|name| [Variable::Gain(name.clone()), Variable::Delay(name.clone())]),
+        );
         for (index, record) in records.iter().enumerate() {
             variables.extend([
                 Variable::Phase(index),
@@ -141,7 +150,7 @@ impl<'a> Space<'a> {
     /// True if a variable changes only what sensors read.
     pub(crate) fn is_of_reading(&self, variable: usize) -> bool {
         match &self.variables[variable] {
-            Variable::Gain(_) => true,
+            Variable::Gain(_) | Variable::Delay(_) => true,
             Variable::Coordinate(candidate, _) => {
                 self.candidates[*candidate].effect.spec().class == quietcut_model::effects::Class::Sensor
             }
@@ -221,8 +230,14 @@ impl<'a> Space<'a> {
             .map(|name| {
                 let mut pickup = effects.pickup(pickup_of(name)?);
                 for (variable, z) in self.variables.iter().zip(z) {
-                    if matches!(variable, Variable::Gain(channel) if channel == name) {
-                        pickup.weights = pickup.weights.map(|weight| weight * (1.0 + ASSUMED_GAIN * z));
+                    match variable {
+                        Variable::Gain(channel) if channel == name => {
+                            pickup.weights = pickup.weights.map(|weight| weight * (1.0 + ASSUMED_GAIN * z));
+                        }
+                        Variable::Delay(channel) if channel == name => {
+                            pickup.delay_s += ASSUMED_DELAY * z / record.rate_hz;
+                        }
+                        _ => {}
                     }
                 }
                 Some(pickup)

@@ -25,6 +25,8 @@ pub(crate) struct Plan<'a> {
     pub spectrum: &'a LineSpectrum,
     pub bands: &'a [Band],
     pub blocks: &'a [BlockWeights],
+    /// True if blocks are longer than the slowest decay, so that their errors are independent.
+    pub blocks_forget: bool,
     pub rate_hz: f64,
     /// Spindle frequency, revolutions per sample.
     pub per_sample: f64,

@@ -79,14 +79,15 @@ pub(crate) struct Orders {
     pub covariances: Vec<OrderCovariance>,
     /// Errors common to all orders but 0, beyond `covariances`.
     pub common: Common,
-    /// Amplitudes over time; empty if the record is shorter than three blocks.
+    /// Amplitudes over time; empty if the record is shorter than three blocks of three revolutions.
     pub blocks: Vec<AmplitudeBlock>,
-    /// `None` if the record is shorter than three blocks.
+    /// `None` if the record is shorter than three blocks of three revolutions.
     pub trend: Option<Trend>,
     pub spectrum: Spectrum,
     /// Spectral lines that are no orders, by channel and descending power.
     pub lines: Vec<SpectralLine>,
     kernel: AliasKernel,
+    block_weights: Vec<BlockWeights>,
     variance_of_mean: f64,
 }
 
@@ -129,14 +130,19 @@ impl Orders {
         let bands: Vec<Band> = (0..=highest)
             .map(|order| spectrum.band(order, names.len()))
             .collect();
-        let blocks = block_weights(per_sample, settings.slowest_decay_s * rate_hz, &taper);
+        let mut blocks_of_plan = block_weights(per_sample, settings.slowest_decay_s * rate_hz, &taper);
+        let forget = !blocks_of_plan.is_empty();
+        if !forget {
+            blocks_of_plan = block_weights(per_sample, 0.0, &taper);
+        }
         let plan = Plan {
             revolutions: &revolutions,
             taper,
             kernel: &kernel,
             spectrum: &spectrum,
             bands: &bands,
-            blocks: &blocks,
+            blocks: &blocks_of_plan,
+            blocks_forget: forget,
             rate_hz,
             per_sample,
             speed_wander: angle.speed_wander,
@@ -151,6 +157,19 @@ impl Orders {
             blocks,
             trend,
         } = over_time(&reduced, &spectral, &plan, range.start);
+        let trend = trend.map(|trend| {
+            let columns: Vec<DVector<Complex64>> = samples
+                .iter()
+                .map(|samples| {
+                    let of_channel = slope_of(samples, &revolutions, &kernel, &blocks_of_plan);
+                    DVector::from_vec(of_channel)
+                })
+                .collect();
+            Trend {
+                amplitudes: DMatrix::from_columns(&columns),
+                ..trend
+            }
+        });
         let variance = taper.variance_of_mean();
         Ok(Self {
             channels: names.iter().map(ToString::to_string).collect(),
@@ -184,6 +203,7 @@ impl Orders {
                 .collect(),
             angle,
             kernel,
+            block_weights: blocks_of_plan,
             variance_of_mean: variance,
         })
     }
@@ -211,6 +231,11 @@ impl Orders {
             *entry /= taper.sum();
         }
         self.kernel.solve(&right)
+    }
+
+    /// Trend of the amplitudes in samples at these spindle angles, as [`Trend::amplitudes`].
+    pub(crate) fn trend_of(&self, samples: &[f64], revolutions: &[f64]) -> Vec<Complex64> {
+        slope_of(samples, revolutions, &self.kernel, &self.block_weights)
     }
 
     /// Times of the reduced samples of a record, s after the first sample, and their spindle angles, in revolutions.
@@ -391,7 +416,8 @@ fn over_time(
     let of_record = plan.taper.variance_of_mean() / of_block;
     let independent = independent_combinations(plan);
     let common = |deviations: &[DMatrix<Complex64>]| {
-        factors.as_ref().map_or_else(Common::default, |factors| {
+        let factors = factors.as_ref().filter(|_| plan.blocks_forget);
+        factors.map_or_else(Common::default, |factors| {
             Common::new(deviations, factors, &independent, of_record)
         })
     };
@@ -411,6 +437,52 @@ fn over_time(
         }),
         blocks,
     }
+}
+
+/// Slope of the amplitudes of one channel over the blocks, times the standard deviation of the time over the record.
+///
+/// Aliases are not removed first, as they are for the noise between the lines: near a whole number of samples in a
+/// revolution they lie so near the lines that they would take up a slow change.
+fn slope_of(
+    samples: &[f64],
+    revolutions: &[f64],
+    kernel: &AliasKernel,
+    blocks: &[BlockWeights],
+) -> Vec<Complex64> {
+    let circle = Circle::new(kernel.orders());
+    let taper = Taper::new(samples.len());
+    let weighted = samples
+        .iter()
+        .enumerate()
+        .map(|(sample, value)| (revolutions[sample], taper.weight(sample) * value));
+    let mut right = circle.sums(weighted);
+    for entry in &mut right {
+        *entry /= taper.sum();
+    }
+    let amplitudes = kernel.solve(&right);
+    let series = circle.series(&amplitudes);
+    let residual: Vec<f64> = samples
+        .iter()
+        .zip(revolutions)
+        .map(|(value, revolution)| value - series.at(*revolution))
+        .collect();
+    let apart: Vec<&BlockWeights> = blocks.iter().step_by(2).collect();
+    let centre = |block: &BlockWeights| block.first as f64 + 0.5 * (block.taper.count() - 1) as f64;
+    let mean = apart.iter().map(|block| centre(block)).sum::<f64>() / apart.len().max(1) as f64;
+    let squares: f64 = apart.iter().map(|block| (centre(block) - mean).powi(2)).sum();
+    let scale = samples.len() as f64 / 12.0_f64.sqrt();
+    let mut slope = vec![Complex64::ZERO; kernel.orders() + 1];
+    for block in apart {
+        let weighted = (0..block.taper.count()).map(|sample| {
+            let at = block.first + sample;
+            (revolutions[at], block.taper.weight(sample) * residual[at])
+        });
+        let factor = (centre(block) - mean) * scale / squares / block.taper.sum();
+        for (slope, sum) in slope.iter_mut().zip(circle.sums(weighted)) {
+            *slope += sum * factor;
+        }
+    }
+    slope
 }
 
 /// Slope of the amplitudes over time.

@@ -46,7 +46,8 @@ impl SpindleAngle {
             .filter(|edge_s| *edge_s >= settled_s)
             .collect();
         check_revolutions(recording, edges_s.len().saturating_sub(1))?;
-        Ok(Self::from_edges(edges_s, recording.sample_rate_hz))
+        let finer = if is_sampled_finely(recording) { FINER } else { 1.0 };
+        Ok(Self::from_edges(edges_s, finer * recording.sample_rate_hz))
     }
 
     /// Fits the spindle angle to the beginnings of successive revolutions, s after the first sample, and the end of the
@@ -119,6 +120,34 @@ impl SpindleAngle {
         let mean_hz = count as f64 / (self.edges_s[count] - first);
         self.revolutions.at(times_s.map(|t| (t - first) * mean_hz))
     }
+}
+
+/// Times the sample rate that times of edges are exact, where samples lie on the edges.
+const FINER: f64 = 20.0;
+/// Levels between which a sample lies on an edge, as shares of the range of the tachometer.
+const ON_EDGE: [f64; 2] = [0.05, 0.95];
+
+/// True if most rising edges of the tachometer have a sample on them, so that their times are known between the samples.
+fn is_sampled_finely(recording: &Recording) -> bool {
+    let Some(channel) = recording.channel("tacho") else {
+        return false;
+    };
+    let low = channel.samples.iter().copied().fold(f64::INFINITY, f64::min);
+    let high = channel.samples.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let level = |sample: f64| (sample - low) / (high - low);
+    let (mut edges, mut seen) = (0, 0);
+    for pair in channel.samples.windows(2) {
+        let [before, after] = [level(pair[0]), level(pair[1])];
+        if before < 0.5 && after >= 0.5 {
+            edges += 1;
+            seen += usize::from(
+                [before, after]
+                    .iter()
+                    .any(|level| (ON_EDGE[0]..=ON_EDGE[1]).contains(level)),
+            );
+        }
+    }
+    2 * seen > edges
 }
 
 /// Fewest whole revolutions that are reduced. The covariance of seven channels requires two times eight independent
