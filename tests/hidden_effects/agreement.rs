@@ -11,7 +11,7 @@ use quietcut::structure::Direction;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-use super::cause::{Cause, EffectKind, PROCESS, STRUCTURAL};
+use super::cause::{Cause, EffectKind, OF_OWN_FAMILY, PROCESS, STRUCTURAL};
 use super::cut::CutBench;
 use super::machine::Machine;
 use super::oracle::Lab;
@@ -43,8 +43,8 @@ fn texts(cause: &Cause, machine: &Machine, rig: &Rig) -> Vec<String> {
 
 #[test]
 fn structural_effects_agree_with_the_library() {
-    let others = [EffectKind::SensorOffsetByMode, EffectKind::QuadraticDamping];
-    for kind in STRUCTURAL.into_iter().chain(others) {
+    let all = STRUCTURAL.into_iter().chain(OF_OWN_FAMILY);
+    for kind in all.chain([EffectKind::SensorOffsetByMode]) {
         let mut compared = 0;
         for seed in 0..40 {
             let mut random = ChaCha8Rng::seed_from_u64(seed);

@@ -21,6 +21,7 @@ pub(crate) enum EffectKind {
     QuadraticStiffness,
     CubicDamping,
     QuadraticDamping,
+    QuinticStiffness,
     SofteningHardening,
     CoulombFriction,
     Backlash,
@@ -52,8 +53,8 @@ pub(crate) enum EffectKind {
     SensorSquare,
 }
 
-/// Effects of the library that tests of structures can hide. [`EffectKind::QuadraticDamping`] has a family of its own, so that the draws of
-/// the other families stay.
+/// Effects of the library that tests of structures can hide. Those of [`OF_OWN_FAMILY`] are not among them, so that the draws of the other
+/// families stay.
 pub(crate) const STRUCTURAL: [EffectKind; 17] = [
     EffectKind::Mass,
     EffectKind::Stiffness,
@@ -73,6 +74,10 @@ pub(crate) const STRUCTURAL: [EffectKind; 17] = [
     EffectKind::CrossAxis,
     EffectKind::SensorOffset,
 ];
+
+/// Effects of the library that tests of structures hide in a family of their own.
+pub(crate) const OF_OWN_FAMILY: [EffectKind; 2] =
+    [EffectKind::QuadraticDamping, EffectKind::QuinticStiffness];
 
 /// Effects of the library that belong to the cutting process.
 pub(crate) const PROCESS: [EffectKind; 8] = [
@@ -134,6 +139,7 @@ impl EffectKind {
             Self::QuadraticStiffness => &["quadratic-stiffness"],
             Self::CubicDamping => &["cubic-damping"],
             Self::QuadraticDamping => &["quadratic-damping"],
+            Self::QuinticStiffness => &["quintic-stiffness"],
             Self::SofteningHardening => &["softening-hardening"],
             Self::CoulombFriction => &["coulomb-friction"],
             Self::Backlash => &["backlash"],
@@ -208,6 +214,7 @@ impl EffectKind {
             | Self::Stiffness
             | Self::Damping
             | Self::CubicStiffness
+            | Self::QuinticStiffness
             | Self::QuadraticStiffness => {
                 vec![size * either(random)]
             }
@@ -304,6 +311,7 @@ impl Cause {
             ],
             EffectKind::CubicStiffness => vec![("k3_n_per_m3", 0.1 * s[0] * k / peak.powi(2))],
             EffectKind::QuadraticStiffness => vec![("k2_n_per_m2", 0.1 * s[0] * k / peak)],
+            EffectKind::QuinticStiffness => vec![("k5_n_per_m5", 0.1 * s[0] * k / peak.powi(4))],
             EffectKind::CubicDamping => vec![("c3_ns3_per_m3", 0.5 * s[0] * c / speed.powi(2))],
             EffectKind::QuadraticDamping => vec![("c2_ns2_per_m2", 0.5 * s[0] * c / speed)],
             EffectKind::SofteningHardening => {
@@ -401,6 +409,7 @@ impl Cause {
         match self.kind {
             EffectKind::CubicStiffness => system.add(spring(3, value)),
             EffectKind::QuadraticStiffness => system.add(spring(2, value)),
+            EffectKind::QuinticStiffness => system.add(spring(5, value)),
             EffectKind::SofteningHardening => {
                 system.add(spring(3, value));
                 system.add(spring(5, second));

@@ -124,6 +124,7 @@ fn a_part_of_the_campaign() {
     let part = [
         (Family::Shaker, 0..4),
         (Family::QuadraticDamping, 0..2),
+        (Family::QuinticStiffness, 0..2),
         (Family::Sweep, 0..2),
         (Family::FreeDecay, 0..2),
         (Family::CuttingWithForce, 0..1),

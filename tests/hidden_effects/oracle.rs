@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 use nalgebra::{DMatrix, DVector};
 use rand_chacha::ChaCha8Rng;
 
-use super::cause::{Cause, EffectKind};
+use super::cause::{Cause, EffectKind, OF_OWN_FAMILY};
 use super::noise::Whitening;
 
 /// Squared distance (χ²) below which two causes cannot be separated.
@@ -45,7 +45,7 @@ pub(crate) trait Lab {
     /// The effects among these that families without an effect of their own hide.
     fn drawn(&self) -> Vec<EffectKind> {
         let mut kinds = self.kinds();
-        kinds.retain(|kind| *kind != EffectKind::QuadraticDamping);
+        kinds.retain(|kind| !OF_OWN_FAMILY.contains(kind));
         kinds
     }
 

@@ -28,13 +28,15 @@ pub(crate) enum Family {
     TwoEffects,
     /// Tests of structures with quadratic damping.
     QuadraticDamping,
+    /// Tests of structures with a quintic spring.
+    QuinticStiffness,
     /// Cuts in chatter. The oracle does not treat them: in a growing motion every trajectory contains more information on the machine than
     /// a fit can extract. Of rates, only that of answers with high confidence is required.
     Chatter,
 }
 
 impl Family {
-    pub(crate) const ALL: [Self; 10] = [
+    pub(crate) const ALL: [Self; 11] = [
         Self::Shaker,
         Self::Sweep,
         Self::FreeDecay,
@@ -44,6 +46,7 @@ impl Family {
         Self::NotInLibrary,
         Self::TwoEffects,
         Self::QuadraticDamping,
+        Self::QuinticStiffness,
         Self::Chatter,
     ];
 
@@ -59,6 +62,7 @@ impl Family {
             Self::NotInLibrary => "not-in-library",
             Self::TwoEffects => "two-effects",
             Self::QuadraticDamping => "quadratic-damping",
+            Self::QuinticStiffness => "quintic-stiffness",
             Self::Chatter => "chatter",
         }
     }
@@ -334,6 +338,7 @@ fn hide(family: Family, bench: &dyn Lab, random: &mut ChaCha8Rng) -> Option<Vec<
         Family::Nothing => return Some(Vec::new()),
         Family::NotInLibrary => (NOT_IN_LIBRARY.to_vec(), 1),
         Family::QuadraticDamping => (vec![EffectKind::QuadraticDamping], 1),
+        Family::QuinticStiffness => (vec![EffectKind::QuinticStiffness], 1),
         Family::TwoEffects => (bench.drawn(), 2),
         Family::Chatter if random.random::<f64>() < 0.2 => return Some(Vec::new()),
         _ => (bench.drawn(), 1),

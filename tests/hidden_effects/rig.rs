@@ -8,7 +8,7 @@ use quietcut::recording::{Channel, Quantity, RecordedChannel, Recording, Sidecar
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-use super::cause::{Cause, EffectKind, STRUCTURAL, Scale};
+use super::cause::{Cause, EffectKind, OF_OWN_FAMILY, STRUCTURAL, Scale};
 use super::machine::{Machine, between};
 use super::motion::{Path, System, first_order, interpolated};
 use super::noise::Whitening;
@@ -410,7 +410,7 @@ impl Lab for Bench {
             kind => kind,
         };
         let structural = STRUCTURAL.into_iter().map(of_machine);
-        structural.chain([EffectKind::QuadraticDamping]).collect()
+        structural.chain(OF_OWN_FAMILY).collect()
     }
 
     fn is_free_decay(&self) -> bool {

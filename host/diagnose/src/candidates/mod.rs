@@ -27,6 +27,7 @@ mod process;
 mod process_damping;
 mod quadratic_damping;
 mod quadratic_stiffness;
+mod quintic_stiffness;
 mod restoring;
 mod runout;
 mod sensor;
@@ -60,6 +61,7 @@ fn of(effect: EffectName) -> Vec<Box<dyn Cause>> {
         EffectName::QuadraticStiffness => vec![Box::new(quadratic_stiffness::CAUSE)],
         EffectName::CubicDamping => vec![Box::new(cubic_damping::CAUSE)],
         EffectName::SofteningHardening => vec![Box::new(softening_hardening::CAUSE)],
+        EffectName::QuinticStiffness => vec![Box::new(quintic_stiffness::CAUSE)],
         EffectName::QuadraticDamping => vec![Box::new(quadratic_damping::CAUSE)],
         EffectName::CoulombFriction => vec![
             Box::new(coulomb_friction::SYMMETRIC),

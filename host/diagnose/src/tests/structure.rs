@@ -65,7 +65,7 @@ fn to_be_filled(rate_hz: f64, seed: u64) -> Recording {
 }
 
 /// Sweeps through the resonance at three force levels, with hidden effects.
-fn records(effects: &[&str]) -> Vec<Recording> {
+pub(crate) fn records(effects: &[&str]) -> Vec<Recording> {
     let sweep = |(seed, amplitude_n)| {
         let signal = Signal::Sweep {
             first_hz: 10.0,
@@ -79,7 +79,7 @@ fn records(effects: &[&str]) -> Vec<Recording> {
 }
 
 /// Two free decays from static forces, recorded from their start on, without the force, with hidden effects.
-fn free_decays(effects: &[&str]) -> Vec<Recording> {
+pub(crate) fn free_decays(effects: &[&str]) -> Vec<Recording> {
     let (rate_hz, pull_s) = (256.0, 5.0);
     let free_decay = |(seed, force_n)| {
         let signal = Signal::Release {

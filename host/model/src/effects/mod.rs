@@ -34,6 +34,7 @@ mod pickup;
 mod process_damping;
 mod quadratic_damping;
 mod quadratic_stiffness;
+mod quintic_stiffness;
 mod runout;
 mod sensor_delay;
 mod sensor_gain;
@@ -72,6 +73,7 @@ list! {
     QuadraticStiffness => quadratic_stiffness::QUADRATIC_STIFFNESS,
     CubicDamping => cubic_damping::CUBIC_DAMPING,
     SofteningHardening => softening_hardening::SOFTENING_HARDENING,
+    QuinticStiffness => quintic_stiffness::QUINTIC_STIFFNESS,
     QuadraticDamping => quadratic_damping::QUADRATIC_DAMPING,
     CoulombFriction => coulomb_friction::COULOMB_FRICTION,
     Backlash => backlash::BACKLASH,
