@@ -19,6 +19,7 @@ mod force_coefficients;
 mod force_coefficients_by_one_factor;
 mod force_exponent;
 mod hysteresis;
+mod joint_friction;
 mod linear_parameter;
 mod mass;
 mod missing_mode;
@@ -71,6 +72,10 @@ fn of(effect: EffectName) -> Vec<Box<dyn Cause>> {
         ],
         EffectName::Backlash => vec![Box::new(backlash::CAUSE)],
         EffectName::Hysteresis => vec![Box::new(hysteresis::CAUSE)],
+        EffectName::JointFriction => vec![
+            Box::new(joint_friction::MICROSLIP),
+            Box::new(joint_friction::SLIP),
+        ],
         EffectName::ModeCoupling => vec![Box::new(mode_coupling::QUARTIC), Box::new(mode_coupling::CUBIC)],
         EffectName::Drift => vec![Box::new(drift::RATE), Box::new(drift::SETTLING)],
         EffectName::ForceCoefficients => vec![

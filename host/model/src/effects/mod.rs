@@ -21,10 +21,12 @@ mod first_order_section;
 mod force_coefficients;
 mod force_exponent;
 mod hysteresis;
+mod joint_friction;
 mod linear_change;
 mod list;
 mod local_force;
 mod location;
+mod masing_memory;
 mod mass;
 mod missing_mode;
 mod mode_coupling;
@@ -48,6 +50,8 @@ pub mod table;
 mod values;
 mod wear;
 
+#[cfg(test)]
+mod joint_friction_tests;
 #[cfg(test)]
 mod round_trip_tests;
 #[cfg(test)]
@@ -78,6 +82,7 @@ list! {
     CoulombFriction => coulomb_friction::COULOMB_FRICTION,
     Backlash => backlash::BACKLASH,
     Hysteresis => hysteresis::HYSTERESIS,
+    JointFriction => joint_friction::JOINT_FRICTION,
     ModeCoupling => mode_coupling::MODE_COUPLING,
     Drift => drift::DRIFT,
     ForceCoefficients => force_coefficients::FORCE_COEFFICIENTS,

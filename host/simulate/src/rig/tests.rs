@@ -5,7 +5,7 @@ use std::f64::consts::{PI, TAU};
 use super::*;
 use quietcut_testkit::case;
 
-fn rig(signal: Signal, effects: &[&str]) -> Rig {
+pub(super) fn rig(signal: Signal, effects: &[&str]) -> Rig {
     Rig {
         effects: Effects::parse(effects.iter().copied()).unwrap(),
         measured: vec![Quantity::Displacement, Quantity::Velocity, Quantity::Acceleration],
@@ -13,12 +13,12 @@ fn rig(signal: Signal, effects: &[&str]) -> Rig {
     }
 }
 
-fn samples<'a>(recording: &'a Recording, name: &str) -> &'a [f64] {
+pub(super) fn samples<'a>(recording: &'a Recording, name: &str) -> &'a [f64] {
     &recording.channel(name).unwrap().samples
 }
 
 /// The mode of chapter 5 at 17 Hz without its cubic terms: 188 kg, 305 N s/m, 2.26e6 N/m.
-fn linear() -> Structure {
+pub(super) fn linear() -> Structure {
     let mut structure = case("kuka-kr90-y17-low").structure.unwrap();
     if let quietcut_model::structure::Form::Matrices(matrices) = &mut structure.form {
         (matrices.cubic_damping, matrices.cubic_stiffness) = (None, None);
