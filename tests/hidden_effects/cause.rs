@@ -7,6 +7,7 @@ use super::job::CutScale;
 use super::law::Law;
 use super::machine::{Machine, between, either};
 use super::motion::System;
+use super::sliders::Sliders;
 
 /// A kind of effect.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -22,6 +23,7 @@ pub(crate) enum EffectKind {
     CubicDamping,
     QuadraticDamping,
     QuinticStiffness,
+    JointFriction,
     SofteningHardening,
     CoulombFriction,
     Backlash,
@@ -76,8 +78,11 @@ pub(crate) const STRUCTURAL: [EffectKind; 17] = [
 ];
 
 /// Effects of the library that tests of structures hide in a family of their own.
-pub(crate) const OF_OWN_FAMILY: [EffectKind; 2] =
-    [EffectKind::QuadraticDamping, EffectKind::QuinticStiffness];
+pub(crate) const OF_OWN_FAMILY: [EffectKind; 3] = [
+    EffectKind::QuadraticDamping,
+    EffectKind::QuinticStiffness,
+    EffectKind::JointFriction,
+];
 
 /// Effects of the library that belong to the cutting process.
 pub(crate) const PROCESS: [EffectKind; 8] = [
@@ -140,6 +145,7 @@ impl EffectKind {
             Self::CubicDamping => &["cubic-damping"],
             Self::QuadraticDamping => &["quadratic-damping"],
             Self::QuinticStiffness => &["quintic-stiffness"],
+            Self::JointFriction => &["joint-friction"],
             Self::SofteningHardening => &["softening-hardening"],
             Self::CoulombFriction => &["coulomb-friction"],
             Self::Backlash => &["backlash"],
@@ -178,6 +184,7 @@ impl EffectKind {
         match self {
             Self::MissingMode | Self::SpeedFluctuation => 3,
             Self::SofteningHardening | Self::Backlash | Self::Hysteresis | Self::SensorOffsetByMode => 2,
+            Self::JointFriction => 2,
             Self::ForceCoefficients | Self::EdgeForce | Self::ForceExponent | Self::Runout => 2,
             _ => 1,
         }
@@ -230,6 +237,7 @@ impl EffectKind {
                 };
                 vec![apart, between(random, 0.01, 0.05), between(random, 4.0, 60.0)]
             }
+            Self::JointFriction => vec![size, random.random_range(0.3..0.9)],
             Self::SofteningHardening => vec![size, random.random_range(0.4..0.7)],
             Self::Backlash => vec![random.random_range(0.15..0.7), between(random, 0.05, 0.5)],
             Self::Hysteresis => vec![between(random, 0.03, 0.3), random.random_range(0.1..0.5)],
@@ -255,7 +263,7 @@ impl EffectKind {
             Self::MissingMode => [0.55, 0.7, 0.9, 1.15, 1.4, 1.7]
                 .map(|f| vec![f, 0.02, 30.0])
                 .to_vec(),
-            Self::SofteningHardening => vec![vec![0.1, 0.5]],
+            Self::SofteningHardening | Self::JointFriction => vec![vec![0.1, 0.5]],
             Self::Backlash => [0.15, 0.35, 0.6].map(|gap| vec![gap, 0.1]).to_vec(),
             Self::Hysteresis => [0.1, 0.3].map(|z| vec![0.05, z]).to_vec(),
             Self::CoulombFriction => vec![vec![0.2]],
@@ -312,6 +320,11 @@ impl Cause {
             EffectKind::CubicStiffness => vec![("k3_n_per_m3", 0.1 * s[0] * k / peak.powi(2))],
             EffectKind::QuadraticStiffness => vec![("k2_n_per_m2", 0.1 * s[0] * k / peak)],
             EffectKind::QuinticStiffness => vec![("k5_n_per_m5", 0.1 * s[0] * k / peak.powi(4))],
+            EffectKind::JointFriction => vec![
+                ("softening_n_per_m", 0.1 * s[0] * k),
+                ("exponent", s[1]),
+                ("reference_m", peak),
+            ],
             EffectKind::CubicDamping => vec![("c3_ns3_per_m3", 0.5 * s[0] * c / speed.powi(2))],
             EffectKind::QuadraticDamping => vec![("c2_ns2_per_m2", 0.5 * s[0] * c / speed)],
             EffectKind::SofteningHardening => {
@@ -446,6 +459,11 @@ impl Cause {
                 yield_m: second,
                 own: 0,
             }),
+            EffectKind::JointFriction => {
+                // Sliders stronger than that slip in no test.
+                let most_m = 4.0 * scale.peak_m;
+                system.add_joint(axis, Sliders::new(value, second, scale.peak_m, most_m));
+            }
             EffectKind::ModeCoupling => system.add(Law::Coupling {
                 axes: [0, 1],
                 coefficient: value,

@@ -5,8 +5,9 @@ use std::f64::consts::TAU;
 
 use super::job::Job;
 use super::law::State;
-use super::motion::{System, interpolated};
+use super::motion::System;
 use super::process::Process;
+use super::signal::interpolated;
 
 /// Working point of one cut.
 #[derive(Clone, Debug)]

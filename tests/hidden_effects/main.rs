@@ -32,6 +32,7 @@ mod puzzle;
 mod rig;
 mod sensor;
 mod signal;
+mod sliders;
 
 use campaign::{Report, Share};
 use puzzle::{Family, Puzzle};
@@ -125,6 +126,7 @@ fn a_part_of_the_campaign() {
         (Family::Shaker, 0..4),
         (Family::QuadraticDamping, 0..2),
         (Family::QuinticStiffness, 0..2),
+        (Family::JointFriction, 0..2),
         (Family::Sweep, 0..2),
         (Family::FreeDecay, 0..2),
         (Family::CuttingWithForce, 0..1),

@@ -416,6 +416,7 @@ impl Cause {
         match self.kind {
             EffectKind::MissingMode => s[0] > 0.1 && (0.0005..0.3).contains(&s[1]) && s[2] > 0.5,
             EffectKind::SofteningHardening => s[0].abs() < 4.0 && s[1] > 0.2,
+            EffectKind::JointFriction => (0.0..4.0).contains(&s[0]) && s[1] > 0.05 && s[1] <= 1.0,
             EffectKind::Stiffness => (-9.5..4.0).contains(&s[0]),
             EffectKind::Backlash => s[0] > 0.0 && s[0] < 2.0 && (0.0..0.95).contains(&s[1]),
             EffectKind::Hysteresis => s[1] > 0.01 && s[0].abs() < 0.9,

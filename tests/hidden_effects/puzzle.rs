@@ -30,13 +30,15 @@ pub(crate) enum Family {
     QuadraticDamping,
     /// Tests of structures with a quintic spring.
     QuinticStiffness,
+    /// Tests of structures with the microslip of a joint.
+    JointFriction,
     /// Cuts in chatter. The oracle does not treat them: in a growing motion every trajectory contains more information on the machine than
     /// a fit can extract. Of rates, only that of answers with high confidence is required.
     Chatter,
 }
 
 impl Family {
-    pub(crate) const ALL: [Self; 11] = [
+    pub(crate) const ALL: [Self; 12] = [
         Self::Shaker,
         Self::Sweep,
         Self::FreeDecay,
@@ -47,6 +49,7 @@ impl Family {
         Self::TwoEffects,
         Self::QuadraticDamping,
         Self::QuinticStiffness,
+        Self::JointFriction,
         Self::Chatter,
     ];
 
@@ -63,6 +66,7 @@ impl Family {
             Self::TwoEffects => "two-effects",
             Self::QuadraticDamping => "quadratic-damping",
             Self::QuinticStiffness => "quintic-stiffness",
+            Self::JointFriction => "joint-friction",
             Self::Chatter => "chatter",
         }
     }
@@ -339,6 +343,7 @@ fn hide(family: Family, bench: &dyn Lab, random: &mut ChaCha8Rng) -> Option<Vec<
         Family::NotInLibrary => (NOT_IN_LIBRARY.to_vec(), 1),
         Family::QuadraticDamping => (vec![EffectKind::QuadraticDamping], 1),
         Family::QuinticStiffness => (vec![EffectKind::QuinticStiffness], 1),
+        Family::JointFriction => (vec![EffectKind::JointFriction], 1),
         Family::TwoEffects => (bench.drawn(), 2),
         Family::Chatter if random.random::<f64>() < 0.2 => return Some(Vec::new()),
         _ => (bench.drawn(), 1),

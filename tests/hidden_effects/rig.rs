@@ -10,11 +10,11 @@ use rand_chacha::ChaCha8Rng;
 
 use super::cause::{Cause, EffectKind, OF_OWN_FAMILY, STRUCTURAL, Scale};
 use super::machine::{Machine, between};
-use super::motion::{Path, System, first_order, interpolated};
+use super::motion::{Path, System, first_order};
 use super::noise::Whitening;
 use super::oracle::{Lab, Output};
 use super::sensor::{Sensor, letter, noisy, read_by, sensors};
-use super::signal::signal;
+use super::signal::{interpolated, signal};
 
 /// EffectKind of a test of the structure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

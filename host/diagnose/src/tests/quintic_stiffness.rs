@@ -3,7 +3,7 @@
 use crate::Options;
 use crate::conclusion::answer::{Diagnosis, Outcome};
 use crate::diagnose;
-use crate::tests::structure::{baseline, free_decays, records};
+use crate::tests::structure::{baseline, decays, random_seed, sweeps};
 use quietcut_recording::Recording;
 
 /// Names of the causes, and for each wanted parameter the distance of its estimate from the truth in half widths of
@@ -35,14 +35,17 @@ fn found(records: &[Recording], wanted: &[(&str, &str, f64)]) -> Diagnosis {
 fn a_quintic_spring_is_found_at_three_levels() {
     for k5 in [1e17, -1e15] {
         let text = format!("quintic-stiffness={k5}");
-        found(&records(&[&text]), &[("quintic-stiffness", "k5_n_per_m5", k5)]);
+        found(
+            &sweeps(&[&text], random_seed()),
+            &[("quintic-stiffness", "k5_n_per_m5", k5)],
+        );
     }
 }
 
 #[test]
 fn a_quintic_spring_is_found_in_free_decays() {
     found(
-        &free_decays(&["quintic-stiffness=2e19"]),
+        &decays(&["quintic-stiffness=2e19"], random_seed()),
         &[("quintic-stiffness", "k5_n_per_m5", 2e19)],
     );
 }
@@ -50,7 +53,7 @@ fn a_quintic_spring_is_found_in_free_decays() {
 #[test]
 fn a_cubic_and_a_quintic_spring_of_one_sign_are_two_causes_and_of_two_signs_one() {
     found(
-        &free_decays(&["cubic-stiffness=1e12", "quintic-stiffness=2e19"]),
+        &decays(&["cubic-stiffness=1e12", "quintic-stiffness=2e19"], random_seed()),
         &[
             ("cubic-stiffness", "k3_n_per_m3", 1e12),
             ("quintic-stiffness", "k5_n_per_m5", 2e19),
@@ -61,7 +64,10 @@ fn a_cubic_and_a_quintic_spring_of_one_sign_are_two_causes_and_of_two_signs_one(
         ("softening-hardening", "k5_n_per_m5", 2e19),
     ];
     found(
-        &free_decays(&["cubic-stiffness=-1e12", "quintic-stiffness=2e19"]),
+        &decays(
+            &["cubic-stiffness=-1e12", "quintic-stiffness=2e19"],
+            random_seed(),
+        ),
         &turn,
     );
 }
