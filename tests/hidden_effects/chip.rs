@@ -8,6 +8,7 @@ use super::law::State;
 use super::motion::System;
 use super::process::Process;
 use super::signal::interpolated;
+use super::sliders::Branches;
 
 /// Working point of one cut.
 #[derive(Clone, Debug)]
@@ -110,7 +111,7 @@ impl Chips<'_> {
             let stepped = |to: f64| {
                 let mut after = *y;
                 let force = |t: f64, x: [f64; 3], v: [f64; 3]| self.force(t, x, v, cutting, past);
-                system.advance(from, to - from, &mut after, &mut [], &force);
+                system.advance(from, to - from, &mut after, &mut Branches::default(), &force);
                 let then = self.cutting(to, system.displacement(&after), engaged, past);
                 (after, then)
             };
@@ -135,7 +136,7 @@ impl Chips<'_> {
             }
         }
         let force = |t: f64, x: [f64; 3], v: [f64; 3]| self.force(t, x, v, cutting, past);
-        system.advance(from, to - from, y, &mut [], &force);
+        system.advance(from, to - from, y, &mut Branches::default(), &force);
     }
 
     /// Those of the `engaged` teeth that reach the surface.

@@ -20,6 +20,7 @@ use super::oracle::{Lab, Output};
 use super::process::Process;
 use super::sensor::{Sensor, letter, noisy, read_by};
 use super::signal::interpolated;
+use super::sliders::Branches;
 
 /// Cuts of a machine, with the sensors that record them.
 pub(crate) struct CutBench {
@@ -270,7 +271,7 @@ impl CutBench {
                 let cutting = chips.cutting(t, x, chips.engaged(t + 1e-6 * step_s), &u);
                 let force = |t: f64, x: [f64; 3], v: [f64; 3]| chips.force(t, x, v, cutting, &u);
                 let mut path = Path::default();
-                system.note(t, &y, &[], &force, &mut path);
+                system.note(t, &y, &Branches::default(), &force, &mut path);
                 found.force.push(chips.force(t, x, path.v[0], cutting, &u));
                 found.u.push(x);
                 found.a.push(path.a[0]);
@@ -289,7 +290,7 @@ impl CutBench {
                     let cutting = chips.cutting(switch, x, chips.engaged(switch + beside * step_s), &u);
                     let force = |t: f64, x: [f64; 3], v: [f64; 3]| chips.force(t, x, v, cutting, &u);
                     let mut path = Path::default();
-                    system.note(switch, &y, &[], &force, &mut path);
+                    system.note(switch, &y, &Branches::default(), &force, &mut path);
                     path.a[0]
                 });
                 let jump = std::array::from_fn(|axis| after[axis] - before[axis]);

@@ -320,6 +320,41 @@ mod tests {
     }
 
     #[test]
+    fn a_joint_on_a_harmonic_orbit_has_its_describing_function() {
+        for slip in [
+            &[][..],
+            &["joint-friction.slip_m=1e-5", "joint-friction.beta=0.5"],
+        ] {
+            let first = [
+                "joint-friction=2e5",
+                "joint-friction.exponent=0.6",
+                "joint-friction.reference_m=1e-5",
+                "joint-friction.direction=y",
+            ];
+            let texts: Vec<&str> = first.iter().chain(slip).copied().collect();
+            let joint = terms(&texts);
+            let [_, spring, _] = equivalent(&joint, &harmonic(), [1e9; 3]);
+            let exact = joint[0].describing_function(SIZE_M, OMEGA).unwrap();
+            assert!(
+                (spring.stiffness / exact.re - 1.0).abs() < 1e-4,
+                "{spring:?} {exact}"
+            );
+            assert!(
+                (spring.damping * OMEGA / exact.im - 1.0).abs() < 1e-4,
+                "{spring:?} {exact}"
+            );
+            // A small disturbance moves the tool within small loops: it loses less than the orbit, and more stiffness
+            // than none.
+            let springs = [spring; 3];
+            let [_, small, _] = incremental(&joint, &harmonic(), OMEGA / TAU * 0.7236, &springs, [1e9; 3]);
+            assert!(
+                small.stiffness < 0.0 && small.damping < spring.damping,
+                "{small:?} {spring:?}"
+            );
+        }
+    }
+
+    #[test]
     fn hysteresis_dissipates_the_area_of_its_loop() {
         let loops = terms(&[
             "hysteresis=2e5",
