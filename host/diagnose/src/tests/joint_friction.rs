@@ -105,9 +105,9 @@ fn a_joint_is_found_in_impacts() {
                     peak_n,
                     pulse_s: 0.02,
                 }],
-                seconds: 5.0,
+                seconds: 4.0,
             };
-            let mut record = recorded_of(&baseline(), Direction::X, signal, 1024.0, texts, seed);
+            let mut record = recorded_of(&baseline(), Direction::X, signal, 2048.0, texts, seed);
             record.sidecar.kind = Some(TestKind::Hammer);
             record
         };
