@@ -57,7 +57,8 @@ pub trait RestoringForce: Debug + Send + Sync {
     fn begin(&self, _at: &MotionState, _own: &mut [f64]) {}
 
     /// True if the internal states are a memory of the path that the displacement has taken: they are constant within a
-    /// regime, and only [`Self::begin`], [`Self::enter`] and [`Self::follow`] change them.
+    /// regime, and only [`Self::begin`], [`Self::enter`] and [`Self::follow`] change them. Along a given motion such a force
+    /// does not depend on the regime.
     fn remembers(&self) -> bool {
         false
     }

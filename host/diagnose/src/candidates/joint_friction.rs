@@ -13,7 +13,7 @@ use quietcut_model::effects::EffectName;
 
 pub(super) const MICROSLIP: Restoring = Restoring {
     nonlinear_parameters: &["exponent"],
-    nonlinear_grid: |_, _| [0.25, 0.5, 0.75, 1.0].map(|exponent| vec![exponent]).to_vec(),
+    nonlinear_grid: |_, _| [0.3, 0.6, 1.0].map(|exponent| vec![exponent]).to_vec(),
     bounds: |_, _| vec![EXPONENT],
     // The largest displacement, rounded down to a power of ten.
     fixed: |study, axis| {
@@ -29,9 +29,8 @@ pub(super) const SLIP: Restoring = Restoring {
     nonlinear_grid: |study, axis| {
         let largest_m = largest_m(study, axis);
         [0.1, 0.3, 0.7]
-            .into_iter()
-            .flat_map(|slip| [0.3, 0.7].map(|exponent| vec![exponent, slip * largest_m, 0.5]))
-            .collect()
+            .map(|slip| vec![0.5, slip * largest_m, 0.5])
+            .to_vec()
     },
     bounds: |study, axis| {
         let largest_m = largest_m(study, axis);

@@ -192,7 +192,7 @@ fn the_describing_function_is_the_sum_of_many_sliders() {
 
 #[test]
 fn a_long_decay_and_a_new_motion_need_no_more_memory() {
-    // A decay of 300 turning points to 0.5 %, then growth to beyond its start: 24 points are in memory.
+    // A decay of 300 turning points to 0.5 %, then growth to beyond its start: 16 points are in memory.
     let e = 0.5;
     let joint = joint(&["joint-friction.exponent=0.5"]);
     let decay = (0..300).map(|k| 3e-5 * (-1.0_f64).powi(k) * 0.9825_f64.powi(k));

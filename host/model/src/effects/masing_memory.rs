@@ -10,7 +10,7 @@
 //! jumps by that change if a later motion comes back to the forgotten loop.
 
 /// Number of turning points in memory. A choice.
-pub(super) const POINTS: usize = 24;
+pub(super) const POINTS: usize = 16;
 
 /// Number of internal states: displacements of the turning points, m, the first with the largest absolute value; g, m,
 /// at all but the first, which is on the backbone; the displacement at the last sample of a given motion, m. Unused
