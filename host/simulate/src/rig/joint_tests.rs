@@ -75,7 +75,8 @@ fn a_joint_moves_as_a_sum_of_sliders() {
         let wanted = integrated(sliders, |t| tones.force_n(t), (step_s, count));
         let y = samples(&recording, "y");
         let size = y.iter().fold(0.0_f64, |most, y| most.max(y.abs()));
-        assert!(size > 1.5e-4 && size < 6e-4, "{size}");
+        // With complete slip the tool moves beyond it, without it not beyond the strongest slider.
+        assert!(size > 1.5e-4 && (slip_m.is_some() == (size > most_m)), "{size}");
         let apart = y.iter().zip(wanted.iter().step_by(FINER));
         let apart = apart.fold(0.0_f64, |most, (y, wanted)| most.max((y - wanted).abs()));
         println!("{slip_m:?}: {:e}", apart / size);
