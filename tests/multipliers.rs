@@ -380,6 +380,7 @@ fn disturbances_of_extended_cases_grow_as_their_multipliers_say() {
     let spring = "[extension.cubic-stiffness]\nk3_n_per_m3 = 8e14\ndirection = \"x\"\n";
     let turn =
         "[extension.softening-hardening]\nk3_n_per_m3 = -4e14\nk5_n_per_m5 = 3e24\ndirection = \"x\"\n";
+    let quintic = "[extension.quintic-stiffness]\nk5_n_per_m5 = 4e24\ndirection = \"x\"\n";
     let shared =
         "[extension.mode-coupling]\nkxyy_n_per_m3 = 4e14\nkxxy_n_per_m2 = 2e9\ndirections = [\"x\", \"y\"]\n";
     let squared = "[extension.quadratic-damping]\nc2_ns2_per_m2 = 60.0\ndirection = \"x\"\n";
@@ -392,6 +393,7 @@ fn disturbances_of_extended_cases_grow_as_their_multipliers_say() {
         (two, chip),
         (two, spring),
         (two, turn),
+        (two, quintic),
         (two, shared),
         (two, squared),
         (two, mode),

@@ -33,6 +33,32 @@ struct AnsweredCause {
     parameters: Vec<(String, [f64; 2])>,
 }
 
+/// True values of parameters, with the softening of a joint at the reference displacement of an answer, which is a scale
+/// and no parameter.
+fn at_reference_of(
+    values: &[(&'static str, f64)],
+    parameters: &[(String, [f64; 2])],
+) -> Vec<(&'static str, f64)> {
+    let of = |wanted: &str| {
+        values
+            .iter()
+            .find(|(key, _)| *key == wanted)
+            .map(|(_, value)| *value)
+    };
+    let answered = parameters.iter().find(|(key, _)| key == "reference_m");
+    let (Some(reference_m), Some(exponent), Some((_, [answered_m, _]))) =
+        (of("reference_m"), of("exponent"), answered)
+    else {
+        return values.to_vec();
+    };
+    let at = |(key, value): &(&'static str, f64)| match *key {
+        "softening_n_per_m" => Some((*key, value * (answered_m / reference_m).powf(exponent))),
+        "reference_m" => None,
+        _ => Some((*key, *value)),
+    };
+    values.iter().filter_map(at).collect()
+}
+
 /// The puzzle of one seed with the answer and its assessment.
 #[derive(Clone, Debug)]
 pub(crate) struct Finding {
@@ -166,7 +192,7 @@ impl Finding {
         if right && puzzle.verdict == Verdict::Separable {
             for AnsweredCause { name, parameters, .. } in &said.causes {
                 for hidden in puzzle.hidden.iter().filter(|hidden| hidden.name == name) {
-                    for (key, truth) in &hidden.values {
+                    for (key, truth) in &at_reference_of(&hidden.values, parameters) {
                         let Some((_, [low, high])) = parameters.iter().find(|(known, _)| known == key) else {
                             continue;
                         };

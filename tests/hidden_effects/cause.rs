@@ -7,6 +7,7 @@ use super::job::CutScale;
 use super::law::Law;
 use super::machine::{Machine, between, either};
 use super::motion::System;
+use super::sliders::Sliders;
 
 /// A kind of effect.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -21,6 +22,8 @@ pub(crate) enum EffectKind {
     QuadraticStiffness,
     CubicDamping,
     QuadraticDamping,
+    QuinticStiffness,
+    JointFriction,
     SofteningHardening,
     CoulombFriction,
     Backlash,
@@ -52,8 +55,8 @@ pub(crate) enum EffectKind {
     SensorSquare,
 }
 
-/// Effects of the library that tests of structures can hide. [`EffectKind::QuadraticDamping`] has a family of its own, so that the draws of
-/// the other families stay.
+/// Effects of the library that tests of structures can hide. Those of [`OF_OWN_FAMILY`] are not among them, so that the draws of the other
+/// families stay.
 pub(crate) const STRUCTURAL: [EffectKind; 17] = [
     EffectKind::Mass,
     EffectKind::Stiffness,
@@ -87,6 +90,13 @@ pub(crate) const RESTORING: [EffectKind; 11] = [
     EffectKind::Hysteresis,
     EffectKind::ModeCoupling,
     EffectKind::Drift,
+];
+
+/// Effects of the library that tests of structures hide in a family of their own.
+pub(crate) const OF_OWN_FAMILY: [EffectKind; 3] = [
+    EffectKind::QuadraticDamping,
+    EffectKind::QuinticStiffness,
+    EffectKind::JointFriction,
 ];
 
 /// Effects of the library that belong to the cutting process.
@@ -149,6 +159,8 @@ impl EffectKind {
             Self::QuadraticStiffness => &["quadratic-stiffness"],
             Self::CubicDamping => &["cubic-damping"],
             Self::QuadraticDamping => &["quadratic-damping"],
+            Self::QuinticStiffness => &["quintic-stiffness"],
+            Self::JointFriction => &["joint-friction"],
             Self::SofteningHardening => &["softening-hardening"],
             Self::CoulombFriction => &["coulomb-friction"],
             Self::Backlash => &["backlash"],
@@ -187,6 +199,7 @@ impl EffectKind {
         match self {
             Self::MissingMode | Self::SpeedFluctuation => 3,
             Self::SofteningHardening | Self::Backlash | Self::Hysteresis | Self::SensorOffsetByMode => 2,
+            Self::JointFriction => 2,
             Self::ForceCoefficients | Self::EdgeForce | Self::ForceExponent | Self::Runout => 2,
             _ => 1,
         }
@@ -223,6 +236,7 @@ impl EffectKind {
             | Self::Stiffness
             | Self::Damping
             | Self::CubicStiffness
+            | Self::QuinticStiffness
             | Self::QuadraticStiffness => {
                 vec![size * either(random)]
             }
@@ -238,6 +252,7 @@ impl EffectKind {
                 };
                 vec![apart, between(random, 0.01, 0.05), between(random, 4.0, 60.0)]
             }
+            Self::JointFriction => vec![size, random.random_range(0.3..0.9)],
             Self::SofteningHardening => vec![size, random.random_range(0.4..0.7)],
             Self::Backlash => vec![random.random_range(0.15..0.7), between(random, 0.05, 0.5)],
             Self::Hysteresis => vec![between(random, 0.03, 0.3), random.random_range(0.1..0.5)],
@@ -263,7 +278,7 @@ impl EffectKind {
             Self::MissingMode => [0.55, 0.7, 0.9, 1.15, 1.4, 1.7]
                 .map(|f| vec![f, 0.02, 30.0])
                 .to_vec(),
-            Self::SofteningHardening => vec![vec![0.1, 0.5]],
+            Self::SofteningHardening | Self::JointFriction => vec![vec![0.1, 0.5]],
             Self::Backlash => [0.15, 0.35, 0.6].map(|gap| vec![gap, 0.1]).to_vec(),
             Self::Hysteresis => [0.1, 0.3].map(|z| vec![0.05, z]).to_vec(),
             Self::CoulombFriction => vec![vec![0.2]],
@@ -319,6 +334,12 @@ impl Cause {
             ],
             EffectKind::CubicStiffness => vec![("k3_n_per_m3", 0.1 * s[0] * k / peak.powi(2))],
             EffectKind::QuadraticStiffness => vec![("k2_n_per_m2", 0.1 * s[0] * k / peak)],
+            EffectKind::QuinticStiffness => vec![("k5_n_per_m5", 0.1 * s[0] * k / peak.powi(4))],
+            EffectKind::JointFriction => vec![
+                ("softening_n_per_m", 0.1 * s[0] * k),
+                ("exponent", s[1]),
+                ("reference_m", peak),
+            ],
             EffectKind::CubicDamping => vec![("c3_ns3_per_m3", 0.5 * s[0] * c / speed.powi(2))],
             EffectKind::QuadraticDamping => vec![("c2_ns2_per_m2", 0.5 * s[0] * c / speed)],
             EffectKind::SofteningHardening => {
@@ -416,6 +437,7 @@ impl Cause {
         match self.kind {
             EffectKind::CubicStiffness => system.add(spring(3, value)),
             EffectKind::QuadraticStiffness => system.add(spring(2, value)),
+            EffectKind::QuinticStiffness => system.add(spring(5, value)),
             EffectKind::SofteningHardening => {
                 system.add(spring(3, value));
                 system.add(spring(5, second));
@@ -452,6 +474,11 @@ impl Cause {
                 yield_m: second,
                 own: 0,
             }),
+            EffectKind::JointFriction => {
+                // Sliders stronger than that slip in no test.
+                let most_m = 4.0 * scale.peak_m;
+                system.add_joint(axis, Sliders::new(value, second, scale.peak_m, most_m));
+            }
             EffectKind::ModeCoupling => system.add(Law::Coupling {
                 axes: [0, 1],
                 coefficient: value,

@@ -5,9 +5,11 @@ use std::f64::consts::TAU;
 
 use super::disturbance::Disturbance;
 use super::job::Job;
-use super::law::{Branch, State};
-use super::motion::{System, interpolated};
+use super::law::State;
+use super::motion::System;
 use super::process::Process;
+use super::signal::interpolated;
+use super::sliders::Branches;
 
 /// Working point of one cut.
 #[derive(Clone, Debug)]
@@ -105,7 +107,7 @@ impl Chips<'_> {
         system: &System,
         [mut from, to]: [f64; 2],
         y: &mut State,
-        branches: &mut Vec<Branch>,
+        branches: &mut Branches,
         past: &[[f64; 3]],
     ) {
         let engaged = self.engaged(0.5 * (from + to));

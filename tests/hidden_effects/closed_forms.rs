@@ -4,6 +4,7 @@ use nalgebra::DMatrix;
 
 use super::law::Law;
 use super::motion::{Path, System};
+use super::sliders::Sliders;
 
 const MASS: f64 = 2.0;
 const STIFFNESS: f64 = 800.0;
@@ -118,4 +119,24 @@ fn a_hardening_spring_has_the_period_of_its_potential() {
         .collect();
     let found = (crossings[crossings.len() - 1] - crossings[0]) / (crossings.len() - 1) as f64;
     assert!((found / period - 1.0).abs() < 1e-6, "{found} {period}");
+}
+
+#[test]
+fn a_joint_dissipates_a_power_of_the_amplitude() {
+    // To first order in s/k a cycle dissipates 4e/(e + 2)·s·A²·(A/u₀)^e of the energy ½·k·A²: A^−e grows by
+    // 4e²/(e + 2)·(s/k)/u₀^e in each cycle.
+    let (e, softening, start) = (0.6_f64, 2e-3 * STIFFNESS, 1e-3);
+    let step = std::f64::consts::PI / OMEGA / 200.0;
+    let mut system = one(0.0, &[], step);
+    system.add_joint(0, Sliders::new(softening, e, start, 2.0 * start));
+    let u = released(&system, start, step, 400 * 42);
+    let tops: Vec<f64> = u
+        .windows(3)
+        .filter(|top| top[1] > 0.0 && top[0] < top[1] && top[1] >= top[2])
+        .map(|top| top[1] - (top[2] - top[0]).powi(2) / (8.0 * (top[2] - 2.0 * top[1] + top[0])))
+        .collect();
+    let rise = (tops[39].powf(-e) - tops[0].powf(-e)) / 39.0;
+    let wanted = 4.0 * e * e / (e + 2.0) * softening / STIFFNESS / start.powf(e);
+    // Terms of the next order are s/k = 2e-3 of it.
+    assert!((rise / wanted - 1.0).abs() < 6e-3, "{rise} {wanted}");
 }

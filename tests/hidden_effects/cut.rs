@@ -17,11 +17,11 @@ use super::chip::{Chips, Run};
 use super::disturbance::Disturbance;
 use super::job::{CutScale, Job};
 use super::machine::{Machine, between};
-use super::motion::interpolated;
 use super::motion::{Path, System};
 use super::oracle::{Lab, Output};
 use super::process::Process;
 use super::sensor::{Sensor, letter, noisy, read_by};
+use super::signal::interpolated;
 use super::uncertainty;
 
 /// Cuts of a machine, with the sensors that record them.

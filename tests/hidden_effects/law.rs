@@ -43,6 +43,8 @@ pub(crate) enum Law {
         yield_m: f64,
         own: usize,
     },
+    /// A joint of sliders, number `sliders` of the system.
+    Joint { axis: usize, sliders: usize },
     /// Mode coupling: the derivatives of the potential ½·k·x²·y².
     Coupling { axes: [usize; 2], coefficient: f64 },
     /// Drift of the stiffness: r·t·K·u.
@@ -79,11 +81,15 @@ impl Law {
     pub(crate) fn switches(&self) -> bool {
         matches!(
             self,
-            Self::Friction { .. } | Self::Gap { .. } | Self::BoucWen { .. } | Self::Stop { .. }
+            Self::Friction { .. }
+                | Self::Gap { .. }
+                | Self::BoucWen { .. }
+                | Self::Joint { .. }
+                | Self::Stop { .. }
         )
     }
 
-    /// The restoring force f_r along x, y, z, N.
+    /// The restoring force f_r along x, y, z, N; zero for a joint, whose force depends on its sliders.
     pub(crate) fn restoring(&self, t: f64, u: [f64; 3], v: [f64; 3], y: &State, branch: Branch) -> [f64; 3] {
         let mut force = [0.0; 3];
         match *self {
@@ -159,6 +165,7 @@ impl Law {
                 omega,
                 phase,
             } => force[axis] = -amplitude_n * (omega * t + phase).cos(),
+            Self::Joint { .. } => {}
         }
         force
     }

@@ -34,6 +34,7 @@ mod puzzle;
 mod rig;
 mod sensor;
 mod signal;
+mod sliders;
 mod uncertainty;
 mod workshop;
 
@@ -128,6 +129,8 @@ fn a_part_of_the_campaign() {
     let part = [
         (Family::Shaker, 0..4),
         (Family::QuadraticDamping, 0..2),
+        (Family::QuinticStiffness, 0..2),
+        (Family::JointFriction, 0..2),
         (Family::Sweep, 0..2),
         (Family::FreeDecay, 0..2),
         (Family::CuttingWithForce, 0..1),

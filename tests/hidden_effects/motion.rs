@@ -4,6 +4,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::law::{Branch, Law, ROOM, State, signs};
+use super::sliders::{Branches, Sliders};
 
 /// A force along x, y, z, N, as a function of time, displacement and velocity.
 pub(crate) type Force<'a> = dyn Fn(f64, [f64; 3], [f64; 3]) -> [f64; 3] + 'a;
@@ -23,6 +24,7 @@ pub(crate) struct System {
     laws: Vec<Law>,
     /// Time from which the laws of time count, s.
     start_s: f64,
+    sliders: Vec<Sliders>,
     /// The step h for which `half` holds e^(A·h/2), by rows.
     step_s: f64,
     half: Vec<f64>,
@@ -62,6 +64,7 @@ impl System {
             mobility,
             laws: Vec::new(),
             start_s: 0.0,
+            sliders: Vec::new(),
             step_s,
             half: rows(&(first_order(&inverse, damping, stiffness) * (0.5 * step_s)).exp()),
         }
@@ -106,6 +109,25 @@ impl System {
         });
     }
 
+    /// Adds a joint along an axis to the equation of motion.
+    pub(crate) fn add_joint(&mut self, axis: usize, sliders: Sliders) {
+        self.laws.push(Law::Joint {
+            axis,
+            sliders: self.sliders.len(),
+        });
+        self.sliders.push(sliders);
+    }
+
+    /// Moves the sliders of all joints to where they are in the state `y`.
+    fn drag(&self, y: &State, branches: &mut Branches) {
+        let u = self.displacement(y);
+        for (law, places) in self.laws.iter().zip(&mut branches.places) {
+            if let Law::Joint { axis, sliders } = law {
+                self.sliders[*sliders].drag(u[*axis], places);
+            }
+        }
+    }
+
     fn states(&self) -> usize {
         2 * self.freedoms
             + self
@@ -148,7 +170,7 @@ impl System {
         &self,
         t: f64,
         y: &State,
-        branches: &[Branch],
+        branches: &Branches,
         force: &Force<'_>,
         whole: bool,
         rate: &mut State,
@@ -157,9 +179,12 @@ impl System {
         let (u, v) = (self.of_tip(&y[..n]), self.of_tip(&y[n..2 * n]));
         let mut left = force(t, u, v);
         let mut stuck = None;
-        for (law, &branch) in self.laws.iter().zip(branches) {
+        for (index, (law, &branch)) in self.laws.iter().zip(&branches.each).enumerate() {
             match law {
                 Law::Friction { axis, .. } if branch == 0 => stuck = Some(*axis),
+                Law::Joint { axis, sliders } => {
+                    left[*axis] -= self.sliders[*sliders].restoring(u[*axis], &branches.places[index]);
+                }
                 law => {
                     let restoring = law.restoring(t - self.start_s, u, v, y, branch);
                     for axis in 0..3 {
@@ -220,11 +245,11 @@ impl System {
     }
 
     /// One step: by Lawson's method if the step is the one of the exponential and no law sticks, otherwise by the classical method.
-    fn step(&self, t: f64, h: f64, y: &State, branches: &[Branch], force: &Force<'_>) -> State {
+    fn step(&self, t: f64, h: f64, y: &State, branches: &Branches, force: &Force<'_>) -> State {
         let sticks = self
             .laws
             .iter()
-            .zip(branches)
+            .zip(&branches.each)
             .any(|(law, branch)| matches!(law, Law::Friction { .. }) && *branch == 0);
         // Times are sums, so that a whole step is one within rounding.
         if sticks || (h - self.step_s).abs() > 1e-9 * self.step_s {
@@ -251,7 +276,7 @@ impl System {
     }
 
     /// One step of the classical Runge–Kutta method of fourth order.
-    fn classical_step(&self, t: f64, h: f64, y: &State, branches: &[Branch], force: &Force<'_>) -> State {
+    fn classical_step(&self, t: f64, h: f64, y: &State, branches: &Branches, force: &Force<'_>) -> State {
         let states = self.states();
         let mut k = [[0.0; ROOM]; 4];
         let mut at = *y;
@@ -272,14 +297,14 @@ impl System {
     }
 
     /// Distance of the laws from their next switch: the smallest, and the index of its law. Negative after the switch.
-    fn margin(&self, t: f64, y: &State, branches: &[Branch], force: &Force<'_>) -> (f64, usize) {
+    fn margin(&self, t: f64, y: &State, branches: &Branches, force: &Force<'_>) -> (f64, usize) {
         let mut least = (f64::INFINITY, 0);
         if self.laws.iter().all(|law| !law.switches()) {
             return least;
         }
         let n = self.freedoms;
         let (u, v) = (self.of_tip(&y[..n]), self.of_tip(&y[n..2 * n]));
-        for (index, (law, &branch)) in self.laws.iter().zip(branches).enumerate() {
+        for (index, (law, &branch)) in self.laws.iter().zip(&branches.each).enumerate() {
             let margin = match law {
                 Law::Friction { axis, .. } if branch != 0 => f64::from(branch) * v[*axis],
                 Law::Friction { breakaway_n, .. } => {
@@ -293,6 +318,7 @@ impl System {
                     // Only the zeros of velocity and internal state count, so that their units may differ.
                     (of_v * v[*axis] * self.step_s).min(of_z * y[*own])
                 }
+                Law::Joint { axis, .. } => f64::from(branch) * v[*axis],
                 Law::Stop { axis, gap_m, .. } => f64::from(2 * branch - 1) * (u[*axis] - gap_m),
                 _ => f64::INFINITY,
             };
@@ -318,27 +344,27 @@ impl System {
         index: usize,
         t: f64,
         y: &mut State,
-        branches: &mut [Branch],
+        branches: &mut Branches,
         force: &Force<'_>,
         start: bool,
     ) {
         let n = self.freedoms;
         let (u, v) = (self.of_tip(&y[..n]), self.of_tip(&y[n..2 * n]));
         let sign = |value: f64| if value > 0.0 { 1 } else { -1 };
-        branches[index] = match self.laws[index] {
+        branches.each[index] = match self.laws[index] {
             Law::Friction { axis, .. } if start && v[axis] != 0.0 => sign(v[axis]),
             Law::Friction {
                 axis, breakaway_n, ..
             } => {
                 // At the end of sticking the limit is slightly reduced, because the switch was found only within rounding.
-                let sticks = branches[index] == 0 && !start;
+                let sticks = branches.each[index] == 0 && !start;
                 let limit = if sticks {
                     breakaway_n * (1.0 - 1e-9)
                 } else {
                     breakaway_n
                 };
                 self.stop(axis, v[axis], y);
-                branches[index] = 0;
+                branches.each[index] = 0;
                 let mut rate = [0.0; ROOM];
                 let holding = self.rate(t, y, branches, force, true, &mut rate);
                 if holding.abs() < limit { 0 } else { sign(holding) }
@@ -350,21 +376,24 @@ impl System {
                     sign(u[axis])
                 }
             }
-            Law::Gap { axis, .. } if branches[index] == 0 => sign(u[axis]),
+            Law::Gap { axis, .. } if branches.each[index] == 0 => sign(u[axis]),
             Law::Gap { .. } => 0,
             Law::BoucWen { axis, own, .. } => {
                 let [backward, negative] = [v[axis], y[own]].map(|value| Branch::from(value < 0.0));
                 backward + 2 * negative
             }
+            Law::Joint { axis, .. } if start => sign(v[axis]),
+            Law::Joint { .. } => -branches.each[index],
             Law::Stop { axis, gap_m, .. } if start => Branch::from(u[axis] > gap_m),
-            Law::Stop { .. } => 1 - branches[index],
+            Law::Stop { .. } => 1 - branches.each[index],
             _ => 0,
         };
     }
 
     /// The branches of all laws at the start.
-    pub(crate) fn branches(&self, t: f64, y: &mut State, force: &Force<'_>) -> Vec<Branch> {
-        let mut branches = vec![0; self.laws.len()];
+    pub(crate) fn branches(&self, t: f64, y: &mut State, force: &Force<'_>) -> Branches {
+        let mut branches = Branches::new(self.laws.len());
+        self.drag(y, &mut branches);
         for index in 0..self.laws.len() {
             self.switch(index, t, y, &mut branches, force, true);
         }
@@ -372,7 +401,7 @@ impl System {
     }
 
     /// Advances the state from `t` to `t + h`, with steps that end when a law switches.
-    pub(crate) fn advance(&self, t: f64, h: f64, y: &mut State, branches: &mut [i8], force: &Force<'_>) {
+    pub(crate) fn advance(&self, t: f64, h: f64, y: &mut State, branches: &mut Branches, force: &Force<'_>) {
         let (mut now, end) = (t, t + h);
         // At most 64 switches per step are resolved.
         for _ in 0..64 {
@@ -381,11 +410,13 @@ impl System {
             let (margin, _) = self.margin(end, &after, branches, force);
             if margin >= 0.0 {
                 *y = after;
+                self.drag(y, branches);
                 return;
             }
             let outside = self.crossing(now, rest, y, branches, force, margin);
             let mut at = self.step(now, outside * rest, y, branches, force);
             now += outside * rest;
+            self.drag(&at, branches);
             let (_, index) = self.margin(now, &at, branches, force);
             self.switch(index, now, &mut at, branches, force, false);
             *y = at;
@@ -394,6 +425,7 @@ impl System {
             }
         }
         *y = self.step(now, end - now, y, branches, force);
+        self.drag(y, branches);
     }
 
     /// The share of a step just after which a law switches, if the end of the step is beyond the switch by `margin`. Regula falsi with the
@@ -403,7 +435,7 @@ impl System {
         t: f64,
         h: f64,
         y: &State,
-        branches: &[Branch],
+        branches: &Branches,
         force: &Force<'_>,
         margin: f64,
     ) -> f64 {
@@ -441,7 +473,7 @@ impl System {
     }
 
     /// Appends the motion of the tool at one time of the grid to `path`.
-    pub(crate) fn note(&self, t: f64, y: &State, branches: &[Branch], force: &Force<'_>, path: &mut Path) {
+    pub(crate) fn note(&self, t: f64, y: &State, branches: &Branches, force: &Force<'_>, path: &mut Path) {
         let n = self.freedoms;
         let mut rate = [0.0; ROOM];
         self.rate(t, y, branches, force, true, &mut rate);
@@ -466,27 +498,4 @@ pub(crate) fn first_order(
     a.view_mut((n, 0), (n, n)).copy_from(&(-inverse_mass * stiffness));
     a.view_mut((n, n), (n, n)).copy_from(&(-inverse_mass * damping));
     a
-}
-
-/// Value of `series` at `place`, a fractional index: cubic interpolation through the four nearest points.
-pub(crate) fn interpolated(series: &[[f64; 3]], place: f64) -> [f64; 3] {
-    let nearest = place.round();
-    if (place - nearest).abs() < 1e-6 {
-        return series[nearest as usize];
-    }
-    let first = (place.floor() as usize).saturating_sub(1).min(series.len() - 4);
-    let s = place - first as f64;
-    let weights = [
-        -(s - 1.0) * (s - 2.0) * (s - 3.0) / 6.0,
-        s * (s - 2.0) * (s - 3.0) / 2.0,
-        -s * (s - 1.0) * (s - 3.0) / 2.0,
-        s * (s - 1.0) * (s - 2.0) / 6.0,
-    ];
-    std::array::from_fn(|axis| {
-        weights
-            .iter()
-            .zip(&series[first..])
-            .map(|(w, value)| w * value[axis])
-            .sum()
-    })
 }

@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 use nalgebra::{DMatrix, DVector};
 use rand_chacha::ChaCha8Rng;
 
-use super::cause::{Cause, EffectKind};
+use super::cause::{Cause, EffectKind, OF_OWN_FAMILY};
 use super::noise::Whitening;
 
 /// Squared distance (χ²) below which two causes cannot be separated.
@@ -45,7 +45,7 @@ pub(crate) trait Lab {
     /// The effects among these that families without an effect of their own hide.
     fn drawn(&self) -> Vec<EffectKind> {
         let mut kinds = self.kinds();
-        kinds.retain(|kind| *kind != EffectKind::QuadraticDamping);
+        kinds.retain(|kind| !OF_OWN_FAMILY.contains(kind));
         kinds
     }
 
@@ -416,6 +416,7 @@ impl Cause {
         match self.kind {
             EffectKind::MissingMode => s[0] > 0.1 && (0.0005..0.3).contains(&s[1]) && s[2] > 0.5,
             EffectKind::SofteningHardening => s[0].abs() < 4.0 && s[1] > 0.2,
+            EffectKind::JointFriction => (0.0..4.0).contains(&s[0]) && s[1] > 0.05 && s[1] <= 1.0,
             EffectKind::Stiffness => (-9.5..4.0).contains(&s[0]),
             EffectKind::Backlash => s[0] > 0.0 && s[0] < 2.0 && (0.0..0.95).contains(&s[1]),
             EffectKind::Hysteresis => s[1] > 0.01 && s[0].abs() < 0.9,

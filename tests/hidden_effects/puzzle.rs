@@ -28,6 +28,10 @@ pub(crate) enum Family {
     TwoEffects,
     /// Tests of structures with quadratic damping.
     QuadraticDamping,
+    /// Tests of structures with a quintic spring.
+    QuinticStiffness,
+    /// Tests of structures with the microslip of a joint.
+    JointFriction,
     /// Cuts in chatter. The oracle does not treat them: in a growing motion every trajectory contains more information on the machine than
     /// a fit can extract. Of rates, only that of answers with high confidence is required.
     Chatter,
@@ -38,7 +42,7 @@ pub(crate) enum Family {
 }
 
 impl Family {
-    pub(crate) const ALL: [Self; 12] = [
+    pub(crate) const ALL: [Self; 14] = [
         Self::Shaker,
         Self::Sweep,
         Self::FreeDecay,
@@ -48,6 +52,8 @@ impl Family {
         Self::NotInLibrary,
         Self::TwoEffects,
         Self::QuadraticDamping,
+        Self::QuinticStiffness,
+        Self::JointFriction,
         Self::Chatter,
         Self::CuttingInWorkshop,
         Self::NothingInWorkshop,
@@ -65,6 +71,8 @@ impl Family {
             Self::NotInLibrary => "not-in-library",
             Self::TwoEffects => "two-effects",
             Self::QuadraticDamping => "quadratic-damping",
+            Self::QuinticStiffness => "quintic-stiffness",
+            Self::JointFriction => "joint-friction",
             Self::Chatter => "chatter",
             Self::CuttingInWorkshop => "workshop-cutting",
             Self::NothingInWorkshop => "workshop-nothing",
@@ -353,6 +361,8 @@ fn hide(family: Family, bench: &dyn Lab, random: &mut ChaCha8Rng) -> Option<Vec<
         Family::Nothing => return Some(Vec::new()),
         Family::NotInLibrary => (NOT_IN_LIBRARY.to_vec(), 1),
         Family::QuadraticDamping => (vec![EffectKind::QuadraticDamping], 1),
+        Family::QuinticStiffness => (vec![EffectKind::QuinticStiffness], 1),
+        Family::JointFriction => (vec![EffectKind::JointFriction], 1),
         Family::TwoEffects => (bench.drawn(), 2),
         Family::Chatter if random.random::<f64>() < 0.2 => return Some(Vec::new()),
         _ => (bench.drawn(), 1),

@@ -8,13 +8,13 @@ use quietcut::recording::{Channel, Quantity, RecordedChannel, Recording, Sidecar
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-use super::cause::{Cause, EffectKind, STRUCTURAL, Scale};
+use super::cause::{Cause, EffectKind, OF_OWN_FAMILY, STRUCTURAL, Scale};
 use super::machine::{Machine, between};
-use super::motion::{Path, System, first_order, interpolated};
+use super::motion::{Path, System, first_order};
 use super::noise::Whitening;
 use super::oracle::{Lab, Output};
 use super::sensor::{Sensor, letter, noisy, read_by, sensors};
-use super::signal::signal;
+use super::signal::{interpolated, signal};
 
 /// EffectKind of a test of the structure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -410,7 +410,7 @@ impl Lab for Bench {
             kind => kind,
         };
         let structural = STRUCTURAL.into_iter().map(of_machine);
-        structural.chain([EffectKind::QuadraticDamping]).collect()
+        structural.chain(OF_OWN_FAMILY).collect()
     }
 
     fn is_free_decay(&self) -> bool {

@@ -6,7 +6,7 @@ use rand_distr::{Distribution, StandardNormal};
 
 use super::cause::{Cause, EffectKind, Scale};
 use super::machine::Machine;
-use super::motion::interpolated;
+use super::signal::interpolated;
 
 /// One sensor of displacement or acceleration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,4 +1,4 @@
-//! Excitation forces of shakers and hammers.
+//! Excitation forces of shakers and hammers, and interpolation between samples.
 
 use std::f64::consts::{PI, TAU};
 
@@ -68,4 +68,27 @@ pub(crate) fn signal(
             Box::new(move |t| tones.iter().map(|(f, phase)| (TAU * f * t + phase).cos()).sum())
         }
     }
+}
+
+/// Value of `series` at `place`, a fractional index: cubic interpolation through the four nearest points.
+pub(crate) fn interpolated(series: &[[f64; 3]], place: f64) -> [f64; 3] {
+    let nearest = place.round();
+    if (place - nearest).abs() < 1e-6 {
+        return series[nearest as usize];
+    }
+    let first = (place.floor() as usize).saturating_sub(1).min(series.len() - 4);
+    let s = place - first as f64;
+    let weights = [
+        -(s - 1.0) * (s - 2.0) * (s - 3.0) / 6.0,
+        s * (s - 2.0) * (s - 3.0) / 2.0,
+        -s * (s - 1.0) * (s - 3.0) / 2.0,
+        s * (s - 1.0) * (s - 2.0) / 6.0,
+    ];
+    std::array::from_fn(|axis| {
+        weights
+            .iter()
+            .zip(&series[first..])
+            .map(|(w, value)| w * value[axis])
+            .sum()
+    })
 }

@@ -143,7 +143,12 @@ pub fn restoring_from(
         {
             step(restoring_force, regime, (&before, &at), motion.step_s, own);
         }
-        let now = regime_at(restoring_force, regime, &at, own);
+        // The memory of a path knows its branch.
+        let now = if restoring_force.remembers() {
+            0
+        } else {
+            regime_at(restoring_force, regime, &at, own)
+        };
         for (signal, value) in force.iter_mut().zip(restoring_force.restoring_n(now, &at, own)) {
             signal[sample] = value;
         }

@@ -35,7 +35,7 @@ pub type Regime = u8;
 ///
 /// A restoring force may have internal states and several regimes, such as stick and slip; the integrator takes f_r as
 /// smooth within each. The integrator ends a step where [`RestoringForce::margin`] falls below zero;
-/// [`RestoringForce::next`] then selects the next regime. A [`RestoringForce::locked`] regime keeps one axis at rest,
+/// [`RestoringForce::next`] then selects the next regime, and [`RestoringForce::enter`] may change internal states there. A [`RestoringForce::locked`] regime keeps one axis at rest,
 /// as sticking friction does: f_r then balances all other forces on that axis.
 pub trait RestoringForce: Debug + Send + Sync {
     /// Number of internal states. Each is a displacement in m, which the error control of the integrator assumes.
@@ -55,6 +55,17 @@ pub trait RestoringForce: Debug + Send + Sync {
     /// Sets the internal states `own` at the first sample of a given motion, such as a recording or a periodic orbit,
     /// in which the tool may already move; a simulation from rest begins with zeros.
     fn begin(&self, _at: &MotionState, _own: &mut [f64]) {}
+
+    /// True if the internal states are a memory of the path that the displacement has taken: they are constant within a
+    /// regime, and only [`Self::begin`], [`Self::enter`] and [`Self::follow`] change them. Along a given motion such a force
+    /// does not depend on the regime.
+    fn remembers(&self) -> bool {
+        false
+    }
+
+    /// Changes the internal states `own` of a force that remembers its path, at the instant `at` from which `regime`
+    /// holds, which may be the regime of before.
+    fn enter(&self, _regime: Regime, _at: &MotionState, _own: &mut [f64]) {}
 
     /// Restoring force f_r, N, in `regime`, which is not a locked one.
     fn restoring_n(&self, regime: Regime, at: &MotionState, own: &[f64]) -> [f64; 3];

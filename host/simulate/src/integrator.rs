@@ -156,13 +156,14 @@ impl<'a> Integrator<'a> {
         Ok(())
     }
 
-    /// The regime of a restoring force from the current time on. If it is locked, the velocity along its axis is set to
-    /// zero.
+    /// The regime of a restoring force from the current time on, which the force enters. If it is locked, the velocity
+    /// along its axis is set to zero.
     fn next_regime(&mut self, index: usize, before: Option<Regime>) -> Regime {
         let restoring_force = &self.model.restoring_forces[index];
         let (at, state_range) = (self.at(self.t, &self.y), self.state_range(index));
         let holding_n = self.holding_n(index, self.t, &self.y.clone());
-        let regime = restoring_force.next(before, &at, &self.y[state_range], holding_n);
+        let regime = restoring_force.next(before, &at, &self.y[state_range.clone()], holding_n);
+        restoring_force.enter(regime, &at, &mut self.y[state_range]);
         if let Some(axis) = restoring_force.holds().filter(|_| restoring_force.locked(regime)) {
             let order = self.model.dynamics.order();
             self.model.dynamics.halt(axis, &mut self.y[..order]);

@@ -156,6 +156,24 @@ fn let_go(study: &Study<'_>, dynamics: &Dynamics, states: &mut [f64]) {
     }
 }
 
+/// Forces that remember their path begin where the structure does.
+fn remember(model: &Model, states: &mut [f64]) {
+    let (structure, own) = states.split_at_mut(model.dynamics.order());
+    let at = MotionState {
+        t: 0.0,
+        x: model.dynamics.displacement(structure),
+        v: model.dynamics.velocity_under(structure, [0.0; 3]),
+    };
+    let mut from = 0;
+    for term in &model.restoring_forces {
+        let to = from + term.states();
+        if term.remembers() {
+            term.begin(&at, &mut own[from..to]);
+        }
+        from = to;
+    }
+}
+
 impl ClosedLoop {
     /// `None` where some record cannot be simulated.
     pub(crate) fn new(study: &Study<'_>) -> Option<Self> {
@@ -228,7 +246,10 @@ impl ClosedLoop {
         }
         let mut sizes: Vec<Option<f64>> = model.dynamics.sizes().iter().map(|size| Some(*size)).collect();
         sizes[structure.len()..].fill(None);
-        sizes.resize(states.len(), Some(1.0));
+        for term in &model.restoring_forces {
+            let size = (!term.remembers()).then_some(1.0);
+            sizes.resize(sizes.len() + term.states(), size);
+        }
         Some((states, sizes))
     }
 
@@ -268,6 +289,7 @@ impl ClosedLoop {
         states.resize(model.order(), 0.0);
         if starts_anywhere(record) {
             let_go(study, &model.dynamics, &mut states);
+            remember(&model, &mut states);
         }
         // The mean over the last sample ends half a sample later.
         let later = if model.dynamics.velocity_jumps() { 0.5 } else { 0.0 };

@@ -19,6 +19,7 @@ mod force_coefficients;
 mod force_coefficients_by_one_factor;
 mod force_exponent;
 mod hysteresis;
+mod joint_friction;
 mod linear_parameter;
 mod mass;
 mod missing_mode;
@@ -27,6 +28,7 @@ mod process;
 mod process_damping;
 mod quadratic_damping;
 mod quadratic_stiffness;
+mod quintic_stiffness;
 mod restoring;
 mod runout;
 mod sensor;
@@ -60,6 +62,7 @@ fn of(effect: EffectName) -> Vec<Box<dyn Cause>> {
         EffectName::QuadraticStiffness => vec![Box::new(quadratic_stiffness::CAUSE)],
         EffectName::CubicDamping => vec![Box::new(cubic_damping::CAUSE)],
         EffectName::SofteningHardening => vec![Box::new(softening_hardening::CAUSE)],
+        EffectName::QuinticStiffness => vec![Box::new(quintic_stiffness::CAUSE)],
         EffectName::QuadraticDamping => vec![Box::new(quadratic_damping::CAUSE)],
         EffectName::CoulombFriction => vec![
             Box::new(coulomb_friction::SYMMETRIC),
@@ -69,6 +72,10 @@ fn of(effect: EffectName) -> Vec<Box<dyn Cause>> {
         ],
         EffectName::Backlash => vec![Box::new(backlash::CAUSE)],
         EffectName::Hysteresis => vec![Box::new(hysteresis::CAUSE)],
+        EffectName::JointFriction => vec![
+            Box::new(joint_friction::MICROSLIP),
+            Box::new(joint_friction::SLIP),
+        ],
         EffectName::ModeCoupling => vec![Box::new(mode_coupling::QUARTIC), Box::new(mode_coupling::CUBIC)],
         EffectName::Drift => vec![Box::new(drift::RATE), Box::new(drift::SETTLING)],
         EffectName::ForceCoefficients => vec![

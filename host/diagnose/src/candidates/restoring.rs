@@ -16,6 +16,8 @@ pub(super) struct Restoring {
     pub(super) linear: &'static [&'static str],
     /// Keys of the nonlinear parameters.
     pub(super) nonlinear_parameters: &'static [&'static str],
+    /// Parameters of the restoring force along one axis that are not fitted, such as a scale.
+    pub(super) fixed: fn(&Study<'_>, usize) -> Vec<Parameter>,
     /// Number of axes at each location of the restoring force: 2 for a potential that couples two axes, otherwise 1.
     pub(super) axes: usize,
     /// True if exchanging the two axes of a coupling leaves the restoring force unchanged: (a, b) and (b, a) are then
@@ -46,6 +48,7 @@ pub(super) const fn plain(effect: EffectName, linear: &'static [&'static str]) -
         effect,
         linear,
         nonlinear_parameters: &[],
+        fixed: |_, _| Vec::new(),
         axes: 1,
         is_symmetric: false,
         everywhere: false,
@@ -177,7 +180,10 @@ impl Restoring {
         let unit: Vec<f64> = (0..self.linear.len())
             .map(|i| f64::from(u8::from(i == index)))
             .collect();
-        let table = self.table(location, nonlinear_parameters, &unit);
+        let mut table = self.table(location, nonlinear_parameters, &unit);
+        for (key, value) in (self.fixed)(study, first_axis(location)) {
+            table.insert(key.into(), value.into());
+        }
         let effects = Effects::of_extension(self.name(), &table).map_err(|error| error.to_string())?;
         let terms = terms_of(&effects, study.baseline.structure).map_err(|error| error.to_string())?;
         let mut sum: [Vec<f64>; 3] = std::array::from_fn(|_| Vec::new());
@@ -265,11 +271,12 @@ impl Cause for Restoring {
 
     fn parameters(
         &self,
-        _: &Study<'_>,
-        _: &Location,
+        study: &Study<'_>,
+        location: &Location,
         nonlinear_parameters: &[f64],
         coefficients: &[f64],
     ) -> Option<Vec<Parameter>> {
+        let fixed = (self.fixed)(study, first_axis(location));
         let mut laws = coefficients.chunks(self.linear.len());
         laws.clone().all(self.physical).then(|| {
             laws.by_ref()
@@ -278,8 +285,9 @@ impl Cause for Restoring {
                         .iter()
                         .zip(law)
                         .chain(self.nonlinear_parameters.iter().zip(nonlinear_parameters))
+                        .map(|(key, value)| (*key, *value))
+                        .chain(fixed.iter().copied())
                 })
-                .map(|(key, value)| (*key, *value))
                 .collect()
         })
     }

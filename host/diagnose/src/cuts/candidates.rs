@@ -148,6 +148,7 @@ fn of_restoring_force(along: Along, all: &mut Vec<Candidate>) {
         "k2_n_per_m2",
         spring_n / x.powi(2),
     );
+    one(EffectName::QuinticStiffness, "k5_n_per_m5", spring_n / x.powi(5));
     one(EffectName::CubicDamping, "c3_ns3_per_m3", damper_n / v.powi(3));
     one(
         EffectName::QuadraticDamping,

@@ -5,6 +5,7 @@ use std::f64::consts::TAU;
 use crate::baseline::cubic_term::cubic_term;
 use crate::error::DiagnoseError;
 use quietcut_model::case::Case;
+use quietcut_model::effects::{EffectError, EffectName};
 use quietcut_model::milling::Cut;
 use quietcut_model::{Cutter, Effects, ModelError};
 use quietcut_stability::cut_orbit::CutModel;
@@ -25,7 +26,7 @@ pub(crate) struct Conditions {
 /// The machine of `case` with further effects in a cut.
 ///
 /// # Errors
-/// The case lacks a section, or an effect does not apply to it.
+/// The case lacks a section, or an effect does not apply to it or has a memory of its path.
 pub(crate) fn cut_model(
     case: &Case,
     effects: &Effects,
@@ -34,6 +35,14 @@ pub(crate) fn cut_model(
     let wrong = |error: ModelError| DiagnoseError::simulate(&case.path, error);
     let structure = case.structure()?;
     let (dynamics, mut restoring_forces) = effects.dynamics(structure).map_err(wrong)?;
+    // The periodic orbit integrates internal states; a memory of the path has no derivative.
+    if restoring_forces.iter().any(|force| force.remembers()) {
+        let error = EffectError::Cut {
+            name: EffectName::JointFriction.name(),
+            what: "the periodic orbit of a cut has no memory of turning points",
+        };
+        return Err(wrong(error.into()));
+    }
     restoring_forces.extend(cubic_term(structure));
     let cutter = Cutter::new(
         case.tool()?,

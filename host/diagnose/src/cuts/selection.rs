@@ -9,6 +9,7 @@ use super::fit::{Fit, fit};
 use super::record::ReducedCut;
 use super::space::Space;
 use crate::baseline::Baseline;
+use quietcut_model::effects::{Class, EffectName};
 
 /// Number of candidates that are fitted, of those that the baseline's derivatives rank first.
 const FITTED: usize = 8;
@@ -83,7 +84,7 @@ fn extended<'a>(best: &Explanation<'a>, all: &[Candidate], records: &[ReducedCut
                 .space
                 .candidates
                 .iter()
-                .any(|known| is_same(known, candidate))
+                .any(|known| is_same(known, candidate) || share_a_term(known, candidate))
         })
         .flat_map_iter(|(index, candidate)| candidate.starts().into_iter().map(move |start| (index, start)));
     let mut scored: Vec<Scored> = starts
@@ -114,6 +115,7 @@ fn extended<'a>(best: &Explanation<'a>, all: &[Candidate], records: &[ReducedCut
         })
     };
     let mut found: Vec<Explanation<'a>> = scored.into_par_iter().filter_map(fitted).collect();
+    found.retain(|set| !hides_softening_hardening(set));
     found.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
     found
 }
@@ -133,6 +135,27 @@ fn prior_of(best: &Explanation<'_>) -> f64 {
 /// True if two candidates are the same effect at the same place.
 fn is_same(one: &Candidate, other: &Candidate) -> bool {
     one.effect == other.effect && one.location == other.location
+}
+
+/// True if two restoring forces at one place share a term of the equation, as softening-hardening and a cubic spring.
+fn share_a_term(one: &Candidate, other: &Candidate) -> bool {
+    let spec = one.effect.spec();
+    let is_force = matches!(spec.class, Class::RestoringForce(_));
+    is_force && spec.shares_term_with.contains(&other.effect) && one.location == other.location
+}
+
+/// True if a set has a cubic and a quintic spring with k3 < 0 < k5 at one place: softening-hardening.
+fn hides_softening_hardening(set: &Explanation<'_>) -> bool {
+    let found = |effect: EffectName, sign: f64| {
+        let all = set.space.candidates.iter().enumerate();
+        all.filter(move |(number, candidate)| {
+            let parameters = || candidate.parameters(&set.space.coordinates(*number, &set.fit.z));
+            candidate.effect == effect && parameters().iter().all(|(_, value)| sign * value > 0.0)
+        })
+    };
+    found(EffectName::CubicStiffness, -1.0).any(|(_, cubic)| {
+        found(EffectName::QuinticStiffness, 1.0).any(|(_, quintic)| cubic.location == quintic.location)
+    })
 }
 
 /// Logarithm of the probability of each candidate before the records are seen: equal for all names, divided over the

@@ -257,14 +257,14 @@ impl Library {
     }
 
     /// Parameters by key of every cause of a candidate model; `None` if those of one cause are not physical or cannot
-    /// be computed.
+    /// be computed, or if several causes are together one effect of another name.
     pub(crate) fn parameters(
         &self,
         study: &Study<'_>,
         model: &CandidateModel,
     ) -> Option<Vec<Vec<Parameter>>> {
         let mut from = 0;
-        model
+        let parameters: Vec<Vec<Parameter>> = model
             .choices
             .iter()
             .map(|choice| {
@@ -279,7 +279,8 @@ impl Library {
                     coefficients,
                 )
             })
-            .collect()
+            .collect::<Option<_>>()?;
+        (!self.hides_one_effect(&model.choices, &parameters)).then_some(parameters)
     }
 
     /// Names and tables of the extensions that add a candidate model to a case; `None` as for

@@ -1,9 +1,9 @@
 //! Which causes may act together in a candidate model.
 
-use crate::candidates::cause::Location;
+use crate::candidates::cause::{LocatedEffect, Location, Parameter};
 use crate::fit::candidate_model::{CandidateModel, Choice};
 use crate::fit::library::Library;
-use quietcut_model::effects::{Argument, Class};
+use quietcut_model::effects::{Argument, Class, EffectName};
 
 impl Library {
     /// True if a further cause may join a candidate model.
@@ -89,6 +89,34 @@ impl Library {
             _ => None,
         }
     }
+}
+
+impl Library {
+    /// True if two causes with these parameters are one effect under its own name: a cubic and a quintic spring with
+    /// k3 < 0 < k5 along one axis are softening-hardening.
+    pub(crate) fn hides_one_effect(&self, choices: &[Choice], parameters: &[Vec<Parameter>]) -> bool {
+        let springs = [EffectName::CubicStiffness, EffectName::QuinticStiffness];
+        let found = choices.iter().zip(parameters).flat_map(|(choice, parameters)| {
+            let cause = self.cause(choice.candidate);
+            let is_spring = springs.contains(&cause.effect());
+            let location = &self.candidates[choice.candidate].location;
+            let parts = is_spring.then(|| cause.located_effects(location, parameters));
+            parts.unwrap_or_default()
+        });
+        are_softening_hardening(&found.collect::<Vec<_>>())
+    }
+}
+
+/// True if among these effects are a cubic spring and a quintic one with k3 < 0 < k5 at one location.
+fn are_softening_hardening(effects: &[LocatedEffect]) -> bool {
+    let of = |name: EffectName| effects.iter().filter(move |effect| effect.name == name.name());
+    let value = |effect: &LocatedEffect| effect.parameters.first().map_or(0.0, |(_, value)| *value);
+    of(EffectName::CubicStiffness)
+        .filter(|cubic| value(cubic) < 0.0)
+        .any(|cubic| {
+            of(EffectName::QuinticStiffness)
+                .any(|quintic| value(quintic) > 0.0 && meet(&cubic.location, &quintic.location))
+        })
 }
 
 /// True if two locations of causes are equal or have a common axis.

@@ -103,8 +103,8 @@ pub(crate) fn without(library: &Library, model: &CandidateModel, position: usize
 }
 
 /// Candidate models in which a simpler cause at the same location replaces the cause at index `position`, such as a
-/// cubic spring for softening-hardening. The parameters of the simpler cause are some of those of the replaced one,
-/// with the same values.
+/// cubic or a quintic spring for softening-hardening. The parameters of the simpler cause are some of those of the
+/// replaced one, with the same values.
 pub(crate) fn nested(
     study: &Study<'_>,
     library: &Library,
@@ -132,15 +132,12 @@ pub(crate) fn nested(
         // A simpler cause can replace this one only if the parameters that it reports are among those of the replaced
         // cause, with equal values.
         let cause = library.cause(choice.candidate);
-        let own: Vec<f64> = values
-            .iter()
-            .take(columns.len())
-            .map(|(_, value)| *value)
-            .collect();
-        let reported = cause.parameters(study, acts_at, nonlinear_parameters, &own)?;
-        if reported.is_empty() || !reported.iter().all(|parameter| values.contains(parameter)) {
-            return None;
-        }
+        let own = values.windows(columns.len()).find_map(|some| {
+            let own: Vec<f64> = some.iter().map(|(_, value)| *value).collect();
+            let reported = cause.parameters(study, acts_at, nonlinear_parameters, &own)?;
+            let is_part = !reported.is_empty() && reported.iter().all(|known| values.contains(known));
+            is_part.then_some(own)
+        })?;
         let mut coefficients = model.fit.coefficients.clone();
         coefficients.splice(from..to, own);
         let mut choices = model.choices.clone();

@@ -3,6 +3,8 @@
 mod chatter;
 pub(crate) mod cutting;
 mod hammer;
+mod joint_friction;
+mod quintic_stiffness;
 mod sensor;
 pub(crate) mod structure;
 mod two_effects;

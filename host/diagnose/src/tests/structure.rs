@@ -54,6 +54,14 @@ pub(crate) fn recorded_of(
     recording
 }
 
+/// A seed of noise that differs in each run of the tests, and is printed.
+pub(crate) fn random_seed() -> u64 {
+    let since = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
+    let seed = u64::from(since.unwrap().subsec_nanos());
+    println!("noise from seed {seed} on");
+    seed
+}
+
 /// A recording of more than one second whose samples the caller replaces.
 fn to_be_filled(rate_hz: f64, seed: u64) -> Recording {
     let signal = Signal::Release {
@@ -64,8 +72,12 @@ fn to_be_filled(rate_hz: f64, seed: u64) -> Recording {
     recorded(signal, rate_hz, &[], seed)
 }
 
-/// Sweeps through the resonance at three force levels, with hidden effects.
 fn records(effects: &[&str]) -> Vec<Recording> {
+    sweeps(effects, 7)
+}
+
+/// Sweeps through the resonance at three force levels, with hidden effects and noise from `seed` on.
+pub(crate) fn sweeps(effects: &[&str], seed: u64) -> Vec<Recording> {
     let sweep = |(seed, amplitude_n)| {
         let signal = Signal::Sweep {
             first_hz: 10.0,
@@ -75,11 +87,18 @@ fn records(effects: &[&str]) -> Vec<Recording> {
         };
         recorded(signal, 256.0, effects, seed)
     };
-    [(7, 5.0), (8, 20.0), (9, 60.0)].map(sweep).into()
+    [(seed, 5.0), (seed + 1, 20.0), (seed + 2, 60.0)]
+        .map(sweep)
+        .into()
 }
 
-/// Two free decays from static forces, recorded from their start on, without the force, with hidden effects.
 fn free_decays(effects: &[&str]) -> Vec<Recording> {
+    decays(effects, 7)
+}
+
+/// Two free decays from static forces, recorded from their start on, without the force, with hidden effects and noise
+/// from `seed` on.
+pub(crate) fn decays(effects: &[&str], seed: u64) -> Vec<Recording> {
     let (rate_hz, pull_s) = (256.0, 5.0);
     let free_decay = |(seed, force_n)| {
         let signal = Signal::Release {
@@ -95,7 +114,7 @@ fn free_decays(effects: &[&str]) -> Vec<Recording> {
         recording.sidecar.input = None;
         recording
     };
-    [(7, 500.0), (8, 200.0)].map(free_decay).into()
+    [(seed, 500.0), (seed + 1, 200.0)].map(free_decay).into()
 }
 
 fn diagnosed(effects: &[&str]) -> Diagnosis {

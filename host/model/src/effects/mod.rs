@@ -21,10 +21,12 @@ mod first_order_section;
 mod force_coefficients;
 mod force_exponent;
 mod hysteresis;
+mod joint_friction;
 mod linear_change;
 mod list;
 mod local_force;
 mod location;
+mod masing_memory;
 mod mass;
 mod missing_mode;
 mod mode_coupling;
@@ -34,6 +36,7 @@ mod pickup;
 mod process_damping;
 mod quadratic_damping;
 mod quadratic_stiffness;
+mod quintic_stiffness;
 mod runout;
 mod sensor_delay;
 mod sensor_gain;
@@ -47,6 +50,8 @@ pub mod table;
 mod values;
 mod wear;
 
+#[cfg(test)]
+mod joint_friction_tests;
 #[cfg(test)]
 mod round_trip_tests;
 #[cfg(test)]
@@ -72,10 +77,12 @@ list! {
     QuadraticStiffness => quadratic_stiffness::QUADRATIC_STIFFNESS,
     CubicDamping => cubic_damping::CUBIC_DAMPING,
     SofteningHardening => softening_hardening::SOFTENING_HARDENING,
+    QuinticStiffness => quintic_stiffness::QUINTIC_STIFFNESS,
     QuadraticDamping => quadratic_damping::QUADRATIC_DAMPING,
     CoulombFriction => coulomb_friction::COULOMB_FRICTION,
     Backlash => backlash::BACKLASH,
     Hysteresis => hysteresis::HYSTERESIS,
+    JointFriction => joint_friction::JOINT_FRICTION,
     ModeCoupling => mode_coupling::MODE_COUPLING,
     Drift => drift::DRIFT,
     ForceCoefficients => force_coefficients::FORCE_COEFFICIENTS,

@@ -5,9 +5,9 @@ use std::sync::Arc;
 
 use num_complex::Complex64;
 
-use super::cubic_stiffness;
 use super::local_force::LocalForce;
 use super::{Argument, Class, EffectName, EffectSpec, Harmonic, Locations, Parameter, Treatment};
+use super::{cubic_stiffness, quintic_stiffness};
 
 /// The specification.
 pub(super) const SOFTENING_HARDENING: EffectSpec = EffectSpec {
@@ -23,11 +23,11 @@ pub(super) const SOFTENING_HARDENING: EffectSpec = EffectSpec {
     ],
     treatment: Treatment::Smooth,
     candidates: &["one law along one direction"],
-    shares_term_with: &[EffectName::CubicStiffness],
+    shares_term_with: &[EffectName::CubicStiffness, EffectName::QuinticStiffness],
     summary: "a spring softens at small and hardens at large displacement",
     equation: "f_r += k3·x³ + k5·x⁵, k3 < 0 < k5",
     shows: "a natural frequency that falls with the amplitude X and rises again beyond X² = −0.6·k3/k5; odd harmonics up to the fifth",
-    hidden_by: "levels below the turn, where it is cubic stiffness; two regimes with an edge between them are backlash",
+    hidden_by: "levels below the turn, where it is cubic stiffness; levels far beyond it, where it is quintic stiffness; two regimes with an edge between them are backlash",
     source: "Nayfeh and Mook, Nonlinear Oscillations (1979), ch. 4",
     example: "k3_n_per_m3 = -5e12\nk5_n_per_m5 = 2e21\ndirection = \"x\"",
     describing_function: Some(describing_function),
@@ -46,5 +46,6 @@ pub(super) const SOFTENING_HARDENING: EffectSpec = EffectSpec {
 /// Describing functions at the displacement amplitude X: ¾X² of k3·x³ for k3 = 1, and ⅝X⁴ of k5·x⁵ for k5 = 1.
 fn describing_function(at: Harmonic) -> [Complex64; 2] {
     let [cubic, _] = cubic_stiffness::describing_function(at);
-    [cubic, Complex64::new(0.625 * at.amplitude_m.powi(4), 0.0)]
+    let [quintic, _] = quintic_stiffness::describing_function(at);
+    [cubic, quintic]
 }

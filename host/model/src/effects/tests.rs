@@ -185,6 +185,7 @@ fn closed_forms_of_describing_functions_are_the_sums() {
             "softening-hardening=-5e12",
             "softening-hardening.k5_n_per_m5=4e21",
         ],
+        &["quintic-stiffness=4e21"],
         &["quadratic-damping=2e4"],
         &["coulomb-friction=3"],
         &["backlash=0.02", "backlash.stiffness_fraction=0.4"],

@@ -6,6 +6,8 @@ mod noise;
 mod signal;
 
 #[cfg(test)]
+mod joint_tests;
+#[cfg(test)]
 mod tests;
 
 use std::path::Path;

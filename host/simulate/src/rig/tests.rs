@@ -5,7 +5,7 @@ use std::f64::consts::{PI, TAU};
 use super::*;
 use quietcut_testkit::case;
 
-fn rig(signal: Signal, effects: &[&str]) -> Rig {
+pub(super) fn rig(signal: Signal, effects: &[&str]) -> Rig {
     Rig {
         effects: Effects::parse(effects.iter().copied()).unwrap(),
         measured: vec![Quantity::Displacement, Quantity::Velocity, Quantity::Acceleration],
@@ -13,12 +13,12 @@ fn rig(signal: Signal, effects: &[&str]) -> Rig {
     }
 }
 
-fn samples<'a>(recording: &'a Recording, name: &str) -> &'a [f64] {
+pub(super) fn samples<'a>(recording: &'a Recording, name: &str) -> &'a [f64] {
     &recording.channel(name).unwrap().samples
 }
 
 /// The mode of chapter 5 at 17 Hz without its cubic terms: 188 kg, 305 N s/m, 2.26e6 N/m.
-fn linear() -> Structure {
+pub(super) fn linear() -> Structure {
     let mut structure = case("kuka-kr90-y17-low").structure.unwrap();
     if let quietcut_model::structure::Form::Matrices(matrices) = &mut structure.form {
         (matrices.cubic_damping, matrices.cubic_stiffness) = (None, None);
@@ -44,7 +44,7 @@ fn every_smooth_restoring_force_obeys_its_equation() {
     let tones = Signal::tones(&[16.0, 17.4, 18.1], [30.0, 30.0], 3.0, 2);
     let (m, c, k) = (188.0, 305.0, 2.26e6);
     type Law = fn(f64, f64, f64) -> f64;
-    let cases: [(&[&str], Law); 7] = [
+    let cases: [(&[&str], Law); 8] = [
         (&["cubic-stiffness=-5e12"], |x, _, _| -5e12 * x.powi(3)),
         (&["quadratic-stiffness=3e9"], |x, _, _| 3e9 * x * x),
         (&["cubic-damping=2.5e6"], |_, v, _| 2.5e6 * v.powi(3)),
@@ -56,6 +56,7 @@ fn every_smooth_restoring_force_obeys_its_equation() {
             ],
             |x, _, _| -5e12 * x.powi(3) + 4e20 * x.powi(5),
         ),
+        (&["quintic-stiffness=4e20"], |x, _, _| 4e20 * x.powi(5)),
         (&["drift.relative_rate_per_s=0.02"], |x, _, t| {
             2.26e6 * 0.02 * t * x
         }),

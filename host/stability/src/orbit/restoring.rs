@@ -320,6 +320,33 @@ mod tests {
     }
 
     #[test]
+    fn a_joint_on_a_harmonic_orbit_has_its_describing_function() {
+        for slip in [
+            &[][..],
+            &["joint-friction.slip_m=1e-5", "joint-friction.beta=0.5"],
+        ] {
+            let first = [
+                "joint-friction=2e5",
+                "joint-friction.exponent=0.6",
+                "joint-friction.reference_m=1e-5",
+                "joint-friction.direction=y",
+            ];
+            let texts: Vec<&str> = first.iter().chain(slip).copied().collect();
+            let joint = terms(&texts);
+            let [_, spring, _] = equivalent(&joint, &harmonic(), [1e9; 3]);
+            let exact = joint[0].describing_function(SIZE_M, OMEGA).unwrap();
+            assert!(
+                (spring.stiffness / exact.re - 1.0).abs() < 1e-4,
+                "{spring:?} {exact}"
+            );
+            assert!(
+                (spring.damping * OMEGA / exact.im - 1.0).abs() < 1e-4,
+                "{spring:?} {exact}"
+            );
+        }
+    }
+
+    #[test]
     fn hysteresis_dissipates_the_area_of_its_loop() {
         let loops = terms(&[
             "hysteresis=2e5",
