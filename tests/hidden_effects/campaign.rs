@@ -9,6 +9,7 @@ use serde_json::Value;
 
 use super::oracle::Verdict;
 use super::puzzle::{Family, Hidden, Puzzle};
+use super::workshop;
 
 /// The answer of the diagnosis to one puzzle.
 #[derive(Clone, Debug, Default)]
@@ -295,7 +296,7 @@ impl Report {
         tool: &(dyn Fn(&Puzzle) -> Value + Sync),
     ) -> Self {
         let of = |seed| {
-            let finding = Finding::of(&Puzzle::draw(family, seed), tool);
+            let finding = Finding::of(&workshop::draw(family, seed), tool);
             eprintln!("{} {finding}", family.name());
             finding
         };

@@ -270,7 +270,7 @@ fn recordings_of_the_answers() {
     for (family, seeds) in ANSWERED {
         if family.name().contains(&text) {
             seeds.par_iter().for_each(|seed| {
-                let puzzle = Puzzle::draw(family, *seed);
+                let puzzle = workshop::draw(family, *seed);
                 puzzle.keep_short(folder);
                 println!("{} {seed}: {} samples", family.name(), puzzle.samples());
             });
@@ -292,7 +292,7 @@ fn puzzles_to_look_at() {
         .filter(|family| family.name().contains(&text))
     {
         (first..first + seeds).into_par_iter().for_each(|seed| {
-            let puzzle = Puzzle::draw(family, seed);
+            let puzzle = workshop::draw(family, seed);
             puzzle.keep(folder);
             println!(
                 "{} {seed}: {:?} {:?}",

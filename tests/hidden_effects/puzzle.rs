@@ -119,9 +119,6 @@ const NOISE_IN_CHATTER: f64 = 0.01;
 impl Puzzle {
     /// Draws the puzzle of a seed: the first draw that is not borderline.
     pub(crate) fn draw(family: Family, seed: u64) -> Self {
-        if matches!(family, Family::CuttingInWorkshop | Family::NothingInWorkshop) {
-            return super::workshop::draw(family, seed);
-        }
         let mut redrawn = 0;
         loop {
             let mut random = ChaCha8Rng::seed_from_u64(seed * 1000 + redrawn as u64);
@@ -214,9 +211,9 @@ impl Puzzle {
         };
         let bench = match cutting {
             Some(forces) if family == Family::Chatter => {
-                Bench::Cut(CutBench::draw(random, forces).chattering()?)
+                Bench::Cut(Box::new(CutBench::draw(random, forces).chattering()?))
             }
-            Some(forces) => Bench::Cut(CutBench::draw(random, forces)),
+            Some(forces) => Bench::Cut(Box::new(CutBench::draw(random, forces))),
             None => {
                 let test = match family {
                     Family::Shaker => Test::Shaker,
@@ -228,7 +225,7 @@ impl Puzzle {
                 let directions = if random.random::<f64>() < 0.35 { 2 } else { 1 };
                 let machine = Machine::draw(random, directions);
                 let rig = Rig::draw(random, test, &machine);
-                Bench::Rig(RigBench { machine, rig })
+                Bench::Rig(Box::new(RigBench { machine, rig }))
             }
         };
         let lab = bench.lab();
@@ -292,15 +289,15 @@ impl Puzzle {
 
 /// The virtual test or cut in which the effects of a puzzle are hidden.
 enum Bench {
-    Rig(RigBench),
-    Cut(CutBench),
+    Rig(Box<RigBench>),
+    Cut(Box<CutBench>),
 }
 
 impl Bench {
     fn lab(&self) -> &dyn Lab {
         match self {
-            Self::Rig(bench) => bench,
-            Self::Cut(bench) => bench,
+            Self::Rig(bench) => &**bench,
+            Self::Cut(bench) => &**bench,
         }
     }
 

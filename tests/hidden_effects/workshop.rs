@@ -17,10 +17,19 @@ const NOISE: [f64; 2] = [1e-3, 0.03];
 /// Ratio that stands for an effect whose plainness is measured otherwise.
 const PLAIN_RATIO: f64 = f64::INFINITY;
 
-/// The puzzle of a seed.
+/// The puzzle of a seed of any family.
+pub(crate) fn draw(family: Family, seed: u64) -> Puzzle {
+    if matches!(family, Family::CuttingInWorkshop | Family::NothingInWorkshop) {
+        in_workshop(family, seed)
+    } else {
+        Puzzle::draw(family, seed)
+    }
+}
+
+/// The puzzle of a seed in a workshop.
 ///
 /// A draw is repeated only if the machine is unstable with its effect, or the effect cannot act on it.
-pub(crate) fn draw(family: Family, seed: u64) -> Puzzle {
+fn in_workshop(family: Family, seed: u64) -> Puzzle {
     (0..)
         .find_map(|again| {
             let mut random = ChaCha8Rng::seed_from_u64(1_000_000 + seed * 1000 + again);

@@ -68,7 +68,40 @@ pub(crate) fn explain<'a>(baseline: &'a Baseline<'a>, records: &[ReducedCut]) ->
         }
         first.ranked = next;
     }
+    while let Some(fewer) = first.ranked.first().and_then(|best| reduced(best, &all, records)) {
+        first.ranked = vec![fewer];
+    }
     Some(first)
+}
+
+/// The best set without one of its effects, if that effect does not gain beside the others: a later effect may have taken
+/// its place.
+fn reduced<'a>(best: &Explanation<'a>, all: &[Candidate], records: &[ReducedCut]) -> Option<Explanation<'a>> {
+    if best.space.candidates.len() < 2 {
+        return None;
+    }
+    let prior = priors(all);
+    let without = |number: usize| {
+        let (space, start) = best.space.without(number, &best.fit.z);
+        let fitted = fit(&space, records, start, Some(&best.fit))?;
+        let known: f64 = space
+            .candidates
+            .iter()
+            .filter_map(|candidate| {
+                let place = all.iter().position(|other| is_same(other, candidate))?;
+                Some(prior[place])
+            })
+            .sum();
+        Some(Explanation {
+            evidence: known + fitted.evidence(),
+            space,
+            fit: fitted,
+        })
+    };
+    (0..best.space.candidates.len())
+        .filter_map(without)
+        .max_by(|a, b| a.evidence.total_cmp(&b.evidence))
+        .filter(|fewer| fewer.evidence > best.evidence - LEAST_GAIN)
 }
 
 /// Sets with one more effect than `best`, by descending evidence.

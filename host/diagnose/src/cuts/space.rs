@@ -113,6 +113,25 @@ impl<'a> Space<'a> {
         }
     }
 
+    /// This space and a point of it without the candidate `number`.
+    pub(crate) fn without(&self, number: usize, z: &[f64]) -> (Self, Vec<f64>) {
+        let is_coordinate = |variable: &Variable| matches!(variable, Variable::Coordinate(..));
+        let known = self.variables.iter().filter(|variable| !is_coordinate(variable));
+        let mut space = Self {
+            baseline: self.baseline,
+            candidates: Vec::new(),
+            variables: known.cloned().collect(),
+        };
+        let mut point = z[..space.variables.len()].to_vec();
+        for (other, candidate) in self.candidates.iter().enumerate() {
+            if other != number {
+                space = space.with(candidate);
+                point.extend(self.coordinates(other, z));
+            }
+        }
+        (space, point)
+    }
+
     /// Numbers of the variables that are coordinates of the candidate `number`.
     pub(crate) fn places_of(&self, number: usize) -> Vec<usize> {
         let is_own =

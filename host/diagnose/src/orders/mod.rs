@@ -8,6 +8,7 @@
 //! | `circle`, `taper`, `alias_kernel` | Fourier sums over the angle, weights of the samples, least squares and aliasing |
 //! | `reduction`, `channel_reduction` | the entry, [`reduction::Orders`], and its work on one channel |
 //! | `between_lines`, `block_noise`, `common`, `distance` | covariance of the amplitudes and distances measured by it |
+//! | `trend` | slow changes of the orders |
 //! | `asynchronous` | spectrum of the residual and its lines |
 //!
 //! Convention: y = Y_0 + 2 Re Σ_{k≥1} Y_k e^{ikθ}, θ = 0 at immersion angle 0 of tooth 1, growing with time.
@@ -27,3 +28,4 @@ pub(crate) mod spindle_angle;
 mod taper;
 #[cfg(test)]
 mod tests;
+pub(crate) mod trend;

@@ -16,6 +16,7 @@ use crate::orders::common::{BLOCKS_MAX, BLOCKS_MIN, Common};
 use crate::orders::distance::{self, Hotelling, OrderCovariance, SquaredDistance};
 use crate::orders::spindle_angle::{SpindleAngle, check_revolutions};
 use crate::orders::taper::Taper;
+use crate::orders::trend::{AmplitudeBlock, Trend, slope, slope_of};
 use quietcut_recording::Recording;
 
 /// Highest frequency of an order over the sample rate. From half the sample rate an order and its conjugate coincide;
@@ -39,29 +40,6 @@ pub(crate) struct ReductionSettings {
     pub slowest_decay_s: f64,
     /// Time after the first sample from which on the cut has settled, s.
     pub settled_s: f64,
-}
-
-/// Amplitudes of all channels in a block of whole revolutions, weighted by Hann's window.
-#[derive(Clone, Debug)]
-pub(crate) struct AmplitudeBlock {
-    /// Middle of the block, s after the first sample.
-    pub centre_s: f64,
-    /// Amplitudes by order (rows, from 0) and channel (columns).
-    pub amplitudes: DMatrix<Complex64>,
-}
-
-/// Linear change of the amplitudes over a record.
-#[derive(Clone, Debug)]
-pub(crate) struct Trend {
-    /// Slope of the amplitudes over time, times `scale_s`.
-    pub amplitudes: DMatrix<Complex64>,
-    /// Standard deviation of the time over the reduced revolutions, s.
-    pub scale_s: f64,
-    /// Variance of `amplitudes` over that of the amplitudes of the record.
-    pub variance: f64,
-    /// Errors common to all orders but 0, from the deviations of the blocks from the trend, for the amplitudes of the
-    /// record.
-    pub common: Common,
 }
 
 /// Orders of a recorded cut.
@@ -436,79 +414,6 @@ fn over_time(
             common: common(&deviations),
         }),
         blocks,
-    }
-}
-
-/// Slope of the amplitudes of one channel over the blocks, times the standard deviation of the time over the record.
-///
-/// Aliases are not removed first, as they are for the noise between the lines: near a whole number of samples in a
-/// revolution they lie so near the lines that they would take up a slow change.
-fn slope_of(
-    samples: &[f64],
-    revolutions: &[f64],
-    kernel: &AliasKernel,
-    blocks: &[BlockWeights],
-) -> Vec<Complex64> {
-    let circle = Circle::new(kernel.orders());
-    let taper = Taper::new(samples.len());
-    let weighted = samples
-        .iter()
-        .enumerate()
-        .map(|(sample, value)| (revolutions[sample], taper.weight(sample) * value));
-    let mut right = circle.sums(weighted);
-    for entry in &mut right {
-        *entry /= taper.sum();
-    }
-    let amplitudes = kernel.solve(&right);
-    let series = circle.series(&amplitudes);
-    let residual: Vec<f64> = samples
-        .iter()
-        .zip(revolutions)
-        .map(|(value, revolution)| value - series.at(*revolution))
-        .collect();
-    let apart: Vec<&BlockWeights> = blocks.iter().step_by(2).collect();
-    let centre = |block: &BlockWeights| block.first as f64 + 0.5 * (block.taper.count() - 1) as f64;
-    let mean = apart.iter().map(|block| centre(block)).sum::<f64>() / apart.len().max(1) as f64;
-    let squares: f64 = apart.iter().map(|block| (centre(block) - mean).powi(2)).sum();
-    let scale = samples.len() as f64 / 12.0_f64.sqrt();
-    let mut slope = vec![Complex64::ZERO; kernel.orders() + 1];
-    for block in apart {
-        let weighted = (0..block.taper.count()).map(|sample| {
-            let at = block.first + sample;
-            (revolutions[at], block.taper.weight(sample) * residual[at])
-        });
-        let factor = (centre(block) - mean) * scale / squares / block.taper.sum();
-        for (slope, sum) in slope.iter_mut().zip(circle.sums(weighted)) {
-            *slope += sum * factor;
-        }
-    }
-    slope
-}
-
-/// Slope of the amplitudes over time.
-struct Slope {
-    amplitudes: DMatrix<Complex64>,
-    /// Variance over that of a block.
-    variance: f64,
-    centre_s: f64,
-}
-
-/// Slope of the amplitudes of every second block, which do not overlap, by `scale_s`.
-fn slope(blocks: &[AmplitudeBlock], scale_s: f64) -> Slope {
-    let apart: Vec<&AmplitudeBlock> = blocks.iter().step_by(2).collect();
-    let centre_s = apart.iter().map(|block| block.centre_s).sum::<f64>() / apart.len() as f64;
-    let squares: f64 = apart
-        .iter()
-        .map(|block| (block.centre_s - centre_s).powi(2))
-        .sum();
-    let mut amplitudes = &apart[0].amplitudes * Complex64::ZERO;
-    for block in &apart {
-        amplitudes += &block.amplitudes * Complex64::from((block.centre_s - centre_s) * scale_s / squares);
-    }
-    Slope {
-        amplitudes,
-        variance: scale_s * scale_s / squares,
-        centre_s,
     }
 }
 

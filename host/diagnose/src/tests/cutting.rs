@@ -4,6 +4,7 @@ use std::path::Path;
 
 use nalgebra::Matrix3;
 
+use crate::answer::Figure;
 use crate::records::study::Study;
 use crate::tests::virtual_records::record;
 use crate::{Diagnosis, Options, diagnose};
@@ -255,9 +256,10 @@ fn large_process_damping_is_found_beside_runout() {
         ("runout", "runout_um", 20.0),
     ] {
         let cause = diagnosis.causes.iter().find(|cause| cause.name == name).unwrap();
-        let found = cause.parameters[key].value;
-        // With 2 % noise, some 20 000 samples leave an error below 0.2 %.
-        assert!((found / truth - 1.0).abs() < 2e-3, "{}", summary(&diagnosis));
+        let Figure { value, ci90 } = &cause.parameters[key];
+        // Sensors and engagement are known to 0.1 % only, by which these two, which act on the same few orders, err more.
+        assert!((value / truth - 1.0).abs() < 1e-2, "{}", summary(&diagnosis));
+        assert!((ci90[0]..ci90[1]).contains(&truth), "{}", summary(&diagnosis));
     }
 }
 

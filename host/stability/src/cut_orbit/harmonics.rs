@@ -7,7 +7,9 @@ use nalgebra::DMatrix;
 use num_complex::Complex64;
 
 use super::mesh::{Mesh, SAME_TIME};
+use super::model::CutModel;
 use super::orbit::CutOrbit;
+use super::period::Period;
 use super::sensitivity::Sensitivity;
 use quietcut_numerics::quadrature::Gauss;
 
@@ -98,6 +100,30 @@ fn integrals(gauss: &Gauss, share: f64, orders: usize) -> DMatrix<Complex64> {
         }
     }
     sum
+}
+
+impl CutOrbit {
+    /// Where teeth enter or leave at the angles of the engagement: time, s from the beginning of the revolution, and the
+    /// cutting force along x, y, z after it minus that before it, N.
+    pub fn jumps_of_engagement(&self, model: &CutModel) -> Vec<(f64, [f64; 3])> {
+        let period = Period {
+            model,
+            ports: &self.ports,
+            mesh: &self.mesh,
+            motion: &self.motion,
+        };
+        let subintervals = &self.mesh.subintervals;
+        let mut jumps = Vec::new();
+        for (index, subinterval) in subintervals.iter().enumerate() {
+            let before = &subintervals[(index + subintervals.len() - 1) % subintervals.len()];
+            if before.stretch != subinterval.stretch {
+                let [before, after] = period.beside(index);
+                let jump_n = std::array::from_fn(|axis| after.cutting_n[axis] - before.cutting_n[axis]);
+                jumps.push((subinterval.start_s, jump_n));
+            }
+        }
+        jumps
+    }
 }
 
 impl CutOrbit {

@@ -4,8 +4,6 @@ use nalgebra::DVector;
 
 use super::law::{Forces, Instant};
 use super::mesh::Contact;
-use super::model::CutModel;
-use super::orbit::CutOrbit;
 use super::period::{Period, SparseRow};
 
 /// Least jump of an input, over its largest value in the revolution. Where a force only has a kink, an event that is
@@ -32,33 +30,9 @@ pub(super) struct Jump {
     pub(super) own: DVector<f64>,
 }
 
-impl CutOrbit {
-    /// Where teeth enter or leave at the angles of the engagement: time, s from the beginning of the revolution, and the
-    /// cutting force along x, y, z after it minus that before it, N.
-    pub fn jumps_of_engagement(&self, model: &CutModel) -> Vec<(f64, [f64; 3])> {
-        let period = Period {
-            model,
-            ports: &self.ports,
-            mesh: &self.mesh,
-            motion: &self.motion,
-        };
-        let subintervals = &self.mesh.subintervals;
-        let mut jumps = Vec::new();
-        for (index, subinterval) in subintervals.iter().enumerate() {
-            let before = &subintervals[(index + subintervals.len() - 1) % subintervals.len()];
-            if before.stretch != subinterval.stretch {
-                let [before, after] = period.beside(index);
-                let jump_n = std::array::from_fn(|axis| after.cutting_n[axis] - before.cutting_n[axis]);
-                jumps.push((subinterval.start_s, jump_n));
-            }
-        }
-        jumps
-    }
-}
-
 impl Period<'_> {
     /// Forces just before and at the start of a subinterval.
-    fn beside(&self, index: usize) -> [Forces; 2] {
+    pub(super) fn beside(&self, index: usize) -> [Forces; 2] {
         let subintervals = &self.mesh.subintervals;
         let before = &subintervals[(index + subintervals.len() - 1) % subintervals.len()];
         let path = self.path();
