@@ -123,14 +123,16 @@ impl OfJumps {
         let mut smooth = coefficients.to_vec();
         let mut sampled = [(); 2].map(|()| vec![Complex64::ZERO; orders.amplitudes.nrows()]);
         for jump in jumps {
-            let Some(sawtooth) = self.nearest(jump.angle_rad) else {
+            // Beyond the range the sawtooth is folded as the other orders are.
+            let known = self.nearest(jump.angle_rad);
+            let Some(sawtooth) = known.filter(|_| jump.early_rad.abs() <= self.range_rad) else {
                 continue;
             };
             for (order, coefficient) in smooth.iter_mut().enumerate().skip(1) {
                 *coefficient -= jump.size * of_sawtooth(order, jump.angle_rad - jump.early_rad);
             }
             let step_rad = 2.0 * self.range_rad / (PHASES - 1) as f64;
-            let place = ((jump.early_rad + self.range_rad) / step_rad).clamp(0.0, (PHASES - 1) as f64);
+            let place = (jump.early_rad + self.range_rad) / step_rad;
             let first = (place as usize).min(PHASES - 2);
             let pairs = sawtooth.seen[first].iter().zip(&sawtooth.seen[first + 1]);
             for (order, (one, next)) in pairs.enumerate() {

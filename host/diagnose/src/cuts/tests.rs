@@ -1,7 +1,11 @@
 //! Effects hidden in virtual cuts.
 
+use std::f64::consts::TAU;
 use std::time::Instant;
 
+use num_complex::Complex64;
+
+use super::jumps::ChannelJump;
 use super::record::ReducedCut;
 use super::selection::{Explanation, explain};
 use crate::baseline::Baseline;
@@ -68,5 +72,52 @@ fn effects_far_from_the_baseline_and_below_the_noise_of_a_sample_are_explained()
         assert_eq!(names, expected, "{effects:?}: {baseline} {best}");
         // χ² of 840 values per value: 1 ± 0.05, somewhat below since the variables are fitted.
         assert!(best < 1.15, "{effects:?}: {best}");
+    }
+}
+
+#[test]
+fn a_late_jump_is_folded_as_its_samples_are() {
+    let baseline_case = case("0.15", "");
+    let baseline = Baseline::new(&baseline_case).unwrap();
+    let recording = &records(&[], true, 7)[0];
+    let record = ReducedCut::new(&baseline, recording).unwrap();
+    let orders = &record.orders;
+    let (_, revolutions) = orders.sampled(recording);
+    let sample_rad = TAU * record.conditions.spindle_hz / record.rate_hz;
+    let exit_rad = baseline_case.cut().unwrap().exit_deg.to_radians();
+    let tooth_rad = TAU / baseline_case.tool().unwrap().teeth as f64;
+    for late_samples in [0.0, 0.3, -2.6, 3.9, 11.0, -40.0] {
+        // A sawtooth that jumps by 1 where the second tooth leaves, as a late channel shows it.
+        let angle_rad = exit_rad - tooth_rad;
+        let late_rad = late_samples * sample_rad;
+        let shown = angle_rad + late_rad;
+        let samples = revolutions
+            .iter()
+            .map(|revolution| 0.5 - (revolution - shown / TAU).rem_euclid(1.0));
+        let reduced = orders.of_samples(samples, &revolutions);
+        let coefficients: Vec<Complex64> = (0..=record.highest)
+            .map(|order| match order {
+                0 => Complex64::ZERO,
+                order => {
+                    let order = order as f64;
+                    Complex64::cis(-order * shown) / Complex64::new(0.0, TAU * order)
+                }
+            })
+            .collect();
+        let jump = ChannelJump {
+            angle_rad,
+            early_rad: -late_rad,
+            size: 1.0,
+        };
+        let [seen, _] = record.jumps.seen(orders, &coefficients, &[jump]);
+        let apart = (1..seen.len()).map(|order| (seen[order] - reduced[order]).norm());
+        let apart = apart.fold(0.0, f64::max);
+        println!("{late_samples} samples late: {apart:.1e}");
+        // Between two sampled delays, a quarter of a sample apart, the sawtooth is interpolated; beyond the range, the
+        // orders above the highest known one are left out: both are at most 1/(2π highest) in each order, twice.
+        assert!(
+            apart < 1.0 / (std::f64::consts::PI * record.highest as f64),
+            "{late_samples}: {apart}"
+        );
     }
 }
