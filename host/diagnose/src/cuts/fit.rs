@@ -101,7 +101,7 @@ impl State {
                     predicted += record.common_directions().nth(*direction)? * z;
                 }
                 Variable::Trend(own, direction) if *own == number => {
-                    *trend.as_mut()? -= record.trend_directions().nth(*direction)? * z;
+                    *trend.as_mut()? -= record.trend_directions.get(*direction)? * z;
                 }
                 _ => {}
             }
@@ -127,8 +127,8 @@ impl State {
                     Some(record.whitened_over_time(record.common_directions().nth(*direction)?, None))
                 }
                 Variable::Trend(_, direction) => {
-                    let direction = record.trend_directions().nth(*direction)?;
-                    Some(record.whitened_over_time(&(&direction * Complex64::ZERO), Some(&direction)))
+                    let direction = record.trend_directions.get(*direction)?;
+                    Some(record.whitened_over_time(&(direction * Complex64::ZERO), Some(direction)))
                 }
                 Variable::Phase(_) => {
                     let turned = &self.middle.by_phase * Complex64::from(phase_deviation(record));

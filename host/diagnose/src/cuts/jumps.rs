@@ -19,11 +19,9 @@ use nalgebra::{DMatrix, Vector3};
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-use super::conditions::{Conditions, cut_model};
-use crate::baseline::{Baseline, derivatives};
-use crate::error::DiagnoseError;
+use super::machine::Machine;
 use crate::orders::reduction::Orders;
-use quietcut_recording::{Quantity, Recording};
+use quietcut_stability::cut_orbit::{CutOrbit, ForceOrders};
 
 /// Standard deviation of the angles of entry and exit, rad: that of a radial depth that is known to a thousandth of the
 /// radius of the tool, at 90°.
@@ -39,7 +37,7 @@ const LARGEST_PHASE: f64 = 0.1;
 /// Distance of the spindle angles of the same jump, rad.
 const SAME_ANGLE: f64 = 1e-6;
 
-/// A jump of the force on a rigid tool.
+/// A jump of the force.
 struct Jump {
     /// Spindle angle, rad.
     angle_rad: f64,
@@ -65,7 +63,8 @@ pub(super) struct OfJumps {
     range_rad: f64,
     /// One standard deviation of each angle of the engagement, and of the samples beside each jump.
     pub directions: Vec<DMatrix<Complex64>>,
-    /// By jump: what its folded orders, which may move slowly against the others, leave in the trend.
+    /// What jumps leave in the trend: their folded orders, which may move slowly against the others, and samples beside
+    /// them that are seen on their other side for a part of the record.
     pub trends: Vec<DMatrix<Complex64>>,
 }
 
@@ -77,39 +76,39 @@ struct Sawtooth {
 }
 
 impl OfJumps {
-    /// For the jumps of the force at the given conditions of a recording.
-    ///
-    /// # Errors
-    /// The case lacks a section.
+    /// For the jumps of the force of a machine on its orbit.
     pub(super) fn new(
-        baseline: &Baseline<'_>,
-        conditions: &Conditions,
-        recording: &Recording,
+        machine: &Machine,
+        orbit: &CutOrbit,
+        rate_hz: f64,
         orders: &Orders,
-    ) -> Result<Self, DiagnoseError> {
-        let jumps = jumps(baseline, conditions)?;
-        let angle = &orders.angle;
-        let mut directions = of_engagement(baseline, conditions, orders, &jumps);
-        directions.extend(
-            jumps
-                .iter()
-                .flat_map(|jump| of_samples(baseline, jump, recording, orders)),
-        );
-        let range_rad = RANGE * TAU * angle.frequency_hz / recording.sample_rate_hz;
-        let trends = if orders.trend.is_some() {
-            jumps
-                .iter()
-                .map(|jump| folded_trend(baseline, jump, recording, orders))
-                .collect()
-        } else {
-            Vec::new()
-        };
-        Ok(Self {
+        revolutions: &[f64],
+    ) -> Self {
+        let jumps = jumps(machine, orbit);
+        let largest = jumps.iter().map(|jump| jump.force_n.norm()).fold(0.0, f64::max);
+        let acting: Vec<&Jump> = jumps
+            .iter()
+            .filter(|jump| jump.force_n.norm() > 1e-9 * largest)
+            .collect();
+        let mut directions = of_engagement(machine, orders, &acting);
+        let beside: Vec<_> = acting
+            .iter()
+            .flat_map(|jump| beside(machine, jump, rate_hz, orders))
+            .collect();
+        let mut trends = Vec::new();
+        if orders.trend.is_some() {
+            let folded = |jump: &&Jump| folded_trend(machine, jump, orders, revolutions);
+            trends.extend(acting.iter().map(folded));
+            trends.extend_from_slice(&beside);
+        }
+        directions.extend(beside);
+        let range_rad = RANGE * TAU * orders.angle.frequency_hz / rate_hz;
+        Self {
             trends,
             directions,
-            sawteeth: sawteeth(&jumps, range_rad, recording, orders),
+            sawteeth: sawteeth(&jumps, range_rad, orders, revolutions),
             range_rad,
-        })
+        }
     }
 
     /// Amplitudes as the record shows them, of a channel with these Fourier coefficients and jumps, and their derivative
@@ -155,10 +154,7 @@ impl OfJumps {
     }
 
     fn nearest(&self, angle_rad: f64) -> Option<&Sawtooth> {
-        let apart = |sawtooth: &&Sawtooth| {
-            let turn = (angle_rad - sawtooth.angle_rad).rem_euclid(TAU);
-            turn.min(TAU - turn)
-        };
+        let apart = |sawtooth: &&Sawtooth| apart(angle_rad, sawtooth.angle_rad);
         let nearest = self.sawteeth.iter().min_by(|a, b| apart(a).total_cmp(&apart(b)));
         nearest.filter(|nearest| apart(nearest) < SAME_ANGLE)
     }
@@ -170,39 +166,53 @@ fn of_sawtooth(order: usize, angle_rad: f64) -> Complex64 {
     Complex64::cis(-order * angle_rad) / Complex64::new(0.0, TAU * order)
 }
 
-fn jumps(baseline: &Baseline<'_>, conditions: &Conditions) -> Result<Vec<Jump>, DiagnoseError> {
-    let model = cut_model(baseline.case, &baseline.effects, conditions)?;
-    let cutter = &model.cutter;
+/// The jumps of a machine at entry and exit of its teeth, on its orbit and where it is larger on a rigid tool without
+/// runout. At 0° and 180° a chip begins and ends with thickness 0, but for the runout.
+fn jumps(machine: &Machine, orbit: &CutOrbit) -> Vec<Jump> {
+    let cutter = &machine.model.cutter;
+    let on_orbit = orbit.jumps_of_engagement(&machine.model);
     let mut all = Vec::new();
-    let mut largest: f64 = 0.0;
     for tooth in &cutter.teeth {
         for (edge_rad, sign) in [(cutter.start_rad, 1.0), (cutter.exit_rad, -1.0)] {
+            let angle_rad = edge_rad - tooth.angle_rad;
             let at = cutter.immersion(edge_rad);
             let thickness_m = cutter.recession_m(at, tooth.feed_m).max(0.0);
-            let force_n = sign * Vector3::from(cutter.force.force_n(at, thickness_m, cutter.depth_m));
-            largest = largest.max(force_n.norm());
+            let rigid_n = sign * Vector3::from(cutter.force.force_n(at, thickness_m, cutter.depth_m));
+            let own_n = on_orbit
+                .iter()
+                .filter(|(time_s, _)| apart(machine.model.rad_per_s * time_s, angle_rad) < SAME_ANGLE)
+                .fold(Vector3::zeros(), |sum, (_, force_n)| {
+                    sum + Vector3::from(*force_n)
+                });
             all.push(Jump {
-                angle_rad: edge_rad - tooth.angle_rad,
-                force_n,
+                angle_rad,
+                force_n: if own_n.norm() > rigid_n.norm() {
+                    own_n
+                } else {
+                    rigid_n
+                },
                 is_exit: sign < 0.0,
             });
         }
     }
-    // At 0° and 180° a chip begins and ends with thickness 0.
-    all.retain(|jump| jump.force_n.norm() > 1e-9 * largest);
-    Ok(all)
+    all
+}
+
+/// Smallest difference of two angles, rad.
+fn apart(one_rad: f64, other_rad: f64) -> f64 {
+    let turn = (one_rad - other_rad).rem_euclid(TAU);
+    turn.min(TAU - turn)
 }
 
 /// The sawteeth of jumps, sampled at the angles of the samples and reduced.
-fn sawteeth(jumps: &[Jump], range_rad: f64, recording: &Recording, orders: &Orders) -> Vec<Sawtooth> {
-    let (_, revolutions) = orders.sampled(recording);
+fn sawteeth(jumps: &[Jump], range_rad: f64, orders: &Orders, revolutions: &[f64]) -> Vec<Sawtooth> {
     let seen = |jump: &Jump, phase: usize| {
         let share = 2.0 * phase as f64 / (PHASES - 1) as f64 - 1.0;
         let angle_rad = jump.angle_rad - range_rad * share;
         let samples = revolutions
             .iter()
             .map(|revolution| 0.5 - (revolution - angle_rad / TAU).rem_euclid(1.0));
-        orders.of_samples(samples, &revolutions)
+        orders.of_samples(samples, revolutions)
     };
     jumps
         .par_iter()
@@ -214,20 +224,14 @@ fn sawteeth(jumps: &[Jump], range_rad: f64, recording: &Recording, orders: &Orde
 }
 
 /// The trend of the channels of force and acceleration that a sawtooth of the size of a jump leaves.
-fn folded_trend(
-    baseline: &Baseline<'_>,
-    jump: &Jump,
-    recording: &Recording,
-    orders: &Orders,
-) -> DMatrix<Complex64> {
-    let (_, revolutions) = orders.sampled(recording);
+fn folded_trend(machine: &Machine, jump: &Jump, orders: &Orders, revolutions: &[f64]) -> DMatrix<Complex64> {
     let samples: Vec<f64> = revolutions
         .iter()
         .map(|revolution| 0.5 - (revolution - jump.angle_rad / TAU).rem_euclid(1.0))
         .collect();
-    let of_one = orders.trend_of(&samples, &revolutions);
+    let of_one = orders.trend_of(&samples, revolutions);
     let mut trend = DMatrix::zeros(orders.amplitudes.nrows(), orders.channels.len());
-    for (channel, size) in sizes(baseline, orders, jump).into_iter().enumerate() {
+    for (channel, size) in sizes(machine, jump).into_iter().enumerate() {
         for (order, one) in of_one.iter().enumerate() {
             trend[(order, channel)] = one * size;
         }
@@ -236,12 +240,7 @@ fn folded_trend(
 }
 
 /// By edge of the engagement: the orders of one standard deviation of its angle, at which the force of all teeth jumps.
-fn of_engagement(
-    baseline: &Baseline<'_>,
-    conditions: &Conditions,
-    orders: &Orders,
-    jumps: &[Jump],
-) -> Vec<DMatrix<Complex64>> {
+fn of_engagement(machine: &Machine, orders: &Orders, jumps: &[&Jump]) -> Vec<DMatrix<Complex64>> {
     [false, true]
         .into_iter()
         .filter_map(|is_exit| {
@@ -251,7 +250,7 @@ fn of_engagement(
                     let force_n = jump
                         .force_n
                         .map(|force| Complex64::from(-force * ENGAGEMENT / TAU));
-                    impulse(baseline, conditions, orders, force_n, jump.angle_rad)
+                    impulse(machine, orders, force_n, jump.angle_rad)
                 })
                 .reduce(|sum, one| sum + one)
         })
@@ -260,20 +259,15 @@ fn of_engagement(
 
 /// What samples leave that are before a jump of a channel and taken as after it, or the reverse: they lie beside the
 /// jump, not at it, so that their impulse has moments.
-fn of_samples(
-    baseline: &Baseline<'_>,
-    jump: &Jump,
-    recording: &Recording,
-    orders: &Orders,
-) -> Vec<DMatrix<Complex64>> {
+fn beside(machine: &Machine, jump: &Jump, rate_hz: f64, orders: &Orders) -> Vec<DMatrix<Complex64>> {
     let angle = &orders.angle;
     // Where samples keep their place within the revolution, a jump that is late by δ is seen late by the angle γ between
     // two samples with the probability δ/γ, and else not.
     let error = angle.angle_deviation_rad.hypot(ENGAGEMENT);
-    let between = TAU * angle.frequency_hz / recording.sample_rate_hz;
+    let between = TAU * angle.frequency_hz / rate_hz;
     let deviation = error.max((error * between).sqrt());
     let apart = error.hypot(angle.phase_deviation_rad.min(LARGEST_PHASE));
-    let sizes = sizes(baseline, orders, jump);
+    let sizes = sizes(machine, jump);
     if sizes.iter().all(|size| *size == 0.0) {
         return Vec::new();
     }
@@ -289,49 +283,24 @@ fn of_samples(
 }
 
 /// Jumps of the channels of force and acceleration.
-fn sizes(baseline: &Baseline<'_>, orders: &Orders, jump: &Jump) -> Vec<f64> {
-    let structure = &baseline.first_order;
-    let accelerated = &structure.c * (&structure.a * (&structure.b * jump.force_n));
-    let of = |name: &String| match baseline.pickup(name) {
-        Some(pickup) if pickup.quantity == Quantity::Force => pickup.read(jump.force_n.into()),
-        Some(pickup) if pickup.quantity == Quantity::Acceleration => pickup.read(accelerated.into()),
-        _ => 0.0,
-    };
-    orders.channels.iter().map(of).collect()
+fn sizes(machine: &Machine, jump: &Jump) -> Vec<f64> {
+    machine
+        .reading
+        .jump(&machine.model.structure, jump.force_n.into())
 }
 
 /// Orders of the channels under an impulse of the force at a spindle angle.
 fn impulse(
-    baseline: &Baseline<'_>,
-    conditions: &Conditions,
+    machine: &Machine,
     orders: &Orders,
     force_n: Vector3<Complex64>,
     angle_rad: f64,
 ) -> DMatrix<Complex64> {
-    let pickups: Vec<_> = orders.channels.iter().map(|name| baseline.pickup(name)).collect();
-    let (rows, columns) = orders.amplitudes.shape();
-    let mut direction = DMatrix::zeros(rows, columns);
-    for order in 1..rows {
-        let omega = TAU * conditions.spindle_hz * order as f64;
-        let turned = force_n * Complex64::cis(-(order as f64) * angle_rad);
-        let moved = baseline
-            .first_order
-            .receptance(omega)
-            .map(|receptance| receptance * turned);
-        for (channel, pickup) in pickups.iter().enumerate() {
-            let Some(pickup) = pickup else { continue };
-            let value = match (pickup.quantity, &moved) {
-                (Quantity::Force, _) => turned,
-                (quantity, Some(moved)) => moved * Complex64::new(0.0, omega).powi(derivatives(quantity)),
-                (_, None) => continue,
-            };
-            direction[(order, channel)] = pickup
-                .weights
-                .iter()
-                .zip(value.iter())
-                .map(|(weight, value)| value * *weight)
-                .sum();
-        }
-    }
-    direction
+    let impulse_n = DMatrix::from_fn(orders.amplitudes.nrows(), 3, |order, axis| {
+        force_n[axis] * Complex64::cis(-(order as f64) * angle_rad)
+    });
+    machine.reading.orders(&ForceOrders {
+        cutting_n: impulse_n.clone(),
+        structure_n: impulse_n,
+    })
 }

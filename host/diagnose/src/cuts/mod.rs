@@ -3,8 +3,9 @@
 //!
 //! | file | content |
 //! |---|---|
-//! | `record`, `jumps`, `wander` | a recorded cut, reduced; what errors of the spindle angle and the speed leave in its orders |
-//! | `conditions`, `reading` | a machine in a cut; the orders of its channels |
+//! | `record` | a recorded cut, reduced |
+//! | `jumps`, `wander`, `scatter` | what errors of the spindle angle and the speed, and the scatter of tooth forces, leave in its orders |
+//! | `conditions`, `machine`, `reading` | a machine in a cut; the orders of its channels |
 //! | `candidate`, `candidates` | effects with their widths |
 //! | `space` | variables of a fit |
 //! | `moment` | the orbit of a machine, and its derivatives |
@@ -20,9 +21,11 @@ mod conditions;
 pub(crate) mod diagnosis;
 mod fit;
 mod jumps;
+mod machine;
 mod moment;
 mod reading;
 mod record;
+mod scatter;
 mod selection;
 mod space;
 #[cfg(test)]

@@ -4,8 +4,9 @@ use nalgebra::DMatrix;
 use num_complex::Complex64;
 
 use super::jumps::ChannelJump;
+use super::machine::Machine;
 use super::record::ReducedCut;
-use super::space::{Machine, Space, Variable};
+use super::space::{Space, Variable};
 use quietcut_stability::cut_orbit::{CutOrbit, ForceOrders, OrderWeights};
 
 /// Step of a central difference of what a variable changes explicitly, in its standard deviations. The error is its
@@ -36,11 +37,11 @@ impl Moment {
         time_s: f64,
         near: Option<&Self>,
     ) -> Option<Self> {
-        let machine = space.machine(z, number, record, time_s)?;
+        let mut machine = space.machine(z, number, record, time_s)?;
         let orbit = match near {
             // A step beyond which Newton's method does not follow is too long.
             Some(near) => CutOrbit::near(&machine.model, &near.orbit),
-            None => CutOrbit::new(&machine.model),
+            None => CutOrbit::along_depth(&mut machine.model),
         }
         .ok()?;
         let weights = orbit.order_weights(record.highest);
@@ -101,7 +102,7 @@ impl Moment {
         let forces = self.orbit.force_order_slopes(&self.weights, &sensitivity);
         slope += self.machine.reading.orders(&forces);
         turn(&mut slope, phase_rad);
-        Some(record.seen(&slope))
+        Some(record.orders.of_channels(&slope))
     }
 }
 

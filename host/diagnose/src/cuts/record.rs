@@ -3,16 +3,19 @@
 use std::f64::consts::TAU;
 use std::path::PathBuf;
 
-use nalgebra::{Cholesky, DMatrix};
+use nalgebra::{Cholesky, DMatrix, DVector};
 use num_complex::Complex64;
 
 use super::conditions::Conditions;
 use super::jumps::OfJumps;
+use super::machine::Machine;
+use super::scatter;
 use super::wander;
 use crate::baseline::{Baseline, derivatives};
 use crate::error::DiagnoseError;
 use crate::motion::recorded_cut::cut_of;
 use crate::orders::circle::Circle;
+use crate::orders::distance::OrderCovariance;
 use crate::orders::reduction::{Orders, ReductionSettings};
 use crate::orders::spindle_angle::SpindleAngle;
 use crate::orders::trend::Trend;
@@ -20,6 +23,7 @@ use crate::signal::noise::rms;
 use quietcut_model::structure::FirstOrder;
 use quietcut_numerics::eigenvalues::eigenvector;
 use quietcut_recording::{Quantity, Recording};
+use quietcut_stability::cut_orbit::CutOrbit;
 
 /// Range of the highest order of a prediction over that at half the sample rate. Jumps of the force have orders far
 /// above, which fold; each unit takes one cell of the spectrum between two lines, of as many cells as there are
@@ -47,11 +51,16 @@ pub(crate) struct ReducedCut {
     /// By order from 1: the matrix W with WᴴW = 2 Σ⁻¹, Σ the covariance of the amplitudes of all channels, so that real
     /// and imaginary parts of W e have unit variance.
     whiteners: Vec<DMatrix<Complex64>>,
+    /// The same of the trend; empty without it.
+    trend_whiteners: Vec<DMatrix<Complex64>>,
     /// What free decays of the modes leave in the orders, real and imaginary part of each mode, as large at the start of
     /// the record as the motion.
     decays: Vec<DMatrix<Complex64>>,
-    /// What errors of the spindle angle leave in the orders: in all of them, and where the force jumps.
-    of_angle: Vec<DMatrix<Complex64>>,
+    /// What errors of the spindle angle leave in the orders, in all of them and where the force jumps, and the scatter of
+    /// the tooth forces.
+    of_cut: Vec<DMatrix<Complex64>>,
+    /// Directions in which the trend of all orders errs together, in standard deviations.
+    pub(crate) trend_directions: Vec<DMatrix<Complex64>>,
     /// Where the force jumps.
     pub(super) jumps: OfJumps,
     /// Sample rate, Hz.
@@ -64,7 +73,7 @@ impl ReducedCut {
     /// Reduces a recording.
     ///
     /// # Errors
-    /// The recording lacks a channel or a value of the cut, or is too short.
+    /// The recording lacks a channel or a value of the cut, or is too short; or the baseline has no forced periodic orbit.
     pub(crate) fn new(baseline: &Baseline<'_>, recording: &Recording) -> Result<Self, DiagnoseError> {
         let given = recording.sidecar.cut.unwrap_or_default();
         let depth_mm = given.axial_depth_mm.ok_or_else(|| {
@@ -92,7 +101,8 @@ impl ReducedCut {
             settled_s,
         };
         let orders = Orders::with_angle(recording, &names, angle, &settings)?;
-        let decays = decays(baseline, recording, &orders);
+        let samples = Sampled::new(recording, &orders);
+        let decays = decays(baseline, recording, &orders, &samples);
         let conditions = Conditions {
             spindle_hz: orders.angle.frequency_hz,
             depth_m: 1e-3 * depth_mm,
@@ -102,33 +112,63 @@ impl ReducedCut {
                 0.5 * (edges_s[0] + edges_s[orders.angle.count()])
             },
         };
-        let jumps = OfJumps::new(baseline, &conditions, recording, &orders)?;
-        let mut of_angle = jumps.directions.clone();
-        of_angle.push(smeared(&orders));
-        let shifted = shifted(&orders, recording);
+        let rate_hz = recording.sample_rate_hz;
+        let no_orbit = || {
+            DiagnoseError::record(
+                &recording.path,
+                "the case has no forced periodic motion in this cut".to_owned(),
+            )
+        };
         let highest = orders.kernel().aliases();
-        let of_speed = wander::directions(baseline, &conditions, &orders, recording.sample_rate_hz, highest);
-        let [tilted, bent @ ..] = shifted;
-        of_angle.extend(bent);
-        match of_speed {
-            Some([moved, wandering]) => of_angle.extend([moved + tilted, wandering]),
-            None => of_angle.push(tilted),
+        let mut machine = Machine::of_baseline(baseline, &conditions, &orders.channels, highest, rate_hz)
+            .ok_or_else(no_orbit)?;
+        let orbit = CutOrbit::along_depth(&mut machine.model).map_err(|_| no_orbit())?;
+        let jumps = OfJumps::new(&machine, &orbit, rate_hz, &orders, &samples.revolutions);
+        let mut of_cut = jumps.directions.clone();
+        of_cut.push(smeared(&orders));
+        let of_speed = wander::directions(baseline, &conditions, &orders, rate_hz, (&machine, &orbit));
+        let (mut of_angle, of_trend): (Vec<_>, Vec<_>) = shifted(&orders, &samples)
+            .into_iter()
+            .map(|[mean, trend]| (mean, trend))
+            .unzip();
+        if let Some([moved, wandering]) = of_speed {
+            of_angle[0] += moved;
+            of_cut.push(wandering);
         }
-        let whiteners = whiteners(&orders).ok_or_else(|| {
+        of_cut.extend(of_angle);
+        let of_teeth = scatter::directions(&machine, &orders);
+        let mut trend_directions = Vec::new();
+        if orders.trend.is_some() {
+            trend_directions = of_blocks(&orders);
+            trend_directions.extend_from_slice(&jumps.trends);
+            trend_directions.extend(of_trend);
+            trend_directions.extend_from_slice(&of_teeth);
+        }
+        of_cut.extend(of_teeth);
+        let forces = orbit.force_orders(&orbit.order_weights(highest));
+        let coefficients = machine.reading.orders(&forces);
+        let no_noise = || {
             DiagnoseError::record(
                 &recording.path,
                 "the noise of a channel is not a number".to_owned(),
             )
-        })?;
+        };
+        let whiteners = whiteners(&orders).ok_or_else(no_noise)?;
+        let trend_whiteners = match &orders.trend {
+            Some(trend) => trend_whiteners(&orders, trend, &coefficients).ok_or_else(no_noise)?,
+            None => Vec::new(),
+        };
         Ok(Self {
             path: recording.path.clone(),
             highest,
-            rate_hz: recording.sample_rate_hz,
+            rate_hz,
             orders,
             conditions,
             whiteners,
+            trend_whiteners,
             decays,
-            of_angle,
+            of_cut,
+            trend_directions,
             jumps,
         })
     }
@@ -136,8 +176,7 @@ impl ReducedCut {
     /// Number of compared values: real and imaginary parts of the amplitudes of all orders but 0, whose offset is free,
     /// and of their trend.
     pub(crate) fn count(&self) -> usize {
-        let of_mean = 2 * self.whiteners.len() * self.orders.channels.len();
-        of_mean * (1 + usize::from(self.orders.trend.is_some()))
+        2 * (self.whiteners.len() + self.trend_whiteners.len()) * self.orders.channels.len()
     }
 
     /// Amplitudes and their trend in standard deviations of their errors, in a common order of values. Without a trend
@@ -147,13 +186,10 @@ impl ReducedCut {
         amplitudes: &DMatrix<Complex64>,
         trend: Option<&DMatrix<Complex64>>,
     ) -> Vec<f64> {
-        let mut values = self.whitened(amplitudes);
-        if let Some(known) = &self.orders.trend {
-            let scale = known.variance.sqrt().recip();
-            match trend {
-                Some(trend) => values.extend(self.whitened(trend).iter().map(|value| scale * value)),
-                None => values.resize(2 * values.len(), 0.0),
-            }
+        let mut values = whitened(&self.whiteners, amplitudes);
+        match trend {
+            Some(trend) => values.extend(whitened(&self.trend_whiteners, trend)),
+            None => values.resize(self.count(), 0.0),
         }
         values
     }
@@ -161,25 +197,6 @@ impl ReducedCut {
     /// Times of the record, s, whose half difference in the prediction is that of the trend.
     pub(crate) fn ends_s(&self, trend: &Trend) -> [f64; 2] {
         [-1.0, 1.0].map(|sign| self.conditions.time_s + sign * trend.scale_s)
-    }
-
-    /// Amplitudes as the reduction would find them, from Fourier coefficients of the channels.
-    pub(crate) fn seen(&self, coefficients: &DMatrix<Complex64>) -> DMatrix<Complex64> {
-        let columns: Vec<_> = coefficients
-            .column_iter()
-            .map(|column| nalgebra::DVector::from_vec(self.orders.seen(column.as_slice())))
-            .collect();
-        DMatrix::from_columns(&columns)
-    }
-
-    /// Amplitudes in standard deviations of their errors, in a common order of values.
-    pub(crate) fn whitened(&self, amplitudes: &DMatrix<Complex64>) -> Vec<f64> {
-        let mut values = Vec::with_capacity(self.count());
-        for (index, whitener) in self.whiteners.iter().enumerate() {
-            let white = whitener * amplitudes.row(index + 1).transpose();
-            values.extend(white.iter().flat_map(|value| [value.re, value.im]));
-        }
-        values
     }
 
     /// True if a spectral line of a channel of motion that is no order exceeds the share `least` of the largest order.
@@ -209,49 +226,96 @@ impl ReducedCut {
     }
 
     /// Directions in which all orders err together, in standard deviations: by slow changes, by a motion that has
-    /// not settled, and where the force jumps.
+    /// not settled, where the force jumps, and as tooth forces scatter.
     pub(crate) fn common_directions(&self) -> impl Iterator<Item = &DMatrix<Complex64>> {
         self.orders
             .common
             .directions
             .iter()
             .chain(&self.decays)
-            .chain(&self.of_angle)
-    }
-
-    /// Directions in which the trend of all orders errs together, in standard deviations.
-    pub(crate) fn trend_directions(&self) -> impl Iterator<Item = DMatrix<Complex64>> {
-        let of_blocks = self.orders.trend.iter().flat_map(|trend| {
-            let scale = Complex64::from(trend.variance.sqrt());
-            trend
-                .common
-                .directions
-                .iter()
-                .map(move |direction| direction * scale)
-        });
-        of_blocks.chain(self.jumps.trends.iter().cloned())
+            .chain(&self.of_cut)
     }
 }
 
+/// The reduced samples.
+struct Sampled {
+    times_s: Vec<f64>,
+    /// Spindle angle, revolutions.
+    revolutions: Vec<f64>,
+}
+
+impl Sampled {
+    fn new(recording: &Recording, orders: &Orders) -> Self {
+        let (times_s, revolutions) = orders.sampled(recording);
+        Self { times_s, revolutions }
+    }
+}
+
+/// Directions in which the trend errs as its deviations from block to block show.
+fn of_blocks(orders: &Orders) -> Vec<DMatrix<Complex64>> {
+    let Some(trend) = &orders.trend else {
+        return Vec::new();
+    };
+    let scale = Complex64::from(trend.variance.sqrt());
+    let directions = trend.common.directions.iter();
+    directions.map(|direction| direction * scale).collect()
+}
+
+/// Amplitudes of all orders but 0 in standard deviations of their errors.
+fn whitened(whiteners: &[DMatrix<Complex64>], amplitudes: &DMatrix<Complex64>) -> Vec<f64> {
+    let mut values = Vec::with_capacity(2 * whiteners.len() * amplitudes.ncols());
+    for (index, whitener) in whiteners.iter().enumerate() {
+        let white = whitener * amplitudes.row(index + 1).transpose();
+        values.extend(white.iter().flat_map(|value| [value.re, value.im]));
+    }
+    values
+}
+
 fn whiteners(orders: &Orders) -> Option<Vec<DMatrix<Complex64>>> {
-    let channels = orders.channels.len() as f64;
     let inflation = orders.common.inflation();
-    orders.covariances[1..]
-        .iter()
-        .enumerate()
-        .map(|(index, covariance)| {
-            // The mean of T² exceeds the number of values, since the covariance is estimated (Hotelling).
-            let freedoms = covariance.freedoms;
-            let scale = inflation * freedoms / (freedoms - channels).max(1.0);
-            let mut matrix = &covariance.matrix * Complex64::from(scale);
-            for channel in 0..orders.channels.len() {
-                let amplitude = orders.amplitudes[(index + 1, channel)].norm();
-                matrix[(channel, channel)] += (FLATNESS * amplitude).powi(2);
-            }
-            let lower = Cholesky::new(matrix * Complex64::from(0.5))?.l();
-            lower.try_inverse()
-        })
-        .collect()
+    let further = |order: usize, channel: usize| FLATNESS * orders.amplitudes[(order, channel)].norm();
+    inverse_factors(orders, inflation, further)
+}
+
+/// Whiteners of the trend: besides the noise, the orders of a prediction above those of the record fold onto them, with
+/// phases that may change over the record.
+fn trend_whiteners(
+    orders: &Orders,
+    trend: &Trend,
+    coefficients: &DMatrix<Complex64>,
+) -> Option<Vec<DMatrix<Complex64>>> {
+    let highest = orders.amplitudes.nrows() - 1;
+    let folded = |order: usize, channel: usize| {
+        let of_alias = |alias: usize| {
+            let parts = trend.folding[alias - order].hypot(trend.folding[alias + order]);
+            (parts * coefficients[(alias, channel)].norm()).powi(2)
+        };
+        let power: f64 = (highest + 1..coefficients.nrows()).map(of_alias).sum();
+        power.sqrt()
+    };
+    inverse_factors(orders, trend.variance * trend.common.inflation(), folded)
+}
+
+/// The inverse factors of the covariances between the lines, times `factor`, with further errors of each order and
+/// channel.
+fn inverse_factors(
+    orders: &Orders,
+    factor: f64,
+    further: impl Fn(usize, usize) -> f64,
+) -> Option<Vec<DMatrix<Complex64>>> {
+    let channels = orders.channels.len();
+    let of_order = |(index, covariance): (usize, &OrderCovariance)| {
+        // The mean of T² exceeds the number of values, since the covariance is estimated (Hotelling).
+        let freedoms = covariance.freedoms;
+        let scale = factor * freedoms / (freedoms - channels as f64).max(1.0);
+        let mut matrix = &covariance.matrix * Complex64::from(scale);
+        for channel in 0..channels {
+            matrix[(channel, channel)] += further(index + 1, channel).powi(2);
+        }
+        let lower = Cholesky::new(matrix * Complex64::from(0.5))?.l();
+        lower.try_inverse()
+    };
+    orders.covariances[1..].iter().enumerate().map(of_order).collect()
 }
 
 /// What the mean over errors of the spindle angle with the variance σ² takes from the orders: Y_k k² σ²/2.
@@ -264,11 +328,10 @@ fn smeared(orders: &Orders) -> DMatrix<Complex64> {
     smeared
 }
 
-/// What errors of the spindle angle leave in the orders of a record, if they go over it as the Legendre polynomials of
-/// the degrees 1 to 4: one standard deviation of the mean speed, then of the angle. The signal at the angle θ + ε(t)
-/// differs by ε dy/dθ.
-fn shifted(orders: &Orders, recording: &Recording) -> [DMatrix<Complex64>; 4] {
-    let (times_s, revolutions) = orders.sampled(recording);
+/// What errors of the spindle angle leave in the orders of a record and in their trend, if they go over it as the
+/// Legendre polynomials of the degrees 1 to 4: one standard deviation of the mean speed, then of the angle. The signal at
+/// the angle θ + ε(t) differs by ε dy/dθ.
+fn shifted(orders: &Orders, Sampled { times_s, revolutions }: &Sampled) -> [[DMatrix<Complex64>; 2]; 4] {
     let circle = Circle::new(orders.amplitudes.nrows() - 1);
     let slopes: Vec<Vec<f64>> = orders
         .amplitudes
@@ -295,17 +358,25 @@ fn shifted(orders: &Orders, recording: &Recording) -> [DMatrix<Complex64>; 4] {
         } else {
             angle.angle_deviation_rad
         };
-        let columns: Vec<_> = slopes
+        let columns: Vec<[DVector<Complex64>; 2]> = slopes
             .iter()
             .map(|slopes| {
-                let samples = slopes.iter().zip(&times_s).map(|(slope, time_s)| {
+                let moved = |(slope, time_s): (&f64, &f64)| {
                     let x = 2.0 * (time_s - first_s) / (last_s - first_s) - 1.0;
                     size * legendre(index + 1, x) * slope
-                });
-                nalgebra::DVector::from_vec(orders.of_samples(samples, &revolutions))
+                };
+                let samples: Vec<f64> = slopes.iter().zip(times_s).map(moved).collect();
+                [
+                    orders.of_samples(samples.iter().copied(), revolutions),
+                    orders.trend_of(&samples, revolutions),
+                ]
+                .map(DVector::from_vec)
             })
             .collect();
-        DMatrix::from_columns(&columns)
+        [0, 1].map(|part| {
+            let columns: Vec<_> = columns.iter().map(|column| column[part].clone()).collect();
+            DMatrix::from_columns(&columns)
+        })
     })
 }
 
@@ -321,8 +392,12 @@ fn legendre(degree: usize, x: f64) -> f64 {
 
 /// Orders that free decays of the structure leave in a reduction: by mode its real and imaginary part, as large at the
 /// start as the motion.
-fn decays(baseline: &Baseline<'_>, recording: &Recording, orders: &Orders) -> Vec<DMatrix<Complex64>> {
-    let (times_s, revolutions) = orders.sampled(recording);
+fn decays(
+    baseline: &Baseline<'_>,
+    recording: &Recording,
+    orders: &Orders,
+    Sampled { times_s, revolutions }: &Sampled,
+) -> Vec<DMatrix<Complex64>> {
     let first_s = orders.angle.edges_s()[0];
     let poles = baseline.first_order.poles().into_iter();
     let mut all = Vec::new();
@@ -355,7 +430,7 @@ fn decays(baseline: &Baseline<'_>, recording: &Recording, orders: &Orders) -> Ve
                     let samples = times_s
                         .iter()
                         .map(|time_s| (amplitude * part / share * (pole * (time_s - first_s)).exp()).re);
-                    nalgebra::DVector::from_vec(orders.of_samples(samples, &revolutions))
+                    DVector::from_vec(orders.of_samples(samples, revolutions))
                 })
                 .collect();
             all.push(DMatrix::from_columns(&columns));

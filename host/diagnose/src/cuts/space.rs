@@ -5,6 +5,7 @@
 
 use super::candidate::Candidate;
 use super::conditions::{Conditions, cut_model};
+use super::machine::Machine;
 use super::reading::Reading;
 use super::record::ReducedCut;
 use crate::baseline::{Baseline, pickup_of};
@@ -12,7 +13,6 @@ use crate::error::DiagnoseError;
 use quietcut_model::case::{Case, Deviation, Parameter};
 use quietcut_model::effects::EffectName;
 use quietcut_model::{Effects, ModelError};
-use quietcut_stability::cut_orbit::CutModel;
 
 /// Standard deviation of a parameter of a case that states none, relative to its value: the case is taken as exact to
 /// the last digit that a case file usually has.
@@ -55,12 +55,6 @@ pub(crate) struct Space<'a> {
     pub variables: Vec<Variable>,
 }
 
-/// A machine in one cut, with its channels.
-pub(crate) struct Machine {
-    pub model: CutModel,
-    pub reading: Reading,
-}
-
 impl<'a> Space<'a> {
     /// What is uncertain without any candidate.
     pub(crate) fn new(baseline: &'a Baseline<'a>, records: &[ReducedCut]) -> Self {
@@ -89,7 +83,7 @@ impl<'a> Space<'a> {
                 (0..record.common_directions().count()).map(|direction| Variable::Common(index, direction)),
             );
             variables.extend(
-                (0..record.trend_directions().count()).map(|direction| Variable::Trend(index, direction)),
+                (0..record.trend_directions.len()).map(|direction| Variable::Trend(index, direction)),
             );
         }
         Self {

@@ -84,11 +84,11 @@ fn a_late_jump_is_folded_as_its_samples_are() {
     let orders = &record.orders;
     let (_, revolutions) = orders.sampled(recording);
     let sample_rad = TAU * record.conditions.spindle_hz / record.rate_hz;
-    let exit_rad = baseline_case.cut().unwrap().exit_deg.to_radians();
+    let start_rad = baseline_case.cut().unwrap().start_deg.to_radians();
     let tooth_rad = TAU / baseline_case.tool().unwrap().teeth as f64;
     for late_samples in [0.0, 0.3, -2.6, 3.9, 11.0, -40.0] {
-        // A sawtooth that jumps by 1 where the second tooth leaves, as a late channel shows it.
-        let angle_rad = exit_rad - tooth_rad;
+        // A sawtooth that jumps by 1 where the second tooth enters, as a late channel shows it.
+        let angle_rad = start_rad - tooth_rad;
         let late_rad = late_samples * sample_rad;
         let shown = angle_rad + late_rad;
         let samples = revolutions

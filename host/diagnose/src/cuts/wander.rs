@@ -12,8 +12,8 @@
 use nalgebra::DMatrix;
 use num_complex::Complex64;
 
-use super::conditions::{Conditions, cut_model};
-use super::reading::Reading;
+use super::conditions::Conditions;
+use super::machine::Machine;
 use crate::baseline::Baseline;
 use crate::orders::reduction::Orders;
 use quietcut_stability::cut_orbit::CutOrbit;
@@ -32,41 +32,29 @@ pub(super) fn directions(
     conditions: &Conditions,
     orders: &Orders,
     rate_hz: f64,
-    highest: usize,
+    middle: (&Machine, &CutOrbit),
 ) -> Option<[DMatrix<Complex64>; 2]> {
     let angle = &orders.angle;
     let wander = angle.speed_wander.hypot(HIDDEN * angle.angle_deviation_rad);
-    let at = |step: f64, near: Option<&CutOrbit>| {
+    let highest = orders.kernel().aliases();
+    let read = |machine: &Machine, orbit: &CutOrbit| {
+        let forces = orbit.force_orders(&orbit.order_weights(highest));
+        machine.reading.orders(&forces)
+    };
+    let at = |step: f64| {
         let conditions = Conditions {
             spindle_hz: conditions.spindle_hz * (1.0 + step),
             ..*conditions
         };
-        let model = cut_model(baseline.case, &baseline.effects, &conditions).ok()?;
-        let pickups: Option<Vec<_>> = orders.channels.iter().map(|name| baseline.pickup(name)).collect();
-        let reading = Reading::new(
-            &model.structure,
-            pickups?,
-            conditions.spindle_hz,
-            highest,
-            rate_hz,
-        )?;
-        let orbit = near
-            .map_or_else(|| CutOrbit::new(&model), |near| CutOrbit::near(&model, near))
-            .ok()?;
-        let forces = orbit.force_orders(&orbit.order_weights(highest));
-        Some((reading.orders(&forces), orbit))
+        let machine = Machine::of_baseline(baseline, &conditions, &orders.channels, highest, rate_hz)?;
+        let orbit = CutOrbit::near(&machine.model, middle.1).ok()?;
+        Some(read(&machine, &orbit))
     };
-    let (middle, orbit) = at(0.0, None)?;
-    let [(below, _), (above, _)] = [at(-STEP, Some(&orbit))?, at(STEP, Some(&orbit))?];
+    let [below, above] = [at(-STEP)?, at(STEP)?];
+    let middle = read(middle.0, middle.1);
     let error = angle.frequency_deviation_hz / angle.frequency_hz;
     let moved = (&above - &below) * Complex64::from(0.5 * error / STEP);
     let bent =
         (above + below - middle * Complex64::from(2.0)) * Complex64::from(0.5 * (wander / STEP).powi(2));
-    Some([moved, bent].map(|direction| {
-        let seen: Vec<_> = direction
-            .column_iter()
-            .map(|column| nalgebra::DVector::from_vec(orders.seen(column.as_slice())))
-            .collect();
-        DMatrix::from_columns(&seen)
-    }))
+    Some([moved, bent].map(|direction| orders.of_channels(&direction)))
 }

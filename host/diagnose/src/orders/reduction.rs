@@ -16,7 +16,7 @@ use crate::orders::common::{BLOCKS_MAX, BLOCKS_MIN, Common};
 use crate::orders::distance::{self, Hotelling, OrderCovariance, SquaredDistance};
 use crate::orders::spindle_angle::{SpindleAngle, check_revolutions};
 use crate::orders::taper::Taper;
-use crate::orders::trend::{AmplitudeBlock, Trend, slope, slope_of};
+use crate::orders::trend::{AmplitudeBlock, Trend, folding_of, slope, slope_of};
 use quietcut_recording::Recording;
 
 /// Highest frequency of an order over the sample rate. From half the sample rate an order and its conjugate coincide;
@@ -145,6 +145,7 @@ impl Orders {
                 .collect();
             Trend {
                 amplitudes: DMatrix::from_columns(&columns),
+                folding: folding_of(&revolutions, &blocks_of_plan, highest + aliases),
                 ..trend
             }
         });
@@ -190,6 +191,15 @@ impl Orders {
     /// channel, including aliasing; see [`AliasKernel::seen`].
     pub(crate) fn seen(&self, c: &[Complex64]) -> Vec<Complex64> {
         self.kernel.seen(c)
+    }
+
+    /// [`Self::seen`] of all channels: Fourier coefficients by order (rows, from 0) and channel (columns).
+    pub(crate) fn of_channels(&self, coefficients: &DMatrix<Complex64>) -> DMatrix<Complex64> {
+        let columns: Vec<DVector<Complex64>> = coefficients
+            .column_iter()
+            .map(|column| DVector::from_vec(self.seen(column.as_slice())))
+            .collect();
+        DMatrix::from_columns(&columns)
     }
 
     /// Amplitudes of the orders 0 … K that the reduction finds in samples at these spindle angles, those of the record,
@@ -411,6 +421,7 @@ fn over_time(
             amplitudes: slope.amplitudes,
             scale_s,
             variance: slope.variance / of_record,
+            folding: Vec::new(),
             common: common(&deviations),
         }),
         blocks,

@@ -27,6 +27,9 @@ pub(crate) struct Trend {
     pub scale_s: f64,
     /// Variance of `amplitudes` over that of the amplitudes of the record.
     pub variance: f64,
+    /// By m = 0 … K + P: what a signal e^{ipθ} of unit amplitude leaves in the trend of the order k, m = |k − p|. At a
+    /// speed that wanders the orders above K do not keep their phase against those onto which they fold.
+    pub folding: Vec<f64>,
     /// Errors common to all orders but 0, from the deviations of the blocks from the trend, for the amplitudes of the
     /// record.
     pub common: Common,
@@ -59,19 +62,38 @@ pub(super) fn slope_of(
         .zip(revolutions)
         .map(|(value, revolution)| value - series.at(*revolution))
         .collect();
+    over_blocks(&circle, revolutions, blocks, |sample| residual[sample])
+}
+
+/// [`Trend::folding`] for differences of orders up to `highest`.
+pub(super) fn folding_of(revolutions: &[f64], blocks: &[BlockWeights], highest: usize) -> Vec<f64> {
+    let sums = over_blocks(&Circle::new(highest), revolutions, blocks, |_| 1.0);
+    sums.into_iter().map(Complex64::norm).collect()
+}
+
+/// Slope, over every second block, of the means of v e^{−ikθ} for the orders of a circle, times the standard deviation of
+/// the time over the record.
+fn over_blocks(
+    circle: &Circle,
+    revolutions: &[f64],
+    blocks: &[BlockWeights],
+    value: impl Fn(usize) -> f64,
+) -> Vec<Complex64> {
     let apart: Vec<&BlockWeights> = blocks.iter().step_by(2).collect();
     let centre = |block: &BlockWeights| block.first as f64 + 0.5 * (block.taper.count() - 1) as f64;
     let mean = apart.iter().map(|block| centre(block)).sum::<f64>() / apart.len().max(1) as f64;
     let squares: f64 = apart.iter().map(|block| (centre(block) - mean).powi(2)).sum();
-    let scale = samples.len() as f64 / 12.0_f64.sqrt();
-    let mut slope = vec![Complex64::ZERO; kernel.orders() + 1];
+    let scale = revolutions.len() as f64 / 12.0_f64.sqrt();
+    let mut slope = Vec::new();
     for block in apart {
         let weighted = (0..block.taper.count()).map(|sample| {
             let at = block.first + sample;
-            (revolutions[at], block.taper.weight(sample) * residual[at])
+            (revolutions[at], block.taper.weight(sample) * value(at))
         });
+        let sums = circle.sums(weighted);
+        slope.resize(sums.len(), Complex64::ZERO);
         let factor = (centre(block) - mean) * scale / squares / block.taper.sum();
-        for (slope, sum) in slope.iter_mut().zip(circle.sums(weighted)) {
+        for (slope, sum) in slope.iter_mut().zip(sums) {
             *slope += sum * factor;
         }
     }

@@ -29,6 +29,8 @@ const RESOLVABLE: f64 = 1e-3;
 const MOST_EVENTS: usize = 256;
 /// Number of Newton steps without one of half the size of the smallest before, after which a search ends.
 const STALLED: usize = 7;
+/// Depth of the shallow cut from which an orbit is followed, as a share of that of the cut.
+const SHALLOW: f64 = 0.01;
 /// Smallest step of a natural continuation, as a share of its way.
 const LEAST_STEP: f64 = 1e-3;
 /// Largest share of the force in the two highest Legendre polynomials of a subinterval: the error of the orbit is of
@@ -135,11 +137,39 @@ impl CutOrbit {
     /// # Errors
     /// See [`CutOrbitError`].
     pub fn continued(model: &dyn Fn(f64) -> CutModel) -> Result<Self, CutOrbitError> {
-        let mut orbit = Self::new(&model(0.0))?;
+        Self::new(&model(0.0))?.followed(|share, orbit| Self::near(&model(share), orbit))
+    }
+
+    /// The orbit of `model`, from the tool at rest; where it is not found there, followed from that of a shallow cut, in
+    /// which the motion is small against the chips and the teeth are in contact as those of a rigid tool.
+    ///
+    /// # Errors
+    /// See [`CutOrbitError`].
+    pub fn along_depth(model: &mut CutModel) -> Result<Self, CutOrbitError> {
+        Self::new(model).or_else(|_| {
+            let depth_m = model.cutter.depth_m;
+            model.cutter.depth_m = SHALLOW * depth_m;
+            let found = Self::new(model).and_then(|shallow| {
+                shallow.followed(|share, orbit| {
+                    model.cutter.depth_m = (SHALLOW + (1.0 - SHALLOW) * share) * depth_m;
+                    Self::near(model, orbit)
+                })
+            });
+            model.cutter.depth_m = depth_m;
+            found
+        })
+    }
+
+    /// Natural continuation from this orbit at 0 to 1: `near` is the orbit at a share of the way near another.
+    fn followed(
+        self,
+        mut near: impl FnMut(f64, &Self) -> Result<Self, CutOrbitError>,
+    ) -> Result<Self, CutOrbitError> {
+        let mut orbit = self;
         let (mut share, mut step) = (0.0, 0.25);
         while share < 1.0 {
             let next = f64::min(share + step, 1.0);
-            match Self::near(&model(next), &orbit) {
+            match near(next, &orbit) {
                 Ok(found) => {
                     (orbit, share) = (found, next);
                     step *= 2.0;
