@@ -8,6 +8,7 @@
 //! | [`least_squares`] | linear, from normal equations, nonlinear |
 //! | [`newton`] | Newton's method for numbers and vectors |
 //! | [`roots`] | bisection, Newton's method with a bracket, regula falsi, golden section |
+//! | [`lu`] | LU factors of large matrices |
 //! | [`crossing`] | the first zero crossing within a time step |
 //! | [`quadrature`] | Gauss–Legendre nodes and weights |
 //! | [`dormand_prince`] | one step of an integration in time |
@@ -39,6 +40,7 @@ pub mod crossing;
 pub mod dormand_prince;
 pub mod eigenvalues;
 pub mod least_squares;
+pub mod lu;
 pub mod newton;
 pub mod quadrature;
 pub mod roots;

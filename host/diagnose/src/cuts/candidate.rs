@@ -41,6 +41,8 @@ pub(crate) struct Candidate {
     pub grid: Vec<Vec<f64>>,
     /// True if the effect is absent where the first coordinate is zero.
     pub vanishes: bool,
+    /// True if the effect has an internal state that follows the motion: where it vanishes it has no orbit of its own.
+    pub has_state: bool,
     parameters: Parameters,
 }
 
@@ -57,6 +59,7 @@ impl Candidate {
             coordinates,
             grid: Vec::new(),
             vanishes: false,
+            has_state: false,
             parameters: Arc::new(parameters),
         }
     }
@@ -77,6 +80,12 @@ impl Candidate {
     pub(crate) fn vanishing_at_zero(mut self) -> Self {
         self.vanishes = true;
         self.coordinates[0] = Coordinate::POSITIVE;
+        self
+    }
+
+    /// This candidate with an internal state.
+    pub(crate) fn with_state(mut self) -> Self {
+        self.has_state = true;
         self
     }
 

@@ -4,7 +4,7 @@
 //! of the case is given as a share of it; restoring forces are compared with the linear spring or damper along the motion
 //! of the baseline, so that widths do not depend on units or size of a machine.
 //!
-//! Hysteresis is not among them: its internal state leaves it without a derivative at the baseline.
+//! Microslip of joints is not among them: its memory of turning points has no derivative.
 
 use super::candidate::{Candidate, Coordinate};
 use super::fit::Fit;
@@ -38,6 +38,8 @@ const DELAY_SAMPLES: f64 = 3.0;
 const CROSS_AXIS: f64 = 0.05;
 /// Motion at a sensor over that at the tool tip, in a mode.
 const OFFSET: f64 = 0.3;
+/// Coordinate of an effect with an internal state at which it is compared with the records to first order.
+const FAINT: f64 = 0.01;
 /// Compliance of a missing mode over the static compliance of its direction.
 const COMPLIANCE: f64 = 0.3;
 
@@ -178,9 +180,30 @@ fn of_restoring_force(along: Along, all: &mut Vec<Candidate>) {
     );
     let gap = move |z: &[f64]| vec![("gap_mm", 2e3 * x * z[0])];
     all.push(
-        Candidate::new(EffectName::Backlash, place, vec![Coordinate::POSITIVE], gap)
+        Candidate::new(
+            EffectName::Backlash,
+            place.clone(),
+            vec![Coordinate::POSITIVE],
+            gap,
+        )
+        .vanishing_at_zero()
+        .started_at(vec![vec![0.1], vec![0.5]]),
+    );
+    // Yields at a third of the motion; a loop that yields much later is linear, one that yields much earlier is friction.
+    let loops = move |z: &[f64]| {
+        vec![
+            ("hysteretic_stiffness_n_per_m", NONLINEAR * along.stiffness * z[0]),
+            ("yield_m", x / 3.0 * (3.0_f64.ln() * z[1]).exp()),
+            ("exponent", 1.0 + z[2]),
+        ]
+    };
+    let coordinates = vec![Coordinate::POSITIVE, Coordinate::FREE, Coordinate::POSITIVE];
+    let yields = [-1.5, 0.0, 1.0].map(|place| vec![FAINT, place, 0.0]);
+    all.push(
+        Candidate::new(EffectName::Hysteresis, place, coordinates, loops)
             .vanishing_at_zero()
-            .started_at(vec![vec![0.1], vec![0.5]]),
+            .with_state()
+            .started_at(yields.to_vec()),
     );
 }
 

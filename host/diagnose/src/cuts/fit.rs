@@ -356,7 +356,14 @@ impl Fit {
         let mut columns = DMatrix::zeros(rows, coordinates.len());
         let mut row = 0;
         for (number, (state, record)) in self.states.iter().zip(records).enumerate() {
-            for index in 0..coordinates.len() {
+            let own = match candidate.has_state {
+                true => Some(State::new(&wider, &z, number, record, None)?),
+                false => None,
+            };
+            // Where an effect is faint, only its size acts.
+            let count = if own.is_some() { 1 } else { coordinates.len() };
+            let state = own.as_ref().unwrap_or(state);
+            for index in 0..count {
                 let column = state.difference(&wider, &z, first + index, number, record)?;
                 columns
                     .view_mut((row, index), (column.len(), 1))

@@ -11,6 +11,7 @@
 //! | `events` | loss of contact, surfaces, stick |
 //! | `period` | forces along the motion |
 //! | `newton`, `jumps` | the equations, with the instants at which forces jump |
+//! | `states` | internal states along a known motion |
 //! | `orbit` | the orbit |
 //! | `sensitivity` | derivatives with respect to parameters |
 //! | `harmonics` | Fourier coefficients of the forces |
@@ -28,6 +29,7 @@ mod period;
 mod propagator;
 mod response;
 mod sensitivity;
+mod states;
 #[cfg(test)]
 mod tests;
 

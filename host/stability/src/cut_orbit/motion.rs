@@ -20,6 +20,24 @@ impl Motion {
         }
     }
 
+    /// This motion, with the outputs `own`, with others: what these lack is 0.
+    pub(super) fn of(&self, own: &Ports, other: &Ports) -> Self {
+        if own.outputs() == other.outputs() {
+            return self.clone();
+        }
+        let moved = 2 * own.axes.len();
+        let mut values = Vec::with_capacity(self.values.len() / self.per_point * other.outputs());
+        for point in self.values.chunks_exact(self.per_point) {
+            let first = values.len();
+            values.extend_from_slice(&point[..moved]);
+            values.resize(first + other.outputs(), 0.0);
+        }
+        Self {
+            values,
+            per_point: other.outputs(),
+        }
+    }
+
     pub(super) fn at_point(&self, point: usize) -> &[f64] {
         &self.values[point * self.per_point..(point + 1) * self.per_point]
     }

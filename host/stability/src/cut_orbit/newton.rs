@@ -9,8 +9,7 @@
 //! where J_e is the jump of f at the event e, whose delay by δt_e is an impulse −J_e δt_e with the response G_e, and
 //! g_e(t_e, y) = 0 defines its instant.
 
-use nalgebra::linalg::LU;
-use nalgebra::{DMatrix, DVector, Dyn, Matrix3, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use super::events::{Events, Revolution};
 use super::jumps::{Jump, JumpSize};
@@ -20,6 +19,7 @@ use super::model::{CutModel, Ports};
 use super::motion::Motion;
 use super::period::{Period, SparseRow};
 use super::response::Response;
+use quietcut_numerics::lu::Lu;
 
 /// The equations of a Newton step, factored.
 pub(super) struct Linearization {
@@ -33,7 +33,7 @@ pub(super) struct Linearization {
     jumps: Vec<Jump>,
     /// Outputs by unknowns.
     response: DMatrix<f64>,
-    factors: LU<f64, Dyn, Dyn>,
+    factors: Lu,
 }
 
 impl Period<'_> {
@@ -102,13 +102,8 @@ impl Period<'_> {
             .map(|jump| (jump.size.subinterval, -&jump.size.inputs))
             .collect();
         let matrix = response.matrix(&first_column, count, &impulses);
-        let factors = self.equations(&inputs_by, &jumps, count, &matrix).lu();
-        let is_regular = factors
-            .u()
-            .diagonal()
-            .iter()
-            .all(|pivot| pivot.is_finite() && *pivot != 0.0);
-        is_regular.then_some(Linearization {
+        let factors = Lu::new(self.equations(&inputs_by, &jumps, count, &matrix));
+        factors.is_regular().then_some(Linearization {
             first_column,
             count,
             inputs_by,
@@ -169,7 +164,7 @@ impl Linearization {
     /// Solves the equations for right-hand sides: `inputs` at all nodes, and `events` for each jump.
     pub(super) fn solve(&self, mesh: &Mesh, ports: &Ports, inputs: &[f64], events: &[f64]) -> Option<Change> {
         let per_subinterval = mesh.nodes() * ports.inputs();
-        let mut right = DVector::zeros(self.count + self.jumps.len());
+        let mut right = DMatrix::zeros(self.count + self.jumps.len(), 1);
         for (index, first) in self.first_column.iter().enumerate() {
             let Some(first) = first else { continue };
             let own = &inputs[index * per_subinterval..(index + 1) * per_subinterval];
@@ -181,13 +176,14 @@ impl Linearization {
         if !self.factors.solve_mut(&mut right) {
             return None;
         }
+        let right = right.column(0);
         let mut all_inputs = vec![0.0; inputs.len()];
         for (index, first) in self.first_column.iter().enumerate() {
             let Some(first) = first else { continue };
             all_inputs[index * per_subinterval..(index + 1) * per_subinterval]
                 .copy_from_slice(right.rows(*first, per_subinterval).as_slice());
         }
-        let outputs = &self.response * &right;
+        let outputs = &self.response * right;
         let of_row = |row: &SparseRow| row.iter().map(|(at, weight)| weight * outputs[*at]).sum::<f64>();
         let cutting_n = self
             .cutting_by

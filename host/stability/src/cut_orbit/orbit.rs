@@ -9,6 +9,7 @@ use super::motion::Motion;
 use super::newton::{self, Linearization};
 use super::period::{NodeForces, Period};
 use super::response::Response;
+use super::states;
 
 /// Nodes per subinterval.
 const NODES: usize = 8;
@@ -185,8 +186,7 @@ impl CutOrbit {
         let ports = model.ports();
         let stretches = Stretches::new(&model.cutter, model.rad_per_s);
         let known = known.filter(|known| {
-            known.ports.outputs() == ports.outputs()
-                && known.ports.axes == ports.axes
+            known.ports.axes == ports.axes
                 && (known.mesh.revolution_s / stretches.revolution_s - 1.0).abs() < 1e-12
         });
         let mut start = Start::new(model, &ports, &stretches, known);
@@ -251,19 +251,22 @@ impl Start {
         let contacts: Vec<Contact> = stretches.teeth.iter().map(teeth).collect();
         let gauss = Gauss::shared(NODES);
         let mut splits = Vec::new();
-        let (mesh, motion) = if let Some(known) = known {
+        let (mesh, mut motion) = if let Some(known) = known {
             splits.clone_from(&known.splits);
-            (known.mesh.clone(), known.motion.clone())
+            (known.mesh.clone(), known.motion.of(&known.ports, ports))
         } else {
             let mesh = Mesh::new(stretches, &splits, &contacts, &[], gauss);
             let rest = Motion::at_rest(&mesh, ports);
-            // At rest dry friction would hold the tool: the force of a rigid tool tells where it slips.
-            let moved = model
-                .may_hold()
+            // At rest dry friction would hold the tool, and internal states would have no sign: the force of a rigid
+            // tool tells where it moves.
+            let moved = (model.may_hold() || ports.internal > 0)
                 .then(|| rigid(model, ports, &mesh, &rest))
                 .flatten();
             (mesh, moved.unwrap_or(rest))
         };
+        if known.is_none_or(|known| known.ports.internal != ports.internal) {
+            states::follow(model, ports, &mesh, &mut motion);
+        }
         let events = newton::events(model, ports, stretches, &mesh, &motion);
         let own = Mesh::new(stretches, &splits, &events.starts, &events.events, gauss);
         let motion = motion.on(&mesh, &own);
