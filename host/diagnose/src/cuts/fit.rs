@@ -356,13 +356,8 @@ impl Fit {
         let mut columns = DMatrix::zeros(rows, coordinates.len());
         let mut row = 0;
         for (number, (state, record)) in self.states.iter().zip(records).enumerate() {
-            let own = match candidate.has_state {
-                true => Some(State::new(&wider, &z, number, record, None)?),
-                false => None,
-            };
-            // Where an effect is faint, only its size acts.
-            let count = if own.is_some() { 1 } else { coordinates.len() };
-            let state = own.as_ref().unwrap_or(state);
+            // Where an effect with an internal state is faint, only its size acts.
+            let count = if candidate.has_state { 1 } else { coordinates.len() };
             for index in 0..count {
                 let column = state.difference(&wider, &z, first + index, number, record)?;
                 columns

@@ -154,14 +154,24 @@ pub(super) struct Change {
     pub(super) outputs: DVector<f64>,
     /// Inputs at all nodes.
     pub(super) inputs: Vec<f64>,
-    /// Cutting forces at all nodes, without what changes explicitly, N.
-    pub(super) cutting_n: Vec<[f64; 3]>,
     /// Delay of each event at which the inputs jump, s.
     pub(super) delays_s: Vec<f64>,
 }
 
 impl Linearization {
-    /// Solves the equations for right-hand sides: `inputs` at all nodes, and `events` for each jump.
+    /// Inputs where no force acts on the orbit; `None` if all are zero.
+    pub(super) fn undriven(&self, mesh: &Mesh, ports: &Ports, inputs: &[f64]) -> Option<Vec<f64>> {
+        let per_subinterval = mesh.nodes() * ports.inputs();
+        let mut undriven = inputs.to_vec();
+        for (own, first) in undriven.chunks_exact_mut(per_subinterval).zip(&self.first_column) {
+            if first.is_some() {
+                own.fill(0.0);
+            }
+        }
+        undriven.iter().any(|input| *input != 0.0).then_some(undriven)
+    }
+
+    /// Solves the equations for right-hand sides: `inputs` at the driven nodes, and `events` for each jump.
     pub(super) fn solve(&self, mesh: &Mesh, ports: &Ports, inputs: &[f64], events: &[f64]) -> Option<Change> {
         let per_subinterval = mesh.nodes() * ports.inputs();
         let mut right = DMatrix::zeros(self.count + self.jumps.len(), 1);
@@ -183,18 +193,20 @@ impl Linearization {
             all_inputs[index * per_subinterval..(index + 1) * per_subinterval]
                 .copy_from_slice(right.rows(*first, per_subinterval).as_slice());
         }
-        let outputs = &self.response * right;
-        let of_row = |row: &SparseRow| row.iter().map(|(at, weight)| weight * outputs[*at]).sum::<f64>();
-        let cutting_n = self
-            .cutting_by
-            .chunks_exact(3)
-            .map(|rows| std::array::from_fn(|axis| of_row(&rows[axis])));
         Some(Change {
-            cutting_n: cutting_n.collect(),
             inputs: all_inputs,
             delays_s: right.rows(self.count, self.jumps.len()).iter().copied().collect(),
-            outputs,
+            outputs: &self.response * right,
         })
+    }
+
+    /// Change of the cutting forces at all nodes by a change of the outputs, N.
+    pub(super) fn cutting_n(&self, outputs: &[f64]) -> Vec<[f64; 3]> {
+        let of_row = |row: &SparseRow| row.iter().map(|(at, weight)| weight * outputs[*at]).sum::<f64>();
+        self.cutting_by
+            .chunks_exact(3)
+            .map(|rows| std::array::from_fn(|axis| of_row(&rows[axis])))
+            .collect()
     }
 
     /// Inputs at the driven nodes and event functions by a change of the outputs.

@@ -1,12 +1,13 @@
 //! Derivatives of an orbit with respect to parameters of its model.
 
 use super::jumps::JumpSize;
-use super::model::CutModel;
+use super::model::{CutModel, Ports};
 use super::motion::Motion;
 use super::newton::Change;
 use super::orbit::CutOrbit;
 use super::period::Period;
 use super::response::Response;
+use super::states;
 
 /// Derivative of an orbit with respect to one parameter.
 pub struct Sensitivity {
@@ -32,11 +33,12 @@ impl CutOrbit {
     ///
     /// By the implicit function theorem: only the forces of the law along the orbit, and the response of the structure
     /// to the forces of the orbit, are differentiated by a difference; the change of the orbit is one back-substitution.
-    /// `None` if the models differ in spindle speed, engagement or number of axes or internal states, or the structure
-    /// has no periodic response.
+    /// `None` if the models differ in spindle speed, engagement or number of axes, have other structures and further
+    /// internal states, or the structure has no periodic response.
     ///
     /// A parameter that vanishes in the orbit's model is possible, such as the coefficient of a further nonlinear
-    /// spring. The derivative is one-sided where a restoring force would change its regimes.
+    /// spring. The derivative is one-sided where a restoring force would change its regimes. Internal states of forces
+    /// that the orbit lacks are those along its motion, if it has none itself.
     pub fn derivative(&self, plus: &CutModel, minus: &CutModel, difference: f64) -> Option<Sensitivity> {
         let (plus, minus) = (self.explicit(plus)?, self.explicit(minus)?);
         let slope = |a: &[f64], b: &[f64]| -> Vec<f64> {
@@ -45,10 +47,11 @@ impl CutOrbit {
         let by_outputs = slope(&plus.outputs, &minus.outputs);
         let inputs = slope(&plus.inputs, &minus.inputs);
         let events: Vec<f64> = slope(&plus.events, &minus.events).iter().map(|g| -g).collect();
-        let change: Change = self.linearized.solve(&self.mesh, &self.ports, &inputs, &events)?;
+        let change = self.changed(&inputs, &events)?;
+        let by_motion = self.linearized.cutting_n(change.outputs.as_slice());
         let explicit = plus.cutting_n.iter().zip(&minus.cutting_n);
-        let cutting_n = explicit.zip(&change.cutting_n).map(|((plus, minus), change)| {
-            std::array::from_fn(|axis| (plus[axis] - minus[axis]) / difference + change[axis])
+        let cutting_n = explicit.zip(&by_motion).map(|((plus, minus), by_motion)| {
+            std::array::from_fn(|axis| (plus[axis] - minus[axis]) / difference + by_motion[axis])
         });
         Some(Sensitivity {
             cutting_n: cutting_n.collect(),
@@ -67,6 +70,27 @@ impl CutOrbit {
         })
     }
 
+    /// First-order change of the orbit under further inputs at all nodes, and further values of the event functions.
+    fn changed(&self, inputs: &[f64], events: &[f64]) -> Option<Change> {
+        let (mesh, ports) = (&self.mesh, &self.ports);
+        // A further force may act where none acts on the orbit.
+        let Some(undriven) = self.linearized.undriven(mesh, ports, inputs) else {
+            return self.linearized.solve(mesh, ports, inputs, events);
+        };
+        let moved = Response::new(mesh, ports)?.outputs(&undriven);
+        let (by_inputs, by_events) = self.linearized.applied(mesh, ports, &moved);
+        let inputs: Vec<f64> = inputs.iter().zip(by_inputs).map(|(own, by)| own + by).collect();
+        let events: Vec<f64> = events.iter().zip(by_events).map(|(own, by)| own - by).collect();
+        let mut change = self.linearized.solve(mesh, ports, &inputs, &events)?;
+        for (sum, own) in change.inputs.iter_mut().zip(undriven) {
+            *sum += own;
+        }
+        for (sum, own) in change.outputs.iter_mut().zip(moved) {
+            *sum += own;
+        }
+        Some(change)
+    }
+
     fn impulse(&self, jump: &JumpSize, delay_s: f64) -> (f64, [f64; 3], Vec<f64>) {
         let inputs = jump.inputs.iter().map(|size| -delay_s * size);
         let cutting_n = jump.cutting_n.map(|size| -delay_s * size);
@@ -81,10 +105,12 @@ impl CutOrbit {
     fn explicit(&self, model: &CutModel) -> Option<Explicit> {
         let ports = model.ports_with(self.ports.accelerations.is_some());
         let is_alike = ports.axes == self.ports.axes
-            && ports.internal == self.ports.internal
             && (model.revolution_s() / self.mesh.revolution_s - 1.0).abs() < 1e-12;
         if !is_alike {
             return None;
+        }
+        if ports.internal != self.ports.internal {
+            return self.with_states(model, &ports);
         }
         let same = ports.a == self.ports.a && ports.b == self.ports.b && ports.output == self.ports.output;
         let motion = if same {
@@ -107,6 +133,36 @@ impl CutOrbit {
             cutting_n: forces.cutting_n,
             inputs: forces.inputs,
             outputs: motion.values,
+        })
+    }
+}
+
+impl CutOrbit {
+    /// [`Self::explicit`] of a model with internal states, for an orbit without.
+    fn with_states(&self, model: &CutModel, ports: &Ports) -> Option<Explicit> {
+        let order = self.ports.a.nrows();
+        let same = self.ports.internal == 0
+            && ports.a.view((0, 0), (order, order)) == self.ports.a
+            && ports.b.view((0, 0), (order, self.ports.inputs())) == self.ports.b;
+        if !same {
+            return None;
+        }
+        let mut motion = self.motion.of(&self.ports, ports);
+        states::follow(model, ports, &self.mesh, &mut motion);
+        let period = Period {
+            model,
+            ports,
+            mesh: &self.mesh,
+            motion: &motion,
+        };
+        let forces = period.forces();
+        let own = self.ports.inputs();
+        let inputs = forces.inputs.chunks_exact(ports.inputs());
+        Some(Explicit {
+            events: self.linearized.conditions(&period),
+            cutting_n: forces.cutting_n,
+            inputs: inputs.flat_map(|inputs| inputs[..own].to_vec()).collect(),
+            outputs: self.motion.values.clone(),
         })
     }
 }

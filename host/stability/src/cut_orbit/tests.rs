@@ -348,6 +348,51 @@ fn derivatives_equal_differences_of_orbits() {
 }
 
 #[test]
+fn forces_that_an_orbit_lacks_act_in_air_as_well() {
+    let case = case("kuka-kr90-half", &[], "");
+    let at = |effects: &[String]| {
+        let effects = Effects::parse(effects.iter().map(String::as_str)).unwrap();
+        model(&case, 559.0, 0.5, &effects)
+    };
+    let cubic = |share: f64| {
+        vec![
+            format!("cubic-stiffness={}", 1e11 * share),
+            "cubic-stiffness.direction=y".into(),
+        ]
+    };
+    let loops = |share: f64| {
+        vec![
+            format!("hysteresis={}", 2e4 * share),
+            "hysteresis.yield_m=1e-5".into(),
+            "hysteresis.direction=y".into(),
+        ]
+    };
+    // Without the force of a spring the orbit is not split where the loop has its kinks.
+    let forces: [(&str, f64, &dyn Fn(f64) -> Vec<String>); 2] =
+        [("cubic-stiffness", 1e-5, &cubic), ("hysteresis", 0.01, &loops)];
+    for (name, tolerance, effect) in forces {
+        let orbit = CutOrbit::new(&at(&[])).unwrap();
+        let (whole, half) = (at(&effect(1.0)), at(&effect(0.5)));
+        let found = orbit.derivative(&whole, &half, 0.5).unwrap();
+        // The difference of orbits, to second order in the size of the force.
+        let along = [0.02, 0.01].map(|share| CutOrbit::near(&at(&effect(share)), &orbit).unwrap());
+        let (mut size, mut apart): (f64, f64) = (0.0, 0.0);
+        for index in 0..50 {
+            let t = 60.0 / 559.0 * f64::from(index) / 50.0;
+            let [moved, less] = along.each_ref().map(|orbit| orbit.displacement_m(t));
+            let (rest, slope) = (orbit.displacement_m(t), found.displacement(&orbit, t));
+            for axis in 0..3 {
+                let expected = (4.0 * less[axis] - moved[axis] - 3.0 * rest[axis]) / 0.02;
+                size = size.max(expected.abs());
+                apart = apart.max((expected - slope[axis]).abs());
+            }
+        }
+        println!("{name}: {:.1e}", apart / size);
+        assert!(apart < tolerance * size, "{name}: {apart} of {size}");
+    }
+}
+
+#[test]
 #[ignore = "cost: the times of an orbit with forty derivatives, for the release profile"]
 fn cost_of_an_orbit_with_forty_derivatives() {
     let pitch = [("teeth = 2", "teeth = 4\npitch_deg = [80.0, 100.0, 85.0, 95.0]")];
