@@ -13,8 +13,10 @@ use quietcut_numerics::statistics::chi_squared_quantile;
 const CONVERGED: f64 = 1e-4;
 /// Damping from which on a step that does not lower the cost ends a fit.
 const MOST_DAMPING: f64 = 50.0;
+/// Least decrease of the cost over that predicted, for which derivatives of an earlier step are trusted.
+const TRUSTED: f64 = 0.8;
 /// Largest number of steps, those that are too long included.
-const STEPS: usize = 14;
+const STEPS: usize = 20;
 
 /// One cut at a point of the space.
 struct State {
@@ -116,8 +118,15 @@ impl State {
         })
     }
 
-    /// Derivatives of the predicted amplitudes, in standard deviations.
-    fn columns(&self, space: &Space<'_>, z: &[f64], number: usize, record: &ReducedCut) -> Columns {
+    /// Derivatives of the predicted amplitudes, in standard deviations, by the variables from the number `first` on.
+    fn columns(
+        &self,
+        space: &Space<'_>,
+        z: &[f64],
+        first: usize,
+        number: usize,
+        record: &ReducedCut,
+    ) -> Columns {
         let column = |index: usize| -> Option<Vec<f64>> {
             if !space.acts_on(index, number) {
                 return None;
@@ -137,7 +146,10 @@ impl State {
                 _ => self.difference(space, z, index, number, record),
             }
         };
-        (0..space.variables.len()).into_par_iter().map(column).collect()
+        (first..space.variables.len())
+            .into_par_iter()
+            .map(column)
+            .collect()
     }
 
     fn difference(
@@ -184,27 +196,32 @@ fn states(
         .collect()
 }
 
-fn jacobian(space: &Space<'_>, z: &[f64], records: &[ReducedCut], states: &[State]) -> DMatrix<f64> {
+/// The derivatives by the variables from the number `first` on; those before are kept.
+fn update(
+    jacobian: &mut DMatrix<f64>,
+    first: usize,
+    space: &Space<'_>,
+    z: &[f64],
+    records: &[ReducedCut],
+    states: &[State],
+) {
     let all: Vec<Columns> = states
         .iter()
         .zip(records)
         .enumerate()
-        .map(|(number, (state, record))| state.columns(space, z, number, record))
+        .map(|(number, (state, record))| state.columns(space, z, first, number, record))
         .collect();
-    let rows = records.iter().map(ReducedCut::count).sum();
-    let mut jacobian = DMatrix::zeros(rows, space.variables.len());
-    let mut first = 0;
+    let mut row = 0;
     for (columns, record) in all.iter().zip(records) {
         for (index, column) in columns.iter().enumerate() {
-            if let Some(column) = column {
-                jacobian
-                    .view_mut((first, index), (column.len(), 1))
-                    .copy_from_slice(column);
+            let mut own = jacobian.view_mut((row, first + index), (record.count(), 1));
+            match column {
+                Some(column) => own.copy_from_slice(column),
+                None => own.fill(0.0),
             }
         }
-        first += record.count();
+        row += record.count();
     }
-    jacobian
 }
 
 fn stacked(states: &[State]) -> DVector<f64> {
@@ -215,8 +232,11 @@ fn stacked(states: &[State]) -> DVector<f64> {
     DVector::from_vec(all)
 }
 
-/// Fits the variables of `space` to the records, from `start`; `near` are the orbits of an earlier fit. `None` if no
-/// orbit exists at the start.
+/// Fits the variables of `space` to the records, from `start`; `near` is an earlier fit, of a part of the space. `None`
+/// if no orbit exists at the start.
+///
+/// Derivatives by what is uncertain of the baseline hardly change, and most of the cost is theirs: they are those of the
+/// earlier fit and of earlier steps, until a step gains less than they promise, and at the end.
 pub(crate) fn fit(
     space: &Space<'_>,
     records: &[ReducedCut],
@@ -226,7 +246,25 @@ pub(crate) fn fit(
     let mut z = start;
     let mut current = states(space, &z, records, near.map(|near| near.states.as_slice()))?;
     let mut damping = 1e-6;
-    let mut slopes = jacobian(space, &z, records, &current);
+    let rows = records.iter().map(ReducedCut::count).sum();
+    let mut slopes = DMatrix::zeros(rows, z.len());
+    let known = space.known();
+    let inherited = near.filter(|near| near.jacobian.nrows() == rows && near.jacobian.ncols() >= known);
+    if let Some(near) = inherited {
+        slopes
+            .columns_mut(0, known)
+            .copy_from(&near.jacobian.columns(0, known));
+    }
+    // True if all derivatives are those at `z`.
+    let mut exact = inherited.is_none();
+    update(
+        &mut slopes,
+        if exact { 0 } else { known },
+        space,
+        &z,
+        records,
+        &current,
+    );
     for _ in 0..STEPS {
         let residual = stacked(&current);
         let position = DVector::from_column_slice(&z);
@@ -237,7 +275,12 @@ pub(crate) fn fit(
             break;
         };
         if predicted < CONVERGED {
-            break;
+            if exact {
+                break;
+            }
+            update(&mut slopes, 0, space, &z, records, &current);
+            exact = true;
+            continue;
         }
         let next = states(space, &moved, records, Some(&current));
         let new_cost = next.as_ref().map_or(f64::INFINITY, |next| {
@@ -247,15 +290,20 @@ pub(crate) fn fit(
             damping = (0.1 * damping).max(1e-9);
             let Some(next) = next else { break };
             (z, current) = (moved, next);
-            slopes = jacobian(space, &z, records, &current);
-            if cost - new_cost < CONVERGED {
-                break;
-            }
+            exact = cost - new_cost < TRUSTED * predicted;
+            let first = if exact { 0 } else { known };
+            update(&mut slopes, first, space, &z, records, &current);
+        } else if !exact {
+            update(&mut slopes, 0, space, &z, records, &current);
+            exact = true;
         } else if damping > MOST_DAMPING {
             break;
         } else {
             damping = (10.0 * damping).max(0.1);
         }
+    }
+    if !exact {
+        update(&mut slopes, 0, space, &z, records, &current);
     }
     let residual = stacked(&current);
     let mut information = slopes.tr_mul(&slopes);

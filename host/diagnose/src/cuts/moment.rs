@@ -9,8 +9,8 @@ use super::record::ReducedCut;
 use super::space::{Space, Variable};
 use quietcut_stability::cut_orbit::{CutOrbit, ForceOrders, OrderWeights};
 
-/// Step of a central difference of what a variable changes explicitly, in its standard deviations. The error is its
-/// square times the curvature, and rounding over it.
+/// Step of a difference of what a variable changes explicitly, in its standard deviations. The error is half of it times
+/// the curvature, and rounding over it.
 const DIFFERENCE: f64 = 1e-3;
 
 /// A machine in a cut at one time.
@@ -19,6 +19,8 @@ pub(super) struct Moment {
     pub(super) orbit: CutOrbit,
     weights: OrderWeights,
     forces: ForceOrders,
+    /// Where teeth enter or leave at the angles of the engagement: time, s, and jump of the cutting force, N.
+    jumps: Vec<(f64, [f64; 3])>,
     /// Fourier coefficients of the channels.
     pub(super) coefficients: DMatrix<Complex64>,
     /// Amplitudes of the channels as the record would show them.
@@ -49,8 +51,10 @@ impl Moment {
         let mut coefficients = machine.reading.orders(&forces);
         let phase_rad = phase(space, z, number, record);
         turn(&mut coefficients, phase_rad);
-        let [seen, by_phase] = seen(&machine, &orbit, &coefficients, record, phase_rad);
+        let jumps = orbit.jumps_of_engagement(&machine.model);
+        let [seen, by_phase] = seen(&machine, &jumps, &coefficients, record, phase_rad);
         Some(Self {
+            jumps,
             seen,
             by_phase,
             machine,
@@ -73,32 +77,28 @@ impl Moment {
         record: &ReducedCut,
         time_s: f64,
     ) -> Option<DMatrix<Complex64>> {
-        let at = |step: f64| {
-            let mut moved = z.to_vec();
-            moved[index] += step;
-            space.machine(&moved, number, record, time_s)
-        };
-        // At the boundary of a variable its derivative is one-sided.
-        let below = if z[index] - DIFFERENCE < space.lower(index) {
-            0.0
-        } else {
-            DIFFERENCE
-        };
-        let (plus, minus) = (at(DIFFERENCE)?, at(-below)?);
-        let step = DIFFERENCE + below;
+        let mut moved = z.to_vec();
+        moved[index] += DIFFERENCE;
+        let plus = space.machine(&moved, number, record, time_s)?;
         let phase_rad = phase(space, z, number, record);
+        // The moment may be that of a space without the effect of the variable, which is not absent at `z`.
+        let own = match space.variables[index] {
+            Variable::Coordinate(..) => Some(space.machine(z, number, record, time_s)?),
+            _ => None,
+        };
+        let own = own.as_ref().unwrap_or(&self.machine);
+        let step = Complex64::from(DIFFERENCE);
         if space.is_of_reading(index) {
             let read = |machine: &Machine| {
                 let mut coefficients = machine.reading.orders(&self.forces);
                 turn(&mut coefficients, phase_rad);
-                let [seen, _] = seen(machine, &self.orbit, &coefficients, record, phase_rad);
+                let [seen, _] = seen(machine, &self.jumps, &coefficients, record, phase_rad);
                 seen
             };
-            return Some((read(&plus) - read(&minus)) / Complex64::from(step));
+            return Some((read(&plus) - read(own)) / step);
         }
-        let mut slope =
-            (plus.reading.orders(&self.forces) - minus.reading.orders(&self.forces)) / Complex64::from(step);
-        let sensitivity = self.orbit.derivative(&plus.model, &minus.model, step)?;
+        let mut slope = (plus.reading.orders(&self.forces) - own.reading.orders(&self.forces)) / step;
+        let sensitivity = self.orbit.derivative(&plus.model, &own.model, DIFFERENCE)?;
         let forces = self.orbit.force_order_slopes(&self.weights, &sensitivity);
         slope += self.machine.reading.orders(&forces);
         turn(&mut slope, phase_rad);
@@ -109,16 +109,15 @@ impl Moment {
 /// Amplitudes of the channels as a record shows them, and their derivative by the phase of its tachometer.
 fn seen(
     machine: &Machine,
-    orbit: &CutOrbit,
+    jumps: &[(f64, [f64; 3])],
     coefficients: &DMatrix<Complex64>,
     record: &ReducedCut,
     phase_rad: f64,
 ) -> [DMatrix<Complex64>; 2] {
-    let jumps: Vec<(f64, Vec<f64>)> = orbit
-        .jumps_of_engagement(&machine.model)
-        .into_iter()
+    let jumps: Vec<(f64, Vec<f64>)> = jumps
+        .iter()
         .map(|(time_s, force_n)| {
-            let sizes = machine.reading.jump(&machine.model.structure, force_n);
+            let sizes = machine.reading.jump(&machine.model.structure, *force_n);
             (machine.model.rad_per_s * time_s, sizes)
         })
         .collect();

@@ -260,10 +260,12 @@ fn score(
         .zip(&candidate.coordinates)
         .map(|((start, change), coordinate)| (start + change).clamp(coordinate.lower.max(-REACH), REACH))
         .collect();
+    // A coordinate that the records do not move may lie on its bound.
     let inside = z
         .iter()
+        .zip(change.iter())
         .zip(&candidate.coordinates)
-        .all(|(z, coordinate)| *z > coordinate.lower);
+        .all(|((z, change), coordinate)| *z > coordinate.lower || *change == 0.0);
     let gain = 0.5 * gradient.dot(&change) - determinant;
     let z = if inside {
         z

@@ -126,6 +126,15 @@ impl<'a> Space<'a> {
         (space, point)
     }
 
+    /// Number of variables that are no coordinates of candidates. They come first.
+    pub(crate) fn known(&self) -> usize {
+        let is_coordinate = |variable: &Variable| matches!(variable, Variable::Coordinate(..));
+        self.variables
+            .iter()
+            .position(is_coordinate)
+            .unwrap_or(self.variables.len())
+    }
+
     /// Numbers of the variables that are coordinates of the candidate `number`.
     pub(crate) fn places_of(&self, number: usize) -> Vec<usize> {
         let is_own =
