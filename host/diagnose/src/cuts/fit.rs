@@ -13,8 +13,9 @@ use quietcut_numerics::statistics::chi_squared_quantile;
 const CONVERGED: f64 = 1e-4;
 /// Damping from which on a step that does not lower the cost ends a fit.
 const MOST_DAMPING: f64 = 50.0;
-/// Least decrease of the cost over that predicted, for which derivatives of an earlier step are trusted.
-const TRUSTED: f64 = 0.8;
+/// Largest relative difference of the decrease of the cost from that predicted, up to which derivatives of an earlier
+/// step are trusted.
+const TRUSTED: f64 = 0.2;
 /// Largest number of steps, those that are too long included.
 const STEPS: usize = 20;
 
@@ -24,7 +25,7 @@ struct State {
     /// Early and late in the record, as far from its middle as times are on average; `None` for a machine that does not
     /// change.
     ends: Option<[Moment; 2]>,
-    /// Measured minus predicted amplitudes.
+    /// Measured minus predicted amplitudes, without what is common to the orders.
     error: DMatrix<Complex64>,
     /// The same and that of the trend, in standard deviations.
     residual: Vec<f64>,
@@ -91,29 +92,17 @@ impl State {
             }
             _ => None,
         };
-        let mut predicted = middle.seen.clone();
         let mut trend = record.orders.trend.as_ref().map(|trend| trend.amplitudes.clone());
         if let (Some(trend), Some(ends)) = (&mut trend, &ends) {
             *trend -= half_difference(ends.each_ref().map(|end| &end.seen));
         }
-        for (variable, z) in space.variables.iter().zip(z) {
-            let z = Complex64::from(*z);
-            match variable {
-                Variable::Common(own, direction) if *own == number => {
-                    predicted += record.common_directions().nth(*direction)? * z;
-                }
-                Variable::Trend(own, direction) if *own == number => {
-                    *trend.as_mut()? -= record.trend_directions.get(*direction)? * z;
-                }
-                _ => {}
-            }
-        }
-        let error = &record.orders.amplitudes - predicted;
-        let residual = record.whitened_over_time(&error, trend.as_ref());
+        let error = &record.orders.amplitudes - &middle.seen;
+        let own = record.errors.own(&error, trend.as_ref());
+        let residual = record.errors.whitened(&error, trend.as_ref());
         Some(Self {
             middle,
             ends,
-            error,
+            error: own,
             residual,
         })
     }
@@ -132,16 +121,9 @@ impl State {
                 return None;
             }
             match &space.variables[index] {
-                Variable::Common(_, direction) => {
-                    Some(record.whitened_over_time(record.common_directions().nth(*direction)?, None))
-                }
-                Variable::Trend(_, direction) => {
-                    let direction = record.trend_directions.get(*direction)?;
-                    Some(record.whitened_over_time(&(direction * Complex64::ZERO), Some(direction)))
-                }
                 Variable::Phase(_) => {
                     let turned = &self.middle.by_phase * Complex64::from(phase_deviation(record));
-                    Some(record.whitened_over_time(&turned, None))
+                    Some(record.errors.whitened(&turned, None))
                 }
                 _ => self.difference(space, z, index, number, record),
             }
@@ -174,7 +156,7 @@ impl State {
             }
             _ => None,
         };
-        Some(record.whitened_over_time(&middle, trend.as_ref()))
+        Some(record.errors.whitened(&middle, trend.as_ref()))
     }
 }
 
@@ -214,13 +196,13 @@ fn update(
     let mut row = 0;
     for (columns, record) in all.iter().zip(records) {
         for (index, column) in columns.iter().enumerate() {
-            let mut own = jacobian.view_mut((row, first + index), (record.count(), 1));
+            let mut own = jacobian.view_mut((row, first + index), (record.errors.count(), 1));
             match column {
                 Some(column) => own.copy_from_slice(column),
                 None => own.fill(0.0),
             }
         }
-        row += record.count();
+        row += record.errors.count();
     }
 }
 
@@ -236,7 +218,7 @@ fn stacked(states: &[State]) -> DVector<f64> {
 /// if no orbit exists at the start.
 ///
 /// Derivatives by what is uncertain of the baseline hardly change, and most of the cost is theirs: they are those of the
-/// earlier fit and of earlier steps, until a step gains less than they promise, and at the end.
+/// earlier fit and of earlier steps, until a step gains less or more than they promise, and at the end.
 pub(crate) fn fit(
     space: &Space<'_>,
     records: &[ReducedCut],
@@ -246,7 +228,10 @@ pub(crate) fn fit(
     let mut z = start;
     let mut current = states(space, &z, records, near.map(|near| near.states.as_slice()))?;
     let mut damping = 1e-6;
-    let rows = records.iter().map(ReducedCut::count).sum();
+    let rows = records
+        .iter()
+        .map(|record: &ReducedCut| record.errors.count())
+        .sum();
     let mut slopes = DMatrix::zeros(rows, z.len());
     let known = space.known();
     let inherited = near.filter(|near| near.jacobian.nrows() == rows && near.jacobian.ncols() >= known);
@@ -290,7 +275,7 @@ pub(crate) fn fit(
             damping = (0.1 * damping).max(1e-9);
             let Some(next) = next else { break };
             (z, current) = (moved, next);
-            exact = cost - new_cost < TRUSTED * predicted;
+            exact = ((cost - new_cost) / predicted - 1.0).abs() > TRUSTED;
             let first = if exact { 0 } else { known };
             update(&mut slopes, first, space, &z, records, &current);
         } else if !exact {
@@ -365,7 +350,7 @@ fn step(
 }
 
 impl Fit {
-    /// Measured minus predicted amplitudes, by record.
+    /// Measured minus predicted amplitudes without what is common to the orders, by record.
     pub(crate) fn errors(&self) -> impl Iterator<Item = &DMatrix<Complex64>> {
         self.states.iter().map(|state| &state.error)
     }
@@ -400,7 +385,10 @@ impl Fit {
         let mut z = self.z.clone();
         z.extend_from_slice(coordinates);
         let first = self.z.len();
-        let rows = records.iter().map(ReducedCut::count).sum();
+        let rows = records
+            .iter()
+            .map(|record: &ReducedCut| record.errors.count())
+            .sum();
         let mut columns = DMatrix::zeros(rows, coordinates.len());
         let mut row = 0;
         for (number, (state, record)) in self.states.iter().zip(records).enumerate() {
@@ -412,7 +400,7 @@ impl Fit {
                     .view_mut((row, index), (column.len(), 1))
                     .copy_from_slice(&column);
             }
-            row += record.count();
+            row += record.errors.count();
         }
         Some(columns)
     }

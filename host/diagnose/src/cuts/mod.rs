@@ -3,7 +3,7 @@
 //!
 //! | file | content |
 //! |---|---|
-//! | `record` | a recorded cut, reduced |
+//! | `record`, `amplitude_errors` | a recorded cut, reduced; the errors of its orders |
 //! | `jumps`, `wander`, `scatter` | what errors of the spindle angle and the speed, and the scatter of tooth forces, leave in its orders |
 //! | `conditions`, `machine`, `reading` | a machine in a cut; the orders of its channels |
 //! | `candidate`, `candidates` | effects with their widths |
@@ -14,6 +14,7 @@
 //! | `answer`, `views` | the answer, with its pictures |
 //! | `diagnosis` | the entry |
 
+mod amplitude_errors;
 mod answer;
 mod candidate;
 mod candidates;

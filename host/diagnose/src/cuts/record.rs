@@ -3,9 +3,10 @@
 use std::f64::consts::TAU;
 use std::path::PathBuf;
 
-use nalgebra::{Cholesky, DMatrix, DVector};
+use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 
+use super::amplitude_errors::AmplitudeErrors;
 use super::conditions::Conditions;
 use super::jumps::OfJumps;
 use super::machine::Machine;
@@ -15,7 +16,6 @@ use crate::baseline::{Baseline, derivatives};
 use crate::error::DiagnoseError;
 use crate::motion::recorded_cut::cut_of;
 use crate::orders::circle::Circle;
-use crate::orders::distance::OrderCovariance;
 use crate::orders::reduction::{Orders, ReductionSettings};
 use crate::orders::spindle_angle::SpindleAngle;
 use crate::orders::trend::Trend;
@@ -33,9 +33,6 @@ const ALIAS_FACTOR: [f64; 2] = [2.0, 8.0];
 /// is left of the free decay is fitted.
 const SETTLED_DECAYS: f64 = 3.0;
 const SETTLED_SHARE: f64 = 0.25;
-/// Standard deviation of the sensitivity of a channel at one order against that at others. Data sheets promise 1 to 5 %
-/// over the whole range of a sensor.
-const FLATNESS: f64 = 1e-3;
 /// Mains frequencies, Hz, whose harmonics are no chatter, and their deviation in a grid.
 const MAINS_HZ: [f64; 2] = [50.0, 60.0];
 const MAINS_WANDER: f64 = 1e-3;
@@ -48,19 +45,7 @@ pub(crate) struct ReducedCut {
     pub path: PathBuf,
     pub orders: Orders,
     pub conditions: Conditions,
-    /// By order from 1: the matrix W with WᴴW = 2 Σ⁻¹, Σ the covariance of the amplitudes of all channels, so that real
-    /// and imaginary parts of W e have unit variance.
-    whiteners: Vec<DMatrix<Complex64>>,
-    /// The same of the trend; empty without it.
-    trend_whiteners: Vec<DMatrix<Complex64>>,
-    /// What free decays of the modes leave in the orders, real and imaginary part of each mode, as large at the start of
-    /// the record as the motion.
-    decays: Vec<DMatrix<Complex64>>,
-    /// What errors of the spindle angle leave in the orders, in all of them and where the force jumps, and the scatter of
-    /// the tooth forces.
-    of_cut: Vec<DMatrix<Complex64>>,
-    /// Directions in which the trend of all orders errs together, in standard deviations.
-    pub(crate) trend_directions: Vec<DMatrix<Complex64>>,
+    pub errors: AmplitudeErrors,
     /// Where the force jumps.
     pub(super) jumps: OfJumps,
     /// Sample rate, Hz.
@@ -102,7 +87,6 @@ impl ReducedCut {
         };
         let orders = Orders::with_angle(recording, &names, angle, &settings)?;
         let samples = Sampled::new(recording, &orders);
-        let decays = decays(baseline, recording, &orders, &samples);
         let conditions = Conditions {
             spindle_hz: orders.angle.frequency_hz,
             depth_m: 1e-3 * depth_mm,
@@ -124,8 +108,12 @@ impl ReducedCut {
             .ok_or_else(no_orbit)?;
         let orbit = CutOrbit::along_depth(&mut machine.model).map_err(|_| no_orbit())?;
         let jumps = OfJumps::new(&machine, &orbit, rate_hz, &orders, &samples.revolutions);
-        let mut of_cut = jumps.directions.clone();
-        of_cut.push(smeared(&orders));
+        // Directions in which all orders err together: by slow changes, by a motion that has not settled, where the force
+        // jumps, by the spindle angle and speed, and as tooth forces scatter.
+        let mut directions = orders.common.directions.clone();
+        directions.extend(decays(baseline, recording, &orders, &samples));
+        directions.extend_from_slice(&jumps.directions);
+        directions.push(smeared(&orders));
         let of_speed = wander::directions(baseline, &conditions, &orders, rate_hz, (&machine, &orbit));
         let (mut of_angle, of_trend): (Vec<_>, Vec<_>) = shifted(&orders, &samples)
             .into_iter()
@@ -133,9 +121,9 @@ impl ReducedCut {
             .unzip();
         if let Some([moved, wandering]) = of_speed {
             of_angle[0] += moved;
-            of_cut.push(wandering);
+            directions.push(wandering);
         }
-        of_cut.extend(of_angle);
+        directions.extend(of_angle);
         let of_teeth = scatter::directions(&machine, &orders);
         let mut trend_directions = Vec::new();
         if orders.trend.is_some() {
@@ -144,54 +132,25 @@ impl ReducedCut {
             trend_directions.extend(of_trend);
             trend_directions.extend_from_slice(&of_teeth);
         }
-        of_cut.extend(of_teeth);
+        directions.extend(of_teeth);
         let forces = orbit.force_orders(&orbit.order_weights(highest));
         let coefficients = machine.reading.orders(&forces);
-        let no_noise = || {
+        let errors = AmplitudeErrors::new(&orders, &coefficients, directions, &trend_directions);
+        let errors = errors.ok_or_else(|| {
             DiagnoseError::record(
                 &recording.path,
                 "the noise of a channel is not a number".to_owned(),
             )
-        };
-        let whiteners = whiteners(&orders).ok_or_else(no_noise)?;
-        let trend_whiteners = match &orders.trend {
-            Some(trend) => trend_whiteners(&orders, trend, &coefficients).ok_or_else(no_noise)?,
-            None => Vec::new(),
-        };
+        })?;
         Ok(Self {
             path: recording.path.clone(),
             highest,
             rate_hz,
             orders,
             conditions,
-            whiteners,
-            trend_whiteners,
-            decays,
-            of_cut,
-            trend_directions,
+            errors,
             jumps,
         })
-    }
-
-    /// Number of compared values: real and imaginary parts of the amplitudes of all orders but 0, whose offset is free,
-    /// and of their trend.
-    pub(crate) fn count(&self) -> usize {
-        2 * (self.whiteners.len() + self.trend_whiteners.len()) * self.orders.channels.len()
-    }
-
-    /// Amplitudes and their trend in standard deviations of their errors, in a common order of values. Without a trend
-    /// of its own the record has no values of it.
-    pub(crate) fn whitened_over_time(
-        &self,
-        amplitudes: &DMatrix<Complex64>,
-        trend: Option<&DMatrix<Complex64>>,
-    ) -> Vec<f64> {
-        let mut values = whitened(&self.whiteners, amplitudes);
-        match trend {
-            Some(trend) => values.extend(whitened(&self.trend_whiteners, trend)),
-            None => values.resize(self.count(), 0.0),
-        }
-        values
     }
 
     /// Times of the record, s, whose half difference in the prediction is that of the trend.
@@ -224,17 +183,6 @@ impl ReducedCut {
     fn resolution_hz(&self) -> f64 {
         self.conditions.spindle_hz / self.orders.angle.count() as f64
     }
-
-    /// Directions in which all orders err together, in standard deviations: by slow changes, by a motion that has
-    /// not settled, where the force jumps, and as tooth forces scatter.
-    pub(crate) fn common_directions(&self) -> impl Iterator<Item = &DMatrix<Complex64>> {
-        self.orders
-            .common
-            .directions
-            .iter()
-            .chain(&self.decays)
-            .chain(&self.of_cut)
-    }
 }
 
 /// The reduced samples.
@@ -259,63 +207,6 @@ fn of_blocks(orders: &Orders) -> Vec<DMatrix<Complex64>> {
     let scale = Complex64::from(trend.variance.sqrt());
     let directions = trend.common.directions.iter();
     directions.map(|direction| direction * scale).collect()
-}
-
-/// Amplitudes of all orders but 0 in standard deviations of their errors.
-fn whitened(whiteners: &[DMatrix<Complex64>], amplitudes: &DMatrix<Complex64>) -> Vec<f64> {
-    let mut values = Vec::with_capacity(2 * whiteners.len() * amplitudes.ncols());
-    for (index, whitener) in whiteners.iter().enumerate() {
-        let white = whitener * amplitudes.row(index + 1).transpose();
-        values.extend(white.iter().flat_map(|value| [value.re, value.im]));
-    }
-    values
-}
-
-fn whiteners(orders: &Orders) -> Option<Vec<DMatrix<Complex64>>> {
-    let inflation = orders.common.inflation();
-    let further = |order: usize, channel: usize| FLATNESS * orders.amplitudes[(order, channel)].norm();
-    inverse_factors(orders, inflation, further)
-}
-
-/// Whiteners of the trend: besides the noise, the orders of a prediction above those of the record fold onto them, with
-/// phases that may change over the record.
-fn trend_whiteners(
-    orders: &Orders,
-    trend: &Trend,
-    coefficients: &DMatrix<Complex64>,
-) -> Option<Vec<DMatrix<Complex64>>> {
-    let highest = orders.amplitudes.nrows() - 1;
-    let folded = |order: usize, channel: usize| {
-        let of_alias = |alias: usize| {
-            let parts = trend.folding[alias - order].hypot(trend.folding[alias + order]);
-            (parts * coefficients[(alias, channel)].norm()).powi(2)
-        };
-        let power: f64 = (highest + 1..coefficients.nrows()).map(of_alias).sum();
-        power.sqrt()
-    };
-    inverse_factors(orders, trend.variance * trend.common.inflation(), folded)
-}
-
-/// The inverse factors of the covariances between the lines, times `factor`, with further errors of each order and
-/// channel.
-fn inverse_factors(
-    orders: &Orders,
-    factor: f64,
-    further: impl Fn(usize, usize) -> f64,
-) -> Option<Vec<DMatrix<Complex64>>> {
-    let channels = orders.channels.len();
-    let of_order = |(index, covariance): (usize, &OrderCovariance)| {
-        // The mean of T² exceeds the number of values, since the covariance is estimated (Hotelling).
-        let freedoms = covariance.freedoms;
-        let scale = factor * freedoms / (freedoms - channels as f64).max(1.0);
-        let mut matrix = &covariance.matrix * Complex64::from(scale);
-        for channel in 0..channels {
-            matrix[(channel, channel)] += further(index + 1, channel).powi(2);
-        }
-        let lower = Cholesky::new(matrix * Complex64::from(0.5))?.l();
-        lower.try_inverse()
-    };
-    orders.covariances[1..].iter().enumerate().map(of_order).collect()
 }
 
 /// What the mean over errors of the spindle angle with the variance σ² takes from the orders: Y_k k² σ²/2.

@@ -147,34 +147,9 @@ fn extended<'a>(best: &Explanation<'a>, all: &[Candidate], records: &[ReducedCut
             fit: fitted,
         })
     };
-    if std::env::var_os("SHOWSEL").is_some() {
-        for s in &scored {
-            println!(
-                "SCORE {} {} {:.1} {:?}",
-                all[s.index].effect.name(),
-                all[s.index].location,
-                s.gain,
-                s.start
-            );
-        }
-    }
     let mut found: Vec<Explanation<'a>> = scored.into_par_iter().filter_map(fitted).collect();
     found.retain(|set| !hides_softening_hardening(set));
     found.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
-    if std::env::var_os("SHOWSEL").is_some() {
-        for f in &found {
-            let n = f.space.candidates.len() - 1;
-            println!(
-                "FOUND {} {} {:.1} left {:.1} of {} {:?}",
-                f.space.candidates[n].effect.name(),
-                f.space.candidates[n].location,
-                f.evidence,
-                f.fit.left,
-                f.fit.residual.len(),
-                f.space.coordinates(n, &f.fit.z)
-            );
-        }
-    }
     found
 }
 

@@ -40,10 +40,6 @@ pub(crate) enum Variable {
     Depth(usize),
     /// Feed of a record.
     Feed(usize),
-    /// A direction in which all orders of a record err together.
-    Common(usize, usize),
-    /// A direction in which the trend of all orders of a record errs.
-    Trend(usize, usize),
     /// A coordinate of a candidate.
     Coordinate(usize, usize),
 }
@@ -73,18 +69,12 @@ impl<'a> Space<'a> {
                 .into_iter()
                 .flat_map(|name| [Variable::Gain(name.clone()), Variable::Delay(name.clone())]),
         );
-        for (index, record) in records.iter().enumerate() {
+        for index in 0..records.len() {
             variables.extend([
                 Variable::Phase(index),
                 Variable::Depth(index),
                 Variable::Feed(index),
             ]);
-            variables.extend(
-                (0..record.common_directions().count()).map(|direction| Variable::Common(index, direction)),
-            );
-            variables.extend(
-                (0..record.trend_directions.len()).map(|direction| Variable::Trend(index, direction)),
-            );
         }
         Self {
             baseline,
@@ -160,11 +150,7 @@ impl<'a> Space<'a> {
     /// True if a variable may act on a record.
     pub(crate) fn acts_on(&self, variable: usize, record: usize) -> bool {
         match self.variables[variable] {
-            Variable::Phase(own)
-            | Variable::Depth(own)
-            | Variable::Feed(own)
-            | Variable::Common(own, _)
-            | Variable::Trend(own, _) => own == record,
+            Variable::Phase(own) | Variable::Depth(own) | Variable::Feed(own) => own == record,
             _ => true,
         }
     }
