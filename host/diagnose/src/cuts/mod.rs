@@ -6,7 +6,7 @@
 //! | `record`, `amplitude_errors` | a recorded cut, reduced; the errors of its orders |
 //! | `jumps`, `wander`, `scatter` | what errors of the spindle angle and the speed, and the scatter of tooth forces, leave in its orders |
 //! | `conditions`, `machine`, `reading` | a machine in a cut; the orders of its channels |
-//! | `candidate`, `candidates` | effects with their widths |
+//! | `candidate`, `restoring_candidates`, `candidates` | effects with their widths |
 //! | `space` | variables of a fit |
 //! | `moment` | the orbit of a machine, and its derivatives |
 //! | `fit` | fit of a machine |
@@ -26,6 +26,7 @@ mod machine;
 mod moment;
 mod reading;
 mod record;
+mod restoring_candidates;
 mod scatter;
 mod selection;
 mod space;

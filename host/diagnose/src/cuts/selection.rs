@@ -15,9 +15,10 @@ use quietcut_model::effects::{Class, EffectName};
 const FITTED: usize = 8;
 /// Largest number of effects.
 const EFFECTS: usize = 3;
-/// Least gain of a further effect in the logarithm of its probability: odds of 20, and of 20 000 where what is known
-/// explains the records within their noise already.
-const LEAST_GAIN: f64 = 3.0;
+/// Least gain of a further effect in the logarithm of its probability: odds of 100, so that one of 100 sets of
+/// records in which nothing is hidden shows an effect, and of 20 000 where what is known explains the records within
+/// their noise already.
+const LEAST_GAIN: f64 = 4.6;
 const LEAST_GAIN_BEYOND_NOISE: f64 = 10.0;
 
 /// A set of effects, fitted.
