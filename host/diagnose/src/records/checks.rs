@@ -1,6 +1,6 @@
 //! Refuses recordings that cannot be compared, with a message that says what is required.
 
-use crate::baseline::Baseline;
+use crate::baseline::{Baseline, pickup_of};
 use crate::criteria::{
     CLIPPED_IMPACT_SAMPLES, CLIPPED_IMPACT_STEP, CLIPPED_SHARE, FRICTION_RATIO, GAIN_UNIT_TOLERANCE,
     IMPOSSIBLE_RATIO, LEAST_CORRELATION_OF_KNOWN_UNIT, LEAST_CORRELATION_OF_UNKNOWN_UNIT,
@@ -8,12 +8,47 @@ use crate::criteria::{
     WRONG_UNIT_RATIO,
 };
 use crate::error::DiagnoseError;
+use crate::motion::recorded_cut::check_sidecar;
+use crate::motion::spindle_motion::SpindleMotion;
 use crate::records::channel::Observed;
+use crate::records::pulses;
 use crate::signal::noise::rms;
+use quietcut_model::case::Case;
 use quietcut_recording::Recording;
 
-/// Refuses a recording that is too short or without a channel to compare, or has a channel that is clipped, not finite,
-/// or zero throughout.
+/// Refuses a recording with a channel that is not finite, or clipped where it measures the machine.
+pub(crate) fn signals(recording: &Recording) -> Result<(), DiagnoseError> {
+    let wrong = |what: String| Err(DiagnoseError::record(&recording.path, what));
+    for channel in &recording.channels {
+        if let Some(at) = channel.samples.iter().position(|sample| !sample.is_finite()) {
+            return wrong(format!(
+                "{} is not a finite number at {:.6} s; every sample must be finite",
+                channel.name,
+                recording.time_s(at)
+            ));
+        }
+        if pickup_of(&channel.name).is_some()
+            && let Some(level) = clipped(&channel.samples)
+        {
+            return wrong(format!(
+                "{} is clipped at {level:.6e} {}: the range of the sensor is too small; record again with a larger range or less excitation",
+                channel.name,
+                channel.quantity.unit()
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// Refuses a recorded cut whose sidecar contradicts the teeth of the case or the speed of the tachometer, or whose
+/// tachometer has wrong pulses.
+pub(crate) fn cut(case: &Case, recording: &Recording) -> Result<(), DiagnoseError> {
+    pulses::check(recording)?;
+    // A recording without a usable tachometer is refused when it is prepared.
+    SpindleMotion::new(recording, None).map_or(Ok(()), |motion| check_sidecar(case, recording, motion.rpm()))
+}
+
+/// Refuses a recording that is too short or without a channel to compare, or has a channel that is zero throughout.
 pub(crate) fn record(
     baseline: &Baseline<'_>,
     recording: &Recording,
@@ -39,24 +74,6 @@ pub(crate) fn record(
         return wrong(format!(
             "too short: {count} samples, {seconds:.3} s; at least {LEAST_SAMPLES} samples and {needed_s:.3} s ({LEAST_PERIODS} periods of the slowest mode) are required"
         ));
-    }
-    for channel in &recording.channels {
-        if let Some(at) = channel.samples.iter().position(|sample| !sample.is_finite()) {
-            return wrong(format!(
-                "{} is not a finite number at {:.6} s; every sample must be finite",
-                channel.name,
-                recording.time_s(at)
-            ));
-        }
-        if baseline.pickup(&channel.name).is_some()
-            && let Some(level) = clipped(&channel.samples)
-        {
-            return wrong(format!(
-                "{} is clipped at {level:.6e} {}: the range of the sensor is too small; record again with a larger range or less excitation",
-                channel.name,
-                channel.quantity.unit()
-            ));
-        }
     }
     if let Some(still) = channels.iter().find(|channel| rms(&channel.measured) == 0.0) {
         return wrong(format!(
