@@ -70,7 +70,10 @@ fn contradiction(path: &Path, given: f64, fitting: &[FittingInput], of_given_too
         inputs.join(", or ")
     );
     if !of_given_tool.is_empty() {
-        let others: Vec<String> = of_given_tool.iter().map(|path| path.display().to_string()).collect();
+        let others: Vec<String> = of_given_tool
+            .iter()
+            .map(|path| path.display().to_string())
+            .collect();
         text += &format!(
             ". {} fits the tool of the case: are these recordings of different tools?",
             others.join(", ")

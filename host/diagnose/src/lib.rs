@@ -109,8 +109,8 @@ pub use progress::{Options, Stage};
 use conclusion::{conclude, long_records};
 use quietcut_model::case::Case;
 use quietcut_recording::{Recording, TestKind};
-use records::{checks, full_engagement};
 use records::study::Study;
+use records::{checks, full_engagement};
 
 /// Finds what the case gets wrong about the recordings, and why.
 ///

@@ -171,6 +171,31 @@ pub(crate) fn unit(
     ))
 }
 
+/// Refuses a channel of a hammer test that follows the prediction of the case with the opposite sign.
+///
+/// `response` and `measured` are as in [`unit`]. An impact begins a response with the sign of its force, whatever mass,
+/// stiffness and damping are: another structure has another waveform, not the same one inverted. Of steady tones this
+/// does not hold, since a resonance turns their phase.
+pub(crate) fn sign(
+    path: &std::path::Path,
+    name: &str,
+    response: &[f64],
+    measured: &[f64],
+) -> Result<(), DiagnoseError> {
+    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    let correlation = dot(response, measured) / (dot(response, response) * dot(measured, measured)).sqrt();
+    if correlation.is_nan() || correlation > -LEAST_CORRELATION_OF_UNKNOWN_UNIT.sqrt() {
+        return Ok(());
+    }
+    Err(DiagnoseError::record(
+        path,
+        format!(
+            "{name} answers the impacts with the opposite sign of the prediction (correlation {correlation:.2}): the \
+             sensor, the hammer or the sign in the file is inverted"
+        ),
+    ))
+}
+
 /// Result of the unit checks of a cut: success if one channel passes or none is checked, otherwise the first refusal.
 /// If one unit is right, a ratio of another channel within the limits of [`far_off`] is not a wrong unit: a wrong edge
 /// coefficient alone may change a small axial force by a factor of ten.

@@ -40,10 +40,13 @@ pub(crate) fn check(recording: &Recording) -> Result<(), DiagnoseError> {
             recording.start_s + time_s
         ))
     };
-    let words: Vec<String> = [said(&found.missed, "missed"), said(&found.additional, "additional")]
-        .into_iter()
-        .flatten()
-        .collect();
+    let words: Vec<String> = [
+        said(&found.missed, "missed"),
+        said(&found.additional, "additional"),
+    ]
+    .into_iter()
+    .flatten()
+    .collect();
     if words.is_empty() {
         return Ok(());
     }
@@ -86,7 +89,11 @@ fn faults(times_s: &[f64]) -> Faults {
 fn neighbours(intervals: &[f64], at: usize) -> Option<f64> {
     let from = at.saturating_sub(NEIGHBOURS);
     let to = (at + NEIGHBOURS + 1).min(intervals.len());
-    let mut beside: Vec<f64> = intervals[from..at].iter().chain(&intervals[at + 1..to]).copied().collect();
+    let mut beside: Vec<f64> = intervals[from..at]
+        .iter()
+        .chain(&intervals[at + 1..to])
+        .copied()
+        .collect();
     median(&mut beside)
 }
 
@@ -113,7 +120,11 @@ mod tests {
                 let mut times = pulses(modulation);
                 times.insert(12, times[11] + late);
                 let found = faults(&times);
-                assert_eq!((found.missed.len(), found.additional.len()), (0, 1), "{late} {found:?}");
+                assert_eq!(
+                    (found.missed.len(), found.additional.len()),
+                    (0, 1),
+                    "{late} {found:?}"
+                );
             }
         }
     }

@@ -32,7 +32,9 @@ impl Alternative {
                 _ if name == other => (one, *second),
                 _ => (name, 1.0),
             },
-            Self::Inverted(names) | Self::Rotation(_, names) if names.iter().any(|own| own == name) => (name, -1.0),
+            Self::Inverted(names) | Self::Rotation(_, names) if names.iter().any(|own| own == name) => {
+                (name, -1.0)
+            }
             Self::Unit(names, factor, _) if names.iter().any(|own| own == name) => (name, *factor),
             _ => (name, 1.0),
         }
@@ -41,7 +43,9 @@ impl Alternative {
     /// Entry and exit, degrees, if they differ from those that are given.
     pub(super) fn engagement_deg(&self) -> Option<[f64; 2]> {
         match self {
-            Self::Engagement(degrees) | Self::Mirrored(degrees) | Self::Rotation(Some(degrees), _) => Some(*degrees),
+            Self::Engagement(degrees) | Self::Mirrored(degrees) | Self::Rotation(Some(degrees), _) => {
+                Some(*degrees)
+            }
             _ => None,
         }
     }
@@ -108,13 +112,29 @@ fn rounded(factor: f64) -> String {
 const UNITS: [(&[Quantity], f64, &str); 11] = [
     (&[Quantity::Force], 4.448_222, "pounds of force read as N"),
     (&[Quantity::Force], 1.0 / 4.448_222, "N read as pounds of force"),
-    (&[Quantity::Displacement, Quantity::Velocity, Quantity::Acceleration], 1.0 / 25.4e-3, "m read as inches"),
+    (
+        &[Quantity::Displacement, Quantity::Velocity, Quantity::Acceleration],
+        1.0 / 25.4e-3,
+        "m read as inches",
+    ),
     (&[Quantity::Force], 9.806_65, "kilograms of force read as N"),
     (&[Quantity::Force], 1.0 / 9.806_65, "N read as kilograms of force"),
     (&[Quantity::Force], 1e3, "kN read as N"),
-    (&[Quantity::Displacement, Quantity::Velocity, Quantity::Acceleration], 1e-3, "mm read as m"),
-    (&[Quantity::Displacement, Quantity::Velocity], 1e-6, "µm read as m"),
-    (&[Quantity::Displacement, Quantity::Velocity, Quantity::Acceleration], 25.4e-3, "inches read as m"),
+    (
+        &[Quantity::Displacement, Quantity::Velocity, Quantity::Acceleration],
+        1e-3,
+        "mm read as m",
+    ),
+    (
+        &[Quantity::Displacement, Quantity::Velocity],
+        1e-6,
+        "µm read as m",
+    ),
+    (
+        &[Quantity::Displacement, Quantity::Velocity, Quantity::Acceleration],
+        25.4e-3,
+        "inches read as m",
+    ),
     (&[Quantity::Acceleration], 9.806_65, "g read as m/s²"),
     (&[Quantity::Acceleration], 1.0 / 9.806_65, "m/s² read as g"),
 ];
@@ -159,7 +179,8 @@ pub(super) fn of_channels(channels: &[(String, Quantity)]) -> Vec<Alternative> {
             }
         }
         for group in &groups {
-            let unit = |(factor, words): &(f64, &'static str)| Alternative::Unit(group.clone(), *factor, words);
+            let unit =
+                |(factor, words): &(f64, &'static str)| Alternative::Unit(group.clone(), *factor, words);
             all.extend(factors.iter().map(unit));
         }
     }

@@ -120,7 +120,11 @@ impl FeedForces {
         let part = |part: usize| Vector3::from_fn(|axis, _| exit[3 * part + axis] - start[3 * part + axis]);
         let turn = |rad: f64| Complex64::cis(order as f64 * rad);
         let sum = |of: &dyn Fn(&[f64; 3]) -> f64| -> Complex64 {
-            engagement.teeth.iter().map(|tooth| turn(tooth[0]) * of(tooth)).sum()
+            engagement
+                .teeth
+                .iter()
+                .map(|tooth| turn(tooth[0]) * of(tooth))
+                .sum()
         };
         let by_feed = sum(&|[_, _, feed]| *feed);
         let all = sum(&|_| 1.0);
@@ -138,7 +142,11 @@ impl FeedForces {
     fn integral(&self, rad: f64, order: usize) -> [Complex64; 3 * PARTS] {
         let place = (rad.rem_euclid(TAU) / TAU * STEPS as f64).min(STEPS as f64);
         // A full revolution ends at the last angle of the table.
-        let place = if place == 0.0 && rad > 0.0 { STEPS as f64 } else { place };
+        let place = if place == 0.0 && rad > 0.0 {
+            STEPS as f64
+        } else {
+            place
+        };
         let first = (place as usize).min(STEPS - 1);
         let share = place - first as f64;
         let at = |step: usize| (step * self.orders + order) * 3 * PARTS;

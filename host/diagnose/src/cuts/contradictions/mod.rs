@@ -24,7 +24,7 @@ use quietcut_recording::Recording;
 
 use self::alternative::Alternative;
 use self::screen::Screen;
-use self::wide_fit::{WideFit, wide_fit};
+use self::wide_fit::{WideFit, frequency_costs, wide_fit};
 use super::record::ReducedCut;
 use crate::baseline::Baseline;
 use crate::error::{DiagnoseError, FittingInput};
@@ -37,6 +37,10 @@ const LEFT: f64 = 0.05;
 const FITS: f64 = 0.999;
 /// Difference of the costs of two inputs that fit equally well: odds of 1 000.
 const AS_GOOD: f64 = 14.0;
+/// Decrease of χ² by one free factor up to which a given one is within two standard deviations.
+const TWO_DEVIATIONS: f64 = 4.0;
+/// Relative difference of the speed from the stated one up to which it is taken as rounded or set by hand.
+const SPEED_AS_STATED: f64 = 5e-3;
 /// Largest gain of a sensor beside another unit, as a logarithm: beyond, neither unit is the right one.
 const OTHER_GAIN: f64 = 0.25;
 
@@ -47,7 +51,10 @@ pub(super) fn contradiction(
     records: &[ReducedCut],
     recordings: &[Recording],
 ) -> Option<DiagnoseError> {
-    let screens: Vec<Option<Screen<'_>>> = records.iter().map(|record| Screen::new(baseline, record)).collect();
+    let screens: Vec<Option<Screen<'_>>> = records
+        .iter()
+        .map(|record| Screen::new(baseline, record))
+        .collect();
     let is_air = |screen: &Option<Screen<'_>>| screen.as_ref().is_some_and(Screen::is_air);
     if let Some(index) = screens.iter().position(is_air) {
         return Some(DiagnoseError::record(
@@ -56,11 +63,22 @@ pub(super) fn contradiction(
              of the case would be plain. Was the tool in the cut, and are the channels those of this cut?",
         ));
     }
+    let of_clock =
+        |(screen, recording): (&Option<Screen<'_>>, &Recording)| clock(screen.as_ref()?, recording);
+    if let Some(error) = screens.iter().zip(recordings).find_map(of_clock) {
+        return Some(error);
+    }
     let found: Vec<Option<Found>> = screens.iter().map(|screen| found(screen.as_ref()?)).collect();
-    let (index, first) = found.iter().enumerate().find_map(|(index, found)| Some((index, found.as_ref()?)))?;
+    let (index, first) = found
+        .iter()
+        .enumerate()
+        .find_map(|(index, found)| Some((index, found.as_ref()?)))?;
     let (best, _) = first.alternatives.first()?;
     // A tool that fits some records only is that of those records.
-    let others = found.iter().zip(recordings).filter(|(found, _)| best.is_of_tool() && found.is_none());
+    let others = found
+        .iter()
+        .zip(recordings)
+        .filter(|(found, _)| best.is_of_tool() && found.is_none());
     Some(DiagnoseError::Contradiction {
         path: recordings[index].path.clone(),
         given: first.given,
@@ -73,6 +91,33 @@ pub(super) fn contradiction(
                 left: *left,
             })
             .collect(),
+    })
+}
+
+/// A sample clock that is off: the tachometer differs from the stated speed, and the natural frequencies from those of
+/// the case by the same factor. Either alone is no contradiction: a spindle slips, and a stiffness changes.
+fn clock(screen: &Screen<'_>, recording: &Recording) -> Option<DiagnoseError> {
+    let stated_rpm = recording.sidecar.cut?.spindle_rpm?;
+    let ratio = 60.0 * screen.record.conditions.spindle_hz / stated_rpm;
+    if (ratio - 1.0).abs() < SPEED_AS_STATED {
+        return None;
+    }
+    let [given, by_clock, by_any] = frequency_costs(screen, ratio)?;
+    let is_clock = given - by_clock > AS_GOOD && by_clock - by_any < TWO_DEVIATIONS;
+    is_clock.then(|| {
+        DiagnoseError::record(
+            &recording.path,
+            format!(
+                "the sample clock seems off by {:.1} %: the tachometer gives {:.1} rev/min where the sidecar states \
+                 {stated_rpm}, and the natural frequencies differ from the case by the same factor. Both fit a sample \
+                 rate of {:.1} Hz instead of {:.1} Hz. State the true one (--rate, sample_rate_hz), or correct \
+                 spindle_rpm if it is not the speed of the spindle",
+                100.0 * (ratio - 1.0),
+                ratio * stated_rpm,
+                recording.sample_rate_hz / ratio,
+                recording.sample_rate_hz
+            ),
+        )
     })
 }
 

@@ -94,14 +94,25 @@ impl<'a> Screen<'a> {
         let cutter = &model.cutter;
         let orders = record.orders.amplitudes.nrows().min(HIGHEST + 1);
         let names = &record.orders.channels;
-        let pickups: Vec<Pickup> = names.iter().map(|name| baseline.pickup(name)).collect::<Option<_>>()?;
+        let pickups: Vec<Pickup> = names
+            .iter()
+            .map(|name| baseline.pickup(name))
+            .collect::<Option<_>>()?;
         if pickups.iter().any(|pickup| !pickup.modes.is_empty()) {
             return None;
         }
         let spindle_hz = record.conditions.spindle_hz;
-        let reading = Reading::new(&model.structure, pickups.clone(), spindle_hz, orders - 1, record.rate_hz)?;
+        let reading = Reading::new(
+            &model.structure,
+            pickups.clone(),
+            spindle_hz,
+            orders - 1,
+            record.rate_hz,
+        )?;
         let along = |axis: usize| {
-            let unit = DMatrix::from_fn(orders, 3, |_, own| Complex64::from(f64::from(u8::from(own == axis))));
+            let unit = DMatrix::from_fn(orders, 3, |_, own| {
+                Complex64::from(f64::from(u8::from(own == axis)))
+            });
             reading.orders(&ForceOrders {
                 cutting_n: unit.clone(),
                 structure_n: unit,
@@ -116,10 +127,16 @@ impl<'a> Screen<'a> {
         let soft = model.structure.receptance(0.0)?;
         let at_tool = std::array::from_fn(|axis| {
             let spring = soft[(axis, axis)].re.abs().recip();
-            [spring, 2.0 * DAMPING_RATIO * spring / omega, spring / (omega * omega)]
+            [
+                spring,
+                2.0 * DAMPING_RATIO * spring / omega,
+                spring / (omega * omega),
+            ]
         });
         let columns = record.orders.amplitudes.column_iter();
-        let largest = columns.map(|column| column.iter().skip(1).map(|y| y.norm()).fold(0.0, f64::max)).collect();
+        let largest = columns
+            .map(|column| column.iter().skip(1).map(|y| y.norm()).fold(0.0, f64::max))
+            .collect();
         Some(Self {
             record,
             forces: FeedForces::new(cutter, &unit, orders),
@@ -131,7 +148,10 @@ impl<'a> Screen<'a> {
             mean,
             deviation,
             orders,
-            channels: pickups.iter().map(|pickup| (pickup.name.clone(), pickup.quantity)).collect(),
+            channels: pickups
+                .iter()
+                .map(|pickup| (pickup.name.clone(), pickup.quantity))
+                .collect(),
             pickups,
             largest,
             folding: record.rate_hz / spindle_hz,
@@ -145,9 +165,7 @@ impl<'a> Screen<'a> {
         let noise = self.record.orders.covariances[order].matrix[(source, source)].re;
         let folded = order as f64 / (self.folding - order as f64).max(1.0);
         let [own, all] = ALLOWANCE;
-        let variance = noise
-            + (own.hypot(folded) * amplitude).powi(2)
-            + (all * self.largest[source]).powi(2);
+        let variance = noise + (own.hypot(folded) * amplitude).powi(2) + (all * self.largest[source]).powi(2);
         factor.abs() * variance.max(f64::MIN_POSITIVE).sqrt()
     }
 
@@ -156,7 +174,10 @@ impl<'a> Screen<'a> {
         let names = &self.record.orders.channels;
         let of = |(own, (name, _)): (usize, &(String, Quantity))| {
             let (read, factor) = alternative.map_or((name.as_str(), 1.0), |changed| changed.reads(name));
-            (names.iter().position(|other| other == read).unwrap_or(own), factor)
+            (
+                names.iter().position(|other| other == read).unwrap_or(own),
+                factor,
+            )
         };
         self.channels.iter().enumerate().map(of).collect()
     }
@@ -187,22 +208,33 @@ impl<'a> Screen<'a> {
         2 * (self.orders - 1) * self.channels.len()
     }
 
-    /// True if no order of the tooth passing rises above the noise although a tenth of those of the case would.
+    /// True if the orders of a channel are far above its noise.
+    fn is_plain(&self, channel: usize) -> bool {
+        let orders = &self.record.orders;
+        let of = |order: usize| {
+            let noise = orders.covariances[order].matrix[(channel, channel)]
+                .re
+                .max(f64::MIN_POSITIVE);
+            2.0 * orders.amplitudes[(order, channel)].norm_sqr() / noise
+        };
+        let count = 2.0 * (self.orders - 1) as f64;
+        (1..self.orders).map(of).sum::<f64>() > PLAIN * chi_squared_quantile(AIR, count)
+    }
+
+    /// True if no order above 1, which an unbalanced spindle has in air too, rises above the noise although a tenth of
+    /// those of the case would.
     pub(super) fn is_air(&self) -> bool {
         let orders = &self.record.orders;
-        let teeth = self.given.teeth.len();
         let [mut measured, mut expected, mut count] = [0.0; 3];
-        for order in (teeth..self.orders).step_by(teeth) {
-            let force: Vector3<Complex64> = self
-                .forces
-                .at(&self.given, order)
-                .iter()
-                .zip(self.mean.iter())
-                .map(|(column, mean)| column * Complex64::from(*mean))
-                .sum();
+        for order in 2..self.orders {
+            let columns = self.forces.at(&self.given, order);
+            let parts = columns.iter().zip(self.mean.iter());
+            let force: Vector3<Complex64> = parts.map(|(column, mean)| column * Complex64::from(*mean)).sum();
             let read = &self.transfer[order] * force;
             for channel in 0..self.channels.len() {
-                let noise = orders.covariances[order].matrix[(channel, channel)].re.max(f64::MIN_POSITIVE);
+                let noise = orders.covariances[order].matrix[(channel, channel)]
+                    .re
+                    .max(f64::MIN_POSITIVE);
                 measured += 2.0 * orders.amplitudes[(order, channel)].norm_sqr() / noise;
                 expected += 2.0 * LEAST_OF_CUT * LEAST_OF_CUT * read[channel].norm_sqr() / noise;
                 count += 2.0;
@@ -218,9 +250,19 @@ impl<'a> Screen<'a> {
         if given < self.seen() {
             return Vec::new();
         }
+        // A channel at rest, as of an axis that sticks, fits any unit.
+        let changes = |alternative: &Alternative, name: &str| alternative.reads(name) != (name, 1.0);
         let mut all = of_channels(&self.channels);
+        all.retain(|alternative| {
+            let mut channels = self.channels.iter().enumerate();
+            channels.all(|(channel, (name, _))| !changes(alternative, name) || self.is_plain(channel))
+        });
         let teeth = self.given.teeth.len();
-        all.extend((1..=TEETH).filter(|other| *other != teeth).map(Alternative::Teeth));
+        all.extend(
+            (1..=TEETH)
+                .filter(|other| *other != teeth)
+                .map(Alternative::Teeth),
+        );
         let normals: Vec<String> = self
             .channels
             .iter()
@@ -260,7 +302,14 @@ impl<'a> Screen<'a> {
             .min_by(|a, b| a.0.total_cmp(&b.0))?;
         for step in &STEPS_DEG[1..] {
             let [start, exit] = best.1;
-            for near in [[-step, 0.0], [*step, 0.0], [0.0, -step], [0.0, *step], [-step, -step], [*step, *step]] {
+            for near in [
+                [-step, 0.0],
+                [*step, 0.0],
+                [0.0, -step],
+                [0.0, *step],
+                [-step, -step],
+                [*step, *step],
+            ] {
                 let moved = [start + near[0], exit + near[1]];
                 if moved[0] < 0.0 || moved[1] > 180.0 || moved[1] - moved[0] < STEPS_DEG[3] {
                     continue;
@@ -285,7 +334,9 @@ impl<'a> Screen<'a> {
             let forces = self.forces.at(engagement, order);
             for (channel, (source, factor)) in sources.iter().enumerate() {
                 let measured = orders.amplitudes[(order, *source)] * *factor;
-                let deviation = self.deviation_of(order, *source, *factor).hypot(STRUCTURE * measured.norm());
+                let deviation = self
+                    .deviation_of(order, *source, *factor)
+                    .hypot(STRUCTURE * measured.norm());
                 let row = self.transfer[order].row(channel);
                 let read: [Complex64; COLUMNS] = std::array::from_fn(|column| {
                     let force = &forces[column];

@@ -74,7 +74,11 @@ pub(super) struct WideFit {
 }
 
 /// The best fit of the orders with an input; `None` if the receptance is singular.
-pub(super) fn wide_fit(screen: &Screen<'_>, alternative: Option<&Alternative>, thorough: bool) -> Option<WideFit> {
+pub(super) fn wide_fit(
+    screen: &Screen<'_>,
+    alternative: Option<&Alternative>,
+    thorough: bool,
+) -> Option<WideFit> {
     let problem = Problem::new(screen, alternative);
     let starts = if thorough { &STARTS[..] } else { &STARTS[..1] };
     let fits = starts.iter().filter_map(|start| {
@@ -83,12 +87,28 @@ pub(super) fn wide_fit(screen: &Screen<'_>, alternative: Option<&Alternative>, t
         problem.fit(z)
     });
     let (cost, z) = fits.min_by(|a, b| a.0.total_cmp(&b.0))?;
-    let gains = (0..screen.channels.len()).map(|channel| problem.value(&z, PLACE_CHANNELS + 2 * channel).abs());
+    let gains =
+        (0..screen.channels.len()).map(|channel| problem.value(&z, PLACE_CHANNELS + 2 * channel).abs());
     Some(WideFit {
         cost,
         largest_gain: gains.fold(0.0, f64::max),
         engagement_deg: problem.engagement(&z).map(f64::to_degrees),
     })
+}
+
+/// Least costs of a record with the structure of the baseline: as it is, with natural frequencies times `ratio`, and with
+/// them times any factor. `None` if the receptance is singular.
+pub(super) fn frequency_costs(screen: &Screen<'_>, ratio: f64) -> Option<[f64; 3]> {
+    let cost = |factor: f64, is_free: bool| {
+        let mut problem = Problem::new(screen, None);
+        problem.frequency_factor = factor;
+        let last = if is_free { PLACE_ADDED } else { PLACE_FREQUENCY };
+        for held in &mut problem.widths[last..PLACE_ANGLES] {
+            held.most = 0.0;
+        }
+        Some(problem.fit(DVector::zeros(problem.widths.len()))?.0)
+    };
+    Some([cost(1.0, false)?, cost(ratio, false)?, cost(ratio, true)?])
 }
 
 /// The variables of a record with one input.
@@ -97,6 +117,8 @@ struct Problem<'a, 'b> {
     widths: Vec<Width>,
     /// Entry and exit at z = 0, rad.
     angles_rad: [f64; 2],
+    /// Factor of the natural frequencies at z = 0.
+    frequency_factor: f64,
     alternative: Option<&'a Alternative>,
 }
 
@@ -112,7 +134,12 @@ impl<'a, 'b> Problem<'a, 'b> {
             _ => GIVEN_ANGLE,
         };
         widths.extend([angle; 2]);
-        let phase_rad = screen.record.orders.angle.phase_deviation_rad.clamp(PHASE[0], PHASE[1]);
+        let phase_rad = screen
+            .record
+            .orders
+            .angle
+            .phase_deviation_rad
+            .clamp(PHASE[0], PHASE[1]);
         widths.push(width(phase_rad, 3.0));
         for _ in &screen.channels {
             widths.extend([GAIN, DELAY]);
@@ -122,6 +149,7 @@ impl<'a, 'b> Problem<'a, 'b> {
             screen,
             widths,
             angles_rad: [engagement.start_rad, engagement.exit_rad],
+            frequency_factor: 1.0,
             alternative,
         }
     }
@@ -139,7 +167,7 @@ impl<'a, 'b> Problem<'a, 'b> {
 
     /// Receptances of the baseline at the orders, its natural frequencies times a factor.
     fn receptances(&self, z: &DVector<f64>) -> Option<Vec<Matrix3<Complex64>>> {
-        let factor = self.value(z, PLACE_FREQUENCY).exp();
+        let factor = self.frequency_factor * self.value(z, PLACE_FREQUENCY).exp();
         let hertz = self.screen.record.conditions.spindle_hz / factor;
         let at = |order: usize| self.screen.structure.receptance(TAU * hertz * order as f64);
         (0..self.screen.orders).map(at).collect()
@@ -176,7 +204,12 @@ impl<'a, 'b> Problem<'a, 'b> {
     }
 
     /// Receptance with a mass, a damper and a spring at the tool.
-    fn with_added(&self, receptance: &Matrix3<Complex64>, omega: f64, z: &DVector<f64>) -> Option<Matrix3<Complex64>> {
+    fn with_added(
+        &self,
+        receptance: &Matrix3<Complex64>,
+        omega: f64,
+        z: &DVector<f64>,
+    ) -> Option<Matrix3<Complex64>> {
         let axes = &self.screen.axes;
         let block = DMatrix::from_fn(axes.len(), axes.len(), |i, j| receptance[(axes[i], axes[j])]);
         let mut stiffness = block.try_inverse()?;
@@ -212,7 +245,12 @@ impl<'a, 'b> Problem<'a, 'b> {
             Quantity::Force => *force,
             quantity => moved * s.powi(derivatives(quantity)),
         };
-        let sum: Complex64 = pickup.weights.iter().zip(value.iter()).map(|(weight, value)| value * *weight).sum();
+        let sum: Complex64 = pickup
+            .weights
+            .iter()
+            .zip(value.iter())
+            .map(|(weight, value)| value * *weight)
+            .sum();
         let place = PLACE_CHANNELS + 2 * channel;
         let gain = self.value(z, place).exp();
         let delay_s = pickup.delay_s + self.value(z, place + 1) / self.screen.record.rate_hz;

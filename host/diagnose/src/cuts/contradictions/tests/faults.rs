@@ -64,16 +64,36 @@ fn of_quantity(record: &Recording, quantity: Quantity) -> Vec<String> {
 
 /// Sample positions of the rising edges.
 fn edges(level: &[f64]) -> Vec<usize> {
-    let middle = 0.5
-        * level
-            .iter()
-            .fold(0.0_f64, |most, value| most.max(*value));
+    let middle = 0.5 * level.iter().fold(0.0_f64, |most, value| most.max(*value));
     (1..level.len())
         .filter(|at| level[at - 1] < middle && level[*at] >= middle)
         .collect()
 }
 
 impl Fault {
+    /// Words of the message that says this fault, for a tool with `teeth` teeth and the channels of `records`.
+    pub(super) fn words(self, teeth: usize, records: &[Recording]) -> String {
+        let all = |quantity| of_quantity(&records[0], quantity).join(", ");
+        match self {
+            Self::Teeth(_) => format!("a tool with {teeth} t"),
+            Self::Engagement(..) => "another engagement".into(),
+            Self::UpForDown => "mirrored at the feed".into(),
+            Self::Rotation => "rotates the other way".into(),
+            Self::Swapped(_) => "swapped".into(),
+            Self::Inverted(quantity, axis) => format!("{} with the opposite sign", name(quantity, axis)),
+            Self::AllInverted(quantity) => format!("{} with the opposite sign", all(quantity)),
+            Self::Scaled(quantity, axis, _) => format!("{} times", name(quantity, axis)),
+            Self::AllScaled(quantity, _) => format!("{} times", all(quantity)),
+            Self::Air => "a record of air".into(),
+            Self::Clipped(..) => "is clipped".into(),
+            Self::MissedPulses(_) => "missed".into(),
+            Self::DoubledPulses(_) => "additional".into(),
+            Self::Clock(_) => "the sample clock".into(),
+            Self::NotANumber(_) => "not a finite number".into(),
+            Self::TwoTools => "different tools".into(),
+        }
+    }
+
     /// Spoils case and records; `None` if the fault does not apply to them. `other` are records of another tool.
     pub(super) fn spoil(self, case: &mut Case, records: &mut [Recording], other: &[Recording]) -> Option<()> {
         let mut random = ChaCha8Rng::seed_from_u64(77);
@@ -120,14 +140,20 @@ impl Fault {
             Self::Swapped(quantity) => {
                 for record in records {
                     let names = of_quantity(record, quantity);
-                    let [first, second, ..] = &names[..] else { return None };
+                    let [first, second, ..] = &names[..] else {
+                        return None;
+                    };
                     let one = samples(record, first)?.clone();
                     let two = std::mem::replace(samples(record, second)?, one);
                     *samples(record, first)? = two;
                 }
             }
-            Self::Inverted(quantity, axis) => return Self::Scaled(quantity, axis, -1.0).spoil(case, records, other),
-            Self::AllInverted(quantity) => return Self::AllScaled(quantity, -1.0).spoil(case, records, other),
+            Self::Inverted(quantity, axis) => {
+                return Self::Scaled(quantity, axis, -1.0).spoil(case, records, other);
+            }
+            Self::AllInverted(quantity) => {
+                return Self::AllScaled(quantity, -1.0).spoil(case, records, other);
+            }
             Self::Scaled(quantity, axis, factor) => {
                 for record in records {
                     scale(record, &name(quantity, axis), factor).then_some(())?;

@@ -176,7 +176,11 @@ impl Machine {
     /// An effect with sizes of this machine.
     pub(super) fn filled(&self, effect: &str) -> String {
         let is_soft = self.structure == ROBOT;
-        let motion = if self.measured.contains(&Quantity::Displacement) { "x" } else { "ax" };
+        let motion = if self.measured.contains(&Quantity::Displacement) {
+            "x"
+        } else {
+            "ax"
+        };
         let [frequency, mass, friction, cubic] = if is_soft {
             ["35", "120", "1", "5e11"]
         } else {
@@ -195,7 +199,10 @@ impl Machine {
         Effects::parse_over(effects.iter().copied(), Some(self.seconds)).ok()?;
         let records = std::panic::catch_unwind(|| self.records(effects, noise, seed)).ok()?;
         let is_finite = |record: &Recording| {
-            record.channels.iter().all(|channel| channel.samples.iter().all(|sample| sample.is_finite()))
+            record
+                .channels
+                .iter()
+                .all(|channel| channel.samples.iter().all(|sample| sample.is_finite()))
         };
         records.iter().all(is_finite).then_some(records)
     }

@@ -4,12 +4,13 @@ mod faults;
 mod machines;
 
 use faults::Fault;
-use machines::MACHINES;
+use machines::{MACHINES, Machine};
 
 use super::contradiction;
 use crate::baseline::Baseline;
 use crate::cuts::record::ReducedCut;
 use crate::records::checks;
+use crate::{DiagnoseError, Options, diagnose};
 use quietcut_model::case::Case;
 use quietcut_recording::Quantity::{Acceleration, Displacement, Force};
 use quietcut_recording::Recording;
@@ -61,43 +62,66 @@ fn refusal(case: &Case, records: &[Recording]) -> Option<String> {
         return Some(error.to_string());
     }
     let baseline = Baseline::new(case).unwrap();
-    let reduced: Vec<ReducedCut> =
-        records.iter().map(|record| ReducedCut::new(&baseline, record).unwrap()).collect();
-    let start = std::time::Instant::now();
-    let found = contradiction(&baseline, &reduced, records).map(|error| error.to_string());
-    if start.elapsed().as_secs_f64() > 0.5 {
-        println!("  {:.3} s", start.elapsed().as_secs_f64());
+    let reduced: Vec<ReducedCut> = records
+        .iter()
+        .map(|record| ReducedCut::new(&baseline, record).unwrap())
+        .collect();
+    contradiction(&baseline, &reduced, records).map(|error| error.to_string())
+}
+
+/// Effects that hide beside every fault: the baseline is wrong by some per cent.
+const HIDDEN: [&str; 2] = ["force-coefficients=0.08", "stiffness=0.03"];
+
+/// Tries all faults on a machine; returns how many there are, and those that are not said with the right words.
+fn faults_not_said(machine: &Machine) -> (usize, Vec<String>) {
+    let good = machine.records(&HIDDEN, 0.01, 5);
+    let other_teeth = if machine.teeth == 2 { 3 } else { 2 };
+    let other = machine.with_teeth(other_teeth).records(&HIDDEN, 0.01, 9);
+    let (mut tried, mut missed) = (0, Vec::new());
+    for fault in faults() {
+        let (mut case, mut records) = (machine.case(), good.clone());
+        if fault.spoil(&mut case, &mut records, &other).is_none() {
+            continue;
+        }
+        tried += 1;
+        let found = refusal(&case, &records).unwrap_or_else(|| "nothing".into());
+        println!("{}, {fault:?}: {found}", machine.name);
+        if !found.contains(&fault.words(machine.teeth, &records)) {
+            missed.push(format!("{fault:?}: {found}"));
+        }
     }
-    found
+    (tried, missed)
 }
 
 #[test]
-#[ignore = "table"]
-fn table() {
-    let wanted = std::env::var("QUIETCUT_BAD").unwrap_or_default();
-    let only: Option<usize> = std::env::var("QUIETCUT_MACHINE").ok().and_then(|text| text.parse().ok());
-    for (index, machine) in MACHINES.iter().enumerate() {
-        if only.is_some_and(|only| only != index) {
-            continue;
-        }
-        let hidden = ["force-coefficients=0.08", "stiffness=0.03"];
-        let good = machine.records(&hidden, 0.01, 5);
-        let other_teeth = if machine.teeth == 2 { 3 } else { 2 };
-        let other = machine.with_teeth(other_teeth).records(&hidden, 0.01, 9);
-        println!("## {} ({} samples)", machine.name, good[0].len());
-        println!("nothing: {:?}", refusal(&machine.case(), &good));
-        for fault in faults() {
-            let label = format!("{fault:?}");
-            if !wanted.split('|').any(|wanted| label.contains(wanted)) {
-                continue;
-            }
-            let (mut case, mut records) = (machine.case(), good.clone());
-            if fault.spoil(&mut case, &mut records, &other).is_none() {
-                continue;
-            }
-            println!("{label}: {}", refusal(&case, &records).unwrap_or_else(|| "MISSED".into()));
-        }
+fn faults_of_a_stiff_tool_are_said() {
+    let (_, missed) = faults_not_said(&MACHINES[2]);
+    // A unit that is off by less than ten may be another machine, and so may a clock.
+    let allowed = ["Scaled(Acceleration, 0, 4.448)", "Clock"];
+    let wrong: Vec<&String> = missed
+        .iter()
+        .filter(|missed| !allowed.iter().any(|allowed| missed.starts_with(allowed)))
+        .collect();
+    assert!(wrong.is_empty(), "{wrong:#?}");
+}
+
+#[test]
+#[ignore = "campaign: all faults of all machines, two minutes"]
+fn faults_of_all_machines_are_said() {
+    let (mut tried, mut missed) = (0, 0);
+    for machine in &MACHINES {
+        let (of_machine, not_said) = faults_not_said(machine);
+        println!(
+            "{}: {} of {of_machine} not said: {not_said:#?}",
+            machine.name,
+            not_said.len()
+        );
+        tried += of_machine;
+        missed += not_said.len();
     }
+    println!("{missed} of {tried} not said");
+    // Units that are off by less than ten, clocks, and small changes of the engagement.
+    assert!(5 * missed < tried, "{missed} of {tried}");
 }
 
 /// Causes of each kind that must not be taken for a wrong input.
@@ -117,8 +141,17 @@ const CAUSES: [&[&str]; 22] = [
     &["sensor-gain=1.3", "sensor-gain.channel=MOTION"],
     &["sensor-gain=0.7", "sensor-gain.channel=MOTION"],
     &["sensor-delay=2e-4", "sensor-delay.channel=MOTION"],
-    &["cross-axis=0.2", "cross-axis.channel=MOTION", "cross-axis.from=y"],
-    &["missing-mode=FREQUENCY", "missing-mode.direction=x", "missing-mode.damping_ratio=0.03", "missing-mode.modal_mass_kg=MASS"],
+    &[
+        "cross-axis=0.2",
+        "cross-axis.channel=MOTION",
+        "cross-axis.direction=y",
+    ],
+    &[
+        "missing-mode=FREQUENCY",
+        "missing-mode.direction=x",
+        "missing-mode.damping_ratio=0.03",
+        "missing-mode.modal_mass_kg=MASS",
+    ],
     &["coulomb-friction=FRICTION", "coulomb-friction.direction=y"],
     &["cubic-stiffness=CUBIC", "cubic-stiffness.direction=x"],
     &["cubic-stiffness=-CUBIC", "cubic-stiffness.direction=y"],
@@ -126,30 +159,138 @@ const CAUSES: [&[&str]; 22] = [
     &["drift=-0.2"],
 ];
 
-#[test]
-#[ignore = "table"]
-fn causes() {
-    let only: Option<usize> = std::env::var("QUIETCUT_MACHINE").ok().and_then(|text| text.parse().ok());
-    let (mut tried, mut refused) = (0, 0);
-    for (index, machine) in MACHINES.iter().enumerate() {
-        if only.is_some_and(|only| only != index) {
-            continue;
-        }
-        println!("## {}", machine.name);
-        for effects in CAUSES {
-            for seed in [3, 4] {
-                let effects: Vec<String> = effects.iter().map(|effect| machine.filled(effect)).collect();
-                let effects: Vec<&str> = effects.iter().map(String::as_str).collect();
-                let Some(records) = machine.try_records(&effects, 0.02, seed) else {
-                    println!("{effects:?}: NOT POSSIBLE");
-                    continue;
-                };
-                tried += 1;
-                let found = refusal(&machine.case(), &records);
-                refused += usize::from(found.is_some());
-                println!("{effects:?}: {found:?}");
+/// Hides each cause in a machine; returns how many were tried, and what was refused.
+fn refused_causes(machine: &Machine, seeds: std::ops::Range<u64>) -> (usize, Vec<String>) {
+    let (mut tried, mut refused) = (0, Vec::new());
+    for effects in CAUSES {
+        let effects: Vec<String> = effects.iter().map(|effect| machine.filled(effect)).collect();
+        let effects: Vec<&str> = effects.iter().map(String::as_str).collect();
+        for seed in seeds.clone() {
+            let Some(records) = machine.try_records(&effects, 0.02, seed) else {
+                println!("{}, {effects:?}: not possible", machine.name);
+                continue;
+            };
+            tried += 1;
+            if let Some(found) = refusal(&machine.case(), &records) {
+                refused.push(format!("{}, {effects:?}: {found}", machine.name));
             }
         }
     }
-    println!("{refused} of {tried} refused");
+    (tried, refused)
+}
+
+#[test]
+fn causes_are_no_wrong_input() {
+    let (tried, refused) = refused_causes(&MACHINES[0], 3..4);
+    assert!(refused.is_empty() && tried > 15, "{tried} {refused:#?}");
+}
+
+#[test]
+#[ignore = "campaign: 300 cuts with a cause, five minutes"]
+fn causes_of_all_machines_are_no_wrong_input() {
+    let (mut all, mut wrong) = (0, Vec::new());
+    for machine in &MACHINES {
+        let (tried, refused) = refused_causes(machine, 3..5);
+        println!("{}: {} of {tried} refused", machine.name, refused.len());
+        all += tried;
+        wrong.extend(refused);
+    }
+    println!("{} of {all} refused", wrong.len());
+    assert!(wrong.is_empty(), "{wrong:#?}");
+}
+
+#[test]
+fn a_diagnosis_of_a_wrong_tool_ends_with_what_fits() {
+    let machine = &MACHINES[2];
+    let (mut case, mut records) = (machine.case(), machine.records(&HIDDEN, 0.01, 5));
+    Fault::Teeth(3).spoil(&mut case, &mut records, &[]).unwrap();
+    let error = diagnose(&case, &records, &Options::default()).unwrap_err();
+    assert!(matches!(error, DiagnoseError::Contradiction { .. }), "{error}");
+    let said = error.to_string();
+    assert!(
+        said.starts_with("cut-0.csv") && said.contains("a tool with 4 teeth"),
+        "{said}"
+    );
+}
+
+/// Cases and recordings in the folder that `QUIETCUT_KEEP` names, as `hidden_effects` writes them.
+fn kept() -> Vec<(String, Case, Vec<Recording>)> {
+    let folder = std::path::PathBuf::from(std::env::var_os("QUIETCUT_KEEP").unwrap());
+    let mut files: Vec<std::path::PathBuf> = std::fs::read_dir(&folder)
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
+        .collect();
+    files.sort();
+    let is_case =
+        |file: &&std::path::PathBuf| file.extension().is_some_and(|extension| extension == "hidden");
+    files
+        .iter()
+        .filter(is_case)
+        .filter_map(|hidden| {
+            let name = hidden.file_stem()?.to_str()?.to_string();
+            let case = Case::read(&hidden.with_extension("toml")).ok()?;
+            let records = files
+                .iter()
+                .filter(|file| file.extension().is_some_and(|extension| extension == "csv"))
+                .filter(|file| {
+                    file.file_stem().is_some_and(|stem| {
+                        stem.to_str()
+                            .is_some_and(|stem| stem.starts_with(&format!("{name}-")))
+                    })
+                })
+                .map(|file| Recording::read(file).unwrap())
+                .collect();
+            Some((name, case, records))
+        })
+        .collect()
+}
+
+#[test]
+#[ignore = "campaign: puzzles that hidden_effects wrote to QUIETCUT_KEEP"]
+fn puzzles_are_no_wrong_input() {
+    let (mut tried, mut refused) = (0, 0);
+    let mut said = std::collections::BTreeMap::<String, [usize; 2]>::new();
+    for (name, case, records) in kept() {
+        if records.is_empty()
+            || records
+                .iter()
+                .any(|record| record.sidecar.kind != Some(quietcut_recording::TestKind::Cutting))
+        {
+            continue;
+        }
+        let refusal = |case: &Case, records: &[Recording]| {
+            let (case, records) = (case.clone(), records.to_vec());
+            std::panic::catch_unwind(move || refusal(&case, &records))
+                .unwrap_or_else(|_| Some("PANIC".into()))
+        };
+        tried += 1;
+        if let Some(found) = refusal(&case, &records) {
+            refused += 1;
+            println!("{name}: {found}");
+        }
+        let teeth = case.tool.as_ref().unwrap().teeth;
+        for fault in faults() {
+            let (mut case, mut records) = (case.clone(), records.clone());
+            for record in &mut records {
+                if let (Some(cut), Some(given)) = (record.sidecar.cut.as_mut(), case.cut) {
+                    cut.start_deg.get_or_insert(given.start_deg);
+                    cut.exit_deg.get_or_insert(given.exit_deg);
+                }
+            }
+            if fault == Fault::TwoTools || fault.spoil(&mut case, &mut records, &[]).is_none() {
+                continue;
+            }
+            let found = refusal(&case, &records).unwrap_or_default();
+            let entry = said.entry(format!("{fault:?}")).or_default();
+            entry[1] += 1;
+            entry[0] += usize::from(found.contains(&fault.words(teeth, &records)));
+            if !found.is_empty() && !found.contains(&fault.words(teeth, &records)) {
+                println!(
+                    "{name} {fault:?}: OTHER {}",
+                    &found.chars().take(330).collect::<String>()
+                );
+            }
+        }
+    }
+    println!("{refused} of {tried} refused\n{said:#?}");
 }
