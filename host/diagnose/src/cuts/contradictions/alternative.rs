@@ -68,8 +68,11 @@ impl fmt::Display for Alternative {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let angles = |[start, exit]: &[f64; 2]| format!("start_deg = {start:.0} and exit_deg = {exit:.0}");
         match self {
-            Self::Teeth(1) => write!(f, "a tool with 1 tooth"),
-            Self::Teeth(teeth) => write!(f, "a tool with {teeth} teeth"),
+            Self::Teeth(teeth) => write!(
+                f,
+                "a tool with {teeth} {} (or other pulses_per_rev of the tachometer)",
+                if *teeth == 1 { "tooth" } else { "teeth" }
+            ),
             Self::Engagement(degrees) => write!(f, "another engagement, about {}", angles(degrees)),
             Self::Mirrored(degrees) => write!(
                 f,

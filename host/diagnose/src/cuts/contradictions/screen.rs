@@ -109,30 +109,7 @@ impl<'a> Screen<'a> {
             orders - 1,
             record.rate_hz,
         )?;
-        let along = |axis: usize| {
-            let unit = DMatrix::from_fn(orders, 3, |_, own| {
-                Complex64::from(f64::from(u8::from(own == axis)))
-            });
-            reading.orders(&ForceOrders {
-                cutting_n: unit.clone(),
-                structure_n: unit,
-            })
-        };
-        let by_axis = [along(0), along(1), along(2)];
-        let transfer = (0..orders)
-            .map(|order| DMatrix::from_fn(names.len(), 3, |channel, axis| by_axis[axis][(order, channel)]))
-            .collect();
         let (mean, deviation, unit) = coefficients(baseline, cutter)?;
-        let omega = TAU * baseline.lowest_hz()?;
-        let soft = model.structure.receptance(0.0)?;
-        let at_tool = std::array::from_fn(|axis| {
-            let spring = soft[(axis, axis)].re.abs().recip();
-            [
-                spring,
-                2.0 * DAMPING_RATIO * spring / omega,
-                spring / (omega * omega),
-            ]
-        });
         let columns = record.orders.amplitudes.column_iter();
         let largest = columns
             .map(|column| column.iter().skip(1).map(|y| y.norm()).fold(0.0, f64::max))
@@ -142,9 +119,9 @@ impl<'a> Screen<'a> {
             forces: FeedForces::new(cutter, &unit, orders),
             given: Engagement::of(cutter),
             axes: baseline.axes.clone(),
+            at_tool: at_tool(baseline, &model.structure)?,
             structure: model.structure,
-            at_tool,
-            transfer,
+            transfer: transfer(&reading, orders, names.len()),
             mean,
             deviation,
             orders,
@@ -257,25 +234,7 @@ impl<'a> Screen<'a> {
             let mut channels = self.channels.iter().enumerate();
             channels.all(|(channel, (name, _))| !changes(alternative, name) || self.is_plain(channel))
         });
-        let teeth = self.given.teeth.len();
-        all.extend(
-            (1..=TEETH)
-                .filter(|other| *other != teeth)
-                .map(Alternative::Teeth),
-        );
-        let normals: Vec<String> = self
-            .channels
-            .iter()
-            .map(|(name, _)| name.clone())
-            .filter(|name| name.ends_with('y'))
-            .collect();
-        let [start, exit] = [self.given.start_rad, self.given.exit_rad].map(f64::to_degrees);
-        let mirrored = [180.0 - exit, 180.0 - start];
-        all.push(Alternative::Rotation(None, normals.clone()));
-        if (start + exit - 180.0).abs() > STEPS_DEG[3] && mirrored.iter().all(|degrees| *degrees >= 0.0) {
-            all.push(Alternative::Mirrored(mirrored));
-            all.push(Alternative::Rotation(Some(mirrored), normals));
-        }
+        all.extend(self.of_tool());
         let mut ranked: Vec<(f64, Alternative)> = all
             .into_iter()
             .map(|alternative| (self.cost_of(&alternative), alternative))
@@ -285,6 +244,29 @@ impl<'a> Screen<'a> {
         ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
         ranked.truncate(FITTED);
         ranked.into_iter().map(|(_, alternative)| alternative).collect()
+    }
+
+    /// Other teeth, directions of rotation, and the mirrored engagement.
+    fn of_tool(&self) -> Vec<Alternative> {
+        let teeth = self.given.teeth.len();
+        let others = (1..=TEETH).filter(|other| *other != teeth);
+        let mut all: Vec<Alternative> = others.map(Alternative::Teeth).collect();
+        let [start, exit] = [self.given.start_rad, self.given.exit_rad].map(f64::to_degrees);
+        let mirrored = [180.0 - exit, 180.0 - start];
+        let differs =
+            (start + exit - 180.0).abs() > STEPS_DEG[3] && mirrored.iter().all(|degrees| *degrees >= 0.0);
+        if differs {
+            all.push(Alternative::Mirrored(mirrored));
+        }
+        let names = self.channels.iter().map(|(name, _)| name.clone());
+        let normals: Vec<String> = names.filter(|name| name.ends_with('y')).collect();
+        // With a feed along x the other direction of rotation mirrors y.
+        let is_along_x = self.record.conditions.cut.feed_direction_deg.rem_euclid(180.0) == 0.0;
+        if is_along_x && !normals.is_empty() {
+            all.push(Alternative::Rotation(None, normals.clone()));
+            all.extend(differs.then_some(Alternative::Rotation(Some(mirrored), normals)));
+        }
+        all
     }
 
     fn cost_of(&self, alternative: &Alternative) -> f64 {
@@ -380,6 +362,33 @@ impl<'a> Screen<'a> {
         }
         start - moved.dot(&change)
     }
+}
+
+/// By order: what each channel reads of a unit force along each axis.
+fn transfer(reading: &Reading, orders: usize, channels: usize) -> Vec<DMatrix<Complex64>> {
+    let along = |axis: usize| {
+        let is_own = |own: usize| f64::from(u8::from(own == axis));
+        let unit = DMatrix::from_fn(orders, 3, |_, own| Complex64::from(is_own(own)));
+        reading.orders(&ForceOrders {
+            cutting_n: unit.clone(),
+            structure_n: unit,
+        })
+    };
+    let by_axis = [along(0), along(1), along(2)];
+    let of = |order: usize| DMatrix::from_fn(channels, 3, |channel, axis| by_axis[axis][(order, channel)]);
+    (0..orders).map(of).collect()
+}
+
+/// By axis: the static stiffness at the tool, and the damper and the mass with which it would have the lowest natural
+/// frequency and the damping ratio [`DAMPING_RATIO`].
+fn at_tool(baseline: &Baseline<'_>, structure: &FirstOrder) -> Option<[[f64; 3]; 3]> {
+    let omega = TAU * baseline.lowest_hz()?;
+    let soft = structure.receptance(0.0)?;
+    Some(std::array::from_fn(|axis| {
+        let spring = soft[(axis, axis)].re.abs().recip();
+        let damper = 2.0 * DAMPING_RATIO * spring / omega;
+        [spring, damper, spring / (omega * omega)]
+    }))
 }
 
 /// Mean and deviation of coefficients and runout in the case, and the size of each coefficient that counts as one.
