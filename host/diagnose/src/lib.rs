@@ -137,11 +137,12 @@ pub fn diagnose_watched(
     watch: &dyn Fn(Stage),
 ) -> Result<Diagnosis, DiagnoseError> {
     watch(Stage::Records);
-    let (recordings, shortened) = full_engagement::in_full_engagement(case, recordings)?;
+    let (recordings, mut remarks) = full_engagement::in_full_engagement(case, recordings)?;
     for recording in recordings.iter() {
         checks::signals(recording)?;
         if recording.sidecar.kind == Some(TestKind::Cutting) {
             checks::cut(case, recording)?;
+            remarks.extend(checks::speed_remark(recording));
         }
     }
     let of_cuts = cuts::diagnosis::diagnosed(case, &recordings, watch)?;
@@ -164,6 +165,6 @@ pub fn diagnose_watched(
             "no test is proposed that separates the candidate models: {reason}"
         )),
     }
-    diagnosis.warnings.splice(0..0, shortened);
+    diagnosis.warnings.splice(0..0, remarks);
     Ok(diagnosis)
 }

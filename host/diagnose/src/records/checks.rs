@@ -4,8 +4,8 @@ use crate::baseline::{Baseline, pickup_of};
 use crate::criteria::{
     CLIPPED_IMPACT_SAMPLES, CLIPPED_IMPACT_STEP, CLIPPED_SHARE, FRICTION_RATIO, GAIN_UNIT_TOLERANCE,
     IMPOSSIBLE_RATIO, LEAST_CORRELATION_OF_KNOWN_UNIT, LEAST_CORRELATION_OF_UNKNOWN_UNIT,
-    LEAST_ENERGY_OVER_FORCE_NOISE, LEAST_PERIODS, LEAST_SAMPLES, POUND_TOLERANCE, UNIT_TOLERANCE,
-    WRONG_UNIT_RATIO,
+    LEAST_ENERGY_OVER_FORCE_NOISE, LEAST_PERIODS, LEAST_SAMPLES, POUND_TOLERANCE, SPEED_AS_STATED,
+    UNIT_TOLERANCE, WRONG_UNIT_RATIO,
 };
 use crate::error::DiagnoseError;
 use crate::motion::recorded_cut::check_sidecar;
@@ -46,6 +46,20 @@ pub(crate) fn cut(case: &Case, recording: &Recording) -> Result<(), DiagnoseErro
     pulses::check(recording)?;
     // A recording without a usable tachometer is refused when it is prepared.
     SpindleMotion::new(recording, None).map_or(Ok(()), |motion| check_sidecar(case, recording, motion.rpm()))
+}
+
+/// A remark on a recorded cut whose tachometer gives another speed than its sidecar states, by more than
+/// [`SPEED_AS_STATED`].
+pub(crate) fn speed_remark(recording: &Recording) -> Option<String> {
+    let stated_rpm = recording.sidecar.cut?.spindle_rpm?;
+    let rpm = SpindleMotion::new(recording, None).ok()?.rpm();
+    ((rpm / stated_rpm - 1.0).abs() > SPEED_AS_STATED).then(|| {
+        format!(
+            "{}: the tachometer gives {rpm:.1} rev/min, the sidecar {stated_rpm}: either the spindle slips or the sample \
+             clock is off, and with the clock all frequencies; a mass or stiffness of the whole machine may then be none",
+            recording.path.display()
+        )
+    })
 }
 
 /// Refuses a recording that is too short or without a channel to compare, or has a channel that is zero throughout.

@@ -27,6 +27,7 @@ use self::screen::Screen;
 use self::wide_fit::{WideFit, frequency_costs, wide_fit};
 use super::record::ReducedCut;
 use crate::baseline::Baseline;
+use crate::criteria::SPEED_AS_STATED;
 use crate::error::{DiagnoseError, FittingInput};
 
 /// χ² per value above the noise from which on the given input is refused: that of the allowance of its orders.
@@ -39,8 +40,6 @@ const FITS: f64 = 0.999;
 const AS_GOOD: f64 = 14.0;
 /// Decrease of χ² by one free factor up to which a given one is within two standard deviations.
 const TWO_DEVIATIONS: f64 = 4.0;
-/// Relative difference of the speed from the stated one up to which it is taken as rounded or set by hand.
-const SPEED_AS_STATED: f64 = 5e-3;
 /// Largest gain of a sensor beside another unit, as a logarithm: beyond, neither unit is the right one.
 const OTHER_GAIN: f64 = 0.25;
 

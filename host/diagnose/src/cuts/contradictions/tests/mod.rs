@@ -109,6 +109,34 @@ fn faults_of_a_stiff_tool_are_said() {
 }
 
 #[test]
+fn a_slot_that_is_none_is_said() {
+    // The orbit of this engagement has no unknowns.
+    let machine = &MACHINES[4];
+    let (mut case, mut records) = (machine.case(), machine.records(&HIDDEN, 0.01, 5));
+    Fault::Engagement(20.0, 0.0)
+        .spoil(&mut case, &mut records, &[])
+        .unwrap();
+    let found = refusal(&case, &records).unwrap();
+    assert!(found.contains("another engagement"), "{found}");
+}
+
+#[test]
+fn a_clock_that_is_off_is_said() {
+    let machine = &MACHINES[0];
+    let mut records = machine.records(&HIDDEN, 0.01, 5);
+    Fault::Clock(1.02)
+        .spoil(&mut machine.case(), &mut records, &[])
+        .unwrap();
+    let found = refusal(&machine.case(), &records).unwrap();
+    assert!(
+        found.contains("rate of 2048.0 Hz instead of 2089.0 Hz"),
+        "{found}"
+    );
+    let remark = checks::speed_remark(&records[0]).unwrap();
+    assert!(remark.contains("918.0 rev/min, the sidecar 900"), "{remark}");
+}
+
+#[test]
 #[ignore = "campaign: all faults of all machines, two minutes"]
 fn faults_of_all_machines_are_said() {
     let (mut tried, mut missed) = (0, 0);
