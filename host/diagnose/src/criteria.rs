@@ -25,6 +25,10 @@ pub(crate) const LEAST_RELATIVE_NOISE: f64 = 3e-5;
 /// if there are fewer than 20 pulses per revolution.
 pub(crate) const SPEED_MISMATCH: f64 = 0.05;
 
+/// Relative difference of the spindle speed by the tachometer from that in the sidecar up to which the latter is taken as
+/// rounded or set by hand: a speed with three digits is rounded by up to 0.5 %.
+pub(crate) const SPEED_AS_STATED: f64 = 5e-3;
+
 /// Fewest tachometer edges, one per revolution, that determine the spindle angle within a fraction of a sample: two for
 /// a straight line, and two residuals.
 pub(crate) const LEAST_TACHOMETER_EDGES: usize = 4;

@@ -103,14 +103,14 @@ pub use conclusion::lobes;
 pub use conclusion::missing_force::{AtAmplitude, MissingForce};
 pub use conclusion::recorded_cuts::recorded_cuts;
 pub use conclusion::residual_views::{ResidualView, SpindleMotionView};
-pub use error::DiagnoseError;
+pub use error::{DiagnoseError, FittingInput};
 pub use progress::{Options, Stage};
 
 use conclusion::{conclude, long_records};
 use quietcut_model::case::Case;
-use quietcut_recording::Recording;
-use records::full_engagement;
+use quietcut_recording::{Recording, TestKind};
 use records::study::Study;
+use records::{checks, full_engagement};
 
 /// Finds what the case gets wrong about the recordings, and why.
 ///
@@ -137,7 +137,14 @@ pub fn diagnose_watched(
     watch: &dyn Fn(Stage),
 ) -> Result<Diagnosis, DiagnoseError> {
     watch(Stage::Records);
-    let (recordings, shortened) = full_engagement::in_full_engagement(case, recordings)?;
+    let (recordings, mut remarks) = full_engagement::in_full_engagement(case, recordings)?;
+    for recording in recordings.iter() {
+        checks::signals(recording)?;
+        if recording.sidecar.kind == Some(TestKind::Cutting) {
+            checks::cut(case, recording)?;
+            remarks.extend(checks::speed_remark(recording));
+        }
+    }
     let of_cuts = cuts::diagnosis::diagnosed(case, &recordings, watch)?;
     let (concluded, remark) = match of_cuts {
         Some(diagnosis) => (Some(diagnosis), None),
@@ -158,6 +165,6 @@ pub fn diagnose_watched(
             "no test is proposed that separates the candidate models: {reason}"
         )),
     }
-    diagnosis.warnings.splice(0..0, shortened);
+    diagnosis.warnings.splice(0..0, remarks);
     Ok(diagnosis)
 }

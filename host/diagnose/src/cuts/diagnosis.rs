@@ -1,6 +1,7 @@
 //! Diagnosis of records that are all stable cuts.
 
 use super::answer::answer;
+use super::contradictions::contradiction;
 use super::record::ReducedCut;
 use super::selection::explain;
 use crate::baseline::Baseline;
@@ -23,7 +24,7 @@ const MODULATED: f64 = 0.8;
 /// records: those in chatter, those whose speed is modulated, and those whose orders are left unexplained.
 ///
 /// # Errors
-/// The case cannot be simulated.
+/// The case cannot be simulated, or contradicts a record.
 pub(crate) fn diagnosed(
     case: &Case,
     recordings: &[Recording],
@@ -59,6 +60,9 @@ pub(crate) fn diagnosed(
         return Ok(None);
     }
     watch(Stage::Causes(1));
+    if let Some(error) = contradiction(&baseline, &records, recordings) {
+        return Err(error);
+    }
     let Some(explanations) = explain(&baseline, &records) else {
         return Ok(None);
     };

@@ -11,6 +11,7 @@
 //! | `moment` | the orbit of a machine, and its derivatives |
 //! | `fit` | fit of a machine |
 //! | `selection` | sets of effects by their evidence |
+//! | `contradictions` | another tool, engagement or wiring of channels than given |
 //! | `answer`, `views` | the answer, with its pictures |
 //! | `diagnosis` | the entry |
 
@@ -19,6 +20,7 @@ mod answer;
 mod candidate;
 mod candidates;
 mod conditions;
+mod contradictions;
 pub(crate) mod diagnosis;
 mod fit;
 mod jumps;

@@ -56,6 +56,33 @@ pub(crate) fn cut_of(case: &Case, recording: &Recording) -> Result<Cut, Diagnose
     })
 }
 
+/// Refuses a sidecar that gives another number of teeth than the case, or another speed than the tachometer, `rpm`,
+/// rev/min.
+///
+/// # Errors
+/// The case has no tool, or the sidecar contradicts the case or the tachometer.
+pub(crate) fn check_sidecar(case: &Case, recording: &Recording, rpm: f64) -> Result<(), DiagnoseError> {
+    let (tool, given) = (case.tool()?, recording.sidecar.cut.unwrap_or_default());
+    if let Some(teeth) = given.teeth.filter(|teeth| *teeth as usize != tool.teeth) {
+        return Err(DiagnoseError::record(
+            &recording.path,
+            format!(
+                "[cut] in the sidecar gives {teeth} teeth, but the case {}: they describe different tools",
+                tool.teeth
+            ),
+        ));
+    }
+    match given.spindle_rpm {
+        Some(stated) if (rpm / stated - 1.0).abs() > SPEED_MISMATCH => Err(DiagnoseError::record(
+            &recording.path,
+            format!(
+                "the tachometer gives {rpm:.1} rev/min, but the sidecar {stated}: check pulses_per_rev of the tachometer"
+            ),
+        )),
+        _ => Ok(()),
+    }
+}
+
 impl RecordedCut {
     /// The cut of a recording: speed from the tachometer, depth, immersion and feed from the sidecar, the rest from the
     /// case with its extensions. Immersion and feed that the sidecar lacks are those of the case.
@@ -69,32 +96,13 @@ impl RecordedCut {
         let depth_mm = given.axial_depth_mm.ok_or_else(|| {
             recording.lacks("axial_depth_mm under [cut] in its sidecar (.toml), the axial depth of the cut")
         })?;
-        if let Some(teeth) = given.teeth.filter(|teeth| *teeth as usize != tool.teeth) {
-            return Err(DiagnoseError::record(
-                &recording.path,
-                format!(
-                    "[cut] in the sidecar gives {teeth} teeth, but the case {}: they describe different tools",
-                    tool.teeth
-                ),
-            ));
-        }
         let wrong = |error| DiagnoseError::simulate(&case.path, error);
         let cutter = Cutter::new(tool, material, &cut, 1e-3 * depth_mm).map_err(wrong)?;
         let spindle_motion = SpindleMotion::new(recording, effects.spindle(Spindle::new(1.0)).fluctuation())?;
         let cutter = effects
             .cutter(cutter.at_speed(spindle_motion.rpm()))
             .map_err(wrong)?;
-        if let Some(rpm) = given.spindle_rpm
-            && (spindle_motion.rpm() / rpm - 1.0).abs() > SPEED_MISMATCH
-        {
-            return Err(DiagnoseError::record(
-                &recording.path,
-                format!(
-                    "the tachometer gives {:.1} rev/min, but the sidecar {rpm}: check pulses_per_rev of the tachometer",
-                    spindle_motion.rpm()
-                ),
-            ));
-        }
+        check_sidecar(case, recording, spindle_motion.rpm())?;
         Ok(Self {
             cutter,
             spindle_motion,

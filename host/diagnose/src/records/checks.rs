@@ -1,19 +1,68 @@
 //! Refuses recordings that cannot be compared, with a message that says what is required.
 
-use crate::baseline::Baseline;
+use crate::baseline::{Baseline, pickup_of};
 use crate::criteria::{
     CLIPPED_IMPACT_SAMPLES, CLIPPED_IMPACT_STEP, CLIPPED_SHARE, FRICTION_RATIO, GAIN_UNIT_TOLERANCE,
     IMPOSSIBLE_RATIO, LEAST_CORRELATION_OF_KNOWN_UNIT, LEAST_CORRELATION_OF_UNKNOWN_UNIT,
-    LEAST_ENERGY_OVER_FORCE_NOISE, LEAST_PERIODS, LEAST_SAMPLES, POUND_TOLERANCE, UNIT_TOLERANCE,
-    WRONG_UNIT_RATIO,
+    LEAST_ENERGY_OVER_FORCE_NOISE, LEAST_PERIODS, LEAST_SAMPLES, POUND_TOLERANCE, SPEED_AS_STATED,
+    UNIT_TOLERANCE, WRONG_UNIT_RATIO,
 };
 use crate::error::DiagnoseError;
+use crate::motion::recorded_cut::check_sidecar;
+use crate::motion::spindle_motion::SpindleMotion;
 use crate::records::channel::Observed;
+use crate::records::pulses;
 use crate::signal::noise::rms;
+use quietcut_model::case::Case;
 use quietcut_recording::Recording;
 
-/// Refuses a recording that is too short or without a channel to compare, or has a channel that is clipped, not finite,
-/// or zero throughout.
+/// Refuses a recording with a channel that is not finite, or clipped where it measures the machine.
+pub(crate) fn signals(recording: &Recording) -> Result<(), DiagnoseError> {
+    let wrong = |what: String| Err(DiagnoseError::record(&recording.path, what));
+    for channel in &recording.channels {
+        if let Some(at) = channel.samples.iter().position(|sample| !sample.is_finite()) {
+            return wrong(format!(
+                "{} is not a finite number at {:.6} s; every sample must be finite",
+                channel.name,
+                recording.time_s(at)
+            ));
+        }
+        if pickup_of(&channel.name).is_some()
+            && let Some(level) = clipped(&channel.samples)
+        {
+            return wrong(format!(
+                "{} is clipped at {level:.6e} {}: the range of the sensor is too small; record again with a larger range or less excitation",
+                channel.name,
+                channel.quantity.unit()
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// Refuses a recorded cut whose sidecar contradicts the teeth of the case or the speed of the tachometer, or whose
+/// tachometer has wrong pulses.
+pub(crate) fn cut(case: &Case, recording: &Recording) -> Result<(), DiagnoseError> {
+    pulses::check(recording)?;
+    // A recording without a usable tachometer is refused when it is prepared.
+    SpindleMotion::new(recording, None).map_or(Ok(()), |motion| check_sidecar(case, recording, motion.rpm()))
+}
+
+/// A remark on a recorded cut whose tachometer gives another speed than its sidecar states, by more than
+/// [`SPEED_AS_STATED`].
+pub(crate) fn speed_remark(recording: &Recording) -> Option<String> {
+    let stated_rpm = recording.sidecar.cut?.spindle_rpm?;
+    let rpm = SpindleMotion::new(recording, None).ok()?.rpm();
+    ((rpm / stated_rpm - 1.0).abs() > SPEED_AS_STATED).then(|| {
+        format!(
+            "{}: the tachometer gives {rpm:.1} rev/min, the sidecar {stated_rpm}: either the spindle slips or the sample \
+             clock is off, and with the clock all frequencies; a mass or stiffness of the whole machine may then be none",
+            recording.path.display()
+        )
+    })
+}
+
+/// Refuses a recording that is too short or without a channel to compare, or has a channel that is zero throughout.
 pub(crate) fn record(
     baseline: &Baseline<'_>,
     recording: &Recording,
@@ -39,24 +88,6 @@ pub(crate) fn record(
         return wrong(format!(
             "too short: {count} samples, {seconds:.3} s; at least {LEAST_SAMPLES} samples and {needed_s:.3} s ({LEAST_PERIODS} periods of the slowest mode) are required"
         ));
-    }
-    for channel in &recording.channels {
-        if let Some(at) = channel.samples.iter().position(|sample| !sample.is_finite()) {
-            return wrong(format!(
-                "{} is not a finite number at {:.6} s; every sample must be finite",
-                channel.name,
-                recording.time_s(at)
-            ));
-        }
-        if baseline.pickup(&channel.name).is_some()
-            && let Some(level) = clipped(&channel.samples)
-        {
-            return wrong(format!(
-                "{} is clipped at {level:.6e} {}: the range of the sensor is too small; record again with a larger range or less excitation",
-                channel.name,
-                channel.quantity.unit()
-            ));
-        }
     }
     if let Some(still) = channels.iter().find(|channel| rms(&channel.measured) == 0.0) {
         return wrong(format!(
@@ -150,6 +181,31 @@ pub(crate) fn unit(
             "{name} is {} times the prediction of the case, with the same waveform: its unit, that of the force, or the case is wrong; give units in the header as name [unit].{}",
             digits(factor, 4),
             said(likely)
+        ),
+    ))
+}
+
+/// Refuses a channel of a hammer test that follows the prediction of the case with the opposite sign.
+///
+/// `response` and `measured` are as in [`unit`]. An impact begins a response with the sign of its force, whatever mass,
+/// stiffness and damping are: another structure has another waveform, not the same one inverted. Of steady tones this
+/// does not hold, since a resonance turns their phase.
+pub(crate) fn sign(
+    path: &std::path::Path,
+    name: &str,
+    response: &[f64],
+    measured: &[f64],
+) -> Result<(), DiagnoseError> {
+    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    let correlation = dot(response, measured) / (dot(response, response) * dot(measured, measured)).sqrt();
+    if correlation.is_nan() || correlation > -LEAST_CORRELATION_OF_UNKNOWN_UNIT.sqrt() {
+        return Ok(());
+    }
+    Err(DiagnoseError::record(
+        path,
+        format!(
+            "{name} answers the impacts with the opposite sign of the prediction (correlation {correlation:.2}): the \
+             sensor, the hammer or the sign in the file is inverted"
         ),
     ))
 }

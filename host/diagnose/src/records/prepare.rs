@@ -151,7 +151,13 @@ fn checked(record: Record) -> Result<Record, DiagnoseError> {
         let (response, measured) = (&response[range.clone()], &channel.measured[range]);
         let by_noise = energy_by_force_noise(&record, index);
         let name = &channel.pickup.name;
-        Some(checks::unit(&record.path, name, response, measured, by_noise))
+        let path = &record.path;
+        if record.kind == Some(TestKind::Hammer)
+            && let Err(inverted) = checks::sign(path, name, response, measured)
+        {
+            return Some(Err(inverted));
+        }
+        Some(checks::unit(path, name, response, measured, by_noise))
     };
     let mut checked = record.channels.iter().enumerate().filter_map(checked);
     if is_cut {

@@ -5,15 +5,15 @@ use std::path::Path;
 use crate::conclusion::answer::Outcome;
 use crate::tests::virtual_records::case;
 use crate::{Diagnosis, Options, diagnose};
+use quietcut_model::case::Case;
 use quietcut_model::structure::Direction;
-use quietcut_recording::Quantity;
+use quietcut_recording::{Quantity, Recording};
 use quietcut_simulate::Effects;
 use quietcut_simulate::rig::{Impact, Noise, Rig, Signal};
 
-/// Diagnosis of ten impacts on the Stäubli robot, with accelerometers and 1 % noise on every channel. The spectrum of the impacts reaches
+/// Ten impacts on the Stäubli robot, with accelerometers and 1 % noise on every channel. The spectrum of the impacts reaches
 /// to the end of the band.
-fn diagnosed(effects: &[&str]) -> Diagnosis {
-    let baseline = case("staubli-tx200", "");
+fn impacts(baseline: &Case, effects: &[&str]) -> Recording {
     let impacts = (0..10).map(|index| Impact {
         start_s: 0.5 + 5.0 * f64::from(index),
         peak_n: 200.0,
@@ -35,7 +35,35 @@ fn diagnosed(effects: &[&str]) -> Diagnosis {
         ..Noise::default()
     };
     noise.add(&mut recording, 4);
+    recording
+}
+
+/// Diagnosis of [`impacts`].
+fn diagnosed(effects: &[&str]) -> Diagnosis {
+    let baseline = case("staubli-tx200", "");
+    let recording = impacts(&baseline, effects);
     diagnose(&baseline, &[recording], &Options::default()).unwrap()
+}
+
+#[test]
+fn an_inverted_sensor_or_hammer_is_refused() {
+    let baseline = case("staubli-tx200", "");
+    for name in ["ax", "fx"] {
+        // The structure is softer than that of the case as well.
+        let mut recording = impacts(&baseline, &["stiffness=-0.05"]);
+        let inverted = recording.channels.iter_mut().find(|channel| channel.name == name);
+        inverted
+            .unwrap()
+            .samples
+            .iter_mut()
+            .for_each(|sample| *sample *= -1.0);
+        let error = diagnose(&baseline, &[recording], &Options::default()).unwrap_err();
+        let said = error.to_string();
+        assert!(
+            said.contains("ax answers the impacts with the opposite sign"),
+            "{said}"
+        );
+    }
 }
 
 #[test]

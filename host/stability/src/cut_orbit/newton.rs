@@ -183,7 +183,8 @@ impl Linearization {
         for (index, (jump, event)) in self.jumps.iter().zip(events).enumerate() {
             right[self.count + index] = event / (jump.rate * mesh.revolution_s);
         }
-        if !self.factors.solve_mut(&mut right) {
+        // Without unknowns, as where no chip depends on the motion, there is nothing to solve; the solver requires a row.
+        if !right.is_empty() && !self.factors.solve_mut(&mut right) {
             return None;
         }
         let right = right.column(0);
