@@ -368,7 +368,8 @@ fn forces_that_an_orbit_lacks_act_in_air_as_well() {
         ]
     };
     // Without the force of a spring the orbit is not split where the loop has its kinks.
-    let forces: [(&str, f64, &dyn Fn(f64) -> Vec<String>); 2] =
+    type Texts<'a> = &'a dyn Fn(f64) -> Vec<String>;
+    let forces: [(&str, f64, Texts<'_>); 2] =
         [("cubic-stiffness", 1e-5, &cubic), ("hysteresis", 0.01, &loops)];
     for (name, tolerance, effect) in forces {
         let orbit = CutOrbit::new(&at(&[])).unwrap();
