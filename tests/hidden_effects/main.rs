@@ -143,6 +143,12 @@ fn a_part_of_the_campaign() {
         (Family::TwoEffects, 7009..7010),
         // A delayed sensor.
         (Family::Chatter, 55..56),
+        // At a whole number of samples per revolution, orders above half the sample rate turn against those onto which
+        // they fold; over 24 revolutions the scatter of tooth forces is a trend, without wear; the orbit of a soft machine
+        // is not found from rest.
+        (Family::NothingInWorkshop, 9..10),
+        (Family::NothingInWorkshop, 11..13),
+        (Family::NothingInWorkshop, 6..7),
     ];
     let reports: Vec<Report> = part
         .into_par_iter()
