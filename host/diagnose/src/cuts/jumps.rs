@@ -76,10 +76,10 @@ struct Sawtooth {
 }
 
 impl OfJumps {
-    /// For the jumps of the force of a machine on its orbit.
+    /// For the jumps of the force of a machine on its orbit, if there is one.
     pub(super) fn new(
         machine: &Machine,
-        orbit: &CutOrbit,
+        orbit: Option<&CutOrbit>,
         rate_hz: f64,
         orders: &Orders,
         revolutions: &[f64],
@@ -168,9 +168,9 @@ fn of_sawtooth(order: usize, angle_rad: f64) -> Complex64 {
 
 /// The jumps of a machine at entry and exit of its teeth, on its orbit and where it is larger on a rigid tool without
 /// runout. At 0° and 180° a chip begins and ends with thickness 0, but for the runout.
-fn jumps(machine: &Machine, orbit: &CutOrbit) -> Vec<Jump> {
+fn jumps(machine: &Machine, orbit: Option<&CutOrbit>) -> Vec<Jump> {
     let cutter = &machine.model.cutter;
-    let on_orbit = orbit.jumps_of_engagement(&machine.model);
+    let on_orbit = orbit.map_or_else(Vec::new, |orbit| orbit.jumps_of_engagement(&machine.model));
     let mut all = Vec::new();
     for tooth in &cutter.teeth {
         for (edge_rad, sign) in [(cutter.start_rad, 1.0), (cutter.exit_rad, -1.0)] {

@@ -58,7 +58,7 @@ impl ReducedCut {
     /// Reduces a recording.
     ///
     /// # Errors
-    /// The recording lacks a channel or a value of the cut, or is too short; or the baseline has no forced periodic orbit.
+    /// The recording lacks a channel or a value of the cut, or is too short; or the baseline has an undamped mode at an order.
     pub(crate) fn new(baseline: &Baseline<'_>, recording: &Recording) -> Result<Self, DiagnoseError> {
         let given = recording.sidecar.cut.unwrap_or_default();
         let depth_mm = given.axial_depth_mm.ok_or_else(|| {
@@ -97,24 +97,27 @@ impl ReducedCut {
             },
         };
         let rate_hz = recording.sample_rate_hz;
-        let no_orbit = || {
+        let no_orders = || {
             DiagnoseError::record(
                 &recording.path,
-                "the case has no forced periodic motion in this cut".to_owned(),
+                "the case has no orders of this cut: it has an undamped mode at one of them".to_owned(),
             )
         };
         let highest = orders.kernel().aliases();
         let mut machine = Machine::of_baseline(baseline, &conditions, &orders.channels, highest, rate_hz)
-            .ok_or_else(no_orbit)?;
-        let orbit = CutOrbit::along_depth(&mut machine.model).map_err(|_| no_orbit())?;
-        let jumps = OfJumps::new(&machine, &orbit, rate_hz, &orders, &samples.revolutions);
+            .ok_or_else(no_orders)?;
+        // Without an orbit, as of a case with another engagement, errors are those of a rigid tool.
+        let orbit = CutOrbit::along_depth(&mut machine.model).ok();
+        let jumps = OfJumps::new(&machine, orbit.as_ref(), rate_hz, &orders, &samples.revolutions);
         // Directions in which all orders err together: by slow changes, by a motion that has not settled, where the force
         // jumps, by the spindle angle and speed, and as tooth forces scatter.
         let mut directions = orders.common.directions.clone();
         directions.extend(decays(baseline, recording, &orders, &samples));
         directions.extend_from_slice(&jumps.directions);
         directions.push(smeared(&orders));
-        let of_speed = wander::directions(baseline, &conditions, &orders, rate_hz, (&machine, &orbit));
+        let of_speed = orbit
+            .as_ref()
+            .and_then(|orbit| wander::directions(baseline, &conditions, &orders, rate_hz, (&machine, orbit)));
         let (mut of_angle, of_trend): (Vec<_>, Vec<_>) = shifted(&orders, &samples)
             .into_iter()
             .map(|[mean, trend]| (mean, trend))
@@ -133,7 +136,10 @@ impl ReducedCut {
             trend_directions.extend_from_slice(&of_teeth);
         }
         directions.extend(of_teeth);
-        let forces = orbit.force_orders(&orbit.order_weights(highest));
+        let forces = orbit.map_or_else(
+            || scatter::rigid_forces(&machine.model.cutter, highest),
+            |orbit| orbit.force_orders(&orbit.order_weights(highest)),
+        );
         let coefficients = machine.reading.orders(&forces);
         let errors = AmplitudeErrors::new(&orders, &coefficients, directions, &trend_directions);
         let errors = errors.ok_or_else(|| {

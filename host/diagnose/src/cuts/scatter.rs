@@ -39,11 +39,7 @@ pub(super) fn directions(machine: &Machine, orders: &Orders) -> Vec<DMatrix<Comp
     let cutter = &machine.model.cutter;
     let patterns: Vec<DMatrix<Complex64>> = (0..cutter.teeth.len())
         .map(|tooth| {
-            let force_n = tooth_force(cutter, tooth, highest);
-            let forces = ForceOrders {
-                structure_n: force_n.clone(),
-                cutting_n: force_n,
-            };
+            let forces = of_force(tooth_force(cutter, tooth, highest));
             orders.of_channels(&machine.reading.orders(&forces))
         })
         .collect();
@@ -80,6 +76,21 @@ fn deviation(orders: &Orders, patterns: &[DMatrix<Complex64>]) -> f64 {
         .collect();
     let mean = alike.iter().sum::<f64>() / alike.len() as f64;
     if mean > 0.0 { mean.sqrt().recip() } else { 0.0 }
+}
+
+/// Forces of all teeth of a rigid tool.
+pub(super) fn rigid_forces(cutter: &Cutter, highest: usize) -> ForceOrders {
+    let none = DMatrix::zeros(highest + 1, 3);
+    let of_teeth = (0..cutter.teeth.len()).map(|tooth| tooth_force(cutter, tooth, highest));
+    of_force(of_teeth.fold(none, |sum, force_n| sum + force_n))
+}
+
+/// A cutting force that no restoring force opposes.
+fn of_force(force_n: DMatrix<Complex64>) -> ForceOrders {
+    ForceOrders {
+        structure_n: force_n.clone(),
+        cutting_n: force_n,
+    }
 }
 
 /// Fourier coefficients of the force of one tooth of a rigid tool, orders × 3.

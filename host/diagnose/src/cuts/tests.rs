@@ -53,7 +53,7 @@ fn effects_far_from_the_baseline_and_below_the_noise_of_a_sample_are_explained()
         (&[], &[]),
         (&["force-coefficients=0.2"], &["force-coefficients"]),
         (&["runout=20", "runout.angle_deg=40"], &["runout"]),
-        (&["process-damping=2e5"], &["process-damping"]),
+        (&["process-damping=4e5"], &["process-damping"]),
         (&["edge-force=1.5", "edge-force.kre_n_per_mm=1"], &["edge-force"]),
         (
             &["force-exponent=0.75", "force-exponent.reference_chip_mm=0.1"],
